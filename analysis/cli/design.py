@@ -59,7 +59,7 @@ def leave_if_stopped(stopped: Interrupted | None, kept: str) -> None:
 def search_options(command: Callable[..., Any]) -> Callable[..., Any]:
     """Add the options that all commands with a search share."""
     for option in (
-        click.option("--plots/--no-plots", default=True, show_default=True, help="Whether to write plots."),
+        click.option("--plots/--no-plots", "--plot/--no-plot", default=True, show_default=True, help="Whether to write plots."),
         out_option(help="Folder for the results."),
         workers_options(),
         click.option("--seed", type=click.IntRange(0), help="Of the search: the same seed gives the same linkages."),

@@ -30,7 +30,7 @@ from .design import overrides_of, print_best, print_solutions, write_described, 
     "--crank-phase", metavar="ANGLE", help="Of a function: the crank's angle from the ground link at rotation 0."
 )
 @click.option("--count", type=click.IntRange(1), default=6, show_default=True, help="Linkages of four poses to report.")
-@click.option("--plots/--no-plots", default=True, show_default=True, help="Whether to write plots.")
+@click.option("--plots/--no-plots", "--plot/--no-plot", default=True, show_default=True, help="Whether to write plots.")
 @out_option(help="Folder for the results.")
 @handled
 def exact(case: str, settings: Sequence[str], crank_phase: str | None, count: int, plots: bool, out: str) -> None:

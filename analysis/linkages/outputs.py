@@ -43,7 +43,10 @@ class Outputs:
     def variables(self) -> Iterator[str]:
         """Yield the source texts of the output variables, in their order."""
         yield from (output.variable for output in self._all())
-        sources = ("springs and gravity", "dampers and friction", "drives and loads")
+        lost = "dampers and friction"
+        if any(spring.law for spring in self.description.springs.values()):
+            lost = "dampers and friction, and against force laws, which may give it back,"
+        sources = ("springs and gravity", lost, "drives and loads")
         yield f"*energy_outputs({', '.join(map(quoted, sources))})"
 
     def _all(self) -> Iterator[Output]:

@@ -26,7 +26,7 @@ from .arguments import driven, turn_durations
 from .case import Case
 from .inputs import Inputs, parameter_readers, start_from
 from .masses import mass_origins, resolve_sections
-from .signals import Harmonics, InductionMotor, Piecewise, TorsionBar, ramp, table
+from .signals import SHAPES, Harmonics, InductionMotor, Piecewise, TorsionBar, ramp, table
 
 # Parameters
 
@@ -356,8 +356,10 @@ def _reader(unit: str, folder: Path) -> Reader:
             with warnings.catch_warnings():
                 warnings.simplefilter("ignore", RuntimeWarning)
                 return Kinds(kinds)(item, name)
-        except LinkworkError:
-            raise
+        except LinkworkError as error:
+            if name in str(error):
+                raise
+            raise InputError(f"{name}: {error}") from None
         except (ValueError, ArithmeticError) as error:  # such as of a spline through numbers near 1e308
             raise InputError(f"{name} cannot be made a signal: {files.first_line(error)}") from error
 
@@ -371,7 +373,7 @@ def signal_kinds(unit: str, folder: Path) -> dict[str, Table]:
         "ramp": Table(ramp, {"start": value, "end": value, "from_time": Quantity("s"), "to_time": Quantity("s")}),
         "table": Table(
             partial(_tabulated, folder, unit),
-            {"times": Many(Quantity("s")), "values": values, "file": files.text, "interpolation": files.text},
+            {"times": Many(Quantity("s")), "values": values, "file": files.text, "interpolation": Choice(SHAPES)},
         ),
         "harmonics": Table(
             _harmonics,

@@ -244,6 +244,8 @@ def simulate_many(
     mechanism = mechanism_of(parameters[0])
     if any(mechanism_of(p) is not mechanism for p in distinct(parameters)):
         raise InputError("an ensemble's parameters must all be of one mechanism")
+    if isinstance(outputs, str):
+        raise InputError(f"outputs is {outputs!r}: it must be a list of names, such as [{outputs!r}]")
     names = mechanism.output_names if outputs is None else tuple(outputs)
     columns = tuple(column_of(name, mechanism.output_names) for name in names)
     all_inputs, starts = _checked(mechanism, inputs, initial, len(parameters))

@@ -203,6 +203,10 @@ def steps(times: ArrayLike, values: ArrayLike) -> Piecewise:
     return Piecewise(breaks, coefficients, unit)
 
 
+#: Shapes of a table between its points.
+SHAPES = ("linear", "cubic", "hold")
+
+
 @in_si(times="s")
 def table(times: ArrayLike, values: ArrayLike, kind: str = "linear") -> Piecewise:
     """Return a signal through the points (times, values), shapes (n,): ``linear``, ``cubic`` (spline) or ``hold``.

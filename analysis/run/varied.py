@@ -82,7 +82,10 @@ def vary(parameters: Parameters, inputs: Any, values: Mapping[str, Any]) -> tupl
     of_sets: dict[str, NDArray[np.float64]] = {}
     of_inputs: dict[str, NDArray[np.float64]] = {}
     for name, given in values.items():
-        if (field := field_name(name)) in own:
+        field = field_name(name)
+        if field in of_sets or channels.get(name) in of_inputs:
+            raise InputError(f"vary has {name} twice, by its FMI name and by that in Python: give one of them")
+        if field in own:
             of_sets[field] = _column(name, given, partial(_read_parameter, parameters, field))
         elif name in channels:
             of_inputs[channels[name]] = _column(name, given, partial(_read_input, channels[name]))

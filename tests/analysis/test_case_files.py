@@ -172,6 +172,14 @@ step = "1 ms"
         ('published = "table-3.2"', r"did you mean table-3\.1"),
         ('published = "table-3.1"\n[run]\nstop = 1', r"run\.stop"),
         ('published = "table-3.1"\nspeed = 1', r"did you mean drive\.speed"),
+        (
+            'published = "table-3.1"\n[drive]\ntorque = {kind = "table", times = [0, 1], values = [1]}',
+            r"drive\.torque: a table needs as many",
+        ),
+        (
+            'published = "table-3.1"\n[load]\nfx = {kind = "table", times = [0, 1], values = [1, 2], interpolation = "step"}',
+            r"load\.fx\.interpolation 'step'",
+        ),
         ('published = "table-3.1"\nstop_time = 1', r"did you mean run\.stop_time"),
         ('published = "table-3.1"\n[drive]\nspeeed = 1', r"did you mean drive\.speed"),
         ('published = "table-3.1"\n[drive]\ntorque = 1', r"run\.stop_time is missing"),

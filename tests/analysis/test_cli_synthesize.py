@@ -158,6 +158,28 @@ def test_a_crank_that_swings_backwards_is_run_over_its_task_alone(tmp_path) -> N
     np.testing.assert_allclose(place, linkage.path(at), atol=1e-4)
 
 
+@pytest.mark.parametrize(
+    ("point", "given"), [((0.1, 0.5), {}), ((0.1, 0.5), {"coupler_mass": 0.6}), ((0.3, 0.0), {"load": (0.0, 0.0)})]
+)
+def test_both_files_of_a_linkage_have_the_same_masses_and_load(own_linkages, tmp_path, point, given) -> None:
+    linkage = syn.Linkage(
+        ground_length=0.3, crank_length=0.08, coupler_length=0.25, rocker_length=0.2,
+        point_distance=point[0], point_angle=point[1], ground_angle=0.3,
+    )  # fmt: skip
+    at = np.linspace(0.0, 6.0, 13)
+    solution = syn.Solution.of(syn.TimedPath(points=linkage.path(at) + 1e-3, rotation=at), linkage)
+    make = syn.Make(**{"speed": 15.0, "load": (3.0, -20.0)} | given)
+    runs = []
+    for tables in (solution.described_case(make, "one"), solution.run_case(make, "other")):
+        ran = case_from(tables, folder=tmp_path)
+        runs.append(simulate(ran.parameters, ran.inputs, initial=ran.initial, stop_time=0.8, step=0.01))
+    # of the other file a stiff spring holds the rocker's pivot, which settles first
+    torques = [run["drive.applied_torque"][1:] for run in runs]
+    np.testing.assert_allclose(*torques, atol=2e-3 * np.abs(torques[0]).max())
+    forces = [np.hypot(run[f"{pin}.fx"], run[f"{pin}.fy"])[1:] for run, pin in zip(runs, ("A", "pin.A"))]
+    np.testing.assert_allclose(*forces, atol=1e-2 * forces[0].max())
+
+
 def test_an_animation_is_made_where_it_is_asked_for(linkwork, tmp_path, monkeypatch) -> None:
     (tmp_path / "case.toml").write_text(CAPPED)
     asked = []

@@ -289,6 +289,15 @@ def test_a_constant_function_has_no_generator() -> None:
         syn.function_generators(syn.RockerFunction(angle=[0.5, 1.0, 1.5], rotation=[0.0, 0.5, 1.0]), crank_phase=0.5)
 
 
+@pytest.mark.parametrize("step", [0.1, 1.0 / 3.0, pi / 9.0])
+@pytest.mark.parametrize(("count", "mounting", "crank_phase"), [(4, False, None), (4, True, 0.2), (5, True, None)])
+def test_a_rocker_that_turns_with_the_crank_is_that_of_every_parallelogram(step, count, mounting, crank_phase) -> None:
+    rotation = step * np.arange(count)
+    task = syn.RockerFunction(angle=1.0 + rotation, rotation=rotation, mounting=mounting)
+    with pytest.raises(InputError, match="points of the function are not independent"):
+        syn.function_generators(task, crank_phase=crank_phase)
+
+
 def test_chebyshev_spacing() -> None:
     """The cosines of 30, 90 and 150 degrees; between the points an error that the polynomial through them levels."""
     assert syn.chebyshev_spacing(0.0, 2.0, 3) == pytest.approx([1.0 - sqrt(0.75), 1.0, 1.0 + sqrt(0.75)])

@@ -178,6 +178,17 @@ def test_a_torque_that_varies_takes_the_place_of_the_speed_of_a_published_set() 
         simulate_many("table-3.1", Inputs(speed=3.0), vary={"drive.torque": [0.0, 1.0]}, stop_time=0.1)
 
 
+def test_a_parameter_that_varies_under_two_names_is_refused() -> None:
+    for names in (("slider.stiffness", "slider_stiffness"), ("drive.speed", "speed")):
+        with pytest.raises(InputError, match=f"{names[1]} twice"):
+            simulate_many("table-3.1", vary={name: [1.0, 2.0] for name in names}, stop_time=0.1)
+
+
+def test_a_text_in_the_place_of_outputs_is_refused() -> None:
+    with pytest.raises(InputError, match="must be a list of names"):
+        simulate_many("table-3.1", vary={"slider.stiffness": [1e3]}, stop_time=0.1, outputs="slider.position")
+
+
 def test_texts_and_names_of_the_contract_vary_too(tmp_path: Path) -> None:
     values = {"slider.stiffness": ["1 kN/m", 1500.0], "drive.speed": ["420 rpm", "430 rpm"]}
     varied = simulate_many("table-3.1", vary=values, folder=tmp_path, **OPTIONS)

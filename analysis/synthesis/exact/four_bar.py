@@ -8,7 +8,7 @@ linkages, Trans. ASME 77, 1955), with th2 = phi + th20 and th4 = psi - the outpu
 Three points determine R1, R2, R3 if crank phase and mounting angle are known. With a fourth point one of the two is unknown:
 the determinant of the four equations is a trigonometric polynomial of second degree in it. With a fifth point both are
 unknown: relative to the crank the rocker is a body in five poses, and C has a constant distance from B, which is the problem
-of `burmester`. One of its four dyads is always C on D with B on A, so that there are at most three linkages.
+of `burmester`. In one of its four dyads C is always at D and B at A, so that there are at most three linkages.
 """
 
 from __future__ import annotations
@@ -30,11 +30,11 @@ from ..task.task import PrecisionPoints, RockerFunction, Task, TimedPath, Untime
 from .burmester import INDEPENDENT, REAL, Exact, dyads_of_five, exact_solution
 
 FloatArray = NDArray[np.float64]
-#: Crank, coupler and rocker in units of the ground link; the crank's phase and the output's mounting (rad).
+#: Lengths of crank, coupler and rocker in units of the ground link; crank phase and mounting angle of the output (rad).
 Links = tuple[float, float, float, float, float]
 #: Default ground link of a function generator (m), as in a search.
 GROUND = 0.1
-#: Distance from the unit circle up to which a root of the determinant is an angle.
+#: Distance from the unit circle up to which a root of the determinant counts as an angle.
 ON_CIRCLE = 1e-6
 
 
@@ -53,7 +53,7 @@ class Generators(Exact):
     solutions: tuple[Solution, ...]
 
     def describe(self) -> str:
-        """Say in a sentence how many linkages there are."""
+        """Return a sentence that says how many linkages there are."""
         points = format_count(len(np.asarray(self.task.angle)), "point")
         if not self.solutions:
             return f"no four-bar does the function exactly at these {points}"
@@ -61,6 +61,12 @@ class Generators(Exact):
         if not self.sound:
             return f"{linkages} through the {points}: each has a defect, so that no sound four-bar exists"
         return f"{linkages} through the {points}: {len(self.sound)} sound"
+
+
+_MANY = (
+    "the points of the function are not independent, as those of a constant, or of a rocker that turns with the crank, are not: "
+    "infinitely many linkages have them. Change a point"
+)
 
 
 @in_si(crank_phase="rad", ground_length="m")
@@ -126,29 +132,30 @@ def _rows(th2: FloatArray, th4: FloatArray) -> FloatArray:
 def _roots(rows: Callable[[float], FloatArray]) -> list[float]:
     """Return the angles in (-pi/2, pi/2] at which the determinant of four equations is zero.
 
-    It is a trigonometric polynomial of first degree in twice the angle: half a turn on, a link is the same one that points in
-    the opposite direction.
+    The determinant is a trigonometric polynomial of first degree in twice the angle: half a turn further, a link is the same,
+    with a negative length.
     """
-    terms = np.fft.fft([np.linalg.det(rows(0.5 * at)) for at in turn(3)]) / 3.0
+    samples = [rows(0.5 * at) for at in turn(3)]
+    scale = np.linalg.svd(np.array(samples), compute_uv=False)
+    if (scale[:, -1] < INDEPENDENT * scale[:, 0]).all():
+        raise InputError(_MANY)  # it is zero at every angle
+    terms = np.fft.fft(np.linalg.det(samples)) / 3.0
     # the powers -1 ... 1 of exp(2 i angle), the highest first
     found = np.roots(terms[[1, 0, 2]])
     return [0.5 * float(np.angle(root)) for root in found if abs(abs(root) - 1.0) < ON_CIRCLE]
 
 
 def _links(th2: FloatArray, th4: FloatArray, crank_phase: float, mounting: float) -> Links | None:
-    """Compute the links, in units of the ground link, from points with common R1, R2, R3; None if the coupler is not real.
+    """Compute the links, in units of the ground link, from points with common R1, R2, R3; None if no real links exist.
 
-    A negative length means that the link points in the opposite direction.
+    For a negative length, the link points in the opposite direction: its angle is changed by pi.
 
     Raises InputError if the points leave infinitely many linkages.
     """
     rows = _rows(th2, th4)
     scale = np.linalg.svd(rows[:, :3], compute_uv=False)
     if scale[-1] < INDEPENDENT * scale[0]:
-        raise InputError(
-            "the points of the function are not independent, as those of a constant are not: infinitely many linkages have "
-            "them. Change a point"
-        )
+        raise InputError(_MANY)
     r1, r2, r3 = np.linalg.lstsq(rows[:, :3], -rows[:, 3], rcond=None)[0].tolist()
     if min(abs(r1), abs(r2)) < INDEPENDENT:
         return None
@@ -166,9 +173,12 @@ def _links(th2: FloatArray, th4: FloatArray, crank_phase: float, mounting: float
 
 
 def _five_point_links(phi: FloatArray, psi: FloatArray) -> list[Links | None]:
-    """Compute the links for five points: dyads of the rocker's poses relative to the crank, with pivot B and point C."""
+    """Compute the links for five points: the dyads for the rocker's poses relative to the crank, with pivot B and point C."""
     places = np.exp(-1j * phi)
-    parts = dyads_of_five(places, psi - phi)
+    try:
+        parts = dyads_of_five(places, psi - phi)
+    except InputError:
+        raise InputError(_MANY) from None
     real = np.abs(np.hstack(parts).imag).max(axis=1) <= REAL
     z, m = (part[real].real @ np.array([1.0, 1j]) for part in parts)
     m = places[0] + m
@@ -188,7 +198,7 @@ def _make_generator(
     crank_phase: float,
     mounting: float,
 ) -> Solution:
-    """Build the four-bar with these links, in units of the ground link, and check it from the first point to the last."""
+    """Build the four-bar with these links, in units of the ground link (m), and check it between first and last point."""
     th2 = np.asarray(task.rotation) + crank_phase
     th4 = np.asarray(task.angle) - mounting
     b, c = crank * np.exp(1j * th2), 1.0 + rocker * np.exp(1j * th4)
@@ -205,7 +215,7 @@ def _make_generator(
     return exact_solution(task, linkage, np.asarray(task.rotation), sides)
 
 
-#: Rotations between two stations at which a link's angle is tracked.
+#: Number of steps between two stations in which a link's angle is tracked.
 BETWEEN = 90
 
 
@@ -223,7 +233,8 @@ def cognates(linkage: Linkage, rotation: ArrayLike = 0.0) -> tuple[Linkage, Link
     Returns
     -------
     tuple of Linkage
-        The cognate on G and D, driven at G; the one on A and G, driven at A; the same one, driven at G.
+        The cognate with the pivots G and D, driven at G; that with A and G, driven at A; the same, driven at G. G is the third
+        fixed pivot.
 
     Raises
     ------
@@ -259,8 +270,8 @@ def cognates(linkage: Linkage, rotation: ArrayLike = 0.0) -> tuple[Linkage, Link
 def alternatives(solution: Solution) -> tuple[Solution, ...]:
     """Return the cognates of a solution as solutions of its task: the same curve from other pivots.
 
-    For a task with crank rotations only the one that turns with the crank is returned; for a closed path those whose cranks
-    can turn fully.
+    For a task with crank rotations only the cognate whose crank turns with the original's is returned; for a closed path those
+    whose cranks can turn fully.
 
     Returns
     -------
@@ -295,10 +306,13 @@ def alternatives(solution: Solution) -> tuple[Solution, ...]:
 
 
 def _sides(linkage: Linkage, rotation: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return the assemblies over the task of the cognates on A and G, driven at A and at G: +1 with C to the left of B -> D."""
+    """Return the assemblies of the cognates with the pivots A and G, driven at A and driven at G, at the crank rotations.
+
+    An assembly is +1 with C to the left of B -> D, -1 to the right.
+    """
     k = _place_on_coupler(linkage)
     g = linkage.directions(rotation)
-    # from A, the ground link along the real axis
+    # positions relative to A, with the ground link along the real axis
     b = linkage.crank_length * np.exp(1j * (rotation + linkage.crank_phase))
     pin = k * linkage.coupler_length * (g[0] + 1j * g[1])
     pivot = k * linkage.ground_length
@@ -311,7 +325,7 @@ def _sides(linkage: Linkage, rotation: FloatArray) -> tuple[FloatArray, FloatArr
 
 
 def has_cognates(solution: Solution) -> bool:
-    """Return whether `alternatives` has any: for a path traced by a four-bar whose coupler point is neither B nor C."""
+    """Return whether a solution has cognates: a path traced by a four-bar whose coupler point is neither B nor C."""
     linkage = solution.linkage
     return _is_path(solution.task) and linkage.kind == "four-bar" and linkage.pivot is None and _off_pins(linkage)
 
@@ -343,7 +357,7 @@ def _place_on_coupler(linkage: Linkage) -> complex:
 
 
 def _pinned_four_bar(a: complex, b: complex, c: complex, d: complex, p: complex) -> Linkage:
-    """Build the four-bar with these pins at a crank rotation of 0."""
+    """Build the four-bar whose pins and coupler point have these positions at a crank rotation of 0."""
     ground, arm, coupler, to_point = d - a, b - a, c - b, p - b
     return Linkage(
         pivot_x=a.real,

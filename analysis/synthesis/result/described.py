@@ -9,7 +9,8 @@ from typing import Any
 import numpy as np
 
 from ...units import with_unit
-from ..linkage.linkage import Linkage, SliderCrank
+from ..linkage import linkage as geometry
+from ..linkage.linkage import Linkage, SliderCrank, on_line
 from ..linkage.machine import Make
 from ..linkage.pivot import SecondCrank, SliderMotion
 
@@ -19,7 +20,7 @@ _NAME = "found-linkage"
 def description(linkage: Linkage, make: Make, *, rotation: float = 0.0, direction: float = 1.0) -> dict[str, Any]:
     """Return the table ``[linkage]`` with the description of a four-bar, a slider-crank or a five-bar.
 
-    A rocker pivot that moves on a guide, or on a crank without gears, is a second freedom: `drives` gives the speeds of both.
+    A rocker pivot that moves on a guide, or on a crank without gears, is a second freedom: `drives` returns both speeds.
 
     Parameters
     ----------
@@ -37,8 +38,9 @@ def description(linkage: Linkage, make: Make, *, rotation: float = 0.0, directio
     bodies["coupler"] = _bar("BC", linkage.coupler_length, make, make.coupler_mass)
     if linkage.point_distance and not linkage.point_is_pin:
         point = rect(linkage.point_distance, linkage.point_angle)
-        bodies["coupler"]["points"] = {"P": _place(point)}
-    # not within a turn: gears would be at another tooth
+        bodies["coupler"] |= {"points": {"P": _place(point)}, **_with_arm(linkage, make)}
+        del bodies["coupler"]["section"]
+    # the angle is not wrapped to a turn, because the position of gears depends on whole turns
     start = a1 + float(linkage.crank_angle(rotation))
     crank = {"joint": "A", "start": with_unit(start, "rad"), "speed": with_unit(direction * make.speed, "rad/s")}
     tables: dict[str, Any] = {
@@ -68,7 +70,7 @@ def description(linkage: Linkage, make: Make, *, rotation: float = 0.0, directio
         angle = with_unit(a1 + float(second.angle(rotation)), "rad")
         tables["freedoms"]["pivot"] = {"joint": "E", "start": angle, "driven": True}
     elif isinstance(second, SecondCrank):
-        # where the first crank points along x
+        # angle of the second crank while the first points along x
         phase = a1 + second.phase - second.ratio * (a1 + linkage.crank_phase)
         tables["gears"] = {
             "teeth": {
@@ -78,14 +80,27 @@ def description(linkage: Linkage, make: Make, *, rotation: float = 0.0, directio
             }
         }
     if any(make.load):
-        tables["loads"] = ["P" if "points" in bodies["coupler"] else "C"]
+        tables["loads"] = [_loaded(linkage)]
     return tables
 
 
-def drives(linkage: Linkage, make: Make, *, rotation: float = 0.0, direction: float = 1.0) -> dict[str, Any]:
-    """Return the tables of the drives of a linkage whose rocker pivot is a freedom: the speeds of crank and pivot in time.
+def loads(linkage: Linkage, make: Make) -> dict[str, Any]:
+    """Return the table with the values of the load of ``make``, by the point on which it acts; empty without a load."""
+    values = {f"load_{axis}": with_unit(force, "N") for axis, force in zip("xy", make.load)}
+    return {_loaded(linkage): values} if any(make.load) else {}
 
-    The arguments are those of `description`. For other linkages the result is empty: the description has the crank speed.
+
+def _loaded(linkage: Linkage) -> str:
+    """Return the name of the point on which the load acts: the coupler point, or the pin that it is."""
+    if linkage.point_is_pin:
+        return "C"
+    return "P" if linkage.point_distance else "B"
+
+
+def drives(linkage: Linkage, make: Make, *, rotation: float = 0.0, direction: float = 1.0) -> dict[str, Any]:
+    """Return the drive tables of a linkage whose rocker pivot is a second freedom: the speeds of crank and pivot over time.
+
+    The arguments are those of `description`. For other linkages the result is empty, because `description` gives the speed.
     """
     pivot = linkage.pivot
     if pivot is None or not pivot.series.order:
@@ -103,6 +118,22 @@ def drives(linkage: Linkage, make: Make, *, rotation: float = 0.0, direction: fl
     if isinstance(pivot, SecondCrank):
         waves["mean"] = with_unit(speed * pivot.ratio, unit)
     return {"crankDrive": {"speed": with_unit(speed, "rad/s")}, "pivotDrive": {"speed": waves}}
+
+
+def _with_arm(linkage: Linkage, make: Make) -> dict[str, Any]:
+    """Return mass, centre of mass and moment of inertia of a coupler with an arm to its point, as its plant has them."""
+    line = make.density * make.width * make.thickness
+    r, a2 = linkage.point_distance, linkage.point_angle
+    straight = on_line(linkage.coupler_length, r, a2)
+    links = linkage.crank_length, linkage.coupler_length, linkage.rocker_length
+    made = geometry.bodies(*links, r, a2, line, make.width, straight)
+    made |= make.weighed(made)
+    centre = rect(made["coupler_cog_distance"], made["coupler_cog_angle"])
+    return {
+        "mass": with_unit(made["coupler_mass"], "kg"),
+        "cog": _place(centre),
+        "inertia": with_unit(made["coupler_inertia"], "kg.m2"),
+    }
 
 
 def _place(z: complex) -> list[Any]:

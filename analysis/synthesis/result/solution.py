@@ -23,7 +23,7 @@ from ..linkage.linkage import Linkage, SliderCrank, wrapped
 from ..linkage.machine import Make
 from ..task.target import area_between, distance_to, halves, hausdorff, straightness
 from ..task.task import PrecisionPoints, RockerFunction, Task, TimedPath, UntimedPath, covers_turn, normal_form
-from .described import description, drives
+from .described import description, drives, loads
 
 FloatArray = NDArray[np.float64]
 #: Fraction of the target's size squared below which an error is due to rounding.
@@ -48,7 +48,7 @@ class Evaluation:
     angle_errors : ndarray, shape (n,), or None
         Angular errors of a motion (rad).
     rotation : ndarray, shape (n,), or None
-        Crank rotations at which the targets are compared; None if they were not given with the linkage.
+        Crank rotations at which the linkage is compared with the targets; None for a closed path without given rotations.
     length : float
         For a motion, the length by which an angular error is multiplied to count as an error of position (m); see `Motion`.
     """
@@ -80,9 +80,9 @@ class Evaluation:
 
 
 def evaluate(task: Task, linkage: Linkage, rotation: FloatArray | None = None) -> Evaluation:
-    """Compare a linkage with its task by the task's measure.
+    """Compute the errors of a linkage in a task by the task's measure.
 
-    The comparison is independent of any search: an untimed path is compared as a polygon of `CURVE` points with the target.
+    They are independent of any search: the coupler curve for an untimed path is a polygon of `CURVE` points.
 
     Parameters
     ----------
@@ -119,7 +119,7 @@ def evaluate(task: Task, linkage: Linkage, rotation: FloatArray | None = None) -
 
 
 def _objective_values(task: Task, squares: FloatArray) -> tuple[float, float]:
-    """Return quality function and objective from the weighted squared errors."""
+    """Return the values of quality function and objective from the weighted squared errors; infinite if one is not finite."""
     error = float(squares.sum())
     if not np.isfinite(error):
         return inf, inf
@@ -148,7 +148,8 @@ def _evaluate_path(task: UntimedPath, linkage: Linkage, rotation: FloatArray | N
     elif (weights == weights[0]).all():
         error = float(weights[0]) * area_between(curve, path, closed=path.closed)
     else:
-        # a weighted area: along the target with its weights, and along the curve with those of the nearest stations, by halves
+        # a weighted area: half the integral along the target with its weights, half that along the curve with the weights of
+        # the nearest stations
         traced = curve @ np.array([1.0, 1j])
         steps = np.abs(np.diff(np.append(traced, traced[0]) if path.closed else traced))
         nearest = np.abs(traced[:, None] - stations[None, :]).argmin(axis=1)
@@ -165,7 +166,7 @@ class Verdicts:
     Attributes
     ----------
     grashof : str
-        Type of the four-bar or slider-crank, see `Linkage.grashof`; for a moving rocker pivot the kind of its motion.
+        Type of the linkage, see `Linkage.title`.
     full_turn : bool
         Whether the crank can turn fully.
     circuit : bool
@@ -175,7 +176,7 @@ class Verdicts:
     order : bool
         Whether the targets are reached in order while the crank turns in one direction.
     least_transmission, greatest_transmission : float
-        Range of the angle between coupler and rocker during the task (rad), or over a turn if it is closed.
+        Range of the angle between coupler and rocker during the task (rad), or over a turn if the task takes a whole one.
     """
 
     grashof: str
@@ -203,17 +204,17 @@ class Verdicts:
 
 
 def judge(linkage: Linkage, rotation: FloatArray, *, closed: bool) -> Verdicts:
-    """Check a linkage for defects over the crank rotations from the first to the last of ``rotation``, or over a turn.
+    """Check a linkage for defects between the least and the greatest of its crank rotations, or if ``closed`` over a turn.
 
-    The distance from crank pin to rocker pivot, on which everything depends, is evaluated densely and, with a fixed pivot,
-    where the crank lies along the ground link.
+    The distance from crank pin to rocker pivot, which determines the transmission angle, is evaluated densely and, with a
+    fixed pivot, where the crank lies along the ground link.
     """
     steps = np.diff(rotation)
     order = bool(np.all(steps > 0.0) or np.all(steps < 0.0))
     begin, end = (0.0, 2.0 * pi) if closed else (float(rotation.min()), float(rotation.max()))
     way = np.linspace(begin, end, 1441)
     if linkage.pivot is None:
-        # th2 a multiple of pi
+        # rotations at which th2 is a multiple of pi
         first = np.ceil((begin + linkage.crank_phase) / pi)
         last = np.floor((end + linkage.crank_phase) / pi)
         way = np.concatenate([way, np.arange(first, last + 1) * pi - linkage.crank_phase])
@@ -238,7 +239,7 @@ class StraightPart:
     Attributes
     ----------
     travel, flatness : float
-        Length along the line from its first point to its last, and extent across that line (m).
+        Length along the wanted line from the first traced point to the last, and extent across that line (m).
     begin, end : float
         Crank rotations at its ends (rad).
     """
@@ -333,18 +334,18 @@ class Solution(Shown):
 
     @property
     def rotation(self) -> FloatArray:
-        """Return the crank rotations over which the task is done: its stations, or a turn."""
+        """Return the crank rotations over which the task is done: those of its stations, or a turn."""
         if self.evaluation.rotation is not None and not (isinstance(self.task, UntimedPath) and self.task.path.closed):
             return self.evaluation.rotation
         return np.linspace(0.0, 2.0 * pi, CURVE, endpoint=False)
 
     @property
     def way(self) -> tuple[float, float] | None:
-        """Return the first and last crank rotation of the task; None if the crank turns fully."""
+        """Return the least and greatest crank rotation of the task; None if the crank can turn fully."""
         return None if self.verdicts.full_turn else (float(self.rotation.min()), float(self.rotation.max()))
 
     def straight(self) -> StraightPart | None:
-        """Return the straight part of the task as it is traced; None if the task has none."""
+        """Return the straight part of the task as the linkage traces it; None if the task has none."""
         asked = normal_form(self.task).straight
         rotation = self.evaluation.rotation
         if asked is None or rotation is None or not isinstance(self.task, UntimedPath):
@@ -418,7 +419,7 @@ class Solution(Shown):
         elif moved:
             turn = tau / make.speed
             run = {"stop_time": with_unit(2.0 * self.linkage.turns * turn, "s"), "step": with_unit(turn / 360.0, "s")}
-        return {"title": title, "linkage": tables, **moved, "run": run}
+        return {"title": title, "linkage": tables, **moved, **loads(self.linkage, make), "run": run}
 
     def columns(self) -> dict[str, FloatArray]:
         """Return crank rotation, target, traced point or angle, error and transmission angle at each target; SI.
@@ -462,7 +463,7 @@ class Solution(Shown):
 def whole_turn(task: Task, rotation: FloatArray) -> bool:
     """Return whether the stations of a task cover a whole turn.
 
-    Untimed precision points never do: the widest step between two of them says nothing about the step from last to first.
+    Those of untimed precision points do not count as a whole turn, whatever the steps between them.
     """
     if isinstance(task, PrecisionPoints) and task.rotation is None:
         return False
@@ -484,7 +485,10 @@ def angle_at_c(linkage: Linkage, rotation: FloatArray) -> FloatArray:
 
 
 def path_rate(linkage: Linkage, at: FloatArray, both: NDArray[np.complex128]) -> NDArray[np.complex128]:
-    """Return dP/dphi from the crank's rotation and the pivot's motion."""
+    """Return the derivative of the coupler point with respect to the crank rotation, including the pivot's motion (m/rad).
+
+    ``both`` are the derivatives of `Linkage.path_jacobian`, as complex numbers x + iy.
+    """
     step = 1e-6
     ahead, behind = linkage.displacement(at + step), linkage.displacement(at - step)
     vx, vy = ((a - b) / (2.0 * step) for a, b in zip(ahead, behind))
@@ -495,7 +499,7 @@ def path_rate(linkage: Linkage, at: FloatArray, both: NDArray[np.complex128]) ->
 def nearest_rotations(
     linkage: Linkage, points: NDArray[np.complex128], begin: float = 0.0, end: float = 2.0 * pi
 ) -> FloatArray:
-    """Find the crank rotations at which the coupler point is nearest to points (complex, m), without jumps of a turn.
+    """Return the crank rotations at which the coupler point is nearest to points (complex, m), without jumps of a turn.
 
     The search covers the rotations from ``begin`` to ``end``, by default a whole turn.
     """
