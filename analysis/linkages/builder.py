@@ -21,7 +21,7 @@ LINKAGE = "linkage"
 
 
 def described(tables: Mapping[str, Any]) -> Description:
-    """Read a description from the tables of a file below ``[linkage]``.
+    """Read a description from the content of the table ``[linkage]`` of a file.
 
     Raises
     ------
@@ -40,7 +40,7 @@ def described_in(tables: Mapping[str, Any]) -> bool:
 def with_linkage(tables: Mapping[str, Any], folder: Path) -> Mapping[str, Any]:
     """Compile the linkage described in the tables of a case; return tables that name it as their published set.
 
-    What a named file has beside its linkage holds, too, unless the tables have it: `_over`.
+    If the tables name a file, the tables beside the linkage in that file hold too, unless they are overridden: `_merged`.
 
     Raises
     ------
@@ -54,23 +54,23 @@ def with_linkage(tables: Mapping[str, Any], folder: Path) -> Mapping[str, Any]:
     if not described_in(tables):
         return tables
     own = tables[LINKAGE]
-    named = _chain(folder / own) if isinstance(own, str) else []
+    named = _named_files(folder / own) if isinstance(own, str) else []
     made: dict[str, Any] = {}
     for path, below in reversed(named):
-        made = _over(made, _found_from(_beside(below, "title", "tune"), path.parent))
-    rest = _beside(tables)
-    return {"published": _package(named[-1][1] if named else tables).mechanism().name, **_over(made, rest)}
+        made = _merged(made, _with_absolute_files(_without_linkage(below, "title", "tune"), path.parent))
+    rest = _without_linkage(tables)
+    return {"published": _package(named[-1][1] if named else tables).mechanism().name, **_merged(made, rest)}
 
 
-def _beside(tables: Mapping[str, Any], *others: str) -> dict[str, Any]:
-    """Return the tables beside a linkage, without others; raises InputError if they name a published set as well."""
+def _without_linkage(tables: Mapping[str, Any], *others: str) -> dict[str, Any]:
+    """Return the tables without the linkage and ``others``; raise InputError if they name a published set as well."""
     if "published" in tables:
         raise InputError(f"a case has one mechanism: leave out linkage, or published = {tables['published']!r}")
     return {name: value for name, value in tables.items() if name not in (LINKAGE, *others)}
 
 
-def _chain(path: Path) -> list[tuple[Path, Mapping[str, Any]]]:
-    """Return the file that tables name, and the files that it names in turn, each with its tables, to the described linkage."""
+def _named_files(path: Path) -> list[tuple[Path, Mapping[str, Any]]]:
+    """Return the file at ``path`` and the files that it names in turn, each with its tables; the last has the linkage."""
     found: list[tuple[Path, Mapping[str, Any]]] = []
     while True:
         if any(path.resolve() == known.resolve() for known, _ in found):
@@ -86,25 +86,25 @@ def _chain(path: Path) -> list[tuple[Path, Mapping[str, Any]]]:
         path = path.parent / tables[LINKAGE]
 
 
-def _found_from(table: Any, folder: Path) -> Any:
-    """Return tables whose files are found from anywhere."""
+def _with_absolute_files(table: Any, folder: Path) -> Any:
+    """Return a table in which the names of files, relative to ``folder``, are absolute paths."""
     if not isinstance(table, Mapping):
         return table
     return {
         name: str((folder / value).resolve())
         if name == "file" and isinstance(value, str)
-        else _found_from(value, folder)
+        else _with_absolute_files(value, folder)
         for name, value in table.items()
     }
 
 
-def _over(base: Mapping[str, Any], tables: Mapping[str, Any], *, top: bool = True) -> dict[str, Any]:
-    """Return tables with those of another file beneath them: entry by entry, but at the top runs and drives as a whole."""
+def _merged(base: Mapping[str, Any], tables: Mapping[str, Any], *, top: bool = True) -> dict[str, Any]:
+    """Return ``base`` overridden by ``tables``, entry by entry; at the top level runs and drives are replaced as a whole."""
     merged = {**base, **tables}
     for name, table in tables.items():
         whole = top and (name in ("run", "drive") or name.endswith("Drive"))
         if not whole and isinstance(table, Mapping) and isinstance(below := base.get(name), Mapping):
-            merged[name] = _over(below, table, top=False)
+            merged[name] = _merged(below, table, top=False)
     return merged
 
 
@@ -113,7 +113,7 @@ def _no_linkage(path: str | Path) -> InputError:
 
 
 def _package(tables: Mapping[str, Any]) -> Package:
-    """Return the package of the linkage in the tables of a file; a linkage without a title has that of the file."""
+    """Return the package of the linkage in the tables of a file; its title is by default that of the file."""
     title = {"title": tables["title"]} if "title" in tables else {}
     return Package(described({**title, **tables[LINKAGE]}))
 
@@ -135,7 +135,7 @@ def load_package(path: str | Path) -> Package:
     ------
     InputError, LinkageError, ParameterError
     """
-    return _package(_chain(Path(path))[-1][1])
+    return _package(_named_files(Path(path))[-1][1])
 
 
 #: A number in SI, or a text with a unit such as "50 mm".
@@ -160,7 +160,7 @@ class Builder:
     """
 
     def __init__(self, name: str, ground: Mapping[str, Place], **entries: Any) -> None:
-        self.tables: dict[str, Any] = {"name": name, "ground": _plain(ground), "bodies": {}, **_given(entries)}
+        self.tables: dict[str, Any] = {"name": name, "ground": _as_data(ground), "bodies": {}, **_without_none(entries)}
 
     def __repr__(self) -> str:
         return f"<linkage {self.tables['name']}: {', '.join(self.tables['bodies']) or 'no bodies yet'}>"
@@ -169,7 +169,7 @@ class Builder:
         named = self.tables.setdefault(table, {})
         if name in named:
             raise InputError(f"{self!r} has {table}.{name} already: another one needs a name of its own")
-        named[name] = _given(entries)
+        named[name] = _without_none(entries)
         return self
 
     def body(
@@ -192,7 +192,7 @@ class Builder:
         bar : (str, str), optional
             Two points: the first is the body's origin, the second lies at ``length`` along its x axis.
         length : optional
-            Of the bar (m).
+            Length of the bar (m).
         points : mapping of str to (x, y), optional
             Further points, or all points of a body that is not a bar (m).
         mass, cog, inertia : optional
@@ -212,7 +212,7 @@ class Builder:
         Parameters
         ----------
         name : str
-            Of the joint and of the points.
+            Name of the joint and of the points.
         **places : (x, y)
             Coordinates of the point in the frame of each body, by the body's name, or ``ground`` (m).
 
@@ -232,7 +232,7 @@ class Builder:
                 raise unknown_name(body, (GROUND, *self.tables["bodies"]), f"body {body}, of the pin {name}")
             own = self.tables["bodies"].get(body)
             points = self.tables["ground"] if own is None else own.setdefault("points", {})
-            points[name] = _plain(place)
+            points[name] = _as_data(place)
         return self
 
     def slide(
@@ -243,7 +243,7 @@ class Builder:
         Parameters
         ----------
         name : str
-            Of the joint.
+            Name of the joint.
         body : str
             The block: its origin is on the line, and its x axis along it.
         through : str
@@ -443,15 +443,15 @@ def linkage(
     )  # fmt: skip
 
 
-def _given(entries: Mapping[str, Any]) -> dict[str, Any]:
+def _without_none(entries: Mapping[str, Any]) -> dict[str, Any]:
     """Return the entries that are not None, in the form of a file."""
-    return {key: _plain(value) for key, value in entries.items() if value is not None}
+    return {key: _as_data(value) for key, value in entries.items() if value is not None}
 
 
-def _plain(value: Any) -> Any:
+def _as_data(value: Any) -> Any:
     """Return mappings, sequences and arrays as the dicts and lists of a file."""
     if isinstance(value, Mapping):
-        return {key: _plain(inner) for key, inner in value.items()}
+        return {key: _as_data(inner) for key, inner in value.items()}
     if isinstance(value, (np.ndarray, np.generic)):
         return value.tolist()
-    return [_plain(inner) for inner in value] if isinstance(value, (list, tuple)) else value
+    return [_as_data(inner) for inner in value] if isinstance(value, (list, tuple)) else value

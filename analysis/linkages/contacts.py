@@ -17,7 +17,7 @@ class Contacts:
         self.joints = [motion.structure.joints[name] for name in motion.description.friction]
 
     def blocks(self) -> Iterator[str]:
-        """Write all functions."""
+        """Write the functions of unit friction, of the joint forces with friction, and of their changes by unit friction."""
         yield self._rubbing()
         rows = ["return ("]
         for joint in self.joints:

@@ -71,7 +71,7 @@ class Body:
     bar : tuple of str
         Two points: the first is the body's origin, the second lies at ``length`` along its x axis.
     length : float
-        Of the bar (m).
+        Length of the bar (m).
     mass, inertia : float
         Mass (kg) and moment of inertia about the centre of mass (kg.m2).
     cog : tuple of float
@@ -191,7 +191,7 @@ class Spring:
     at : str
         a joint, or
     bodies : tuple of str
-        two bodies: the angle of the second relative to the first twists the spring, up to half a turn, wherever they are.
+        two bodies, which need not be joined: the angle of the second relative to the first, up to half a turn, twists it.
     stiffness, damping : float
         In N/m and N.s/m; about a pin in N.m/rad and N.m.s/rad.
     free : float
@@ -221,7 +221,7 @@ class Spring:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PointLoad:
-    """A force at a point, an input.
+    """An input force at a point.
 
     Attributes
     ----------
@@ -251,8 +251,8 @@ class FreedomTable:
     start : float
         Initial coordinate (rad, m).
     speed : float
-        Commanded rate at the start and by default (rad/s, m/s), also if it is given as 0 with a unit; for a freedom that is
-        not driven, its initial rate.
+        Commanded rate at the start and by default (rad/s, m/s). The whole number 0 commands none, "0 rpm" commands rest. For a
+        freedom that is not driven, its initial rate.
     driven : bool
         Whether its rate can be commanded; by default only the first freedom can be.
     """
@@ -283,7 +283,7 @@ class Description:
     bodies, slides, slots, gears, racks, springs : mapping
         By name.
     freedoms : mapping of str to FreedomTable
-        By name, one to four; if none is given, the program chooses them.
+        By name, one to four; if none is given, they are chosen automatically.
     assembly : mapping of str to int
         Assembly of each dyad, +1 or -1, by the name of the joint between its two bodies; +1 by default.
     friction : mapping

@@ -61,7 +61,7 @@ class Picture:
         for name, gear in d.gears.items():
             carrier, pins = self.bearings(gear.bodies)
             (x0, y0), (x1, y1) = (self.interface.own(carrier, pin) for pin in pins)
-            # the pitch point divides the line of centres so that both gears have one velocity there
+            # the pitch point divides the line of centres so that both gears have the same velocity there
             share = f"p.{name}_ratio * (p.{name}_ratio - 1.0) / ((p.{name}_ratio - 1.0) ** 2 + 1e-12)"
             for wheel, bearing, part in zip(gear.bodies, pins, (share, f"({share} - 1.0)"), strict=True):
                 tick = f"arm({self.interface.turn(wheel, 'b.')}, {part} * ({x1} - {x0}), {part} * ({y1} - {y0}))"
@@ -77,11 +77,11 @@ class Picture:
         return joints, parts
 
     def tick(self, pair: str, gear: str, pin: str, arm: str) -> Marked:
-        """Return the point of a gear on its pitch circle, from its bearing by the expression ``arm``."""
+        """Return the mark of a gear on its pitch circle; the expression ``arm`` leads there from the bearing ``pin``."""
         return Marked(f"{pair}{gear}Tick", f"mark on {gear}", f"*(b.at_{pin}.x + {arm}.x, b.at_{pin}.y + {arm}.y, 0.0)")
 
     def bearings(self, bodies: tuple[str, ...]) -> tuple[str, tuple[str, ...]]:
-        """Return the body that carries two gears, and the pins of both on it."""
+        """Return the name of the body that carries two gears, and the names of their two pins on it."""
         step = next(s for s in self.structure.steps if isinstance(s, Geared) and {s.body, s.mate} == set(bodies))
         joints = [joint for joint in self.structure.joints.values() if isinstance(joint, Pin)]
         return step.parent, tuple(
@@ -95,7 +95,7 @@ class Picture:
         return function(signature, "Compute the places of the points of the picture.", rows)
 
     def moves(self, own: str) -> str:
-        """Return the parameters that change when a point of the picture is dragged."""
+        """Return the source of the argument with the parameters that follow when a point is dragged; empty if none does."""
         names = {p.name for p in self.interface.parameters}
         for body, points in self.interface.points.items():
             if own in points:

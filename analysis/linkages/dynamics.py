@@ -37,7 +37,7 @@ class Motion:
         self.along = springs_at(self.description, interface)
         self.bodies = self.structure.bodies
         self.reactions: list[Reaction] = []
-        #: in the order in which their forces are computed
+        #: steps with racks, in the order in which their forces are computed
         self.racked = [step for step in reversed(self.structure.steps) if isinstance(step, Racked)]
 
     def owner(self, own: str) -> str:
@@ -89,7 +89,7 @@ class Motion:
         return "angle" if isinstance(self.structure.joints[spring.at], Pin) else "position"
 
     def resistance(self, name: str, spring: Spring) -> str:
-        """Return the expression of the damper and friction force of a spring; empty if it has neither."""
+        """Return the expression of the force of a spring's damper, friction and force law; empty if it has none of these."""
         words = []
         if given(spring.damping):
             words.append(f"p.{name}_damping * s.{name}_rate")
@@ -211,7 +211,7 @@ class Motion:
         taken: set[str] = set()
 
         def reaction(joint: Joint, by: str, on: str, force: str) -> None:
-            # the forces in a pin of several bodies are C, C2, C3, but for names that other joints and racks have
+            # the forces in a pin of several bodies are C, C2, C3, without the names of other joints and racks
             others = {*self.structure.joints, *self.description.racks}
             further = (f"{joint.name}{n}" for n in count(2) if f"{joint.name}{n}" not in others)
             name = next(n for n in chain([joint.name], further) if n not in taken)

@@ -1,7 +1,7 @@
 """Write the equations of a described linkage as a Python module that calls `linkwork.planar`.
 
 The pose of a body, its `Frame`, is the position of its origin and its direction. A direction is a `Turn`: cosine and sine
-of the angle, with its derivatives. The expressions below are the right sides of the lines of that module.
+of the angle, with its derivatives. The methods below write the lines of that module, or return expressions in them.
 """
 
 from __future__ import annotations
@@ -21,18 +21,21 @@ class Places:
         self.structure, self.interface = interface.structure, interface
         self.n = len(interface.drives)
         self.lines: list[str] = []
-        #: variables of points of the ground or of known bodies
+        #: variables of points of the ground or of known bodies, by name of the point
         self.places: dict[str, str] = {}
-        #: of bodies whose angles are linear: coefficients of the coordinates, and the constant terms
+        #: for bodies whose angles are linear in the coordinates: their coefficients, and the constant terms
         self.angles: dict[str, tuple[dict[int, str], list[str]]] = {GROUND: ({}, [])}
-        #: of slides whose positions are linear
+        #: the same for slides whose positions are linear in the coordinates
         self.travels: dict[str, tuple[dict[int, str], list[str]]] = {}
         self.margins: list[str] = []
 
     # Places
 
     def point(self, body: str, own: str, frame: str = "") -> str:
-        """Return the expression of a point of a body; ``frame`` is the body's pose if it is not the one in the ground."""
+        """Return the expression of a point of a body.
+
+        ``frame`` is the variable of the body's pose, by default its pose in the ground; "own" is the body's own frame.
+        """
         x, y = self.interface.own(body, own)
         if body == GROUND or frame == "own":
             return f"fixed({x}, {y}, {self.n})"
@@ -54,7 +57,7 @@ class Places:
         return f"Frame(minus({pin}, arm({turn}, {x}, {y})), {turn})"
 
     def inclined(self, turn: str, joint: Slider, sign: int = 1) -> str:
-        """Return the direction of a body's guide line from that of the body; with sign -1, the body's from the line's."""
+        """Return the direction of a body's guide line from that of the body; with sign -1, the body's from that of the line."""
         if not joint.inclined:
             return turn
         return f"inclined({turn}, p.{joint.name}_COS, {'-' if sign < 0 else ''}p.{joint.name}_SIN)"
@@ -222,7 +225,7 @@ class Places:
             self.lines.append(f"{own}_frame = within({body}_frame, {own}_in_{body})")
 
     def insides(self, step: Dyad) -> None:
-        """Write the poses of the bodies that hang on the two bodies of a dyad, relative to these."""
+        """Write the poses of the bodies inside the two sides of a dyad, relative to the side's first body."""
         for side in step.sides:
             kept = dict(self.angles)
             self.angles[side.body] = {}, []

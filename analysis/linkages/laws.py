@@ -20,7 +20,7 @@ Law: TypeAlias = str | tuple[tuple[Any, Any], ...]
 
 #: Functions of `math` that formulas may use.
 FUNCTIONS = ("sin", "cos", "tan", "atan", "tanh", "exp", "log", "sqrt", "fabs")
-#: Those that a written law may call.
+#: Functions that the source of a law may call.
 WRITTEN = (*FUNCTIONS, "pow")
 _NODES = (ast.Expression, ast.BinOp, ast.UnaryOp, ast.Add, ast.Sub, ast.Mult, ast.Div, ast.Pow, ast.USub, ast.UAdd)
 _ROWS = Many(Many(unchanged, length=2), least=2)
@@ -98,7 +98,7 @@ def constants(value: Any, name: str) -> dict[str, tuple[float, str]]:
 
 
 def _constant(value: Any, name: str) -> tuple[float, str]:
-    # a radian has no dimension: whether one is meant is seen from the text alone
+    # a radian has no dimension: only the text shows whether it is meant
     angular = bool(re.search("rad|deg|°|rpm|/min|turn|rev|cycle", str(value)))
     for unit in sorted(_UNITS, key=lambda unit: ("rad" in unit) != angular):
         try:

@@ -186,7 +186,7 @@ class Package:
         self.name = f"{re.sub(r'[^a-z0-9]', '_', description.name.lower())}_{digest[:12]}"
 
     def mechanism(self, folder: Path | None = None) -> Mechanism:
-        """Import the package and return its mechanism, registered.
+        """Import the package, register its mechanism and return it.
 
         Parameters
         ----------
@@ -220,7 +220,7 @@ class Package:
         except AssemblyError as error:
             signs = ", linkage.assembly" if any(dyad.assembled for dyad in self.structure.dyads) else ""
             raise LinkageError(
-                f"{error}{self._apart(made)}: the start in linkage.freedoms{signs} or the lengths must be others"
+                f"{error}{self._unreachable(made)}: the start in linkage.freedoms{signs} or the lengths must be others"
             ) from None
         self._check_motion(made)
         self._check_twists(made)
@@ -233,8 +233,8 @@ class Package:
             raise
         return made
 
-    def _apart(self, made: Mechanism) -> str:
-        """Say which two bodies do not reach each other at the start; empty if all do."""
+    def _unreachable(self, made: Mechanism) -> str:
+        """Return the words of an error on two bodies that do not reach each other at the start; empty if all do."""
         start = made.published[made.name]
         try:
             made.modules[-1].places(made.state(start.initial), start.parameters.constants())
@@ -272,7 +272,7 @@ class Package:
         raise LinkageError(f"the accelerations at the start are no finite numbers: {causes} must be another")
 
     def _check_twists(self, made: Mechanism) -> None:
-        """Raise LinkageError if a torsion spring whose turns nothing counts is twisted by more than half a turn."""
+        """Raise LinkageError if a torsion spring is twisted by more than half a turn and no freedom counts its turns."""
         start = made.published[made.name]
         places = made.modules[-1].places(made.state(start.initial), start.parameters.constants())
         for name, spring in self.description.springs.items():
@@ -282,7 +282,7 @@ class Package:
             one, other = (0.0 if b == GROUND else planar.angle_of(getattr(places, f"{b}_frame").turn) for b in bodies)
             free, angle = getattr(start.parameters, f"{name}_free_angle"), remainder(other - one, tau)
             shorter = remainder(angle - free, tau)
-            # both usual readings of an angle, in (-pi, pi] and in [0, 2 pi)
+            # an angle may be meant in (-pi, pi] or in [0, 2 pi)
             if min(abs(angle - free), abs(angle % tau - free)) > pi + 1e-9:
                 raise LinkageError(
                     f"linkage.springs.{name}.free is {degrees(free):.6g} deg, and the angle at the start "
@@ -296,7 +296,7 @@ class Package:
         blocks += motion.springs() if self.description.springs else ()
         blocks += [*motion.acting(), *motion.motion(), *motion.forces()]
         blocks += Contacts(motion).blocks() if self.description.friction else ()
-        # of the forces it is only known now which joints have one
+        # only now it is known which joint forces there are
         self.outputs = Outputs(motion)
         scale = _error_scale(self.interface.drives, *size(self.interface))
         body = "\n\n\n".join([*blocks, self.outputs.function(), scale, self.picture.positions()])

@@ -163,7 +163,7 @@ def freedoms(description: Description, structure: Structure) -> tuple[Drive, ...
 
 
 def _wound(description: Description, pin: str) -> bool:
-    """Return whether a spring about a pin is wound up turn by turn."""
+    """Return whether a spring about a pin is wound up further by every turn."""
     springs = [spring for spring in description.springs.values() if spring.at == pin]
     return any(
         given(spring.stiffness) or (spring.law and not periodic(spring.law, spring.constants)) for spring in springs
@@ -370,7 +370,7 @@ def _mass(name: str, body: Body) -> _Mass | None:
             raise LinkageError(f"{where}.section is none of a plate: the body must have a bar and its length")
         mass, centre, inertia = body.section.properties(body.length)
         x, y = (0 if abs(c) < 1e-12 else float(c) for c in centre)
-        # a mass beside a section is weighed: the radius of gyration stays
+        # a mass given beside a section was weighed; the radius of gyration remains that of the section
         own = mass if body.mass is None else body.mass
         return _Mass(float(own), (x, y), float(inertia * own / mass))
     if body.mass is None:
@@ -382,14 +382,14 @@ def _mass(name: str, body: Body) -> _Mass | None:
 
 
 def turn_of(description: Description, name: str) -> str:
-    """Return the name of the angle of a torsion spring: that of its pin; its own with several at the pin, or between bodies."""
+    """Return the name of a torsion spring's angle: its pin's, or its own if the pin has other springs or it has no pin."""
     pin = description.springs[name].at
     alone = sum(spring.at == pin for spring in description.springs.values()) == 1
     return f"{pin if pin and alone else name}.turn"
 
 
 def _spring(name: str, description: Description, structure: Structure, drive: Drive | None) -> Iterator[Parameter]:
-    """Yield the parameters of a spring that are given."""
+    """Yield the parameters that the description gives for a spring; ``drive`` is the freedom at its joint, if any."""
     where, spring = f"linkage.springs.{name}", description.springs[name]
     if (bool(spring.between), bool(spring.at), bool(spring.bodies)).count(True) != 1:
         raise LinkageError(
@@ -440,7 +440,7 @@ def _check_names(found: list[Parameter]) -> None:
 
 
 def size(found: Interface) -> tuple[float, float]:
-    """Return the greatest coordinate of a point (m) and the mass of all bodies (kg), each 1 if there is none."""
+    """Return the greatest length or coordinate (m) and the mass of all bodies (kg), each 1 if there is none."""
     lengths = [abs(p.value) for p in found.parameters if p.unit == "m" and p.role not in ("spring", "law", "friction")]
     masses = [p.value for p in found.parameters if p.unit == "kg"]
     return max(lengths, default=1.0) or 1.0, sum(masses) or 1.0

@@ -53,7 +53,7 @@ def reach(mechanism: Mechanism, freedom: int = 0, *, most: float | None = None, 
     most : float, optional
         Greatest distance from the start that is searched: by default half the period, or half a turn; for a slide 1 m.
     samples : int
-        Positions that are tried to either side.
+        Number of positions that are tried on either side.
     """
     coordinate, period = mechanism.freedoms[freedom].coordinate, mechanism.freedoms[freedom].period
     unit = next(v.unit for v in mechanism.variables if v.name == coordinate)
@@ -74,7 +74,7 @@ def reach(mechanism: Mechanism, freedom: int = 0, *, most: float | None = None, 
 
     ends, free, least = [], [], margin(middle)
     for sign in (-1.0, 1.0):
-        # one place more to either side, so that a dip in the first or the last interval is seen
+        # one place more at either end, so that a dip in the first or the last interval is seen
         places = (middle + sign * most * np.arange(-1, samples + 2) / samples).tolist()
         values = [margin(places[0]), least]
         for n, q in enumerate(places[2:], 2):

@@ -12,7 +12,10 @@ from ..sections import Bar, MassProperties, Plate, Rod, Section, Tube, density
 
 @dataclass(frozen=True, slots=True)
 class Made:
-    """Body of a link: a bar of constant cross-section with an ``overhang`` (m) beyond each pin, or a plate."""
+    """Body of a link: a bar of constant section with an ``overhang`` (m) beyond each pin, or a plate with ``corners`` (m).
+
+    ``words`` describe the body in messages.
+    """
 
     section: Section | Plate
     words: str

@@ -40,7 +40,7 @@ Joint = Pin | Slider
 
 
 class Freed(NamedTuple):
-    """A body whose joint with the known body ``parent`` is a freedom; ``sign`` is -1 if it is the first body of the joint."""
+    """A body whose joint with the known body ``parent`` is a freedom; ``sign`` is -1 if ``body`` is the joint's first body."""
 
     body: str
     parent: str
@@ -55,7 +55,10 @@ class Freed(NamedTuple):
 
 
 class Geared(NamedTuple):
-    """A gear whose angle follows from its mate's, both pinned to ``parent``; ``inverse`` if the mate is the pair's second."""
+    """A gear whose angle follows from that of its mate, both pinned to ``parent``.
+
+    ``gear`` is the name of the pair in the description; ``inverse`` says whether the mate is its second gear.
+    """
 
     body: str
     parent: str
@@ -66,10 +69,11 @@ class Geared(NamedTuple):
 
 
 class Racked(NamedTuple):
-    """A rack that follows from its gear, or the gear from its rack: ``body`` from ``mate``; ``joint`` joins it to ``parent``.
+    """A rack whose position follows from its gear, or a gear whose angle follows from its rack.
 
-    ``rack`` is the name of the pair in the description; ``pin`` joins the gear and ``slide`` the rack to ``parent``. ``linear``
-    says whether the travel is linear in the coordinates.
+    ``body`` follows from ``mate``, and ``joint`` joins it to the carrier ``parent``. ``rack`` is the name of the pair in the
+    description; ``pin`` joins the gear and ``slide`` the rack to the carrier. ``linear`` says whether the travel of the slide
+    is linear in the coordinates.
     """
 
     body: str
@@ -88,7 +92,7 @@ class Racked(NamedTuple):
 
 
 class Side(NamedTuple):
-    """One side of a dyad: a body, its joint with the known body ``parent``, and the bodies that hang on it."""
+    """One side of a dyad: a body, its joint with the known body ``parent``, and the steps that place bodies relative to it."""
 
     body: str
     parent: str
@@ -97,7 +101,7 @@ class Side(NamedTuple):
 
     @property
     def bodies(self) -> tuple[str, ...]:
-        """Names of the bodies, the joined one first."""
+        """Names of the side's bodies, ``body`` first."""
         return (self.body, *(body for step in self.inside for body in step.bodies))
 
 
@@ -120,7 +124,7 @@ class Dyad(NamedTuple):
 
     @property
     def inner_dyads(self) -> Iterator[Dyad]:
-        """The dyads inside its sides, in their order, and then itself."""
+        """The dyads inside the sides, in their order, and last this dyad."""
         for side in self.sides:
             for step in side.inside:
                 if isinstance(step, Dyad):
@@ -214,7 +218,7 @@ def joints(description: Description) -> dict[str, Joint]:
 
 
 def on_one_body(name: str, rack: Rack, found: Mapping[str, Joint]) -> tuple[Pin, Slider, str]:
-    """Return the pin of a gear, the slide of its rack, and the body that both are on.
+    """Return the pin of a gear, the slide of its rack, and the body to which both joints connect them.
 
     Raises
     ------
@@ -345,7 +349,7 @@ def _proposed(description: Description, found: Mapping[str, Joint], count: int) 
 
 
 def _tree(root: str, found: Mapping[str, Joint], freed: list[str]) -> list[Freed]:
-    """Return the bodies that freedoms connect to one body, each after its parent."""
+    """Return the steps that place the bodies which freedoms connect to the body ``root``, each after its parent."""
     steps: list[Freed] = []
     there = {root}
     growing = True
@@ -386,7 +390,7 @@ def _solve(description: Description, found: Mapping[str, Joint], freed: list[str
         steps.append(step)
         known |= dict.fromkeys(new)
         if not isinstance(step, Dyad) and step.body in linear:
-            # what freedoms join to a gear or a rack comes with it
+            # bodies that freedoms join to a gear or a rack follow with it
             hung = [own for own in _tree(step.body, found, freed) if own.body not in known]
             steps += hung
             known |= dict.fromkeys(own.body for own in hung)
@@ -395,7 +399,10 @@ def _solve(description: Description, found: Mapping[str, Joint], freed: list[str
 
 
 def _next_dyad(fixed: list[Joint], trees: Mapping[str, list[Freed]], known: Mapping[str, None]) -> Dyad | None:
-    """Return a dyad whose sides are bodies with those that freedoms join to them; if none, with inner dyads too."""
+    """Return the next dyad on the known bodies; None if there is none.
+
+    Each side is a body with the bodies that freedoms join to it; if there is no such dyad, sides may also contain dyads.
+    """
     if dyad := next(_dyads(fixed, trees, known), None):
         return dyad
     groups: dict[str, list[Freed | Dyad]] = {}
@@ -445,7 +452,10 @@ def _racked(
     linear: set[str],
     travels: set[str],
 ) -> Iterator[Racked]:
-    """Yield the racks whose gears are known and the gears whose racks are; ``travels`` are slides with linear positions."""
+    """Yield the racks whose gears are known and the gears whose racks are known.
+
+    ``travels`` are the slides whose positions are linear in the coordinates.
+    """
     for name, rack in description.racks.items():
         pin, slide, carrier = on_one_body(name, rack, found)
         if rack.rack not in known and slide in fixed and {rack.gear, carrier} <= linear:
@@ -466,7 +476,7 @@ def _links(fixed: list[Joint], first: set[str], second: set[str]) -> Iterator[tu
 def _dyads(
     fixed: list[Joint], trees: Mapping[str, Sequence[Freed | Dyad]], known: Mapping[str, None]
 ) -> Iterator[Dyad]:
-    """Yield the dyads on known bodies; ``trees`` are the steps by which further bodies hang on each body."""
+    """Yield the dyads on known bodies; ``trees`` are the steps that place further bodies relative to each unknown body."""
     base = set(known)
     sides = [
         Side(body, parent, joint, tuple(inside))
@@ -481,7 +491,7 @@ def _dyads(
             if inner.name in (one.joint.name, other.joint.name):
                 continue
             kind = _kind(pair, inner)
-            # a slide between the two has no part beyond the bodies that are joined to the known ones
+            # an inner slide must join the two bodies that are joined to known ones, not bodies inside the sides
             if kind and (isinstance(inner, Pin) or (first, second) == (pair[0].body, pair[1].body)):
                 yield Dyad(kind, pair, inner, (first, second))
 

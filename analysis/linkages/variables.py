@@ -40,7 +40,10 @@ class Variables:
     # Parameters
 
     def constants(self) -> dict[str, str]:
-        """Return the constants of the equations, as expressions in the parameters; no constant of a law has capitals."""
+        """Return the constants of the equations by name, as expressions in the parameters.
+
+        Constants of laws have no capitals in their names, so that ``COS`` and ``SIN`` are free.
+        """
         found = {p.field: f"self.{p.field}" for p in self.interface.parameters}
         for name, joint in sliders(self.structure).items():
             if joint.inclined:
@@ -61,7 +64,7 @@ class Variables:
         return found or {"nothing": "0.0"}
 
     def rules(self) -> str:
-        """Return the arguments of the parameters' rules."""
+        """Return the source of the arguments of the parameters' `Rules`."""
 
         def names(rule: str) -> str:
             return "".join(f'"{p.field}", ' for p in self.interface.parameters if p.rule == rule)
@@ -106,7 +109,7 @@ class Variables:
         return [*names, *(f"initial.{s.name}" for s in self.starts[: len(self.interface.drives)])]
 
     def links(self) -> Iterator[str]:
-        """Yield the bars whose masses may follow from a section."""
+        """Yield the `Link` of each bar whose mass may follow from a section."""
         names = {p.name for p in self.interface.parameters}
         for name, body in self.description.bodies.items():
             if body.bar and {f"{name}.mass", f"{name}.inertia", f"{name}.cog_x"} <= names:
@@ -119,7 +122,7 @@ class Variables:
         return f"{drive.name}_{name}" if self.several or not drive.table else name
 
     def driven(self) -> str:
-        """Return the entries of the published set that command its rates."""
+        """Return the entries of the published set's ``drive``: the commanded rates."""
         driven = [d for d in self.interface.drives if d.commanded]
         return ", ".join(f'"{self._argument(d, "speed")}": {d.speed!r}' for d in driven)
 
@@ -133,7 +136,7 @@ class Variables:
                 yield f'"{name}.mass": "as given{still}"'
 
     def freedoms(self) -> Iterator[str]:
-        """Yield the freedoms."""
+        """Yield the source of each `Freedom`."""
         for d in self.interface.drives:
             mode, period = "None", f"{2.0 * d.turns_back} * pi" if d.turns_back else "0.0"
             if d.table:
@@ -144,7 +147,7 @@ class Variables:
             yield f'Freedom("{d.coordinate}", "{d.rate}", {start}, {mode}, {period}{swings})'
 
     def channels(self) -> Iterator[str]:
-        """Yield the channels."""
+        """Yield the source of each `Channel`."""
         for number, d in enumerate(self.interface.drives):
             table = d.table or d.name
             yield f'Channel("{table}.{d.load}", "{self._argument(d, d.load)}", "force", {number})'
