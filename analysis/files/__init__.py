@@ -1,6 +1,6 @@
 """Reading and writing files: tables of numbers, curves, drawings, and TOML or JSON with units; knows no mechanism.
 
-The names are those of ``__init__.pyi``; each is imported from its module when it is first used.
+``__init__.pyi`` lists the public names; each is imported from its module when it is first used.
 """
 
 from __future__ import annotations

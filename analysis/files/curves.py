@@ -1,4 +1,4 @@
-"""Points of a curve from a CSV or SVG file."""
+"""Read the points of a curve from a CSV or SVG file."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ _CSS = {**LENGTHS, "": INCH / 96, "px": INCH / 96, "pt": INCH / 72, "pc": INCH /
 _CHORD_ERROR = 1e-4
 #: Greatest extent of a curve of an SVG file (m), against typing errors.
 _WIDEST = 1e9
-#: Greatest depth of groups and uses in an SVG file, and greatest number of elements with all uses replaced.
+#: Greatest depth of nested groups and uses in an SVG file; greatest number of elements after all uses are replaced.
 _DEPTH, _ELEMENTS = 100, 100_000
 #: Words and units in SVG's transforms that svgelements knows; it ignores others silently.
 _TRANSFORMS = {
@@ -59,15 +59,16 @@ def read_points(
     points : ndarray, shape (n, 2)
         m.
     closed : bool
+        Whether the last point is joined to the first.
 
     Raises
     ------
     InputError
-        If the file cannot be read, or is not of this kind; with the line for CSV.
+        If the file cannot be read or is not valid; for CSV the message gives the line.
     UnknownNameError
-        If nothing in an SVG file has the name.
+        If no element of the SVG file has this ``id``.
     ParameterError
-        If the unit is not one of length.
+        If the unit is not a unit of length.
     """
     path = Path(path)
     ending = checked_ending(path, (".csv", ".txt", ".svg"))
@@ -93,7 +94,7 @@ def read_points(
 
 
 def _two_columns(path: Path, text: str) -> NDArray[np.float64]:
-    """Read x and y from the lines of a CSV file."""
+    """Return the columns x and y of a CSV file's text, shape (n, 2)."""
     rows: list[tuple[float, float]] = []
     header = False
     for number, line in enumerate(text.splitlines(), start=1):
@@ -116,7 +117,7 @@ def _two_columns(path: Path, text: str) -> NDArray[np.float64]:
 
 
 def _svg_points(path: Path, text: str, scale: float | None, name: str | None) -> tuple[NDArray[np.float64], bool]:
-    """Read the points of a curve from an SVG document, and whether it is closed."""
+    """Return the points of a curve in an SVG document, shape (n, 2), and whether the curve is closed."""
     require("svgelements")
     from io import StringIO
     from xml.etree import ElementTree
@@ -162,12 +163,12 @@ def _svg_points(path: Path, text: str, scale: float | None, name: str | None) ->
 
 
 def _check_tree(path: Path, root: Any) -> None:
-    """Check transforms, and the size of a drawing in which each ``<use>`` is replaced by a copy of its target."""
+    """Check that the transforms of an SVG drawing are known, and its size after each ``<use>`` is replaced by its target."""
     named = {element.get("id"): element for element in root.iter() if element.get("id") is not None}
     sizes: dict[int, int] = {}
 
     def size(element: Any, depth: int) -> int:
-        """Return the number of elements that replace an element."""
+        """Return the number of elements in an element, itself included, after uses are replaced."""
         if depth > _DEPTH:
             raise InputError(f"{path} has groups and uses inside each other, deeper than {_DEPTH}, or a use of itself")
         if id(element) not in sizes:

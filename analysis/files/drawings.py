@@ -60,7 +60,7 @@ class _Shape:
             raise InputError(f"{self!r} on layer {self.layer}: {requirement}")
 
     def _check(self, *numbers: float, positive: float = 1.0) -> None:
-        """Check that numbers are finite, and one of them above zero."""
+        """Check that all numbers are finite, and that ``positive`` is greater than zero."""
         self._require(all(map(isfinite, (*numbers, positive))), "all numbers must be finite")
         self._require(positive > 0.0, f"its size is {positive!r} m: it must be greater than zero")
 
@@ -91,8 +91,8 @@ class Circle(_Shape):
 class Polyline(_Shape):
     """Points joined by straight lines or arcs, shape (n, 2) in m; if closed, the last is joined to the first.
 
-    ``bulges``, one for each point, make the segment to the next point an arc, as in DXF: the tangent of a quarter of its
-    angle, positive counter-clockwise, at most 1, which is a half circle.
+    ``bulges``, one for each point, make arcs of the segments, as in DXF: each is the tangent of a quarter of the angle of the
+    arc to the next point, positive counter-clockwise, from -1 to 1; 1 is a half circle.
     """
 
     points: NDArray[np.float64]
@@ -122,7 +122,7 @@ class Polyline(_Shape):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Text(_Shape):
-    """A line of text that starts at a point (m), in letters of a height (m)."""
+    """A line of text that starts at ``position`` (m), with letters of ``height`` (m)."""
 
     position: Point
     height: float
@@ -135,7 +135,7 @@ class Text(_Shape):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Dimension(_Shape):
-    """The distance between two points (m), written over a line at a distance ``offset`` (m) to their left."""
+    """The distance between two points (m), written on a parallel line at the distance ``offset`` (m) to their left."""
 
     start: Point
     end: Point
@@ -161,7 +161,7 @@ class Dimension(_Shape):
 
     @property
     def readable(self) -> Dimension:
-        """The same dimension with its points from left to right, or upwards: read from below or from the right."""
+        """The same dimension with its points from left to right or upwards, so that it is read from below or from the right."""
         (x1, y1), (x2, y2) = self.start, self.end
         slight = 1e-9 * abs(y2 - y1)
         forward = x2 - x1 > slight or (abs(x2 - x1) <= slight and y2 > y1)
@@ -186,7 +186,7 @@ class Drawing:
     InputError
         If there is no shape, all shapes are at one point, or the title is not one printable line.
     UnknownNameError
-        If there is no layer of a shape's name.
+        If the layer of a shape is not in ``layers``.
     """
 
     title: str
@@ -211,7 +211,7 @@ class Drawing:
 
     @property
     def extents(self) -> tuple[Point, Point]:
-        """Lower left and upper right corner (m) of all shapes; of texts only the start counts."""
+        """Lower left and upper right corner (m) of the box about all shapes; of texts only the start counts."""
         points = np.vstack(
             [np.array([p for line in self.lines for p in (line.start, line.end)]).reshape(-1, 2)]
             + [np.array(c.centre) + side * c.radius for c in self.circles for side in (-1.0, 1.0)]
@@ -224,7 +224,7 @@ class Drawing:
 
 
 def _unit_length(unit: str, known: Iterable[str]) -> float:
-    """Return the length of a unit (m)."""
+    """Return the length of a unit (m); raise ParameterError if the unit is not in ``known``."""
     names = tuple(known)
     if unit not in names:
         raise ParameterError("unit", unit, f"be one of {', '.join(names)}")
@@ -232,7 +232,7 @@ def _unit_length(unit: str, known: Iterable[str]) -> float:
 
 
 def _label(dimension: Dimension, metre: float) -> str:
-    """Write a distance in a unit, rounded to hundredths of it."""
+    """Return the text of a dimension in a unit of length ``metre`` (m), rounded to hundredths of the unit."""
     return f"{round(dimension.length / metre, 2):g}"
 
 
@@ -248,12 +248,12 @@ def to_dxf(drawing: Drawing, unit: str = "mm") -> str:
     Returns
     -------
     str
-        Without a date: times and identifiers in the header are 0.
+        The DXF text, without a date: times and identifiers in the header are 0.
 
     Raises
     ------
     ParameterError
-        If the unit is not known.
+        If the unit is unknown.
     MissingLibraryError
         If ezdxf is not installed.
     """
@@ -320,7 +320,7 @@ def to_dxf(drawing: Drawing, unit: str = "mm") -> str:
 
 
 def to_svg(drawing: Drawing, unit: str = "mm") -> str:
-    """Write a drawing as SVG of real size: ``width`` and ``height`` in the unit, which is also the user unit.
+    """Write a drawing as SVG to scale 1:1, with ``width`` and ``height`` in the unit, which is also the user unit.
 
     Parameters
     ----------
@@ -331,13 +331,13 @@ def to_svg(drawing: Drawing, unit: str = "mm") -> str:
     Returns
     -------
     str
-        A group for each layer with shapes, its name as ``id``. SVG's y points down: a point (x, y) is at (x, -y), so that
-        `analysis.files.read_points` reads back the same points.
+        The SVG text, with a group for each layer that has shapes; its ``id`` is the layer's name. As SVG's y points down, a
+        point (x, y) is at (x, -y), and `analysis.files.read_points` reads the same points back.
 
     Raises
     ------
     ParameterError
-        If the unit is not one of SVG's.
+        If SVG does not have the unit.
     """
     svg = _Svg(drawing, _unit_length(unit, SVG_UNITS))
     number = svg.number
@@ -370,7 +370,7 @@ def to_svg(drawing: Drawing, unit: str = "mm") -> str:
 
 
 class _Svg:
-    """Elements of an SVG, in one group for each layer."""
+    """Elements of an SVG, in one group for each layer; ``metre`` is the length of its unit (m)."""
 
     def __init__(self, drawing: Drawing, metre: float) -> None:
         self.metre = metre
@@ -388,15 +388,15 @@ class _Svg:
         }
 
     def number(self, metres: float) -> str:
-        """Write a length in the unit."""
+        """Return a length (m) as text in the unit of the SVG."""
         return format(metres / self.metre + 0.0, ".15g")
 
     def point(self, x: float, y: float) -> str:
-        """Write a point, with y downwards."""
+        """Return a point (m) as text, with y downwards."""
         return f"{self.number(x)},{self.number(-y)}"
 
     def add(self, layer: str, tag: str, **attributes: Any) -> ElementTree.Element:
-        """Add an element; attributes that are numbers are lengths (m)."""
+        """Add an element to a layer and return it; attributes that are numbers are lengths (m)."""
         texts = {name: value if isinstance(value, str) else self.number(value) for name, value in attributes.items()}
         return ElementTree.SubElement(self.groups[layer], tag, texts)
 
@@ -419,14 +419,14 @@ class _Svg:
         return " ".join(parts) + (" Z" if polyline.closed else "")
 
     def add_text(self, layer: str, text: str, place: Point, height: float, **attributes: Any) -> ElementTree.Element:
-        """Add a text, its letters filled with the colour of the layer."""
+        """Add a text with letters in the colour of the layer, and return its element."""
         element = self.add(layer, "text", x=place[0], y=-place[1], **{"font-size": height}, **attributes)
         element.attrib |= {"font-family": "sans-serif", "fill": f"#{self.layers[layer].colour:06x}", "stroke": "none"}
         element.text = text
         return element
 
     def add_dimension(self, dimension: Dimension) -> None:
-        """Add the lines of a dimension, its arrows, and its number, which is read from below or from the right."""
+        """Add the lines, the arrows and the number of a dimension; the number is read from below or from the right."""
         layer, height, ends = dimension.layer, dimension.height, dimension.line
         for start, end in (ends, *zip((dimension.start, dimension.end), ends)):
             self.add_line(layer, start, end)
@@ -445,12 +445,12 @@ class _Svg:
 
 
 def save_drawing(path: str | Path, drawing: Drawing, *, unit: str = "mm") -> Path:
-    """Write a drawing as DXF or SVG, according to the path's ending.
+    """Write a drawing as DXF or SVG, according to the path's ending, and return the path.
 
     Raises
     ------
     InputError
-        If the ending is another.
+        If the path has another ending.
     ParameterError
         If the format does not have the unit.
     """
@@ -460,7 +460,7 @@ def save_drawing(path: str | Path, drawing: Drawing, *, unit: str = "mm") -> Pat
 
 
 def save_figure(figure: Any, path: str | Path, *, dpi: int = 150) -> Path:
-    """Write a Matplotlib figure in the format of the path's ending, PNG without one."""
+    """Write a Matplotlib figure in the format of the path's ending, by default PNG, and return the path."""
     with output(path) as (part, path):
         kind = path.suffix[1:] or "png"
         try:

@@ -1,8 +1,8 @@
 """Output files: a command overwrites only its own files, unless --force is given.
 
 A folder of results has a file ``.linkwork`` with hash, command and name of each result. A file that the command did not write,
-or that has changed since, stays, and the new file is put beside it: no result is lost, old or new. Outside of commands, in
-Python, a file replaces the one that was there.
+or that was changed later, stays, and the new file gets another name beside it, so that no result is lost. In Python, outside
+of commands, a new file replaces an existing one.
 """
 
 from __future__ import annotations
@@ -28,11 +28,11 @@ class Writing:
     Attributes
     ----------
     command : str
-        Its name; it may overwrite its own files.
+        Name of the command, which may overwrite its own files.
     force : bool
-        Whether it may overwrite other files.
+        Whether the command may overwrite other files.
     notes : list of str
-        A sentence for each file that was put beside another one.
+        A sentence for each file that got another name.
     """
 
     command: str
@@ -55,7 +55,7 @@ def written_by(command: str, force: bool = False) -> Iterator[Writing]:
 
 @contextmanager
 def output(path: str | Path) -> Iterator[tuple[Path, Path]]:
-    """Yield a path to write to and the final path, where the file then appears complete, or not at all."""
+    """Yield a temporary path to write to, and the final path, to which the file is moved when it is complete."""
     path = free_path(path)
     with whole(path) as part:
         yield part, path
@@ -73,7 +73,7 @@ def write_text(path: str | Path, text: str) -> Path:
 
 
 def free_path(path: str | Path) -> Path:
-    """Return the path, or one beside it if the command may not overwrite the file there."""
+    """Return the path, or a numbered one beside it if the current command may not overwrite the file there."""
     path, writing = Path(path), _CURRENT.get()
     if writing is None or writing.force or _is_own(path, writing.command):
         return path
@@ -86,33 +86,33 @@ def free_path(path: str | Path) -> Path:
 
 
 def record_output(path: Path) -> None:
-    """Record that the command wrote a file."""
+    """Record that the current command wrote a file, in ``.linkwork`` of its folder."""
     writing = _CURRENT.get()
     if writing is None:
         return
-    line = _line(path, writing.command)
-    if _recorded(path) != line:
+    line = _record_line(path, writing.command)
+    if _last_record_line(path) != line:
         # one short line at a time, so that commands in one folder do not disturb each other; if it fails, nothing is lost
         with suppress(OSError), path.with_name(RECORD).open("ab") as file:
             file.write(os.fsencode(f"{line}\n"))
 
 
 def _is_own(path: Path, command: str) -> bool:
-    """Return whether the path is free, or holds what the command wrote."""
+    """Return whether there is no file at the path, or one that the command wrote and nobody has changed."""
     if not os.path.lexists(path):
         return True
-    return path.is_file() and _recorded(path) == _line(path, command)
+    return path.is_file() and _last_record_line(path) == _record_line(path, command)
 
 
-def _line(path: Path, command: str) -> str:
-    """Return the line of the record for a file as it is."""
+def _record_line(path: Path, command: str) -> str:
+    """Return the line of the record for a file with its present content: hash, command, name."""
     with path.open("rb") as file:
         digest = hashlib.file_digest(file, "sha256").hexdigest()
     return f"{digest} {command}: {path.name}"
 
 
-def _recorded(path: Path) -> str:
-    """Return the last line of the record about a file."""
+def _last_record_line(path: Path) -> str:
+    """Return the last line of the record about a file; empty if there is none."""
     try:
         lines = os.fsdecode(path.with_name(RECORD).read_bytes()).splitlines()
     except (OSError, UnicodeDecodeError):

@@ -1,4 +1,4 @@
-"""Reading and writing files of any kind: limits of size, plain files only, files that are written in whole."""
+"""Read and write files of any kind, with limits of size, plain files only, and no incomplete files."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ _UTF_16 = (b"\xff\xfe", b"\xfe\xff")
 
 
 class WritingError(LinkworkError, OSError):
-    """A file cannot be written, for lack of space or of permission; the message names the file."""
+    """Error for a file that cannot be written, for lack of space or of permission; the message names the file."""
 
 
 def limit(name: str, default: int) -> int:
@@ -61,7 +61,7 @@ def checked_ending(path: Path, known: Sequence[str]) -> str:
 
 @contextmanager
 def whole(path: Path) -> Iterator[Path]:
-    """Yield a path to write to, which is renamed to ``path`` at the end: the file is there complete, or not at all."""
+    """Yield a temporary path to write to, which is renamed to ``path`` at the end, so that no incomplete file appears."""
     part = prepare(path).with_name(f"{path.name}.{os.getpid()}.part")
     try:
         yield part
@@ -89,7 +89,7 @@ def read_text(path: Path) -> str:
     except (EOFError, zlib.error, gzip.BadGzipFile) as error:
         raise InputError(f"{path} cannot be read: it is not a whole gzip file ({first_line(error)})") from error
     except (OSError, ValueError) as error:  # ValueError: a name with a null character in it
-        raise InputError(f"{_shown(path)} cannot be read: {getattr(error, 'strerror', None) or error}") from error
+        raise InputError(f"{_printable(path)} cannot be read: {getattr(error, 'strerror', None) or error}") from error
     if len(content) > most * _MB:
         raise InputError(
             f"{path} has more than {most} MB of text: give LINKWORK_MAX_FILE_MB a greater number to read it all the same"
@@ -103,7 +103,7 @@ def read_text(path: Path) -> str:
 
 
 def check_plain(path: Path) -> None:
-    """Raise InputError unless a path leads to a plain file, as devices and pipes may never end; OSError if nothing is there."""
+    """Raise InputError if a path is no plain file, as devices and pipes may never end; OSError if nothing is there."""
     mode = os.stat(path).st_mode
     if not stat.S_ISREG(mode):
         kinds = ((stat.S_ISDIR, "a folder"), (stat.S_ISFIFO, "a pipe"), (stat.S_ISSOCK, "a socket"))
@@ -117,7 +117,7 @@ def check_fmu(path: str | Path) -> None:
     Raises
     ------
     InputError
-        If not; the message says how to raise a limit.
+        If it cannot; the message says how to raise a limit.
     """
     path, most, members = Path(path), limit("FMU_MB", _FMU), limit("FMU_MEMBERS", _MEMBERS)
     try:
@@ -150,7 +150,7 @@ def check_fmu(path: str | Path) -> None:
             raise InputError(f"{path} has the member {name[:80]!r}, which would be unpacked outside of its folder")
 
 
-def _shown(path: Path) -> str:
+def _printable(path: Path) -> str:
     """Return a path as an error names it: printable, and of bounded length."""
     text = str(path)
     return text if text.isprintable() and len(text) <= 300 else repr(text[:300])
@@ -162,7 +162,7 @@ def first_line(error: Exception) -> str:
 
 
 def is_number(text: str) -> bool:
-    """Return whether Python reads a text as a number."""
+    """Return whether Python's ``float`` accepts a text."""
     try:
         float(text)
     except ValueError:

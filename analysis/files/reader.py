@@ -33,7 +33,7 @@ Made = TypeVar("Made")
 
 
 def unknown_name(name: str, known: Iterable[str], words: str | None = None) -> UnknownNameError:
-    """Return the error for a name that is not among those known, with the nearest ones; ``words`` replace the name in it."""
+    """Return the error for a name that is not in ``known``, with the nearest names; ``words`` replace the name in the text."""
     return UnknownNameError(name, tuple(known), words or "")
 
 
@@ -59,7 +59,7 @@ class _Entry(NamedTuple):
 
 
 def _entries(kind: Callable[..., Any], readers: Mapping[str, Reader], keys: Mapping[str, str]) -> dict[str, _Entry]:
-    """Return the entries of a kind of table by their names in the table; those without a default are required."""
+    """Return the entries of a kind of table by their names in the table; arguments without a default are required."""
     needed = set()
     if kind is not dict:
         arguments = inspect.signature(kind).parameters.values()
@@ -98,16 +98,17 @@ def read(
     Parameters
     ----------
     kind : dataclass, function or dict
+        It is called with the values by field and makes the object.
     value : mapping
         The table.
     name : str
-        Its dotted name; empty for a whole file.
+        Dotted name of the table; empty for a whole file.
     readers : mapping, optional
-        Readers by field, for fields that declare none, or in place of those that they declare.
+        Readers by field; they replace those that fields declare.
     keys : mapping, optional
-        Names in the table by field, where they differ.
+        Names in the table by field, if they differ.
     base : dataclass instance, optional
-        Source of the values that the table leaves out.
+        Values of the fields that are not in the table.
 
     Raises
     ------
@@ -152,7 +153,7 @@ def flag(value: Any, name: str) -> bool:
 
 
 def as_table(value: Any, name: str) -> Mapping[str, Any]:
-    """Read a table without looking inside."""
+    """Read a table without checking its entries."""
     if not isinstance(value, Mapping):
         raise ParameterError(name, value, "be a table")
     return value
@@ -215,7 +216,7 @@ class Whole:
 
 @dataclass(frozen=True, slots=True)
 class Choice:
-    """Reader of one of some texts."""
+    """Reader of a text that must be one of ``names``."""
 
     names: Iterable[str]
 
@@ -235,11 +236,11 @@ class Many:
     Attributes
     ----------
     item : callable
-        Reader of the items; their names have their number.
+        Reader of the items, whose names are numbered, such as ``bar.holes[0]``.
     least, length : int, optional
-        Least number, or number, of items.
+        Least number of items, and exact number of items.
     single : bool
-        Whether a single item may stand without a list.
+        Whether a single item may be given without a list.
     """
 
     item: Reader
@@ -261,7 +262,7 @@ class Many:
 
 @dataclass(frozen=True, slots=True)
 class Range:
-    """Reader of [least, greatest], or of one value for both."""
+    """Reader of [least, greatest], or of one value for both; ``ordered`` says whether least may not exceed greatest."""
 
     item: Reader
     ordered: bool = True

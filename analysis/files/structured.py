@@ -1,4 +1,4 @@
-"""TOML and JSON files as nested tables."""
+"""Read and write nested tables as TOML or JSON files."""
 
 from __future__ import annotations
 
@@ -18,8 +18,7 @@ from .paths import checked_ending, first_line, read_text
 from .reader import as_table
 
 ENDINGS = (".toml", ".json")
-#: Limits of a file of tables, which no case file exceeds: depth of nesting, characters of a text and of a name, bits of a whole
-#: number.
+#: Limits of a file of tables: depth of nesting, characters of a text and of a name, bits of a whole number.
 _DEPTH, _TEXT, _NAME, _BITS = 50, 10_000, 200, 1024
 
 
@@ -29,7 +28,7 @@ def write_tables(path: str | Path, data: Mapping[str, Any], *, head: str = "") -
     Raises
     ------
     InputError
-        If the ending is another.
+        If the path has another ending.
     """
     path = Path(path)
     if checked_ending(path, ENDINGS) == ".json":
@@ -58,7 +57,7 @@ def read_tables(path: str | Path) -> dict[str, Any]:
         raise InputError(f"{path} has tables or lists inside each other, deeper than {_DEPTH}") from None
     except ValueError as error:  # wrong syntax, or a whole number with thousands of digits
         raise InputError(
-            f"{path} is not valid {ending[1:].upper()}: {first_line(error)[:300]}{_twice(text, error)}"
+            f"{path} is not valid {ending[1:].upper()}: {first_line(error)[:300]}{_duplicate_in_words(text, error)}"
         ) from error
     if not isinstance(data, dict):
         raise InputError(f"{path} must hold tables, not {type(data).__name__}")
@@ -66,8 +65,8 @@ def read_tables(path: str | Path) -> dict[str, Any]:
     return data
 
 
-def _twice(text: str, error: ValueError) -> str:
-    """Return in words the entry or table of a TOML file that is there twice, where this is the error."""
+def _duplicate_in_words(text: str, error: ValueError) -> str:
+    """Return in words which entry or table of a TOML file is there twice; empty for any other error."""
     if not re.match("Cannot (overwrite|declare)", str(error)):
         return ""
     last = re.search(r"at line (\d+)", str(error))
@@ -79,7 +78,7 @@ def _twice(text: str, error: ValueError) -> str:
 
 
 def _check(path: Path, data: dict[str, Any]) -> None:
-    """Check the sizes of names, texts, numbers and nesting."""
+    """Raise InputError if names, texts, whole numbers or the nesting exceed their limits."""
     level: list[tuple[str, Any]] = [("", data)]
     for _ in range(_DEPTH):
         inside: list[tuple[str, Any]] = []
@@ -109,7 +108,7 @@ def _check_text(path: Path, name: str, text: str, longest: int) -> None:
 def overridden(
     data: Mapping[str, Any], overrides: Mapping[str, Any], *, exclusive: Collection[str] = ()
 ) -> dict[str, Any]:
-    """Return tables with single values replaced.
+    """Return a copy of nested tables with single values replaced.
 
     Parameters
     ----------
@@ -122,7 +121,7 @@ def overridden(
     Raises
     ------
     ParameterError
-        If a value would have to stand inside something that is no table.
+        If a dotted name leads through an entry that is no table.
     """
     result = dict(data)
     for name, value in overrides.items():

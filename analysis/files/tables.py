@@ -21,19 +21,19 @@ from .outputs import output
 from .paths import first_line, is_number, read_text, whole
 from .reader import unknown_name
 
-#: Numbers that are formatted at a time, for which Ctrl-C waits.
+#: Numbers that are written in one block; Ctrl-C takes effect between blocks.
 _BLOCK = 50_000
-#: Size (bytes) from which on a file is announced, with its progress on a terminal.
+#: A file of this size (bytes) or more is announced, and its progress is shown on a terminal.
 LARGE = 20_000_000
 
 
 def write_csv(path: str | Path, columns: Mapping[str, ArrayLike]) -> Path:
-    """Write columns of equal length with a header line; numbers in full precision.
+    """Write columns of equal length, by name, to a CSV file in full precision, and return its path.
 
     Raises
     ------
     InputError
-        If the columns differ in length, or there is no such folder.
+        If the columns differ in length, or the folder does not exist.
     Interrupted
         If Ctrl-C was pressed; no file is left then.
     """
@@ -55,7 +55,7 @@ def write_csv(path: str | Path, columns: Mapping[str, ArrayLike]) -> Path:
 
 
 def _write_rows(file: TextIO, path: Path, columns: Sequence[NDArray[np.float64]]) -> None:
-    """Write the rows block by block."""
+    """Write the rows block by block; announce a large file and show its progress."""
     count, block = len(columns[0]), max(1, _BLOCK // len(columns))
     row = ",".join(["%.17g"] * len(columns)) + "\n"
     done: Callable[[int], None] | None = None
@@ -74,7 +74,7 @@ def _write_rows(file: TextIO, path: Path, columns: Sequence[NDArray[np.float64]]
 
 @contextmanager
 def _bar(what: str, count: int) -> Iterator[Callable[[int], None]]:
-    """Show a progress bar if standard error is a terminal; yield the function that takes the number of rows done."""
+    """Show a progress bar if standard error is a terminal; yield a function to be called with the number of rows done."""
     from rich.console import Console
     from rich.progress import Progress
 
@@ -127,13 +127,13 @@ def read_columns(path: str | Path, names: Sequence[str | None]) -> list[NDArray[
     ----------
     path : str or Path
     names : sequence of str or None
-        Name of each column in the header line, with or without its unit in brackets; None takes the column at the same place
-        in the file. In a file without a header, columns are taken by their places.
+        Name of each column in the header line, with or without its unit in brackets; for None the column at the same position
+        is taken. In a file without a header all columns are taken by position.
 
     Raises
     ------
     InputError
-        If it cannot be read, or a cell is not a number; the message has the line.
+        If the file cannot be read, or a cell is not a number; the message gives the line.
     UnknownNameError
         If there is no such column.
     """
@@ -162,7 +162,7 @@ def read_columns(path: str | Path, names: Sequence[str | None]) -> list[NDArray[
 
 
 def read_rows(path: str | Path) -> list[dict[str, str]]:
-    """Read the rows of a CSV file as texts by the names in its header line.
+    """Read the rows of a CSV file, each as a dictionary of texts by the names in the header line.
 
     Raises
     ------
@@ -181,7 +181,7 @@ def read_rows(path: str | Path) -> list[dict[str, str]]:
 
 
 def save_array(path: str | Path, values: ArrayLike) -> Path:
-    """Write an array for a cache, complete or not at all; see `load_array`."""
+    """Write an array with its hash to a file of a cache, and return the path; see `load_array`."""
     content = io.BytesIO()
     np.save(content, np.asarray(values, dtype=float))
     with whole(path := Path(path)) as part:
@@ -190,7 +190,7 @@ def save_array(path: str | Path, values: ArrayLike) -> Path:
 
 
 def load_array(path: str | Path) -> NDArray[np.float64] | None:
-    """Read an array of `save_array`; None if there is no file, or, with a warning, if its hash says that it is damaged."""
+    """Read an array that `save_array` wrote; None if there is no file, or, with a warning, if the hash does not match."""
     path = Path(path)
     try:
         if not path.is_file():

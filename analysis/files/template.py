@@ -1,4 +1,4 @@
-"""Write tables with every entry explained, from the readers of `analysis.files.reader` and docstrings."""
+"""Write tables of case files with an explanation of every entry, from the readers of its fields and from docstrings."""
 
 from __future__ import annotations
 
@@ -17,22 +17,22 @@ from ..units import with_unit
 from . import reader
 from .reader import Choice, Many, Quantity, Range, Reader, Table, Whole
 
-#: Easily read units by SI unit, with the number of them in one SI unit.
+#: Easily read units by SI unit, each with the factor from SI.
 _FRIENDLY = {"rad": ("deg", degrees(1.0)), "rad/s": ("rpm", 30.0 / pi)}
 #: Angle of examples (rad).
 _ANGLE = pi / 6.0
-#: Column of the explanations.
+#: Column at which the explanations start.
 _COLUMN = 46
 
 
 def in_words(value: float, unit: str) -> str:
-    """Write a quantity in SI with an easily read unit, to ten digits."""
+    """Return a quantity given in SI as text with an easily read unit, to ten digits."""
     name, factor = _FRIENDLY.get(unit, (with_unit(value, unit).partition(" ")[2], 1.0))
     return f"{value * factor:.10g} {name}"
 
 
 def literal(value: Any) -> str:
-    """Write a value as TOML in one line."""
+    """Return a value as TOML in one line."""
     if isinstance(value, Mapping):
         return f"{{ {', '.join(f'{key} = {literal(inner)}' for key, inner in value.items())} }}"
     if isinstance(value, Sequence) and not isinstance(value, str):
@@ -87,7 +87,10 @@ def example(read: Reader) -> Any:
 
 
 def meanings(kind: Any, *, follow: bool = True) -> dict[str, str]:
-    """Return what the docstrings of a class or function, and of names in backticks in its first line, say of the entries."""
+    """Return the explanations of entries by name, from the docstring of a class or function.
+
+    With ``follow`` the docstrings of names in backticks in its first line are used as well.
+    """
     doc = inspect.getdoc(kind) or ""
     found: dict[str, str] = {}
     if follow:
@@ -109,7 +112,7 @@ def meanings(kind: Any, *, follow: bool = True) -> dict[str, str]:
 
 
 def line(name: str, value: Any, comment: str, *, active: bool) -> str:
-    """Write an entry and its explanation; an entry that is not active, or has no value, becomes a comment."""
+    """Return the line of an entry with its explanation; the entry is commented out if it is not active or has no value."""
     text = f"{name} = {literal(value)}" if value is not None else f"{name} = ..."
     if value is None or not active:
         text = f"# {text}"
@@ -117,7 +120,7 @@ def line(name: str, value: Any, comment: str, *, active: bool) -> str:
 
 
 def _default(of: Any, read: Reader) -> Any:
-    """Return a default as a file has it; None if a file cannot express it."""
+    """Return a default as it is written in a file; None if a file cannot express it."""
     if isinstance(read, Quantity) and isinstance(of, (int, float)):
         return (float(of) if read.unit == "1" else in_words(of, read.unit)) if isfinite(of) else None
     if isinstance(read, Range) and isinstance(of, tuple):
@@ -136,12 +139,13 @@ def entries(
     Parameters
     ----------
     kind : dataclass, or dict with ``readers``
+        Kind of the table.
     given : mapping
         Values by name in the file.
     readers : mapping, optional
         Readers by name, instead of the dataclass's own.
     active : bool
-        Whether the given entries are no comments.
+        Whether the given entries are active; otherwise they are comments too.
     """
     about = {} if kind is dict else meanings(kind)
     known: dict[str, tuple[Reader, Any, str]] = {name: (read, None, "") for name, read in (readers or {}).items()}
