@@ -1,4 +1,4 @@
-"""Instances of Linkwork's FMUs through FMPy: any kind of FMU, co-simulation and model exchange."""
+"""Run instances of Linkwork's FMUs with FMPy: any kind of FMU, in co-simulation and model exchange."""
 
 from __future__ import annotations
 
@@ -31,19 +31,19 @@ from .component import ComponentModel, ComponentSlave, component_of
 
 
 class CosimulationError(LinkworkError):
-    """An FMU could not be loaded or initialised; the sentence is the FMU's own where it gave one."""
+    """An FMU could not be loaded or initialised; the message is the FMU's own if it gave one."""
 
 
 def unpacking_folder() -> str:
-    """Return a folder to unpack an FMU in: the temporary folder, or another if a Python FMU cannot read that one.
+    """Return a folder in which to unpack an FMU: the temporary folder, or another if a Python FMU cannot read that one.
 
-    An FMU is told the URI of its folder. PythonFMU's wrapper decodes "%20" in it and nothing else, and where it does not find
-    its files then it ends the process.
+    An FMU receives the URI of its folder. PythonFMU's wrapper decodes only "%20" in the URI; if it then does not find its
+    files, it ends the process.
 
     Raises
     ------
     CosimulationError
-        If there is none.
+        If there is no such folder.
     """
     here = tempfile.gettempdir()
     others = ("/tmp", "/var/tmp") if os.name == "posix" else (os.environ.get("PUBLIC"), "C:/Windows/Temp")
@@ -57,7 +57,7 @@ def unpacking_folder() -> str:
 
 
 def _description(fmu: str | Path) -> Any:
-    """Read the model description of an FMU with FMPy."""
+    """Read and validate the model description of an FMU; CosimulationError if there is no such FMU."""
     if not Path(fmu).is_file():
         raise CosimulationError(f"there is no file {fmu}: build it with 'linkwork build'")
     try:
@@ -73,26 +73,26 @@ def read_description(fmu: str | Path, *, validate: bool = False) -> Any:
     Raises
     ------
     InputError
-        If it cannot be read, or leaves out the name of a variable.
+        If the description cannot be read, or a variable has no name.
     """
     try:
         with ZipFile(fmu) as archive:
             root = ElementTree.fromstring(archive.read("modelDescription.xml"))
         description = read_model_description(str(fmu), validate=validate)
     except Exception as error:  # FMPy raises plain ones
-        # a validation has its findings below its first line
+        # the findings of a validation are below its first line
         lines = [line.strip("- ") for line in str(error).splitlines()] or [type(error).__name__]
         said = " ".join(lines[:2]) if lines[0].endswith(":") else lines[0]
         raise InputError(f"{fmu} is not an FMU: {said}") from error
     for variable in root.iterfind("ModelVariables/*"):
-        if not variable.get("name"):  # FMPy leaves it out, and numbers the others wrongly
+        if not variable.get("name"):  # FMPy skips such a variable, and numbers the others wrongly
             reference = variable.get("valueReference")
             raise InputError(f"{fmu} is not an FMU: the variable with the value reference {reference} has no name")
     return description
 
 
 def offered(fmu: str | Path) -> dict[str, str]:
-    """Return the interfaces that an FMU has, by their names in `cosimulate`, each with a description.
+    """Return the interfaces that an FMU has: their descriptions by their names in `cosimulate`.
 
     Raises
     ------
@@ -109,29 +109,29 @@ def offered(fmu: str | Path) -> dict[str, str]:
 
 
 class _Instance:
-    """An instance of an FMU of Linkwork through FMPy, initialised. Use as a context manager.
+    """An initialised instance of an FMU of Linkwork, run by FMPy. Use it as a context manager.
 
-    Which mechanism it must be of, the parameters say; which version of FMI it is, the file says.
+    The FMU must be of the mechanism to which the parameters belong; the file determines the version of FMI.
 
     Parameters
     ----------
     fmu : path
     parameters, initial
-        Of a mechanism.
+        Parameters and initial state of a mechanism.
     modes : dict
         Values of the mechanism's modes, by name.
     tolerance, start_time : float
     inputs : dict
-        At the start, by name.
+        Inputs at the start, by name.
 
     Raises
     ------
     CosimulationError
-        If the file is no such FMU, or its initialisation fails.
+        If the file is not such an FMU, or its initialisation fails.
     """
 
     interface: ClassVar[str]
-    #: The attribute of FMPy's model description that has the interface; the class that runs it, by the version of FMI.
+    #: Attribute of FMPy's model description that describes the interface; classes that run it, by the version of FMI.
     described: ClassVar[str]
     _classes: ClassVar[Mapping[str, type]]
     _component: ClassVar[type]
@@ -165,11 +165,11 @@ class _Instance:
                 f"{self.description.modelName}: it has no {named}"
             )
         try:
-            # native FMUs read nothing from their folder
+            # only Python FMUs read files from their folder
             wrapped = str(self.description.generationTool).startswith("PythonFMU")
             self._folder = tempfile.mkdtemp(dir=unpacking_folder() if wrapped else None)
             extract(str(fmu), self._folder)
-            with chdir("."):  # FMPy leaves the working folder changed where a library cannot be loaded
+            with chdir("."):  # FMPy leaves the working folder changed if a library cannot be loaded
                 self._fmu = self._running(described.modelIdentifier)(
                     guid=self.description.guid,
                     unzipDirectory=self._folder,
@@ -191,7 +191,7 @@ class _Instance:
         self._get_reals = getattr(self._fmu, f"get{self._real}")
 
     def _running(self, identifier: str) -> type:
-        """Return the class that runs the FMU: a WebAssembly component where there is no library for this platform."""
+        """Return the class that runs the FMU: of FMPy, or for a WebAssembly component if no library is for this platform."""
         assert self._folder is not None
         native = Path(self._folder) / "binaries" / (platform_tuple if self._fmi3 else platform)
         if native.is_dir() or not component_of(self._folder, identifier).is_file():
@@ -232,7 +232,7 @@ class _Instance:
         self._fmu.exitInitializationMode()
 
     def _log(self, *arguments: Any) -> None:
-        """Record a log message; of the arguments of FMI 2.0 or 3.0 the message is the last."""
+        """Record a log message, the last of the arguments in FMI 2.0 and in FMI 3.0."""
         self.messages.append(arguments[-1].decode("utf-8", errors="replace"))
 
     def __enter__(self) -> Self:
@@ -242,7 +242,7 @@ class _Instance:
         self.close()
 
     def set_inputs(self, values: Mapping[str, float]) -> None:
-        """Set all inputs."""
+        """Set all inputs, by name."""
         self._set_reals(self._inputs, [values[name] for name in self.input_names])
 
     def outputs(self) -> list[float]:
@@ -250,7 +250,7 @@ class _Instance:
         return list(self._get_reals(self._outputs))
 
     def trouble(self) -> tuple[int, str]:
-        """Return solver.status and solver.message."""
+        """Read solver.status and solver.message."""
         found = []
         for name in ("solver.status", "solver.message"):
             variable = self._variables[name]
@@ -278,7 +278,7 @@ class FmuRun(_Instance):
     _component = ComponentSlave
 
     def step(self, time: float, step: float) -> tuple[int, str]:
-        """Take one communication step; returns solver.status and solver.message, 0 and an empty string where it succeeds."""
+        """Take one communication step; return 0 and an empty text, or solver.status and solver.message if it is refused."""
         try:
             self._fmu.doStep(time, step)
         except FMICallException:
@@ -287,16 +287,16 @@ class FmuRun(_Instance):
 
     @property
     def interpolates(self) -> bool:
-        """Return whether the FMU takes inputs that are linear over a step."""
+        """Return whether the FMU can have inputs that change linearly over a step."""
         return bool(getattr(self.description.coSimulation, "canInterpolateInputs", False))
 
     def set_slopes(self, values: Mapping[str, float]) -> None:
-        """Set the time derivatives of all inputs over the next step."""
+        """Set the time derivatives of all inputs over the next step, by name."""
         self._fmu.setRealInputDerivatives(self._inputs, [1] * len(values), [values[name] for name in self.input_names])
 
 
 class FmuModel(_Instance):
-    """An instance of an FMU for model exchange, in continuous-time mode once it is made: states, derivatives, events.
+    """An instance of an FMU for model exchange, in continuous-time mode: states, derivatives, events.
 
     Attributes
     ----------
@@ -319,12 +319,12 @@ class FmuModel(_Instance):
         self.update()
 
     def put(self, time: float, x: Any) -> None:
-        """Set time and states, an array of ctypes."""
+        """Set the time and the states, an array of ctypes."""
         self._fmu.setTime(time)
         self._fmu.setContinuousStates(x, self.states)
 
     def get_states(self, x: Any) -> None:
-        """Write the states into an array of ctypes, as the getters below do."""
+        """Write the states into an array of ctypes; the getters below do the same with their values."""
         self._fmu.getContinuousStates(x, self.states)
 
     def get_nominals(self, x: Any) -> None:
@@ -337,13 +337,13 @@ class FmuModel(_Instance):
         self._fmu.getEventIndicators(z, self.indicators)
 
     def event(self, inputs: Mapping[str, float]) -> bool:
-        """Set new input values in event mode and return whether the FMU asks for the end of the run."""
+        """Set new inputs in event mode; return whether the FMU requests the end of the run."""
         self._fmu.enterEventMode()
         self.set_inputs(inputs)
         return self.update()
 
     def update(self) -> bool:
-        """Update discrete states, enter continuous-time mode, return whether the FMU asks for the end of the run."""
+        """Update discrete states and enter continuous-time mode; return whether the FMU requests the end of the run."""
         again, terminate = True, False
         while again and not terminate:
             again, terminate, *_ = self._update()

@@ -1,10 +1,10 @@
-"""Runs of an ensemble in lanes: as many at once as the processor takes doubles, each with its own time, step size and end.
+"""Runs of an ensemble in lanes: one run in each lane of the processor's vectors, with its own time, step size and end.
 
 The steps are those of `compiled`: the stages of all lanes are computed together, and each lane then accepts its step or tries
-a shorter one. A lane whose run ends takes the next run. Intervals of inputs begin, and the limit of assembly is located, by
-the functions of single runs. Arrays in lanes are flat: number i of lane l is at ``LANES * i + l``.
+a shorter one. When a run ends, its lane takes the next run. Beginning an interval of inputs and locating the limit of assembly
+is done by the functions for single runs. Arrays in lanes are flat: number i of lane l is at ``LANES * i + l``.
 
-A run fits here if its inputs are constant in each interval. Others, which have them evaluated at each stage, are left to
+Only runs whose inputs are constant in each interval fit here; runs whose inputs must be evaluated at each stage are left to
 `compiled.run`.
 """
 
@@ -45,10 +45,13 @@ from .stepping_in_lanes import errors_in_lanes, interpolants_in_lanes, interpola
 
 
 class Lanes(NamedTuple):
-    """Work arrays: addresses of the equations in lanes; of each lane its run or -1, where that is, whether the step is the last
-    of its interval, what became of it; and in lanes the state, its end and that at a stage, modes, channels, constants, scales,
-    step size, error, fraction of the step, stages, interpolant, clearance; and a row for each lane, the state at the
-    fraction."""
+    """Work arrays of all lanes.
+
+    ``code`` are the addresses of the equations in lanes. For each lane: ``run`` is the number of its run or -1, ``phase`` and
+    ``outcome`` are constants of this module, ``last`` is 1 if the step is the last of its interval. In lanes: state ``x``,
+    state at the end of the step ``y`` and at a stage ``z``, modes, channels, constants, scales, step size, error, fraction of
+    the step, stages, interpolant, clearance. A row of ``between`` is the state of a lane at its fraction.
+    """
 
     code: NDArray[np.int64]
     run: NDArray[np.int64]
@@ -71,15 +74,15 @@ class Lanes(NamedTuple):
     between: NDArray[np.float64]
 
 
-# Where a run is: between intervals, inside one whose first rates are not known, or inside
+# Phase of a run: between intervals, in an interval whose first rates are not known, or in an interval with known rates
 _BETWEEN, _ENTERED, _INSIDE = range(3)
-# What became of a step
+# Outcome of a step: no step, rejected, accepted, accepted and its samples not yet recorded
 _IDLE, _REJECTED, _ACCEPTED, _SAMPLED = range(4)
 
 
 @part
 def _make_lanes(code, states, modes, channels, constants):
-    """Allocate work arrays, with empty lanes."""
+    """Allocate the work arrays, with no run in any lane."""
     n = states * LANES
     return Lanes(
         code, np.full(LANES, -1), np.zeros(LANES, np.int64), np.zeros(LANES, np.int64), np.zeros(LANES, np.int64),
@@ -96,7 +99,7 @@ def _equation(which, x, out, v):
 
 @inner
 def _attempt(v):
-    """Take a step in all lanes into ``v.y``, as `stepping.attempt`."""
+    """Take a step in all lanes, as `stepping.attempt` does, into ``v.y``; write the errors into ``v.error``."""
     for s in range(1, STAGES):
         stage_in_lanes(s, v.x, v.k, v.h, v.y)
         _equation(DERIVATIVE, v.y, v.k[s], v)
@@ -115,7 +118,7 @@ def _make_interpolants(v):
 
 @inner
 def _sample(samples, state, v):
-    """Record the samples inside the steps."""
+    """Record the samples inside the accepted steps of all lanes."""
     while True:
         more = False
         for lane in range(LANES):
@@ -154,7 +157,7 @@ def _finite(lane, states, many):
 
 @inner
 def _judge(lane, error, carry, samples, v):
-    """Return what becomes of the step of a lane with an error relative to the tolerance."""
+    """Return the outcome of a lane's step, whose error is relative to the tolerance."""
     clearance, states = v.clearance[lane], v.x.shape[0] // LANES
     if not error <= 1.0 or isnan(clearance) or not _finite(lane, states, v.y):
         return _REJECTED
@@ -167,7 +170,7 @@ def _judge(lane, error, carry, samples, v):
 
 
 class Work(NamedTuple):
-    """What the lanes work on: the arguments of `run_in_lanes`, and room for the functions of single runs."""
+    """The arguments of `run_in_lanes`, and the work arrays that the functions for single runs need."""
 
     fits: NDArray[np.bool_]
     problem: Problem
@@ -182,13 +185,13 @@ class Work(NamedTuple):
 
 @inline
 def _motion(i, w):
-    """Return a reference to a run."""
+    """Return a reference to run i as a `Motion`."""
     return motion_of(i, w.problem, w.source, w.batch, w.watch, w.samples, w.room, w.state)
 
 
 @inner
 def _take_run(lane, first, most, v, w):
-    """Give a lane the first run from a number on that has something to do; return the number after it."""
+    """Give a lane the next run, from number ``first`` on, that fits and has steps to take; return the number after it."""
     i, end = first, w.status.shape[0]
     while i < end and not (w.fits[i] and w.status[i] == RUNNING and w.state.carries[i].steps < most):
         i += 1
@@ -203,7 +206,7 @@ def _take_run(lane, first, most, v, w):
 
 @inner
 def _enter(lane, v, w):
-    """Begin an interval, or go on inside one, unless the run ends there."""
+    """Begin a lane's next interval or continue inside one; the lane becomes empty if the run ends there."""
     i = v.run[lane]
     carry = w.state.carries[i]
     if carry.midway == 0:
@@ -219,7 +222,7 @@ def _enter(lane, v, w):
 
 @inner
 def _fill(first, most, v, w):
-    """Bring each lane to the beginning of a step; return the number of lanes that have one, and of the next run."""
+    """Bring each lane to the beginning of a step; return how many lanes have a step, and the number of the next run."""
     busy = 0
     for lane in range(LANES):
         v.outcome[lane] = _IDLE
@@ -241,7 +244,7 @@ def _fill(first, most, v, w):
 
 @inner
 def _choose_sizes(v, w):
-    """Choose the size of each lane's step, with the first rates of the intervals that begin."""
+    """Choose the step size of each lane; compute the first rates in lanes whose interval begins."""
     fresh = False
     for lane in range(LANES):
         fresh |= v.run[lane] >= 0 and v.phase[lane] == _ENTERED
@@ -263,7 +266,7 @@ def _choose_sizes(v, w):
 
 @inner
 def _end_at_limit(lane, v, w):
-    """End a run at the limit of assembly inside its step."""
+    """End a lane's run at the limit of assembly, which lies inside its step."""
     i, h = v.run[lane], v.h[lane]
     take(lane, LANES, v.x, w.state.x[i])
     take(lane, LANES, v.y, w.room.y)
@@ -279,7 +282,7 @@ def _end_at_limit(lane, v, w):
 
 @inner
 def _decide(lane, least, v, w):
-    """Decide what becomes of the step of a lane."""
+    """Decide on the outcome of a lane's step and choose the next step size; end the run if it cannot continue."""
     i, h = v.run[lane], v.h[lane]
     carry = w.state.carries[i]
     error = v.error[lane] / w.problem.tolerance
@@ -299,7 +302,7 @@ def _decide(lane, least, v, w):
 
 @inner
 def _move_on(lane, v, w):
-    """Go on from the end of an accepted step."""
+    """Move a lane to the end of its accepted step."""
     i = v.run[lane]
     carry = w.state.carries[i]
     for j in range(lane, v.x.shape[0], LANES):
@@ -318,7 +321,7 @@ def _move_on(lane, v, w):
 
 @inner
 def _run(lanes, work, most, budget):
-    """Do the work of `run_in_lanes`, which holds the arrays that are referred to here."""
+    """Do the work of `run_in_lanes`: that function keeps the arrays alive to which this one has references."""
     v, w = refer(lanes), refer(work)
     least = LEAST_STEP * (w.problem.end - w.samples.times[0])
     first = 0
@@ -352,9 +355,10 @@ def _run(lanes, work, most, budget):
     purpose="the solver of ensembles",
 )
 def run_in_lanes(code, fits, problem, source, batch, watch, state, samples, status, most, budget):
-    """Integrate the runs of a batch that fit and whose status is RUNNING, as `compiled.run` does one after the other.
+    """Integrate the runs of a batch for which ``fits`` is true and whose status is RUNNING, several at once.
 
-    ``code`` are the addresses of the equations in lanes, see `equations.machine`.
+    ``code`` are the addresses of the equations in lanes, see `equations.machine`; the other arguments are those of
+    `compiled.run`.
     """
     states, channels = state.x.shape[1], state.u.shape[1]
     room = make_room(states, problem.outputs, channels)

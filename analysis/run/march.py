@@ -1,4 +1,4 @@
-"""Runs by SciPy's ODE methods, and by others of its kind: independent of the compiled solver."""
+"""Solve a run with an ODE method of SciPy, or another method with its interface, independently of the compiled solver."""
 
 from __future__ import annotations
 
@@ -21,16 +21,16 @@ from .prepared import Run, verdict
 from .sampling import NotFiniteError, release, sample
 from .trajectory import Occurrence, Trajectory
 
-#: Evaluations without a value, while the time hardly advances, after which an implicit method is stopped: LSODA never would.
+#: Evaluations without a value at almost the same time after which an implicit method is stopped: LSODA would never stop.
 MOST_LOSSES = 300
 
-#: What ends an interval early: an event of the user, the release of a torsion bar by its number, or None: the limit of
-#: assembly.
+#: What can end an interval early: an event of the user, the number of a torsion bar that is released, or None for the limit
+#: of assembly.
 What = Event | int | None
 
 
 def solve(run: Run, method: str | type[OdeSolver], options: dict[str, Any], progress: bool) -> Trajectory:
-    """Solve a run by `solve_ivp`, one interval of smooth inputs after the other."""
+    """Solve a run with `solve_ivp`, one interval of smooth inputs after the other."""
     begun = clock.perf_counter()
     march = March(run)
     interrupted = False
@@ -67,9 +67,9 @@ def solve(run: Run, method: str | type[OdeSolver], options: dict[str, Any], prog
 
 
 class March:
-    """A run by `solve_ivp`: the loop of `compiled.run` over the intervals of smooth inputs, in Python.
+    """A run with `solve_ivp`: the loop of `compiled.run` over the intervals of smooth inputs, in Python.
 
-    It shares the equations and the sampling of the inputs with the compiled code, and neither integrator nor root finder.
+    Equations and sampling of inputs are the same as in the compiled code, integrator and root finder are not.
     """
 
     def __init__(self, run: Run) -> None:
@@ -79,25 +79,26 @@ class March:
         start = run.start()
         self.x, self.energy, self.scale = start.x, start.energy, start.scale
         self.laws = run.encoded.source.laws.copy()
-        #: components of the state that torsion bars act by
+        #: components of the state that are the angles of torsion bars
         self.angles = run.encoded.source.law_places[:, 1].tolist()
         self.t = float(run.settings.times[0])
-        #: what acts on the plant
+        #: inputs in force, in the form that the equations take
         self.held: Any = None
         self.rows: list[tuple[float, NDArray[np.float64], Any]] = []
         self.occurrences: list[Occurrence] = []
         self.evaluations = 0
         self.status = k.RUNNING
-        #: the input that was not finite inside a step, which is then tried again shorter; evaluations without a value, and
-        #: the latest time with a value, with its state
+        #: number of an input that was not finite inside a step (the step is then repeated with a shorter length), and number of
+        #: evaluations without a value
         self._lost: int | None = None
         self.losses = 0
-        #: times nearer than this are the same in the present interval (s)
+        #: times in the present interval count as equal if their distance is smaller (s)
         self.same = 0.0
-        #: derivative without a value: so large that errors are, or for Radau and BDF no number, which ends their iterations
+        #: stands for a derivative without a value: it makes the error large, or as NaN ends the iterations of Radau and BDF
         self.nothing = 1e200
+        #: latest time at which the derivative had a value, and the state there
         self.good = self.t, self.x
-        #: value of each event at the end of the interval before; zero where it happened just there
+        #: value of each event at the end of the last interval; zero if the event happened there
         self._gaps: list[float] | None = None
 
     def _end_of_interval(self, interval: int) -> float:
@@ -108,7 +109,7 @@ class March:
         return float(later[0] if len(later) else times[-1])
 
     def _sample(self, stop: float) -> NDArray[np.float64]:
-        """Sample the inputs at the beginning of an interval."""
+        """Sample the inputs at the beginning of an interval that ends at ``stop``; return the channels."""
         e, t, end = self.of.encoded, self.t, self.settings.times[-1]
         if self.settings.hold:
             ahead = stop if t < end else t + self.settings.hold
@@ -119,7 +120,7 @@ class March:
         return u
 
     def run(self, method: str | type[OdeSolver], options: dict[str, Any], show: Callable[[float], None] | None) -> None:
-        """Integrate to the end, to a stopping event, or until the integrator fails."""
+        """Integrate until the end, a stopping event, the limit of assembly, or a failure of the integrator."""
         times, end = self.settings.times, self.settings.times[-1]
         method, interval = self._ending(method), 0
         while True:
@@ -167,7 +168,7 @@ class March:
         return self.of.applied(sample(self.of.encoded, t, x, self.laws, left=t >= stop))
 
     def _derivative(self, t: float, x: NDArray[np.float64], stop: float) -> NDArray[np.float64]:
-        # where there is no configuration or no input, such a derivative has the step tried again shorter
+        # without a configuration or an input, such a derivative makes the method repeat the step with a shorter length
         nothing = np.full(len(x), self.nothing)
         try:
             held = self._inputs(t, x, stop)
@@ -179,22 +180,22 @@ class March:
         if result is None:
             self.losses += 1
             return nothing
-        # a trial of a step too long may be anywhere
+        # a stage of a step that is too long may be anywhere
         if t > self.good[0] and np.abs(x).max() < 1e100:
             self.good = t, x.copy()
         return result
 
     def _value(self, x: NDArray[np.float64], held: Any) -> NDArray[np.float64] | None:
-        """Return the derivative at a state, or None where the equations have none."""
+        """Return the derivative at a state, or None if the equations have no value there."""
         try:
             return np.array(self.equations.derivative(tuple(x), held, self.of.p))
         except (ArithmeticError, ValueError):
             return None
 
     def _ending(self, method: str | type[OdeSolver]) -> str | type[OdeSolver]:
-        """Return a method of SciPy, made to end where the equations have no value beyond.
+        """Return a method that fails as soon as it reaches a state at which the equations have no value.
 
-        The implicit methods may else accept a state without one, or try again for ever.
+        Only SciPy's implicit methods are changed: they might accept such a state, or repeat the step for ever.
         """
         kind = getattr(integrate, method) if isinstance(method, str) else method
         if not issubclass(kind, (BDF, LSODA, Radau)):
@@ -208,7 +209,7 @@ class March:
             def _step_impl(self) -> tuple[bool, str | None]:
                 try:
                     done, message = super()._step_impl()
-                except ValueError:  # a Jacobian that is no number
+                except ValueError:  # a Jacobian with NaN
                     return False, self.TOO_SMALL_STEP
                 if self.t > self.reached + march.same:
                     self.reached, march.losses = self.t, 0
@@ -220,7 +221,7 @@ class March:
         return Ending
 
     def outputs(self, x: NDArray[np.float64], held: Any) -> tuple[float, ...]:
-        """Return the outputs at a state, NaN where a law of a spring has no value."""
+        """Return the outputs at a state; all are NaN if they cannot be computed, as where a spring's law has no value."""
         try:
             found: tuple[float, ...] = self.equations.outputs(tuple(x), held, self.energy, self.of.p)
         except (ArithmeticError, ValueError):
@@ -255,7 +256,7 @@ class March:
                 **options,
             )
         self.evaluations += int(solution.nfev)
-        # in the order of `watched`: of what happens at one time, the limit and the release come first
+        # `watched` has the limit and the releases first, so that they come first among simultaneous events
         happened = sorted(
             (
                 (float(t), what, x)
@@ -267,7 +268,7 @@ class March:
         for t, event, x in happened:
             if isinstance(event, Event):
                 self.occurrences.append(Occurrence(event.name, t, tuple(x[:-2].tolist())))
-        # SciPy gives empty lists where an event comes before the first of the times
+        # SciPy returns empty lists if an event comes before the first of the times
         for t, x in zip(solution.t, np.ascontiguousarray(np.asarray(solution.y).T)):
             if t < stop:
                 self.rows.append((float(t), x, self._inputs(t, x, stop)))
@@ -290,8 +291,8 @@ class March:
             clearance = self.equations.clearance(tuple(self.x), self.held, self.of.p)
             self.status = k.LIMIT if abs(clearance) < NEAR_LIMIT else k.NO_STEP
         self.held = self._inputs(self.t, self.x, stop)
-        # what happens together with the release or the end of the interval must neither be lost nor be reported twice: what
-        # has not been reported by now is left to the beginning of the next one
+        # an event at the release or at the end of the interval must be reported exactly once: if it has not been reported
+        # here, it is left to the beginning of the next interval
         same = SAME * (self.t - t0)
         just_now = [event for t, event, _ in happened if t >= self.t - same]
         before = self.x - same * self._derivative(self.t, self.x, stop)
@@ -307,7 +308,7 @@ class March:
         return what.stop if isinstance(what, Event) else True
 
     def _watched(self, stop: float) -> list[tuple[What, Callable[[float, NDArray[np.float64]], float]]]:
-        """Return the event functions for `solve_ivp`: the limit of assembly, the release of torsion bars, the user's."""
+        """Return events and their functions for `solve_ivp`: limit of assembly, release of torsion bars, events of the user."""
 
         def limit(t: float, x: NDArray[np.float64]) -> float:
             try:
@@ -329,7 +330,7 @@ class March:
             function.terminal = True
 
         t0, x0 = self.t, self.x
-        # SciPy reports an event that starts at zero: such a one is given the sign of what follows
+        # SciPy reports an event whose function starts at zero: its start gets the sign of the values that follow
         x1 = x0 + 1e-6 * (stop - t0) * self._derivative(t0, x0, stop)
 
         def of(event: Event, start: float) -> Callable[[float, NDArray[np.float64]], float]:

@@ -13,7 +13,7 @@ from .equations import CLEARANCE
 from .sources import ADDRESSES, PLACES, Source, channels_at, unwound
 from .stepping import interpolate
 
-# Status of a run, as the kernels return it: where the run has one, the solver.status of the FMI contract
+# Status of a run, as the kernels return it; from BAD_INPUT to NO_STEP the same as solver.status of the FMI contract
 RUNNING = -1
 FINISHED = 0
 BAD_INPUT = 2
@@ -25,9 +25,10 @@ EVENT = 10
 class Problem(NamedTuple):
     """Data shared by the runs of a batch.
 
-    ``equations`` are addresses, by `equations.DERIVATIVE` and its kin; ``commands``, shape (c, 3), for each commanded rate in
-    force the numbers of its channel, of the state that it is, and of the channel of its own rate; ``outputs`` their number;
-    ``hold`` the step (s) over which inputs are sampled at the samples' times and held, 0 where they act continuously.
+    ``equations`` are the addresses of the equations, with the indices `equations.DERIVATIVE` to `equations.JUMP`. A row of
+    ``commands``, shape (c, 3), has for a commanded rate the numbers of its channel, of the component of the state that it
+    prescribes, and of the channel of its derivative. ``outputs`` is the number of outputs. ``hold`` is the step (s) over which
+    inputs are held after they are sampled at the samples' times, 0 if they act continuously. ``end`` is the run's end (s).
     """
 
     equations: NDArray[np.int64]
@@ -40,9 +41,12 @@ class Problem(NamedTuple):
 
 
 class Watch(NamedTuple):
-    """Events: a row each of OUTPUT, LEVEL, DIRECTION, STOPS; address of the function in the place of an output, or 0; last
-    value; and rows of those found: number, time, state. Where the energy balance is to be kept, the numbers of the outputs
-    that are its residual and the kinetic energy; else none."""
+    """Events to look for, and those found.
+
+    An event has a row of ``table`` (columns OUTPUT, LEVEL, DIRECTION, STOPS), the address of its function, or 0 if it uses an
+    output, and its last value in ``gaps``. A row of ``found`` has the number of an event, its time and the state. ``balance``
+    are the indices of the outputs energy residual and kinetic energy if the energy balance is to be restored, else empty.
+    """
 
     table: NDArray[np.float64]
     addresses: NDArray[np.int64]
@@ -56,23 +60,24 @@ OUTPUT, LEVEL, DIRECTION, STOPS = range(4)
 
 
 def watch_nothing(size: int) -> Watch:
-    """Return an empty table of events for states of a given size."""
+    """Return a `Watch` without events, for states of a given size."""
     none = np.empty(0, dtype=np.int64)
     return Watch(np.empty((0, 4)), none, np.empty(0), np.empty((0, 2 + size)), none)
 
 
 class Samples(NamedTuple):
-    """Times to record (s), increasing, the first one the start; states and inputs there, of a run or of each of a batch."""
+    """Times of the samples (s), increasing from the start; states and inputs there, of one run or of each in a batch."""
 
     times: NDArray[np.float64]
     states: NDArray[np.float64]
     forces: NDArray[np.float64]
 
 
-#: What a run goes on from beside its state and inputs. Of the interval of smooth inputs: the times of its beginning and its
-#: end, the time since it began, its number, the piece of the polynomials or -1 where the inputs stay as they are, and whether
-#: the run is inside it. Of the steps: the size to try, counts. Of what is recorded: the next sample, the events found, and
-#: those before the step under way. Whether the run has started, and the channel that was not finite.
+#: Data from which a run continues, besides state and inputs. Interval of smooth inputs: its begin and end (``stop``), the time
+#: elapsed in it, its number, the number of the polynomial piece or -1 if the inputs are constant, and 1 in ``midway`` if the
+#: run is inside it. Steps: the size to try next, numbers of steps, rejected steps and evaluations. Records: number of the next
+#: sample, number of events found, and number found before the present step (``known``). Then 1 in ``started`` once the run has
+#: started, and in ``lost`` the channel that was not finite.
 CARRY = np.dtype(
     [
         ("begin", "f8"),
@@ -95,7 +100,7 @@ CARRY = np.dtype(
 
 
 class State(NamedTuple):
-    """The progress of runs, a row each: `CARRY`, state, inputs in force."""
+    """Progress of runs, one row for each: a record `CARRY`, the state, the inputs in force."""
 
     carries: NDArray[np.void]
     x: NDArray[np.float64]
@@ -103,8 +108,8 @@ class State(NamedTuple):
 
 
 class Room(NamedTuple):
-    """Work arrays: stages, state at a step's end and one inside it, coefficients of the interpolant, inputs inside a step
-    or at an interval's end, outputs."""
+    """Work arrays: stages ``k``, states at a step's end ``y`` and inside it ``z``, coefficients of the interpolant ``f``,
+    inputs inside a step or at an interval's end, outputs."""
 
     k: NDArray[np.float64]
     y: NDArray[np.float64]
@@ -117,8 +122,8 @@ class Room(NamedTuple):
 class Motion(NamedTuple):
     """A run in progress.
 
-    ``p`` are the constants and the mechanical energy at the start, ``scale`` magnitudes for the error; ``steady`` says whether
-    the inputs, but for the torsion bar, are constant between the breaks; ``x`` and ``u`` are the state and the inputs in force.
+    ``p`` are the constants and the mechanical energy at the start, ``scale`` magnitudes for the error; ``steady`` is true if
+    the inputs, except the torsion bar, are constant between the breaks; ``x`` and ``u`` are the state and the inputs in force.
     """
 
     problem: Problem
@@ -143,34 +148,34 @@ STATE = types.NamedTuple((CARRIES, MATRIX, MATRIX), State)
 
 @inner
 def equation(which, t, x, u, out, motion):
-    """Write one of the equations of the mechanism, by `equations.DERIVATIVE` and its kin, into ``out``."""
+    """Evaluate the equation with the index ``which``, `equations.DERIVATIVE` to `equations.JUMP`, into ``out``."""
     problem = motion.problem
     evaluate(problem.equations[which], t, x, problem.modes, u, motion.p, out)
 
 
 @inner
 def clearance_at(x, u, motion):
-    """Compute the clearance of a state from the limit of assembly; NaN beyond it."""
+    """Return the clearance to the limit of assembly at state x with inputs u; NaN beyond the limit."""
     equation(CLEARANCE, 0.0, x, u, motion.room.outputs, motion)
     return motion.room.outputs[0]
 
 
 @inner
 def time_at(s, h, motion):
-    """Return the time at the fraction s of a step."""
+    """Return the time at the fraction s of a step of size h."""
     return motion.carry.begin + (motion.carry.elapsed + s * h)
 
 
 @inner
 def renew(elapsed, x, u, motion):
-    """Write the channels at a time and a state of the interval into u, unless they are constant in it."""
+    """Update the channels u for the time since the interval's begin and the state x, unless they are constant."""
     if motion.carry.piece >= 0:
         channels_at(motion.carry.begin, elapsed, motion.carry.piece, x, motion.source, u)
 
 
 @inner
 def look_inside(s, h, motion):
-    """Write state and inputs at the fraction s of a step into ``room.z`` and ``room.inside``."""
+    """Write state and inputs at the fraction s of a step of size h into ``room.z`` and ``room.inside``."""
     room = motion.room
     interpolate(s, motion.x, room.f, room.z)
     copy(motion.u, room.inside)
@@ -179,7 +184,7 @@ def look_inside(s, h, motion):
 
 @inner
 def released(y, motion):
-    """Return whether a torsion bar is released in a step that ends at y."""
+    """Return whether a torsion bar is released in a step that ends at the state y; False if inputs are held."""
     if motion.problem.hold == 0.0:
         for n in range(motion.source.laws.shape[0]):
             if unwound(n, y, motion.source):

@@ -152,8 +152,8 @@ def simulate(
     Returns
     -------
     Trajectory
-        A run that reaches the limit of assembly, or whose step size underflows, ends there with a status, a message and all data
-        up to there.
+        A run that reaches the limit of assembly, or whose step size underflows, ends there with a status, a message and all
+        data up to there.
 
     Raises
     ------
