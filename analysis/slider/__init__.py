@@ -1,8 +1,8 @@
-"""Planning the motion of the five-bar's slider, so that the linkage does its task; and the drive that the motion needs.
+"""Plan the motion of the five-bar's slider for a task of the linkage, and compute the drive that the motion needs.
 
-The best position at every crank angle (`variational_motion`), the best Fourier series (`slider_motion`), the simplest mechanism
-that is good enough (`simplest_mechanism`); then the force that produces a motion (`inverse_dynamics`, `best_spring`), and a run
-under control on the full plant (`track`).
+`variational_motion` finds the best position at every crank angle, `slider_motion` the best Fourier series, and
+`simplest_mechanism` the simplest mechanism that is good enough. `inverse_dynamics` and `best_spring` compute the force of a
+motion; `track` runs the full plant under control.
 """
 
 from __future__ import annotations

@@ -60,7 +60,7 @@ from .motion import motion_of_plant, slider_motion
 from .strategy import RATIOS, Criterion, Strategy, simplest_mechanism
 from .tracking import TrackingController, TrackingResult, track
 
-#: A name of a dimension in the columns of solutions.csv: by itself, or with its unit.
+#: Names of the dimensions of a linkage; the columns of solutions.csv have them with their units.
 DIMENSIONS = (*LENGTHS, *ANGLES)
 
 
@@ -75,12 +75,13 @@ class SliderTable:
     Attributes
     ----------
     harmonics : tuple of int
-        Numbers of harmonics, increasing; each search starts from the solutions of the one before.
+        Numbers of harmonics, increasing; each search starts from the solutions of the previous one.
     links : str
         "kept", or "free": optimised together with the motion.
     guide_angle, position, stroke, speed, acceleration
-        Bounds, as of `SliderUnknown`.
+        Bounds, see `SliderUnknown`.
     starts : int
+        Number of starts of each search.
     """
 
     harmonics: tuple[int, ...] = entry(_increasing, (2,))
@@ -96,14 +97,14 @@ class SliderTable:
         self.unknown(0)  # checks them
 
     def unknown(self, harmonics: int) -> SliderUnknown:
-        """Return the unknown motion with a number of harmonics and the bounds."""
+        """Return the unknowns of a motion with a number of harmonics, within the bounds of the table."""
         bounds = {name: getattr(self, name) for name in ("guide_angle", "position", "stroke", "speed", "acceleration")}
         return SliderUnknown(harmonics=harmonics, **bounds)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class StrategyWanted:
-    """Arguments of `simplest_mechanism`."""
+    """The table ``[strategy]``: arguments of `simplest_mechanism`."""
 
     tolerance: float = entry(unchanged)
     criterion: Criterion = entry(Choice(get_args(Criterion)), "worst")
@@ -115,7 +116,7 @@ class StrategyWanted:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class DriveWanted:
-    """The table ``[drive]``: crank speed (rad/s), samples of a turn, and whether the best spring is put in."""
+    """The table ``[drive]``: crank speed (rad/s), samples in a crank turn, and whether the best spring is added."""
 
     speed: float = entry(Quantity("rad/s", above=0.0))
     samples: int = entry(Whole(72), 720)
@@ -124,22 +125,24 @@ class DriveWanted:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class TrackingWanted:
-    """The table ``[tracking]``: arguments of `track`, and departures of the plant from the model.
+    """The table ``[tracking]``: arguments of `track`, and differences between plant and model.
 
     Attributes
     ----------
     period : float
         Sampling period (s).
     bandwidth : float, optional
-        Bandwidth of the feedback, a PID (rad/s); ten times the crank's speed by default, 0 for none.
+        Bandwidth of the PID feedback (rad/s); ten times the crank speed by default, 0 for no feedback.
     feedforward : bool
+        Whether there is a feed-forward.
     revolutions : float
+        Number of crank turns.
     limit : float
-        Limit of the force (N).
+        Largest magnitude of the force (N).
     coulomb_friction : float, optional
         Coulomb friction of the plant (N); by default the model's.
     mass_error : float
-        Share by which the plant's slider and links are heavier than the model's.
+        Relative excess of the plant's masses and moments of inertia of slider and links over the model's.
     load_known : bool
         Whether the feed-forward knows the load.
     """
@@ -156,7 +159,7 @@ class TrackingWanted:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Load:
-    """The table ``[load]``: load at P (N), along the ground link and to its left."""
+    """The table ``[load]``: force at the coupler point P (N), along the ground link and to its left."""
 
     fx: float = entry(Quantity("N"), 0.0)
     fy: float = entry(Quantity("N"), 0.0)
@@ -171,12 +174,13 @@ class SliderCase:
     synthesis : SynthesisCase
         Task, bounds, constraints, search, and masses of the linkage.
     linkage : Linkage or None
-        Linkage whose pivot is moved; None if it is to be found first.
+        Linkage whose pivot is moved; None if it is to be found by a search.
     slider : SliderTable
         Unknowns and bounds of the motion.
     strategy, drive, tracking
-        Further computations; None if not asked for.
+        Further computations; None if not requested.
     load : Load, optional
+        Force at the coupler point.
     """
 
     synthesis: SynthesisCase = entry(unchanged)
@@ -209,26 +213,26 @@ class SliderCase:
         return constraints
 
     def _bounds(self) -> Mapping[str, tuple[float, float]]:
-        """Return bounds of the links; a given linkage that is kept fixes all of them."""
+        """Return the bounds of the links: those of the case, or the dimensions of a given linkage that is kept."""
         if self.linkage is None or self.free:
             return self.synthesis.bounds
         return _fixed_bounds(self.linkage)
 
     def four_bar(self, *, progress: bool = False) -> Solution:
-        """Return the given linkage with its pivot fixed, evaluated, or the best linkage of a search."""
+        """Evaluate the given linkage with a fixed pivot; without a given linkage search for the best one."""
         task = self.synthesis.task
         if self.linkage is None:
             return self.synthesis.solve(progress=progress).best
         if isinstance(task, (TimedPath, RockerFunction)) or (isinstance(task, UntimedPath) and task.path.closed):
             return Solution.of(task, self.linkage)
-        # where it is on the way of the task is not given: found with every dimension fixed
+        # the crank rotations along an open path are unknown: a search with all dimensions fixed finds them
         only, seed = (Assembly(branch=self.linkage.branch),), self.synthesis.search.seed
         return synthesize(
             task, _fixed_bounds(self.linkage), only, search=Search(seed=seed, candidates=1 << 10, starts=4, solutions=1)
         ).best
 
     def move(self, four_bar: Solution, harmonics: int, guesses: tuple[Solution, ...], *, progress: bool) -> Synthesis:
-        """Find the best motion with a number of harmonics; see `slider_motion`."""
+        """Find the best motion of the pivot with a number of harmonics; see `slider_motion`."""
         search = self.synthesis.search
         bounds = (
             _free_bounds(four_bar.linkage, self.synthesis.task) | dict(self.synthesis.bounds) if self.free else None
@@ -270,7 +274,7 @@ class SliderCase:
         return inverse_dynamics(parameters, motion, speed, load=load, samples=wanted.samples)
 
     def tracked(self, drive: SliderDrive) -> TrackingResult:
-        """Run the plant under control."""
+        """Run the plant, which may differ from the model, under the tracking controller."""
         wanted = self.tracking
         assert wanted is not None
         model = drive.parameters
@@ -298,7 +302,7 @@ class SliderCase:
         )
 
     def _design(self, drive: SliderDrive, wanted: TrackingWanted) -> Design | None:
-        """Return the feedback of the run under control, None without."""
+        """Return the design of the tracking controller's feedback; None if its bandwidth is zero."""
         bandwidth = 10.0 * abs(drive.crank_speed) if wanted.bandwidth is None else wanted.bandwidth
         return (
             design_pid(linearise_along(drive.parameters, drive).mean(), bandwidth=bandwidth)
@@ -307,13 +311,13 @@ class SliderCase:
         )
 
     def system(self, drive: SliderDrive, case: str) -> dict[str, Any]:
-        """Return the tables of a system in which a controller lets the slider of a case file follow its motion."""
+        """Return the tables of a system in which a controller moves the slider; ``case`` is the case file of the linkage."""
         from ..export.controllers import HARMONICS
 
         wanted = self.tracking or TrackingWanted()
         design = self._design(drive, wanted)
         reference: dict[str, Any] = {"sample_time": with_unit(wanted.period, "s")}
-        # at equal angles over a turn from 0, the angle that the crank starts at
+        # samples at equal angles over a turn, from 0, where the crank starts
         for name, unit, samples in (("motion", "m", drive.states[:, 1]), ("load", "N", drive.force)):
             forwards = samples if drive.crank_speed > 0.0 else np.roll(samples[::-1], 1)
             series = FourierSeries.from_samples(forwards, HARMONICS)
@@ -359,7 +363,7 @@ def _fixed_bounds(linkage: Linkage) -> dict[str, tuple[float, float]]:
 
 
 def _free_bounds(linkage: Linkage, task: Task) -> dict[str, tuple[float, float]]:
-    """Return bounds of free links: lengths from a quarter to four times; dimensions without effect on a rocker stay fixed."""
+    """Return wide bounds of free links, such as a quarter to four times a length; unbounded dimensions stay fixed."""
     near = {name: (0.25 * getattr(linkage, name), 4.0 * getattr(linkage, name)) for name in LINKS}
     near["crank_phase"] = (linkage.crank_phase - pi, linkage.crank_phase + pi)
     if isinstance(task, RockerFunction):
@@ -375,7 +379,7 @@ def _free_bounds(linkage: Linkage, task: Task) -> dict[str, tuple[float, float]]
 
 
 def run_case(drive: SliderDrive, title: str, force_file: str) -> dict[str, Any]:
-    """Return the tables of a case file that runs one turn under the control force of a file; see `docs/case-files.md`."""
+    """Return the tables of a case file that runs one turn with the control force in a file; see `docs/case-files.md`."""
     assert not callable(drive.load)
     position, velocity = drive.states[0, [1, 3]].tolist()
     return {
@@ -389,7 +393,7 @@ def run_case(drive: SliderDrive, title: str, force_file: str) -> dict[str, Any]:
     }
 
 
-#: The tables of a case beside those of a synthesis, for `linkwork new`.
+#: Tables of a case that a synthesis case does not have, for `linkwork new`.
 TABLES: Mapping[str, type] = {
     "slider": SliderTable, "strategy": StrategyWanted, "drive": DriveWanted, "load": Load, "tracking": TrackingWanted,
 }  # fmt: skip
@@ -399,7 +403,7 @@ TABLES: Mapping[str, type] = {
 
 
 def _read_strategy(value: Any, name: str, *, angular: bool) -> StrategyWanted:
-    """Read the table ``[strategy]``; its tolerance has the unit of the criterion, the quality function is squared."""
+    """Read the table ``[strategy]``; the tolerance is in m or rad, and squared if the criterion is the quality function."""
     unit = ("rad" if angular else "m") + "**2" * (as_table(value, name).get("criterion") == "error")
     return read(StrategyWanted, value, name, readers={"tolerance": Quantity(unit, above=0.0)})
 
@@ -419,7 +423,7 @@ def load_slider_case(path: str | Path, overrides: Mapping[str, Any] | None = Non
     Raises
     ------
     InputError, ParameterError
-        If the file cannot be read, or an entry is not usable.
+        If the file cannot be read, or an entry is invalid.
     InfeasibleError
         If bounds and constraints contradict one another.
     """
@@ -430,7 +434,7 @@ def load_slider_case(path: str | Path, overrides: Mapping[str, Any] | None = Non
 def slider_case_from(
     data: Mapping[str, Any], *, folder: Path, title: str = "", overrides: Mapping[str, Any] | None = None
 ) -> SliderCase:
-    """Build a case from the tables of a case file; its files are looked for in ``folder``."""
+    """Build a case from the tables of a case file; file names in it are relative to ``folder``."""
     data = {"title": title} | overridden(data, overrides or {})
     own = [name for name in entry_names(SliderCase) if name != "synthesis"]
     check_names(data, "", [name for name in (*entry_names(SynthesisCase), *own) if name != "trade_off"])
@@ -455,7 +459,7 @@ def linkage_from_csv(path: str | Path, rank: int = 1) -> Linkage:
     Raises
     ------
     InputError
-        If the file cannot be read, is none of that kind, or has no linkage of that rank.
+        If the file cannot be read, is not of that kind, or has no linkage of that rank.
     """
     rows = read_rows(path)
     if not 1 <= rank <= len(rows):

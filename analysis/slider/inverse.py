@@ -1,4 +1,4 @@
-"""Inverse dynamics: the control force, the crank torque and the pin forces of a prescribed motion of the slider.
+"""Inverse dynamics: compute control force, crank torque and pin forces for a prescribed motion of the slider.
 
 The slider follows u(th2) while the crank turns at a constant speed w2, so that u' = w2 du/dth2 and u'' = w2^2 d2u/dth2^2.
 The second equation of motion then gives the force,
@@ -43,14 +43,14 @@ LEAST_SAMPLES = 16
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class TurnBalance:
-    """Energy over one turn of a periodic motion (J): friction and damper take as much as is supplied.
+    """Energy over one turn of a periodic motion (J): the work supplied equals the work dissipated.
 
     Attributes
     ----------
     force, torque, load : float
         Work of the slider force, of the crank torque, of the load at P.
     dissipated : float
-        Work of damper and guide friction.
+        Work dissipated by damper and guide friction.
     """
 
     force: float
@@ -60,23 +60,23 @@ class TurnBalance:
 
     @property
     def residual(self) -> float:
-        """Work supplied less work dissipated (J); zero but for rounding where the samples carry the motion."""
+        """Work supplied minus work dissipated (J); zero but for rounding if the samples resolve the motion."""
         return self.force + self.torque + self.load - self.dissipated
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class SliderDrive:
-    """One turn of the crank with a prescribed slider motion, at equal steps of the crank angle, without the end.
+    """One turn of the crank with a prescribed slider motion, sampled at equal steps of the crank angle, without the end.
 
     Attributes
     ----------
     parameters : FiveBarParameters
     slider : FourierSeries
-        u(th2) (m).
+        Slider position u(th2) (m).
     crank_speed : float
         rad/s.
     load : (float, float) or function of the crank angle
-        At P (N).
+        Load at the coupler point P (N).
     crank_angle, time : ndarray, shape (n,)
         rad, s; both zero at the start.
     states, inputs : ndarray, shape (n, 6)
@@ -111,12 +111,12 @@ class SliderDrive:
         return magnitude
 
     def turn(self, samples: int) -> SliderDrive:
-        """Return the same motion at another number of samples."""
+        """Return the drive for the same motion with another number of samples."""
         return inverse_dynamics(self.parameters, self.slider, self.crank_speed, load=self.load, samples=samples)
 
     @property
     def modes(self) -> tuple[int, ...]:
-        """Values of the mechanism's modes: a commanded crank speed."""
+        """Values of the mechanism's modes: 1, as the crank speed is commanded."""
         return (1,)
 
     @property
@@ -205,8 +205,8 @@ def slider_force(
 ) -> float:
     """Return the slider force F2 (N) for a slider acceleration u'' (m/s2) at constant crank speed.
 
-    Raises ValueError, ZeroDivisionError if the links cannot be joined there; InputError if there is friction by contact
-    forces.
+    Raises ValueError or ZeroDivisionError if the links cannot be joined at this position, and InputError if the parameters have
+    friction that depends on contact forces.
     """
     require_no_contact_friction(p, "a prescribed motion of the slider")
     g = kinematics.position(th2, u, p)
@@ -227,13 +227,13 @@ def inverse_dynamics(
     load: Load = (0.0, 0.0),
     samples: int = 720,
 ) -> SliderDrive:
-    """Compute forces and torque that move the slider along u(th2) while the crank turns at a constant speed.
+    """Compute the forces and the crank torque that move the slider along u(th2) while the crank turns at a constant speed.
 
     Parameters
     ----------
     parameters : FiveBarParameters
     slider : FourierSeries
-        Slider position u (m) over the crank angle th2; of a motion given by samples, `FourierSeries.from_samples`.
+        Slider position u (m) over the crank angle th2; `FourierSeries.from_samples` makes it from samples.
     crank_speed : float
         rad/s, not zero; below zero the crank turns clockwise.
     load : (float, float) or function of the crank angle (rad)
@@ -246,7 +246,7 @@ def inverse_dynamics(
     InputError
         If the speed is zero or not finite, the load is not two finite numbers, or there are too few samples for the series.
     AssemblyError
-        If the links cannot be joined somewhere on the turn, with the place.
+        If the links cannot be joined somewhere on the turn; the message gives the crank angle.
     """
     check_speed(crank_speed)
     samples = whole_number(samples, "samples of a turn")
@@ -281,20 +281,20 @@ def inverse_dynamics(
 
 
 def check_speed(crank_speed: float) -> None:
-    """Make sure that a constant crank speed (rad/s) is finite and not zero; raises InputError otherwise."""
+    """Raise InputError if a constant crank speed (rad/s) is zero or not finite."""
     if not (isfinite(crank_speed) and crank_speed != 0.0):
         raise InputError(f"crank speed is {crank_speed} rad/s: it must be finite and not zero")
 
 
 def whole_number(value: float, what: str) -> int:
-    """Return a whole number as an int; raises InputError with the name of the quantity if it is not whole."""
+    """Return a whole number as an int; raise InputError, with the name ``what`` of the quantity, if it is not whole."""
     if not float(value).is_integer():
         raise InputError(f"{value} {what}: it must be a whole number")
     return int(value)
 
 
 def load_at_angle(load: Load, crank_angle: float) -> tuple[float, float]:
-    """Return the load at P (N, N) at a crank angle (rad); raises InputError if it is not two finite numbers."""
+    """Return the load at P (N, N) at a crank angle (rad); raise InputError if it is not two finite numbers."""
     given = load(crank_angle) if callable(load) else load
     try:
         fx, fy = (float(part) for part in given)
@@ -325,7 +325,7 @@ class BestSpring:
     parameters : FiveBarParameters
         Parameters with that spring.
     stiffness, free_position : float
-        N/m, m; no spring is a stiffness of zero.
+        N/m, m; a stiffness of zero means no spring.
     rms_force : float
         Rms control force with that spring (N).
     rms_force_without : float
@@ -352,8 +352,8 @@ def best_spring(
 ) -> BestSpring:
     """Find stiffness and free position of the spring that minimise the rms control force of a motion.
 
-    The force is affine in k and k u0, so that this is linear least squares over the wedge k >= 0, low k <= k u0 <= high k:
-    its minimum inside, or else on one of the two edges.
+    The force is affine in k and k u0. The minimum is therefore a linear least-squares solution in the wedge k >= 0,
+    low k <= k u0 <= high k: inside of it or on one of its two edges.
 
     Parameters
     ----------
@@ -361,12 +361,12 @@ def best_spring(
         Least and greatest free position (m); by default the ground link's length either way. Without bounds a constant
         force would be matched by an arbitrarily soft spring.
     parameters, slider, crank_speed, load, samples
-        As for `inverse_dynamics`; the spring of the parameters does not matter.
+        As for `inverse_dynamics`; a spring in the parameters is ignored.
 
     Raises
     ------
     InputError, AssemblyError
-        As `inverse_dynamics`; also if the bounds are not finite and in order.
+        As for `inverse_dynamics`; also if the bounds are not finite and in order.
     """
     low, high = free_position or (-parameters.ground_length, parameters.ground_length)
     if not (-inf < low <= high < inf):

@@ -1,8 +1,8 @@
-"""Direct search for the slider's motion as a Fourier series of the crank's rotation (thesis, chapter VII).
+"""Find the slider's motion as a Fourier series of the crank rotation by direct search (thesis, chapter VII).
 
-The rocker pivot of a given linkage is moved to improve its task: mean, harmonics and guide angle, and the links if they are
-free, are optimised with exact Jacobians from several starts, within bounds of stroke, speed and acceleration. The optimum at
-each crank angle alone is in `analysis.slider.variational`; it may jump, a Fourier series cannot.
+A slider moves the rocker pivot of a given linkage, so that the linkage does its task better. Mean, harmonics and guide angle,
+and the links if they are free, are optimised with exact Jacobians from several starts, within bounds of stroke, speed and
+acceleration. `analysis.slider.variational` finds the optimum at each crank angle separately, which may jump.
 """
 
 from __future__ import annotations
@@ -54,18 +54,18 @@ def slider_motion(
     task : Task
         Task of `analysis.synthesis`, with its weights.
     linkage : Linkage or Solution
-        Its dimensions are kept except those with ``bounds``. For an open path it must be a solution, which has the crank
-        rotations of the stations.
+        Linkage whose dimensions are kept, except those with ``bounds``. For an open path it must be a solution, which knows
+        the crank rotations of the stations.
     unknown : SliderUnknown or CrankUnknown
         Harmonics, and bounds of guide angle, stroke, speed and acceleration.
     bounds : mapping, optional
         Dimensions that are optimised together with the motion, (least, greatest) by name (m, rad).
     constraints : sequence
-        By default the links stay joined over the turn.
+        Constraints of the search; by default the links must stay joined over the turn.
     guesses : sequence of Linkage or Solution
-        Further starts of the search: their pivots' motion, and their free dimensions.
+        Further starts of the search, with the motion of their pivots and their free dimensions.
     search : Search
-        Its starts are random phases and amplitudes of the harmonics and guide angles; there is no scan.
+        Settings of the search, which starts from random harmonics and guide angles, without a scan.
 
     Returns
     -------
@@ -75,7 +75,7 @@ def slider_motion(
     Raises
     ------
     InputError, InfeasibleError, SynthesisInterrupted
-        As `synthesize`.
+        As for `synthesize`.
 
     Examples
     --------
@@ -110,7 +110,10 @@ def slider_motion(
 
 
 def greatest_derivative(linkage: Linkage, order: int) -> float:
-    """Return the greatest magnitude over a turn of the slider's position (order 0) or of a derivative by the rotation."""
+    """Return the greatest magnitude over a turn of the slider position's derivative by the crank rotation (m/rad^order).
+
+    Order 0 is the position itself; the result is 0 for a pivot that is no slider.
+    """
     if not isinstance(linkage.pivot, SliderMotion):
         return 0.0
     series = linkage.pivot.series
@@ -120,7 +123,7 @@ def greatest_derivative(linkage: Linkage, order: int) -> float:
 
 
 def motion_of_plant(linkage: Linkage) -> FourierSeries:
-    """Return the slider's position (m) over the plant's crank angle th2 = phi + th20, for `inverse_dynamics` and `track`.
+    """Return the slider position (m) as a series of the plant's crank angle th2 = phi + th20, see `inverse_dynamics`.
 
     Raises
     ------

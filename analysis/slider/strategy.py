@@ -1,8 +1,8 @@
 """Search for the simplest mechanism that meets a tolerance (thesis, section 7.4).
 
-A four-bar first; if its best is not good enough, a four-bar whose rocker pivot is moved by a slider, harmonic by harmonic,
-links and motion optimised together; then five-bars, whose rocker pivot is on a second crank, geared to the first or turned
-independently. Each step starts from the one before, and records why it was not enough.
+The search tries a four-bar first, then four-bars whose rocker pivot is moved by a slider, with more and more harmonics, links
+and motion optimised together, and last five-bars, whose rocker pivot is on a second crank, geared to the first one or turned
+independently. Each step starts from earlier solutions, and records why it was accepted or rejected.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ from ..synthesis import (
 
 Criterion = Literal["error", "worst"]
 
-#: Ratios of the gears that are tried, turns of the second crank for one of the first.
+#: Gear ratios that are tried: turns of the second crank for one turn of the first.
 RATIOS = (1, -1, 2, -2)
 
 
@@ -46,11 +46,11 @@ class Step:
     mechanism : str
         Description of the mechanism.
     solution : Solution or None
-        Its best solution; None if there is none.
+        Best solution of the mechanism; None if there is none.
     value : float
         Value compared with the tolerance; infinite without a solution.
     reason : str
-        Why it was taken, or why it was not enough.
+        Reason why the mechanism was accepted or rejected.
     """
 
     mechanism: str
@@ -69,7 +69,9 @@ class Strategy:
     met : bool
         Whether the last step meets the tolerance, with no circuit, branch or order defect.
     tolerance : float
+        Greatest value allowed, in the unit of the criterion.
     criterion : str
+        "error" (the quality function) or "worst" (the worst error).
     """
 
     steps: tuple[Step, ...]
@@ -79,7 +81,7 @@ class Strategy:
 
     @property
     def chosen(self) -> Step:
-        """The step that meets the tolerance; without one, the nearest, those without a defect first."""
+        """The step that meets the tolerance; if none does, the one with the least value, preferably without a defect."""
         if self.met:
             return self.steps[-1]
         return min(self.steps, key=lambda s: (s.solution is None or not s.solution.verdicts.sound, s.value))
@@ -89,7 +91,7 @@ class Strategy:
 
 
 class StrategyInterrupted(Interrupted):
-    """The search for the simplest mechanism was stopped; ``strategy`` holds the steps so far, or None."""
+    """Error for a search that was stopped with Ctrl-C; ``strategy`` holds the steps so far, or is None."""
 
     def __init__(self, strategy: Strategy | None) -> None:
         self.strategy = strategy
@@ -117,7 +119,7 @@ def simplest_mechanism(
     tolerance : float
         Bound of the quality function (m2, rad2), or of the worst error (m, rad; angular errors of a motion times its length).
     criterion : "error" or "worst"
-        The criterion; ``"worst"`` is also minimised, whatever the task's objective.
+        Whether the quality function or the worst error is compared; the worst error then also replaces the task's objective.
     bounds, constraints
         Bounds and constraints of the links of every mechanism, as for `synthesize`.
     stroke : float, optional
@@ -127,9 +129,9 @@ def simplest_mechanism(
     ratios : sequence of int
         Gear ratios to be tried.
     second_crank : float, optional
-        Its greatest length (m); half the stroke by default.
+        Greatest length of the second crank (m); half the stroke by default.
     search : Search
-        Search for each mechanism; the four-bar has twice as many starts.
+        Settings of the search for each mechanism; the four-bar has twice as many starts.
 
     Returns
     -------
@@ -138,9 +140,9 @@ def simplest_mechanism(
     Raises
     ------
     InputError
-        If the tolerance or another number is not usable.
+        If the tolerance or another number is invalid.
     InfeasibleError
-        If there is not even a four-bar.
+        If no four-bar satisfies the constraints.
     StrategyInterrupted
         On Ctrl-C, with the steps so far.
     """
@@ -158,7 +160,7 @@ def simplest_mechanism(
         if not (isfinite(ratio) and ratio == int(ratio)):
             raise InputError(f"ratio {ratio} of the gears: it must be a whole number, or the path does not close")
     if criterion == "worst":
-        # the criterion is also the objective
+        # the worst error is also minimised
         task = replace(task, objective="worst")
     tried = _Trials(task, tolerance, criterion, bounds, constraints, search)
     four_bar = tried.four_bar()
@@ -183,7 +185,7 @@ def simplest_mechanism(
             return tried.result()
         if found:
             geared[ratio] = found
-    # from the best gears on, the second crank is turned by itself
+    # the second crank is turned independently, starting from the best gears
     ratio = min(geared, key=lambda r: geared[r].value, default=1)
     guesses = [geared.get(ratio, four_bar)]
     for count in numbers:
@@ -199,7 +201,7 @@ def simplest_mechanism(
 
 @dataclass(eq=False)
 class _Trials:
-    """Mechanisms tried so far; fields as the arguments of `simplest_mechanism`."""
+    """Mechanisms tried so far; the fields are arguments of `simplest_mechanism`."""
 
     task: Task
     tolerance: float
@@ -215,23 +217,23 @@ class _Trials:
         return self._met
 
     def four_bar(self) -> Solution:
-        """Find the best four-bar and record it."""
+        """Find the best four-bar, record it and return it."""
         search = replace(self.search, starts=2 * int(self.search.starts))
-        solution = self._step("four-bar", self._found("four-bar", search))
+        solution = self._record("four-bar", self._run_search("four-bar", search))
         assert solution is not None
         return solution
 
     def attempt(
         self, mechanism: str, unknown: SliderUnknown | CrankUnknown, guesses: Sequence[Solution]
     ) -> Solution | None:
-        """Optimise links and pivot motion together, from a scan and from simpler mechanisms, and record the result."""
+        """Optimise links and pivot motion together, record the result and return the best solution; None if there is none."""
         try:
-            found = self._found(mechanism, self.search, unknown, guesses)
+            found = self._run_search(mechanism, self.search, unknown, guesses)
         except InfeasibleError:
             found = None
-        return self._step(mechanism, found)
+        return self._record(mechanism, found)
 
-    def _found(
+    def _run_search(
         self,
         mechanism: str,
         search: Search,
@@ -242,11 +244,11 @@ class _Trials:
             return synthesize(self.task, self.bounds, self.constraints, pivot=pivot, guesses=guesses, search=search)
         except (SynthesisInterrupted, KeyboardInterrupt) as error:
             if isinstance(error, SynthesisInterrupted) and error.synthesis is not None:
-                self._step(mechanism, error.synthesis)
+                self._record(mechanism, error.synthesis)
             raise StrategyInterrupted(self.result() if self.steps else None) from None
 
-    def _step(self, mechanism: str, found: Synthesis | None) -> Solution | None:
-        """Record a mechanism with the reason why it is taken or not."""
+    def _record(self, mechanism: str, found: Synthesis | None) -> Solution | None:
+        """Record a mechanism with the reason why it is accepted or rejected; return its best solution, if it has one."""
         if found is None:
             self.steps.append(
                 Step(mechanism=mechanism, solution=None, value=inf, reason="none keeps the constraints: moved on")

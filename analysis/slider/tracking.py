@@ -1,12 +1,12 @@
-"""Tracking of a slider motion u(th2) on the full plant by feed-forward and feedback.
+"""Track a slider motion u(th2) with the full plant by feed-forward and feedback.
 
 The force over a sampling period h is
 
     F2 = F_ff + feedback on (u - u_ref, u' - u_ref')
 
-F_ff is the force of inverse dynamics on the model half a period ahead, at th2 + w2 h/2: a held force is right in the middle of
-its period, so that the error is of order h^2, whereas the force at the sample would make it of order h. The reference follows
-the measured crank. Gains, integral and limit of the feedback are those of `analysis.linear`.
+F_ff is the force by inverse dynamics of the model half a period ahead, at th2 + w2 h/2. This force, held over the period, is
+exact in its middle, so that the error is of order h^2; the force at the sample would give an error of order h. F_ff and u_ref'
+are computed at the measured crank angle. Gains, integral and limit of the feedback are those of `analysis.linear`.
 
 The plant in the loop may differ from the model in friction, masses, and the load at P.
 """
@@ -56,14 +56,14 @@ class TrackingController:
     feedforward : bool
         Whether there is a feed-forward; otherwise the holding force of the design's linear model takes its place.
     load : (float, float) or function of the crank angle
-        At P (N), as far as the feed-forward knows it.
+        Load at P (N) that the feed-forward takes into account.
     limit : float
         Largest force either way (N).
 
     Raises
     ------
     InputError
-        If there is neither feed-forward nor feedback, or an argument is not usable.
+        If there is neither feed-forward nor feedback, or an argument is invalid.
     """
 
     channel = "slider.force"
@@ -105,7 +105,7 @@ class TrackingController:
             self.feedback.reset()
 
     def force(self, measured: Sequence[float], reference: float) -> float:
-        """Return the force (N) for the next period, from (th2, u, th2', u') and the reference (m)."""
+        """Return the force (N) for the next period from the measured (th2, u, th2', u') in SI and the reference of u (m)."""
         th2, u, w2, v = measured
         if self.feedforward:
             forward = self._forward(th2 + 0.5 * w2 * self.period, w2)
@@ -132,7 +132,7 @@ class TrackingMetrics:
     rms_point_error, peak_point_error : float
         Distance of the coupler point P from the model's P on the reference (m).
     rms_force, peak_force : float
-        N.
+        Slider force (N).
     mean_power, peak_power : float
         Power of the slider force (W); the peak is its greatest magnitude.
     """
@@ -223,13 +223,13 @@ def track(
     plant : FiveBarParameters, optional
         Parameters of the plant; by default those of the controller's model.
     load : (float, float) or function of the crank angle
-        At P (N), held over a period at its value in the middle of it; the feed-forward uses the controller's load.
+        Load on the plant at P (N), held over each period at its value in the middle; the feed-forward uses the controller's.
     initial : InitialState, optional
-        By default on the reference at crank angle 0.
+        Initial state; by default the slider is on the reference at crank angle 0.
     fmu : path, optional
         FiveBarSlider.fmu to be run instead of the plant in process.
     tolerance : float
-        Of the plant's integrator.
+        Tolerance of the plant's integrator.
 
     Returns
     -------
@@ -239,9 +239,9 @@ def track(
     Raises
     ------
     InputError
-        If an argument is not usable.
+        If an argument is invalid.
     AssemblyError
-        If the links cannot be joined: the model's somewhere on the reference, or the plant's at the start.
+        If the links of the model cannot be joined somewhere on the reference, or those of the plant at the start.
     """
     check_speed(crank_speed)
     if not 0.0 < revolutions < inf:
@@ -281,7 +281,7 @@ def track(
 
 
 def _point_error(parameters: FiveBarParameters, loop: LoopResult) -> FloatArray:
-    """Return the distance of the coupler point from the model's coupler point on the reference."""
+    """Return the distance of P from the model's P on the reference (m), shape (n,)."""
     assert loop.trajectory is not None
     p = parameters.constants()
     wanted = [

@@ -1,4 +1,4 @@
-"""The slider position of least error at every crank angle, in closed form: the variational method of the thesis.
+"""Find the slider position of least error at every crank angle in closed form, by the variational method of the thesis.
 
 The links are given, and the crank is at phi. In the frame of the guide, with its zero at the end E of the ground link, let
 b = (B - E) exp(-i alpha), s = th3 - alpha, t = th4 - alpha. Loop closure is then (Youssef, section 7.3)
@@ -9,8 +9,8 @@ and one freedom is left, the slider position u. It moves the links by
 
     ds/du = cos t / (l3 sin(t - s)),   dt/du = cos s / (l4 sin(t - s)).
 
-For a path, P turns with the coupler about B and |P - p*|^2 falls with the angle between BP and the direction from B to p*; for
-a function the rocker has to be at th4*. So the error as a function of u has its minima
+For a path, P turns with the coupler about B, and |P - p*|^2 grows with the angle between BP and the direction from B to p*; for
+a function the rocker has to be at th4*. The error as a function of u therefore has its minima
 
     with the link at the target angle, the other link on either side of the perpendicular to the guide;
     with the other link perpendicular to the guide, either way, and the link on either side: cos t = 0 for a path, cos s = 0
@@ -18,8 +18,8 @@ a function the rocker has to be at th4*. So the error as a function of u has its
     at an end of the range of u: a limit of assembly (sin(t - s) = 0, BD = l3 + l4 or |l3 - l4|) or an end of the stroke.
 
 The first two kinds are the thesis's (7.6)-(7.15). The third kind is not in the thesis: without it the optimum may lie in the
-other assembly, past a dead centre. A linkage that keeps its assembly stops there, and earlier if it keeps a least transmission
-angle.
+other assembly, past a dead centre. A linkage that keeps its assembly must stop at the dead centre, or before it if it keeps a
+least transmission angle.
 """
 
 from __future__ import annotations
@@ -38,15 +38,15 @@ from ..synthesis import Linkage, SecondCrank
 
 FloatArray = NDArray[np.float64]
 
-#: What makes a position of the slider a minimum of the error, see `VariationalMotion.kind`.
+#: Reasons why a slider position is a minimum of the error, see `VariationalMotion.kind`.
 KINDS = ("target", "perpendicular", "limit", "stroke")
 #: Rounding errors of sines and their products.
 ROUNDING = 1e-12
-#: Halvings of a step in search of a path of minima across it, and the gap, of l3 + l4, at which it is found. A minimum that
-#: reaches the perpendicular does so as the square root: 44 halvings bring it to 2.4e-7.
+#: Greatest number of bisections of a step in search of a continuous path of minima across it, and the gap, relative to l3 + l4,
+#: below which the path is found. Near the perpendicular u changes as a square root: 44 bisections reduce its gap to 2.4e-7.
 HALVINGS = 44
 GAP = 1e-5
-#: Weight of the travel where errors are equal, against errors of 1 altogether; a jump costs more than any error.
+#: Costs of the squared travel, which decides between equal errors, and of a jump, which exceeds the sum of all errors (1).
 TRAVEL = 1e-12
 JUMP = 2.0
 
@@ -58,7 +58,7 @@ class VariationalMotion:
     Attributes
     ----------
     rotation : ndarray, shape (n,)
-        phi (rad).
+        Crank rotation phi (rad).
     u : ndarray, shape (n,)
         Slider position (m).
     coupler_angle, rocker_angle : ndarray, shape (n,)
@@ -66,17 +66,17 @@ class VariationalMotion:
     branch : ndarray of int, shape (n,)
         Assembly, the sign of sin(th4 - th3).
     kind : ndarray of str, shape (n,)
-        Why the error is least: "target" (the link is at the target angle), "perpendicular" (the other link is, to the
-        guide), "limit" (limit of assembly or least transmission angle), "stroke" (end of the stroke).
+        Why the error is least: "target" (the link is at the target angle), "perpendicular" (the other link is perpendicular
+        to the guide), "limit" (limit of assembly or least transmission angle), "stroke" (end of the stroke).
     error : ndarray, shape (n,)
         Distance from the target point (m), or from the target angle (rad).
     weights : ndarray, shape (n,)
         Weights of the squared errors.
     jumps : ndarray of int
-        Every k for which the slider would have to jump from rotation k to the next: no path of minima of one assembly leads
-        across.
+        Every k for which the slider has to jump between rotation k and the next, as no continuous path of minima of one
+        assembly connects them.
     guide_angle : float
-        alpha (rad).
+        Angle alpha from the ground link (rad).
     """
 
     rotation: FloatArray
@@ -101,12 +101,12 @@ class VariationalMotion:
         return float(np.ptp(self.u))
 
     def to_series(self, order: int) -> FourierSeries:
-        """Fit a Fourier series of the crank's rotation to u by weighted least squares: a start for a direct search.
+        """Fit a Fourier series of the crank rotation to u by weighted least squares, as a start for a direct search.
 
         Raises
         ------
         InputError
-            If the rotations are too few for the order.
+            If there are too few rotations for the order.
         """
         if order < 0 or 2 * order + 1 > len(self.u):
             raise InputError(
@@ -120,7 +120,10 @@ class VariationalMotion:
 
 
 class _Minima(NamedTuple):
-    """Candidates of every kind and assembly at crank rotations, each of shape (m, n); ``valid`` marks the minima."""
+    """Candidates for minima, shape (m, n): a row for each kind and assembly, a column for each crank rotation.
+
+    Slider position (m), angles of coupler and rocker (rad), error, and whether the candidate is a minimum.
+    """
 
     u: FloatArray
     coupler: FloatArray
@@ -153,13 +156,13 @@ class _Problem:
 
     @property
     def labels(self) -> tuple[NDArray[np.str_], NDArray[np.int64]]:
-        """Kind and assembly of each row of `minima`."""
+        """Kind and assembly of each row of `minima`, two arrays of shape (m,)."""
         kinds = ["target"] * 2 + ["perpendicular"] * 4
         kinds += ["limit"] * 2 * len(self._limits()) + ["stroke"] * sum(map(isfinite, self.stroke))
         return np.array(kinds * len(self.assemblies)), np.repeat(self.assemblies, len(kinds))
 
     def _limits(self) -> list[tuple[float, float, float]]:
-        """Return the limits of the range of u: angle at C between coupler and rocker, BD, and +1 if BD may not be longer."""
+        """Return the limits of the distance BD: angle at C (rad), BD (m), and 1 if BD may not be greater, -1 if not smaller."""
         l3, l4 = self.linkage.coupler_length, self.linkage.rocker_length
         low = self.least_transmission
         least = sqrt((l3 - l4) ** 2 + 4.0 * l3 * l4 * sin(0.5 * low) ** 2)
@@ -176,7 +179,7 @@ class _Problem:
         return b
 
     def minima(self, rotation: FloatArray, target: NDArray[np.complex128] | FloatArray) -> _Minima:
-        """Return the candidates for minima of the error over the slider position."""
+        """Return the candidates for minima of the error over the slider position, with targets of shape (n,)."""
         k = self.linkage
         l3, l4 = k.coupler_length, k.rocker_length
         path = np.iscomplexobj(target)
@@ -229,7 +232,7 @@ class _Problem:
         return _Minima(u, coupler + self.guide_angle, rocker + self.guide_angle, error, valid)
 
     def _ends(self, b: NDArray[np.complex128]) -> tuple[FloatArray, FloatArray, FloatArray, NDArray[np.bool_]]:
-        """Return the ends of the range of u: position, angle at C, direction into the range, whether the end exists."""
+        """Return the ends of the range of u: position (m), angle at C (rad), direction into the range (1 or -1), existence."""
         l3, l4 = self.linkage.coupler_length, self.linkage.rocker_length
         low, high = self.stroke
         ends = []
@@ -267,26 +270,26 @@ def variational_motion(
     Parameters
     ----------
     linkage : Linkage
-        Its ``pivot`` is replaced: the guide starts at the end of the ground link.
+        Linkage whose ``pivot`` is replaced: the guide starts at the end of the ground link.
     rotation : array_like, shape (n,)
-        phi (rad), increasing.
+        Crank rotation phi (rad), increasing.
     target : array_like, shape (n, 2) or (n,)
-        Where the coupler point should be (m), or the angle that the rocker should have from the ground link (rad), with the
-        linkage's ``output_angle`` as mounting angle; whole turns do not count.
+        Wanted position of the coupler point (m), or wanted angle of the rocker from the ground link (rad), with the linkage's
+        ``output_angle`` as mounting angle; whole turns do not count.
     guide_angle : float
-        alpha, the guide's direction from the ground link (rad).
+        Direction alpha of the guide from the ground link (rad).
     stroke : (float, float)
         Least and greatest slider position (m).
     least_transmission : float
-        Least angle between coupler and rocker at C, from 0 and from pi (rad). With zero the optimum runs to the limit of
-        assembly, where the plant cannot follow.
+        Least distance of the angle at C between coupler and rocker from 0 and from pi (rad). With zero the optimum may be at
+        the limit of assembly, where the plant cannot follow.
     assemblies : tuple of int, optional
         Assemblies to choose from, +1 and -1; the linkage's own by default.
     weights : array_like, shape (n,), optional
-        Of the squared errors; one by default. They do not matter where each rotation is taken by itself.
+        Weights of the squared errors; one by default. They affect the positions only of a continuous motion.
     continuous : bool
-        False takes the least error at each rotation, and the least travel among equals. True takes the motion with the
-        fewest jumps, none if there is one, and of these the one with the least sum of squared errors.
+        False: the least error at each rotation, and of equal errors the least travel. True: the motion with the fewest jumps
+        (none, if possible), and of such motions the one with the least sum of squared errors.
     closed : bool
         Whether the first rotation follows the last one, a turn later.
 
@@ -295,7 +298,7 @@ def variational_motion(
     InputError
         If rotations, targets or weights have wrong shapes, are not finite or not increasing, or span more than a turn.
     ParameterError
-        If guide angle, stroke, least transmission angle or assemblies make no sense, or the coupler point of a path is on the
+        If guide angle, stroke, least transmission angle or assemblies are invalid, or the coupler point of a path is on the
         crank pin, where the slider does not move it.
     AssemblyError
         If there is a rotation at which the links cannot be joined at any slider position.
@@ -330,9 +333,9 @@ def variational_motion(
         raise AssemblyError(_out_of_reach(problem, phi[~joined], n))
 
     error = np.where(minima.valid, minima.error, inf)
-    # equals, the two sides of the other link, are so to the last bit
+    # the two sides of the other link have exactly equal errors
     chosen_from = minima.valid if continuous else error == error.min(axis=0)
-    bridged = _bridged(problem, phi, goal, minima, chosen_from)
+    bridged = _connected(problem, phi, goal, minima, chosen_from)
     travel = minima.u / (linkage.coupler_length + linkage.rocker_length)
     choice = _choose_minima(w * minima.error**2, travel, chosen_from, bridged, closed)
     at = (choice, np.arange(n))
@@ -353,13 +356,13 @@ def variational_motion(
 
 
 def _wrapped(angle: FloatArray) -> FloatArray:
-    """Return the angle in (-pi, pi]."""
+    """Return angles (rad) shifted by whole turns into (-pi, pi]."""
     value: FloatArray = pi - np.mod(pi - angle, 2.0 * pi)
     return value
 
 
 def _out_of_reach(problem: _Problem, phi: FloatArray, n: int) -> str:
-    """Return a sentence about the worst of the rotations at which the links cannot be joined at any slider position."""
+    """Return a sentence about the worst of the rotations ``phi``, at which no slider position lets the links be joined."""
     b = problem.pin(phi)
     limits = problem._limits()
     most = limits[0][1]
@@ -384,19 +387,20 @@ def _out_of_reach(problem: _Problem, phi: FloatArray, n: int) -> str:
     )
 
 
-def _bridged(
+def _connected(
     problem: _Problem,
     phi: FloatArray,
     goal: NDArray[np.complex128] | FloatArray,
     minima: _Minima,
     chosen_from: NDArray[np.bool_],
 ) -> NDArray[np.bool_]:
-    """Return whether a path of minima leads from minimum i at rotation k to minimum j at the next, shape (n, m, m).
+    """Return whether a continuous path of minima leads from minimum i at rotation k to minimum j at the next, shape (n, m, m).
 
     The last rotation is followed by the first, a turn later.
 
-    Between the rotations the target goes straight. The step is halved at the minimum that fills its gap best, the half with
-    the wider gap is halved in turn, and so on: the gap of a path vanishes, that of a jump remains.
+    Between two rotations the target moves along a straight line. The step is bisected: in its middle the minimum with the
+    smallest gap is taken, then the half with the wider gap is bisected, and so on. The gap of a path vanishes, that of a jump
+    remains.
     """
     m, n = minima.u.shape
     following = (np.arange(n) + 1) % n
@@ -435,14 +439,14 @@ def _bridged(
 def _choose_minima(
     squares: FloatArray, travel: FloatArray, chosen_from: NDArray[np.bool_], bridged: NDArray[np.bool_], closed: bool
 ) -> NDArray[np.int64]:
-    """Choose the row of each column by dynamic programming: fewest jumps, then least sum of squares, then least travel."""
+    """Choose a row for each column by dynamic programming: fewest jumps, then least sum of squares, then least travel."""
     m, n = squares.shape
     whole = float(np.where(chosen_from, squares, 0.0).max(axis=0).sum())
     cost = np.where(chosen_from, squares / (whole or 1.0), inf)
     step = np.empty((n, m, m))
     for k in range(n):
         step[k] = TRAVEL * (travel[:, k, None] - travel[:, (k + 1) % n]) ** 2 + JUMP * ~bridged[k]
-    # row of the first column by row of the present one
+    # least cost so far, by the row in the first column and the row in the present one
     total = np.where(np.eye(m, dtype=bool), cost[:, 0], inf)
     before = np.empty((n, m, m), dtype=int)
     for k in range(1, n):
