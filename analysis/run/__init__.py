@@ -1,6 +1,6 @@
-"""Running a mechanism: inputs, the compiled solver, trajectories, ensembles, co-simulation, standard checks.
+"""Run mechanisms: inputs, the compiled solver, trajectories, ensembles, co-simulation, standard checks.
 
-The public names are those of ``__init__.pyi``; each is imported from its module when it is first used.
+The public names are listed in ``__init__.pyi``; a name is imported from its module when it is first used.
 """
 
 from __future__ import annotations

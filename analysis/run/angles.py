@@ -1,7 +1,7 @@
 """Angles of long runs: whole turns are subtracted from the state, counted, and added back to the outputs.
 
-An angle of 1e9 turns is rounded to 1e-6 rad. An integrator that sees it takes the rounding for the motion, and its tolerance,
-which is relative to the state, for one of whole turns.
+An angle of 1e9 turns is rounded to 1e-6 rad. An integrator would take the rounding for motion; and its tolerance, which is
+relative to the state, would allow errors of whole turns.
 """
 
 from __future__ import annotations
@@ -18,13 +18,13 @@ from linkwork.mechanism import Mechanism
 from .events import Event
 from .inputs import Encoded
 
-#: Turns from which on they are taken off: all, or where a mechanism is not the same after any number of turns, such as one with
-#: a groove, multiples of these. A power of two, as the denominators of most ratios of a groove are.
+#: Number of turns above which turns are subtracted: all whole turns or, if the mechanism is not the same after one turn, as
+#: with a groove, multiples of this number. It is a power of two, like the denominators of most ratios of a groove.
 TURNS = 1024
 
 
 class WholeTurns:
-    """Whole turns subtracted from the angles of a run; none if an input or an event depends on the angle itself."""
+    """Whole turns that are subtracted from the angles of a run; none if an input or an event is a user's function."""
 
     def __init__(
         self, mechanism: Mechanism, p: Any, modes: Sequence[float], encoded: Encoded, events: Sequence[Event]
@@ -40,7 +40,11 @@ class WholeTurns:
     def take(
         self, x: NDArray[np.float64], u: NDArray[np.float64], laws: NDArray[np.float64], first: int, watch: Any = None
     ) -> None:
-        """Subtract whole turns from the state x if there are many; ``first`` is the number of the next sample."""
+        """Subtract whole turns from the state x, in place, if it has many and the mechanism is then the same.
+
+        ``u`` are the channels, ``laws`` the torque laws of the inputs, ``first`` the number of the next sample, and ``watch``
+        has the table of events, whose levels are reduced too.
+        """
         if not self.too_many(x) or laws[:, 2].any():
             return
         period = np.zeros(len(x))
@@ -62,7 +66,7 @@ class WholeTurns:
                 watch.table[(watch.table[:, 0] == column), 1] -= angle
 
     def put_back(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return the outputs at the samples with the subtracted turns added back."""
+        """Add the subtracted turns back to the outputs at the samples, in place, and return the outputs."""
         for first, off in self._since:
             values[first:, self._columns] += off[: len(self._columns)]
         return values
@@ -90,7 +94,7 @@ def repeats(
     u: NDArray[np.float64],
     way: NDArray[np.float64],
 ) -> bool:
-    """Return whether a mechanism with the constants p behaves the same at the state x and after the displacement ``way``."""
+    """Return whether outputs and derivatives of a mechanism are the same at the states x and x + way, coordinates aside."""
     equations = mechanism.equations
     acting = equations.applied(modes, tuple(u.tolist()), p)
     coordinates = coordinates_of(mechanism)

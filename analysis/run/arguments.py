@@ -17,12 +17,12 @@ from ..units import Amount
 from .inputs import Inputs, parameter_readers, start_from
 
 _Function = TypeVar("_Function", bound=Callable[..., Any])
-#: Function of a published set and an argument (None if it was not given) that returns the value to use.
+#: Takes a published set and an argument, None if it was not given; returns the value to use for the argument.
 Fill = Callable[[PublishedSet, Any], Any]
 
 
 def published_set(known: str | PublishedSet) -> PublishedSet:
-    """Return a published set, given itself or by name.
+    """Return a published set by its name; a set itself is returned as it is.
 
     Raises
     ------
@@ -38,12 +38,12 @@ def published_set(known: str | PublishedSet) -> PublishedSet:
 
 
 def takes_published(**fills: Fill) -> Callable[[_Function], _Function]:
-    """Let the argument ``parameters`` of a function be a published set or its name, or a list with some of them.
+    """Decorate a function so that its argument ``parameters`` may be a published set or its name, or a list with such.
 
     Parameters
     ----------
     **fills : function
-        What the set says of other arguments, such as ``initial=started``.
+        For other arguments, such as ``initial=started``: a function that returns the argument's value for a published set.
     """
 
     def decorate(function: _Function) -> _Function:
@@ -70,7 +70,7 @@ def takes_published(**fills: Fill) -> Callable[[_Function], _Function]:
                 values = value if own_each else [value] * len(sets)
                 filled = [v if known is None else fill(known, v) for known, v in zip(sets, values)]
                 bound[name] = filled if several else filled[0]
-            # `its` has no arguments that are positional only: all can go by their names, but for further keywords
+            # no argument is positional only: all can be passed by name, and further keywords after them
             others = bound.pop(further, {})
             return function(**bound, **others)
 
@@ -80,9 +80,9 @@ def takes_published(**fills: Fill) -> Callable[[_Function], _Function]:
 
 
 def takes_options(kind: type) -> Callable[[_Function], _Function]:
-    """Reject keyword arguments that a function does not have, neither itself nor among its TypedDict of options.
+    """Decorate a function to reject keywords that are neither its arguments nor keys of ``kind``, its TypedDict of options.
 
-    A class in the place of the argument ``method`` has options of its own.
+    If the argument ``method`` is a class, all keywords are accepted, as the class may have options of its own.
     """
 
     def decorate(function: _Function) -> _Function:
@@ -101,7 +101,7 @@ def takes_options(kind: type) -> Callable[[_Function], _Function]:
 
 
 def driven(known: PublishedSet, inputs: Any) -> Any:
-    """Return inputs that drive each freedom as the published set does, unless they drive it themselves."""
+    """Return inputs completed with the drives of the published set, for freedoms that they do not drive themselves."""
     inputs = Inputs() if inputs is None else inputs
     if not isinstance(inputs, Inputs):
         return inputs
@@ -110,7 +110,7 @@ def driven(known: PublishedSet, inputs: Any) -> Any:
 
 
 def _but_for(known: PublishedSet, names: Iterable[str]) -> PublishedSet:
-    """Return a published set without the drives of freedoms that inputs of these names, the arguments' or FMI's, drive."""
+    """Return a published set without the drives of freedoms that inputs with these names (in `Inputs` or FMI) drive."""
     mechanism, names = mechanism_of(known.parameters), {*names}
     given = names | {channel.argument for channel in mechanism.channels if channel.name in names}
     modes = [mode.arguments for mode in mechanism.modes]
@@ -119,22 +119,19 @@ def _but_for(known: PublishedSet, names: Iterable[str]) -> PublishedSet:
 
 
 def started(known: PublishedSet, initial: Any) -> Any:
-    """Return the given initial state, completed from the published set."""
+    """Return the initial state: as given, a mapping completed from the published set, or that of the set if it is None."""
     if isinstance(initial, Mapping):
         return start_from(mechanism_of(known.parameters), initial, known.initial)
     return known.initial if initial is None else initial
 
 
 def at_its_speed(known: PublishedSet, speed: Any) -> Any:
-    """Return the given crank speed, or else the speed of the published set (rad/s)."""
+    """Return the given crank speed, or the speed of the published set (rad/s) if it is None."""
     return known.crank_speed if speed is None else speed
 
 
 def turn_durations(inputs: Inputs, mechanism: Mechanism) -> tuple[float, float] | None:
-    """Return the durations (s) of one turn of the slowest and the fastest angle with a constant speed.
-
-    None where there is no such freedom.
-    """
+    """Return how long one turn of the slowest and of the fastest crank with a constant speed takes (s), None without any."""
     found = []
     angles = {v.name for v in mechanism.variables if v.unit == "rad"}
     for number, freedom in enumerate(mechanism.freedoms):
@@ -152,13 +149,13 @@ def usual_times(
 ) -> tuple[float, float]:
     """Return the stop time and the sampling step of a run (s).
 
-    By default it has three turns of the slowest crank in steps of a degree of the fastest, at constant speeds. With an end
-    and no step it is 1 ms.
+    With neither given, at constant speeds, a run has three turns of the slowest crank in steps of one degree of the fastest.
+    If only the stop time is given, the step is 1 ms.
 
     Raises
     ------
     InputError
-        If there is no end, and no constant speed.
+        If there is neither a stop time nor a constant speed.
     """
     if stop_time is not None:
         return stop_time, 1e-3 if step is None else step
@@ -176,14 +173,14 @@ def variant(of: Any, /, **changes: Amount) -> Any:
     Parameters
     ----------
     of : str, PublishedSet, parameters of a mechanism, or their class
-        What is changed. A class, such as FiveBarParameters, makes new parameters.
+        What is changed. For a class, such as FiveBarParameters, new parameters are made.
     **changes
-        By the names of the fields, such as ``slider_stiffness="1e6 dyn/cm"``. Numbers are in SI.
+        New values by the names of the fields, such as ``slider_stiffness="1e6 dyn/cm"``. Numbers are in SI.
 
     Returns
     -------
     PublishedSet or parameters
-        A set where one was given, so that its start and its crank speed go with it.
+        A set if a set was given; it keeps its initial state and its crank speed.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""A case, as a case file describes it: a mechanism, its initial state, its inputs, and the duration."""
+"""A case, as described in a case file: a mechanism, its initial state, its inputs, and the duration of the run."""
 
 from __future__ import annotations
 
@@ -18,14 +18,14 @@ class Case:
     ----------
     title : str
     parameters, initial, inputs
-        All of one mechanism, `analysis.mechanisms`; by default it is at rest and nothing acts on it.
+        Parameters, initial state and inputs of one mechanism; by default it is at rest and nothing acts on it.
     stop_time : float
-        End of the run (s); it starts at 0.
+        End of the run (s), which starts at 0.
     step : float
-        Distance of the samples, and communication step of the FMU (s).
+        Time between samples, and communication step of the FMU (s).
     tolerance : float
     masses : tuple of Mass
-        Where the masses come from; empty if it is not known.
+        The masses and where they come from; empty if that is not known.
     """
 
     title: str
@@ -44,9 +44,10 @@ class Case:
 
 
 def published_case(name: str, *, revolutions: float = 3.0, steps_per_revolution: int = 360) -> Case:
-    """Return the case of a published set, driven as published and from its published start.
+    """Return the case of a published set, with its published drive and initial state.
 
-    It lasts some revolutions of the slowest crank; where no speed is commanded, as long as the FMU's default experiment.
+    The run lasts a number of revolutions of the slowest crank; without a commanded speed it is as long as the default
+    experiment of the FMU.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""Cautions about a run: parameters that make it stiff, and a balance of energy that its tolerance does not promise."""
+"""Cautions about a run: it is stiff, or the residual of its energy balance is larger than the tolerance promises."""
 
 from __future__ import annotations
 
@@ -11,21 +11,21 @@ from numpy.typing import NDArray
 
 from linkwork.mechanism import Mechanism
 
-#: Steps from which on a run may be stiff: a usual one takes some 50 a turn.
+#: Number of steps from which on a run is checked for stiffness: a usual run takes about 50 steps for a turn.
 MANY_STEPS = 50_000
-#: Steps after which a stiff run ends if it needs more than this share of the most steps.
+#: Number of steps after which a stiff run ends if it would need more than this fraction of the largest number of steps.
 _PATIENCE, _SHARE = 1_000_000, 0.1
-#: Decay rate times step size from which on stability limits the step: explicit methods of this order bear some 5.
+#: Decay rate times step size from which on stability limits the step: explicit methods of this order are stable up to about 5.
 _STABLE = 2.0
-#: Radians of the fastest vibration in a step from which on the step follows it: at the usual tolerance it takes about one.
+#: Phase angle (rad) of the fastest vibration in a step from which on it limits the step: at the usual tolerance about 1.
 _FOLLOWED = 0.3
-#: Residual of the energy balance relative to tolerance and greatest energy, and at most to the greatest energy, beyond which it
-#: is reported: a usual run has 2, one of 2000 turns 12.
+#: Largest residual of the energy balance without a caution: the first number times tolerance times greatest energy, but at most
+#: the second times greatest energy. In place of the first number a usual run has 2, a run of 2000 turns 12.
 _RESIDUAL, _MOST = 1e4, 0.05
 
 
 def disturbance_rates(mechanism: Mechanism, x: NDArray[np.float64], held: Any, p: Any) -> NDArray[np.complex128]:
-    """Return the eigenvalues of small disturbances of a state (1/s), by differences of the rates."""
+    """Return the eigenvalues (1/s) of the equations linearised at the state x with inputs ``held``, by finite differences."""
     rates, columns = mechanism.equations.derivative, []
     for i, size in enumerate(np.maximum(np.abs(x), 1e-3) * 1e-6):
         ends = []
@@ -38,9 +38,10 @@ def disturbance_rates(mechanism: Mechanism, x: NDArray[np.float64], held: Any, p
 
 
 def stiffness(rates: NDArray[np.complex128], steps: float, duration: float, usual: float) -> str:
-    """Return a sentence on a run of many steps because disturbances die out fast or vibrate fast; empty if it is not one.
+    """Return a caution if fast decay or fast vibration of small disturbances makes the steps of a run short; else empty.
 
-    A vibration is fast beyond the ``usual`` angular frequency (rad/s), which samples or drive explain.
+    ``rates`` are the eigenvalues of `disturbance_rates`; ``steps`` is the number of steps in the ``duration`` (s). A vibration
+    up to the angular frequency ``usual`` (rad/s) is not reported: samples or drive explain it.
     """
     step = duration / steps
     decay, vibration = float(-rates.real.min()), float(np.abs(rates.imag).max())
@@ -58,15 +59,19 @@ def stiffness(rates: NDArray[np.complex128], steps: float, duration: float, usua
 
 
 def too_slow(steps: Any, passed: Any, span: float, most: int) -> Any:
-    """Return whether a run, if it is stiff, is to end after so many steps: it would need too many of the most for its span.
+    """Return whether a stiff run is to end now, since it would need too many steps for its duration ``span`` (s).
 
-    ``steps`` and ``passed``, the time that has passed (s), are of one run or arrays of several.
+    ``steps`` is the number of steps so far, ``passed`` the time that they covered (s), both of one run or arrays of several;
+    ``most`` is the largest number of steps.
     """
     return (steps >= _PATIENCE) & (steps * span >= _SHARE * most * passed)
 
 
 def energy_balance(names: Sequence[str], values: NDArray[np.float64], tolerance: float) -> str:
-    """Return a sentence on a residual of the energy balance greater than a tolerance promises; empty if it is not."""
+    """Return a caution if the residual of the energy balance is larger than the tolerance promises; else an empty text.
+
+    ``values`` are the outputs ``names`` at the samples, shape (n, outputs).
+    """
     if "energy.residual" not in names or not len(values):
         return ""
     places = [n for n, name in enumerate(names) if name.startswith("energy.")]

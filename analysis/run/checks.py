@@ -1,4 +1,4 @@
-"""The standard cases on which the FMU is held against the in-process solver: each mechanism brings its own."""
+"""Check FMUs against the in-process solver on standard cases; each mechanism has its own standard cases."""
 
 from __future__ import annotations
 
@@ -17,13 +17,13 @@ from .cosimulation import Comparison, compare, cosimulate
 from .simulation import simulate
 from .trajectory import Trajectory
 
-#: The interfaces that a run in process can be held against.
+#: Interfaces that can be compared with a run in process.
 CHECKED = ("co-simulation", "model-exchange")
 
 
 @cache
 def standard_cases(mechanism: Mechanism) -> Mapping[str, Case]:
-    """Return the standard cases of a mechanism by name; without cases of its own, the run of its first published set."""
+    """Return the standard cases of a mechanism by name; if it has none, the case of its first published set."""
     if not mechanism.cases:
         name = next(iter(mechanism.published))
         return {name: published_case(name)}
@@ -46,7 +46,7 @@ class _Cases(Mapping[str, Case]):
         return len(self._all())
 
 
-#: By name: every way of driving and loading a mechanism.
+#: Standard cases by name; they cover all ways of driving and loading the mechanisms.
 CASES: Mapping[str, Case] = _Cases()
 
 
@@ -61,10 +61,10 @@ def check(
 ) -> tuple[Trajectory, Trajectory, Comparison]:
     """Run a case in process and through an FMU, with the same inputs, and compare every output.
 
-    In co-simulation the inputs are held on both sides, and the compiled solver takes the same steps as the FMU's: it may agree
-    with it to the last bit, which tests the packaging and every path between. With one of SciPy's methods or Hamming's the
-    integration is an independent one too. In model exchange it is CVode's: both integrate to a hundredth of the case's
-    tolerance, so that what is left is not their error.
+    In co-simulation both runs hold the inputs, and the compiled solver takes the same steps as the FMU's solver: the results
+    may agree to the last bit, which tests packaging and interfaces. With a method of SciPy or Hamming's the integration is
+    independent too. In model exchange CVode integrates the FMU; both runs then have a hundredth of the case's tolerance, so
+    that errors of integration do not matter.
 
     Returns
     -------
@@ -74,9 +74,9 @@ def check(
     Raises
     ------
     InputError
-        If ``interface`` is none that holds the inputs or lets them act continuously on both sides.
+        If ``interface`` is not one of `CHECKED`.
     LinkworkError
-        As `simulate` and `cosimulate`.
+        As for `simulate` and `cosimulate`.
     """
     if interface not in CHECKED:
         raise InputError(f"interface is {interface!r}: a check is of {' or '.join(CHECKED)}")

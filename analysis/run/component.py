@@ -1,4 +1,4 @@
-"""Instances of FMUs that are WebAssembly components (FMI-LS-WASM), run by wasmtime, with the methods of FMPy's instances."""
+"""Run FMUs that are WebAssembly components (FMI-LS-WASM) with wasmtime; instances have the methods of FMPy's instances."""
 
 from __future__ import annotations
 
@@ -11,20 +11,20 @@ from fmpy.fmi1 import FMICallException
 
 from ..libraries import require
 
-#: The folder of the binaries in the archive; the package and version of the draft's interfaces.
+#: Folder of the component in the archive, and name of the draft's interfaces with package and version.
 FOLDER = "wasm32-wasip2"
 _INTERFACE = "fmi:fmi3/{}@3.0.0"
 
 
 def component_of(folder: str | Path, identifier: str) -> Path:
-    """Return where an unpacked FMU has its component."""
+    """Return the path of the component in the folder of an unpacked FMU, by its model identifier."""
     return Path(folder) / "binaries" / FOLDER / f"{identifier}.wasm"
 
 
 class _Component:
-    """An instance in the component of an unpacked FMU.
+    """An instance of the component of an unpacked FMU.
 
-    Methods that are not written here are those of the interface under FMPy's names: ``getFloat64`` is ``get-float64``.
+    Other methods are those of the component's interface, under FMPy's names: ``getFloat64`` calls ``get-float64``.
     """
 
     _interface: ClassVar[str]
@@ -37,7 +37,7 @@ class _Component:
 
         engine = Engine()
         self._named, self._store = (instanceName, guid), Store(engine)
-        #: FMPy's name of the instance; None before and after its life
+        #: the instance, under the name that FMPy uses; None before `instantiate` and after `freeInstance`
         self.component: Any = None
         self._log: Callable[..., None] = lambda *_: None
         made = Component.from_file(engine, str(component_of(unzipDirectory, modelIdentifier)))
@@ -52,7 +52,7 @@ class _Component:
         self._log(message.encode())
 
     def call(self, method: str, *values: Any, kind: str = "method") -> Any:
-        """Call a method of the interface; FMICallException where it fails."""
+        """Call a method of the interface; raise FMICallException if it fails."""
         if method not in self._functions:
             name = f"[{kind}]{self._interface}-instance.{method}"
             index = self._of.get_export_index(self._store, name, self._at)
@@ -99,7 +99,7 @@ class ComponentSlave(_Component):
 
 
 class ComponentModel(_Component):
-    """An instance for model exchange; states are in arrays of ctypes, as FMPy has them."""
+    """An instance for model exchange; states are in arrays of ctypes, as in FMPy."""
 
     _interface, _more = "model-exchange", ()
 

@@ -1,4 +1,4 @@
-"""Trace the equations of a mechanism with CasADi and compile the traces to machine code."""
+"""Trace the equations of a mechanism with CasADi and compile them to machine code."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from ..numerics.tracing import Rebound
 if TYPE_CHECKING:
     from ..numerics.codegen import MachineCode
 
-#: The functions that a run needs, by their numbers among `Machine.addresses`.
+#: Indices in `Machine.addresses` of the functions that a run needs.
 DERIVATIVE, OUTPUTS, CLEARANCE, JUMP = range(4)
 _NAMES = ("derivative", "outputs", "clearance", "jump")
 _IN_ROWS = ("outputs", "chosen")
@@ -39,9 +39,9 @@ def traced(mechanism: Mechanism) -> Rebound:
 
 
 def constants(mechanism: Mechanism, switched: bool = False) -> tuple[Any, Any]:
-    """Return symbols for the constants of the equations, as a column and as the NamedTuple that the equations take.
+    """Return symbols for the constants of the equations: as a column, and as the NamedTuple that the equations take.
 
-    The mechanism's switch is a number there, so that the equations can branch on it.
+    In the NamedTuple the mechanism's switch is a number, so that the equations can branch on it.
     """
     p = symbolic.library().SX.sym("p", len(mechanism.constants._fields))
     k = mechanism.constants(*symbolic.library().vertsplit(p))
@@ -50,9 +50,10 @@ def constants(mechanism: Mechanism, switched: bool = False) -> tuple[Any, Any]:
 
 @cache
 def at_rest(mechanism: Mechanism, cranks: tuple[int, ...], freedom: int) -> Any:
-    """Trace the second derivatives of the energy by rate and by coordinate of a freedom, all at rest.
+    """Return a CasADi function of inertia and stiffness of a freedom, with the mechanism at rest and its coordinate 0.
 
-    The function takes the angle of each crank, and the constants.
+    They are the second derivatives of the energy with respect to the rate and to the coordinate of the freedom. The arguments
+    are the angle of each of ``cranks``, and the constants as a column.
     """
     casadi = symbolic.library()
     s, v, *angles = (casadi.SX.sym(name) for name in ("s", "v", *(f"angle{n}" for n in cranks)))
@@ -68,7 +69,7 @@ def at_rest(mechanism: Mechanism, cranks: tuple[int, ...], freedom: int) -> Any:
 
 
 class OfParameters(NamedTuple):
-    """The parameters of a mechanism traced: a column of symbols for their fields, an object with these, and functions."""
+    """Symbols for the parameters of a mechanism: as a column, as an object with the fields, and the functions that take it."""
 
     own: Any
     parameters: Any
@@ -76,7 +77,7 @@ class OfParameters(NamedTuple):
 
 
 def of_parameters(mechanism: Mechanism) -> OfParameters:
-    """Return the parameters as symbols, so that their ``constants`` and ``error_scale`` can be traced."""
+    """Return symbols for the parameters, so that their ``constants`` and ``error_scale`` can be traced."""
     casadi = symbolic.library()
     functions = symbolic.traced(modules_of(mechanism), max=casadi.fmax, min=casadi.fmin, float=lambda value: value)
     names = [field.name for field in fields(mechanism.parameters)]
@@ -86,21 +87,21 @@ def of_parameters(mechanism: Mechanism) -> OfParameters:
 
 
 def like_parameters(mechanism: Mechanism, functions: Rebound) -> type[SimpleNamespace]:
-    """Return a type with the methods of a mechanism's parameters, taken from ``functions``, for fields of another kind."""
+    """Return a class like a mechanism's parameters whose fields may be symbols or arrays; ``functions`` has its methods."""
     own = vars(mechanism.parameters).items()
     methods = {name: functions.of(f) for name, f in own if isinstance(f, FunctionType) and name[:2] != "__"}
     return type("LikeParameters", (SimpleNamespace,), methods)
 
 
 def modules_of(mechanism: Mechanism) -> tuple[ModuleType, ...]:
-    """Return the modules of the equations, and those that compute constants and scales."""
+    """Return the modules of the equations and the modules that compute constants and error scales."""
     of: Iterable[Callable[..., Any]] = (mechanism.parameters, mechanism.error_scale)
     further = {sys.modules[f.__module__]: None for f in of} | {sys.modules[Mechanism.__module__]: None}
     return tuple(dict.fromkeys((*further, *mechanism.modules)))
 
 
 class Symbols(NamedTuple):
-    """Columns of symbols: state, modes, channels, and constants with the mechanical energy at the start after them."""
+    """Columns of symbols: state, modes, channels, and constants followed by the mechanical energy at the start."""
 
     x: Any
     modes: Any
@@ -109,7 +110,7 @@ class Symbols(NamedTuple):
 
 
 class Traced(NamedTuple):
-    """The equations as functions of `Symbols`: expressions of CasADi, each a column."""
+    """The equations as CasADi expressions in `Symbols`, each a column."""
 
     symbols: Symbols
     derivative: Any
@@ -126,7 +127,7 @@ def expressions(mechanism: Mechanism, switched: bool = False) -> Traced:
     Raises
     ------
     LinkworkError
-        If they are more than straight lines of arithmetic and of the functions `symbolic.ELEMENTARY`.
+        If they contain more than arithmetic without branches and the functions `symbolic.ELEMENTARY`.
     """
     casadi = symbolic.library()
     functions = traced(mechanism)
@@ -172,7 +173,7 @@ def expressions(mechanism: Mechanism, switched: bool = False) -> Traced:
 
 
 def _compiled(traces: Traced, functions: Mapping[str, Any], lanes: int = 1) -> MachineCode:
-    """Return machine code of expressions, by their names, in the symbols of traced equations; outputs go in rows."""
+    """Compile expressions in the symbols of ``traces``, by name; with several lanes, outputs are written row by row."""
     from ..numerics.codegen import MachineCode
 
     casadi = symbolic.library()
@@ -183,12 +184,14 @@ def _compiled(traces: Traced, functions: Mapping[str, Any], lanes: int = 1) -> M
 
 
 class Machine:
-    """Machine code of a mechanism's equations, and what is derived once from parameters for it.
+    """Machine code of a mechanism's equations.
 
     Attributes
     ----------
     addresses : ndarray of int64
-        Of the functions, by DERIVATIVE and its kin.
+        Addresses of the functions, with the indices DERIVATIVE to JUMP.
+    fingerprint : str
+        Hash of the code.
     """
 
     def __init__(self, mechanism: Mechanism, switched: bool, lanes: int) -> None:
@@ -202,7 +205,7 @@ _MACHINES: dict[tuple[Mechanism, bool, int], Machine] = {}
 
 
 def machine(mechanism: Mechanism, switched: bool = False, lanes: int = 1) -> Machine:
-    """Return the machine code of a mechanism's equations for so many states at once; one thread compiles it at first."""
+    """Return the machine code of a mechanism's equations for ``lanes`` states at once, compiled by the first call."""
     key = mechanism, switched, lanes
     if key not in _MACHINES:
         from ..numerics.codegen import MAKING
@@ -215,7 +218,7 @@ def machine(mechanism: Mechanism, switched: bool = False, lanes: int = 1) -> Mac
 
 @cache
 def chosen_outputs(mechanism: Mechanism, switched: bool, columns: tuple[int, ...], lanes: int) -> MachineCode:
-    """Return machine code of the equation ``chosen``: some of the outputs, which costs what these need."""
+    """Compile a function ``chosen`` of the outputs with these indices only, which takes less time than all outputs."""
     from ..numerics.codegen import MAKING
 
     traces = expressions(mechanism, switched)

@@ -24,22 +24,23 @@ class Event:
     Parameters
     ----------
     name : str
-        Name under which it is reported.
+        Name under which the event is reported.
     output : str, optional
-        An output of the FMI contract.
+        Output of the FMI contract that crosses ``level``.
     level : float
         Level of the output, in its SI unit.
     function : callable, optional
-        Instead of an output: a function of time, all coordinates and all their rates, floats, compiled with Numba.
+        Function that crosses zero, instead of an output: of time, all coordinates and all their rates (floats). The compiled
+        solver compiles it with Numba.
     direction : int
-        +1 for rising, -1 for falling, 0 for both.
+        +1 for rising values, -1 for falling, 0 for rising and falling.
     stop : bool
         Whether the run ends there.
 
     Notes
     -----
-    A value that jumps across the level because an input jumps counts as crossing it, at the time of the jump; one that
-    starts on the level does not. What happens more than once within a quarter of an integrator's step may be missed.
+    If the value jumps across the level because an input jumps, the event happens at the jump. A value that starts on the level
+    is no event. Of several crossings within a quarter of an integrator's step some may be missed.
     """
 
     name: str
@@ -62,7 +63,7 @@ class Event:
             raise InputError(f"event {self.name!r} has level {self.level}: it must be a finite number")
 
     def column(self, mechanism: Mechanism) -> int:
-        """Return the index of the output among those of a mechanism.
+        """Return the index of the output among the outputs of a mechanism.
 
         Raises
         ------
@@ -78,20 +79,20 @@ class Event:
 
 
 class RunInterrupted(Interrupted):
-    """A run was interrupted from the keyboard; ``trajectory``, or the run of a system, holds what it had computed."""
+    """A run was interrupted by Ctrl-C; ``trajectory``, of a mechanism or of a system, has the results so far."""
 
     def __init__(self, trajectory: Any) -> None:
         self.trajectory = trajectory
         super().__init__(f"interrupted at t = {trajectory.time[-1]:.6g} s" if len(trajectory) else "interrupted")
 
 
-#: Listener that gets the progress instead of a bar on the terminal.
+#: Function that receives the progress instead of a bar on the terminal.
 _LISTENER: ContextVar[Callable[[str, float], None] | None] = ContextVar("listener", default=None)
 
 
 @contextmanager
 def heard_by(listener: Callable[[str, float], None]) -> Iterator[None]:
-    """Report progress to ``listener(what, share)`` inside the context instead of showing a bar."""
+    """Report progress inside the context to ``listener(what, share)``, share from 0 to 1, instead of showing a bar."""
     token = _LISTENER.set(listener)
     try:
         yield
@@ -101,7 +102,7 @@ def heard_by(listener: Callable[[str, float], None]) -> Iterator[None]:
 
 @contextmanager
 def shown(progress: bool, duration: float, what: str = "running") -> Iterator[Callable[[float], None]]:
-    """Show a progress bar over the time of a run; yield a function that takes the time reached."""
+    """Show a progress bar for a run of a given duration; yield a function to call with the part of it done so far."""
     listener = _LISTENER.get()
     if listener is not None:
         yield lambda done: listener(what, done / duration if duration else 1.0)

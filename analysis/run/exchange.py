@@ -1,4 +1,4 @@
-"""Model exchange: an FMU's derivatives, integrated by CVode of SUNDIALS as FMPy brings it."""
+"""Model exchange: integrate an FMU's derivatives with CVode of SUNDIALS, which is part of FMPy."""
 
 from __future__ import annotations
 
@@ -18,10 +18,10 @@ from .fmu import FmuModel
 from .inputs import Encoded
 from .sampling import named, release, sample
 
-#: Steps of CVode between two samples, at most.
+#: Largest number of CVode's steps between two samples.
 MOST_STEPS = 100_000
 
-#: Which FMPy leaves out: no step goes beyond this time, where an input jumps.
+#: Function of CVode that FMPy does not offer: sets a time beyond which no step goes, as an input jumps there.
 _set_stop_time = sundials_cvode.CVodeSetStopTime
 _set_stop_time.argtypes = [c_void_p, sunrealtype]
 _set_stop_time.restype = c_int
@@ -37,8 +37,8 @@ class ExchangeError(Exception):
 class Exchange(CVodeSolver):  # type: ignore[misc]
     """An FMU in model exchange with its inputs, integrated by CVode.
 
-    Between the times at which inputs jump they are continuous functions of time and state, commanded rates and their rates of
-    change too. At those times the FMU is brought into event mode.
+    Between jumps the inputs, commanded rates and their derivatives included, are continuous functions of time and state. At a
+    jump the FMU goes through event mode.
 
     Parameters
     ----------
@@ -46,17 +46,17 @@ class Exchange(CVodeSolver):  # type: ignore[misc]
     encoded : Encoded
         The inputs.
     times : ndarray
-        Samples (s).
+        Times of the samples (s).
     tolerance : float
-        CVode's relative tolerance; the absolute one of a state is that times its nominal value.
+        CVode's relative tolerance; the absolute tolerance of a state is this times the nominal value of the state.
     """
 
     def __init__(self, model: FmuModel, encoded: Encoded, times: NDArray[np.float64], tolerance: float) -> None:
         self.model, self.encoded = model, encoded
-        # CVode's time counts from there: at a late time its first steps would be lost in the rounding
+        # CVode's time counts from the start: late times would be too coarse, by rounding, for its first steps
         self.origin = self.time = float(times[0])
         self.laws = encoded.source.laws.copy()
-        # the outer pieces go on beyond their ends
+        # at the first and the last break nothing changes: the outer pieces extend beyond them
         breaks = encoded.source.breaks[1:-1]
         inside = breaks[(breaks > times[0]) & (breaks <= times[-1])]
         self.ends = [*inside.tolist(), np.inf]
@@ -87,11 +87,14 @@ class Exchange(CVodeSolver):  # type: ignore[misc]
         return np.ctypeslib.as_array(x, (self.nx,))
 
     def inputs(self, t: float, x: NDArray[np.float64], left: bool = False) -> dict[str, float]:
-        """Return all inputs at a time and a state."""
+        """Return all inputs by name, at a time and a state; ``left`` for the limit from the left where an input jumps."""
         return named(self.encoded, sample(self.encoded, t, x, self.laws, left=left))
 
     def begin(self, released: Any = ()) -> bool:
-        """Begin an interval of smooth inputs with an event, which releases torsion bars; return whether the run ends here."""
+        """Begin an interval of smooth inputs; return whether the FMU requests the end of the run.
+
+        ``released`` has an entry for each torsion bar, not zero if the bar is released now.
+        """
         release(self.encoded, self.state, self.laws)
         self.laws[np.flatnonzero(released), 2] = 0.0
         self.ends = [end for end in self.ends if end > self.time]
@@ -104,7 +107,7 @@ class Exchange(CVodeSolver):  # type: ignore[misc]
         return ended
 
     def advance(self, goal: float) -> bool:
-        """Integrate to a time, or to an earlier event, and return whether the run ends there.
+        """Integrate to the time ``goal`` or to an earlier event; return whether the run ends there.
 
         Raises
         ------
@@ -128,13 +131,13 @@ class Exchange(CVodeSolver):  # type: ignore[misc]
         return self.begin(roots[self.model.indicators :]) if roots.any() or self.time >= self.ends[0] else False
 
     def _reason(self, error: Exception) -> Exception:
-        """Return the cause of a failure of CVode: the error of the inputs if there was one."""
+        """Return the error to raise for a failure of CVode: that of the inputs if they caused it."""
         if self.failure is None or isinstance(self.failure, FMICallException):
             return ExchangeError(str(error))
         return self.failure
 
     def put(self, t: float, x: Any) -> None:
-        """Set the FMU to a time and state of CVode."""
+        """Set time, states and inputs of the FMU to those at a time t (s) and CVode's state x."""
         self.model.put(t, x)
         if not self.still:
             self.model.set_inputs(self.inputs(t, self._array(x), left=t >= self.ends[0]))
@@ -144,10 +147,10 @@ class Exchange(CVodeSolver):  # type: ignore[misc]
     def _tried(self, work: Callable[[], None]) -> int:
         try:
             work()
-        except FMICallException as error:  # there is no such state
+        except FMICallException as error:  # the FMU has no such state
             self.failure = error
             return _SHORTER_STEP
-        except Exception as error:  # of the inputs: it cannot pass through CVode
+        except Exception as error:  # raised by the inputs: it cannot pass through CVode
             self.failure = error
             return _NO_WAY
         return _GOOD
@@ -162,7 +165,7 @@ class Exchange(CVodeSolver):  # type: ignore[misc]
         return self._tried(work)
 
     def g(self, t: float, y: Any, gout: Any, user_data: Any) -> int:
-        """Compute the event indicators, whose zeros are events."""
+        """Compute the functions whose zeros are events: the FMU's event indicators, and the release of torsion bars."""
 
         def work() -> None:
             x = NV_DATA_S(y)

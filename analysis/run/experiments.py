@@ -1,6 +1,6 @@
-"""Experiments that an FMU carries: inputs, parameters and reference results, run again and compared.
+"""Run the experiments that an FMU contains (inputs, parameters and reference results) and compare the results.
 
-The layered standard FMI-LS-REF (https://github.com/modelica/fmi-ls-ref, tag v1.0.0-beta.1) lists them in
+In the layered standard FMI-LS-REF (https://github.com/modelica/fmi-ls-ref, tag v1.0.0-beta.1) they are listed in
 ``extra/org.fmi-standard.fmi-ls-ref/fmi-ls-manifest.xml``, in the format of https://github.com/modelica/ma-hs-experiments.
 """
 
@@ -30,11 +30,11 @@ from .fmu import read_description, unpacking_folder
 STANDARD = "org.fmi-standard.fmi-ls-ref"
 EXPERIMENTS = f"extra/{STANDARD}"
 MANIFEST = f"{EXPERIMENTS}/fmi-ls-manifest.xml"
-#: Type of an annotation of Linkwork that gives the relative difference that an experiment allows.
+#: Type of Linkwork's annotation for the largest relative difference that an experiment allows.
 ALLOWED = "org.linkwork.allowed"
-#: Where an experiment gives none: so many times its tolerance, at least the first, and the second where it has no tolerance.
+#: Without that annotation the first number times the tolerance is allowed, at least the second; without a tolerance the third.
 _TIMES, _LEAST, _USUAL = 100.0, 1e-6, 1e-3
-#: A variable is not asked for more digits than this share of the largest variable of its unit carries.
+#: Smallest scale of a variable's differences, as a fraction of the largest magnitude of variables with the same unit.
 _SMALL = 1e-3
 
 
@@ -44,7 +44,7 @@ class ExperimentError(LinkworkError):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Experiment:
-    """An experiment of an FMU; what its file leaves out is None or empty.
+    """An experiment of an FMU; a field that is not in its file is None or empty.
 
     Attributes
     ----------
@@ -52,11 +52,11 @@ class Experiment:
     start, stop, step, tolerance : float or None
         Times (s) and tolerance of the solver.
     allowed : float or None
-        Greatest relative difference from the reference, if the FMU states one.
+        Largest relative difference from the reference that the FMU allows.
     parameters : mapping
-        Values by the names of variables.
+        Values of parameters by name, as texts.
     stimuli, reference : structured ndarray or None
-        Columns by the names of variables, after the column of the time.
+        Inputs and reference results: a column of times (s), then a column for each variable by its name.
     """
 
     name: str
@@ -73,7 +73,7 @@ class Experiment:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Deviation:
-    """The largest difference of a variable from its reference: where, and relative to the variable's scale."""
+    """Largest difference of a variable from its reference: its time, both values, and the difference relative to the scale."""
 
     name: str
     unit: str
@@ -85,7 +85,7 @@ class Deviation:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Outcome:
-    """An experiment that was run: deviations of all variables, largest first, what was allowed, and why it ended early."""
+    """Result of an experiment: deviations of all variables, largest first, the allowed one, and why a run failed, if so."""
 
     experiment: str
     description: str
@@ -96,19 +96,19 @@ class Outcome:
 
     @property
     def passed(self) -> bool:
-        """Return whether the experiment ran to its end, and every variable is within the allowed difference."""
+        """Return whether the run reached its end and the deviation of every variable is allowed."""
         return not self.message and all(d.relative <= self.allowed for d in self.deviations)
 
 
 def read_experiments(fmu: str | Path) -> tuple[Experiment, ...]:
-    """Read the experiments that an FMU carries.
+    """Read the experiments that an FMU contains.
 
     Raises
     ------
     InputError
         If the file is not an FMU.
     ExperimentError
-        If it has no experiments, or they cannot be read.
+        If the FMU has no experiments, or they cannot be read.
     """
     check_fmu(fmu)
     with ZipFile(fmu) as archive:
@@ -127,13 +127,13 @@ def read_experiments(fmu: str | Path) -> tuple[Experiment, ...]:
 
 
 class _Reader:
-    """The files of an FMU that its manifest leads to."""
+    """Reader of the files in an FMU that its manifest names."""
 
     def __init__(self, fmu: str | Path, archive: ZipFile) -> None:
         self.fmu, self.archive, self.names = fmu, archive, set(archive.namelist())
 
     def place(self, base: str, node: ElementTree.Element) -> str:
-        """Return the place in the archive that the attribute ``source`` leads to from a file."""
+        """Return the path in the archive of the file that the attribute ``source`` of a node in the file ``base`` names."""
         source = node.get("source", "")
         parts = urlsplit(source)
         place = posixpath.normpath(posixpath.join(posixpath.dirname(base), unquote(parts.path)))
@@ -148,7 +148,7 @@ class _Reader:
             raise ExperimentError(f"{self.fmu}: {place} cannot be read: {first_line(error)}") from error
 
     def xml(self, place: str) -> ElementTree.Element:
-        """Read XML; the names of elements come without namespaces."""
+        """Read an XML file; the names of elements are returned without namespaces."""
         try:
             root = ElementTree.fromstring(self.text(place))
         except ElementTree.ParseError as error:
@@ -161,7 +161,7 @@ class _Reader:
         """Yield the experiments of a file."""
         for node in self.xml(place).iter("Experiment"):
             name = node.get("name", "")
-            # the schema has the times at the kind of analysis, the text of the standard at the experiment
+            # times are attributes of the kind of analysis in the schema, of the experiment in the text of the standard
             kinds = [child for child in node if child.tag not in ("Parameters", "Stimuli", "References", "Annotations")]
             if kinds and kinds[0].tag != "TransientSimulation":
                 raise ExperimentError(
@@ -199,7 +199,7 @@ class _Reader:
         return number
 
     def _parameters(self, place: str) -> dict[str, str]:
-        """Read a parameter set of SSP."""
+        """Read a parameter set in SSP's format: values as texts, by name."""
         values = {}
         for node in self.xml(place).iter("Parameter"):
             value = next((child.get("value") for child in node if "value" in child.attrib), None)
@@ -209,7 +209,7 @@ class _Reader:
         return values
 
     def _table(self, place: str) -> NDArray[Any]:
-        """Read a table whose first column is the time."""
+        """Read a CSV table whose first column is the time."""
         names, *rows = list(csv.reader(self.text(place).splitlines())) or [[]]
         names = [name.strip() for name in names]
         if len(names) < 2 or len(set(names)) < len(names) or not rows or any(len(row) != len(names) for row in rows):
@@ -224,18 +224,18 @@ class _Reader:
 
 
 def verify(fmu: str | Path, *, allowed: float | None = None) -> Iterator[Outcome]:
-    """Run the experiments that an FMU of any make carries, by FMPy, and compare with its reference results.
+    """Run the experiments that an FMU from any tool contains, with FMPy, and compare them with its reference results.
 
-    An experiment is run in co-simulation if the FMU has that interface: inputs are held over each step, and the reference
-    has the outputs at its end, before the next inputs. The scale of a variable is the largest magnitude of its reference, and
-    at least a thousandth of the largest of all variables of its unit.
+    An experiment is run in co-simulation if the FMU has that interface: inputs are held over each step, and the reference has
+    the outputs at the end of the step, before the next inputs. Differences are relative to the scale of a variable: the largest
+    magnitude of its reference, but at least a thousandth of that of all variables with the same unit.
 
     Parameters
     ----------
     fmu : path
     allowed : float, optional
-        Greatest relative difference; by default what the experiment states, or else 100 times its tolerance and at least
-        1e-6, or 1e-3 where it has no tolerance.
+        Largest relative difference; by default the one that the experiment states, else 100 times its tolerance but at least
+        1e-6, or 1e-3 if it has no tolerance.
 
     Yields
     ------
@@ -246,7 +246,7 @@ def verify(fmu: str | Path, *, allowed: float | None = None) -> Iterator[Outcome
     InputError
         If the file is not an FMU.
     ExperimentError
-        If it has no experiments, or they cannot be read.
+        If the FMU has no experiments, or they cannot be read.
 
     Examples
     --------
@@ -273,7 +273,7 @@ def verify(fmu: str | Path, *, allowed: float | None = None) -> Iterator[Outcome
 
 
 def _run(experiment: Experiment, description: Any, folder: str, allowed: float | None) -> Outcome:
-    """Run one experiment of an unpacked FMU."""
+    """Run one experiment of an unpacked FMU; ``allowed`` replaces the allowed difference if it is not None."""
     from fmpy import simulate_fmu
 
     kind = "ModelExchange" if description.coSimulation is None else "CoSimulation"
@@ -314,12 +314,12 @@ def _run(experiment: Experiment, description: Any, folder: str, allowed: float |
 
 
 def _columns(table: NDArray[Any] | None) -> tuple[str, ...]:
-    """Return the names of the columns of a table after that of the time."""
+    """Return the names of the columns of a table except the first, the time."""
     return () if table is None else (table.dtype.names or ())[1:]
 
 
 def _deviations(found: NDArray[Any], reference: NDArray[Any], units: Mapping[str, str]) -> tuple[Deviation, ...]:
-    """Return the largest difference of each variable at the times of the reference, the largest of all first."""
+    """Return the largest difference of each variable at the times of the reference, sorted from large to small."""
     clock, *names = reference.dtype.names or ()
     times = reference[clock]
     sizes = {name: float(np.abs(reference[name]).max()) for name in names}

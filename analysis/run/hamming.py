@@ -11,10 +11,10 @@ Predictor and corrector are of order 4, with errors 14/45 h^5 y''''' and -1/40 h
 measures both: 9/121 |p - c| is the local error of the corrector, which sets the step, and modifier and final value take
 it out again, so that the motion converges one order faster than the error estimate says.
 
-The step is doubled from stored back values, which takes seven of them, and halved by Hermite interpolation between the
-last four; where two halvings do not suffice, or the right-hand side is not finite, the run starts again from the last
-good point with the Runge-Kutta method of order 4 and step doubling, as it does at the start and for a last step
-shorter than the others.
+To double the step, every other one of seven stored back values is used; to halve it, Hermite interpolation between the last
+four gives new ones. If two halvings do not suffice, or the right-hand side is not finite, the method starts again from the
+last good point with the Runge-Kutta method of order 4 and error estimation by step doubling. These steps also begin the run,
+and end it if the last step is shorter than the others.
 """
 
 from __future__ import annotations
@@ -32,11 +32,11 @@ Array = NDArray[Any]
 
 ORDER = 4
 
-#: Relative error below which the step is doubled: the error grows by 2^5, and has to stay below 1 with something to spare.
+#: Error relative to the tolerance below which the step is doubled: the error grows by 2^5 and must stay well below 1.
 DOUBLE_BELOW = 1.0 / 64.0
-#: Halvings by interpolation in one step, after which the run starts again with Runge-Kutta steps.
+#: Largest number of halvings in one step; after more the method starts again with Runge-Kutta steps.
 MOST_HALVINGS = 2
-#: Back values kept: those that a doubling takes.
+#: Number of back values that are kept, as many as a doubling needs.
 BACK_VALUES = 7
 
 
@@ -50,8 +50,8 @@ class Point(NamedTuple):
 class Hamming(OdeSolver):  # type: ignore[misc]
     """Hamming's modified predictor-corrector as a method of `scipy.integrate.solve_ivp`.
 
-    Two evaluations of the right-hand side a step. The step is constant until the error asks for half of it or allows
-    twice of it; ``first_step == max_step`` with a loose tolerance holds it fixed.
+    A step takes two evaluations of the right-hand side. The step size is constant until the error requires half of it or
+    allows twice of it; ``first_step == max_step`` with a loose tolerance keeps it fixed.
 
     Parameters
     ----------
@@ -66,16 +66,16 @@ class Hamming(OdeSolver):  # type: ignore[misc]
     max_step : float
         Longest step allowed.
     rtol, atol : float or array_like, shape (n,)
-        The local error of a step is kept below ``atol + rtol |y|``, in the root mean square over the components.
+        Tolerances: the local error of a step is kept below ``atol + rtol |y|``, as root mean square over the components.
     vectorized : bool
-        Whether ``fun`` takes columns of states.
+        Whether ``fun`` can take several states as columns.
     first_step : float, optional
         First step; by default chosen from the first two derivatives.
 
     Attributes
     ----------
     halvings, doublings, starts : int
-        How often the step was halved by interpolation, doubled, and started again with Runge-Kutta steps.
+        Numbers of halvings of the step, of doublings, and of starts with Runge-Kutta steps, the first one included.
 
     Raises
     ------
@@ -105,7 +105,7 @@ class Hamming(OdeSolver):  # type: ignore[misc]
         if not ((self.rtol >= 0.0).all() and (self.atol >= 0.0).all() and (self.rtol + self.atol > 0.0).all()):
             raise ValueError("rtol and atol must be zero or greater, and not both be zero")
         self.max_step = max_step
-        #: back values, the newest first, all ``h`` apart
+        #: back values, the newest first, at times ``h`` apart
         self._back = [Point(self.y, self.fun(self.t, self.y))]
         #: p_n - c_n of the newest point
         self._p_minus_c: Array = np.zeros_like(self.y)
@@ -124,18 +124,18 @@ class Hamming(OdeSolver):  # type: ignore[misc]
         self._node_points: tuple[Point, ...] = ()
 
     def _norm(self, x: Array, size: Array) -> float:
-        """Return the root mean square of ``x`` relative to the tolerance at states of magnitude ``size``."""
+        """Return the root mean square of x divided by the tolerance ``atol + rtol size``."""
         with np.errstate(invalid="ignore", over="ignore", divide="ignore"):
             return float(np.sqrt(np.mean(np.abs(x / (self.atol + self.rtol * size)) ** 2)))
 
     def _first_step(self, span: float) -> float:
-        """Choose the first step from the sizes of y, y' and y'' (Hairer, Norsett and Wanner, section II.4)."""
+        """Choose the first step from the magnitudes of y, y' and y'' (Hairer, Norsett and Wanner, section II.4)."""
         if self.n == 0 or span == 0.0:
             return span
         y, f = self._back[0]
         d0, d1 = self._norm(y, np.abs(y)), self._norm(f, np.abs(y))
         h0 = min(1e-6 if d0 < 1e-5 or d1 < 1e-5 else 0.01 * d0 / d1, span)
-        if h0 == 0.0:  # y' is beyond all bounds
+        if h0 == 0.0:  # y' is infinite
             return h0
         f1 = self.fun(self.t + self.direction * h0, y + self.direction * h0 * f)
         d2 = self._norm(f1 - f, np.abs(y)) / h0
@@ -172,7 +172,7 @@ class Hamming(OdeSolver):  # type: ignore[misc]
         return False, self.TOO_SMALL_STEP
 
     def _next_time(self) -> tuple[float, bool]:
-        """Return the time of the next point, and whether it is the end of the run to within rounding."""
+        """Return the time of the next point, and whether it is the end of the run (to within rounding errors)."""
         t_new = self._anchor + self.direction * self.h * (self._count + 1)
         slack = 16.0 * np.spacing(max(abs(self.t), abs(self.t_bound))) + 1e-12 * self.h
         if self.direction * (self.t_bound - t_new) <= slack:
@@ -185,12 +185,12 @@ class Hamming(OdeSolver):  # type: ignore[misc]
         self._back = [new, *self._back[: BACK_VALUES - 1]]
 
     def _rescale(self, h: float) -> None:
-        """Continue from here with another step size."""
+        """Continue from the present point with another step size."""
         self.h = h
         self._anchor, self._count = self.t, 0
 
     def _restart(self, h: float) -> None:
-        """Forget the back values and go on with Runge-Kutta steps of size ``h``."""
+        """Discard all back values but the newest and continue with Runge-Kutta steps of size ``h``."""
         if len(self._back) > 1:
             self.starts += 1
         self._back = self._back[:1]
@@ -198,7 +198,7 @@ class Hamming(OdeSolver):  # type: ignore[misc]
         self._rescale(h)
 
     def _hamming(self, t_new: float) -> tuple[float, Point, Array]:
-        """Take one step (2.28-2.31); return its relative error, the new point, and its p - c."""
+        """Take one step (2.28-2.31); return its error relative to the tolerance, the new point, and p - c of that point."""
         h = self.direction * self.h
         (y0, f0), (_, f1), (y2, f2), (y3, _) = self._back[:4]
         with np.errstate(invalid="ignore", over="ignore"):
@@ -213,7 +213,10 @@ class Hamming(OdeSolver):  # type: ignore[misc]
         return (error if np.isfinite(new.f).all() else np.inf), new, p - c
 
     def _runge_kutta(self, length: float) -> tuple[float, Point, Point]:
-        """Take two Runge-Kutta steps of half the length; return their error against one full step, the middle, the end."""
+        """Take two Runge-Kutta steps of half the length; return their error, the middle and the end.
+
+        The error, relative to the tolerance, is estimated from the difference to one step of the full length.
+        """
         t, h = self.t, self.direction * length
         start = self._back[0]
         with np.errstate(invalid="ignore", over="ignore"):
@@ -227,7 +230,7 @@ class Hamming(OdeSolver):  # type: ignore[misc]
         return (error if np.isfinite(new.f).all() else np.inf), middle, new
 
     def _rk4(self, t: float, point: Point, h: float) -> Array:
-        """Take a classic Runge-Kutta step of size ``h`` from a point with known derivative."""
+        """Return the state after one classic Runge-Kutta step of size ``h`` from a point at time t."""
         y, k1 = point
         k2: Array = self.fun(t + 0.5 * h, y + 0.5 * h * k1)
         k3: Array = self.fun(t + 0.5 * h, y + 0.5 * h * k2)
@@ -238,7 +241,7 @@ class Hamming(OdeSolver):  # type: ignore[misc]
         return Point(y, self.fun(t, y))
 
     def _double(self) -> None:
-        """Take every other back value, where there are enough and the longer step fits."""
+        """Double the step and keep every other back value, if there are enough and the longer step is allowed."""
         h = 2.0 * self.h
         room = abs(self.t_bound - self.t)
         if len(self._back) < BACK_VALUES or h > self.max_step * (1.0 + 1e-12) or h > room:
@@ -249,7 +252,7 @@ class Hamming(OdeSolver):  # type: ignore[misc]
         self.doublings += 1
 
     def _halve(self) -> bool:
-        """Interpolate the back values at half the step; False where their derivatives are not finite."""
+        """Halve the step and interpolate the back values; return False if their derivatives are not finite."""
         h = self.direction * self.h
         (y0, f0), (y1, f1), (y2, f2), (y3, _) = self._back[:4]
         # Hermite interpolation of degree 6 through y_n .. y_(n-3) and f_n .. f_(n-2)
@@ -265,7 +268,7 @@ class Hamming(OdeSolver):  # type: ignore[misc]
         return True
 
     def _estimate(self) -> Array:
-        """Estimate p_n - c_n for the present back values: the error of the 3/8 rule over them times 242/27."""
+        """Estimate p_n - c_n for new back values: 242/27 times the error of the 3/8 rule over the last four of them."""
         h = self.direction * self.h
         (y0, f0), (_, f1), (_, f2), (y3, f3) = self._back[:4]
         return np.asarray(242.0 / 27.0 * (y0 - y3 - 0.375 * h * (f0 + 3.0 * (f1 + f2) + f3)))
@@ -277,7 +280,7 @@ class Hamming(OdeSolver):  # type: ignore[misc]
 class _Quintic(DenseOutput):  # type: ignore[misc]
     """Hermite interpolation of degree 5 through three equidistant points and their derivatives.
 
-    After a Runge-Kutta step they are its ends and its middle; after one of Hamming's, its ends and the point before.
+    The points are the ends and the middle of a Runge-Kutta step, or the ends of a Hamming step and the point before it.
     """
 
     def __init__(self, t_old: float, t: float, nodes: tuple[float, ...], points: tuple[Point, ...]) -> None:

@@ -1,4 +1,4 @@
-"""Events of a compiled run: the limit of assembly, the release of torsion bars, the user's; where in a step they happen."""
+"""Locate events in the steps of a compiled run: the limit of assembly, the release of torsion bars, events of the user."""
 
 from __future__ import annotations
 
@@ -26,20 +26,19 @@ from .records import (
 from .sources import unwound
 from .stepping import NODES, interpolant, interpolate, stage
 
-#: Events that one step can bring at most, and the beginning of an interval besides.
+#: Largest number of events of one kind in a step, each in its own part of the step; the begin of an interval may add one.
 EVENTS_PER_STEP = 4
 #: Fraction of a step within which an event counts as simultaneous with the end of the run or the release.
 SAME = 1e-9
 
-# What can cut a step short besides a user's event, which goes by its number. Of Python's integers each would be a type of its
-# own to Numba, for which it compiles the functions that take it once more.
-# Torsion bar n is released at RELEASE - n.
+# Numbers of events that are not the user's (those count from 0): NOTHING, ASSEMBLY, and RELEASE - n for torsion bar n. As
+# integers of NumPy: for each constant integer of Python Numba would compile the functions that take it once more.
 RELEASE, NOTHING, ASSEMBLY = np.arange(-3, 0)
 
 
 @inner
 def _gap(e, t, x, u, motion):
-    """Return the function whose zero is an event: the limit of assembly, a release, or event e of the user."""
+    """Return the value, at time t, state x and inputs u, of the function that is zero when event number e happens."""
     watch, source = motion.watch, motion.source
     if e == ASSEMBLY:
         return clearance_at(x, u, motion) - LIMIT_SINE
@@ -53,7 +52,7 @@ def _gap(e, t, x, u, motion):
 
 @inner
 def _crosses(before, after, direction):
-    """Return whether an event happens between two values; one that starts at zero does not."""
+    """Return whether an event's function crosses zero between two values; False if it starts at zero."""
     return (before < 0.0 <= after and direction >= 0.0) or (before > 0.0 >= after and direction <= 0.0)
 
 
@@ -87,13 +86,13 @@ def notice_jumps(motion):
 
 @inner
 def _locate(e, low, high, h, motion):
-    """Return the fraction of the step at which event e happens, by bisection of the interpolant."""
+    """Return the fraction of the step, between ``low`` and ``high``, at which event e happens, by bisection."""
     room = motion.room
     positive = False
     for n in range(55):
         s = low if n == 0 else 0.5 * (low + high)
         look_inside(s, h, motion)
-        # a NaN, beyond the limit of assembly, compares as not positive
+        # NaN, beyond the limit of assembly, counts as not positive
         sign = _gap(e, time_at(s, h, motion), room.z, room.inside, motion) > 0.0
         if n == 0:
             positive = sign
@@ -101,15 +100,15 @@ def _locate(e, low, high, h, motion):
             low = s
         else:
             high = s
-    # the limit is approached, not passed: its own side must still be a configuration
+    # just before the limit of assembly: beyond it there is no configuration
     return low if e == ASSEMBLY else high
 
 
 @inner
 def _events_of_step(what, cut, h, motion):
-    """Record the user's events inside a step, and return the first that stops the run, with its fraction.
+    """Record the user's events inside a step; return the first event that ends the step, and its fraction of the step.
 
-    It is cut short by ``what`` at ``cut`` already.
+    ``what`` and ``cut`` are the event and the fraction of the step at which the step already ends without them.
     """
     watch, room = motion.watch, motion.room
     for e in range(watch.table.shape[0]):
@@ -133,7 +132,7 @@ def _events_of_step(what, cut, h, motion):
 
 @inner
 def _make_interpolant(h, motion):
-    """Make the interpolant of a step whose rates at the end are those of stage 12."""
+    """Compute the interpolant of a step of size h; stage 12 must already have the rates at the end of the step."""
     carry, room, x = motion.carry, motion.room, motion.x
     copy(motion.u, room.inside)
     for s in range(13, 16):
@@ -146,7 +145,7 @@ def _make_interpolant(h, motion):
 
 @inner
 def locate_events(clearance, h, motion):
-    """Make the interpolant of an accepted step, record its events, and return the one that ends it, with its fraction."""
+    """Record the events inside an accepted step; return the event that ends it, or NOTHING, and its fraction of the step."""
     carry, watch = motion.carry, motion.watch
     _make_interpolant(h, motion)
     what, cut = NOTHING, 2.0
@@ -160,7 +159,7 @@ def locate_events(clearance, h, motion):
                 if s < cut:
                     what, cut = RELEASE - n, s
     what, cut = _events_of_step(what, cut, h, motion)
-    # times in the place of fractions; what comes after the cut did not happen
+    # replace fractions by times; remove events after the end of the step
     kept = carry.known
     for n in range(carry.known, carry.found):
         s = watch.found[n, 1]
@@ -174,7 +173,7 @@ def locate_events(clearance, h, motion):
 
 @inner
 def end_at(what, cut, h, motion):
-    """End a step at the fraction of an event, and return the status."""
+    """End a step at the fraction ``cut`` at which event ``what`` happens; return the status of the run."""
     carry, watch, source = motion.carry, motion.watch, motion.source
     x, u = motion.x, motion.u
     t = time_at(cut, h, motion)
@@ -187,7 +186,7 @@ def end_at(what, cut, h, motion):
         watch.gaps[e] = _gap(e, t, x, u, motion)
     status = RUNNING if what <= RELEASE else LIMIT if what == ASSEMBLY else EVENT
     for n in range(carry.known, carry.found):
-        # at the cut itself, but for rounding: it has happened
+        # this event happened at the end of the step, to within rounding errors
         e = int(watch.found[n, 0])
         if watch.found[n, 1] >= time_at(cut - SAME, h, motion):
             watch.gaps[e] = 0.0

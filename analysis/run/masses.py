@@ -1,4 +1,4 @@
-"""Masses of links: computed from the ``section`` of a link in a case file, and where the masses of a case come from."""
+"""Masses of links: compute them from the ``section`` of a link, and tell where the masses of a case come from."""
 
 from __future__ import annotations
 
@@ -25,13 +25,13 @@ class Mass(NamedTuple):
     Attributes
     ----------
     name : str
-        FMI parameter.
+        Name of the FMI parameter.
     value : float
-        (kg).
+        Mass (kg).
     origin : str
-        In words, such as ``"of table-3.1"``.
+        Where the value comes from, such as ``"of table-3.1"``.
     stale : str
-        In words, what the case keeps of the published set though it changes the length of the link; else empty.
+        Text on what is kept from the published set although the link has another length; else empty.
     """
 
     name: str
@@ -41,9 +41,9 @@ class Mass(NamedTuple):
 
 
 def _values(link: Link, units: Mapping[str, str], made: Made, length: float, mass: float | None) -> dict[str, float]:
-    """Return mass, moment of inertia and centre of mass of a link by the names of the parameters, in SI."""
+    """Return mass, moment of inertia and centre of mass of a link (SI), by parameter names; ``mass`` is the weighed one."""
     own, (x, y), inertia = made.properties(length)
-    if mass is not None:  # weighed: of the same shape, and so of the same radius of gyration
+    if mass is not None:  # weighed: the shape, and so the radius of gyration, is that of the section
         own, inertia = mass, inertia * mass / own
     if link.about_pin:
         inertia += own * (x * x + y * y)
@@ -61,14 +61,14 @@ def _values(link: Link, units: Mapping[str, str], made: Made, length: float, mas
 
 @takes_published()
 def with_sections(parameters: Parameters, **sections: Section) -> Parameters:
-    """Return parameters with the masses, centres of mass and moments of inertia of links of these sections.
+    """Return parameters with masses, centres of mass and moments of inertia of links computed from their sections.
 
     Parameters
     ----------
     parameters : parameters of a mechanism
-        Their lengths stay.
+        The lengths of the links are kept.
     **sections
-        By link, such as ``coupler=Bar("20 mm", "5 mm", "steel")``; see `analysis.sections`.
+        Sections by link, such as ``coupler=Bar("20 mm", "5 mm", "steel")``; see `analysis.sections`.
 
     Raises
     ------
@@ -96,14 +96,14 @@ def _section_of(link: Link, flat: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def resolve_sections(mechanism: Mechanism, flat: Mapping[str, Any], base: Parameters | None) -> dict[str, Any]:
-    """Return the dotted names of a file with numbers in the place of the sections of links.
+    """Return the values of a file, by dotted name, with sections of links replaced by masses, centres and inertias.
 
-    A mass that is given beside a section is a weighed one: centre and radius of gyration stay those of the section.
+    If a mass is given besides a section, it is the weighed one: centre and radius of gyration are still those of the section.
 
     Raises
     ------
     ParameterError
-        If a section is wrong, or another number is given that follows from it.
+        If a section is wrong, or a centre or an inertia is given besides a section.
     """
     result = dict(flat)
     units = {v.name: v.unit for v in mechanism.mechanism_variables.values()}
@@ -137,11 +137,11 @@ def mass_origins(
     ----------
     parameters : parameters of a mechanism
     flat : mapping
-        What the case gives, by dotted name, before `resolve_sections`.
+        Values that the case gives, by dotted name, before `resolve_sections`.
     known : PublishedSet, optional
-        Its parameters stand where the case gives nothing.
+        Set from which the other values are taken.
     source : str
-        Its name.
+        Name of the set.
     """
     mechanism = mechanism_of(parameters)
     links = {link.mass: link for link in mechanism.links}
@@ -173,12 +173,12 @@ def mass_origins(
 
 
 def masses_of(parameters: Parameters) -> tuple[Mass, ...]:
-    """Tell whose masses parameters have: those that are equal to the most similar published set's are taken to be of it.
+    """Tell where the masses of parameters come from: those equal to the most similar published set's count as from this set.
 
     Raises
     ------
     InputError
-        If they are those of no mechanism.
+        If the parameters are not those of a mechanism.
     """
     mechanism = mechanism_of(parameters)
     own = {name: getattr(parameters, field_name(name)) for name in mechanism.mechanism_variables}
@@ -189,13 +189,13 @@ def masses_of(parameters: Parameters) -> tuple[Mass, ...]:
     source, known = min(mechanism.published.items(), key=lambda item: len(others(item[1])))
     changed = others(known)
     masses = [name for name, variable in mechanism.mechanism_variables.items() if variable.unit == "kg"]
-    if not any(own[name] for name in masses if name not in changed):  # zeros are nobody's
+    if not any(own[name] for name in masses if name not in changed):  # equal zeros prove nothing
         changed = own
     return mass_origins(parameters, changed, known, source)
 
 
 def in_sentences(masses: tuple[Mass, ...]) -> tuple[str, list[str]]:
-    """Return one sentence that names masses with their origins, and a warning for each that its link's length has left.
+    """Return a sentence with all masses and their origins, and a warning for each mass that is ``stale``.
 
     >>> in_sentences((Mass("crank.mass", 0.1, "as given"), Mass("slider.mass", 0.6, "as given")))[0]
     'masses: crank.mass 0.1 kg, slider.mass 0.6 kg (as given)'

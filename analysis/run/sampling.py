@@ -1,4 +1,4 @@
-"""Sample inputs in Python for co-simulation, SciPy's methods and messages."""
+"""Sample the inputs of a run in Python, for co-simulation, SciPy's methods and error messages."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from .inputs import NUMBER, Encoded
 
 
 class NotFiniteError(InputError):
-    """An input, by its number among the channels, is not a finite number at a time and a state."""
+    """An input, given by the number of its channel, is not a finite number at a time t and a state x."""
 
     def __init__(self, encoded: Encoded, number: int, t: float, x: NDArray[np.float64]) -> None:
         self.number = number
@@ -35,18 +35,18 @@ def sample(
     Parameters
     ----------
     laws : ndarray, shape (torques, 6)
-        Those of ``encoded``, or what has become of them.
+        Torque laws in their present state, see `signals.Source`; at the start of a run those of ``encoded``.
     left : bool
-        Whether the limit from the left is meant where an input jumps.
+        Whether to take the limit from the left where an input jumps.
     ahead : float
-        Where it is later than t, the channels are sampled at t and held until then (s): commanded
-        rates go along the secant, a torsion bar acts with the torque of the middle of the step, and ``laws`` are overwritten
-        once it is released.
+        If this time is later than t, the channels are sampled at t and held until then (s): commanded rates change linearly, a
+        torsion bar acts with the torque predicted for the middle of the step, and is marked as released in ``laws`` once it
+        has unwound.
 
     Raises
     ------
     NotFiniteError
-        If one of them is not a finite number.
+        If a channel is not a finite number.
     """
     from .sources import channels
 
@@ -65,7 +65,7 @@ def sample(
             for value, _, rate in encoded.commands:
                 u[rate] += (there[value] - here[value]) / (ahead - t) - here[rate]
     for lost in np.flatnonzero(~np.isfinite(u)):
-        # where inputs are held, a rate is the secant of a command
+        # if inputs are held, the derivative of a command is the slope of its secant
         commands = {int(rate): int(value) for value, _, rate in encoded.commands}
         secant = ahead > t and np.isfinite(here[lost])
         raise NotFiniteError(encoded, commands.get(int(lost), int(lost)) if secant else int(lost), t, x)
@@ -73,7 +73,7 @@ def sample(
 
 
 def named(encoded: Encoded, u: NDArray[np.float64]) -> dict[str, float]:
-    """Return the channels by their names in the FMI contract."""
+    """Return the values u of the channels by their names in the FMI contract."""
     return dict(zip(encoded.mechanism.input_names, u.tolist()))
 
 
@@ -83,7 +83,7 @@ def release(encoded: Encoded, x: NDArray[np.float64], laws: NDArray[np.float64])
 
 
 def of_functions(encoded: Encoded, t: float, x: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the contributions of the user's functions to the channels."""
+    """Return what the user's functions add to the channels at time t and state x, shape (channels,)."""
     added = np.zeros(len(encoded.mechanism.channels))
     state = x[: 2 * len(encoded.mechanism.freedoms)].tolist()
     for functions, places in zip(encoded.functions, encoded.source.places):

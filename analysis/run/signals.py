@@ -1,4 +1,4 @@
-"""Signals: inputs of a run as functions of time, and torques that depend on the crank's motion."""
+"""Signals: inputs of a run as functions of time, and torques that depend on the motion of the crank."""
 
 from __future__ import annotations
 
@@ -14,12 +14,12 @@ from linkwork.errors import InputError, ParameterError
 from ..mechanisms import MECHANISMS, input_units
 from ..units import Amount, in_si, si
 
-#: A function of time, all coordinates and all their rates, floats.
+#: A function of time, all coordinates and all their rates; arguments and value are floats.
 StateFunction = Callable[..., float]
 
 
 def _in_si(values: Any, what: str) -> tuple[Any, str]:
-    """Return the values of a signal in SI, and the unit of the inputs that they fit if they were texts."""
+    """Return the values of a signal in SI and their SI unit; the unit is empty if no value is a text."""
     if not any(isinstance(value, str) for value in (values if isinstance(values, (list, tuple)) else (values,))):
         return values, ""
     units = dict.fromkeys(unit for mechanism in MECHANISMS.values() for unit in input_units(mechanism).values())
@@ -40,15 +40,15 @@ class Piecewise:
     Parameters
     ----------
     breaks : ndarray, shape (n + 1,)
-        Times (s), increasing. Before the first and after the last the outer polynomials go on.
+        Times (s), increasing. The first and the last polynomial also hold before the first and after the last break.
     coefficients : ndarray, shape (n, 4)
-        Of the powers 0 to 3 of the time since the break on the left.
+        Coefficients of the powers 0 to 3 of the time since the break on the left.
     unit : str
-        SI unit, where it is known because texts made the signal: it then fits inputs of that unit alone.
+        SI unit if the values were given as texts, else empty. A signal with a unit can be an input of that unit only.
 
     Notes
     -----
-    A jump belongs to the piece on its right: the value at a break is the limit from the right.
+    Where the signal jumps, its value at the break is the limit from the right.
     """
 
     breaks: NDArray[np.float64]
@@ -78,7 +78,7 @@ class Piecewise:
 class Harmonics:
     """mean + sum of amplitude cos(frequency t + phase); frequencies in rad/s, phases in rad, shapes (n,).
 
-    All may be texts with a unit; ``unit`` is then that of mean and amplitudes, see `Piecewise`.
+    The values may be texts with units; ``unit`` is the SI unit of mean and amplitudes if these are texts, see `Piecewise`.
     """
 
     mean: Amount = 0.0
@@ -105,9 +105,10 @@ class Harmonics:
 @in_si(torque="N.m", release_angle="rad")
 @dataclass(frozen=True, slots=True, kw_only=True)
 class TorsionBar:
-    """Torque of a wound-up bar: torque (1 - angle / release_angle) until the crank reaches release_angle, then none.
+    """Torque of a wound-up bar: torque (1 - angle / release_angle) until the crank reaches release_angle, then zero.
 
-    The thesis's launch (section 3.2.2): torque T0 in N.m, released at 1 rad. The switch is located exactly.
+    It starts the mechanism of the thesis (section 3.2.2): torque T0 in N.m, released at 1 rad. The time of the release is
+    located exactly.
     """
 
     torque: Amount
@@ -130,7 +131,7 @@ class InductionMotor:
     breakdown_torque : float
         Greatest torque Tb (N.m).
     breakdown_slip : float
-        Slip sb at which it is reached.
+        Slip sb at which the torque is greatest.
     synchronous_speed : float
         Speed of the field (rad/s).
     """
@@ -148,12 +149,12 @@ class InductionMotor:
             raise InputError(f"synchronous speed is {self.synchronous_speed}: it must be finite and not 0 rad/s")
 
 
-#: Fields of an induction motor, in the order of `kloss`.
+#: Fields of an induction motor in the order of the argument ``motor`` of `kloss`.
 MOTOR = ("breakdown_torque", "breakdown_slip", "synchronous_speed")
 
 
 def kloss(motor: Any, speed: Any) -> Any:
-    """Compute the torque of an `InductionMotor` at a crank speed, also with symbols; it is zero at synchronous speed."""
+    """Return the torque of an induction motor at a crank speed (rad/s), which may be a symbol; ``motor`` is as in `MOTOR`."""
     slip = 1.0 - speed / motor[2]
     return 2.0 * motor[0] * slip * motor[1] / (slip * slip + motor[1] * motor[1])
 
@@ -162,9 +163,10 @@ def kloss(motor: Any, speed: Any) -> Any:
 class Function:
     """A channel given by a Python function of time, all coordinates of the mechanism and all their rates, all floats.
 
-    Of a five-bar they are t, crank angle, slider position u, and their rates; of a slider-crank the second coordinate is the
-    axial shift S1. It is compiled with Numba where it can be, else the run needs one of SciPy's methods. As a speed it must
-    depend on ``t`` alone and needs its ``rate``, the acceleration. ``breaks`` are times (s) where it is not smooth.
+    The arguments for a five-bar are t, crank angle, slider position u, and the two rates; for a slider-crank the second
+    coordinate is the axial shift S1. The compiled solver needs a function that Numba can compile; SciPy's methods take any. A
+    commanded speed must be a function of ``t`` alone and needs ``rate``, the function of its acceleration. ``breaks`` are
+    times (s) at which the function is not smooth.
     """
 
     function: StateFunction
@@ -195,7 +197,7 @@ def ramp(start: Amount, end: Amount, from_time: Amount, to_time: Amount) -> Piec
 
 @in_si(times="s")
 def steps(times: ArrayLike, values: ArrayLike) -> Piecewise:
-    """Return a signal with the value ``values[i]`` from ``times[i]`` on; shapes (n,) and (n,)."""
+    """Return a signal with the value ``values[i]`` from ``times[i]`` (s) to the next time; shapes (n,) and (n,)."""
     t, y, unit = _points(times, values, least=1)
     breaks = np.append(t, t[-1] + 1.0)
     coefficients = np.zeros((len(t), 4))
@@ -209,9 +211,10 @@ SHAPES = ("linear", "cubic", "hold")
 
 @in_si(times="s")
 def table(times: ArrayLike, values: ArrayLike, kind: str = "linear") -> Piecewise:
-    """Return a signal through the points (times, values), shapes (n,): ``linear``, ``cubic`` (spline) or ``hold``.
+    """Return a signal through the points (times, values), shapes (n,), times in s.
 
-    Outside the table the first and the last value hold.
+    ``kind`` is ``linear`` (interpolation), ``cubic`` (spline) or ``hold`` (the value of the last point before). Before and
+    after the table the signal has the first and the last value.
     """
     if kind == "hold":
         return steps(times, values)
@@ -246,7 +249,7 @@ def _points(times: ArrayLike, values: ArrayLike, least: int) -> tuple[NDArray[np
 
 
 class Source(NamedTuple):
-    """The `Inputs` as arrays for the compiled code; a signal is a channel that is not the rate of another.
+    """`Inputs` as arrays for the compiled code. A signal is a channel that is not the derivative of another channel.
 
     Attributes
     ----------
@@ -255,16 +258,17 @@ class Source(NamedTuple):
     coefficients : ndarray, shape (n, signals, 4)
         Polynomials of the signals between the breaks.
     harmonics : ndarray, shape (m, 4)
-        Number of the signal, amplitude, frequency, phase.
+        For each harmonic: number of the signal, amplitude, frequency (rad/s), phase (rad).
     places : ndarray of int, shape (signals, 2)
-        Numbers of the channels that are a signal and its rate, -1 where it has none.
+        For each signal the numbers of its channel and of its derivative's channel, -1 if it has none.
     laws : ndarray, shape (torques, 6)
-        For each of `Mechanism.torques`, a torsion bar: torque, release angle, 1 while it acts, 0 after its release or where
-        there is none; and a motor: breakdown torque and slip, synchronous speed; a torque of zero where there is none.
+        For each of `Mechanism.torques` a torsion bar (torque, release angle, and 1 while it acts, 0 after its release or
+        without a bar) and a motor (breakdown torque, breakdown slip, synchronous speed; the torque is 0 without a motor).
     law_places : ndarray of int, shape (torques, 3)
-        The channels of these torques, and the components of the state that are coordinate and rate of their freedoms.
+        For each of these torques its channel, and the components of the state that are the coordinate and the rate of its
+        freedom.
     functions : ndarray of int, shape (signals, 2)
-        Addresses of the user's compiled functions for a signal and its rate, or 0.
+        Addresses of the user's compiled functions for a signal and its derivative, or 0.
     """
 
     breaks: NDArray[np.float64]

@@ -1,4 +1,4 @@
-"""Evaluate the inputs of a run in compiled code: each channel at a time and a state, or held over a step."""
+"""Evaluate the inputs of a run in compiled code: all channels at a time and a state, or held over a step."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ SOURCE = types.NamedTuple((VECTOR, CUBE, MATRIX, PLACES, MATRIX, PLACES, PLACES)
 
 @inner
 def find(t, breaks):
-    """Return the number of the polynomial piece in force from t on; the outer ones extend beyond the ends."""
+    """Return the number of the polynomial piece that holds from t on; the outer pieces extend beyond the outer breaks."""
     piece, above = 0, breaks.shape[0] - 1
     while above - piece > 1:
         middle = (piece + above) // 2
@@ -32,17 +32,17 @@ def find(t, breaks):
 
 @inner
 def _find_before(t, breaks):
-    """Return the number of the polynomial piece in force up to t."""
+    """Return the number of the polynomial piece that holds up to t."""
     piece = find(t, breaks)
     return piece - 1 if piece > 0 and t == breaks[piece] else piece
 
 
 @inner
 def channels_at(begin, elapsed, piece, x, source, u):
-    """Write the channels at state x, on a given piece of the polynomials, into u.
+    """Write the channels at state x and time ``begin + elapsed`` into u, with the given piece of the polynomials.
 
-    The time is the sum of ``begin`` and ``elapsed``, which is not formed: far from zero it would be rounded so much that an
-    integrator takes the steps of the rounding for those of the input.
+    The sum is not computed: far from zero it would be rounded so much that the inputs change in steps, which an integrator
+    would try to follow.
     """
     s = (begin - source.breaks[piece]) + elapsed
     for n in range(source.places.shape[0]):
@@ -77,7 +77,7 @@ def channels_at(begin, elapsed, piece, x, source, u):
 
 @inner
 def wound(laws):
-    """Return whether a torsion bar acts."""
+    """Return whether any torsion bar acts."""
     for n in range(laws.shape[0]):  # noqa: SIM110 - Numba compiles no generators  # noqa: SIM110 - Numba compiles no generators
         if laws[n, 2] != 0.0:
             return True
@@ -86,16 +86,16 @@ def wound(laws):
 
 @inner
 def unwound(n, x, source):
-    """Return whether a torsion bar acts and has fully unwound at state x."""
+    """Return whether torsion bar n acts and has fully unwound at state x."""
     return source.laws[n, 2] != 0.0 and x[source.law_places[n, 1]] >= source.laws[n, 1]
 
 
 @inner
 def _held_bar(law, angle, speed, step):
-    """Return the correction to the torque of a torsion bar that is held over a step at an angle and a speed.
+    """Return the correction to a torsion bar's torque at the beginning of a step over which the torque is held.
 
-    The torque at the angle predicted for the middle of the step makes the impulse right to second order; that at the
-    beginning would act half a step late. The bar does not pull back.
+    The held torque is that at the angle predicted for the middle of the step: its impulse is correct to second order, while the
+    torque at the beginning would lag by half a step. A negative torque is replaced by zero.
     """
     middle = angle + 0.5 * step * speed
     return law[0] * (max(0.0, 1.0 - middle / law[1]) - (1.0 - angle / law[1]))
@@ -103,9 +103,10 @@ def _held_bar(law, angle, speed, step):
 
 @kernel(types.void(float64, float64, boolean, VECTOR, SOURCE, PLACES, VECTOR, VECTOR), purpose="the sampling of inputs")
 def channels(t, ahead, left, x, source, commands, u, there):
-    """Write the channels at time t and state x into u: the limit from the left or the right where an input jumps.
+    """Write the channels at time t and state x into u; where an input jumps, the limit from the left if ``left``, else right.
 
-    Where ``ahead`` is later than t they are held until then: `hold`; ``there`` is room for channels.
+    If ``ahead`` is later than t, the channels are those held from t to ``ahead``, see `hold`. ``there`` is a work array for
+    channels.
     """
     channels_at(t, 0.0, _find_before(t, source.breaks) if left else find(t, source.breaks), x, source, u)
     if ahead > t:
@@ -114,10 +115,10 @@ def channels(t, ahead, left, x, source, commands, u, there):
 
 @inner
 def hold(t, ahead, x, source, commands, u, there):
-    """Replace the channels at time t by the values that a master holds until ``ahead``.
+    """Replace the channels u at time t by the values that a master holds until the time ``ahead``.
 
-    A torsion bar acts with the torque of the middle of the step; a commanded rate goes along the secant, so that it meets
-    the command again at the next point of the grid.
+    A torsion bar acts with the torque predicted for the middle of the step. A commanded rate changes linearly, so that at
+    ``ahead`` it is equal to the command.
     """
     for n in range(source.laws.shape[0]):
         if source.laws[n, 2] != 0.0:

@@ -1,4 +1,4 @@
-"""A step of the integrator in compiled code, shared by runs and periodic motions: DOP853 for arrays (`linkwork.tableau`)."""
+"""Take a step of the integrator DOP853 (`linkwork.tableau`) in compiled code, for runs and periodic motions."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from linkwork.integrate import GREATEST_FACTOR, LEAST_FACTOR, SAFETY
 from ..numerics.codegen import evaluate, inner
 from .sources import channels_at
 
-# DOP853: the weights of stage s are WEIGHT[ROW[s]:ROW[s + 1]], those of the stages FROM
+# DOP853: the weights in stage s are WEIGHT[ROW[s]:ROW[s + 1]], of the rates at the stages FROM[ROW[s]:ROW[s + 1]]
 ROW = np.cumsum([0, *(len(row) for row in tableau.A)])
 FROM = np.array([stage for row in tableau.A for stage, _ in row])
 WEIGHT = np.array([weight for row in tableau.A for _, weight in row])
@@ -28,9 +28,9 @@ EXPONENT = -1.0 / tableau.ORDER
 
 @inner
 def stage(s, x, k, h, y):
-    """Compute the state at stage s of a step of size h from x; stage 12 is the end of the step.
+    """Compute the state y at stage s of a step of size h from x, from the rates k; stage 12 is the end of the step.
 
-    Four components at a time stay in the processor's registers; each is summed in the order of the stages.
+    Four components at a time are summed in the processor's registers, each in the order of the stages.
     """
     n = x.shape[0]
     first, end = ROW[s], ROW[s + 1]
@@ -57,7 +57,7 @@ def stage(s, x, k, h, y):
 
 
 class Flow(NamedTuple):
-    """A flow: address of the right-hand side, modes, constants, magnitudes to which errors are relative."""
+    """Right-hand side of the equations: its address, modes, constants, and the magnitudes to which errors are relative."""
 
     equation: int
     modes: NDArray[np.float64]
@@ -67,16 +67,15 @@ class Flow(NamedTuple):
 
 @inner
 def attempt(flow, begin, elapsed, h, x, room, u, piece, source):
-    """Take a step of size h from x at ``begin + elapsed`` into room.y; return its error relative to ``flow.scale``.
+    """Take a step of size h from x at the time ``begin + elapsed`` into room.y; return its relative error (`_local_error`).
 
-    The rates at the start of the step are room.k[0].
-
-    ``u`` is what acts; where ``piece`` is not negative it is sampled from ``source`` at each stage.
+    The rates at the start of the step must be in room.k[0]. ``u`` are the channels; if ``piece`` is not negative, they are
+    sampled from ``source`` at each stage.
     """
     k, y = room.k, room.y
     for s in range(1, STAGES):
         stage(s, x, k, h, y)
-        # two conditions: the first decides what is compiled
+        # two conditions, since the first decides what Numba compiles
         if source is not None:  # noqa: SIM102
             if piece >= 0:
                 channels_at(begin, elapsed + NODES[s] * h, piece, y, source, u)
@@ -87,7 +86,7 @@ def attempt(flow, begin, elapsed, h, x, room, u, piece, source):
 
 @inner
 def _local_error(x, y, k, h, scale):
-    """Estimate the relative error of a step from x to y, of order 8 in h (Hairer); NaN if y is not finite."""
+    """Estimate the error of a step from x to y relative to scale and state, of order 8 (Hairer); NaN if y is not finite."""
     sum3 = sum5 = 0.0
     for i in range(x.shape[0]):
         e3 = e5 = 0.0
@@ -105,20 +104,23 @@ def _local_error(x, y, k, h, scale):
 
 @inner
 def shorter(h, error):
-    """Return the step size to try after a step of size h was rejected for its error, relative to the tolerance."""
+    """Return the step size to try after a step of size h was rejected; ``error`` is relative to the tolerance."""
     return h * (max(LEAST_FACTOR, SAFETY * error**EXPONENT) if 1.0 < error < 1e30 else 0.25)
 
 
 @inner
 def following(h, proposed, error):
-    """Return the next step size after an accepted step h; a step cut shorter than ``proposed`` does not reduce it."""
+    """Return the next step size after an accepted step of size h, from its error relative to the tolerance.
+
+    If h was cut shorter than ``proposed``, as at the end of an interval, the next step is not shorter than ``proposed``.
+    """
     factor = GREATEST_FACTOR if error == 0.0 else min(GREATEST_FACTOR, SAFETY * error**EXPONENT)
     return max(proposed, factor * h) if h < proposed else max(LEAST_FACTOR, factor) * h
 
 
 @inner
 def interpolant(x, y, k, h, f):
-    """Compute the coefficients of the interpolant between x and y (Hairer's contd8); k holds all sixteen stages."""
+    """Compute the coefficients f of the interpolant between x and y (Hairer's contd8); k has the rates at all 16 stages."""
     for i in range(x.shape[0]):
         delta = y[i] - x[i]
         f[0, i] = delta
@@ -133,7 +135,7 @@ def interpolant(x, y, k, h, f):
 
 @inner
 def interpolate(s, x, f, out):
-    """Interpolate the state at the fraction s of the step."""
+    """Interpolate the state at the fraction s of a step from x with the coefficients f, into ``out``."""
     for i in range(x.shape[0]):
         y = 0.0
         for r in range(7):

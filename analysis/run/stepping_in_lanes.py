@@ -1,8 +1,8 @@
-"""A step of the integrator in all lanes of the processor at once, for ensembles and periodic motions: DOP853 as in `stepping`.
+"""Take a step of the integrator in all lanes of the processor at once, for ensembles and periodic motions.
 
-Arrays are in lanes (`numerics.vectors`): states, scales, the stages k[s], the coefficients of the interpolant f[r]; step sizes,
-errors and fractions are a number of each lane. Sums are rounded once for each of their terms, so that they differ from those of
-`stepping` in the last digits.
+The method is DOP853 as in `stepping`. Arrays are in lanes (`numerics.vectors`): states, scales, the rates k[s] at the stages,
+the coefficients f[r] of the interpolant. Step sizes, errors and fractions are one number for each lane. Products are added with
+one rounding instead of two, so that results differ from those of `stepping` in the last digits.
 """
 
 from __future__ import annotations
@@ -15,9 +15,9 @@ from ..numerics.codegen import inner
 from ..numerics.vectors import LANES, fused, greater, load, root, size, spread, store
 from .stepping import E3, E5, FROM, ROW, STAGES, WEIGHT
 
-#: In the place of a sum of squares that is zero.
+#: Replaces a sum of squares that is zero.
 _LEAST = 1e-300
-# stages that the error and the interpolant need, which are few of the first ones, with their weights
+# numbers of the stages that the error and the interpolant use, and their weights
 _OF_ERROR = np.flatnonzero((E3 != 0.0) | (E5 != 0.0))
 _E3, _E5 = E3[_OF_ERROR], E5[_OF_ERROR]
 _OF_CURVE = np.flatnonzero(np.any(tableau.D, axis=0))
@@ -26,7 +26,7 @@ _D0, _D1, _D2, _D3 = np.array(tableau.D)[:, _OF_CURVE].copy()
 
 @inner
 def stage_in_lanes(s, x, k, h, y):
-    """Compute the states at stage s of steps of size h from x; stage 12 is the end of the step."""
+    """Compute the states y at stage s of steps of sizes h from x, from the rates k; stage 12 is the end of the step."""
     step = load(h, 0)
     for i in range(x.shape[0] // LANES):
         total = 0.0 * step
@@ -37,7 +37,7 @@ def stage_in_lanes(s, x, k, h, y):
 
 @inner
 def errors_in_lanes(x, y, k, h, scale, errors):
-    """Estimate the relative errors of steps from x to y, of order 8 in h (Hairer); NaN where y is not finite."""
+    """Estimate the errors of steps from x to y relative to scale and state, of order 8 (Hairer); NaN if y is not finite."""
     step = load(h, 0)
     sum3, sum5, valid = 0.0 * step, 0.0 * step, 0.0 * step
     n = x.shape[0] // LANES
@@ -55,7 +55,7 @@ def errors_in_lanes(x, y, k, h, scale, errors):
 
 @inner
 def interpolants_in_lanes(x, y, k, h, f):
-    """Compute the coefficients of the interpolants between x and y (Hairer's contd8); k holds all sixteen stages."""
+    """Compute the coefficients f of the interpolants between x and y (Hairer's contd8); k has the rates at all 16 stages."""
     step = load(h, 0)
     for i in range(x.shape[0] // LANES):
         delta, first = load(y, i) - load(x, i), step * load(k[0], i)
@@ -74,7 +74,7 @@ def interpolants_in_lanes(x, y, k, h, f):
 
 @inner
 def interpolate_in_lanes(fractions, x, f, out):
-    """Interpolate the states at fractions of the steps into rows, one for each lane."""
+    """Interpolate the states at fractions of the steps into the rows of ``out``, one for each lane."""
     after = load(fractions, 0)
     before = 1.0 - after
     for i in range(x.shape[0] // LANES):

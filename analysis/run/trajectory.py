@@ -25,9 +25,9 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True)
 class Occurrence:
-    """An event that happened: its name, the time (s), and the state there in SI.
+    """An event that happened: its name, its time (s), and the state at that time in SI.
 
-    The state is all coordinates of the mechanism and all their rates.
+    The state has all coordinates of the mechanism, followed by all their rates.
     """
 
     name: str
@@ -44,22 +44,22 @@ class Trajectory(Shown):
     time : ndarray, shape (n,)
         Times of the samples (s).
     values : ndarray, shape (n, m)
-        The outputs ``names``, in the order of the mechanism's FMI interface, SI units. At a sample where an input jumps,
-        the values after the jump.
+        Values of the outputs ``names``, in the order of the mechanism's FMI interface, SI units. At a sample where an input
+        jumps they are the values after the jump.
     status : int
         0 if the run reached its end or a stopping event, else the solver.status of the FMI contract.
     message : str
-        Why the run ended early. Of a run to its end, cautions: that it is stiff, or misses the balance of energy by more than
-        the tolerance promises; else empty.
+        Why the run ended early. For a complete run a caution if it is stiff, or if the residual of the energy balance is larger
+        than the tolerance promises; else empty.
     events : tuple of Occurrence
-        Events in the order of time.
+        Events in order of time.
     source : str
         What computed it, such as ``compiled DOP853`` or the name of an FMU.
     statistics : mapping
-        Counts of the integrator, where it gives them: steps, rejected, evaluations, seconds in all
-        and seconds_integrating in the compiled loop.
+        Statistics of the integrator, as far as known: numbers of steps, rejected steps and evaluations; ``seconds`` of the
+        whole run, and ``seconds_integrating`` in the compiled loop.
     parameters : parameters of a mechanism, optional
-        Those of the mechanism that ran.
+        Parameters of the mechanism that ran.
 
     Notes
     -----
@@ -107,9 +107,9 @@ class Trajectory(Shown):
 
     @property
     def masses(self) -> str:
-        """Return a sentence on the masses of the mechanism that ran and whose they are; empty where it is not known.
+        """Return a sentence on the masses of the mechanism and where they come from; empty if the parameters are not known.
 
-        It says, too, which links have other lengths than those of the published set whose masses they have.
+        Links that have the masses of a published set but other lengths are also named.
         """
         if self.parameters is None:
             return ""
@@ -130,10 +130,10 @@ class Trajectory(Shown):
             raise unknown_name(name, self.names, f"output {name!r}") from None
 
     def to_csv(self, path: str | Path) -> Path:
-        """Write time and all outputs to a CSV file, in a folder that is there; its header has names and units.
+        """Write time and all outputs to a CSV file, in an existing folder; the header has names and units.
 
-        A large one is announced with its size. Ctrl-C stops it within a second, as `linkwork.errors.Interrupted`, and leaves no
-        half file.
+        The size of a large file is announced first. Ctrl-C stops the writing within a second, as `linkwork.errors.Interrupted`,
+        and no incomplete file is left.
         """
         from ..files import write_csv
 
@@ -141,7 +141,7 @@ class Trajectory(Shown):
         return write_csv(path, columns)
 
     def to_dataframe(self) -> pandas.DataFrame:
-        """Return the run as a DataFrame indexed by time; needs pandas, of Linkwork's extra ``dataframe``."""
+        """Return the run as a DataFrame indexed by time; this needs pandas, which is in Linkwork's extra ``dataframe``."""
         require("pandas")
         import pandas
 

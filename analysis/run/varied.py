@@ -1,4 +1,4 @@
-"""Sets made by arrays of values: as many parameters or inputs as there are values, without an object for each."""
+"""Sets of parameters or inputs given by arrays of values, without an object for each set."""
 
 from __future__ import annotations
 
@@ -27,16 +27,16 @@ from .inputs import Inputs
 
 
 class Varied(Sequence[Any]):
-    """A sequence of objects that differ in some fields; each is made when it is asked for.
+    """A sequence of objects that differ in some fields; an object is made only when its index is used.
 
     Attributes
     ----------
     base : object
-        Source of the other fields.
+        Object with the values of the other fields.
     columns : dict of str to ndarray
-        Values by field.
+        Values of all objects, by field.
     make : callable
-        Makes one from the base and its own values.
+        Makes an object from the base and its own values, as keywords.
     """
 
     def __init__(self, base: Any, columns: dict[str, NDArray[np.float64]], make: Callable[..., Any]) -> None:
@@ -54,25 +54,25 @@ class Varied(Sequence[Any]):
 
 
 def distinct(items: Sequence[Any]) -> list[Any]:
-    """Return the objects of a sequence, each once; of varied ones the first, which stands for all."""
+    """Return the objects of a sequence without repetitions; of a `Varied` sequence only the first, which represents all."""
     return [items[0]] if isinstance(items, Varied) else list({id(item): item for item in items}.values())
 
 
 def vary(parameters: Parameters, inputs: Any, values: Mapping[str, Any]) -> tuple[Sequence[Any], Any]:
-    """Return sets of parameters, and inputs, that differ in what is varied.
+    """Return the parameters of all sets and their inputs, which differ in the given values.
 
     Parameters
     ----------
     parameters, inputs
-        What all have in common.
+        Values that all sets have in common.
     values : mapping
-        By the name of a parameter, in the FMI contract or of the field, or of an input that is constant: one for each set, in
-        SI or texts with units.
+        Values of a parameter or of a constant input, one for each set, in SI or as texts with units; by the FMI name or the
+        name of the field.
 
     Raises
     ------
     InputError, ParameterError
-        If a name is unknown, lengths differ, or a value is wrong; it says which set.
+        If a name is unknown, lengths differ, or a value is wrong; the message names the set.
     """
     mechanism = mechanism_of(parameters)
     own = {field.name for field in fields(mechanism.parameters)}
@@ -117,7 +117,7 @@ def _read_input(name: str, text: str) -> float:
 
 
 def _column(name: str, given: Any, read: Callable[[str], float]) -> NDArray[np.float64]:
-    """Return the values of one name as an array."""
+    """Return the values of one parameter or input as an array; ``read`` converts texts to SI."""
     if isinstance(given, (list, tuple)):
         given = [read(value) if isinstance(value, str) else value for value in given]
     column = np.asarray(given)
@@ -129,7 +129,7 @@ def _column(name: str, given: Any, read: Callable[[str], float]) -> NDArray[np.f
 
 
 def check_sets(mechanism: Mechanism, sets: Varied) -> None:
-    """Check all sets against the rules of the parameters at once; the first that is wrong says what is."""
+    """Check all sets against the rules of the parameters at once; raise ParameterError for the first that breaks a rule."""
     rules: Rules = mechanism.parameters.RULES  # type: ignore[attr-defined]
     wrong = np.zeros(len(sets), dtype=bool)
     for name, column in sets.columns.items():
@@ -148,7 +148,7 @@ def check_sets(mechanism: Mechanism, sets: Varied) -> None:
                     wrong |= getattr(of, least.field) < least.of(of)
                 wrong |= ~np.isfinite(np.sum(np.broadcast_arrays(*constants, wrong)[:-1], axis=0))
         except (ArithmeticError, ValueError):
-            # of a function of `math`: one by one shows which
+            # raised by a function of `math`: check each set by itself
             wrong[:] = True
     for i in np.flatnonzero(wrong).tolist():
         try:
@@ -159,9 +159,9 @@ def check_sets(mechanism: Mechanism, sets: Varied) -> None:
 
 
 def constants_of(mechanism: Mechanism, sets: Sequence[Parameters]) -> tuple[SimpleNamespace, Any]:
-    """Return the parameters of all sets as one object with arrays, and the constants of the equations from it.
+    """Return the parameters of all sets as one object with arrays, and the constants of the equations computed from it.
 
-    What does not vary is a number.
+    With `Varied` sets, parameters that do not vary are numbers.
     """
     _, like = over_arrays(mechanism)
     names = [field.name for field in fields(mechanism.parameters)]
@@ -175,9 +175,9 @@ def constants_of(mechanism: Mechanism, sets: Sequence[Parameters]) -> tuple[Simp
 
 @cache
 def over_arrays(mechanism: Mechanism) -> tuple[Rebound, type[SimpleNamespace]]:
-    """Return the equations for arrays, and the type of parameters that they take.
+    """Return the equations as functions of arrays, and the class of parameters with arrays as fields.
 
-    The functions are those of `math` itself, element by element, as those of NumPy differ in bits.
+    They apply the functions of `math` to each element, as NumPy's functions differ in the last bits.
     """
     elementwise = {name: _elementwise(getattr(math, name)) for name in ELEMENTARY}
     ours = {"sqrt": np.sqrt, "fabs": np.abs, "max": np.maximum, "min": np.minimum, "float": lambda value: value}
@@ -186,7 +186,7 @@ def over_arrays(mechanism: Mechanism) -> tuple[Rebound, type[SimpleNamespace]]:
 
 
 def _elementwise(function: Callable[..., float]) -> Callable[..., Any]:
-    """Return a function of floats that is applied to arrays element by element."""
+    """Return a function of arrays that applies a function of floats to each element."""
 
     def applied(*values: Any) -> Any:
         if all(isinstance(value, float) for value in values):
