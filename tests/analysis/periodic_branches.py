@@ -18,13 +18,16 @@ FAMILY = Family(
 )
 
 
-def orbit(amplitude: float, largest: float, start: float | None = None, *, crank_turns: int = 1) -> Any:
+def orbit(
+    amplitude: float, largest: float, start: float | None = None, *, periods: int = 1, crank_turns: int = 1
+) -> Any:
     """What is read of an orbit."""
     return SimpleNamespace(
         amplitude=amplitude,
         largest=largest,
         start=np.array([amplitude if start is None else start, 0.0]),
         swing=("u", "m"),
+        periods=periods,
         crank_turns=crank_turns,
     )
 
@@ -45,7 +48,9 @@ def branch(
         family=FAMILY,
         turns=turns,
         parameter=x,
-        orbits=tuple(orbit(*values, crank_turns=common * turns) for values in zip(a.tolist(), rho.tolist())),
+        orbits=tuple(
+            orbit(*values, periods=turns, crank_turns=common * turns) for values in zip(a.tolist(), rho.tolist())
+        ),
         special=tuple(
             SpecialPoint(kind=kind, parameter=value, orbit=orbit(size, 1.0), after=after)
             for kind, value, size, after in special

@@ -334,6 +334,7 @@ def test_basins_name_the_motion_that_a_start_ends_in() -> None:
             swing=("q", "m"),
             flow=flow,
             turns=turns,
+            periods=turns,
             crank_turns=2 * turns,
             turn=lambda samples, turns=turns: SimpleNamespace(period=turns / 7.0),
         )
