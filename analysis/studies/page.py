@@ -100,7 +100,7 @@ def quotes(page: str) -> list[tuple[str, str]]:
 
 
 def sentences(page: str) -> dict[str, list[str]]:
-    """Return for each study on a page, by number, its statements, shortened, with places, and where others are judged."""
+    """Return for each study on a page, by number, its statements, shortened, with places, and the figures that judge others."""
     _, *parts = re.split(r"^`linkwork figures (\S+)`$", page, flags=re.MULTILINE)
     return {
         number: [f"judged at {see}" for see in re.findall(r"are judged at Figs? (.+)\.$", part, flags=re.MULTILINE)]

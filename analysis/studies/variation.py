@@ -38,7 +38,7 @@ def _current() -> _Variation:
 
 @contextmanager
 def varied(changes: Mapping[str, Any]) -> Iterator[set[str]]:
-    """Change parameters in the studies computed inside the context; yield a set that collects the names they can change."""
+    """Change parameters in the studies computed inside the context; yield a set that collects their parameters' names."""
     variation = _Variation(tuple(changes.items()), set())
     token = _CURRENT.set(variation)
     try:

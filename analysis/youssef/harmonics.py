@@ -286,7 +286,7 @@ class Approximations:
     amplitudes: Mapping[str, NDArray[np.float64]]
 
     def at(self, speed: ArrayLike) -> dict[str, NDArray[np.float64]]:
-        """Compute the amplitudes (m) at given speeds (rad/s), an array of their shape by the name of each approximation."""
+        """Return the amplitudes (m) at given speeds (rad/s) by approximation, arrays of the speeds' shape."""
         return _approximate(self.parameters, speed, self.load)
 
     def columns(self) -> dict[str, NDArray[np.float64]]:

@@ -76,7 +76,10 @@ def _angular_velocity() -> float:
 
 
 def _sinusoidal(ratio: float) -> tuple[float, float]:
-    """Return the errors of eq 28a (in/s), as the rate of 28, and of 28b (in/s2), as that of 28a mended; ``ratio`` is alpha."""
+    """Return the errors of eq 28a (in/s) and of eq 28b (in/s2) at alpha = ``ratio``.
+
+    28a should be the rate of 28, and 28b the rate of 28a with its amplitude mended.
+    """
     amplitude, angle, speed, acceleration, h = 2.0, 0.9, CRANK_SPEED, 3.0, 1e-20
     # derivatives along the motion by a complex step, which has no rounding error
     moved, quicker = angle + 1j * h * speed, speed + 1j * h * acceleration

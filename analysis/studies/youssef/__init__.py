@@ -1,4 +1,4 @@
-"""The figures of Youssef's thesis: a module for each chapter, listed here."""
+"""List of the figures of Youssef's thesis and of the modules that compute them."""
 
 from __future__ import annotations
 

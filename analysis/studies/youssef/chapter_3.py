@@ -71,7 +71,7 @@ DRIFT_TURNS = 80
 SAMPLES_PER_DRIFT_TURN = 120
 #: Dampers (dyn.s/cm) with which the drift is nearly linear.
 NEAR_LINEAR = (5e5, 1e6)
-#: Turns of the transient, as the thesis has it, and end of those over which the drift is compared with a line.
+#: Turns of the transient, as the thesis has it, and last of the turns over which the drift is compared with a line.
 TRANSIENT_TURNS, DRAWN_TURNS = 2, 10
 
 TURNS, ANGLE = "turns of the crank [1]", "crank angle [deg]"
@@ -101,7 +101,7 @@ class Drift:
     collinear_turn: float
 
     def turn(self, number: int) -> NDArray[np.float64]:
-        """Return the slider position over a turn (cm), counted from 1, both ends included."""
+        """Return the slider position over turn ``number`` (cm), counted from 1, both ends included."""
         n = SAMPLES_PER_DRIFT_TURN
         return self.slider_cm[(number - 1) * n : number * n + 1]
 
@@ -112,38 +112,38 @@ class Drift:
 
     @property
     def _ends(self) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
-        """Turns after the transient, or all if none comes after it, and the slider position at their ends (cm)."""
+        """Numbers of the turns after the transient, or of all if there are none, and the slider position at their ends (cm)."""
         last = int(min(DRAWN_TURNS, np.nan_to_num(self.collinear_turn, nan=DRAWN_TURNS)))
         turns = np.arange(TRANSIENT_TURNS if last > TRANSIENT_TURNS else 0, last + 1)
         return turns, self.slider_cm[turns * SAMPLES_PER_DRIFT_TURN]
 
     @property
     def rate(self) -> float:
-        """Drift in a turn after the transient, by the best line (cm)."""
+        """Drift per turn after the transient (cm): slope of the least-squares line."""
         return float(np.polyfit(*self._ends, 1)[0])
 
     @property
     def bend(self) -> float:
-        """Greatest distance of the ends of turns after the transient from their best line, relative to the drift over them."""
+        """Greatest distance of the slider at the ends of turns from the least-squares line, relative to the drift over them."""
         turns, ends = self._ends
         return float(np.abs(ends - np.polyval(np.polyfit(turns, ends, 1), turns)).max() / np.ptp(ends))
 
     def unsteadiness(self, number: int) -> float:
-        """Difference between a turn and the next, each less its drift, relative to the range of the next."""
+        """Return the range of the change from a turn to the next, both without drift, relative to the range of the next."""
         share = np.linspace(0.0, 1.0, SAMPLES_PER_DRIFT_TURN + 1)
         one, other = (u - share * (u[-1] - u[0]) for u in map(self.turn, (number, number + 1)))
         return float(np.ptp(other - one) / np.ptp(other))
 
     @property
     def transient(self) -> float:
-        """Turns after which the motion is steady, or where it never is, those until the links are collinear."""
+        """Number of turns until the motion is steady; if it never is, until the links are collinear, or else `DRAWN_TURNS`."""
         end = float(np.nan_to_num(self.collinear_turn, nan=DRAWN_TURNS))
         return next((n for n in range(1, int(end)) if self.unsteadiness(n) <= ALIKE), end)
 
 
 @cache
 def drift(damping: float, gravity: float = 9.81) -> Drift:
-    """Run Table 3.1 at 420 rpm without a spring, up to the limit of assembly."""
+    """Run Table 3.1 at 420 rpm without a spring for `DRIFT_TURNS` turns, or up to the limit of assembly."""
     angle = asin(COLLINEAR_SINE)
     run = simulate(
         table_3_1(0.0, damping, gravity),
@@ -253,8 +253,7 @@ def weightless_result() -> StudyResult:
 
 
 def draw_drift(result: StudyResult) -> Figure:
-    """Draw the drift over the first turns and over many, with a cross at collinear links or dashed curves without "
-    "gravity."""
+    """Draw the drift over the first turns and over many, with a cross at collinear links or dashed curves without gravity."""
     turns = result.columns[TURNS]
     curves, others = [], []
     for colour, mu in zip(COLOURS, DAMPINGS):
@@ -296,7 +295,7 @@ def _steady(stiffness: float) -> SteadyTurn:
 
 
 def springs() -> tuple[float, ...]:
-    """Return the stiffnesses that Fig 3.4 compares, or the reader's (dyn/cm)."""
+    """Return the stiffnesses that Fig 3.4 compares, or only the reader's if there is one (dyn/cm)."""
     return compared("slider.stiffness", STIFFNESSES, "N/m", DYN_PER_CM_PER_NEWTON_PER_METRE)
 
 
@@ -320,7 +319,7 @@ def steady_result() -> StudyResult:
 
 
 def _steady_statements() -> list[Statement]:
-    """Judge transient, mean and least position."""
+    """Judge the transient, and the mean and the least position of the slider."""
     turns = {k: _steady(k) for k in STIFFNESSES}
     places = {k: least(turn.angle_deg, turn.slider_cm)[0] for k, turn in turns.items()}
     means = {k: turn.slider_cm[:-1].mean() for k, turn in turns.items()}
@@ -489,7 +488,7 @@ def draw_steady(result: StudyResult) -> Figure:
 
 @dataclass(frozen=True, slots=True)
 class Parts:
-    """Torque at constant speed over a steady turn (N.m), and its parts by the slider's acceleration and by gravity."""
+    """Torque at constant speed over a steady turn (N.m), and its parts due to the slider's acceleration and to gravity."""
 
     whole: NDArray[np.float64]
     acceleration: NDArray[np.float64]
@@ -505,20 +504,20 @@ def slider_motion(stiffness: float) -> list[NDArray[np.float64]]:
 
 
 def slider_forces(stiffness: float) -> list[NDArray[np.float64]]:
-    """Return the forces of spring and damper and the mean effective mass times the acceleration over the steady turn (N)."""
+    """Return spring force, damper force and mean effective mass times acceleration over the steady turn (N)."""
     p = table_3_1(stiffness)
     factors = (p.slider_stiffness, p.slider_damping, mean_effective_mass(p))
     return [factor * x for factor, x in zip(factors, slider_motion(stiffness))]
 
 
 def spring_share(stiffness: float) -> float:
-    """Return the range of the spring's force over a steady turn, over the greater of the damper's and the mean inertia's."""
+    """Return the range of the spring force divided by the greater range of the other two; see `slider_forces`."""
     spring, *others = (np.ptp(force) for force in slider_forces(stiffness))
     return float(spring / max(others))
 
 
 def parts(stiffness: float) -> Parts:
-    """Split the torque of the steady turn."""
+    """Return the torque over the steady turn, and its parts."""
     parameters, speed = table_3_1(stiffness), SPEED * RAD_S_PER_RPM
     angle, (u, v, a) = np.radians(_steady(stiffness).angle_deg[:-1]), slider_motion(stiffness)
     whole, unaccelerated, weightless = (
@@ -529,9 +528,9 @@ def parts(stiffness: float) -> Parts:
 
 
 def by_position(soft: float, stiff: float) -> NDArray[np.float64]:
-    """Return the part of the difference of the steady torque that the slider's position makes (N.m).
+    """Return the part of the difference of the steady torque between two springs that is due to the slider's position (N.m).
 
-    It is the mean of two: the position changes first, with the rates of the softer spring, or last.
+    It is the mean of two changes of the position alone: at the rates of the softer spring, and at those of the stiffer one.
     """
     angle, p = np.radians(_steady(soft).angle_deg[:-1]), table_3_1(soft).constants()
     motions = [slider_motion(soft), slider_motion(stiff)]
@@ -540,28 +539,28 @@ def by_position(soft: float, stiff: float) -> NDArray[np.float64]:
 
 
 def damper_torque(stiffness: float) -> NDArray[np.float64]:
-    """Return the crank torque over a steady turn that the damper takes, by its power (N.m)."""
+    """Return the crank torque over a steady turn that supplies the damper's power (N.m)."""
     return table_3_1(stiffness).slider_damping * slider_motion(stiffness)[1] ** 2 / (SPEED * RAD_S_PER_RPM)
 
 
 def apart_on_the_graph(
     x: NDArray[np.float64], one: NDArray[np.float64], other: NDArray[np.float64]
 ) -> NDArray[np.float64]:
-    """Return the least distance of each point of a curve from the polygon of another, both of period 1 in x."""
+    """Return the distance of each point of ``one`` curve from the nearest point of the ``other``; both have period 1 in x."""
     points = x + 1j * one
     line = np.concatenate([(x[:-1] + shift) + 1j * other[:-1] for shift in (-1.0, 0.0, 1.0)])
     starts, steps = line[:-1], np.diff(line)
-    return np.array([_nearest(point - starts, steps) for point in points])
+    return np.array([_least_distance(point - starts, steps) for point in points])
 
 
-def _nearest(offsets: NDArray[np.complex128], steps: NDArray[np.complex128]) -> float:
-    """Return the least distance of a point from segments, from its offsets to their starts."""
+def _least_distance(offsets: NDArray[np.complex128], steps: NDArray[np.complex128]) -> float:
+    """Return the distance of a point from the nearest of some segments, by its offsets from their starts and their steps."""
     shares = np.clip((offsets * steps.conj()).real / np.abs(steps) ** 2, 0.0, 1.0)
     return float(np.abs(offsets - shares * steps).min())
 
 
 def torque_result() -> StudyResult:
-    """Compute the torque over the steady turn with each spring, and where it depends on the spring."""
+    """Compute the torque over the steady turn with each spring, and the crank angles at which it depends on the spring."""
     turns = {k: _steady(k) for k in STIFFNESSES}
     angle, torque = turns[1e6].angle_deg, np.array([turn.torque for turn in turns.values()])
     peak = np.abs(torque[1]).max()
@@ -576,6 +575,7 @@ def torque_result() -> StudyResult:
         [apart_on_the_graph(angle / 360.0, curves[i], curves[j]) for i, j in ((0, 1), (0, 2), (1, 2))], axis=0
     )
     elsewhere = seen[away > 10.0].max()
+    extremes = {"greatest": torque.max(axis=1), "least": torque.min(axis=1)}
     at_one_angle = np.where(away > 10.0, np.ptp(curves, axis=0), 0.0)
     soft, stiff = parts(STIFFNESSES[0]), parts(STIFFNESSES[-1])
     placed = by_position(STIFFNESSES[0], STIFFNESSES[-1])
@@ -631,11 +631,13 @@ def torque_result() -> StudyResult:
                             lower=ALIKE,
                             upper=SLIGHTLY,
                             why=f"at the {name} torque the springs differ by {100 * np.ptp(x) / peak:.1f} % of the size of the "
-                            f"least, {100 * np.ptp(x) / abs(x[1]):.1f} % of its own, which is not seen",
+                            f"least, {100 * np.ptp(x) / abs(x[1]):.1f} % of its own",
                         )
-                        for name, x in (("greatest", torque.max(axis=1)), ("least", torque.min(axis=1)))
+                        for name, x in extremes.items()
                     ),
                 ),
+                "on the scale of the graph the two spreads are "
+                f"{' and '.join(f'{100 * np.ptp(x) / np.ptp(torque):.1f}' for x in extremes.values())} % of its height; "
                 f"at the same crank angle the curves differ by up to {at_one_angle.max():.3f} of the graph's height, in the "
                 f"steep reversal at {angle[at_one_angle.argmax()]:.0f} deg",
             ),

@@ -1,8 +1,8 @@
 """The figures of chapter IV: the slider's amplitude over the speed by the linearised equation, and its resonances.
 
-The thesis balances two harmonics, eqs (4.30) to (4.35), of its equation (4.21). We do the same with the right coefficients;
-beside them are its own, as printed and as listed, in the form of its appendix 2. Amplitudes are those of zeta = u/l4; the
-spring with m4 + m5 alone has omega_k = 31.623 rad/s.
+The thesis balances two harmonics, eqs (4.30) to (4.35), of its equation (4.21). We do the same with the right coefficients
+and, for comparison, with the thesis's own, as printed and as listed, in the form of its appendix 2. Amplitudes are those of
+zeta = u/l4; the spring with m4 + m5 alone has omega_k = 31.623 rad/s.
 """
 
 from __future__ import annotations
@@ -69,9 +69,9 @@ SPEEDS = np.unique(
 APART = (np.abs(SPEEDS - 15.5) > 1.0) & (np.abs(SPEEDS - 31.0) > 2.0)
 #: omega_c = mu/(m4 + m5) (1/s) of appendix 2: it raises mu by 200 dyn.s/cm after each curve, and m4 + m5 is 1000 g.
 DAMPERS = tuple(0.2 * n for n in range(1, 7))
-#: omega_c (1/s) of the comparison of second harmonics: the thesis's, which removes all instability.
+#: omega_c (1/s) at which second harmonics are compared: the thesis's value, which removes all instability.
 COMPARED_AT = 0.45
-#: Least amplitude in the region of resonance, and least distance of the outside from the resonance (rad/s): our choice.
+#: Amplitude above which a speed is in the region of resonance, and distance (rad/s) from which it is outside: our choice.
 LARGE, OUTSIDE = 0.1, 3.0
 #: Half the step in speed (rad/s) of appendix 2, to which its output locates a resonance.
 HALF_STEP = 0.05
@@ -88,7 +88,7 @@ def equation(inertia_ratio: float, variant: Variant) -> SliderEquation:
 def linear(
     speed: float, inertia_ratio: float, omega_c: float = 0.0, variant: Variant = Variant.EXACT
 ) -> HarmonicMotion:
-    """Return zeta by the thesis's two harmonics."""
+    """Return the motion zeta at a speed (rad/s), with the thesis's two harmonics."""
     once = equation(inertia_ratio, variant)
     return two_harmonics(replace(once, spring=SQUARE_OF_OMEGA_K / speed**2, damping=omega_c / speed))
 
@@ -96,12 +96,12 @@ def linear(
 def harmonic(
     n: int, speeds: NDArray[np.float64], inertia_ratio: float, omega_c: float = 0.0, variant: Variant = Variant.EXACT
 ) -> NDArray[np.float64]:
-    """Return the amplitude of the n-th harmonic over the speed."""
+    """Return the amplitude of the n-th harmonic at each speed (rad/s)."""
     return np.array([linear(speed, inertia_ratio, omega_c, variant).harmonic(n) for speed in speeds.tolist()])
 
 
 def peak(n: int, inertia_ratio: float, omega_c: float, variant: Variant = Variant.EXACT) -> tuple[float, float]:
-    """Return speed (rad/s) and size of the greatest n-th harmonic near its resonance."""
+    """Return the speed (rad/s) near its resonance at which the n-th harmonic is greatest, and its amplitude there."""
     middle = 0.5 * sum(resonance(chapter_4(inertia_ratio), variant=variant, harmonic=n))
     found = minimize_scalar(
         lambda speed: -linear(speed, inertia_ratio, omega_c, variant).harmonic(n),
@@ -146,7 +146,7 @@ def growth(n: int) -> list[Case]:
 
 
 def listed_cases() -> tuple[Case, ...]:
-    """Compare the listing, run, with the right equation: the roots of the determinant, and the second harmonic."""
+    """Compare the listing with the right equation: roots of the determinant, greatest first and second harmonics."""
     cases = []
     for ratio in INERTIA_RATIOS:
         found = (resonance(chapter_4(ratio), variant=variant) for variant in (Variant.FORTRAN, Variant.EXACT))
@@ -396,7 +396,7 @@ def eliminating(inertia_ratio: float, amplitude: float) -> float:
 
 
 def one_mass(inertia_ratio: float, omega_c: float) -> NDArray[np.float64]:
-    """Return the first harmonic of a single mass on a spring, with the means of M and K alone."""
+    """Return the first harmonic at the speeds `CLOSE` of a single mass on a spring, with the means of M and K alone."""
     found = equation(inertia_ratio, Variant.EXACT)
     stiffness = SQUARE_OF_OMEGA_K / CLOSE**2 + found.stiffness.mean - found.mass.mean
     amplitude: NDArray[np.float64] = found.force.amplitudes[1] / np.abs(stiffness + 1j * omega_c / CLOSE)
@@ -405,7 +405,7 @@ def one_mass(inertia_ratio: float, omega_c: float) -> NDArray[np.float64]:
 
 @cache
 def damped(inertia_ratio: float) -> dict[str, float]:
-    """Return what is judged of the dampers at an I4."""
+    """Return the measures, by name, by which `_curves` and `_dampers` judge the dampers at an I4."""
     weak, strong = (harmonic(1, SPEEDS, inertia_ratio, d) for d in (DAMPERS[0], STRONGEST))
     near_peak = harmonic(1, CLOSE, inertia_ratio, DAMPERS[0])
     (at, height), (at_strong, _) = (peak(1, inertia_ratio, d) for d in (DAMPERS[0], STRONGEST))
@@ -439,7 +439,7 @@ def compute_damped(number: str, inertia_ratio: float) -> StudyResult:
 
 
 def _curves() -> tuple[Statement, ...]:
-    """Judge what is said of the curves of both figures."""
+    """Judge the statements on the curves of Fig 4.6 and 4.7."""
     both = {f"I4 = {ratio:g}": damped(ratio) for ratio in DAMPED_RATIOS}
     return (
         Statement(
@@ -462,7 +462,7 @@ def _curves() -> tuple[Statement, ...]:
 
 
 def _dampers() -> tuple[Statement, ...]:
-    """Judge what is said of the dampers in both figures."""
+    """Judge the statements on the dampers of Fig 4.6 and 4.7."""
     both, level = {f"I4 = {inertia:g}": damped(inertia) for inertia in DAMPED_RATIOS}, 2.0 * LARGE
     needed = [eliminating(inertia, level) for inertia in DAMPED_RATIOS]
     ratio = 0.5 * STRONGEST / OMEGA_K

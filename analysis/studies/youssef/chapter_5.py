@@ -2,8 +2,9 @@
 
 The slider's motion doubles its period near lambda_k^2 = k/((m4 + m5) omega^2) = k0/4, where the crank runs at about twice the
 natural frequency. The thesis takes the stability about zeta = 0, which is no solution, by its equation (4.21), which lacks
-M' zeta'. Ours is that of the true periodic orbit; beside it are the linear equation put right, by Hill's determinant, and the
-thesis's own coefficients, as printed by (5.16) and as appendix 3 evaluates them. An axis A is that of omega = A omega_k.
+M' zeta'. We take the stability of the true periodic orbit and compare it with the corrected linear equation, by Hill's
+determinant, and with the thesis's own coefficients, as printed, by (5.16), and as appendix 3 evaluates them. The axis A of a
+region is omega/omega_k in its middle.
 """
 
 from __future__ import annotations
@@ -74,7 +75,10 @@ COMPARED = (0.5, 1.0, 1.5)
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Sweep:
-    """First region over a parameter: symbol and values, mechanism at a value, and the statements of the figure."""
+    """First region over a parameter: symbol and values, mechanism at a value, and the function that judges the statements.
+
+    ``further`` has other mechanisms, of which the true orbit alone is computed, by their names.
+    """
 
     number: str
     symbol: str
@@ -229,7 +233,7 @@ def judge_inertia(found: Mapping[str, Sequence[Region]]) -> tuple[Statement, ...
 
 
 def to_the_letter(given: SliderEquation) -> tuple[tuple[float, float], ...]:
-    """Return the zeroth boundary by (5.13), twice, and those of the first two regions by (5.16), (5.26); h0 is 0."""
+    """Return pairs of boundaries: the zeroth, by (5.13), twice, and those of regions 1 and 2 by (5.16) and (5.26); h0 = 0."""
     s, k = given.spring_factor, given.stiffness.to_order(2)
 
     def amplitudes(n: int, at: float) -> tuple[float, float]:
@@ -261,7 +265,7 @@ def formulas() -> tuple[Case, ...]:
 
 
 def widest_by_inertia() -> dict[float, float]:
-    """Return the greatest width of Fig 5.1 up to I4 = 1.5, to which Fig 5.4 goes, and 2, since the text does not say it."""
+    """Return the greatest width in Fig 5.1 by limit of I4: 1.5, as in Fig 5.4, and 2, since the text gives no range."""
     found = widths(regions("5.1")["true orbit"])
     return {most: float(found[np.array(SWEEPS["5.1"].values) <= most].max()) for most in (1.5, 2.0)}
 
@@ -313,8 +317,7 @@ def judge_crank(found: Mapping[str, Sequence[Region]]) -> tuple[Statement, ...]:
 
 
 def held(sigma3: float, inertia_ratio: float = 2.0) -> FiveBarParameters:
-    """Return the mechanism that has the thesis's angles with another coupler: ground link and guide direction "
-    "follow."""
+    """Return the mechanism with another coupler and the thesis's angles; ground link and guide direction follow from them."""
     mechanism = closed(sigma3, inertia_ratio)
     ground = rect(mechanism.coupler_length, pi / 3.0) - rect(mechanism.rocker_length, 2.0 * pi / 3.0)
     return replace(mechanism, ground_length=abs(ground), slider_guide_angle=-phase(ground))
@@ -455,7 +458,7 @@ MOTIONS: Mapping[str, Callable[[Plane, int], Test]] = {
 
 
 def with_damping(omega_c: float) -> Plane:
-    """Return the plane of lambda_k^2 and I4 at a damper omega_c (1/s)."""
+    """Return a function that gives mechanism and drive at a lambda_k^2 and an I4, with a damper omega_c (1/s)."""
 
     def operation(lambda_k2: float, inertia_ratio: float) -> Operation:
         return chapter_4(inertia_ratio, omega_c), Drive(speed=crank_speed(lambda_k2))
@@ -465,13 +468,13 @@ def with_damping(omega_c: float) -> Plane:
 
 @cache
 def damped_region(omega_c: float) -> Chart:
-    """Return the boundaries of the first region in lambda_k^2 and I4."""
+    """Return the chart of the first region's boundaries in lambda_k^2 and I4, with a damper omega_c (1/s)."""
     return chart(orbit_test(with_damping(omega_c), -1), BOX, lines=(0, 4), samples=100)
 
 
 @cache
 def removing(motion: str, inertia_ratio: float) -> RemovingDamping:
-    """Find the damper omega_c (1/s) that removes the first region."""
+    """Find the damper omega_c (1/s) that removes the first region of one of the `MOTIONS` at an I4."""
 
     def test(lambda_k2: float, omega_c: float) -> float:
         return MOTIONS[motion](with_damping(omega_c), -1)(lambda_k2, inertia_ratio)
@@ -480,13 +483,13 @@ def removing(motion: str, inertia_ratio: float) -> RemovingDamping:
 
 
 def width_at(found: Chart, value: float) -> float:
-    """Return the width in lambda_k^2 at an I4, zero if there is no region."""
+    """Return the width of a chart's region in lambda_k^2 at an I4, zero if there is no region."""
     roots = found.across(value, samples=100).roots
     return float(np.ptp(roots)) if len(roots) else 0.0
 
 
 def divided(found: PeriodicEquation, harmonics: int) -> PeriodicEquation:
-    """Return an equation divided by its mass, the form (5.27), with its coefficients cut after some harmonics."""
+    """Return an equation divided by its mass, the form (5.27), with coefficients cut after the given number of harmonics."""
     mass = found.a(ANGLES)
     b, c, factor = (FourierSeries.from_samples(x(ANGLES) / mass, harmonics) for x in (found.b, found.c, found.factor))
     return PeriodicEquation(a=FourierSeries.constant(1.0), b=b, c=c, factor=factor)
@@ -519,7 +522,7 @@ def shifts() -> tuple[Case, ...]:
 
 
 def nine_terms(found: PeriodicEquation) -> dict[int, Region]:
-    """Return regions 1 to 4 by nine terms of the determinant; a complex pair of boundaries by its real parts."""
+    """Return regions 1 to 4 by nine terms of the determinant; of a complex pair of boundaries the real parts are taken."""
     # the first of the multiplier 1 is the zeroth boundary
     even, odd = (boundary_stiffnesses(found, m, count=c, order=2).real for m, c in ((1, 5), (-1, 4)))
     ends = np.append(odd, even[1:]).reshape(4, 2).tolist()
@@ -527,7 +530,10 @@ def nine_terms(found: PeriodicEquation) -> dict[int, Region]:
 
 
 def cut_errors(*, harmonics: int, terms: Callable[[PeriodicEquation], Mapping[int, Region]]) -> dict[int, float]:
-    """Return the greater error of the two boundaries of each region, of its width, by the divided equation; I4 = 1."""
+    """Return the greater error of each region's boundaries, relative to its width, by the divided equation at I4 = 1.
+
+    ``harmonics`` are kept in the divided equation; ``terms`` computes its regions.
+    """
     found = equation(chapter_4(1.0))
     cut = terms(divided(found, harmonics))
     return {
@@ -537,7 +543,7 @@ def cut_errors(*, harmonics: int, terms: Callable[[PeriodicEquation], Mapping[in
 
 
 def damped_statements(charts: Mapping[float, Chart]) -> tuple[Statement, ...]:
-    """Judge the statements on the regions by damper (1/s)."""
+    """Judge the statements on the regions, given their charts by damper omega_c (1/s)."""
     tips = [float(found.boundaries[0].points[:, 1].min()) for d, found in charts.items() if d > 0.0]
     worst = {motion: removing(motion, 1.5).damping for motion in MOTIONS}
     mechanisms = [chapter_4(x) for x in COMPARED]

@@ -1,9 +1,9 @@
 """The figures of chapter VI: four-bars for an ellipse and for a rocker function, as printed and ours.
 
-The thesis prints a linkage and its error for each problem. Evaluated as they stand in print they mostly have another error,
-three of them only once a misprint is mended, and within our limits there are far better ones: the thesis's downhill
-simplex did not find the optimum. Without a limit of the links the error of the ellipses goes to zero as they grow, so ours
-are no longer than the longest printed one. Lengths and errors are in the units of print, cm and degrees. Fig 6.11 is in
+The thesis prints a linkage and its error for each problem. Most of these linkages do not have the printed error, three come
+near it only once a misprint is mended, and within our limits there are far better linkages: the thesis's downhill simplex did
+not find the optimum. The error of the ellipses goes to zero as the links grow, so our links are no longer than the longest
+printed link. Lengths and errors are in the units of print, cm and degrees. Fig 6.11 is in
 `analysis.studies.youssef.packaging`.
 """
 
@@ -86,7 +86,7 @@ ANGLES = (0.0, 20.0, 30.0, 35.0, 40.0, 45.0, 50.0, 55.0, 60.0)
 
 
 class Row(NamedTuple):
-    """Figure of chapter VI: its problem, claim, how an illegible place is read, its statements or where they are judged."""
+    """Figure of chapter VI: problem, claim, statements (or the figure ``see`` that has them), reading of illegible places."""
 
     problem: str
     claim: str
@@ -103,12 +103,12 @@ def best(name: str) -> Solution:
 
 
 def printed_error(name: str) -> float:
-    """Return the error of the printed linkage, mended (unit of print)."""
+    """Return the error of the printed linkage with its misprint mended, in the unit of print."""
     return PROBLEMS[name].error_of(PROBLEMS[name].linkage)
 
 
 def share_of_stated(name: str) -> float:
-    """Return the error of the printed linkage over the stated one, by the reading in which it is nearest."""
+    """Return the error of the printed linkage divided by the stated error, in the reading that brings it nearest to 1."""
     p = PROBLEMS[name]
     assert p.error is not None
     return min((error / p.error for error in by_readings(name, p.linkage).values()), key=lambda share: abs(share - 1.0))
@@ -135,7 +135,7 @@ NUMBERS = tuple(n for n in range(18, 361) if 720 % n == 0)
 
 
 def by_readings(name: str, linkage: Linkage) -> dict[str, float]:
-    """Return the error of a linkage (unit of print), of a rocker function by each reading that the text leaves open."""
+    """Return the error of a linkage (unit of print) by reading of the text; only the rocker functions have several readings."""
     if not isinstance(PROBLEMS[name].task, RockerFunction):
         return {"": PROBLEMS[name].error_of(linkage)}
     found: dict[str, float] = {}
@@ -159,14 +159,14 @@ def by_readings(name: str, linkage: Linkage) -> dict[str, float]:
 
 
 def half_units(linkage: Linkage) -> FloatArray:
-    """Return half a unit of the last digit of each number of a linkage (m, rad); zero stands for what is not printed."""
+    """Return half a unit of the last digit of each number of a linkage (m, rad), 0 for a number that is not printed."""
     si = np.array([1.0 / CM_PER_METRE] * 7 + [radians(1.0)] * 3)
     digits = (Decimal(repr(round(float(x), 6))) for x in linkage.vector / si)
     return si * [0.5 * 10.0 ** int(x.as_tuple().exponent) if x else 0.0 for x in digits]
 
 
 def rounded(name: str) -> dict[str, tuple[float, float]]:
-    """Return the range of the error of a printed linkage, by reading, if each of its numbers is rounded up or down."""
+    """Return the range of the error of a printed linkage if each of its numbers is rounded up or down, by reading."""
     p = PROBLEMS[name]
     off = half_units(p.linkage)
     if isinstance(p.task, UntimedPath):
@@ -179,7 +179,7 @@ def rounded(name: str) -> dict[str, tuple[float, float]]:
 
 
 def as_stated(label: str, stated: str, name: str) -> Case:
-    """Judge whether a stated error is in the range of `rounded`, in the reading that is nearest."""
+    """Judge whether a stated error is in the range that `rounded` gives, in the reading that comes nearest to it."""
     ranges, wanted = rounded(name), float(stated)
     near_by = {reading: float(np.clip(wanted, *span)) for reading, span in ranges.items()}
     reading = min(near_by, key=lambda r: abs(near_by[r] - wanted))
@@ -194,7 +194,7 @@ def as_stated(label: str, stated: str, name: str) -> Case:
 
 
 def best_known(*names: str) -> str:
-    """Return our least errors within our limits, for a reason."""
+    """Return words on the least errors that we find within our limits, for the reason of a verdict."""
     found = " and ".join(f"{our_error(name):.2f}" for name in names)
     return f"the least that we find within our limits, see the head, is {found} {PROBLEMS[names[0]].unit}"
 
@@ -287,7 +287,7 @@ def _rocker() -> tuple[Statement, ...]:
 
 
 def straight_error() -> float:
-    """Return the rms distance (mm) from a line of 100 mm, passed within 60 degrees by 13 points, the rest weighted zero."""
+    """Return the rms distance (mm) of our best linkage from 13 points of a line of 100 mm, passed within 60 degrees."""
     points = ellipse(10.0, N)
     points[:13] = np.column_stack([np.linspace(0.30, 0.20, 13), np.full(13, 0.10)])
     weights = np.where(np.arange(N) < 13, 1.0, 0.0)
@@ -365,7 +365,7 @@ def _paths() -> tuple[Statement, ...]:
 
 
 def over_least() -> dict[str, float]:
-    """Return the error of the printed linkage of each figure, mended, over the least that we find with no longer link."""
+    """Return the error of each figure's printed linkage, mended, divided by the least that we find with no longer link."""
     return {f"Fig {n}": printed_error(row.problem) / our_error(row.problem) for n, row in TABLE.items()}
 
 
@@ -412,12 +412,13 @@ TABLE = {
 
 
 def pairing_area(desired: FloatArray, actual: FloatArray, *, window: float) -> float:
-    """Return the thesis's quality function of path generation (section 6.4.1, listing at L9797), in the unit's square.
+    """Return the thesis's quality function of path generation (section 6.4.1, listing at L9797), an area.
 
-    Each desired point is paired with an actual one: the first with the nearest of all, each next one with the nearest of
-    those from its predecessor's partner on, as many as ``window`` times the actual points for each desired one; as many actual
-    points as desired ones are paired in order, because the program leaves no point without a partner (L9894-9898). The area is
-    that of the two triangles between each two successive pairs, added up; the lesser of the two senses of rotation counts.
+    The first desired point is paired with the nearest actual point, each following one with the nearest of a number of actual
+    points from its predecessor's partner on: ``window`` times the number of actual points per desired point. If there are as
+    many actual points as desired ones, they are paired in order, because the program leaves no point without a partner
+    (L9894-9898). Each two successive pairs span two triangles, whose areas are added up; of the two senses of rotation the one
+    with the lesser area is taken.
     """
     span = int(window * len(actual) / len(desired))
     areas = []
@@ -531,7 +532,7 @@ def mounted() -> Solution:
 
 
 def rocker_columns(name: str) -> dict[str, FloatArray]:
-    """Return target, rocker angles and errors over a turn (deg), and the least error over the transmission angle."""
+    """Return target, rocker angles and errors over a turn (deg), and the least error for each bound on transmission angle."""
     p = PROBLEMS[name]
     assert isinstance(p.task, RockerFunction)
     linkages, tasks = {"printed": p.linkage, "ours": best(name).linkage}, {"fixed": p.task}
@@ -553,7 +554,7 @@ def rocker_columns(name: str) -> dict[str, FloatArray]:
 
 
 def draw_rocker(result: StudyResult) -> Figure:
-    """Draw rocker angles, errors, and the least error over the transmission angle."""
+    """Draw rocker angles, errors, and the least error for each bound on the transmission angle."""
     c = result.columns
     labels = {"printed": "printed linkage", "ours": "our linkage", "mounted": "ours, mounting free"}
     look = dict(zip(labels, COLOURED))
@@ -607,7 +608,7 @@ def draw_rocker(result: StudyResult) -> Figure:
 
 
 def compute(number: str) -> StudyResult:
-    """Compute the printed linkage of a problem and ours."""
+    """Compute curves and errors of a figure's printed linkage and of ours, and judge the statements."""
     row = TABLE[number]
     rocker = row.problem.startswith("rocker")
     return StudyResult(

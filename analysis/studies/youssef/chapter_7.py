@@ -91,7 +91,7 @@ PRECISION, BETWEEN = 5, (-0.4, -0.2, 0.2, 0.4)
 
 
 def point(rotation: FloatArray, u: ArrayLike) -> ComplexArray:
-    """Return P at crank rotations with the slider at u = U - 1."""
+    """Return P (l3, complex) at crank rotations (rad) with the slider at u = U - 1."""
     u = np.asarray(u, dtype=float) + np.zeros_like(rotation)
     return np.asarray(LINKAGE.path(rotation, (u, np.zeros_like(u))) @ np.array([1.0, 1j]))
 
@@ -102,7 +102,7 @@ def desired(rotation: FloatArray = ROTATION) -> ComplexArray:
 
 
 def task(weights: ArrayLike | None = None) -> TimedPath:
-    """Return the desired points as a task."""
+    """Return the desired points as a synthesis task."""
     return TimedPath(points=np.column_stack([desired().real, desired().imag]), weights=weights)
 
 
@@ -136,9 +136,9 @@ def squared_errors(found: Solution) -> tuple[float, float]:
 
 
 def ends_of_simplex(starts: int = GUESSES, seed: int = 7) -> list[tuple[float, float]]:
-    """Return the errors of eleven terms at which the downhill simplex ends from random ones, and a descent from there.
+    """Return pairs of squared errors of eleven terms: where the downhill simplex ends, and after a descent from there.
 
-    Guesses that cannot be assembled are left out, as are their ends.
+    The simplex starts from random guesses. Ends at which the links cannot be joined are left out.
     """
     random = np.random.default_rng(seed)
 
@@ -159,9 +159,10 @@ def ends_of_simplex(starts: int = GUESSES, seed: int = 7) -> list[tuple[float, f
 
 
 def with_all_terms(curves: int = 20, seed: int = 11) -> float:
-    """Return the greatest error of the series through the variational motion, over that motion's, less 1, of random curves.
+    """Return the greatest relative excess of the squared error of a series over that of the variational motion.
 
-    The points lie at random about random places of P; the series has as many terms as there are points.
+    The series goes through the variational motion, with as many terms as there are points; the curves are random points near
+    random places of P.
     """
     # off the axis, where the slider can come below the crank pin and the links then have no direction
     random, steps, found = np.random.default_rng(seed), turn(73), []
@@ -176,7 +177,7 @@ def with_all_terms(curves: int = 20, seed: int = 11) -> float:
 
 
 def in_line(rotation: FloatArray, target: ComplexArray) -> tuple[FloatArray, FloatArray]:
-    """Return a and b of U = a +- sqrt(b), eq (7.14): the coupler is in line with the target."""
+    """Return a and b of U = a +- sqrt(b), eq (7.14), with which the coupler points at the target."""
     l2, l3, l4 = LINKAGE.crank_length, LINKAGE.coupler_length, LINKAGE.rocker_length
     th3 = np.angle(target - l2 * np.exp(1j * rotation))
     centre = l2 * np.cos(rotation) + l3 * np.cos(th3)
@@ -305,7 +306,7 @@ def reach(low: float, high: float) -> AccessibleArea:
 def enclosed(low: float, high: float) -> float:
     """Return the area that the coupler curves for U between two limits enclose together.
 
-    What P sweeps from each of 21 curves to the next is the area that it reaches.
+    It is the union of the areas within 21 of the curves and of the area that P reaches, which covers the space between them.
     """
     import shapely
 
@@ -322,10 +323,10 @@ def enclosed(low: float, high: float) -> float:
 
 
 def between_precision_points() -> tuple[float, float, str]:
-    """Return how far P departs from its path at U = 1 (l3): at the precision points, and in the parts between them.
+    """Return the departure of P from its path at U = 1 (l3), if the slider moves by the amplitudes `BETWEEN`.
 
-    In the parts it is the most of all amplitudes, in the part where this is least, and in words the least of all parts and
-    amplitudes.
+    The first value is the greatest at the precision points. The second is the least, of the parts between them, of the greatest
+    of all amplitudes. The text names the part and the amplitude with the least departure.
     """
     change = np.sin(0.5 * PRECISION * TURN) ** 2
     away = np.array([np.abs(point(TURN, a * change) - point(TURN, 0.0)) for a in BETWEEN])
@@ -395,9 +396,9 @@ def draw_wanted(result: StudyResult) -> Figure:
 
 
 def nearest(rotation: float, target: complex) -> tuple[float, float]:
-    """Return the least distance of P from a point at a crank rotation, and how far P moves from there to the next position.
+    """Return the least distance of P from a target at a crank rotation, over the slider `POSITIONS` and both assemblies.
 
-    Over all slider positions and both assemblies.
+    The second value is the distance that P moves from there to the next position.
     """
     crank, found = np.full(POSITIONS.size, rotation), []
     for branch in (1, -1):
@@ -409,7 +410,7 @@ def nearest(rotation: float, target: complex) -> tuple[float, float]:
 
 
 def two_positions() -> StudyResult:
-    """Compute Fig 7.5: both positions of the rocker at a crank angle; what is nearest to random points."""
+    """Compute Fig 7.5, both positions of the rocker at a crank angle, and judge (7.14) and (7.15) with random points."""
     found, (u, _) = variational(), by_equations(ROTATION, desired())
     k = 60
     pin = LINKAGE.crank_length * np.exp(1j * ROTATION[k])
@@ -529,7 +530,7 @@ def columns_of_motions() -> dict[str, FloatArray]:
 
 
 def _unweighted() -> tuple[Statement, ...]:
-    """Return the statements on Fig 7.6 to 7.8, with what they come to with our curve."""
+    """Return the statements on Fig 7.6 to 7.8, with the results for our curve."""
     least, found, ends = variational().squared_error, direct(), ends_of_simplex()
     slope = slider(found.linkage).series.derivative()
     smooth = [np.abs(of(TURN)).max() for of in (slope, slope.derivative())]
@@ -652,7 +653,7 @@ def draw_motions(result: StudyResult, names: tuple[str, ...], what: str) -> Figu
 
 
 class Motions(NamedTuple):
-    """Figure of the motions: its claim, the motions and the quantity that it shows, its statements or where they are judged."""
+    """Figure of the motions: its claim, motions, quantity shown and statements, or the figure ``see`` that judges them."""
 
     claim: str
     names: tuple[str, ...]

@@ -78,7 +78,7 @@ equation ignores makes both smaller. Friction and a stronger damper widen the re
 weaker damper the reverse: no one of them does both.
 """
 
-# --- 8.4: what the widths of the photocell's pulses show
+# --- 8.4: crank speed from the widths of the photocell's pulses
 
 #: Holes of the disc, and moments of inertia of the crank with its flywheels that are tried out (kg.m2); none is printed.
 HOLES, INERTIAS = 60, (5e-3, 2e-2)
@@ -87,7 +87,10 @@ PULSED = 420.0
 
 
 def speed_of_crank(inertia: float) -> NDArray[np.float64]:
-    """Return the crank speed (rad/s) over a turn if a constant torque drives it against the steady motion of `PULSED` rpm."""
+    """Return the crank speed (rad/s) over a turn with a constant torque and a moment of inertia (kg.m2) of the crank.
+
+    The torque of the links is that of the steady motion at `PULSED` rpm.
+    """
     torque = turn("A", PULSED)["drive.applied_torque"]
     energy = np.cumsum(torque.mean() - torque) * 2.0 * pi / len(torque)
     energy = np.append(energy[-1], energy)
@@ -103,7 +106,7 @@ def speed_by_pulses(speed: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def compute_pulses() -> StudyResult:
-    """Compute the speed of the crank over a turn, and what the widths of the pulses tell of it."""
+    """Compute the speed of the crank over a turn, and the speed by the widths of the pulses."""
     speeds = {inertia: speed_of_crank(inertia) for inertia in INERTIAS}
     pulses = {inertia: speed_by_pulses(speed) for inertia, speed in speeds.items()}
     crank_angle = np.linspace(0.0, 360.0, len(speeds[INERTIAS[0]]))
@@ -308,7 +311,7 @@ class Turns:
 
     @property
     def study(self) -> Study:
-        """Return the row as a study."""
+        """The figure as a study."""
         return Study(self.number, self.compute, self.draw)
 
 
@@ -595,13 +598,15 @@ def _fig_8_17() -> tuple[Statement, ...]:
             "above 800 rpm, the greatest speed that was run with it; the sign alone",
             (
                 at_least("speed", float(rig_1.STOPPED["B"]), meeting["B"], "rpm"),
-                at_most("change of the angle", 0.0, _apart(turn("B", 780.0)) - _apart(turn("B", 500.0)), "deg"),
+                at_most(
+                    "change of the angle", 0.0, _fall_angle(turn("B", 780.0)) - _fall_angle(turn("B", 500.0)), "deg"
+                ),
             ),
         ),
     )
 
 
-def _apart(of: Turn) -> float:
+def _fall_angle(of: Turn) -> float:
     """Return the crank angle (deg) from the last maximum of the slider position in a turn to the minimum after it."""
     rising = np.diff(slider(of)) > 0.0
     tops, lows = (np.flatnonzero(x & ~np.roll(x, -1)) for x in (rising, ~rising))
@@ -612,8 +617,8 @@ def _apart(of: Turn) -> float:
 TYPICAL, RUN = (400.0, 585.0, 1000.0), (300.0, 1000.0)
 
 
-def _beyond_unbalance(spring: str, speeds: NDArray[np.float64], unbalance: float) -> float:
-    """Return the greatest amplitude at speeds (rpm) over that of a mass on a spring under an unbalance (cm.kg)."""
+def _unbalance_ratio(spring: str, speeds: NDArray[np.float64], unbalance: float) -> float:
+    """Return the greatest ratio, at speeds (rpm), of the amplitude to that of a mass on a spring under an unbalance (cm.kg)."""
     rates, amplitudes = RAD_S_PER_RPM * speeds, np.array([amplitude(turn(spring, w)) for w in speeds.tolist()])
     return float((amplitudes * dynamic_stiffness(rig(spring), rates) / (unbalance * rates**2)).max())
 
@@ -627,7 +632,7 @@ def _fig_8_18() -> tuple[Statement, ...]:
     most = {s: max(harmonic(turn(s, w), 2) / harmonic(turn(s, w), 1) for w in of) for s, of in about.items()}
     higher = {s: max(overtones(turn(s, w)) for w in speeds) for s in "CD"}
     largest = max(largest_multiplier(s, *RUN) for s in "CD")
-    # by its inertia each link moves the slider as a force does that grows with the square of the speed
+    # the inertia of each link acts on the slider as a force that grows with the square of the speed
     shift, spread, growth, beyond = [], [], [], []
     for s in "CD":
         phases = [np.angle(np.fft.rfft(slider(turn(s, w))[:-1])[1]) for w in speeds]
@@ -636,7 +641,7 @@ def _fig_8_18() -> tuple[Statement, ...]:
         force = sizes[s][:, 0] * dynamic_stiffness(rig(s), rates)
         spread.append(np.ptp(force / rates**2) / np.mean(force / rates**2))
         growth.append(force.max() / force.min())
-        beyond.append(_beyond_unbalance(s, np.array(sorted({*speeds, *about[s]})), float(np.mean(force / rates**2))))
+        beyond.append(_unbalance_ratio(s, np.array(sorted({*speeds, *about[s]})), float(np.mean(force / rates**2))))
     there = max(10.0 * harmonic(turn(s, w), 2) for s, of in about.items() for w in of)
     why = (
         f"near half the natural frequency the second harmonic is {most['C']:.1f} (C) and {most['D']:.1f} (D) times the first, "

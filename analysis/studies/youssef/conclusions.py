@@ -1,6 +1,6 @@
-"""What the thesis concludes: sections 8.0 and 9.1, each sentence that claims something.
+"""Verdicts on the conclusions of the thesis: each sentence of sections 8.0 and 9.1 that claims something.
 
-Most of them sum up what is judged in its chapter; here each is measured once more, by one number for all that it covers.
+Most of these sentences sum up statements that are judged in their chapters; here each is measured again as a whole.
 """
 
 from __future__ import annotations
@@ -41,7 +41,7 @@ NUMBER = "conclusions"
 OMEGA_K = sqrt(SQUARE_OF_OMEGA_K)
 #: Inertia ratios of chapters IV and V, dampers (1/s) and speeds (rad/s) of its resonance curves.
 RATIOS, DAMPER, SPEEDS = (0.25, 0.5, 1.0, 1.5, 2.0), 0.45, np.arange(10.0, 45.0, 0.05)
-#: Lengths of crank and coupler over the rocker's, in the steps of Fig 5.2 and 5.3.
+#: Lengths of crank and coupler relative to the rocker's, in the ranges of Fig 5.2 and 5.3.
 CRANKS, COUPLERS = (0.01, 0.03, 0.05, 0.07, 0.1), (0.8, 0.9, 1.0, 1.1, 1.2)
 #: Amplitude u/l4 above which a speed counts as resonant.
 LARGE = 0.1
@@ -57,7 +57,7 @@ SIGN = "none, the sign decides"
 
 @cache
 def short_crank(inertia_ratio: float, most: int) -> tuple[HarmonicMotion, ...]:
-    """Return u/l4 of chapter IV's mechanism over the speeds, by a number of harmonics."""
+    """Return the motions u/l4 of chapter IV's mechanism at the `SPEEDS`, with the harmonics up to ``most``."""
     found = slider_equation(chapter_4(inertia_ratio), 1.0)
     return tuple(
         harmonic_balance(replace(found, spring=SQUARE_OF_OMEGA_K / w**2, damping=DAMPER / w), most)
@@ -66,12 +66,12 @@ def short_crank(inertia_ratio: float, most: int) -> tuple[HarmonicMotion, ...]:
 
 
 def harmonic(order: int, inertia_ratio: float, most: int = 2) -> NDArray[np.float64]:
-    """Return the amplitude of a harmonic of u/l4 over the speeds, by a number of harmonics."""
+    """Return the amplitude of a harmonic of u/l4 at the `SPEEDS`; see `short_crank`."""
     return np.array([motion.harmonic(order) for motion in short_crank(inertia_ratio, most)])
 
 
 def unlike_oscillator(inertia_ratio: float) -> float:
-    """Return the spread of the force, over the square of the speed, on an oscillator that gives the first harmonic."""
+    """Return the relative spread of F0/omega^2, F0 the force on a damped oscillator that gives the first harmonic."""
     force = harmonic(1, inertia_ratio) * dynamic_stiffness(chapter_4(inertia_ratio, DAMPER), SPEEDS) / SPEEDS**2
     return float(np.ptp(force) / force.mean())
 
@@ -82,7 +82,7 @@ def width(parameters: FiveBarParameters, number: int = 1) -> float:
 
 
 def spacings(run: Trajectory) -> NDArray[np.float64]:
-    """Return the crank angles (deg) between the maxima of the slider after 1 rad."""
+    """Return the crank angles (deg) between successive maxima of the slider position after th2 = 1 rad."""
     angle = run["crank.angle"]
     grid = np.arange(1.0, angle[-1], pi / 720.0)
     u = np.interp(grid, angle, run["slider.position"])
@@ -91,7 +91,7 @@ def spacings(run: Trajectory) -> NDArray[np.float64]:
 
 
 def decay(torque: float, damping: float) -> float:
-    """Return the range of u over the last five turns after a launch over that of the first five, medians."""
+    """Return the median range of u in the last five turns after a launch, divided by that in the first five."""
     swing = Turns.of(launch(torque, stop_time=FREE, samples=6000, damping=damping), start=1.0).slider_range
     return float(np.median(swing[-5:]) / np.median(swing[:5]))
 
@@ -113,13 +113,13 @@ def collinear_turn(damping: float) -> float:
 
 
 def twice_natural() -> float:
-    """Return the speed in the middle of the first region over the natural frequency, the farthest from 2 of `RATIOS`."""
+    """Return the ratio of the speed in the middle of the first region to the natural frequency, farthest from 2 of `RATIOS`."""
     found = [axis(hill(chapter_4(i))) * OMEGA_K / natural_frequency(chapter_4(i)) for i in RATIOS]
     return max(found, key=lambda x: abs(x - 2.0))
 
 
 def introduction() -> tuple[Statement, ...]:
-    """Judge what 8.0 says of the theory."""
+    """Judge the statements of section 8.0 on the theory."""
     second = max(width(chapter_4(i), 2) / width(chapter_4(i)) for i in RATIOS)
     pairs = [[hill(chapter_4(i), number) for number in (2, 1)] for i in RATIOS]
     of_speed = max(np.divide(*(of.low**-0.5 - of.high**-0.5 for of in pair)) for pair in pairs)
@@ -546,7 +546,7 @@ def experiment() -> tuple[Statement, ...]:
 
 
 def compute() -> StudyResult:
-    """Judge each sentence."""
+    """Judge the sentences of sections 8.0 and 9.1."""
     return StudyResult(
         number=NUMBER,
         claim="What the introduction to the experiments says of the theory (8.0), and what the thesis concludes (9.1).",

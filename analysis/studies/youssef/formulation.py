@@ -1,6 +1,6 @@
 """Chapter II and section 3.1: the equations with Lagrange's multipliers, eqs (3.1) to (3.10), and how they are integrated.
 
-The equations are the thesis's, to the letter; what they give is compared with the plant, which has no multipliers.
+The equations are the thesis's, to the letter; their results are compared with those of the plant, which has no multipliers.
 """
 
 from __future__ import annotations
@@ -27,16 +27,16 @@ from .runs import SPEED, table_3_1
 TABLE = table_3_1(1e6)
 OMEGA, STOP = SPEED * RAD_S_PER_RPM, 0.5
 STEPS = (4e-3, 2e-3, 1e-3, 5e-4)
-#: Torque of the launch that is compared (N.m), and relative rounding errors of a solution.
+#: Torque of the launch that is compared (N.m), and greatest relative rounding error of a solution.
 TORQUE, ROUNDING = 10.0, 1e-9
 #: Step (s) at which the thesis's remarks on Runge-Kutta's method are judged, as appendix 1 begins.
 STEP = 1e-3
 
 
 def solved(q: ArrayLike, qd: ArrayLike, torque: float | None = None) -> NDArray[np.float64]:
-    """Solve A W = B, eqs (3.1), (3.8), (3.10), at q = (th2, th3, th4, u).
+    """Solve A W = B, eqs (3.1), (3.8), (3.10), at q = (th2, th3, th4, u) and q' = ``qd`` (SI); return W.
 
-    W = (lambda3, lambda2, lambda1, u'', th4'', th3''); with a torque on the crank th2'' in place of lambda3 (3.2.2).
+    W = (lambda3, lambda2, lambda1, u'', th4'', th3''); if a torque acts on the crank, th2'' takes the place of lambda3 (3.2.2).
     """
     q, qd, p = np.asarray(q), np.asarray(qd), TABLE
     m3, m4, r3, r4, g = p.coupler_mass, p.rocker_mass, p.coupler_cog_distance, p.rocker_cog_distance, p.gravity
@@ -71,7 +71,7 @@ def solved(q: ArrayLike, qd: ArrayLike, torque: float | None = None) -> NDArray[
 
 
 def closed(crank: float, u: float, speed: float, velocity: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return q and q' of the closed loop, eqs (2.1) and (2.4)."""
+    """Return q and q' of the closed loop, eqs (2.1) and (2.4), from crank angle, u and their rates (SI)."""
     p = TABLE.constants()
     g = kinematics.position(crank, u, p)
     k = kinematics.coefficients(g, p)
@@ -91,10 +91,11 @@ def slider_alone(t: float, y: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 class Integrated(NamedTuple):
-    """Runs with a constant step of Hamming's method: times (s), and over them the failure of closure (cm).
+    """Runs by the two approaches of 3.1 with a constant step of Hamming's method.
 
-    ``errors`` are the greatest of u (cm) by the first and the second approach of 3.1, ``unseen`` the greatest failure of
-    closure by the second (cm), ``slider`` its times (s) and u (cm).
+    ``gap`` is the failure of closure (cm) at ``times`` (s) by the first approach, ``errors`` are the greatest errors of u (cm)
+    by the first and by the second, ``unseen`` is the greatest failure of closure (cm) and ``slider`` has times (s) and u (cm)
+    by the second.
     """
 
     times: NDArray[np.float64]
@@ -106,7 +107,7 @@ class Integrated(NamedTuple):
 
 @cache
 def integrated(step: float) -> Integrated:
-    """Integrate with a constant step."""
+    """Integrate the motion by the two approaches of 3.1 with a constant step (s)."""
     options = {"method": Hamming, "first_step": step, "max_step": step, "rtol": 1e3, "atol": 1e9}
     q, qd = closed(0.0, 0.0, OMEGA, 0.0)
     first, second = (
@@ -122,7 +123,7 @@ def integrated(step: float) -> Integrated:
 
 @cache
 def exact() -> Callable[[NDArray[np.float64]], NDArray[np.float64]]:
-    """Return (u, u') in SI over the time, accurate to rounding."""
+    """Return a function that gives (u, u') in SI at times (s), accurate to rounding."""
     options = {"method": "DOP853", "rtol": 1e-12, "atol": 1e-14, "dense_output": True}
     solution: Callable[[NDArray[np.float64]], NDArray[np.float64]]
     solution = solve_ivp(slider_alone, (0.0, STOP), [0.0, 0.0], **options).sol
@@ -145,7 +146,7 @@ class RungeKutta(NamedTuple):
 def runge_kutta(
     f: Callable[[float, NDArray[np.float64]], NDArray[np.float64]], y: ArrayLike, h: float, n: int
 ) -> RungeKutta:
-    """Integrate n steps h of y' = f(t, y)."""
+    """Integrate y' = f(t, y) from t = 0 by n steps h of the classical Runge-Kutta method."""
     states, evaluations = [np.asarray(y, dtype=float)], 0
     for i in range(n):
         y0 = states[-1]
@@ -158,7 +159,10 @@ def runge_kutta(
 
 
 def of_runge_kutta(step: float) -> tuple[float, float]:
-    """Return the greatest error of u (cm) by the second approach, and its change when the step is halved, over 1 - 1/16."""
+    """Return the greatest error of u (cm) by the second approach, and its estimate by halving the step.
+
+    The estimate is the greatest change of u divided by 1 - 1/16.
+    """
     n = round(STOP / step)
     u, halved = (runge_kutta(slider_alone, [0.0, 0.0], STOP / m, m).states[:: m // n, 0] for m in (n, 2 * n))
     error = np.abs(u - exact()(np.linspace(0.0, STOP, n + 1))[0]).max()
@@ -166,7 +170,7 @@ def of_runge_kutta(step: float) -> tuple[float, float]:
 
 
 def stable_steps(turns: int = 400) -> tuple[float, float]:
-    """Return the greatest steps on y' = -y with which Runge-Kutta's and Hamming's methods do not grow."""
+    """Return the greatest steps with which the solutions of y' = -y by Runge-Kutta's and by Hamming's method do not grow."""
 
     def classical(h: float) -> NDArray[np.float64]:
         return runge_kutta(lambda t, y: -y, [1.0], h, turns).states[:, 0]
@@ -188,7 +192,7 @@ def stable_steps(turns: int = 400) -> tuple[float, float]:
 
 
 def opening(q: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the failure of closure (cm), eq (2.1), at columns q."""
+    """Return the failure of closure (cm), eq (2.1), for each column of q, shape (4, n)."""
     lengths = np.array([TABLE.crank_length, TABLE.coupler_length, -TABLE.rocker_length])
     gap: NDArray[np.float64] = CM_PER_METRE * np.abs(lengths @ np.exp(1j * q[:3]) - TABLE.ground_length - q[3])
     return gap
@@ -207,7 +211,10 @@ def evaluations_a_step() -> float:
 
 
 def parasite(past: ArrayLike, rates: ArrayLike, h: float) -> float:
-    """Return the greatest root of a corrector on y' = -y at a step h, apart from the one that is near exp(-h)."""
+    """Return the greatest modulus of the spurious roots of a corrector on y' = -y at a step h: all but that near exp(-h).
+
+    ``past`` and ``rates`` are the corrector's coefficients of the values and of their rates.
+    """
     roots = np.roots(np.asarray(past) + h * np.asarray(rates))
     return float(np.abs(np.delete(roots, np.abs(roots - np.exp(-h)).argmin())).max())
 

@@ -30,11 +30,11 @@ TORQUES = (1e7, 1e8, 2e8)
 TORQUE_RANGE = np.geomspace(TORQUES[0], TORQUES[-1], 14)
 #: Springs of the free motion (dyn/cm).
 SOFT, STIFF = 5e5, 2e6
-#: Crank speed of the steady motion from which a crank is left that runs faster than the launched ones (rpm).
+#: Speed (rpm) from whose steady motion a crank is released for comparison; it is above the speeds after the launches.
 FASTER = 840.0
 #: Crank speed near which the thesis sees higher harmonics (rad/s).
 HARMONIC_SPEED = 27.0
-#: Crank angles in a turn of a free crank.
+#: Number of crank angles at which a turn of a free crank is sampled.
 SAMPLES = 256
 #: Quantity of a plot: its name on the axis, output, factor to its unit, unit.
 Quantity = tuple[str, str, float, str]
@@ -84,7 +84,10 @@ def least_torque() -> float:
 
 @cache
 def coast(stiffness: float, damping: float = 3e4, rpm: float = SPEED) -> Trajectory:
-    """Run Table 3.1 without torque, from its steady motion at a speed, at crank angle 0; the damper may change there."""
+    """Run Table 3.1 without torque, released at crank angle 0 from its steady motion at a speed.
+
+    The steady motion has the thesis's damper, the free motion has ``damping``.
+    """
     period, speed = 60.0 / rpm, rpm * RAD_S_PER_RPM
     steady = simulate(table_3_1(stiffness), Inputs(speed=speed), stop_time=20.0 * period, step=period)
     u, v = (float(steady[name][-1]) for name in ("slider.position", "slider.velocity"))
@@ -94,20 +97,20 @@ def coast(stiffness: float, damping: float = 3e4, rpm: float = SPEED) -> Traject
 
 @dataclass(frozen=True, slots=True)
 class Turns:
-    """Statistics of each whole turn of a free crank, from samples at equal crank angles.
+    """Statistics of each whole turn of a free crank, from samples at evenly spaced crank angles.
 
     Attributes
     ----------
     ends : ndarray
-        Time at which each ends (s).
+        Time at which the turn ends (s).
     speed, speed_range : ndarray
-        Crank speed: 2 pi over the time of the turn, and its range (rad/s).
+        Mean crank speed, 2 pi divided by the time of the turn, and range of the crank speed (rad/s).
     slider, slider_range, velocity_range : ndarray
-        Slider position: mean and range (cm); range of the velocity (cm/s).
+        Mean and range of the slider position (cm), range of its velocity (cm/s).
     first, second : ndarray
-        Harmonics of the crank's turn in the slider position (cm).
+        Amplitudes of the first and the second harmonic of the slider position over the crank angle (cm).
     energy_share : ndarray
-        Relative range of the kinetic energy over that of the crank speed squared.
+        Relative range of the kinetic energy divided by the relative range of the squared crank speed.
     """
 
     ends: NDArray[np.float64]
@@ -122,7 +125,7 @@ class Turns:
 
     @classmethod
     def of(cls, run: Trajectory, start: float = 0.0) -> Turns:
-        """Divide a run into turns from a crank angle (rad) on."""
+        """Divide a run into turns, the first from the crank angle ``start`` (rad), and return their statistics."""
         angle = run["crank.angle"]
         times = np.interp(np.arange(start, angle[-1], 2.0 * pi), angle, run.time)
         names = ("slider.position", "slider.velocity", "crank.speed", "energy.kinetic")
@@ -152,7 +155,10 @@ class Turns:
 
 
 def transient(stiffness: float) -> NDArray[np.float64]:
-    """Return how far u of each turn after a launch with 1e8 dyn.cm is from a free crank's steady decay, by its range."""
+    """Return the distance of u, in each turn after a launch with 1e8 dyn.cm, from the steady decay of a free crank.
+
+    It is the greatest over the turn, at the same mean speed, relative to the range of u in the decay.
+    """
     launched, steady = launch(1e8, stiffness), coast(stiffness, rpm=FASTER)
     (speeds, turns), (known, waves) = (
         (Turns.of(run, 1.0).speed, turn_by_turn(run, "slider.position", 1.0)) for run in (launched, steady)
@@ -166,7 +172,7 @@ def transient(stiffness: float) -> NDArray[np.float64]:
 
 
 def turn_by_turn(run: Trajectory, output: str, start: float) -> NDArray[np.float64]:
-    """Return an output at equal crank angles (rad) of each whole turn from one on, shape (turns, SAMPLES)."""
+    """Return an output over each whole turn from the crank angle ``start`` (rad), shape (turns, SAMPLES)."""
     marks = np.arange(start, run["crank.angle"][-1], 2.0 * pi)
     grid = marks[:-1, None] + np.linspace(0.0, 2.0 * pi, SAMPLES, endpoint=False)
     return np.interp(grid, run["crank.angle"], run[output])
@@ -184,11 +190,11 @@ def half_natural_frequencies(stiffness: float) -> NDArray[np.float64]:
 # --- Launches: 3.6 to 3.10
 
 
-def _by_torque() -> dict[str, Trajectory]:
+def _torque_runs() -> dict[str, Trajectory]:
     return {f"T0 = {plain(torque)} dyn.cm": launch(torque) for torque in TORQUES}
 
 
-def _by_spring() -> dict[str, Trajectory]:
+def _spring_runs() -> dict[str, Trajectory]:
     return {f"k = {plain(k)} dyn/cm": launch(1e8, k) for k in STIFFNESSES}
 
 
@@ -229,27 +235,29 @@ RISE = (
 )
 
 
-def _rise(runs: Mapping[str, Trajectory]) -> tuple[Case, ...]:
+def _rise_cases(runs: Mapping[str, Trajectory]) -> tuple[Case, ...]:
     """Judge whether the crank speed rises along a line, and whether it peaks before the torque ends."""
-    bows = [at_most(f"distance from a line; {label}", ALIKE, from_line(*_to_peak(run))) for label, run in runs.items()]
+    bows = [
+        at_most(f"distance from a line; {label}", ALIKE, from_line(*_rise_to_peak(run))) for label, run in runs.items()
+    ]
     angle = max(run["crank.angle"][run["crank.speed"].argmax()] for run in runs.values())
     return (*bows, at_most("crank angle of the peak, greatest", "1", angle, "rad"))
 
 
-def _to_peak(run: Trajectory) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def _rise_to_peak(run: Trajectory) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Return time and crank speed up to the peak of the speed, relative to their values there."""
     peak = int(run["crank.speed"].argmax())
     return run.time[: peak + 1] / run.time[peak], run["crank.speed"][: peak + 1] / run["crank.speed"][peak]
 
 
-def _by_least_squares(runs: Mapping[str, Trajectory]) -> str:
-    """Say how far the crank speed is from the line of least squares, the most of some runs."""
-    off = [np.abs(w - np.polynomial.Polynomial.fit(t, w, 1)(t)).max() for t, w in map(_to_peak, runs.values())]
+def _least_squares_words(runs: Mapping[str, Trajectory]) -> str:
+    """Return a sentence on the greatest distance of the crank speed from its least-squares line, of all runs."""
+    off = [np.abs(w - np.polynomial.Polynomial.fit(t, w, 1)(t)).max() for t, w in map(_rise_to_peak, runs.values())]
     return f"from the line of least squares the greatest distance is {max(off):.3f}, at the peak, above {ALIKE:g}"
 
 
-def _swings(runs: Mapping[str, Trajectory], start: float) -> tuple[Case, ...]:
-    """Judge whether a free crank swings in speed and slows down on average."""
+def _swing_cases(runs: Mapping[str, Trajectory], start: float) -> tuple[Case, ...]:
+    """Judge whether the speed of a free crank swings within each turn and its mean falls from turn to turn."""
     turns = [Turns.of(run, start) for run in runs.values()]
     return (
         at_least("range over the mean in a turn, least", ALIKE, min((t.speed_range / t.speed).min() for t in turns)),
@@ -257,8 +265,8 @@ def _swings(runs: Mapping[str, Trajectory], start: float) -> tuple[Case, ...]:
     )
 
 
-def _undamped(pairs: Mapping[str, tuple[Trajectory, Trajectory]], start: float) -> tuple[Case, ...]:
-    """Judge whether a free crank loses its mean speed with the damper alone; each pair is a run without it and with it."""
+def _damper_cases(pairs: Mapping[str, tuple[Trajectory, Trajectory]], start: float) -> tuple[Case, ...]:
+    """Judge whether a free crank loses mean speed only if it has a damper; each pair is a run without it and one with it."""
     cases = []
     for label, runs in pairs.items():
         speeds = [Turns.of(run, start).speed for run in runs]
@@ -270,12 +278,12 @@ def _undamped(pairs: Mapping[str, tuple[Trajectory, Trajectory]], start: float) 
 
 
 def _launches(torque: float, stiffness: float) -> tuple[Trajectory, Trajectory]:
-    """Return launches without the damper and with it that are followed for longer."""
+    """Return two launches of 3 s, without the damper and with it."""
     free, damped = (launch(torque, stiffness, 3.0, 6000, damping) for damping in (0.0, 3e4))
     return free, damped
 
 
-#: What is measured by `_swings` and `_undamped`.
+#: What is measured by `_swing_cases` and `_damper_cases`.
 SWINGS = "range of the crank speed in a turn over its mean; its mean relative to that of the turn before; in the free motions"
 UNDAMPED = (
     "greatest mean crank speed of a turn in the second half of the free motion, relative to that of its first turn, without "
@@ -284,20 +292,20 @@ UNDAMPED = (
 )
 
 
-def _after(runs: Mapping[str, Trajectory]) -> list[Turns]:
+def _turns(runs: Mapping[str, Trajectory]) -> list[Turns]:
     """Return the turns after the torque has ended."""
     return [Turns.of(run, start=1.0) for run in runs.values()]
 
 
-def _decay(turns: Sequence[Turns]) -> Case:
-    """Judge whether the mean position decays after the transient."""
+def _decay_case(turns: Sequence[Turns]) -> Case:
+    """Judge whether the mean slider position decays after the transient."""
     decay = max(greatest_ratio(t.slider[t.transient :]) for t in turns)
     return at_most("mean of u relative to the turn before, after the transient, greatest", 1.0, decay)
 
 
 def launch_speeds() -> StudyResult:
     """Compute the crank speed after launches with the three torques."""
-    runs = _by_torque()
+    runs = _torque_runs()
     rises = {label: accelerated(torque) for label, torque in zip(runs, TORQUES)}
     return _launch_result(
         "3.6",
@@ -311,8 +319,8 @@ def launch_speeds() -> StudyResult:
             text("3.2.2, L2124-2134"),
             f"{RISE}; for p1 and p2 we take the peaks",
             ALIKE_WORDS,
-            _rise(rises),
-            _by_least_squares(rises),
+            _rise_cases(rises),
+            _least_squares_words(rises),
         ),
         Statement(
             "The behaviour of the crank speed beyond [theta2] = 1 rad. in Fig. (3.6) is governed by the free motion "
@@ -320,7 +328,7 @@ def launch_speeds() -> StudyResult:
             text("3.2.2, L2142-2147"),
             f"{SWINGS} after all three torques",
             f"{ALIKE:g}, the rule for *steady*; {SIGN}",
-            _swings(runs, 1.0),
+            _swing_cases(runs, 1.0),
         ),
         Statement(
             "The decaying aspect is due to the energy dissipation in the slider guide and will be studied in the "
@@ -329,13 +337,13 @@ def launch_speeds() -> StudyResult:
             f"{UNDAMPED}; with 2e8 dyn.cm and without the damper the links are collinear after four turns, so that "
             "only turns 3 and 4 are compared there",
             f"{ALIKE_WORDS}; a loss is more than that",
-            _undamped({label: _launches(torque, 1e6) for label, torque in zip(runs, TORQUES)}, 1.0),
+            _damper_cases({label: _launches(torque, 1e6) for label, torque in zip(runs, TORQUES)}, 1.0),
         ),
     )
 
 
 def torque_over_time() -> StudyResult:
-    """Compute the time to 1 rad over the torque, its exponent, and the least sufficient torque."""
+    """Compute the time to 1 rad for each torque, the torque's exponent in the time, and the least sufficient torque."""
     time = np.array([release_time(float(torque)) for torque in TORQUE_RANGE])
     slope = float(np.mean(np.diff(np.log(TORQUES)) / np.diff(np.log([release_time(torque) for torque in TORQUES]))))
     low, scale = least_torque(), TORQUES[-1]
@@ -381,8 +389,8 @@ def draw_torque_over_time(result: StudyResult) -> Figure:
 
 def launch_positions() -> StudyResult:
     """Compute the slider position after launches with the three torques."""
-    runs = _by_torque()
-    turns = _after(runs)
+    runs = _torque_runs()
+    turns = _turns(runs)
     largest = max(float(np.abs(run["slider.position"]).max()) for run in runs.values())
     later = turns[2].transient - max(t.transient for t in turns[:2])
     *lesser, shift = (abs(t.slider.mean()) for t in turns)
@@ -399,7 +407,7 @@ def launch_positions() -> StudyResult:
             "turns until the mean of u is farthest from the start, with T0 = 2e8 dyn.cm less the greater of the "
             "others; mean of u relative to the turn before, from then on",
             SIGN,
-            (at_least("turns longer", 1.0, later), _decay(turns[-1:])),
+            (at_least("turns longer", 1.0, later), _decay_case(turns[-1:])),
         ),
         Statement(
             "The three responses show the slider oscillates between its initial position and the crank shaft and as "
@@ -430,13 +438,13 @@ def launch_positions() -> StudyResult:
 
 def launch_speeds_by_spring() -> StudyResult:
     """Compute the crank speed after launches with the three springs."""
-    rises = {label: accelerated(1e8, k) for label, k in zip(_by_spring(), STIFFNESSES)}
+    rises = {label: accelerated(1e8, k) for label, k in zip(_spring_runs(), STIFFNESSES)}
     speeds = np.array([run["crank.speed"] for run in rises.values()])
     loads = np.array([np.hypot(run["pin.C.fx"], run["pin.C.fy"]) for run in rises.values()])
     return _launch_result(
         "3.9",
         "The speed rises linearly, with all springs alike, until the torque no longer accelerates the crank.",
-        _by_spring(),
+        _spring_runs(),
         CRANK_SPEED,
         Statement(
             "The figure shows the crank speed increasing linearly up to the point when the torque input becomes "
@@ -444,8 +452,8 @@ def launch_speeds_by_spring() -> StudyResult:
             text("3.2.2, L2175-2181"),
             RISE,
             ALIKE_WORDS,
-            _rise(rises),
-            _by_least_squares(rises),
+            _rise_cases(rises),
+            _least_squares_words(rises),
         ),
         Statement(
             "The speed fluctuates when the torque is removed and then decays due to the viscous dissipation of "
@@ -455,8 +463,8 @@ def launch_speeds_by_spring() -> StudyResult:
             "after five turns, so that only turns 3 to 5 are compared there",
             f"{ALIKE_WORDS}, and a loss of more than that; of the turn before {SIGN}",
             (
-                *_swings(_by_spring(), 1.0),
-                *_undamped({label: _launches(1e8, k) for label, k in zip(rises, STIFFNESSES)}, 1.0),
+                *_swing_cases(_spring_runs(), 1.0),
+                *_damper_cases({label: _launches(1e8, k) for label, k in zip(rises, STIFFNESSES)}, 1.0),
             ),
         ),
         Statement(
@@ -476,11 +484,11 @@ def launch_speeds_by_spring() -> StudyResult:
 
 def launch_positions_by_spring() -> StudyResult:
     """Compute the slider position after launches with the three springs."""
-    runs = _by_spring()
+    runs = _spring_runs()
     apart = np.ptp([accelerated(1e8, k)["slider.position"] for k in STIFFNESSES], axis=0).max()
     apart /= np.ptp([accelerated(1e8, k)["slider.position"] for k in STIFFNESSES])
     spread = {
-        name: np.ptp([t.transient for t in _after(of)]) for name, of in (("springs", runs), ("torques", _by_torque()))
+        name: np.ptp([t.transient for t in _turns(of)]) for name, of in (("springs", runs), ("torques", _torque_runs()))
     }
     return _launch_result(
         "3.10",
@@ -506,7 +514,7 @@ def launch_positions_by_spring() -> StudyResult:
             "mean of u is farthest from the start; mean of u relative to the turn before, from then on",
             f"{ALIKE_WORDS}; {SIGN}",
             (
-                at_least("k = 5e5 dyn/cm, turns", 1.0, _after(runs)[0].transient),
+                at_least("k = 5e5 dyn/cm, turns", 1.0, _turns(runs)[0].transient),
                 *(
                     case
                     for label, left in zip(list(runs)[1:], map(transient, STIFFNESSES[1:]))
@@ -515,7 +523,7 @@ def launch_positions_by_spring() -> StudyResult:
                         at_most(f"{label}, third turn", ALIKE, left[2]),
                     )
                 ),
-                _decay(_after(runs)),
+                _decay_case(_turns(runs)),
             ),
         ),
         Statement(
@@ -570,7 +578,7 @@ def free_speed(number: str, stiffness: float) -> StudyResult:
 
 
 def _free_swings() -> Statement:
-    """Judge what both figures are said to show."""
+    """Judge what Fig 3.11 and 3.12 show according to the thesis."""
     turns = {label: Turns.of(coast(k)) for label, k in BOTH.items()}
     return Statement(
         "Both figures show that (1) The crank speed behaviour is oscillatory (2) The amplitude of oscillations "
@@ -591,7 +599,7 @@ def _free_swings() -> Statement:
 
 
 def _free_causes() -> Statement:
-    """Judge the causes that the thesis gives for both figures."""
+    """Judge the causes that the thesis gives for what Fig 3.11 and 3.12 show."""
     swings = [
         at_most(f"change of the energy; {label}", 0.5, t.energy_share[: t.shown].max())
         for label, t in ((label, Turns.of(coast(k))) for label, k in BOTH.items())
@@ -604,7 +612,7 @@ def _free_causes() -> Statement:
         f"{HARMONIC_SPEED:g} rad/s: where this energy does not change, the inertia's change with the position alone swings "
         f"the speed; {UNDAMPED}",
         f"less than half, as *due to* says; {ALIKE_WORDS}",
-        (*swings, *_undamped({label: (coast(k, 0.0), coast(k)) for label, k in BOTH.items()}, 0.0)),
+        (*swings, *_damper_cases({label: (coast(k, 0.0), coast(k)) for label, k in BOTH.items()}, 0.0)),
     )
 
 
@@ -632,7 +640,7 @@ def _phase_plane(number: str, stiffness: float, *statements: Statement) -> Study
 
 
 def order_of_chords(run: Trajectory) -> float:
-    """Return the power of the sampling step with which the phase plane departs from its chords, from 4 samples to 2."""
+    """Return the order, in the sampling step, of the distance between the phase-plane curve and its chords."""
     turns = Turns.of(run)
     shown = run.time < turns.ends[turns.shown - 1]
     u, v = (run[f"slider.{name}"][shown] for name in ("position", "velocity"))
@@ -642,7 +650,7 @@ def order_of_chords(run: Trajectory) -> float:
 
 
 def soft_phase_plane() -> StudyResult:
-    """Compute the phase plane with the soft spring, and judge what is said of both figures."""
+    """Compute the phase plane with the soft spring, and judge the statements on Fig 3.13 and 3.14."""
     turns = {label: Turns.of(coast(k)) for label, k in BOTH.items()}
     drift, distance = (
         a / b for a, b in zip(*((np.ptp(t.slider[: t.shown]), abs(t.slider[0])) for t in turns.values()))
@@ -708,7 +716,7 @@ def soft_phase_plane() -> StudyResult:
 
 @cache
 def beyond_linear(stiffness: float) -> float:
-    """Return the second harmonic of u over the first at a constant 27 rad/s, relative to that by the equation linear in u."""
+    """Return the ratio of the second to the first harmonic of u at 27 rad/s, relative to the ratio by the linear equation."""
     parameters = table_3_1(stiffness)
     full = nonlinear_harmonic_balance(parameters, HARMONIC_SPEED)
     linear = harmonic_balance(slider_equation(parameters, HARMONIC_SPEED), full.order)
@@ -801,15 +809,15 @@ def draw_phase_plane(result: StudyResult) -> Figure:
     return plot_curves([panel], title=result.heading, size=(6.4, 4.6))
 
 
-_by_torques = partial(draw_launches, TORQUES, r"$T_0$ [dyn cm]")
-_by_springs = partial(draw_launches, STIFFNESSES, "stiffness k [dyn/cm]")
+_draw_by_torque = partial(draw_launches, TORQUES, r"$T_0$ [dyn cm]")
+_draw_by_spring = partial(draw_launches, STIFFNESSES, "stiffness k [dyn/cm]")
 #: The studies of 3.6 to 3.14.
 STUDIES = (
-    Study("3.6", launch_speeds, _by_torques),
+    Study("3.6", launch_speeds, _draw_by_torque),
     Study("3.7", torque_over_time, draw_torque_over_time),
-    Study("3.8", launch_positions, _by_torques),
-    Study("3.9", launch_speeds_by_spring, _by_springs, sweeps=("slider.stiffness",)),
-    Study("3.10", launch_positions_by_spring, _by_springs, sweeps=("slider.stiffness",)),
+    Study("3.8", launch_positions, _draw_by_torque),
+    Study("3.9", launch_speeds_by_spring, _draw_by_spring, sweeps=("slider.stiffness",)),
+    Study("3.10", launch_positions_by_spring, _draw_by_spring, sweeps=("slider.stiffness",)),
     Study("3.11", partial(free_speed, "3.11", SOFT), draw_free_speed),
     Study("3.12", partial(free_speed, "3.12", STIFF), draw_free_speed),
     Study("3.13", soft_phase_plane, draw_phase_plane),

@@ -1,4 +1,4 @@
-"""Sections 4.1 to 4.4: the linearised equations (4.1) to (4.35), one by one."""
+"""Sections 4.1 to 4.4: verdicts on the linearised equations (4.1) to (4.35), one by one."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ from ..statements import Case, Statement, at_least, at_most, near, text
 from ..study import Study, StudyResult, curves_of
 from .runs import SPEED, table_3_1
 
-#: Greatest rounding errors, crank lengths sigma2 that show an order, and departure of a limit at the shorter one.
+#: Greatest rounding error, crank lengths sigma2 from which an order is computed, and tolerance of a limit at the shorter one.
 ROUNDING, SHORT, LIMIT = 1e-9, (0.002, 0.001), 0.01
 TURN = np.linspace(0.0, 2.0 * pi, 361)
 
@@ -36,7 +36,7 @@ def with_crank(sigma2: float, inertia_ratio: float = 1.0) -> FiveBarParameters:
 
 
 def angles(parameters: FiveBarParameters, zeta: float = 0.0) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return the angles of coupler and rocker over a turn with the slider held."""
+    """Return the angles of coupler and rocker (rad) over a turn with the slider held at zeta."""
     p = parameters.constants()
     places = [kinematics.position(angle, zeta * p.l4, p) for angle in TURN.tolist()]
     coupler, rocker = np.array([kinematics.link_angles(g, p) for g in places]).T
@@ -45,7 +45,7 @@ def angles(parameters: FiveBarParameters, zeta: float = 0.0) -> tuple[NDArray[np
 
 @cache
 def datum(sigma2: float, rocker: float | None = None) -> Datum:
-    """Return the datum by (4.1) unless the rocker's angle is given, and crank and coupler by the closure (4.6)."""
+    """Return the datum: the rocker's angle by (4.1) unless it is given, crank's and coupler's by the closure (4.6)."""
     swing = angles(with_crank(sigma2))[1]
     middle = 0.5 * (swing.max() + swing.min()) if rocker is None else rocker
 
@@ -58,7 +58,7 @@ def datum(sigma2: float, rocker: float | None = None) -> Datum:
 
 
 def deviations(sigma2: float) -> tuple[float, float]:
-    """Return the greatest errors of xi3 and xi4 by (4.8) over a turn, the slider off by sigma2/2."""
+    """Return the greatest errors of xi3 and xi4 (rad) by (4.8) over a turn, with the slider at zeta = sigma2/2."""
     alpha, a3, a4 = datum(sigma2)
     zeta, s = 0.5 * sigma2, sin(a4 - a3)
     by_print = (
@@ -107,7 +107,9 @@ def coefficients(sigma2: float, inertia_ratio: float = 1.0) -> dict[str, float]:
     mechanism = with_crank(sigma2, inertia_ratio)
     right = slider_equation(mechanism, 1.0, variant=Variant.FIRST_ORDER)
     parts = printed(ratios(mechanism), datum(sigma2))
-    found = {name: _over(getattr(parts, name), parts.spring) for name in ("inertia", "stiffness", "force")}
+    found = {
+        name: _first_order_quotient(getattr(parts, name), parts.spring) for name in ("inertia", "stiffness", "force")
+    }
     wanted = {"inertia": right.mass, "stiffness": right.stiffness, "force": right.force}
     names = {"inertia": ("D1", "E1", "F1"), "stiffness": ("G1", "H1", "P1"), "force": ("Q1", "R1", "S1")}
     return {
@@ -121,7 +123,7 @@ def coefficients(sigma2: float, inertia_ratio: float = 1.0) -> dict[str, float]:
 
 
 def constant_parts() -> dict[str, float]:
-    """Return the sizes of h0 and g0 over k0 by the right equation, for chapter IV's mechanism and rig 2."""
+    """Return |h0|/k0 and |g0|/k0 by the right equation, for chapter IV's mechanism and rig 2."""
     found = {}
     for words, mechanism in (("I4 = 2", chapter_4(2.0)), ("rig 2, spring C", SETS["rig-2-spring-c"].parameters)):
         equation = slider_equation(mechanism, 25.0)
@@ -131,19 +133,19 @@ def constant_parts() -> dict[str, float]:
 
 
 def scanned_mean(inertia_ratio: float) -> float:
-    """Return Q1 over A1 by the term of Q1 in the scan that a massless coupler leaves: p45 sigma2 I4 cos(alpha3), sigma3 = 1."""
+    """Return Q1/A1 by the term of Q1 in the scan that is left if the coupler has no mass: p45 sigma2 I4 cos(alpha3)."""
     r = ratios(chapter_4(inertia_ratio))
     return r.p45 * r.sigma2 * r.inertia_ratio * cos(DATUM.coupler) / printed(r).spring.mean
 
 
-def _over(part: FourierSeries, by: FourierSeries) -> tuple[float, float, float]:
-    """Return mean, cosine and sine of a quotient to first order."""
+def _first_order_quotient(part: FourierSeries, by: FourierSeries) -> tuple[float, float, float]:
+    """Return the mean and the first cosine and sine of the quotient of two series, to first order."""
     mean = part.mean / by.mean
     return mean, *((x[1] - mean * y[1]) / by.mean for x, y in ((part.cos, by.cos), (part.sin, by.sin)))
 
 
 def expansion(sigma2: float) -> NDArray[np.float64]:
-    """Return the mean, first and second harmonic of S/I that (4.23) and (4.24) leave out, about the printed datum."""
+    """Return what (4.23) and (4.24) leave out of S/I: sizes of mean, first and second harmonic, about the printed datum."""
     parts = printed(ratios(with_crank(sigma2)))
     kept, angle = convert(parts, Form.SERIES).spring, np.linspace(0.0, 2.0 * pi, 64, endpoint=False)
     left = FourierSeries.from_samples(parts.spring(angle) / parts.inertia(angle) - kept(angle), 2)
@@ -151,8 +153,7 @@ def expansion(sigma2: float) -> NDArray[np.float64]:
 
 
 def recurrence(equation: SliderEquation, mean: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return A and B of (4.33) by (4.34) and (4.35), with a ``mean`` damper in place of lambda_c: (4.32) if there is "
-    "none."""
+    """Return A and B of (4.33) by (4.34) and (4.35), with ``mean`` in place of lambda_c; without a damper this is (4.32)."""
     s, d, k, f = (
         equation.spring_factor,
         equation.damping_factor,
@@ -177,7 +178,10 @@ def recurrence(equation: SliderEquation, mean: float) -> tuple[NDArray[np.float6
 
 
 def balanced(omega_c: float, as_printed: bool = True) -> float:
-    """Return how far (4.34) is from the balance of (4.29), relative to its solution, at 25 rad/s and I4 = 1."""
+    """Return the relative error of the solution of (4.34) against the balance of (4.29), at 25 rad/s and I4 = 1.
+
+    If it is not taken as printed, (4.34) has lambda_c k0 in place of lambda_c.
+    """
     equation = slider_equation(chapter_4(1.0, omega_c), 25.0, variant=Variant.PRINTED, form=Form.SERIES)
     mean = equation.damping * (1.0 if as_printed else equation.damping_factor.mean)
     found = np.linalg.solve(*recurrence(equation, mean))
@@ -203,8 +207,8 @@ def compute() -> StudyResult:
     )
     ways = {
         "right": _quotients(slider_equation(mechanism, 1.0)),
-        "(4.21) as printed": _of(parts),
-        "listing of appendix 2": _of(listed(ratios(mechanism))),
+        "(4.21) as printed": _first_order_series(parts),
+        "listing of appendix 2": _first_order_series(listed(ratios(mechanism))),
     }
     columns = {"crank angle [deg]": np.degrees(TURN)}
     for i, name in enumerate(("inertia M", "stiffness K", "force F")):
@@ -321,11 +325,13 @@ def compute() -> StudyResult:
     )
 
 
-def _of(parts: Coefficients) -> tuple[FourierSeries, ...]:
-    """Return M, K and F of the thesis's coefficients to first order."""
+def _first_order_series(parts: Coefficients) -> tuple[FourierSeries, ...]:
+    """Return M, K and F from the thesis's coefficients, divided by the spring's factor to first order."""
     return tuple(
         FourierSeries(np.array([mean, c]), np.array([0.0, s]))
-        for mean, c, s in (_over(part, parts.spring) for part in (parts.inertia, parts.stiffness, parts.force))
+        for mean, c, s in (
+            _first_order_quotient(part, parts.spring) for part in (parts.inertia, parts.stiffness, parts.force)
+        )
     )
 
 

@@ -20,10 +20,10 @@ from ..study import Study, StudyResult
 from .runs import SPEED, table_3_1
 
 NUMBER = "linkage"
-#: With P 12 cm from the crank pin and 30 degrees off the coupler.
+#: Table 3.1 with P 12 cm from the crank pin and 30 degrees off the coupler.
 MECHANISM = replace(table_3_1(1e6), coupler_point_distance=0.12, coupler_point_angle=radians(30.0))
 TURNS = 3
-#: Crank angle of the still, in the last turn (rad).
+#: Crank angle of the picture, in the last turn (rad).
 STILL = 2.0 * np.pi * (TURNS - 1) + 1.0
 
 

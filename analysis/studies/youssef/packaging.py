@@ -70,7 +70,7 @@ def region(distance: float) -> dict[str, FloatArray]:
 def straightest(curve: FloatArray) -> tuple[Straightness, int]:
     """Return the straightest part of a curve of N points (m) relative to its length, and its number of points.
 
-    Of all parts within 120 degrees of rotation that are at least as long as AB, along the line.
+    The parts compared lie within 120 degrees of rotation and are at least as long as AB, along the line.
     """
     greatest = round(N * PACKAGING_ROTATION / (2.0 * pi)) + 1
     parts = ((part, count) for count in range(2, greatest + 1) for part in parts_of(curve, count, direction=0.0))

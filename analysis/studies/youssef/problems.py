@@ -112,8 +112,8 @@ def ellipse(semi_axis_cm: float, n: int) -> NDArray[np.float64]:
 def rocker_function(n: int, *, weighted: bool = False, mounting: bool = False) -> RockerFunction:
     """Return the function th4* = 70 + 100 |sin(th/2)| degrees at n crank angles, optionally weighted by `WEIGHT`.
 
-    The window is 60 to 260 degrees with both ends. The thesis prints 60 < omega t < 260, but its 35.0 is approached most,
-    at N = 24 and within the window alone, with 60 included.
+    The window is 60 to 260 degrees with both ends. The thesis prints 60 < omega t < 260, but the error comes nearest to its
+    35.0 with 60 included, at N = 24 and within the window alone.
     """
     phi = turn(n)
     # in whole numbers, so that the ends of the window are exact

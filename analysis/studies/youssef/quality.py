@@ -1,9 +1,9 @@
 """Methods of sections 6.2 and 6.3 without a figure: the combined quality function and the constraint of assembly.
 
 The quality functions of a path in time and of the area between the curves may be added. For ellipse (a) the sum is
-minimised with no link longer than the longest of either printed linkage, by the thesis's downhill simplex from our optima
-for each, that in time with both limits of the links. A linkage found for the path alone gets its best crank phase: the
-thesis keeps th20 there although the area does not depend on it (L4700).
+minimised with no link longer than the longest of either printed linkage, by the thesis's downhill simplex. It starts from our
+optimum for the area and from our two for the path in time, one for each limit of the links. A linkage found for the path alone
+gets its best crank phase: the thesis keeps th20 there although the area does not depend on it (L4700).
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ LONGEST = max(TIMED.linkage.largest_link, PATH.linkage.largest_link)
 EVALUATIONS, ROUNDS, SIZE = 1500, 3, 0.01
 #: Error of a linkage outside the limits (cm2); least length (m) and most steps of a descent.
 REFUSED, SHORTEST, STEPS = 1e6, 1e-6, 60
-#: What each linkage was found for.
+#: Aims for which the linkages were found, in words.
 AIMS = {"timed": "for points in time", "path": "for the curve alone", "combined": "for both"}
 #: Number of random four-bars in the test of the constraint.
 SAMPLES = 10_000
@@ -71,7 +71,7 @@ def in_time(linkage: Linkage) -> Linkage:
 
 
 def least_combined(start: Linkage) -> Linkage:
-    """Minimise the combined error by the downhill simplex from a linkage."""
+    """Minimise the combined error by the downhill simplex from a linkage; return the linkage found."""
     unit = np.maximum(np.abs(start.vector), 0.05)
 
     def linkage(x: FloatArray) -> Linkage:
@@ -110,7 +110,7 @@ def below(name: str) -> float:
 
 @cache
 def linkages() -> dict[str, Linkage]:
-    """Return the linkages to compare: printed for the timed ellipse and for the path, ours for each, and for both."""
+    """Return the linkages compared, by name: printed for the timed ellipse and for the path, ours for each and for the sum."""
     limits = (*USUAL, LargestLink(length=LONGEST))
     timed = synthesize(TIMED.task, TIMED.bounds, limits, search=SEARCH).best.linkage
     ours = {"ours; timed": timed, "ours; path": in_time(best("path-a").linkage)}
@@ -120,7 +120,7 @@ def linkages() -> dict[str, Linkage]:
 
 
 def arguments(seed: int = 64) -> FloatArray:
-    """Return the argument of the square root (6.12) of random four-bars at 72 crank angles."""
+    """Return the argument of the square root (6.12) of random four-bars at 72 crank angles, shape (SAMPLES, 72)."""
     l1, l2, l3, l4 = np.random.default_rng(seed).uniform(0.1, 1.0, (4, SAMPLES, 1))
     span = l1**2 + l2**2 - 2.0 * l1 * l2 * np.cos(turn(72))
     return np.asarray(4.0 * l4**2 * span - (l3**2 - l4**2 - span) ** 2)
@@ -133,7 +133,7 @@ def least_away_from_ends() -> int:
 
 
 def late_violations() -> float:
-    """Return the share of the random four-bars that close at the first crank angle, but not at all."""
+    """Return the share of the random four-bars that close at the first crank angle, but not at every later one."""
     found = arguments()
     return float(np.mean((found[:, 0] >= 0.0) & (found < 0.0).any(axis=1)))
 
@@ -218,7 +218,7 @@ def compute() -> StudyResult:
 
 
 def draw(result: StudyResult) -> Figure:
-    """Draw the area over the timed error of each linkage."""
+    """Draw the area against the timed error of each linkage."""
     looks = {"printed": COLOURS[1], "ours": COLOURS[0]}
     curves, labels = [], []
     for name, marker in zip(linkages(), "osos^"):

@@ -28,12 +28,12 @@ from ...youssef import (
 
 
 def crank_speed(lambda_k2: float) -> float:
-    """Return the crank speed (rad/s) at a lambda_k^2."""
+    """Return the crank speed omega (rad/s) at lambda_k^2 = (omega_k/omega)^2."""
     return sqrt(SQUARE_OF_OMEGA_K / lambda_k2)
 
 
 def axis(region: Region) -> float:
-    """Return A of omega = A omega_k in the middle of a region."""
+    """Return the axis of a region: A = omega/omega_k in its middle."""
     return 1.0 / sqrt(0.5 * (region.low + region.high))
 
 
@@ -47,7 +47,7 @@ def equation(
 
 
 def hill(parameters: FiveBarParameters, number: int = 1, variant: Variant = Variant.EXACT) -> Region:
-    """Return a region by Hill's determinant, eq (5.35)."""
+    """Return the region N = ``number`` by Hill's determinant, eq (5.35)."""
     return hill_regions(equation(parameters, variant), number)[number]
 
 
@@ -62,7 +62,7 @@ def right(parameters: FiveBarParameters) -> Region:
 
 
 def first_order(parameters: FiveBarParameters, variant: Variant) -> Region:
-    """Return the first region by eq (5.16)."""
+    """Return the first region by eq (5.16), with the coefficients of a variant."""
     region = perturbed_region(equation(parameters, variant, Form.SERIES), 1, order=1)
     assert region is not None, "there is no damping"
     return region
@@ -76,7 +76,7 @@ def appendix_3(parameters: FiveBarParameters) -> Region:
     return Region(number=1, low=middle - half, high=middle + half)
 
 
-#: How each is computed, by its name in columns and legends.
+#: Methods that compute the first region, by their names in columns and legends.
 WAYS: Mapping[str, Callable[[FiveBarParameters], Region]] = {
     "true orbit": right,
     "linear equation": hill,
@@ -87,6 +87,6 @@ LOOKS = {"true orbit": "-", "linear equation": "--", "(4.21) as printed": ":", "
 
 
 def removing_estimate(parameters: FiveBarParameters, number: int = 1) -> float:
-    """Estimate the damper (1/s) that removes a region of the corrected linear equation from its width."""
+    """Estimate the damper omega_c (1/s) that removes a region of the corrected linear equation, from the region's width."""
     found = equation(parameters)
     return perturbed_removing_damping(found, number) * crank_speed(hill(parameters, number).low)

@@ -39,14 +39,14 @@ from .rigs import (
 STEP = 10.0
 #: Speeds (rpm) up to which each spring was run, since the guide was too short for more, as printed.
 STOPPED = {"A": "500", "B": "800"}
-#: Branches: up to 900 rpm; from there on those from the low and from the high end, and the one of twice the period.
+#: Special points; branches with spring B: up to 900 rpm, beyond it from the low and the high end, and one of twice the period.
 SPECIAL = "fold and period doublings"
 NAMES = ("below resonance", "lower branch", "upper branch", "period of two turns")
 
 
 @cache
 def swept(spring: str, rising: bool) -> Sweep:
-    """Sweep the speed up or down in steps with spring B about resonance."""
+    """Sweep the speed up or down in steps, with spring A over all speeds, with spring B about resonance."""
     low, step = (SLOWEST, 25.0) if spring == "A" else (SPLIT, STEP)
     speeds = np.arange(low, FASTEST[spring] + 1.0, step) * RAD_S_PER_RPM
     return sweep(rig(spring), speeds if rising else speeds[::-1])
@@ -77,8 +77,9 @@ def compute_rig_1() -> StudyResult:
     columns[f"speed; {SPECIAL} [rpm]"] = np.array([s.parameter for s in special]) / RAD_S_PER_RPM
     columns[f"amplitude; {SPECIAL} [cm]"] = CM_PER_METRE * np.array([s.orbit.amplitude for s in special])
     greatest = {"A": float(motions("A").branches[0].amplitude.max()), "B": upper_orbit(1000.0).amplitude}
-    accommodated = {s: max(map(amplitude, _up_to_stop(s).values())) for s in "AB"}
-    reached = {s: _reached(s) for s in "AB"}
+    # at the last speed the guide was too short
+    accommodated = {s: max([amplitude(of) for of in _turns_to_stop(s).values()][:-1]) for s in "AB"}
+    reached = {s: _displacements(s) for s in "AB"}
     why = (
         f"with spring B it is {reached['B'][0]:.2f} cm at {STOPPED['B']} rpm, and {reached['B'][1]:.2f} cm at "
         f"{reached['B'][2]:.0f} rpm, near half the natural frequency, where the rig did run (Fig 8.16)"
@@ -92,9 +93,9 @@ def compute_rig_1() -> StudyResult:
                 "Due to practical difficulties, namely the large amplitudes of oscillations near the natural frequencies, "
                 "resonance curves could not be obtained using this apparatus.",
                 text("8.4.1.2, L6543"),
-                "amplitude near the natural frequency over the greatest up to the greatest speed that was run, which the guide "
-                "did accommodate, at the speeds of L6555: with spring A the greatest of all, with spring B on the upper "
-                "branch at 1000 rpm, within 15 % of 1160: the rule for *near*",
+                "amplitude near the natural frequency over the greatest at speeds below those of L6555, which the guide did "
+                "accommodate: with spring A the greatest of all, with spring B on the upper branch at 1000 rpm, within 15 % of "
+                "1160: the rule for *near*",
                 "at least 1, the rule for *greater*; how long the guide was is not printed",
                 tuple(at_least(f"spring {s}", 1.0, CM_PER_METRE * greatest[s] / accommodated[s]) for s in "AB"),
                 "with spring B on the lower branch, which rising speed follows, it is "
@@ -115,15 +116,15 @@ def compute_rig_1() -> StudyResult:
     )
 
 
-def _up_to_stop(spring: str) -> dict[float, Turn]:
-    """Return a turn of the motion every 5 rpm from the lowest speed of the figures to that at which the rig was stopped."""
+def _turns_to_stop(spring: str) -> dict[float, Turn]:
+    """Return turns of the motion by speed (rpm), every 5 rpm from the figures' lowest to that at which the rig was stopped."""
     speeds = np.arange({"A": 240.0, "B": 500.0}[spring], float(STOPPED[spring]) + 1.0, 5.0).tolist()
     return {w: turn(spring, w) for w in speeds}
 
 
-def _reached(spring: str) -> tuple[float, float, float]:
-    """Return the greatest displacement (cm) at the speed at which the rig was stopped, and below it with its speed (rpm)."""
-    found = {w: float(np.abs(slider(of)).max()) for w, of in _up_to_stop(spring).items()}
+def _displacements(spring: str) -> tuple[float, float, float]:
+    """Return the greatest displacement (cm) at the speed at which the rig was stopped, that below it, and its speed (rpm)."""
+    found = {w: float(np.abs(slider(of)).max()) for w, of in _turns_to_stop(spring).items()}
     _, there = found.popitem()
     at = max(found, key=found.__getitem__)
     return there, found[at], at
@@ -162,7 +163,7 @@ def draw_rig_1(result: StudyResult) -> Figure:
 
 # --- rig-1-friction: what friction in proportion to the guide's force explains of figures 8.7 to 8.17
 
-#: Coefficients of friction in the guide; those of them that are judged: a low one, and one that hides the third harmonic.
+#: Coefficients of friction in the guide; the one of them that hides the third harmonic.
 COEFFICIENTS, STRONG = (0.0, SLIGHT, 0.1, 0.2), 0.2
 #: Speeds (rpm) of the figures where theory and experiment are compared, and of the turns shown.
 COMPARED = {"A": (390.0, 420.0, 450.0), "B": (600.0, 660.0, 720.0)}
@@ -172,13 +173,13 @@ PIN_RADIUS = 3e-4
 
 
 def lowered(spring: str, **changes: float) -> NDArray[np.float64]:
-    """Return the relative decrease of the amplitude by changes of the rig, at the speeds of comparison."""
+    """Return the relative decrease of the amplitude by changes of the rig's parameters, at the speeds `COMPARED`."""
     speeds = COMPARED[spring]
     return np.array([1.0 - amplitude(turn(spring, w, **changes)) / amplitude(turn(spring, w)) for w in speeds])
 
 
 def lag(spring: str, speed: float, coefficient: float) -> float:
-    """Return the delay of the motion by friction that gives the best agreement (deg of crank angle)."""
+    """Return the delay (deg of crank angle) at which the motion without friction agrees best with that with friction."""
     rough, smooth = (slider(turn(spring, speed, slider_friction_coefficient=c))[:-1] for c in (coefficient, 0.0))
     together = np.fft.irfft(np.fft.rfft(rough - rough.mean()) * np.conj(np.fft.rfft(smooth - smooth.mean())))
     shift = 360.0 / len(rough) * int(np.argmax(together))
@@ -186,7 +187,7 @@ def lag(spring: str, speed: float, coefficient: float) -> float:
 
 
 def lost_to_friction(speed: float, coefficient: float) -> float:
-    """Return the work of friction in the guide relative to the damper's, over a crank cycle with spring A."""
+    """Return the work of friction in the guide divided by the work of the damper, over a crank cycle with spring A."""
     of = turn("A", speed, slider_friction_coefficient=coefficient)
     v = of["slider.velocity"]
     viscous = rig("A").slider_damping * np.mean(v**2)
@@ -196,8 +197,8 @@ def lost_to_friction(speed: float, coefficient: float) -> float:
 def _constant_friction(force: float, varying: Turn) -> tuple[float, float, float]:
     """Compare constant friction (N) with friction by the coefficient `SLIGHT`, spring A.
 
-    Returns the greatest difference of u in the turn over the amplitude without friction, the share of this that constant
-    friction takes off, and its work in a turn over that of the varying one, less 1.
+    Returns the greatest difference of u between them, relative to the amplitude without friction; the relative decrease of
+    this amplitude by constant friction; and the relative excess of its work in a turn over that of the ``varying`` friction.
     """
     even, free = turn("A", SHOWN["A"], slider_coulomb_friction=force), amplitude(turn("A", SHOWN["A"]))
     work = SLIGHT * np.mean(np.abs(varying["slider.guide_force"] * varying["slider.velocity"]))
@@ -235,7 +236,11 @@ def compute_friction() -> StudyResult:
     shift = max(abs(lag("A", w, SLIGHT)) for w in COMPARED["A"])
     strong = f"with a coefficient of {STRONG:g} it takes {taken['A', STRONG].max():.0%} off the amplitude, which is not slight"
     heavy = f"the slider's weight, {rig('A').slider_mass * rig('A').gravity:.2f} N, comes on top of the joint's force"
-    b_over_a = " to ".join(f"{taken['B', c].mean() / taken['A', c].mean():.2f}" for c in (SLIGHT, STRONG))
+    b_over_a = " and ".join(f"{taken['B', c].mean() / taken['A', c].mean():.2f} ({c:g})" for c in (SLIGHT, STRONG))
+    in_cm = {
+        key: np.mean([x * amplitude(turn(key[0], w)) for w, x in zip(COMPARED[key[0]], taken[key])]) for key in taken
+    }
+    b_over_a_cm = " and ".join(f"{in_cm['B', c] / in_cm['A', c]:.2f}" for c in (SLIGHT, STRONG))
     return StudyResult(
         number="rig-1-friction",
         claim="Friction by the normal force in the guide, and in the pins, explains the differences of amplitude.",
@@ -308,8 +313,9 @@ def compute_friction() -> StudyResult:
                 "The differences may be attributed to the same factors as previously described with spring A.",
                 text("8.4.1.1, L6528"),
                 why="of the three factors two, the scatter of the damping and the pins, have no size; the first, friction in "
-                f"the guide, with one coefficient for both springs takes off {b_over_a} times as much with B as with A: alone "
-                "it does not explain why the agreement with B is poorer",
+                f"the guide, with one coefficient for both springs takes off {b_over_a} times as great a share of the "
+                f"amplitude with B as with A, means of the three speeds; in cm the ratios are {b_over_a_cm}: alone it does not "
+                "explain why the agreement with B is poorer",
             ),
         ),
     )

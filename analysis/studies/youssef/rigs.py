@@ -63,7 +63,7 @@ FINE, COARSE = 5e-3, 2e-2
 
 @cache
 def rig(spring: str, **changes: float) -> FiveBarParameters:
-    """Return the rig of a spring, with the reader's changes of its parameters, and then these."""
+    """Return the parameters of the rig with a spring, with the reader's changes and then with ``changes`` made."""
     parameters: FiveBarParameters = replace(
         vary(SETS[f"rig-{RIG[spring]}-spring-{spring.lower()}"].parameters), **changes
     )
@@ -77,7 +77,7 @@ def natural_speed(spring: str) -> float:
 
 @cache
 def response(spring: str, low: float, high: float, greatest_step: float = FINE) -> Response:
-    """Return the periodic motions over a range of speeds (rpm), with no branch lost."""
+    """Return the periodic motions over a range of speeds (rpm); fail if a branch is lost."""
     found = frequency_response(rig(spring), low * RAD_S_PER_RPM, high * RAD_S_PER_RPM, greatest_step=greatest_step)
     assert not found.problems, found.problems
     return found
@@ -101,7 +101,7 @@ def orbit(parameters: FiveBarParameters, speed: float, start: NDArray[np.float64
 @cache
 def turn(spring: str, speed: float, **changes: float) -> Turn:
     """Return one turn of the steady motion at a speed (rpm), with changes of the rig's parameters."""
-    # with friction it is found from the motion without: a run from rest to it takes minutes in all
+    # the motion with friction is found from the one without: a run from rest would take minutes
     start = orbit(rig(spring), speed).start if changes else None
     return orbit(rig(spring, **changes), speed, start).turn(SAMPLES)
 
@@ -113,7 +113,7 @@ def slider(of: Turn) -> NDArray[np.float64]:
 
 
 def dynamic_stiffness(p: FiveBarParameters, rates: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return force over amplitude (N/m) of a damped mass on a spring, the mean effective mass, at angular speeds (rad/s)."""
+    """Return force divided by amplitude (N/m) of the mean effective mass on spring and damper at angular speeds (rad/s)."""
     return np.abs(p.slider_stiffness - mean_effective_mass(p) * rates**2 + 1j * p.slider_damping * rates)
 
 
@@ -164,7 +164,7 @@ def near_fraction(spring: str, order: int) -> tuple[float, float]:
 
 
 def rise_at(spring: str, order: int) -> float:
-    """Return the relative rise of the maximum near 1/order of the natural frequency over the next minimum above it."""
+    """Return the relative rise of the maximum near 1/order of the natural frequency over the next minimum; 0 without one."""
     tops = [
         e
         for e in motions(spring).maxima()
@@ -175,7 +175,7 @@ def rise_at(spring: str, order: int) -> float:
 
 
 def overtones(of: Turn) -> float:
-    """Return the greatest of the harmonics 3 to 6 over the greater of the first two."""
+    """Return the greatest of the harmonics 3 to 6 divided by the greater of the first two."""
     first, second, *higher = (harmonic(of, n) for n in range(1, 7))
     return max(higher) / max(first, second)
 
@@ -228,7 +228,7 @@ def curves_over_speed(result: StudyResult, name: str, colour: str, label: str = 
 
 
 def marks(spring: str, *orders: int) -> Mapping[str, float]:
-    """Return the natural frequency of a spring, or fractions of it, as marks of a panel."""
+    """Return the natural frequency with a spring, or fractions of it (rpm), by label, as marks of a panel."""
     words = {1: "natural", 2: "half of it", 3: "a third", 4: "a quarter"}
     return {f"{words[n]}, {natural_speed(spring) / n:.0f} rpm": natural_speed(spring) / n for n in orders}
 

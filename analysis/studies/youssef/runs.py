@@ -1,4 +1,4 @@
-"""The runs behind the figures, cached so that figures share them.
+"""Simulation runs that the figures share, cached.
 
 Parameters are in the thesis's units (dyn/cm, dyn.s/cm, dyn.cm, rpm), as its text names them; results are in cm, degrees,
 turns, rad/s and N.m.
@@ -58,9 +58,9 @@ def scientific(value: float) -> str:
 
 @dataclass(frozen=True, slots=True)
 class SteadyTurn:
-    """One turn of the steady motion, sampled at equal crank angles, the last at 360 deg.
+    """One turn of the steady motion, sampled at evenly spaced crank angles, the last at 360 deg.
 
-    ``change`` is the largest difference of the slider position from the turn before (cm), a measure of steadiness.
+    ``torque`` is the crank torque (N.m); ``change`` is the largest difference of the slider position from the turn before (cm).
     """
 
     angle_deg: NDArray[np.float64]
@@ -86,7 +86,7 @@ class SteadyTurn:
 
 @cache
 def steady_turn(parameters: FiveBarParameters, speed_rpm: float, start: tuple[float, float] = (0.0, 0.0)) -> SteadyTurn:
-    """Run until the motion is steady and return a turn; from rest at u = 0 or from (u, u') at crank angle 0 (m, m/s)."""
+    """Simulate until the motion is steady and return a turn of it; ``start`` is (u, u') (m, m/s) at crank angle 0."""
     period, samples = 60.0 / speed_rpm, 1440
     inputs = Inputs(speed=speed_rpm * RAD_S_PER_RPM)
     turns = ceil(SETTLING_TIME / period)
@@ -117,7 +117,7 @@ def steady_turn(parameters: FiveBarParameters, speed_rpm: float, start: tuple[fl
 
 
 def least(x: NDArray[np.float64], y: NDArray[np.float64]) -> tuple[float, float]:
-    """Return place and value of the minimum of evenly spaced samples, by a parabola through three of them."""
+    """Return the place and the value of the minimum of evenly spaced samples, by a parabola through the lowest three."""
     i = int(np.clip(np.argmin(y), 1, len(y) - 2))
     a, b, c = y[i - 1 : i + 2]
     shift = 0.5 * (a - c) / (a - 2.0 * b + c)
@@ -125,7 +125,7 @@ def least(x: NDArray[np.float64], y: NDArray[np.float64]) -> tuple[float, float]
 
 
 def greatest(x: NDArray[np.float64], y: NDArray[np.float64]) -> tuple[float, float]:
-    """Return place and value of the maximum of evenly spaced samples; see `least`."""
+    """Return the place and the value of the maximum of evenly spaced samples; see `least`."""
     place, value = least(x, -y)
     return place, -value
 
@@ -136,5 +136,5 @@ def greatest_ratio(values: NDArray[np.float64]) -> float:
 
 
 def from_line(x: NDArray[np.float64], y: NDArray[np.float64]) -> float:
-    """Return the distance of an arc from (0, 0) to (1, 1) from the nearest line, midway between the chord and its parallel."""
+    """Return the greatest distance in y of an arc from (0, 0) to (1, 1) from the nearest parallel to its chord."""
     return 0.5 * float(np.ptp(y - x))

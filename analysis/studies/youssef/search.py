@@ -1,8 +1,9 @@
 """The search of section 6.3 as the program of appendix 5 has it, for ellipse (a) with bounds on the lengths; Fig 6.2 and 6.3.
 
-The downhill simplex reflects its worst apex, moves doubly far if that is best, halves the move, or halves itself about its best
-apex (L9480 to L9610). Starting sets follow (6.11); a set outside its bounds is put onto them, and one whose links do not
-close moves back by quarters (L9697). The bounds of the lengths are printed, those of place and angles are ours.
+The downhill simplex reflects its worst vertex, doubles the move if the new vertex is the best, contracts if it is poor, and
+shrinks by half towards its best vertex if that does not help (L9480 to L9610). Starting sets of parameters follow (6.11); a set
+outside its bounds is put onto them, and one whose links do not close moves back by quarters (L9697). The bounds of the lengths
+are printed, those of place and angles are ours.
 """
 
 from __future__ import annotations
@@ -32,7 +33,8 @@ LOW = np.array([-20.0, -20.0, 10.0, 0.1, 10.0, 10.0, 0.0, -pi, -pi, -pi])
 HIGH = np.array([60.0, 60.0, 30.0, 10.0, 30.0, 30.0, 30.0, pi, pi, pi])
 #: Relative difference at which the search stops, the program's (L8962), and evaluations at which it is given up.
 EPS, MOST = 1e-2, 4000
-#: Searches of each kind; located minima in a fresh cycle; points and parameters to begin with: X0, Y0, l2, a1, th20.
+#: Searches of each kind; known minima that a new search includes; points, and indices of the parameters X0, Y0, l2, a1, th20,
+#: with which a search begins.
 SEARCHES, INCLUDED, FEWER_POINTS, FEWER = 20, 4, 12, [0, 1, 3, 7, 8]
 #: Random sets from which descents begin, and difference of two minima (cm2).
 DESCENTS, APART = 40, 0.1
@@ -51,9 +53,9 @@ class Found(NamedTuple):
 
 
 def residuals(v: FloatArray, n: int = N, semi_axis: float = 10.0) -> tuple[FloatArray, FloatArray]:
-    """Return the distances of P from the points of the ellipse at n crank angles (cm), along x and y, by either closure.
+    """Return the distances of P from the points of an ellipse at n crank angles (cm), along x and y, by each closure.
 
-    The semi-axis (cm) is that of ellipse (a), 15 that of (b).
+    ``v`` are the parameters in the order of `LOW`; ``semi_axis`` (cm) is 10 for ellipse (a), 15 for (b).
     """
     x0, y0, l1, l2, l3, l4, r, a1, th20, a2 = v
     pin = l2 * np.exp(1j * (turn(n) + th20))
@@ -77,7 +79,7 @@ def closes(v: FloatArray) -> bool:
 
 
 def admitted(v: FloatArray, towards: FloatArray) -> FloatArray:
-    """Return a set put onto its bounds and moved back by quarters until its links close."""
+    """Return a set put onto its bounds and moved by quarters ``towards`` another set until its links close."""
     v = np.clip(v, LOW, HIGH)
     while not closes(v):
         v = np.clip(0.75 * v + 0.25 * towards, LOW, HIGH)
@@ -85,12 +87,12 @@ def admitted(v: FloatArray, towards: FloatArray) -> FloatArray:
 
 
 def drawn(random: np.random.Generator) -> FloatArray:
-    """Draw a set by (6.11)."""
+    """Draw a random set of parameters by (6.11)."""
     return np.asarray(LOW + (HIGH - LOW) * np.sin(random.uniform(0.0, 2.0 * pi, LOW.size)) ** 2)
 
 
 def starting_sets(random: np.random.Generator, first: list[FloatArray]) -> FloatArray:
-    """Return a set more than there are parameters: the first ones, and more by (6.11)."""
+    """Return starting sets, one more than there are parameters: the sets ``first``, then random ones by (6.11)."""
     sets = list(first)
     while not sets:
         sets = [v for v in [drawn(random)] if closes(v)]
@@ -100,9 +102,9 @@ def starting_sets(random: np.random.Generator, first: list[FloatArray]) -> Float
 
 
 def downhill(of: Error, sets: FloatArray, free: list[int] | None = None) -> Found:
-    """Follow the simplex from its apexes until (6.15) holds, for each parameter by itself as in the program (L9669).
+    """Minimise an error by the simplex with given vertices until (6.15) holds, for each parameter as in the program (L9669).
 
-    ``free`` are the parameters that it moves.
+    ``free`` are the indices of the parameters that it moves, by default all.
     """
     moves = np.arange(LOW.size) if free is None else np.array(free)
     v = sets[: moves.size + 1].copy()
@@ -144,7 +146,7 @@ def downhill(of: Error, sets: FloatArray, free: list[int] | None = None) -> Foun
 
 @cache
 def searches() -> dict[str, tuple[Found, ...]]:
-    """Return the ends of the searches of each kind."""
+    """Run all searches; return their ends by kind."""
     random = np.random.default_rng(62)
     plain = [downhill(error, starting_sets(random, [])) for _ in range(SEARCHES)]
     fresh, fewer_points, fewer = [], [], []
@@ -152,9 +154,9 @@ def searches() -> dict[str, tuple[Found, ...]]:
         known = [plain[i].parameters for i in random.choice(SEARCHES, INCLUDED, replace=False)]
         fresh.append(downhill(error, starting_sets(random, known)))
         first = downhill(lambda v: error(v, FEWER_POINTS), starting_sets(random, []))
-        fewer_points.append(_after(first, FEWER_POINTS / N, random))
+        fewer_points.append(_second_search(first, FEWER_POINTS / N, random))
         first = downhill(error, starting_sets(random, []), FEWER)
-        fewer.append(_after(first, 1.0, random))
+        fewer.append(_second_search(first, 1.0, random))
     kinds = {
         "random sets": plain,
         "with known minima": fresh,
@@ -172,14 +174,14 @@ def work_for_ellipse_b() -> FloatArray:
     return np.array([downhill(of, starting_sets(random, [])).evaluations for _ in range(SEARCHES)], dtype=float)
 
 
-def _after(first: Found, share: float, random: np.random.Generator) -> Found:
-    """Search from the end of a first search, each of whose evaluations took a share of the work of one."""
+def _second_search(first: Found, share: float, random: np.random.Generator) -> Found:
+    """Search from the end of a first search, whose evaluations are added, each counted as a ``share`` of one."""
     then = downhill(error, starting_sets(random, [first.parameters]))
     return then._replace(evaluations=then.evaluations + round(share * first.evaluations))
 
 
 def descended(v: FloatArray, side: int, n: int = N) -> tuple[FloatArray, float]:
-    """Return parameters and error (cm2) to which least squares lead within the bounds, by one closure, at n points."""
+    """Return the parameters and the error (cm2) to which a least-squares descent leads, by closure ``side``, at n points."""
     inside = np.clip(v, LOW + 1e-9, HIGH - 1e-9)
     end = least_squares(lambda v: residuals(v, n)[side], inside, bounds=(LOW, HIGH), xtol=1e-12, ftol=1e-12)
     return end.x, 2.0 * float(end.cost)
@@ -192,7 +194,7 @@ def bottom(found: Found) -> float:
 
 
 def minima(n: int) -> int:
-    """Return the number of different errors (cm2 of 72 points) at n points to which descents from random sets lead."""
+    """Return the number of minima, of errors more than `APART` apart, to which descents from random sets lead at n points."""
     random = np.random.default_rng(612)
     ends = [descended(v, side, n) for v in (drawn(random) for _ in range(DESCENTS)) for side in (0, 1)]
     errors = np.sort([error * N / n for v, error in ends if closes(v)])
@@ -200,7 +202,7 @@ def minima(n: int) -> int:
 
 
 def compute() -> StudyResult:
-    """Compute the ends of all searches, and judge the methods."""
+    """Compute the ends of all searches, and judge the statements on the search."""
     found, least = searches(), our_error(PROBLEM)
     errors = {name: np.sort([end.error for end in ends]) for name, ends in found.items()}
     plain, *techniques = errors
@@ -318,8 +320,8 @@ def compute() -> StudyResult:
                 "to use the values obtained in the initial guesses of the complete optimisation programme.",
                 text("6.3.1, L4359"),
                 f"probability that the errors at the end of {SEARCHES} searches which begin with X0, Y0, l2, a1 and "
-                "th20 alone are so much lower, and their evaluations so much fewer, than those of as many from "
-                "random sets by chance (rank test)",
+                "th20 alone, our choice of five of the ten, as the thesis names neither which nor how many, are so much "
+                "lower, and their evaluations so much fewer, than those of as many from random sets by chance (rank test)",
                 f"{CHANCE:g}, the usual level of significance",
                 by_chance(techniques[2]),
             ),
