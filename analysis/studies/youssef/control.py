@@ -1,11 +1,11 @@
 """The methods of sections 7.1 and 7.4 for driving the slider, applied to a mechanism with masses.
 
 The thesis classifies the methods and computes none: off-line (a spring, a drive without feedback), partial-on-line
-(feedback to a stored motion), and adaptive (trial cycles that correct the drive). Here each drives the two harmonics of
-Fig 7.11: the printed links of the weighted rocker function as steel bars of 20 by 5 mm, a damper and some friction in the
-guide, 120 rpm. The plant differs from the controller's model: twice the friction, coupler and slider a tenth heavier, a
-load on the rocker pin. A trial cycle corrects the stored motion by the Fourier series of the last cycle's deviation. A cam
-on the crank shaft drives the slider by a roller that moves along a line through the shaft.
+(feedback to a stored motion), and adaptive (trial cycles that correct the drive). Here each moves the slider by the two
+harmonics of Fig 7.11, at 120 rpm; the printed links of the weighted rocker function are steel bars of 20 by 5 mm, with a
+damper and some friction in the guide. The plant differs from the controller's model: twice the friction, coupler and slider a
+tenth heavier, a load on the rocker pin. A trial cycle corrects the stored motion by the Fourier series of the last cycle's
+deviation. A cam on the crank shaft drives the slider by a roller that moves along a line through the shaft.
 """
 
 from __future__ import annotations
@@ -48,14 +48,14 @@ LOAD = (-5.0, -3.0)
 CHANGED = (-15.0, -9.0)
 #: Trial cycles, and harmonics of the deviation that they correct.
 TRIALS, HARMONICS = 6, (8, 16)
-#: First step of the search on the machine (m), and its runs.
+#: First step of the search on the machine (m), and number of its runs.
 STEP, SEARCHED = 8e-3, 25
 #: Largest pressure angle of a cam (rad), the usual limit of a follower that slides, and radius of its roller (cm).
 PRESSURE, ROLLER = radians(30.0), 1.0
 
 
 class Machine(NamedTuple):
-    """Mechanism as modelled and as built, motion of its slider over the crank angle (m), and feedback."""
+    """Mechanism as modelled and as built, motion of its slider over the crank angle (m), and design of the feedback."""
 
     model: FiveBarParameters
     plant: FiveBarParameters
@@ -65,7 +65,7 @@ class Machine(NamedTuple):
 
 @cache
 def machine() -> Machine:
-    """Return the printed links in steel, and the two harmonics over the crank angle."""
+    """Return the machine: the printed links in steel, and the two harmonics of Fig 7.11 as the slider's motion."""
     linkage = rocker_motion(2).linkage
     motion = motion_of_plant(linkage)
     model = replace(
@@ -85,7 +85,7 @@ def machine() -> Machine:
 def run(
     stored: FourierSeries, *, feedback: bool = True, load: tuple[float, float] = LOAD, speed: float = SPEED
 ) -> TrackingResult:
-    """Run the plant along a stored motion."""
+    """Run the plant along a stored motion, by feedback, or else by the force that the model needs."""
     m = machine()
     design = m.design if feedback else None
     controller = TrackingController(m.model, stored, PERIOD, design=design, feedforward=not feedback)
@@ -94,7 +94,10 @@ def run(
 
 @cache
 def trials(harmonics: int) -> tuple[NDArray[np.float64], ...]:
-    """Return the deviation of the slider from the desired motion over the last turn of each trial cycle (m)."""
+    """Run the trial cycles; return the slider's deviation from the desired motion over the last turn of each (m).
+
+    After each cycle ``harmonics`` of the deviation are subtracted from the stored motion.
+    """
     turn = round(2.0 * pi / (SPEED * PERIOD))
     stored, deviations = machine().motion, []
     for _ in range(TRIALS):
@@ -124,7 +127,7 @@ def searched() -> tuple[float, float, float]:
     """Search on the machine by a downhill simplex over the coefficients of two harmonics, and again with another load.
 
     Returns the weighted errors of the rocker function (deg2): with the slider at rest, at the end of the first search, and at
-    the end of the second, which begins with what the first one found.
+    the end of the second, which begins with the result of the first.
     """
 
     def error(c: NDArray[np.float64], load: tuple[float, float]) -> float:

@@ -47,7 +47,7 @@ NATURAL = {"C": ("585", "582"), "D": ("825", "829")}
 #: Speeds (rpm) of the linear equation, and those that were run.
 CURVE = np.arange(SLOWEST, FASTEST["C"] + 1.0, 10.0)
 RANGE = np.arange(300.0, 1001.0, 10.0).tolist()
-#: Speed (rpm) beyond resonance at which the amplitude is compared, and dampers over the rig's.
+#: Speed (rpm) beyond resonance at which the amplitude is compared, and dampers relative to the rig's.
 BEYOND, DAMPERS = 1000.0, (1.25, 0.8)
 #: How the width of a resonance is measured, in words.
 WIDTH = "width of the resonance: of the speeds at which the amplitude over the speed squared is at least 0.71 of its greatest"
@@ -93,13 +93,13 @@ def width(spring: str, linear: bool = False, /, **changes: float) -> float:
     else:
         sizes = follow(spring, speeds.tolist(), **changes)
     fine = np.linspace(speeds[0], speeds[-1], 80001)
-    # what drives the slider grows with the square of the speed
+    # the force on the slider grows with the square of the speed
     shape = CubicSpline(speeds, sizes / speeds**2)(fine)
     return float(np.ptp(fine[shape >= shape.max() / sqrt(2.0)]))
 
 
 def _resonance() -> tuple[Statement, ...]:
-    """Judge what is said of Fig 8.19 and 8.20."""
+    """Judge the statements on Fig 8.19 and 8.20."""
     section, larger = (
         "8.4.2.2",
         f"above 1, the sign alone, as *smaller* says; {BEYOND:g} rpm is the greatest speed that was run",
@@ -205,7 +205,7 @@ def _resonance() -> tuple[Statement, ...]:
 
 
 def _factors(base: Mapping[str, float]) -> tuple[Case, ...]:
-    """Judge what friction and other dampers do to the amplitude beyond resonance, without them `base`, and to the width."""
+    """Judge how friction and other dampers change the amplitude beyond resonance, relative to ``base``, and the width."""
     cases = []
     for s in "CD":
         factors: dict[str, dict[str, float]] = {
@@ -280,7 +280,7 @@ def compute_harmonics() -> StudyResult:
             size = f"{10.0 * near_fraction(spring, n)[1]:.1f}" if above > NOTICED else ""
             cases.append(at_most(f"{name}, {part}", NOTICED, above, why=f"the amplitude there is {size} mm"))
         left.append(f"{rise(spring, SLIGHT, 2):.2f}")
-        # of half the natural frequency, the last part
+        # ``above`` is that of the last part, half the natural frequency
         risen = near_fraction(spring, 2)[1] * above / (1.0 + above)
         part_of_all.append(f"{risen / (CM_PER_METRE * branch.amplitude.max()):.3f}")
     return StudyResult(
@@ -385,7 +385,7 @@ def compute_forces() -> StudyResult:
 
 
 def draw_forces(result: StudyResult) -> Figure:
-    """Draw the torque above and the pin forces below, one column a spring, with the law of low speeds dotted."""
+    """Draw the torque above and the pin forces below, one column a spring, the square of the speed dotted."""
     torques, forces = [], []
     for spring in "CD":
         name = f"spring {spring}"
@@ -410,7 +410,7 @@ def draw_forces(result: StudyResult) -> Figure:
 
 
 def _panel(spring: str, y_label: str, lines: list[Curve], top: float, legend: str = "") -> Panel:
-    """Return a panel; that of the second spring, on the right, has the legend for both."""
+    """Return the panel of a spring over the speed; that of spring D, on the right, has the legend for both."""
     first = spring == "C"
     return Panel(
         x_label="crank speed [rpm]",

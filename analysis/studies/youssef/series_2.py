@@ -47,7 +47,7 @@ FloatArray = NDArray[np.float64]
 
 ROCKER, PATH = "rocker-weighted", "path-b"
 TARGET, FIXED = "0.25", "0.55"
-#: Starts of the searches: of the rocker function's, and by its harmonics of the path's, with the stroke that it may use (m).
+#: Starts of the search for the rocker function; starts and greatest stroke (m) of those for the path, by number of harmonics.
 ROCKER_STARTS = 24
 PATH_SEARCHES = {2: (8, 0.25), 3: (8, 0.25), 5: (24, 0.18)}
 #: Printed series: A0, A1, A2 and B1, B2 (cm), guide angle (deg).
@@ -73,7 +73,7 @@ def rocker_motion(harmonics: int) -> Solution:
 def path_motion(harmonics: int) -> Solution:
     """Return the best Fourier series of the slider for path (b), with the printed links.
 
-    The guide within a right angle of the ground link and a bound on the stroke lead the search to the better of many optima.
+    Bounds on the guide's angle, 0 to 90 deg from the ground link, and on the stroke lead the search to the better optima.
     """
     p = PROBLEMS[PATH]
     starts, stroke = PATH_SEARCHES[harmonics]
@@ -100,7 +100,7 @@ def printed(
     sines, sign : float
         Factors of the sines, and of the whole series: senses of the rotation and of the slider.
     turned : float
-        What is added to the crank's rotation in the series (rad): th20 where its argument is th2.
+        Angle added to the crank's rotation in the series (rad): th20 if the argument of the series is th2.
     along : float
         Sense of the guide's angle from the ground link.
     """
@@ -148,26 +148,26 @@ def wanted_angle() -> FloatArray:
 
 @cache
 def reduced() -> Mapping[str, float]:
-    """Return the error with two harmonics of the slider over that with a fixed pivot, by problem of chapter VI."""
+    """Return the error with two harmonics of the slider divided by that with a fixed pivot, by problem of chapter VI."""
     tasks = {
         name: UntimedPath(path=packaging_path()) if name == "packaging" else p.task for name, p in PROBLEMS.items()
     }
-    return {name: _share(task, PROBLEMS[name].linkage) for name, task in tasks.items()}
+    return {name: _error_ratio(task, PROBLEMS[name].linkage) for name, task in tasks.items()}
 
 
 @cache
 def reduced_further() -> Mapping[str, float]:
-    """Return the same with our best links for the problems of the figures."""
-    return {row.problem: _share(PROBLEMS[row.problem].task, best(row.problem).linkage) for row in TABLE.values()}
+    """Return the ratios of `reduced` with our best links, for the problems of the figures of chapter VI."""
+    return {row.problem: _error_ratio(PROBLEMS[row.problem].task, best(row.problem).linkage) for row in TABLE.values()}
 
 
-def _share(task: Task, linkage: Linkage) -> float:
+def _error_ratio(task: Task, linkage: Linkage) -> float:
     unknown = SliderUnknown(harmonics=2, stroke=0.2 * linkage.largest_link)
     return slider_motion(task, linkage, unknown, search=Search(starts=2)).best.error / evaluate(task, linkage).error
 
 
 def by_both_methods() -> tuple[float, float]:
-    """Return the errors (deg2) of two harmonics and the guide's angle by a descent with derivatives and by the simplex."""
+    """Return the least errors (deg2) that a descent and the simplex find over two harmonics and the guide's angle."""
     p = PROBLEMS[ROCKER]
     assert isinstance(p.task, RockerFunction)
     task, root = p.task, np.sqrt(np.asarray(p.task.weights))
@@ -349,13 +349,13 @@ def mended() -> Linkage:
 
 
 def shares_of_stated() -> dict[str, float]:
-    """Return the error with each printed series over the stated one, in the best reading and mended."""
+    """Return the error with each printed series, in its best reading or mended, divided by the stated error."""
     linkages = {ROCKER: readings(ROCKER)[0], PATH: mended()}
     return {name: error_of(name, linkage) / STATED[name] for name, linkage in linkages.items()}
 
 
 def over_rounding() -> tuple[float, float]:
-    """Return the area of `mended` (cm2) with each printed number rounded up or down, whichever lowers it, and raises it."""
+    """Return the least and the greatest area of `mended` (cm2) if each printed number is rounded up or down."""
     found = mended()
     motion = slider(found)
     off = np.concatenate(
@@ -462,7 +462,7 @@ def draw_path(result: StudyResult) -> Figure:
         place, distance = c["place on the ellipse [deg]"], c[f"{name} distance [cm]"]
         distances.append(Curve(x=place, y=distance, label=label, colour=colour))
         if f"{name} slider [cm]" in c:
-            # the mean is a matter of where the guide's zero is
+            # the mean depends only on the choice of the guide's zero
             u = c[f"{name} slider [cm]"]
             sliders.append(Curve(x=c["crank rotation [deg]"], y=u - np.nanmean(u[:-1]), label=label, colour=colour))
     ticks = {"x_ticks": range(0, 361, 60), "legend_at": "outside"}
