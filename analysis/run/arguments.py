@@ -63,7 +63,7 @@ def takes_published(**fills: Fill) -> Callable[[_Function], _Function]:
             bound = its.bind_partial(*arguments, **options).arguments
             bound["parameters"] = own if several else own[0]
             if isinstance(varied := bound.get("vary"), Mapping):
-                sets = [None if known is None else _but_for(known, varied) for known in sets]
+                sets = [None if known is None else _without_drives(known, varied) for known in sets]
             for name, fill in fills.items():
                 value: Any = bound.get(name)
                 own_each = several and isinstance(value, (list, tuple)) and len(value) == len(sets)
@@ -105,11 +105,11 @@ def driven(known: PublishedSet, inputs: Any) -> Any:
     inputs = Inputs() if inputs is None else inputs
     if not isinstance(inputs, Inputs):
         return inputs
-    added = _but_for(known, inputs).drive
+    added = _without_drives(known, inputs).drive
     return inputs.replace(**added) if added else inputs
 
 
-def _but_for(known: PublishedSet, names: Iterable[str]) -> PublishedSet:
+def _without_drives(known: PublishedSet, names: Iterable[str]) -> PublishedSet:
     """Return a published set without the drives of freedoms that inputs with these names (in `Inputs` or FMI) drive."""
     mechanism, names = mechanism_of(known.parameters), {*names}
     given = names | {channel.argument for channel in mechanism.channels if channel.name in names}

@@ -128,7 +128,7 @@ def solve(task: Task, heard: Sequence[bool], into: Sequence[NDArray[np.float64]]
     prepared = prepare(task)
     samples: list[NDArray[np.float64]] = []
     if into is None:
-        ends, *samples = task.parts(_kept(task, prepared, heard))
+        ends, *samples = task.parts(_load_or_solve(task, prepared, heard))
     else:
         ends, rows = np.empty(task.shapes[0]), slice(task.first, task.first + len(prepared.x))
         _integrate(task, prepared, heard, ends, [array[rows] for array in into])
@@ -143,7 +143,7 @@ def solve(task: Task, heard: Sequence[bool], into: Sequence[NDArray[np.float64]]
     )
 
 
-def _kept(task: Task, prepared: Prepared, heard: Sequence[bool]) -> NDArray[np.float64]:
+def _load_or_solve(task: Task, prepared: Prepared, heard: Sequence[bool]) -> NDArray[np.float64]:
     """Return the arrays of `Task.shapes` as one flat array, read from the batch's file or computed and saved there."""
     path = None if task.folder is None else task.folder / f"{prepared.digest(task)}.runs"
     kept = None if path is None else load_array(path)
@@ -279,8 +279,8 @@ def prepare(task: Task) -> Prepared:
     from . import compiled
 
     mechanism, t = task.mechanism, float(task.settings.times[0])
-    encoded, batch = _acting(task)
-    x = np.array(_once(mechanism.state, task.initial))
+    encoded, batch = _encode_inputs(task)
+    x = np.array(_map_distinct(mechanism.state, task.initial))
     # constants, and the energy at the start as last column
     p = np.full((len(x), len(mechanism.constants._fields) + 1), np.nan)
     u = np.zeros((len(x), len(mechanism.channels)))
@@ -335,13 +335,13 @@ def _switched(mechanism: Mechanism, p: NDArray[np.float64]) -> bool:
     return mechanism.switch_place >= 0 and bool(p[:, mechanism.switch_place].any())
 
 
-def _once(make: Callable[[Any], Any], items: Sequence[Any]) -> list[Any]:
+def _map_distinct(make: Callable[[Any], Any], items: Sequence[Any]) -> list[Any]:
     """Return the values of a function for the items; it is called only once for the same object."""
     made = {key: make(item) for key, item in {id(item): item for item in items}.items()}
     return [made[id(item)] for item in items]
 
 
-def _acting(task: Task) -> tuple[Encoded, Any]:
+def _encode_inputs(task: Task) -> tuple[Encoded, Any]:
     """Return the encoded inputs of the first run, and those of all runs as a `compiled.Batch` without constants and scales."""
     from . import compiled
 
@@ -371,7 +371,7 @@ def _acting(task: Task) -> tuple[Encoded, Any]:
         return constant, values
 
     varied = task.inputs.columns if isinstance(task.inputs, Varied) else {}
-    found = _once(kind_of, distinct(task.inputs) * len(task.inputs) if varied else task.inputs)
+    found = _map_distinct(kind_of, distinct(task.inputs) * len(task.inputs) if varied else task.inputs)
     which = np.array([kind for kind, _ in found])
     sources = [e.source for e in kinds]
     sizes = np.array([(len(e.coefficients), len(e.harmonics)) for e in sources])

@@ -210,13 +210,13 @@ def case_from(
     named = {**data, **(overrides or {})}
     mechanism = mechanism_in(named)
     data = with_names_of_files(data, mechanism)
-    overrides = {_in_files(name, mechanism): value for name, value in (overrides or {}).items()}
+    overrides = {_case_file_name(name, mechanism): value for name, value in (overrides or {}).items()}
     published = PUBLISHED[named["published"]] if "published" in named else None
     if named.get("mechanism", mechanism.name) != mechanism.name:
         raise ParameterError("mechanism", named["mechanism"], f"be that of the published set {named['published']}")
     acting = acting_on(mechanism)
     data = files.overridden(_without_rivals(data, overrides, mechanism, acting), overrides)
-    own, found = _divided(data, mechanism, acting, folder)
+    own, found = _split_tables(data, mechanism, acting, folder)
     printed = None if published is None else published.parameters
     try:
         parameters = parameters_from(own, printed, mechanism)
@@ -259,7 +259,7 @@ def with_names_of_files(data: Mapping[str, Any], mechanism: Mechanism) -> dict[s
     return result
 
 
-def _in_files(name: str, mechanism: Mechanism) -> str:
+def _case_file_name(name: str, mechanism: Mechanism) -> str:
     """Return the dotted name of an entry with the FMI name of an input replaced by its name in case files."""
     for channel in mechanism.channels:
         if f"{name}.".startswith(f"{channel.name}."):
@@ -287,7 +287,7 @@ def _without_rivals(
     return result
 
 
-def _divided(
+def _split_tables(
     data: Mapping[str, Any], mechanism: Mechanism, acting: Mapping[str, Acting], folder: Path
 ) -> tuple[dict[str, Any], dict[str, Any]]:
     """Split the tables of a case into those of the parameters and the inputs, read and by their names in `Inputs`.

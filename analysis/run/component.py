@@ -28,7 +28,7 @@ class _Component:
     """
 
     _interface: ClassVar[str]
-    _more: ClassVar[tuple[Any, ...]]
+    _further_arguments: ClassVar[tuple[Any, ...]]
 
     def __init__(self, guid: str, unzipDirectory: str, modelIdentifier: str, instanceName: str) -> None:
         require("wasmtime")
@@ -43,21 +43,21 @@ class _Component:
         made = Component.from_file(engine, str(component_of(unzipDirectory, modelIdentifier)))
         linker = Linker(engine)
         with linker.root() as root, root.add_instance(_INTERFACE.format("callbacks")) as callbacks:
-            callbacks.add_func("log-message", self._heard)
-        self._of = linker.instantiate(self._store, made)
-        self._at = self._of.get_export_index(self._store, _INTERFACE.format(self._interface))
+            callbacks.add_func("log-message", self._receive_log)
+        self._instance = linker.instantiate(self._store, made)
+        self._interface_index = self._instance.get_export_index(self._store, _INTERFACE.format(self._interface))
         self._functions: dict[str, Any] = {}
 
-    def _heard(self, store: Any, name: str, status: str, category: str, message: str) -> None:
+    def _receive_log(self, store: Any, name: str, status: str, category: str, message: str) -> None:
         self._log(message.encode())
 
     def call(self, method: str, *values: Any, kind: str = "method") -> Any:
         """Call a method of the interface; raise FMICallException if it fails."""
         if method not in self._functions:
             name = f"[{kind}]{self._interface}-instance.{method}"
-            index = self._of.get_export_index(self._store, name, self._at)
+            index = self._instance.get_export_index(self._store, name, self._interface_index)
             assert index is not None, name
-            self._functions[method] = self._of.get_func(self._store, index)
+            self._functions[method] = self._instance.get_func(self._store, index)
         own = (self.component,) if kind == "method" else ()
         found = self._functions[method](self._store, *own, *values)
         if isinstance(found, str) and found != "ok" and found != "warning":
@@ -74,7 +74,7 @@ class _Component:
         self._log = logMessage or self._log
         name, token = self._named
         making = f"instantiate-{self._interface}"
-        self.component = self.call(making, name, token, "", False, loggingOn, *self._more, kind="static")
+        self.component = self.call(making, name, token, "", False, loggingOn, *self._further_arguments, kind="static")
         if self.component is None:
             raise FMICallException(making, 3)
 
@@ -89,7 +89,7 @@ class _Component:
 class ComponentSlave(_Component):
     """An instance for co-simulation."""
 
-    _interface, _more = "co-simulation", (False, False, [])
+    _interface, _further_arguments = "co-simulation", (False, False, [])
 
     def doStep(self, time: float, step: float) -> tuple[bool, bool, bool, float]:
         done = self.call("do-step", time, step, True)
@@ -101,7 +101,7 @@ class ComponentSlave(_Component):
 class ComponentModel(_Component):
     """An instance for model exchange; states are in arrays of ctypes, as in FMPy."""
 
-    _interface, _more = "model-exchange", ()
+    _interface, _further_arguments = "model-exchange", ()
 
     def updateDiscreteStates(self) -> tuple[Any, ...]:
         return tuple(vars(self.call("update-discrete-states")).values())

@@ -136,7 +136,7 @@ class EnsembleInterrupted(Interrupted):
 
     def __init__(self, ensemble: Ensemble, folder: Path | None) -> None:
         self.ensemble = ensemble
-        super().__init__(f"interrupted with {_kept(ensemble, folder)}")
+        super().__init__(f"interrupted with {_describe_progress(ensemble, folder)}")
 
 
 class EnsembleBroken(LinkworkError):
@@ -144,10 +144,10 @@ class EnsembleBroken(LinkworkError):
 
     def __init__(self, ensemble: Ensemble, folder: Path | None, error: WorkersLost) -> None:
         self.ensemble = ensemble
-        super().__init__(f"{error}, with {_kept(ensemble, folder)}")
+        super().__init__(f"{error}, with {_describe_progress(ensemble, folder)}")
 
 
-def _kept(ensemble: Ensemble, folder: Path | None) -> str:
+def _describe_progress(ensemble: Ensemble, folder: Path | None) -> str:
     done = np.count_nonzero(ensemble.status != NOT_RUN)
     where = "" if folder is None else f"; whole batches are kept in {folder}: call again to go on"
     return f"{done} of {len(ensemble)} runs done{where}"
@@ -248,7 +248,7 @@ def simulate_many(
         raise InputError(f"outputs is {outputs!r}: it must be a list of names, such as [{outputs!r}]")
     names = mechanism.output_names if outputs is None else tuple(outputs)
     columns = tuple(column_of(name, mechanism.output_names) for name in names)
-    all_inputs, starts = _checked(mechanism, inputs, initial, len(parameters))
+    all_inputs, starts = _check_runs(mechanism, inputs, initial, len(parameters))
     times = sample_times(stop_time, step, options.get("start_time", 0.0))
     settings = settings_of(times, hold, tolerance, options.get("max_steps", MOST_STEPS))
     where = None if folder is None else Path(folder)
@@ -258,7 +258,7 @@ def simulate_many(
     usual = max(min(128, len(parameters) // 4), min(256, len(parameters) // 16))
     # a multiple of 8 fills whole vectors
     batch = batch or max(16, min(usual, _SAMPLES_OF_BATCH // len(settings.times)) // 8 * 8)
-    code = "" if where is None else _code(mechanism, parameters, chain.from_iterable(encoded.functions))
+    code = "" if where is None else _hash_code(mechanism, parameters, chain.from_iterable(encoded.functions))
     tasks = [
         Task(
             mechanism=mechanism,
@@ -307,16 +307,16 @@ class _Gathered:
         self.times, self.names, self.chosen = times, names, chosen
         samples = 0 if chosen else n
         self.maps: list[mmap.mmap] = []
-        self.states = self._room((m, samples, mechanism.size), folder)
-        self.forces = self._room((m, samples, len(mechanism.channels)), folder)
-        self.values = self._room((m, n, len(names)), folder) if chosen else None
+        self.states = self._allocate((m, samples, mechanism.size), folder)
+        self.forces = self._allocate((m, samples, len(mechanism.channels)), folder)
+        self.values = self._allocate((m, n, len(names)), folder) if chosen else None
         self.status = np.full(m, NOT_RUN)
         self.messages = ["not run: interrupted"] * m
         self.counts = np.zeros(m, dtype=np.int64)
         self.energies = np.full(m, np.nan)
         self.modes = np.zeros(len(mechanism.modes))
 
-    def _room(self, shape: tuple[int, ...], folder: Path | None) -> NDArray[np.float64]:
+    def _allocate(self, shape: tuple[int, ...], folder: Path | None) -> NDArray[np.float64]:
         """Allocate an array; with a folder, map it to an unnamed file there so that it takes little memory."""
         size = 8 * prod(shape)
         if folder is None or not size:
@@ -370,7 +370,7 @@ class _Gathered:
         )
 
 
-def _code(mechanism: Mechanism, parameters: Sequence[Parameters], functions: Iterable[Any]) -> str:
+def _hash_code(mechanism: Mechanism, parameters: Sequence[Parameters], functions: Iterable[Any]) -> str:
     """Return hashes of the code on which results depend: equations, solver, users' functions."""
     from ..numerics.codegen import fingerprint
     from ..numerics.vectors import LANES
@@ -387,11 +387,11 @@ def _code(mechanism: Mechanism, parameters: Sequence[Parameters], functions: Ite
     return " ".join([*ours, *(fingerprint(f) if f else "" for f in functions)])
 
 
-def _checked(
+def _check_runs(
     mechanism: Mechanism, inputs: Any, initial: Any, count: int
 ) -> tuple[Sequence[Inputs], list[InitialState]]:
     """Check the inputs and initial states and return those of each run; see `simulate_many` for what inputs must share."""
-    all_inputs, starts = _each(inputs, count, "inputs"), _each(initial, count, "initial states")
+    all_inputs, starts = _one_per_run(inputs, count, "inputs"), _one_per_run(initial, count, "initial states")
     nothing, rest = given(mechanism, None, None)
     if not isinstance(all_inputs, Varied):
         all_inputs = [nothing if i is None else i for i in all_inputs]
@@ -432,7 +432,7 @@ def column_of(name: str, names: tuple[str, ...]) -> int:
     return names.index(name)
 
 
-def _each(value: Any, count: int, what: str) -> Any:
+def _one_per_run(value: Any, count: int, what: str) -> Any:
     if value is None or not isinstance(value, Sequence):
         return [value] * count
     if len(value) != count:

@@ -144,7 +144,7 @@ class Exchange(CVodeSolver):  # type: ignore[misc]
 
     # Functions that CVode calls
 
-    def _tried(self, work: Callable[[], None]) -> int:
+    def _call_safely(self, work: Callable[[], None]) -> int:
         try:
             work()
         except FMICallException as error:  # the FMU has no such state
@@ -162,7 +162,7 @@ class Exchange(CVodeSolver):  # type: ignore[misc]
             self.put(self.origin + t, NV_DATA_S(y))
             self.model.get_derivatives(NV_DATA_S(ydot))
 
-        return self._tried(work)
+        return self._call_safely(work)
 
     def g(self, t: float, y: Any, gout: Any, user_data: Any) -> int:
         """Compute the functions whose zeros are events: the FMU's event indicators, and the release of torsion bars."""
@@ -175,4 +175,4 @@ class Exchange(CVodeSolver):  # type: ignore[misc]
             for n, (angle, law) in enumerate(zip(angles, self.laws), start=self.model.indicators):
                 gout[n] = angle - law[1] if law[2] else 1.0
 
-        return self._tried(work)
+        return self._call_safely(work)

@@ -33,9 +33,9 @@ MANIFEST = f"{EXPERIMENTS}/fmi-ls-manifest.xml"
 #: Type of Linkwork's annotation for the largest relative difference that an experiment allows.
 ALLOWED = "org.linkwork.allowed"
 #: Without that annotation the first number times the tolerance is allowed, at least the second; without a tolerance the third.
-_TIMES, _LEAST, _USUAL = 100.0, 1e-6, 1e-3
+_FACTOR, _LEAST_ALLOWED, _DEFAULT_ALLOWED = 100.0, 1e-6, 1e-3
 #: Smallest scale of a variable's differences, as a fraction of the largest magnitude of variables with the same unit.
-_SMALL = 1e-3
+_LEAST_SCALE = 1e-3
 
 
 class ExperimentError(LinkworkError):
@@ -281,7 +281,7 @@ def _run(experiment: Experiment, description: Any, folder: str, allowed: float |
     if allowed is None:
         allowed = experiment.allowed
     if allowed is None:
-        allowed = _USUAL if tolerance is None else max(_LEAST, _TIMES * tolerance)
+        allowed = _DEFAULT_ALLOWED if tolerance is None else max(_LEAST_ALLOWED, _FACTOR * tolerance)
     names, stimuli = _columns(reference), _columns(experiment.stimuli)
     known = {v.name for v in description.modelVariables}
     unknown = [name for name in (*names, *stimuli, *experiment.parameters) if name not in known]
@@ -332,7 +332,7 @@ def _deviations(found: NDArray[Any], reference: NDArray[Any], units: Mapping[str
         difference = np.abs(values - reference[name])
         difference[np.isnan(difference)] = np.inf
         worst = int(np.argmax(difference))
-        scale = max(sizes[name], _SMALL * of_unit[units[name]]) or 1.0
+        scale = max(sizes[name], _LEAST_SCALE * of_unit[units[name]]) or 1.0
         deviations.append(
             Deviation(
                 name=name,

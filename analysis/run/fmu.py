@@ -170,7 +170,7 @@ class _Instance:
             self._folder = tempfile.mkdtemp(dir=unpacking_folder() if wrapped else None)
             extract(str(fmu), self._folder)
             with chdir("."):  # FMPy leaves the working folder changed if a library cannot be loaded
-                self._fmu = self._running(described.modelIdentifier)(
+                self._fmu = self._instance_class(described.modelIdentifier)(
                     guid=self.description.guid,
                     unzipDirectory=self._folder,
                     modelIdentifier=described.modelIdentifier,
@@ -190,7 +190,7 @@ class _Instance:
         self._set_reals = getattr(self._fmu, f"set{self._real}")
         self._get_reals = getattr(self._fmu, f"get{self._real}")
 
-    def _running(self, identifier: str) -> type:
+    def _instance_class(self, identifier: str) -> type:
         """Return the class that runs the FMU: of FMPy, or for a WebAssembly component if no library is for this platform."""
         assert self._folder is not None
         native = Path(self._folder) / "binaries" / (platform_tuple if self._fmi3 else platform)

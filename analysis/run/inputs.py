@@ -59,19 +59,19 @@ class Inputs:
     >>> drive = Inputs(speed="420 rpm", force=(1.0, ramp(0.0, 2.0, 0.0, 0.5)))
     """
 
-    __slots__ = ("_given", "_told")
+    __slots__ = ("_given", "_text_units")
     _given: dict[str, Any]
     #: Units of the inputs that were given as texts.
-    _told: dict[str, str]
+    _text_units: dict[str, str]
 
     def __init__(self, **channels: Any) -> None:
         known, flags = _arguments()
-        told: dict[str, str] = {}
+        text_units: dict[str, str] = {}
         for name, value in channels.items():
-            channels[name], unit = _in_si(name, value)
+            channels[name], unit = _to_si(name, value)
             signals = [p.unit for p in _parts(value) if isinstance(p, (Piecewise, Harmonics)) and p.unit]
             if channels[name] is not value or signals:
-                told[name] = signals[0] if signals else unit
+                text_units[name] = signals[0] if signals else unit
         for name, value in channels.items():
             if name not in known:
                 raise files.unknown_name(name, known, f"input {name!r}")
@@ -92,7 +92,7 @@ class Inputs:
                     unit = "rad/s2" if name == "speed" else "m/s2"
                     raise InputError(f"a {name} given as a Function needs its rate, the acceleration ({unit})")
         object.__setattr__(self, "_given", given)
-        object.__setattr__(self, "_told", told)
+        object.__setattr__(self, "_text_units", text_units)
 
     def __setattr__(self, name: str, value: Any) -> None:
         raise AttributeError(f"inputs do not change: Inputs.replace({name}=...) makes new ones")
@@ -103,7 +103,7 @@ class Inputs:
         raise AttributeError(str(files.unknown_name(name, _arguments()[0], f"input {name!r}")))
 
     def __reduce__(self) -> Any:
-        return _of, (self._given, self._told)
+        return _restore, (self._given, self._text_units)
 
     def __eq__(self, other: object) -> bool:
         return isinstance(other, Inputs) and self._given == other._given
@@ -152,11 +152,11 @@ class Inputs:
         return all(isinstance(part, NUMBER) for name in self._given for part in self.parts(name))
 
 
-def _of(given: dict[str, Any], told: dict[str, str]) -> Inputs:
+def _restore(given: dict[str, Any], text_units: dict[str, str]) -> Inputs:
     """Restore pickled inputs without checks, because the reading process may not know their mechanism."""
     inputs = object.__new__(Inputs)
     object.__setattr__(inputs, "_given", given)
-    object.__setattr__(inputs, "_told", told)
+    object.__setattr__(inputs, "_text_units", text_units)
     return inputs
 
 
@@ -183,7 +183,7 @@ def _all_units(name: str) -> tuple[str, ...]:
     return tuple(dict.fromkeys(u[name] for m in MECHANISMS.values() if name in (u := input_units(m))))
 
 
-def _in_si(name: str, value: Any) -> tuple[Any, str]:
+def _to_si(name: str, value: Any) -> tuple[Any, str]:
     """Return an input in SI and its unit: the first unit of this input in any mechanism that the value fits."""
     wrong: ParameterError | None = None
     for unit in _all_units(name):
@@ -285,7 +285,7 @@ def given(mechanism: Mechanism, inputs: Inputs | None, initial: InitialState | N
             raise InputError(f"a {mechanism.name} has no input {name!r}: its inputs are {', '.join(known)}")
     if rivals := _rivals(mechanism, inputs):
         _refuse(rivals)
-    for name, unit in inputs._told.items():
+    for name, unit in inputs._text_units.items():
         if unit != (right := input_units(mechanism).get(name, unit)):
             raise InputError(f"{name} of a {mechanism.name} is given in {unit}: it must be in {right}")
     if initial is None:

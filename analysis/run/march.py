@@ -122,7 +122,7 @@ class March:
     def run(self, method: str | type[OdeSolver], options: dict[str, Any], show: Callable[[float], None] | None) -> None:
         """Integrate until the end, a stopping event, the limit of assembly, or a failure of the integrator."""
         times, end = self.settings.times, self.settings.times[-1]
-        method, interval = self._ending(method), 0
+        method, interval = self._with_early_end(method), 0
         while True:
             stop = self._end_of_interval(interval)
             release(self.of.encoded, self.x, self.laws)
@@ -192,7 +192,7 @@ class March:
         except (ArithmeticError, ValueError):
             return None
 
-    def _ending(self, method: str | type[OdeSolver]) -> str | type[OdeSolver]:
+    def _with_early_end(self, method: str | type[OdeSolver]) -> str | type[OdeSolver]:
         """Return a method that fails as soon as it reaches a state at which the equations have no value.
 
         Only SciPy's implicit methods are changed: they might accept such a state, or repeat the step for ever.
@@ -234,7 +234,7 @@ class March:
         """Integrate up to ``stop`` and return whether it was reached."""
         t0, x0 = self.t, self.x
         times = self.settings.times
-        watched = self._watched(stop)
+        watched = self._event_functions(stop)
         self._lost, self.losses, self.good, self.same = None, 0, (t0, x0), SAME * (stop - t0)
 
         def right_side(t: float, x: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -275,7 +275,7 @@ class March:
         what: What = None
         if solution.status == 1:
             t_cut = happened[-1][0]
-            _, what, self.x = next(item for item in happened if item[0] == t_cut and self._ends(item[1]))
+            _, what, self.x = next(item for item in happened if item[0] == t_cut and self._ends_interval(item[1]))
             self.t, self.x = t_cut, self.x.copy()
             if isinstance(what, int):
                 self.x[self.angles[what]] = self.laws[what, 1]
@@ -304,10 +304,10 @@ class March:
         return bool(solution.status == 0)
 
     @staticmethod
-    def _ends(what: What) -> bool:
+    def _ends_interval(what: What) -> bool:
         return what.stop if isinstance(what, Event) else True
 
-    def _watched(self, stop: float) -> list[tuple[What, Callable[[float, NDArray[np.float64]], float]]]:
+    def _event_functions(self, stop: float) -> list[tuple[What, Callable[[float, NDArray[np.float64]], float]]]:
         """Return events and their functions for `solve_ivp`: limit of assembly, release of torsion bars, events of the user."""
 
         def limit(t: float, x: NDArray[np.float64]) -> float:

@@ -18,7 +18,7 @@ from ..units import Amount, in_si, si
 StateFunction = Callable[..., float]
 
 
-def _in_si(values: Any, what: str) -> tuple[Any, str]:
+def _to_si(values: Any, what: str) -> tuple[Any, str]:
     """Return the values of a signal in SI and their SI unit; the unit is empty if no value is a text."""
     if not any(isinstance(value, str) for value in (values if isinstance(values, (list, tuple)) else (values,))):
         return values, ""
@@ -88,7 +88,7 @@ class Harmonics:
     unit: str = ""
 
     def __post_init__(self) -> None:
-        (mean, *amplitudes), unit = _in_si(
+        (mean, *amplitudes), unit = _to_si(
             [self.mean, *np.ravel(np.array(self.amplitudes, object))], "mean and amplitudes"
         )
         if unit:
@@ -237,7 +237,7 @@ def table(times: ArrayLike, values: ArrayLike, kind: str = "linear") -> Piecewis
 
 def _points(times: ArrayLike, values: ArrayLike, least: int) -> tuple[NDArray[np.float64], NDArray[np.float64], str]:
     t = np.asarray(times, dtype=float)
-    values, unit = _in_si(values, "values")
+    values, unit = _to_si(values, "values")
     y = np.asarray(values, dtype=float)
     if t.ndim != 1 or t.shape != y.shape:
         raise InputError(f"a table needs as many times as values in one dimension each, not {t.shape} and {y.shape}")
