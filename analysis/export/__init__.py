@@ -1,4 +1,4 @@
-"""Making FMUs of the mechanisms."""
+"""Build FMUs of the mechanisms."""
 
 from .archive import SOURCES, BuildError, try_out
 from .builds import Built, build_all, kinds_here

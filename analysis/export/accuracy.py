@@ -1,6 +1,6 @@
-"""Work and precision over the tolerance: a table in the documentation of each FMU, from data that this module computes.
+"""Compute work and precision for several tolerances, and write them as a table in the documentation of each FMU.
 
-``python -m analysis.export.accuracy`` writes `DATA` again, in some seconds; `tests/fmu/test_accuracy.py` holds it up to date.
+``python -m analysis.export.accuracy`` rewrites `DATA` in some seconds; `tests/fmu/test_accuracy.py` checks that it is current.
 """
 
 from __future__ import annotations
@@ -41,7 +41,7 @@ CAPTION = (
 def measured(case: Case, tolerance: float) -> tuple[float, dict[str, float]]:
     """Return evaluations of the equations per simulated second, and the largest relative error of each kind of output.
 
-    The truth is a run at the tightest tolerance. Residuals are no outputs of the model.
+    The reference is a run at the tightest tolerance. Residuals are left out.
     """
 
     def run(tolerance: float) -> Any:
@@ -61,7 +61,7 @@ def measured(case: Case, tolerance: float) -> tuple[float, dict[str, float]]:
 
 
 def rows(mechanism: Mechanism) -> Iterator[list[float]]:
-    """Yield a row of the table for each tolerance: it, the work, the errors; the worst of all standard cases."""
+    """Yield a row of the table for each tolerance: the tolerance, then the largest work and errors of all standard cases."""
     for tolerance in TOLERANCES:
         cases = [measured(case, tolerance) for case in standard_cases(mechanism).values()]
         worst = np.max([[work, *errors.values()] for work, errors in cases], axis=0)
@@ -69,18 +69,18 @@ def rows(mechanism: Mechanism) -> Iterator[list[float]]:
 
 
 def known(mechanism: Mechanism) -> list[list[float]]:
-    """Return the rows of a mechanism in `DATA`; none for a mechanism that it does not have."""
+    """Return the rows of a mechanism in `DATA`; an empty list if the mechanism is not there."""
     found: list[list[float]] = json.loads(DATA.read_text(encoding="utf-8")).get(mechanism.name, [])
     return found
 
 
 def texts(row: list[float]) -> list[str]:
-    """Return a row as it is printed."""
+    """Return the numbers of a row as they are printed."""
     return [f"{row[0]:.0e}", f"{row[1]:.0f}", *(f"{value:.1e}" for value in row[2:])]
 
 
 def to_html(mechanism: Mechanism) -> str:
-    """Return the table for the page of an FMU; nothing for a mechanism without data."""
+    """Return the table for the page of an FMU; an empty text for a mechanism without data."""
     body = ["<tr>" + "".join(f"<td>{cell}</td>" for cell in texts(row)) + "</tr>" for row in known(mechanism)]
     if not body:
         return ""

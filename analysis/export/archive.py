@@ -1,4 +1,4 @@
-"""What every kind of FMU has in its archive, and how the archive is written and tried."""
+"""Write the archive of an FMU, with the parts that every kind of FMU has, and try it out."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ LICENSE = next(
 EPOCH = (1980, 1, 1, 0, 0, 0)
 
 
-#: What holds for all of them.
+#: Notes in the documentation of every FMU.
 _EVERY_MODEL = (
     "A step that cannot be taken (not positive, out of order, an input that is not finite, the limit of assembly) is "
     "refused with fmi2Discard. The last good state stays readable and can be saved; solver.status and "
@@ -48,9 +48,9 @@ class BuildError(LinkworkError):
 
 
 def write(entries: Mapping[str, bytes], target: Path) -> Path:
-    """Write an FMU: deflated, in order, with fixed times; in place only if it is valid.
+    """Write an FMU, compressed, in a fixed order and with fixed times, and return its path.
 
-    Raises BuildError if it is not valid.
+    Raises BuildError, and leaves an older file in place, if the FMU is not valid.
     """
     # moved into place whole: a reader never sees half an FMU, and a failed build leaves the old one
     part = target.with_suffix(".part.fmu")
@@ -79,9 +79,9 @@ def documentation(
     notes: Sequence[str],
     icon: str = "model.png",
 ) -> dict[str, bytes]:
-    """Return icon, licence and the HTML page of an FMU: the model, the way it is ``made``, the table of its variables.
+    """Return icon, licence and the HTML page of an FMU by path in the archive.
 
-    ``icon`` is the place of the icon in the archive.
+    The page describes the model and how the FMU is ``made``, and has a table of its variables. ``icon`` is the icon's path.
     """
     rows = []
     for variable in variables:
@@ -141,7 +141,7 @@ def try_out(fmu: Path, script: str = _TRIAL, *arguments: str) -> None:
     ----------
     fmu : path
     script : str
-        What the process runs; the path of the FMU is its first argument, others are given.
+        Python code that the process runs; its arguments are the path of the FMU and ``arguments``.
 
     Raises
     ------

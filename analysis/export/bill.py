@@ -14,7 +14,7 @@ import linkwork
 #: Place in the archive, and its type.
 BILL = "extra/org.cyclonedx/bom.json"
 TYPE = "application/vnd.cyclonedx+json"
-#: Programs that shape the bytes of an FMU: those of every kind, and those of native ones.
+#: Programs that determine the bytes of an FMU, by its kind.
 _MAKERS = {"python": ("pythonfmu", "fmpy"), "native": ("casadi", "ziglang", "fmpy")}
 
 
@@ -24,12 +24,13 @@ def with_bill(name: str, entries: Mapping[str, bytes], *, native: bool, fmi: int
     Parameters
     ----------
     name : str
-        Of the FMU's file, without its ending.
+        Name of the FMU's file, without its ending.
     entries : mapping
-        Content by place in the archive.
+        Content of the files by path in the archive.
     native : bool
+        Whether it is a native FMU, not one in Python.
     fmi : int
-        Version of the standard.
+        Major version of FMI.
     """
     files = {place: hashlib.sha256(content).hexdigest() for place, content in sorted(entries.items())}
     made = [_component("linkwork", linkwork.__version__, "MIT", index="")]
@@ -77,7 +78,7 @@ def with_bill(name: str, entries: Mapping[str, bytes], *, native: bool, fmi: int
 
 
 def _component(name: str, version: str, licence: str = "", *, text: str = "", index: str = "pypi") -> dict[str, Any]:
-    """Return a component; ``index`` is where its package is found."""
+    """Return a component; ``index`` is the registry of its package, empty if it is in none."""
     component: dict[str, Any] = {"type": "library", "name": name, "version": version}
     if text:
         component["description"] = text

@@ -1,4 +1,4 @@
-"""Building every kind of FMU of every mechanism: what ``linkwork build`` does."""
+"""Build every kind of FMU of every mechanism, as ``linkwork build`` does."""
 
 from __future__ import annotations
 
@@ -15,12 +15,12 @@ from .description import KINDS, PYTHON
 from .native_fmu import EVERYWHERE, PLATFORMS, WASM, build_native, this_platform
 from .python_fmu import build
 
-#: In place of names of platforms: all of them.
+#: The name that stands for all platforms.
 ALL = "all"
 
 
 class Built(NamedTuple):
-    """An FMU that was built: its path, and the platforms that its native libraries are for."""
+    """An FMU that was built: its path, and the platforms of its native libraries."""
 
     path: Path
     platforms: tuple[str, ...]
@@ -51,10 +51,10 @@ def build_all(
     kinds : sequence of str, optional
         Of `KINDS`; by default all that can be built here.
     platforms : sequence of str, optional
-        Of `PLATFORMS`, or ``all`` of them: what native FMUs are compiled for; this one by default. `WASM` is for those of FMI
-        3.0 alone; the others do without it.
+        Platforms for which native FMUs are compiled: names in `PLATFORMS`, or ``all``; by default this platform. `WASM` is
+        for FMUs of FMI 3.0 only and left out of the others.
     publish_to : path, optional
-        Folder for what `publish` writes of each that runs here.
+        Folder into which `publish` writes each FMU that runs here.
 
     Yields
     ------
@@ -63,7 +63,7 @@ def build_all(
     Raises
     ------
     UnknownNameError
-        If a model, kind or platform is none of those there are; before anything is built.
+        If there is no such model, kind or platform; raised before anything is built.
     BuildError
         If an FMU cannot be built, is not valid or does not run.
     """

@@ -1,6 +1,6 @@
-"""What https://fmi-standard.org asks the makers of FMUs to publish: each with inputs, reference results and who imports it.
+"""Publish an FMU as https://fmi-standard.org asks: with inputs, reference results and the importers that run it.
 
-The files and their forms are those of "Compatibility information" in the contributing guide of that site.
+The files and their formats are those of "Compatibility information" in the contributing guide of that site.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from linkwork.mechanism import Mechanism
 from .archive import try_out
 from .description import NATIVE_FMI3, PYTHON, Kind, started
 
-#: Importers that the tests of Linkwork run the FMUs in: the package, and with which kinds of FMU by which interfaces.
+#: Importers in which the tests of Linkwork run the FMUs, by package: the kinds of FMU and the interfaces.
 IMPORTERS = {
     "FMPy": "all; co-simulation, and model exchange of the native ones",
     "libcosimpy": "those of FMI 2.0; co-simulation",
@@ -27,16 +27,16 @@ IMPORTERS = {
     "cofmupy": "all; co-simulation",
     "pathsim-fmi": "all; co-simulation, and model exchange of the native ones",
 }
-#: At most so many variables in the reference results, and within what of them an importer should be.
+#: Greatest number of variables in the reference results, and tolerances within which an importer should agree with them.
 VARIABLES = 10
 RELATIVE, ABSOLUTE = 1e-6, 1e-6
 
 
 def publish(mechanism: Mechanism, kind: Kind, fmu: Path, folder: Path | str) -> Path:
-    """Write an FMU with its compatibility information into a folder of its name below a folder, and return that.
+    """Copy an FMU with its compatibility information into a subfolder of ``folder`` with its name; return the subfolder.
 
-    `{name}.fmu`, its inputs `{name}_in.csv`, reference results `{name}_ref.csv` and how they come about `{name}_ref.opt`,
-    and `Readme.txt`. The reference is computed by the plant in Python; FMPy has to come to the same with the FMU.
+    The files are `{name}.fmu`, its inputs `{name}_in.csv`, reference results `{name}_ref.csv`, the options of their
+    computation `{name}_ref.opt`, and `Readme.txt`. The plant in Python computes the reference; FMPy must find the same.
 
     Raises
     ------
@@ -81,7 +81,7 @@ for place, name in enumerate(names):
 
 
 def reference(mechanism: Mechanism) -> tuple[list[str], list[list[float]]]:
-    """Compute time and the most important outputs of the default experiment with the plant in Python, one row for each step."""
+    """Run the default experiment with the plant in Python; return names and, for each step, time and the main outputs."""
     start, stop, step, _ = mechanism.experiment
     first = [name for freedom in mechanism.freedoms for name in (freedom.coordinate, freedom.rate)]
     names = list(dict.fromkeys([*first, *mechanism.output_names]))[: VARIABLES - 1]
@@ -89,7 +89,7 @@ def reference(mechanism: Mechanism) -> tuple[list[str], list[list[float]]]:
     plant = started(mechanism)
     count = int((stop - start) / step * (1.0 + 1e-12))
     times = [start + n * step for n in range(count + 1)]
-    # as FMPy's: the last step is what is left
+    # as in FMPy, the last step may be shorter
     if stop - times[-1] > 1e-6 * step:
         times.append(stop)
     rows = []

@@ -1,8 +1,8 @@
-"""A WebAssembly component around a native FMU, after the draft of FMI-LS-WASM.
+"""Write a WebAssembly component around a native FMU, after the draft of FMI-LS-WASM.
 
 The draft is commit c1aac17 of modelica/fmi-ls-wasm of July 2026. One component has both interfaces, co-simulation and model
-exchange. Within it is the core module that Zig makes of the FMU's C, behind the frame that is written here: types, resources,
-and one lifted function for each method. `native/component.c` has the functions, with the methods' own names.
+exchange. It contains the core module that Zig compiles from the FMU's C, in a frame that is written here: types, resources,
+and one lifted function for each method. `native/component.c` has these functions under the names of the methods.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from .description import layered_standard, written
 #: The layered standard, and its manifest.
 STANDARD = "org.modelica.fmi-ls-wasm"
 MANIFEST = f"extra/{STANDARD}/manifest.xml"
-#: Pages of 64 KiB that the memory begins with; the frame has it, because what the FMU's module calls needs it too.
+#: Initial size of the memory in pages of 64 KiB. The frame has the memory, because callbacks of the FMU's module need it too.
 PAGES = 16
 MEMORY = ("-Wl,--import-memory", f"-Wl,--initial-memory={PAGES << 16}")
 _PACKAGE, _VERSION = "fmi:fmi3", "3.0.0"
@@ -50,7 +50,7 @@ _REFERENCES, _SEED = (
     "unknowns:list<value-reference>,knowns:list<value-reference>,seed:list<f64>",
 )
 _FRACTION, _REQUESTS = "interval-fraction", "requests:list<tuple<value-reference,u32>>"
-#: By name the parameters after the instance, and the result.
+#: Methods of both interfaces by name: parameters after the instance, and result.
 _COMMON = {
     "set-debug-logging": ("logging-on:bool,categories:list<string>", "status"),
     "enter-initialization-mode": ("tolerance:option<f64>,start-time:f64,stop-time:option<f64>", "status"),
@@ -79,7 +79,7 @@ _COMMON = {
 }  # fmt: skip
 _NAMED = "instance-name:string,instantiation-token:string,resource-path:string,visible:bool,logging-on:bool"
 _LISTS = ("continuous-state-derivatives", "event-indicators", "continuous-states", "nominals-of-continuous-states")
-#: Of each interface its own type, the parameters of a new instance, and its own methods.
+#: For each interface its own type, the parameters of a new instance, and its own methods.
 _INTERFACES = {
     "co-simulation": (
         {
@@ -122,7 +122,7 @@ def component(module: bytes) -> bytes:
         If wasmtime is not installed, which turns the frame's text into bytes.
     """
     frame = _frame()
-    # the second core module of the frame is an empty one: sections are a number, a length and a content
+    # replace the second core module of the frame, an empty one; a section is a number, a length and a content
     parts, place, number = [frame[:8]], 8, 0
     while place < len(frame):
         size, begin = _length(frame, place + 1)
@@ -142,7 +142,7 @@ def manifest() -> bytes:
 
 
 def _length(data: bytes, place: int) -> tuple[int, int]:
-    """Read a number of seven bits a byte; return it, and the place behind it."""
+    """Read a number with seven bits in each byte, from an index on; return the number and the index after it."""
     value = shift = 0
     while True:
         byte = data[place]
@@ -164,11 +164,11 @@ def _frame() -> bytes:
     require("wasmtime")
     from wasmtime import wat2wasm
 
-    return bytes(wat2wasm("\n".join(["(component", *_outside(), ")"])))
+    return bytes(wat2wasm("\n".join(["(component", *_outer_lines(), ")"])))
 
 
 def _split(text: str) -> list[str]:
-    """Split a list at the commas that are in no brackets."""
+    """Split a list at the commas outside brackets."""
     parts, depth, begin = [], 0, 0
     for place, letter in enumerate(text):
         depth += (letter == "<") - (letter == ">")
@@ -179,13 +179,13 @@ def _split(text: str) -> list[str]:
 
 
 class _Types:
-    """Definitions of types in a scope of the text format, in which every compound type has a name of its own."""
+    """Definitions of types in one scope of WebAssembly's text format, in which every compound type needs a name."""
 
     def __init__(self, lines: list[str], known: dict[str, str] | None = None) -> None:
         self.lines, self.known = lines, dict(known or {})
 
     def of(self, text: str) -> str:
-        """Return what a type is called in this scope; define it first where it is not known."""
+        """Return the name of a type in this scope; define the type first if it is not known."""
         if text in _PRIMITIVE:
             return text
         if text not in self.known:
@@ -195,7 +195,7 @@ class _Types:
         return self.known[text]
 
     def named(self, text: str) -> str:
-        """Return the name of a type, of a primitive one too."""
+        """Return the name of a type; a primitive type is given a name, too."""
         if text in _PRIMITIVE:
             self.lines.append(f"(type $t{len(self.lines)} {text})")
             return f"$t{len(self.lines) - 1}"
@@ -215,7 +215,7 @@ class _Types:
         return f"({kind} {' '.join(map(self.of, parts))})"
 
     def function(self, parameters: str, result: str) -> str:
-        """Return the parameters and the result of a function."""
+        """Return the parameters and the result of a function in the text format."""
         pairs = [part.partition(":") for part in _split(parameters)]
         given = " ".join(f"(param {_quoted(name)} {self.of(of)})" for name, _, of in pairs)
         return f"{given} (result {self.of(result)})" if result else given
@@ -230,7 +230,7 @@ def _interface(name: str) -> str:
 
 
 def _methods(interface: str) -> Iterator[tuple[str, str, str, str]]:
-    """Yield of each method of an interface the name of its function in C, its own, its parameters and its result."""
+    """Yield for each method of an interface the name of its C function, its own name, its parameters and its result."""
     _, making, own = _INTERFACES[interface]
     resource = f"{interface}-instance"
     yield f"instantiate-{interface}", f"[static]{resource}.instantiate-{interface}", making, f"option<own<{resource}>>"
@@ -239,7 +239,7 @@ def _methods(interface: str) -> Iterator[tuple[str, str, str, str]]:
         yield name, f"[method]{resource}.{name}", given, result
 
 
-def _outside() -> list[str]:
+def _outer_lines() -> list[str]:
     """Return the lines of the component: imports, core modules and their instances, lifted functions, exports."""
     shared: list[str] = []
     types = _Types(shared)
@@ -298,7 +298,7 @@ def _outside() -> list[str]:
             for name in (*_TYPES, *own, f"{interface}-instance")
         ]
         lines += [
-            *_inside(interface),
+            *_inner_lines(interface),
             f"(instance $of-{interface} (instantiate $shim-{interface} {' '.join(given)}))",
             f"(export {_interface(interface)} (instance $of-{interface}))",
         ]
@@ -306,9 +306,9 @@ def _outside() -> list[str]:
 
 
 def _resource(interface: str) -> list[str]:
-    """Return the lines of an instance's type, and of the core module that makes a handle of what the FMU has made."""
+    """Return the lines of an instance's type, and of the core module that returns a handle for an instance of the FMU."""
     resource, making = f"${interface}-instance", f"instantiate-{interface}"
-    # of a text or a list the core function gets address and count, and it returns where the instance is described
+    # the core function receives texts and lists as address and count, and returns the address of its result
     count = sum(1 if part.endswith(":bool") else 2 for part in _split(_INTERFACES[interface][1]))
     numbers = " ".join(["i32"] * count)
     passed = " ".join(f"(local.get {n})" for n in range(count))
@@ -328,8 +328,8 @@ def _resource(interface: str) -> list[str]:
     ]
 
 
-def _inside(interface: str) -> list[str]:
-    """Return the lines of the component that exports an interface: what it imports, under the interface's own names."""
+def _inner_lines(interface: str) -> list[str]:
+    """Return the lines of the inner component that exports an interface: its imports, under the interface's own names."""
     own, resource = _INTERFACES[interface][0], f"{interface}-instance"
     lines: list[str] = []
     outer, inner = _Types(lines), _Types(lines)

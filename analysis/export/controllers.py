@@ -1,8 +1,8 @@
-"""Controllers that travel as Python FMUs: sampled, with everything between two samples held.
+"""Sampled controllers as Python FMUs; their outputs are held between two samples.
 
-An instant of sampling takes the inputs as they are then; what follows from them is there at the end of the communication step.
-A step shorter than the sample time therefore delays by itself, a step as long by one sample, as a computer does that needs that
-long for its answer.
+A sample uses the inputs at its instant, and its outputs are available at the end of the communication step. A step shorter
+than the sample time therefore delays the outputs by the step, a step as long as the sample time by one sample, as does a
+computer that needs that time for its answer.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ from linkwork.wrapper import (
 class Row(NamedTuple):
     """A variable: a parameter, an input, an output, or a local one that is a state of the controller.
 
-    ``rule`` is what a parameter must be, beside finite: a key of `RULES`.
+    ``rule``, a key of `RULES`, is a condition on a parameter besides being finite.
     """
 
     name: str
@@ -42,7 +42,7 @@ class Row(NamedTuple):
     rule: str = ""
 
 
-#: What a parameter must be, in words, and whether a finite value is.
+#: Conditions on a parameter: the words after "it must", and the test of a finite value.
 RULES: dict[str, tuple[str, Callable[[float], bool]]] = {
     "": ("be a finite number", lambda value: True),
     "positive": ("be greater than zero", lambda value: value > 0.0),
@@ -73,14 +73,14 @@ UNITS: dict[str, dict[str, int]] = {
 
 
 class Controller(Fmi2Slave):  # type: ignore[misc]
-    """What the controllers share. Each has its ``rows``, and `sample`, which reads and sets attributes of their names.
+    """Base of the controllers: each has ``rows``, its variables, and `sample`, which reads and sets attributes of their names.
 
-    All parameters but the sample time may be set between steps: they act from the next sample on.
+    All parameters except the sample time may be set between steps; they act from the next sample on.
     """
 
     rows: ClassVar[tuple[Row, ...]]
     sample_time: float
-    #: Where it is in its life, which a saved state tells, too; the times of the run (s).
+    #: Phase of the run, which is part of a saved state; start and stop time of the run (s).
     phase = INSTANTIATED
     start_time, stop_time = 0.0, inf
 
@@ -142,7 +142,7 @@ class Controller(Fmi2Slave):  # type: ignore[misc]
         return values
 
     def set_real(self, vrs: list[int], values: list[float]) -> None:
-        """Set values, all of them or none; in a run the parameters must be valid, and the sample time stays."""
+        """Set all values or none; after the first sample parameters must be valid, and the sample time cannot be set."""
         self._expect("fmi2SetReal", INSTANTIATED, INITIALISING, RUNNING)
         for reference, value in zip(vrs, values):
             if reference not in self.vars:
@@ -157,7 +157,7 @@ class Controller(Fmi2Slave):  # type: ignore[misc]
         super().set_real(vrs, values)
 
     def set_integer(self, vrs: list[int], values: list[int]) -> None:
-        """Refuse: the only integer is the count of samples."""
+        """Refuse the call: the only integer, the count of samples, cannot be set."""
         self._refuse("no integer can be set")
 
     def _expect(self, call: str, *phases: str) -> None:
@@ -178,7 +178,7 @@ class Controller(Fmi2Slave):  # type: ignore[misc]
         raise ValueError(sentence)
 
     def preview(self) -> None:
-        """Set the outputs that a sample at the start would give, and leave the states."""
+        """Set the outputs that a sample at the start would give, without changing the states."""
         if not all(self._valid(name, getattr(self, name)) for name in self.parameters):
             return
         states = {row.name: getattr(self, row.name) for row in self.rows if row.causality == "local"}
@@ -187,7 +187,7 @@ class Controller(Fmi2Slave):  # type: ignore[misc]
             setattr(self, name, value)
 
     def setup_experiment(self, start_time: float, stop_time: float | None, tolerance: float | None) -> None:
-        """Take the times of the run."""
+        """Store the start and stop time of the run."""
         self._expect("fmi2SetupExperiment", INSTANTIATED)
         self.start_time, self.stop_time = start_time, inf if stop_time is None else stop_time
         if not start_time <= self.stop_time:
@@ -199,7 +199,7 @@ class Controller(Fmi2Slave):  # type: ignore[misc]
         self.phase = INITIALISING
 
     def exit_initialization_mode(self) -> None:
-        """Take the sample at the start."""
+        """Check the parameters and take the sample at the start."""
         self._expect("fmi2ExitInitializationMode", INITIALISING)
         for name in self.parameters:
             self._check(name, getattr(self, name))
@@ -207,7 +207,7 @@ class Controller(Fmi2Slave):  # type: ignore[misc]
         self._up_to(self.start_time + 0.5 * self.sample_time)
 
     def do_step(self, current_time: float, step_size: float) -> bool:
-        """Take the samples whose instants are in the step, the one at its end left to the next; refuse what is no step."""
+        """Take the samples in a step, without one at its end; return False if the step is not valid."""
         end = current_time + step_size
         if self.phase != RUNNING:
             wrong = f"the controller is {self.phase}"
@@ -220,7 +220,7 @@ class Controller(Fmi2Slave):  # type: ignore[misc]
         return False
 
     def terminate(self) -> None:
-        """End the run; whatever the phase, a master that cleans up does no harm."""
+        """End the run; this is allowed in every phase, because masters clean up after errors."""
         if self._wrapped and self.phase != TERMINATED:
             end_in_order(self)
         self.phase = TERMINATED
@@ -246,8 +246,8 @@ def _limited(value: float, limit: float) -> float:
 class Pid(Controller):
     """PID controller of a position by a force, with feed-forward and a limit that does not wind up the integral.
 
-    The derivative is that of the error behind a filter of first order. While the force is at its limit the integral is led back
-    with the tracking time (K. J. Astrom and T. Hagglund, Advanced PID Control, 2006, section 3.5).
+    The derivative is that of the error after a first-order filter. While the force is at its limit, the integral is driven
+    back with the tracking time (K. J. Astrom and T. Hagglund, Advanced PID Control, 2006, section 3.5).
     """
 
     rows = (
@@ -282,7 +282,7 @@ class Pid(Controller):
 
 
 class StateFeedback(Controller):
-    """State feedback of position and velocity, as `linearise` and `lqr` give its gains, with feed-forward and a limit."""
+    """State feedback of position and velocity with feed-forward and a limit; `linearise` and `design_lqr` give its gains."""
 
     rows = (
         Row("position_gain", "parameter", "N/m", 0.0, "Force against the deviation of the position"),
@@ -315,7 +315,7 @@ def _series(name: str, unit: str, text: str) -> tuple[Row, ...]:
 
 
 class MotionReference(Controller):
-    """A motion over the crank angle, and the force that goes with it: Fourier series of six harmonics."""
+    """A motion as a function of the crank angle, and the force that belongs to it: Fourier series of six harmonics."""
 
     rows = (
         *_series("motion", "m", "Position"),
@@ -346,7 +346,7 @@ POINTS = 72
 
 
 class ForceTable(Controller):
-    """A force over the crank angle by a table: 72 points, five degrees apart, straight lines between them, turn after turn."""
+    """A force as a function of the crank angle: a table of 72 points, five degrees apart, interpolated linearly; periodic."""
 
     rows = (
         *(Row(f"table_{n}", "parameter", "N", 0.0, f"Force at {n * 360 // POINTS} degrees") for n in range(POINTS)),
@@ -408,7 +408,7 @@ class DcServo(Controller):
         self.encoder_angle = count * floor(self.angle / count)
 
 
-#: By the names that descriptions of systems use.
+#: Controllers by their names in descriptions of systems.
 CONTROLLERS: dict[str, type[Controller]] = {
     "pid": Pid,
     "state-feedback": StateFeedback,

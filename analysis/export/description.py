@@ -1,6 +1,6 @@
-"""The descriptions inside FMUs, for every kind of them, from the mechanism's table of variables.
+"""Write the descriptions inside FMUs of every kind from the mechanism's table of variables.
 
-``modelDescription.xml`` for all kinds, ``buildDescription.xml`` of FMI 3.0.
+They are ``modelDescription.xml`` and, for FMI 3.0, ``buildDescription.xml``.
 """
 
 from __future__ import annotations
@@ -43,9 +43,9 @@ class Kind(NamedTuple):
     fmi : int
         Major version of FMI.
     suffix : str
-        What its model identifier has after the name of the mechanism's FMU; its file name has it with hyphens.
+        End of its model identifier, after the name of the mechanism's FMU; in its file name with hyphens.
     tool : str
-        What makes it.
+        Generation tool.
     interfaces : mapping
         Its interface types, each with its capability flags.
     """
@@ -57,7 +57,7 @@ class Kind(NamedTuple):
 
     @property
     def native(self) -> bool:
-        """Whether it has the variables of `interface` and model exchange, not the mechanism's variables alone."""
+        """Whether it has model exchange and all variables of `interface`, not only the mechanism's variables."""
         return "ModelExchange" in self.interfaces
 
     def identifier(self, mechanism: Mechanism) -> str:
@@ -65,7 +65,7 @@ class Kind(NamedTuple):
         return f"{mechanism.fmu}{self.suffix}"
 
     def file_name(self, mechanism: Mechanism) -> str:
-        """Name of the archive."""
+        """Return the file name of the FMU."""
         return f"{self.identifier(mechanism).replace('_', '-')}.fmu"
 
 
@@ -181,7 +181,7 @@ def _entries(mechanism: Mechanism, kind: Kind) -> tuple[Entry, ...]:
 
 
 def _date() -> dict[str, str]:
-    """Return the date of generation, which would make every build another, only if ``SOURCE_DATE_EPOCH`` sets it."""
+    """Return the date of generation as an attribute if ``SOURCE_DATE_EPOCH`` sets it; else none, so that builds are equal."""
     epoch = os.environ.get("SOURCE_DATE_EPOCH")
     if not epoch:
         return {}
@@ -196,7 +196,7 @@ def layered_standard(tag: str, name: str, version: str, text: str) -> Element:
 
 
 def written(root: Element) -> bytes:
-    """Return the text of an XML file."""
+    """Return the content of an XML file with this root element."""
     indent(root, "\t")
     return f'<?xml version="1.0" encoding="UTF-8"?>\n{tostring(root, encoding="unicode")}\n'.encode()
 
@@ -219,7 +219,7 @@ _TYPES = {
     2: {"Real": "Real", "Integer": "Integer", "String": "String"},
     3: {"Real": "Float64", "Integer": "Int32", "String": "String"},
 }
-# approx, not calculated: only so may an output carry the start value that people look for in the XML
+# approx, not calculated: otherwise an output could not have the start value that people look for in the XML
 _INITIAL = {"parameter": "exact", "output": "approx", "local": "calculated"}
 
 
@@ -241,7 +241,7 @@ def _variables(mechanism: Mechanism, kind: Kind, entries: Iterable[Entry]) -> El
         if variable.causality in _INITIAL:
             attributes["initial"] = _INITIAL[variable.causality]
         value = _value(variable, starts.get(variable.name, variable.start))
-        if entry.derivative_of in scale:  # of a state: OMSimulator takes every other one for a state, too
+        if entry.derivative_of in scale:  # only for states: OMSimulator takes every other variable for one, too
             value["derivative"] = _number(kind, entry.derivative_of)
         nominal = scale.get(entry.reference, variable.nominal)
         if nominal is not None:
@@ -272,7 +272,7 @@ def _value(variable: Variable, start: float | int | str) -> dict[str, str]:
     kind = {"Real": float, "Integer": int, "String": str}[variable.kind]
 
     def text(value: Any) -> str:
-        # 17 digits, for the same number to come back
+        # 17 digits, so that the same number is read back
         return value if kind is str else repr(kind(value))
 
     value = {}
@@ -289,7 +289,7 @@ def _value(variable: Variable, start: float | int | str) -> dict[str, str]:
 
 
 def started(mechanism: Mechanism) -> Plant:
-    """Return the mechanism at its start with the start values of all parameters and inputs."""
+    """Return the plant of a mechanism at its start, with the start values of all parameters and inputs."""
     values = {v.name: v.start for v in mechanism.variables}
     return Plant.of_values(mechanism, values, time=mechanism.experiment[0])
 
@@ -337,7 +337,7 @@ def _structure(mechanism: Mechanism, kind: Kind, entries: Sequence[Entry]) -> El
 
 
 def _on_inputs(mechanism: Mechanism) -> dict[int, References]:
-    """Return the inputs on which each output depends by the table of variables, as value references."""
+    """Return the inputs on which each output depends according to the table of variables, as value references."""
     reference = {entry.variable.name: entry.reference for entry in interface(mechanism)}
     inputs = {
         "state": frozenset[int](),
@@ -349,9 +349,9 @@ def _on_inputs(mechanism: Mechanism) -> dict[int, References]:
 
 @cache
 def traced_dependencies(mechanism: Mechanism) -> dict[int, References]:
-    """Return the dependencies of outputs, derivatives and event indicator by the equations, as value references.
+    """Return the states and inputs on which outputs, derivatives and event indicator depend, as value references.
 
-    On the states, and on the inputs: directly, and through the jump of a commanded rate.
+    The dependencies follow from the equations: direct ones, and those through the jump of a commanded rate.
     """
     casadi = symbolic.library()
     traced = expressions(mechanism, bool(mechanism.switch))
@@ -386,7 +386,7 @@ def _reinitialised(mechanism: Mechanism) -> tuple[int, ...]:
 
 
 def build_description(identifier: str, sources: Sequence[str]) -> bytes:
-    """Return ``buildDescription.xml``, by which the files below ``sources/`` are compiled as C11 without options."""
+    """Return ``buildDescription.xml``: the files below ``sources/`` are to be compiled as C11 without options."""
     root = Element("fmiBuildDescription", {"fmiVersion": "3.0"})
     configuration = SubElement(root, "BuildConfiguration", {"modelIdentifier": identifier})
     files = SubElement(configuration, "SourceFileSet", {"language": "C11"})

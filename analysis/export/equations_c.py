@@ -1,4 +1,4 @@
-"""The C of a native FMU that depends on the mechanism: its equations, as CasADi writes them, and its tables."""
+"""Write the C of a native FMU that depends on the mechanism: its equations, by CasADi, and its tables."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ from ..run import equations
 from .description import Kind, token
 from .interface import Entry, interface, states
 
-#: Lost in every sum with a square that is not zero.
+#: Added under square roots that are differentiated; lost in every sum with a square that is not zero.
 TINY = 1e-300
 
 
@@ -47,14 +47,14 @@ def _equations(mechanism: Mechanism) -> str:
     made = {function.name(): function for function in functions(mechanism)}
     text = c_of(made.values(), "equations")
     if mechanism.switch:
-        text += _choices(mechanism, made["equations_solution"].numel_out(0))
+        text += _switched_calls(mechanism, made["equations_solution"].numel_out(0))
     return '#include "sizes.h"\n\n#ifndef LOCAL\n#define LOCAL\n#endif\n\n' + re.sub(
         "^int equations_", r"LOCAL \g<0>", text, flags=re.MULTILINE
     )
 
 
-#: Functions about functions, which CasADi writes beside each and no one calls.
-_ASKED = re.compile(
+#: Auxiliary functions that CasADi writes for each function and that nothing calls.
+_UNUSED = re.compile(
     r"^[\w* ]+_(?:\w+_mem|checkout|release|incref|decref|n_in|n_out|default_in|\w+_work|work\w*"
     r"|(?:name|sparsity)_(?:in|out)|\w+_size|version)"
     r"\([^)]*\) ?\{(?:[^\n]*\}|.*?^\})\n+",
@@ -63,7 +63,7 @@ _ASKED = re.compile(
 
 
 def c_of(functions: Iterable[Any], file: str) -> str:
-    """Return functions of CasADi as C for the shell; ``file`` begins the names that they share."""
+    """Return functions of CasADi as C for the shell; names that the functions share begin with ``file``."""
     options = {"with_header": False, "main": False, "casadi_int": "int", "with_export": False, "with_mem": False}
     generator = symbolic.library().CodeGenerator(f"{file}.c", options)
     for function in functions:
@@ -71,22 +71,22 @@ def c_of(functions: Iterable[Any], file: str) -> str:
     with TemporaryDirectory(prefix="linkwork-c-") as folder:
         generator.generate(f"{folder}/")
         text = (Path(folder) / f"{file}.c").read_text(encoding="utf-8")
-    text = re.sub("^casadi_real casadi_", r"static \g<0>", _ASKED.sub("", text), flags=re.MULTILINE)
-    # the shell leaves out no argument and no result: without these questions the code is smaller
+    text = re.sub("^casadi_real casadi_", r"static \g<0>", _UNUSED.sub("", text), flags=re.MULTILINE)
+    # the shell passes every argument and every result: without these tests the code is smaller
     return re.sub(r"arg\[(\d+)\]\? (arg\[\1\]\[\d+\]) : 0", r"\2", re.sub(r"if \(res\[\d+\]!=0\) ", "", text))
 
 
-def _choices(mechanism: Mechanism, numbers: int) -> str:
-    """Return C that calls the function traced with the mechanism's switch on or off, by the constants.
+def _switched_calls(mechanism: Mechanism, numbers: int) -> str:
+    """Return C functions that call the version traced with the mechanism's switch on or off, depending on the constants.
 
-    With the switch on the solution that the equations contain, of so many numbers, is computed once, and given to the function
-    that needs it. What is differentiated is always all there is: the constants may change too.
+    With the switch on, the solution that the equations contain, an array of ``numbers``, is computed once and passed to the
+    function that needs it. Derivatives are always those with the switch on, because the constants may change too.
     """
     on = f"arg[3][{mechanism.switch_place}] != 0.0"
     sides = "(const double** arg, double** res, int* iw, double* w, int mem)"
     pair = f"return ({on} ? equations_clearance_on : equations_clearance_off)(arg, res, iw, w, mem);"
     text = f"\nint equations_clearance{sides} {{\n  {pair}\n}}\n"
-    for name, (called, count, results) in _CHOSEN.items():
+    for name, (called, count, results) in _SWITCHED.items():
         given = ", ".join(f"arg[{n}]" for n in range(count))
         off = f"  if (!({on})) return equations_{name}_off(arg, res, iw, w, mem);\n" if called == "values" else ""
         text += f"""
@@ -100,8 +100,8 @@ int equations_{name}{sides} {{
     return text
 
 
-#: Functions that contain a solution with a switch on: which is called then, its arguments, and where its results go.
-_CHOSEN = {
+#: Functions that contain a solution if the switch is on: the function called then, its number of arguments, its results.
+_SWITCHED = {
     "derivative": ("values", 4, "unused, res[0]"),
     "outputs": ("values", 4, "res[0], unused"),
     "forward": ("forward", 7, "res[0], res[1], res[2]"),
@@ -110,7 +110,7 @@ _CHOSEN = {
 
 
 def functions(mechanism: Mechanism) -> list[Any]:
-    """Return the equations that the C shell calls as functions of CasADi; see model.h for their arguments."""
+    """Return as functions of CasADi the equations that the C shell calls; see model.h for their arguments."""
     casadi = symbolic.library()
     named = _table(mechanism, False)
     del named["solution"], named["values"]
@@ -130,7 +130,7 @@ def functions(mechanism: Mechanism) -> list[Any]:
 
 
 def _table(mechanism: Mechanism, switched: bool) -> dict[str, tuple[list[Any], list[Any]]]:
-    """Return arguments and results of the functions, with the mechanism's switch on or off."""
+    """Return arguments and results of the functions by name, with the mechanism's switch on or off."""
     casadi = symbolic.library()
     sx, join = casadi.SX, casadi.vertcat
     trace = equations.expressions(mechanism, switched)
@@ -141,9 +141,9 @@ def _table(mechanism: Mechanism, switched: bool) -> dict[str, tuple[list[Any], l
         raise LinkworkError(f"the start of {mechanism.name} cannot be traced: {_START}") from error
     dx, du, dp = (sx.sym(f"d{n}", *v.shape) for n, v in (("x", s.x), ("u", s.u), ("p", s.p)))
     at, change = join(s.x, s.u, s.p), join(dx, du, dp)
-    values, z, _ = _in_solution(mechanism, s, switched, smooth=True)
-    plain, given_z, solution = _in_solution(mechanism, s, switched, smooth=False)
-    # what is given beside the arguments of a run
+    values, z, _ = _with_solution(mechanism, s, switched, smooth=True)
+    plain, given_z, solution = _with_solution(mechanism, s, switched, smooth=False)
+    # arguments in addition to those of a run
     beside, beside_plain = ([z], [given_z]) if solution.numel() else ([], [])
     given = join(own, state, s.u)
     dgiven = [sx.sym(f"d{n}", *v.shape) for n, v in (("own", own), ("state", state), ("u", s.u))]
@@ -174,18 +174,18 @@ def _table(mechanism: Mechanism, switched: bool) -> dict[str, tuple[list[Any], l
         "solution": (run, [solution]),
         "values": ([*run, *beside_plain], plain[:2]),
         "clearance": (run, [trace.clearance]),
-        "apart": ([s.x, s.p], [_apart(mechanism, s.x, s.p)]),
+        "apart": ([s.x, s.p], [_reach(mechanism, s.x, s.p)]),
         "jump": (run, [trace.jump]),
         "jump_forward": ([*run, dx, du, dp], forward([trace.jump], at, change)),
         "jump_reverse": ([*run, *jump_weights], jump_gradient),
-        "following": ([*run, (rates := sx.sym("rates", mechanism.size))], [_following(mechanism, trace, rates)]),
+        "following": ([*run, (rates := sx.sym("rates", mechanism.size))], [_state_slope(mechanism, trace, rates)]),
         "forward": ([*run, dx, du, dp, *beside], forward(values, at, change)),
         "reverse": ([*run, *weights, *beside], gradient),
     }
 
 
-def _apart(mechanism: Mechanism, x: Any, p: Any) -> Any:
-    """Return the numbers of what is said where the links cannot be joined, at least one."""
+def _reach(mechanism: Mechanism, x: Any, p: Any) -> Any:
+    """Return the numbers in the message that the links cannot be joined; a zero if there are none."""
     casadi = symbolic.library()
     if mechanism.unjoined is None or mechanism.unjoined.reach is None:
         return casadi.SX(0.0)
@@ -193,11 +193,11 @@ def _apart(mechanism: Mechanism, x: Any, p: Any) -> Any:
     return casadi.vertcat(*reach(tuple(casadi.vertsplit(x)), mechanism.constants(*casadi.vertsplit(p)[:-1])))
 
 
-def _following(mechanism: Mechanism, trace: equations.Traced, rates: Any) -> Any:
-    """Return the derivative of a state x whose motion is jump(x, u) with commands that move at an unknown rate.
+def _state_slope(mechanism: Mechanism, trace: equations.Traced, rates: Any) -> Any:
+    """Return the derivative x' of a state for which jump(x, u) is the motion, with commands u of unknown accelerations a.
 
-    ``rates`` is the derivative F of the motion for some accelerations of the commands. What they are does not matter: a change
-    of a command alters the motion by jump_u, as it alters F, so that jump_x x' = F - jump_u a holds for all a alike.
+    ``rates`` is the derivative F of the motion for any a. The choice does not matter: jump_x x' = F - jump_u a, and a change of
+    a changes F by jump_u times that change.
     """
     casadi = symbolic.library()
     s, n = trace.symbols, len(mechanism.freedoms)
@@ -215,13 +215,13 @@ def _following(mechanism: Mechanism, trace: equations.Traced, rates: Any) -> Any
     return casadi.vertcat(result[: 2 * n], (rates - along(result))[2 * n :])
 
 
-def _in_solution(
+def _with_solution(
     mechanism: Mechanism, s: equations.Symbols, switched: bool, *, smooth: bool
 ) -> tuple[list[Any], Any, Any]:
-    """Return outputs, derivative and clearance in symbols for the solution inside them, the symbols, and their values.
+    """Return outputs, derivative and clearance with symbols for the solution of the contact forces; the symbols; the solution.
 
-    A last sweep of Newton's method begins from the solution, so that the derivatives of that sweep are those of the solution.
-    As they are differentiated (``smooth``) a length, the root of squares, changes by 0 where it is 0, not by 0/0.
+    They apply one more sweep of Newton's method to the symbols, so that their derivatives are those of the solution. If
+    ``smooth``, for differentiation, the root of a sum of squares has the derivative 0 where it is 0, instead of 0/0.
     """
     casadi = symbolic.library()
     found: dict[str, tuple[Any, Any]] = {}
@@ -258,7 +258,10 @@ def _in_solution(
 
 
 def beginning(mechanism: Mechanism, modes: Any, u: Any) -> tuple[Any, ...]:
-    """Trace the start: symbols of parameters and given state; constants with energy, state, scale and least parameters."""
+    """Trace the start of a run; return symbols of the parameters and of the given state, and four expressions of them.
+
+    These are the constants followed by the start energy, the initial state, its error scale, and lower bounds of parameters.
+    """
     casadi = symbolic.library()
     own, parameters, functions = equations.of_parameters(mechanism)
     state = casadi.SX.sym("state", 2 * len(mechanism.freedoms))
@@ -274,7 +277,7 @@ def beginning(mechanism: Mechanism, modes: Any, u: Any) -> tuple[Any, ...]:
 
 
 def _check_start(mechanism: Mechanism, begin: Any) -> None:
-    """Make sure that the trace of the start is the start: what NumPy or `float` had to do with it would be lost."""
+    """Check that the traced start gives the numbers of each published set: tracing loses operations of NumPy and `float`."""
     for name, known in mechanism.published.items():
         modes = [mode.default for mode in mechanism.modes]
         state = mechanism.state(known.initial)[: 2 * len(mechanism.freedoms)]
@@ -318,9 +321,9 @@ def _sizes(mechanism: Mechanism, kind: Kind) -> str:
         "COMMANDS": len(commands),
         "OUTPUTS": len(mechanism.output_names),
         "STATES": mechanism.size,
-        # and the energy at the start
+        # with the energy at the start
         "CONSTANTS": len(mechanism.constants._fields) + 1,
-        # the constant that says which functions are called; -1: there is no choice
+        # index of the constant that chooses the functions; -1 if there is no choice
         "SWITCH": mechanism.switch_place,
     }
     constants = {
@@ -347,18 +350,18 @@ def _sizes(mechanism: Mechanism, kind: Kind) -> str:
 
 
 def _unjoined(mechanism: Mechanism) -> list[str]:
-    """Return what C says where the links cannot be joined: the fact, how far apart they are, how near they are to joining."""
+    """Return the C macros of the messages for links that cannot be joined, or hardly."""
     said = mechanism.unjoined or limits.Unjoined("the links cannot be joined", "", "")
     numbers = [f"(r)[{n}]" for n in range(said.apart.count("{"))]
     return [
         f"#define UNJOINED {_text(said.fact)}",
-        f"#define SAY_APART(text, r) {_said(said.apart, numbers)}",
-        f"#define SAY_NEAR(text, angle) {_said(said.near, ['angle'] if said.near else [])}",
+        f"#define SAY_APART(text, r) {_print_call(said.apart, numbers)}",
+        f"#define SAY_NEAR(text, angle) {_print_call(said.near, ['angle'] if said.near else [])}",
     ]
 
 
-def _said(form: str, values: Sequence[str]) -> str:
-    """Return the C that writes a text of Python's form."""
+def _print_call(form: str, values: Sequence[str]) -> str:
+    """Return the C call that prints ``values`` into a text, from a format string of Python."""
     printed = re.sub(r"\{:(\.\d+\w)\}", r"%\1", form)
     given = [_text(printed), *values] if values else ['"%s"', _text(form)]
     return f"snprintf(text, SENTENCE, {', '.join(given)})"
@@ -419,7 +422,7 @@ def _row(mechanism: Mechanism, entry: Entry) -> str:
 
 
 def _place(mechanism: Mechanism, entry: Entry) -> str:
-    """Return the row of a computed variable or the number of an input."""
+    """Return as C the row of a computed variable or the number of an input; -1 for any other variable."""
     if entry.role == "input":
         return str(mechanism.input_names.index(entry.variable.name))
     if entry.role == "output":
@@ -451,7 +454,7 @@ def _rule(mechanism: Mechanism, entry: Entry) -> tuple[str, float, float, str]:
 
 
 def _commands(mechanism: Mechanism) -> list[str]:
-    """Return the commanded channels with their rates and modes."""
+    """Return the rows of the commanded channels: number, index in the state, mode and its value, number of the rate."""
     rows = []
     for number, channel in enumerate(mechanism.channels):
         if channel.kind != "command":

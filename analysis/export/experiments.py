@@ -1,4 +1,4 @@
-"""Experiments in every FMU: the mechanism's standard cases, with reference results that the plant in Python computes.
+"""Write the experiments in every FMU: the mechanism's standard cases, with reference results of the plant in Python.
 
 The files are those of the layered standard FMI-LS-REF; `analysis.run.experiments` reads and runs them.
 """
@@ -25,11 +25,11 @@ from .description import layered_standard, written
 
 #: Communication steps of an experiment, rows of its reference, and digits of its numbers.
 STEPS, ROWS, DIGITS = 100, 10, 12
-#: Tolerances of the reference and of the experiment; the greatest relative difference between them.
+#: Tolerances of the reference and of the experiment; the greatest relative difference that is allowed between them.
 REFERENCE, TOLERANCE, DIFFERENCE = 1e-12, 1e-10, 1e-6
 _SSV = "http://ssp-standard.org/SSP1/SystemStructureParameterValues"
 _DESCRIPTION = "Layered Standard providing information on related files included in an FMU."
-#: Of a file of experiments: its place below the folder of the standard, and its type.
+#: File of experiments: its name below the folder of the standard, and its type.
 _EXPERIMENTS = ("smoke-tests.exp", "application/x-ma-hs-experiments")
 
 
@@ -37,7 +37,8 @@ _EXPERIMENTS = ("smoke-tests.exp", "application/x-ma-hs-experiments")
 def experiments(mechanism: Mechanism) -> dict[str, bytes]:
     """Return the files of a mechanism's experiments and their manifest, by their places in the archive.
 
-    An unregistered mechanism, or one without cases, has its default experiment alone, halved until no limit of assembly is met.
+    An unregistered mechanism, or one without cases, has only its default experiment; if this meets the limit of assembly, it is
+    halved until it does not.
     """
     cases = standard_cases(mechanism) if mechanism.cases and mechanism.name in MECHANISMS else {}
     root = Element("Experiments", {"name": mechanism.fmu, "description": "Standard cases of Linkwork"})
@@ -57,7 +58,7 @@ def experiments(mechanism: Mechanism) -> dict[str, bytes]:
         constant = all(row[1:] == stimuli[0][1:] for row in stimuli)
         rows = [stimuli[0], stimuli[-1]] if constant else stimuli
         files[f"{name}-in.csv"] = table(["time", *mechanism.input_names], rows).encode()
-        results = [mechanism.output_names[place] for place in _results(mechanism)]
+        results = [mechanism.output_names[place] for place in _result_places(mechanism)]
         files[f"{name}-ref.csv"] = table(["time", *results], reference).encode()
         SubElement(node, "Stimuli", {"source": f"{name}-in.csv"})
         SubElement(node, "References", {"source": f"{name}-ref.csv"})
@@ -70,7 +71,7 @@ def experiments(mechanism: Mechanism) -> dict[str, bytes]:
         starts = {v.name: v.start for v in mechanism.variables}
         constant = {name: float(starts[name]) for name in mechanism.input_names}
         length, refused = mechanism.experiment[1] - mechanism.experiment[0], None
-        # one that comes to a limit of assembly ends before it
+        # an experiment that meets the limit of assembly is shortened
         for halved in range(10):
             end = mechanism.experiment[0] + length * 0.5**halved
             try:
@@ -95,26 +96,29 @@ def _manifest() -> bytes:
     return written(root)
 
 
-#: The inputs of a step by name, from its number and the outputs at its start.
+#: Function that returns the inputs of a step by name, from the number of the step and the outputs at its start.
 _Inputs = Callable[[int, Sequence[float] | None], Mapping[str, float]]
 
 
 def _values(mechanism: Mechanism, case: Case) -> dict[str, Any]:
-    """Return parameters, start and modes of a case by FMI name."""
+    """Return parameters, initial state and modes of a case by FMI name."""
     values = {fmi_name(name): value for name, value in asdict(case.parameters).items()}
     values |= {f"initial.{name}": value for name, value in asdict(case.initial).items()}
     return values | case.inputs.modes(mechanism)
 
 
-def _results(mechanism: Mechanism) -> list[int]:
-    """Return the places of the outputs that are results; residuals are errors, which no other solver repeats."""
+def _result_places(mechanism: Mechanism) -> list[int]:
+    """Return the indices of the outputs that are results: all but residuals, which another solver does not reproduce."""
     return [n for n, name in enumerate(mechanism.output_names) if not name.endswith(".residual")]
 
 
 def _reference(
     mechanism: Mechanism, values: Mapping[str, Any], times: Sequence[float], inputs: _Inputs
 ) -> tuple[list[list[float]], list[list[float]]]:
-    """Return the inputs of all steps, and the outputs at the end of some, before the next inputs, both after the time."""
+    """Return rows of the inputs of all steps, and rows of the results at the end of some; each row begins with the time.
+
+    The results are those before the next inputs are set.
+    """
 
     def rounded(number: int, outputs: Sequence[float] | None) -> dict[str, float]:
         return {name: float(f"{value:.{DIGITS}g}") for name, value in inputs(number, outputs).items()}
@@ -124,7 +128,7 @@ def _reference(
     plant = Plant.of_values(mechanism, {**starts, **values, **first}, tolerance=REFERENCE, time=times[0])
     stimuli = [[times[0], *(first[name] for name in mechanism.input_names)]]
     outputs = list(plant.outputs())
-    places = _results(mechanism)
+    places = _result_places(mechanism)
     rows = [[times[0], *(outputs[place] for place in places)]]
     for n, time in enumerate(times[1:], start=1):
         plant.step(times[n - 1], time - times[n - 1])
@@ -139,9 +143,9 @@ def _reference(
 
 
 def _rounded(mechanism: Mechanism, rows: list[list[float]]) -> list[list[float]]:
-    """Round results, after the time, to `DIGITS` of the largest of their unit: another C library gives the same texts."""
+    """Round results to `DIGITS` digits of the largest value of their unit, so that another C library gives the same texts."""
     units = [v.unit for v in mechanism.variables if v.name in mechanism.output_names]
-    units = ["", *(units[place] for place in _results(mechanism))]
+    units = ["", *(units[place] for place in _result_places(mechanism))]
     largest: dict[str, float] = {}
     for unit, column in zip(units, zip(*rows)):
         largest[unit] = max(*map(abs, column), largest.get(unit, 0.0))

@@ -1,4 +1,4 @@
-"""The variables of a native FMU: those of the mechanism's table, and what model exchange needs beside them.
+"""The variables of a native FMU: those of the mechanism's table, and further ones for model exchange.
 
 The mechanism's variables come first, in their order, so that the value reference of each is the same in every kind of FMU.
 """
@@ -17,9 +17,9 @@ from linkwork.variables import UNITS, Variable
 
 from ..files import unknown_name
 
-#: The event indicator.
+#: Name of the event indicator.
 MARGIN = "assembly.margin_to_limit"
-#: The last two components of the state, each with its derivative, and both in words.
+#: The last two components of the state: name, name of the derivative, and descriptions of both.
 WORKS = (
     ("energy.dissipated", "power.dissipated", "Work lost since the start", "Power lost"),
     ("energy.supplied", "power.supplied", "Work of drives and loads since the start", "Power of drives and loads"),
@@ -36,7 +36,7 @@ class Entry(NamedTuple):
     reference : int
         Value reference: its place among the entries. The index of FMI 2.0 is one more.
     derivative_of : int or None
-        Value reference of the variable that it is the time derivative of.
+        Value reference of the variable whose time derivative it is.
     role : str
         Where its value comes from: ``parameter`` (a field of the mechanism's parameters), ``mode``, ``initial`` (a field of
         the state at the start), ``tolerance``, ``input`` (a channel), ``output`` (a component of ``equations.outputs``),
@@ -51,7 +51,7 @@ class Entry(NamedTuple):
 
 
 def with_starts(mechanism: Mechanism, values: Mapping[str, float]) -> Mechanism:
-    """Return a mechanism with other start values by FMI name, from which `build_native` makes an FMU with these values.
+    """Return a mechanism with other start ``values`` by FMI name; `build_native` then builds an FMU with these values.
 
     Raises
     ------
@@ -114,7 +114,7 @@ def _role(mechanism: Mechanism, variable: Variable) -> str:
 
 
 def _additions(mechanism: Mechanism) -> list[tuple[Variable, str]]:
-    """Return the variables that a native FMU has beside those of the mechanism, each with its role."""
+    """Return the variables that a native FMU has in addition to those of the mechanism, each with its role."""
     units = {v.name: v.unit for v in mechanism.variables}
     differentiated = {v.rate_of for v in mechanism.variables}
     added = [(Variable("time", "independent", "s", "Time"), "time")]

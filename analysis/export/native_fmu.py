@@ -1,6 +1,6 @@
-"""Making the native FMUs: the equations as C, the C shell around them, compiled for any platform by Zig.
+"""Build the native FMUs: the equations as C, with the C shell around them, compiled for any platform by Zig.
 
-Model exchange and co-simulation in one archive, FMI 2.0 or 3.0. The sources travel in it.
+One archive has model exchange and co-simulation, of FMI 2.0 or 3.0, and the sources.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ from .terminals import terminal_files
 
 
 class Platform(NamedTuple):
-    """A platform: what Zig calls it, the suffix of its libraries, its folders by the version of FMI, options of its own."""
+    """A platform: its name in Zig, the suffix of its libraries, its folders in FMI 2.0 and 3.0, its own compiler options."""
 
     target: str
     suffix: str
@@ -44,9 +44,9 @@ class Platform(NamedTuple):
     options: tuple[str, ...] = ()
 
 
-#: By the name that FMI 3.0 has for them. glibc 2.17 is that of RHEL 7; all later ones run what needs it; macOS 11 was the first
-#: for ARM, and without a version Zig asks for that of its own day. On Windows Zig adds
-#: 65 kB of its own: what is optimised for size there is not slower by more than the spread of measurements, some 5 %.
+#: Platforms by their names in FMI 3.0. glibc 2.17 is that of RHEL 7, and all later versions are compatible. macOS 11 was the
+#: first for ARM; without a version Zig requires the one that was new when Zig was made. On Windows Zig adds 65 kB of its own;
+#: code optimised for size is not slower there by more than the spread of measurements, some 5 %.
 PLATFORMS = {
     "x86_64-linux": Platform("x86_64-linux-gnu.2.17", "so", "linux64", "x86_64-linux"),
     "aarch64-linux": Platform("aarch64-linux-gnu.2.17", "so", "aarch64-linux", "aarch64-linux"),
@@ -55,13 +55,14 @@ PLATFORMS = {
     "aarch64-darwin": Platform("aarch64-macos.11.0", "dylib", "darwin64", "aarch64-darwin"),
 }
 
-#: The same arithmetic on every platform: no fused multiplications. A trap on undefined behaviour is for tests.
+#: Options of the compiler. Without fused multiplications the arithmetic is the same on every platform. Traps on undefined
+#: behaviour are for tests only.
 OPTIONS = (
     "-std=c11", "-O2", "-shared", "-fPIC", "-fvisibility=hidden", "-ffp-contract=off", "-fno-sanitize=undefined",
     "-ffunction-sections", "-Wl,--gc-sections", "-s",
 )  # fmt: skip
 
-#: The same as one module for WebAssembly, that imports nothing but what it is told to.
+#: Options for one WebAssembly module, which imports nothing but what it is told to.
 WASM_OPTIONS = (
     *(option for option in OPTIONS if option not in ("-shared", "-fPIC", "-fvisibility=hidden")),
     "-mexec-model=reactor", "-Wl,-z,stack-size=262144",
@@ -75,7 +76,7 @@ _HEADERS = {
     2: ("fmi2Functions.h", "fmi2FunctionTypes.h", "fmi2TypesPlatform.h"),
     3: ("fmi3Functions.h", "fmi3FunctionTypes.h", "fmi3PlatformTypes.h"),
 }
-#: What is compiled: it includes all the rest.
+#: Files to compile; they include all others.
 COMPILED = ("all.c",)
 _NOTES = (
     "The equations are those of the Python sources of Linkwork, written as C and compiled; nothing but the C library is "
@@ -119,7 +120,7 @@ def build_native(
     Raises
     ------
     BuildError
-        If Zig is not installed, a file does not compile, the FMU is not valid, or FMI 2.0 is to be for `WASM`.
+        If Zig is not installed, a file does not compile, the FMU is not valid, or `WASM` is asked for with FMI 2.0.
     InputError
         If there is no such platform.
     MechanismError
@@ -156,7 +157,7 @@ def build_native(
 def source_files(mechanism: Mechanism, kind: Kind, *, web: bool = False) -> dict[str, str]:
     """Return all C files of a native FMU by name: the shell, the headers of the standard, and the generated files.
 
-    With ``web`` also what makes a WebAssembly component of it.
+    With ``web`` there is also the file for a WebAssembly component.
 
     `COMPILED` includes all the others. The functions of the standard have the prefix FMI2_FUNCTION_PREFIX or
     FMI3_FUNCTION_PREFIX if it is defined; nothing else is visible outside.
@@ -175,7 +176,7 @@ def source_files(mechanism: Mechanism, kind: Kind, *, web: bool = False) -> dict
 
 
 def _with_prefix(fmi2: str, fmi3: str) -> str:
-    """Return the FMI 2.0 header with the standard's prefix of functions, which FMPy leaves out; FMI 3.0 has the same lines."""
+    """Return the FMI 2.0 header with the standard's lines for a function prefix, which FMPy omits, from the FMI 3.0 header."""
     first, last = fmi2.index("/*\nExport FMI2 API functions"), "#define fmi2FullName(name) name\n"
     lines = fmi3[fmi3.index("#if !defined(FMI3_OVERRIDE") : fmi3.index("/* FMI version */")]
     return fmi2[:first] + lines.replace("FMI3", "FMI2").replace("fmi3", "fmi2") + fmi2[fmi2.index(last) + len(last) :]
@@ -184,7 +185,7 @@ def _with_prefix(fmi2: str, fmi3: str) -> str:
 def compile_binaries(
     identifier: str, kind: Kind, sources: dict[str, str], platforms: Sequence[str]
 ) -> dict[str, bytes]:
-    """Compile the libraries and return them by place in the archive; two architectures of macOS share one file."""
+    """Compile the libraries and return them by path in the archive; two architectures of macOS share one file."""
     found: dict[str, list[bytes]] = {}
     with tempfile.TemporaryDirectory(prefix="linkwork-native-") as folder:
         for name, text in sources.items():
@@ -205,9 +206,9 @@ def compile_binaries(
 def compile_library(
     folder: Path | str, files: Sequence[str], library: str, target: str, options: Sequence[str] = OPTIONS
 ) -> None:
-    """Compile C files of a folder to a library in it.
+    """Compile C files of a folder to a library in the same folder.
 
-    What Zig compiles for itself, such as the C library, is kept with hashes and compiled again if a file has changed.
+    What Zig compiles for its own use, such as the C library, is cached with hashes and compiled again if a file has changed.
 
     Raises
     ------

@@ -1,8 +1,8 @@
-"""Making the Python FMUs.
+"""Build the Python FMUs.
 
-Each carries the plant, its slave and pythonfmu, and needs nothing but a Python of `OLDEST` in the importing process. The plant
-and the slave travel under names with a short hash of their content, because FMUs in one process share one interpreter:
-so different mechanisms, builds and versions run side by side, each on its own equations.
+Each contains the plant, its slave and pythonfmu, and only needs a Python of `OLDEST` or newer in the importing process. The
+plant and the slave have names with a short hash of their content, because FMUs in one process share one interpreter: so
+different mechanisms, builds and versions run side by side, each with its own equations.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ from .bill import with_bill
 from .description import PYTHON, description, token
 from .experiments import experiments
 
-#: The oldest Python that what travels in the FMUs runs on.
+#: The oldest Python on which the modules in the FMUs run.
 OLDEST = (3, 10)
 
 _NEEDS_PYTHON = (
@@ -106,7 +106,7 @@ class {name}(LinkworkSlave):
 
 
 class _Staged(NamedTuple):
-    """What travels inside an FMU: the script with its slave, the package of the plant, what all slaves share."""
+    """Files inside an FMU: script of its slave, package of the plant, module that all slaves share; name of the mechanism."""
 
     script: Path
     package: Path
@@ -115,7 +115,7 @@ class _Staged(NamedTuple):
 
 
 def _stage(mechanism: Mechanism, sources: Path, stage: Path) -> _Staged:
-    """Copy plant and slave under names with a hash of their content; a mechanism from elsewhere joins the plant."""
+    """Copy plant and slave under names with a hash of their content; a mechanism of another package is put into the plant's."""
     shared = sources / "linkwork"
     package = str(mechanism.modules[-1].__package__)
     folder = package.rpartition(".")[2]
@@ -163,14 +163,14 @@ _CONTROLLER = "from {module} import {kind}\n\n\nclass {kind}Controller({kind}):\
 
 
 def build_controller(name: str, dest: Path | str = "build") -> Path:
-    """Build the Python FMU of a controller and return its path, in a folder by the hash of what it carries.
+    """Build the Python FMU of a controller and return its path, in a subfolder named by the hash of its content.
 
     Parameters
     ----------
     name : str
         One of `controllers.CONTROLLERS`.
     dest : path
-        An FMU of the same content that is there is kept.
+        Folder of the subfolder; if it already has the FMU of the same content, this is kept.
     """
     text, shared = (Path(str(module.__file__)).read_text(encoding="utf-8") for module in (controllers, wrapper))
     kind, tag = controllers.CONTROLLERS[name].__name__, hashlib.sha256(f"{text}\0{shared}".encode()).hexdigest()[:8]

@@ -21,7 +21,7 @@ _FAT, _X86, _ARM = b"\xca\xfe\xba\xbe", b"\x07\x00\x00\x01", b"\x0c\x00\x00\x01"
 
 
 class Compared(NamedTuple):
-    """What was compared, whether it is the same, and what it was compared with."""
+    """A comparison: what was compared, whether it is the same, and a text on what it was compared with."""
 
     what: str
     same: bool
@@ -29,10 +29,10 @@ class Compared(NamedTuple):
 
 
 def rebuild(fmu: Path | str) -> Iterator[Compared]:
-    """Compare an FMU with its bill of materials, and its libraries with what its sources give here.
+    """Compare an FMU with its bill of materials, and its libraries with those that its sources give here.
 
     The libraries of a native FMU are compiled again; library and modules of PythonFMU in a Python FMU are compared with the
-    installed package. The same bytes come of the same versions of the programs that the bill names.
+    installed package. They have the same bytes if the programs have the versions that the bill names.
 
     Yields
     ------
@@ -64,13 +64,13 @@ def rebuild(fmu: Path | str) -> Iterator[Compared]:
 
 
 def _versions(tools: dict[str, str], name: str) -> str:
-    """Say by which version of a program the FMU was made, and which is here."""
+    """Return a text on the version of a program that made the FMU, and on the version installed here."""
     here = metadata.version(name)
     return f"{name} {here}" if tools.get(name) == here else f"made by {name} {tools.get(name)}, here is {here}"
 
 
 def _compiled(files: dict[str, bytes], tools: dict[str, str]) -> Iterator[Compared]:
-    """Compile the sources for every platform of the binaries."""
+    """Compile the sources for every platform of the binaries and compare the results."""
     root = ElementTree.fromstring(files["modelDescription.xml"])
     kind = NATIVE_FMI3 if root.get("fmiVersion", "").startswith("3") else NATIVE
     part = root.find("CoSimulation")
@@ -87,7 +87,7 @@ def _compiled(files: dict[str, bytes], tools: dict[str, str]) -> Iterator[Compar
             if place.split("/")[1] == (platform.folder_fmi2 if kind.fmi == 2 else platform.folder_fmi3)
         ]
         head = files[place][:8]
-        if len(wanted) > 1 and head[:4] != _FAT:  # of the two of macOS one alone
+        if len(wanted) > 1 and head[:4] != _FAT:  # only one of the two architectures of macOS
             wanted = [name for name in wanted if head[4:] == (_ARM if name.startswith("aarch64") else _X86)]
         if not wanted:
             yield Compared(place, False, "is for none of the platforms that Linkwork compiles for")

@@ -1,4 +1,4 @@
-"""Terminals and icons of FMUs of FMI 3.0: what is connected together, by one line in a tool."""
+"""Write terminals and icons of FMUs of FMI 3.0; a terminal groups the variables that a tool connects by one line."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from .description import written
 
 #: Size of an icon (pixels), and of the drawing that terminals are placed in.
 _PIXELS, _SIZE = 32, 100
-#: Icons of terminals: whether a pixel is black, by its distance from the middle; a shaft, a slider, a loaded point.
+#: Icons of terminals (a shaft, a slider, a loaded point): whether the point (x, y) in [-1, 1] is black.
 _ICONS: Mapping[str, Callable[[float, float], bool]] = {
     "rotational": lambda x, y: x * x + y * y < 1.0,
     "translational": lambda x, y: max(abs(x), abs(y)) < 0.9,
@@ -31,8 +31,8 @@ def terminal_files(mechanism: Mechanism) -> dict[str, bytes]:
 def terminals(mechanism: Mechanism) -> bytes:
     """Return ``terminalsAndIcons.xml`` with the terminals of shafts, sliders and loaded points.
 
-    A terminal for each freedom, with coordinate, rate and acceleration, its inputs, and the torque or force applied; one for
-    the inputs of each point that a load acts on, with its displacement. Forces and torques flow in, all else are signals.
+    Each freedom has a terminal with its coordinate, rate and acceleration, its inputs, and the torque or force applied; each
+    loaded point has one with its load inputs and its displacement. Forces and torques are inflows, all others signals.
     """
     root = Element("fmiTerminalsAndIcons", {"fmiVersion": "3.0"})
     picture = SubElement(root, "GraphicalRepresentation")
@@ -91,7 +91,7 @@ def _terminals(mechanism: Mechanism) -> dict[str, tuple[str, dict[str, str]]]:
 
 
 def _icon(inside: Callable[[float, float], bool]) -> bytes:
-    """Return a PNG of grey and transparency, black inside (ISO/IEC 15948)."""
+    """Return a PNG (ISO/IEC 15948) that is black where ``inside`` and transparent elsewhere."""
     places = [(2 * n + 1) / _PIXELS - 1.0 for n in range(_PIXELS)]
     rows = b"".join(b"\0" + b"".join(b"\0\xff" if inside(x, y) else b"\0\0" for x in places) for y in places)
 

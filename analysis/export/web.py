@@ -1,6 +1,6 @@
-"""A mechanism for a browser: the C of a native FMU behind a face of its own, as WebAssembly that imports nothing.
+"""Build a mechanism for a browser: the C of a native FMU with an interface of its own, as WebAssembly without imports.
 
-The sizes of the arrays are those of the mechanism, so that each has a module of its own.
+The arrays have the sizes of the mechanism, so that each mechanism has a module of its own.
 """
 
 from __future__ import annotations
@@ -20,10 +20,10 @@ from .description import NATIVE
 from .equations_c import beginning, c_of, generated
 from .native_fmu import EVERYWHERE, WASM, WASM_OPTIONS, compile_library
 
-#: What a browser's module shares with a native FMU, and what it has of its own.
+#: C files that a browser's module shares with a native FMU, and the folder of its own files.
 _SHARED = ("model.h", "plant.h", "plant.c", "step.h")
 _OWN = Path(__file__).with_name("browser")
-#: The equations to which the page adds a motor's torque: the shell calls them by other names.
+#: Equations to which the page adds a motor's torque: the shell calls them with the prefix ``driven_``.
 _DRIVEN = ("derivative", "outputs", "clearance", "forward")
 
 
@@ -57,12 +57,12 @@ def web_sources(mechanism: Mechanism) -> dict[str, str]:
 
 
 def crank_number(mechanism: Mechanism) -> int:
-    """Return the number of the first freedom that turns; -1 without one."""
+    """Return the number of the first freedom that turns; -1 if there is none."""
     return next(iter(mechanism.cyclic), -1)
 
 
 def _header(mechanism: Mechanism) -> str:
-    """Return the text of drawing.h, the declarations that a native FMU does not have."""
+    """Return the text of drawing.h: the declarations that a browser's module has in addition to a native FMU's."""
     joints = mechanism.drawing.joints if mechanism.drawing else ()
     freedoms = mechanism.freedoms
     crank = crank_number(mechanism)
@@ -78,7 +78,7 @@ def _header(mechanism: Mechanism) -> str:
             "#include <stdbool.h>",
             '#include "model.h"',
             "/* TORQUE: the input that is the torque on the crank, -1 without */",
-            f"enum {{ JOINTS = {len(joints)}, CRANK = {crank}, TORQUE = {_torque_of(mechanism, crank)} }};",
+            f"enum {{ JOINTS = {len(joints)}, CRANK = {crank}, TORQUE = {_torque_input(mechanism, crank)} }};",
             f"enum {{ MOTOR = {len(MOTOR)} }};",
             "extern double motor[MOTOR], motor_change[MOTOR];",
             f"#define PERIOD {freedoms[crank].period if crank >= 0 else 0.0!r}",
@@ -97,8 +97,8 @@ def _header(mechanism: Mechanism) -> str:
     )
 
 
-def _torque_of(mechanism: Mechanism, crank: int) -> int:
-    """Return the number of the input that is the torque on the crank; -1 without one."""
+def _torque_input(mechanism: Mechanism, crank: int) -> int:
+    """Return the number of the input that is the torque on the freedom ``crank``; -1 if there is none."""
     return next((n for n, c in enumerate(mechanism.channels) if c.kind == "force" and c.freedom == crank >= 0), -1)
 
 
@@ -125,14 +125,14 @@ def _drawing(mechanism: Mechanism) -> str:
 
 
 def _driven(mechanism: Mechanism) -> list[tuple[Any, ...]]:
-    """Return functions as names, arguments and results: motor torque, derivatives under it, and matrices at rest."""
+    """Return functions, each as name, arguments and results: motor torque, derivatives with a motor, matrices at rest."""
     casadi = symbolic.library()
     join, sx, freedoms = casadi.vertcat, casadi.SX, len(mechanism.freedoms)
     motor, speed, d_motor, d_speed = (sx.sym(n, size) for n, size in zip("mvde", (len(MOTOR), 1, len(MOTOR), 1)))
     torque = kloss(motor, speed)
     crank = crank_number(mechanism)
     other = next((n for n in range(freedoms) if n != crank), -1)
-    trace, place = expressions(mechanism), _torque_of(mechanism, crank)
+    trace, place = expressions(mechanism), _torque_input(mechanism, crank)
     run = trace.symbols
     acting = join(run.u)
     if place >= 0:
@@ -160,7 +160,7 @@ def _places(mechanism: Mechanism, x: Any, modes: Any, u: Any, p: Any) -> Any:
     functions = symbolic.traced((*mechanism.modules, sys.modules[drawing.positions.__module__]))
     *constants, _ = casadi.vertsplit(p)
     k = mechanism.constants(*constants)
-    if mechanism.switch:  # where the joints are, friction does not say
+    if mechanism.switch:  # the positions of the joints do not depend on friction
         k = k._replace(**{mechanism.switch: 0.0})
     modes, channels = (tuple(casadi.vertsplit(v)) if v.numel() else () for v in (modes, u))
     acting = functions.of(mechanism.equations.applied)(modes, channels, k)
