@@ -4,12 +4,12 @@ At prescribed speed the coordinates follow from the rates, and the rates from th
 are therefore the slopes w at the Gauss nodes of each element of a period, and y at its beginning. Newton's method corrects all
 of them together. The slopes of an element are eliminated first; small matrices, whose product is the monodromy matrix, then
 join the elements. With NODES nodes the ends of the elements are of order 2 NODES (E. Hairer, S. P. Norsett, G. Wanner, Solving
-Ordinary Differential Equations I, section II.7). From a good guess, which neighbours give at every node, two or three
-corrections suffice, each with a sixth of the right-hand sides that an integrator of order 8 needs for a period. The decay of
-the Legendre coefficients over each element tells the error.
+Ordinary Differential Equations I, section II.7). From a good guess, which a neighbouring motion gives at every node, two or
+three corrections suffice. Each evaluates the right-hand side a sixth as often as an integrator of order 8 does. The decay of
+the Legendre coefficients over each element is a measure of the error.
 
-The elements are linearised in lanes, as many at once as the processor takes doubles: element e is lane ``e % LANES`` of row
-``e // LANES`` of an array in lanes. Lanes beyond the last element repeat it.
+LANES elements are linearised at once by vector instructions: element e is lane ``e % LANES`` of row ``e // LANES`` of an array
+"in lanes". Lanes beyond the last element repeat it.
 """
 
 from __future__ import annotations
@@ -32,57 +32,55 @@ from .kernels import DIVERGED, DONE, LIMIT, NO_STEP, SECTION, advance, eliminate
 
 #: Nodes of an element.
 NODES = 12
-#: Nodes and weights on an element of length 1, integrals of the Lagrange polynomials up to each node, and their integrals.
+#: Nodes C and weights B on an element of length 1; A integrates the Lagrange polynomials up to each node, AA twice, and BA
+#: integrates them twice up to the end.
 C, B, A, _COEFFICIENTS = gauss(NODES)
 AA = np.ascontiguousarray(A @ A)
 BA = B @ A
-#: The two highest Legendre coefficients.
+#: Rows that compute the two highest Legendre coefficients from values at the nodes.
 TAIL = np.ascontiguousarray(_COEFFICIENTS[-2:])
-#: Tail of the coefficients at most, relative to the root of the integrator's tolerance: the ends of the elements are good to
-#: about its square.
+#: Greatest size of the highest Legendre coefficients, relative to the square root of the integrator's tolerance: the error at
+#: the ends of the elements is about the square of that size.
 DECAY = 200.0
-#: Corrections at most, and the greatest first one, relative to the scale: a motion farther away is no neighbour.
+#: Greatest number of corrections, and greatest size of the first one relative to the scale: a motion farther away is no
+#: neighbour.
 _CORRECTIONS, _FAR = 8, 1.0
 
 
 class Desk(NamedTuple):
-    """Work space of a period.
+    """Work space of a period: arrays in lanes of all elements, then of one row of elements, then matrices that join elements.
 
-    In lanes, a row for so many elements: angles and lengths of the elements; what `linearise` makes of y and w, which are y at
-    the ends with the slopes corrected, its derivatives by y at the beginnings, row by row, and by lambda, and the moves of the
-    slopes (the corrections, and their derivatives likewise, of the form (NODES f, 1 + n (+ 1))); changes of y at the
-    beginnings. In lanes, for one row at a time: arguments and values of the flow, the latter at each node; a number of each
-    element; the linear equations; slopes by lambda of the coordinates at the nodes. Not in lanes: the matrices and vectors of
-    n that join the elements.
+    f = n / 2 is the number of coordinates.
     """
 
-    angles: NDArray[np.float64]  # shape (rows, LANES)
-    lengths: NDArray[np.float64]
-    ends: NDArray[np.float64]  # (rows, n LANES)
-    matrices: NDArray[np.float64]  # (rows, n n LANES)
-    slopes: NDArray[np.float64]  # (rows, n LANES)
-    moves: NDArray[np.float64]  # (rows, NODES f (1 + n (+ 1)) LANES)
-    shifts: NDArray[np.float64]  # (rows, n LANES)
-    z: NDArray[np.float64]
-    out: NDArray[np.float64]
-    single: NDArray[np.float64]
-    equations: NDArray[np.float64]
-    along: NDArray[np.float64]
-    monodromy: NDArray[np.float64]
-    system: NDArray[np.float64]
-    shift: NDArray[np.float64]
-    column: NDArray[np.float64]
+    angles: NDArray[np.float64]  # beginnings of the elements (rad), shape (rows, LANES)
+    lengths: NDArray[np.float64]  # lengths of the elements (rad), (rows, LANES)
+    ends: NDArray[np.float64]  # y at the ends of the elements, with the slopes corrected, (rows, n LANES)
+    matrices: NDArray[np.float64]  # derivatives of ``ends`` by y at the beginnings, (rows, n n LANES)
+    slopes: NDArray[np.float64]  # derivatives of ``ends`` by lambda, (rows, n LANES)
+    # corrections of the slopes w, and their derivatives by y and by lambda, (rows, NODES f (1 + n (+ 1)) LANES)
+    moves: NDArray[np.float64]
+    shifts: NDArray[np.float64]  # changes of y at the beginnings, (rows, n LANES)
+    z: NDArray[np.float64]  # arguments of the flow
+    out: NDArray[np.float64]  # values of the flow at each node
+    single: NDArray[np.float64]  # a number for each element of a row, (LANES,)
+    equations: NDArray[np.float64]  # linear equations for the corrections of the slopes
+    along: NDArray[np.float64]  # derivatives by lambda of the coordinates' slopes at the nodes
+    monodromy: NDArray[np.float64]  # (n, n)
+    system: NDArray[np.float64]  # (n, n + 1)
+    shift: NDArray[np.float64]  # change of y, (n,)
+    column: NDArray[np.float64]  # (n,)
 
 
 @inner
 def row_count(elements):
-    """Return the number of rows that hold so many elements."""
+    """Return the number of rows of lanes that hold ``elements`` elements."""
     return (elements + LANES - 1) // LANES
 
 
 @part
 def make_desk(n, most, directional):
-    """Make work space for y of n components and at most ``most`` elements."""
+    """Make the work space for y of n components and at most ``most`` elements; with lambda if ``directional``."""
     f, columns = n // 2, n + 1 if directional else n
     unknowns, rows = NODES * f, row_count(most)
     return Desk(
@@ -107,7 +105,7 @@ def make_desk(n, most, directional):
 
 @inner
 def lay_elements(angles, desk):
-    """Write the angles at which elements begin, with the end of the last, onto the desk."""
+    """Write the beginnings and lengths of the elements onto the desk; ``angles`` are the beginnings and the end of the last."""
     m = angles.shape[0] - 1
     for place in range(row_count(m) * LANES):
         e = min(place, m - 1)
@@ -117,7 +115,7 @@ def lay_elements(angles, desk):
 
 @inner
 def _identity(matrix):
-    """Write the identity matrix, and zeros beside it."""
+    """Write the identity into a matrix, and zeros into further columns."""
     for i in range(matrix.shape[0]):
         for j in range(matrix.shape[1]):
             matrix[i, j] = 1.0 if i == j else 0.0
@@ -125,7 +123,7 @@ def _identity(matrix):
 
 @inner
 def _equation(section, desk):
-    """Return the address of the flow with its derivatives, by lambda if there is room for them."""
+    """Return the address of the flow with its derivatives, those by lambda included if the desk has room for them."""
     n = desk.shift.shape[0]
     directional = desk.out.shape[1] > n * (1 + n) * LANES
     return section.equations[IN_LANES + (DIRECTIONAL if directional else VARIATIONAL)]
@@ -162,7 +160,7 @@ def _at_node(s, row, unit, y, w, desk):
 
 @inner
 def _linearise_row(section, row, unit, y, w, desk):
-    """Linearise a row of elements about y and w, and eliminate the slopes."""
+    """Linearise a row of elements about y and w, and eliminate the slopes; the results are written onto the desk."""
     n = desk.shift.shape[0]
     f = n // 2
     system, unknowns = desk.equations, NODES * f
@@ -205,10 +203,10 @@ def _linearise_row(section, row, unit, y, w, desk):
 
 @inner
 def _eliminate(system, unknowns, width):
-    """Solve linear equations in lanes: ``kernels.eliminate`` without pivots, which these need not while elements are short.
+    """Solve linear equations in lanes, as ``kernels.eliminate`` does but without pivots.
 
-    The equations are those of the identity less a multiple of the element's length. Where they are far from it the corrections
-    do not converge.
+    The matrix is the identity minus a multiple of the element's length: no pivots are needed while elements are short. If it is
+    far from the identity, the corrections do not converge.
     """
     for c in range(unknowns):
         inverse = 1.0 / load(system, c * width + c)
@@ -228,7 +226,7 @@ def _eliminate(system, unknowns, width):
 
 @inner
 def _close_row(row, unit, y, w, desk):
-    """Write the ends of a row of elements with their derivatives, from the moves of the slopes."""
+    """Compute y at the ends of a row of elements, with its derivatives, from the corrections of the slopes."""
     n = desk.shift.shape[0]
     f = n // 2
     moves = desk.moves[row]
@@ -248,7 +246,7 @@ def _close_row(row, unit, y, w, desk):
                 store(desk.ends[row], i, load(y[row], i) + h * unit * start + coordinate)
                 store(desk.ends[row], f + i, start + rate)
             elif j <= n:
-                # the columns of the free motion: the identity, and h unit from a rate to its coordinate
+                # with constant rates the derivatives are the identity, and h unit of a coordinate by its rate
                 k = j - 1
                 store(desk.matrices[row], i * n + k, coordinate + (1.0 if k == i else 0.0))
                 if k == f + i:
@@ -263,7 +261,7 @@ def _close_row(row, unit, y, w, desk):
 
 @inner
 def linearise(section, y, w, desk):
-    """Linearise all elements about y and w, in lanes; see `Desk`."""
+    """Linearise all elements about y and w, and write the results onto the desk; see `Desk`."""
     unit = _pace(section, y, desk)
     for row in range(y.shape[0]):
         _linearise_row(section, row, unit, y, w, desk)
@@ -271,10 +269,10 @@ def linearise(section, y, w, desk):
 
 @inner
 def _carry(e, y, following, desk):
-    """Carry a change of y, ``desk.shift``, from the beginning of an element to that of the following one.
+    """Replace ``desk.shift``, the change of y at the beginning of element e, by that at the beginning of the next element.
 
-    With -1 for that it is y at the end instead. The change at the beginning is noted in the lane of the element, and after the
-    last one in those that repeat it.
+    ``following`` is the number of the next element; if it is -1, the result is y at the end of element e. The change at the
+    beginning is written into ``desk.shifts``, in the lane of the element and the lanes after it.
     """
     shift, column = desk.shift, desk.column
     row, lane, n = e // LANES, e % LANES, shift.shape[0]
@@ -291,7 +289,7 @@ def _carry(e, y, following, desk):
 
 @inner
 def _chain(e, product, desk):
-    """Multiply a product of matrices by that of an element from the left, in place."""
+    """Multiply ``product`` from the left by the matrix of element e, in place."""
     row, lane, n, column = e // LANES, e % LANES, product.shape[0], desk.column
     for j in range(product.shape[1]):
         for i in range(n):
@@ -304,7 +302,7 @@ def _chain(e, product, desk):
 
 @inner
 def _greatest(values, so_far):
-    """Return the greatest of numbers that are not negative; NaN if one is NaN."""
+    """Return the greatest of ``so_far`` and the values, which are not negative; NaN if one is NaN."""
     for value in values:
         if not (value <= so_far or isnan(so_far)):
             so_far = value
@@ -313,7 +311,7 @@ def _greatest(values, so_far):
 
 @inner
 def _move(section, y, w, desk):
-    """Correct y and slopes of all elements by their changes of y; return the size of the correction, relative to the scale."""
+    """Correct y and the slopes of all elements by ``desk.shifts``; return the greatest correction, relative to the scale."""
     n = desk.shift.shape[0]
     f = n // 2
     columns = desk.moves.shape[1] // (NODES * f * LANES)
@@ -342,9 +340,9 @@ def _move(section, y, w, desk):
 
 @inner
 def _correct_period(section, m, y, w, desk):
-    """Correct y and w of a closed period of m elements once; return the size of the correction, NaN if there is none.
+    """Correct y and w of a closed period of m elements once; return the greatest correction, relative to the scale.
 
-    The monodromy matrix before the correction is written on the desk.
+    It is NaN if the linear system has no solution. The monodromy matrix before the correction is written onto the desk.
     """
     n = desk.shift.shape[0]
     linearise(section, y, w, desk)
@@ -369,9 +367,9 @@ def _correct_period(section, m, y, w, desk):
 
 @inner
 def _tails(section, row, w, desk):
-    """Compute the size of the last Legendre coefficients of the slopes and of their derivatives, relative to the greatest.
+    """Compute the size of the highest Legendre coefficients of the slopes and of their derivatives, relative to the greatest.
 
-    It is written into ``desk.single`` for each of a row of elements.
+    The size for each element of the row is written into ``desk.single``.
     """
     scale = section.scale
     n = scale.shape[0]
@@ -412,9 +410,10 @@ def _least_gap(section, y, w, desk):
 
 @part
 def close(section, m, y, w, desk):
-    """Solve y and slopes of a closed period of m elements, in lanes, by Newton's method; return a `Status` and the tail.
+    """Solve y and w of a closed period of m elements, in lanes, by Newton's method.
 
-    NO_STEP means that the elements are too few: the tail of the Legendre coefficients is long.
+    Return a `Status` and the relative size of the highest Legendre coefficients. NO_STEP means that this size is too large: the
+    elements are too few.
     """
     before = tail = 0.0
     for count in range(_CORRECTIONS):
@@ -434,10 +433,10 @@ def close(section, m, y, w, desk):
 
 @part
 def spread(section, angles, first, start, y, w, room):
-    """Compute y and slopes of elements, from number ``first`` on, by the integrator; return a `Status`.
+    """Compute y and w of elements, from number ``first`` on, by the integrator; return a `Status`.
 
-    ``start``, y at the beginning of the first, becomes y at the end of the last. ``angles`` are those at which they begin, and
-    that of the end.
+    ``start``, y at the beginning of the first element, becomes y at the end of the last. ``angles`` are the beginnings of these
+    elements and the end of the last.
     """
     n = start.shape[0]
     out = np.empty(n)
@@ -462,7 +461,7 @@ def spread(section, angles, first, start, y, w, room):
 
 @inner
 def repeat_last(m, many):
-    """Repeat the last of m elements in the lanes beyond it."""
+    """Copy the last of m elements into the lanes beyond it."""
     row, lane = (m - 1) // LANES, (m - 1) % LANES
     for i in range(many.shape[1] // LANES):
         for other in range(lane + 1, LANES):
@@ -470,15 +469,15 @@ def repeat_last(m, many):
 
 
 class Neighbour(NamedTuple):
-    """A neighbouring motion in lanes: y at the beginnings of the elements, slopes, and their moves, see `Desk`."""
+    """A neighbouring motion, in lanes."""
 
-    y: NDArray[np.float64]
-    w: NDArray[np.float64]
-    moves: NDArray[np.float64]
+    y: NDArray[np.float64]  # y at the beginnings of the elements, shape (rows, n LANES)
+    w: NDArray[np.float64]  # slopes at the nodes, (rows, NODES f LANES)
+    moves: NDArray[np.float64]  # as in `Desk`
 
 
 def neighbour(m: int, n: int) -> Neighbour:
-    """Return the place of a motion of m elements and y of n components, without a motion."""
+    """Return an empty `Neighbour` for a motion of m elements and y of n components."""
     sizes = np.array([n, NODES * (n // 2), NODES * (n // 2) * (2 + n)]) * LANES
     return Neighbour(*(np.zeros((-(-m // LANES), size)) for size in sizes))
 
@@ -520,7 +519,7 @@ def _predict(firsts, starts, change, unit, neighbour, desk):
 
 @inner
 def _correct_pieces(section, firsts, starts, y, w, desk, rows):
-    """Correct y and w of pieces with given beginnings once; return the size of the correction.
+    """Correct y and w of pieces with given beginnings once; return the greatest correction, relative to the scale.
 
     The ends of the pieces are written into ``rows``.
     """
@@ -555,7 +554,7 @@ def _write_derivatives(firsts, rows, desk):
 
 @part
 def _walk(section, angles, firsts, starts, change, known, neighbour, found, tables):
-    """Do the work of `walk`, which holds the arrays that are referred to here."""
+    """Do the work of `walk`, which keeps the arrays of the desk ``tables`` alive while they are used here."""
     y, w, moves = neighbour
     m, desk, room = angles.shape[0] - 1, refer(tables), make_room(section, 0)
     lay_elements(angles, desk)
@@ -566,7 +565,7 @@ def _walk(section, angles, firsts, starts, change, known, neighbour, found, tabl
             first, last = firsts[piece], firsts[piece + 1]
             status = spread(section, angles[first : last + 1], first, starts[piece].copy(), y, w, room)
             if status != DONE:
-                # that the integrator finds no step is no matter of the elements' length
+                # shorter elements would not help the integrator to find a step
                 return LIMIT if status == LIMIT else DIVERGED
     repeat_last(m, y)
     repeat_last(m, w)

@@ -39,13 +39,13 @@ from .kernels import Section, Status
 FloatArray = NDArray[np.float64]
 #: Bound of the local error of a step; the solution is good to about a hundred times as much.
 INTEGRATOR_TOLERANCE = 1e-12
-#: Growth of a deviation over a period, or over one of its pieces, from which it is divided into (more) pieces; growth aimed at
-#: for each; places of a turn from which the ends of the pieces are chosen.
+#: Growth of a deviation over a period, or over one of its pieces, above which the period is divided into (more) pieces; growth
+#: wanted over each piece; number of crank angles in a turn from which the ends of the pieces are chosen.
 GROWTH, AIM, PLACES = 1e3, 10.0, 64
-#: Pieces of a turn at least.
+#: Least number of pieces in a turn.
 _FEWEST = 8
-#: Collocation: calls left to shooting after one in which no number of elements sufficed; elements of a turn to begin with;
-#: elements at most, for each piece and beside eight times as many as that; calls after which they are chosen anew.
+#: Collocation: calls that use shooting after collocation has failed; elements in a turn at first; greatest number of elements
+#: for each piece, in addition to eight times the first number; calls after which the elements are chosen anew.
 _PAUSE, _ELEMENTS, _MOST, _RENEWED = 16, 8, 8, 64
 #: Clearance to the limit of assembly below which shooting takes over: between the nodes the links may come nearer.
 _NEAR = 1e-2
@@ -150,7 +150,7 @@ class OperatingPoint:
         start : ndarray, shape (n,)
             State that gives the magnitudes of y.
         *functions : int
-            Numbers of the flow's functions that are called, beside GAP.
+            Indices of the flow's functions that are needed, in addition to GAP.
         direction : Direction, optional
             Derivatives by a parameter lambda; zero without it.
         along : float
@@ -228,7 +228,7 @@ def operating_point(parameters: Parameters, drive: Drive) -> OperatingPoint:
 def _repeats(point: OperatingPoint) -> bool:
     """Return whether a mechanism is the same after a period, and after a whole turn of each link that swings.
 
-    So counts one that can be joined at none of the angles tried.
+    The result is also True if the links can be joined at none of the angles tried.
     """
     mechanism, flow, rates = point.mechanism, point.flow, len(point.mechanism.freedoms)
     modes, u, p = tuple(map(float, flow.modes)), point.vector[: flow.inputs], point.parameters.constants()
@@ -247,7 +247,7 @@ def _repeats(point: OperatingPoint) -> bool:
 
 
 def _unpickle(mechanism: Mechanism, parameters: Parameters, drive: Drive) -> OperatingPoint:
-    """Return an operating point in a process that may not know a mechanism that the caller has registered."""
+    """Rebuild an operating point from a pickle; register its mechanism if this process does not know it."""
     MECHANISMS.setdefault(mechanism.name, mechanism)
     return operating_point(parameters, drive)
 
@@ -345,7 +345,7 @@ def choose_pieces(point: OperatingPoint, places: FloatArray, turns: int) -> tupl
 
 
 class Discretisation:
-    """Pieces of a period along a family of motions, solved by collocation from the last motion, or else by shooting.
+    """The pieces of a period along a family of motions, solved by collocation from the last motion, or else by shooting.
 
     Parameters
     ----------
@@ -383,7 +383,7 @@ class Discretisation:
         return point.shoot(self.angles, starts, direction, along)
 
     def _collocate(self, section: Section, flow: Flow, starts: FloatArray, value: float) -> Ends | None:
-        """Compute the ends by collocation on as many elements as are needed; None if it fails here."""
+        """Compute the ends by collocation on as many elements as are needed; return None if shooting has to replace it."""
         k, n = starts.shape
         self._calls += 1
         if self._calls % _RENEWED == 1:
@@ -411,7 +411,7 @@ class Discretisation:
             if status == Status.NO_STEP:
                 long = ~(found.tails <= collocation.DECAY * np.sqrt(section.tolerance))
             elif known:
-                # not found from the neighbour: without it
+                # not found from the neighbour: try without it
                 continue
             else:
                 long = np.ones(len(found.tails), dtype=bool)
@@ -421,7 +421,7 @@ class Discretisation:
         return None
 
     def _divide(self, mesh: FloatArray, n: int) -> None:
-        """Divide the pieces into new elements, without a solution to start from."""
+        """Divide the pieces into new elements that begin at the angles ``mesh``, and forget the last motion."""
         self._value = None
         self._mesh = mesh
         self._firsts = np.searchsorted(mesh, self.angles).astype(np.int64)

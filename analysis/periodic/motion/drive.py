@@ -22,7 +22,7 @@ from ...run import InductionMotor, Inputs, driven, given, speed_ratio, started, 
 from ...units import Amount, in_si
 from .flow import Crank, Flow, crank_of, flow, turning_of
 
-#: What to do about a negative speed.
+#: Advice in messages about a negative speed.
 _MIRROR = (
     "; for a crank that turns the other way describe the mirror image: y and angles, that of gravity too, with the opposite "
     "sign, and assemblies to match"
@@ -82,7 +82,7 @@ class Drive:
     ratios : mapping of str to Fraction
         Turns of other cranks for each turn of the crank, by their FMI names; follow from ``speeds``. A crank that is
         neither free nor among them is held. A link that nothing drives may go round, too: its coordinate with the ratio, such
-        as ``{"swing.angle": 1}``; without one its motions are those in which it swings.
+        as ``{"swing.angle": 1}``; without a ratio only motions in which it swings are meant.
     motors : mapping of str to InductionMotor
         Motors on other cranks by the FMI names of the torques.
     speeds : mapping of str to float, optional
@@ -158,12 +158,12 @@ class Drive:
         return {turning_of(mechanism, name): ratio for name, ratio in self.ratios.items()}
 
     def arguments(self, mechanism: Mechanism) -> Mapping[str, str]:
-        """Return the way in which each freedom with a mode is driven: the mode's name, and one of its `Mode.arguments`.
+        """Return how each freedom with a mode is driven, as one of `Mode.arguments` by the name of the mode.
 
         Raises
         ------
         InputError
-            If a mode is not one of a freedom beside the crank, or has no such value.
+            If ``modes`` names a mode that no freedom other than the crank has, or gives it a value that does not exist.
         """
         return _arguments(
             mechanism,
@@ -209,20 +209,20 @@ class Drive:
         return made
 
     def with_rounds(self, mechanism: Mechanism, rounds: Mapping[str, int], turns: int) -> tuple[Drive, int]:
-        """Return the drive of motions in which links go round so many times in ``turns`` common periods.
+        """Return the drive of motions in which links go round given numbers of times in ``turns`` common periods.
 
         Parameters
         ----------
         mechanism : Mechanism
         rounds : mapping of str to int
-            By the coordinates of links that swing.
+            Numbers of whole turns, by the coordinates of links that swing.
         turns : int
 
         Returns
         -------
         drive : Drive
         turns : int
-            Its own common periods in the same time: fewer if the links need several to come round.
+            Common periods of the new drive in the same time: fewer than before if the new ones are longer.
         """
         made, way = self.flow(mechanism), {f.coordinate: round(f.period / (2.0 * pi)) for f in mechanism.freedoms}
         ratios = {name: Fraction(times * way[name], turns * made.turns) for name, times in rounds.items()}
@@ -235,9 +235,9 @@ class Drive:
         Raises
         ------
         UnknownNameError
-            If there is no force of a name.
+            If there is no force, or no motor torque, of a given name.
         InputError
-            If a force does not act, or a coordinate is not one that is held.
+            If a force does not act, or if ``held`` names a coordinate that is not held.
         """
         made, crank, ratios = self.flow(mechanism), self.reference(mechanism), self.turning(mechanism)
         numbers = {c.name: n for n, c in enumerate(mechanism.channels)}
@@ -331,7 +331,7 @@ def _arguments(
         kind = "command" if number == crank and speed_drive else "force"
         acts = kind in names and (number == crank or names[kind].name in acting)
         if not acts and number in turning:
-            # a crank that nothing drives follows, where its speed can be commanded
+            # a crank with a ratio but without a force is commanded, if its speed can be
             kind, acts = ("command", True) if "command" in names else (kind, kind in names)
         found[mode.name] = names[kind].argument if acts else mode.arguments[mode.default]
     return found
@@ -357,7 +357,7 @@ def _value(mode: Mode, argument: str) -> str:
 
 
 def published_drive(known: PublishedSet, drive: Drive | None) -> Drive:
-    """Return the given drive; without one, that of a published set, with held freedoms at their initial values."""
+    """Return ``drive``; if it is None, the drive of a published set, with held freedoms at their initial values."""
     return drive or drive_of(known.parameters, driven(known, None), known.initial)
 
 
@@ -378,7 +378,7 @@ def drive_of(
     parameters : parameters of a mechanism
     inputs : Inputs, optional
     initial : state at the start, optional
-        Positions of the freedoms that are neither free nor the crank's: they are held there.
+        Positions at which freedoms are held: those that are neither free nor the crank.
     speed, torque : optional
         Replace the drive of the crank in the inputs; other commanded cranks keep their ratios to it.
 
@@ -387,12 +387,12 @@ def drive_of(
     VaryingInputError
         If an input varies.
     InputError
-        If nothing drives the crank, or another freedom is commanded to move on and on.
+        If nothing drives the crank, or another freedom is commanded to move without end.
     """
     mechanism = mechanism_of(parameters)
     inputs, initial = given(mechanism, inputs, initial)
     modes = inputs.modes(mechanism)
-    crank, ratios = _turning(mechanism, inputs, initial, modes)
+    crank, ratios = _choose_crank(mechanism, inputs, initial, modes)
     constant: dict[str, float] = {}
     motors: list[InductionMotor] = []
     others: dict[str, InductionMotor] = {}
@@ -437,13 +437,13 @@ def drive_of(
     )
 
 
-def _turning(
+def _choose_crank(
     mechanism: Mechanism, inputs: Inputs, initial: InitialState, modes: Mapping[str, int]
 ) -> tuple[Crank, dict[int, Fraction]]:
-    """Return the crank whose angle is the independent variable under the inputs of a run, and the ratios of the others.
+    """Return the crank whose angle is the independent variable under the inputs of a run, and the ratios of the other cranks.
 
-    It is the first crank that is commanded to turn forward, or else the first. A free crank has the ratio of the speeds at
-    the start, to the nearest whole number.
+    It is the first crank that is commanded to turn forward, or else the first crank. The ratios, by the numbers of freedoms,
+    are those of commanded speeds; a free crank has the ratio of the speeds at the start, to the nearest whole number.
     """
     if len(mechanism.cyclic) < 2:
         return crank_of(mechanism), {}
@@ -466,11 +466,12 @@ def _turning(
     return crank, ratios
 
 
-#: Distance of two starts, relative to the scale, below which they are of one motion.
+#: Distance of two starts, relative to the scale, below which they belong to the same motion.
 SAME = 1e-6
-#: How far starts reach where no limit of assembly is met, in the scale of y, and the step to it.
+#: Greatest distance of starts from rest if no limit of assembly is met, relative to the scale of y, and the factor by which
+#: the distance is increased until the limit is met.
 _WIDEST, _WIDER = 16.0, 1.25
-#: Ratio of both sides of a range beyond which it is one-sided: more than one step of the above.
+#: Ratio of the two sides of a range above which it is one-sided: more than one step by the factor above.
 _ONE_SIDED = 1.3
 #: Crank speeds of starts under a torque, relative to the guess.
 _SPEEDS = (0.25, 1.5)
@@ -528,7 +529,7 @@ def coordinate_ranges(
 
 
 def even_rates(drive: Drive, flow: Flow, guess: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the mean rate of each free coordinate, of those that go round that of an even turning; shape (free,)."""
+    """Return the mean rate of each free coordinate: 0, or the rate of a uniform rotation if it goes round; shape (free,)."""
     turning, pace = drive.turning(flow.mechanism), drive.speed or guess[-1]
     return np.array([pace * turning.get(n, 0) for n in flow.free], dtype=float)
 
@@ -538,8 +539,8 @@ def starts_of(
 ) -> NDArray[np.float64]:
     """Return initial states of many amplitudes and phases within the coordinate ranges, from a scrambled Sobol sequence.
 
-    In the plane of a coordinate and its rate they fill the greatest ellipse about the place where it starts by default. If a
-    coordinate can move much further to one side, as many again fill the ellipse about the middle of its range; shape (count or
+    In the plane of a coordinate and its rate they fill the greatest ellipse about its default initial value. If a coordinate
+    can move much further to one side, as many further states fill the ellipse about the middle of its range; shape (count or
     2 count, n).
 
     Parameters

@@ -18,8 +18,8 @@ from linkwork.errors import InputError, LinkworkError
 
 #: Distance of the largest multiplier from the unit circle below which a verdict is "marginal" by default.
 TOLERANCE = 1e-6
-#: Angle from the real axis (rad) below which a multiplier counts as real. A double one on the axis is computed only to the
-#: square root of the rounding errors.
+#: Angle from the real axis (rad) below which a multiplier counts as real. A double multiplier on the axis is accurate only to
+#: the square root of the rounding errors.
 REAL_ANGLE = 1e-5
 
 
@@ -57,7 +57,7 @@ class StabilityVerdict:
     margin : float
         1 - ``max |multiplier|``: positive if deviations die out, negative if they grow; dimensionless.
     tolerance : float
-        Size of the margin below which the verdict is MARGINAL. A system without damping is never better than that.
+        Size of the margin below which the verdict is MARGINAL. A system without damping is never better than MARGINAL.
     largest_multiplier : complex
         The multiplier of the greatest modulus.
 
@@ -82,7 +82,7 @@ class StabilityVerdict:
 
     @property
     def crossing(self) -> Crossing:
-        """The way in which the largest multiplier leaves the unit circle, or would."""
+        """The way in which the largest multiplier leaves the unit circle, or would leave it if it grew."""
         return crossing(self.largest_multiplier)
 
 
@@ -118,12 +118,12 @@ def verdict(multipliers: ArrayLike, tolerance: float = TOLERANCE) -> StabilityVe
     ----------
     multipliers : array_like of complex, shape (n,)
     tolerance : float
-        Size of the margin up to which the verdict is "marginal"; at least the error of the multipliers.
+        Size of the margin up to which the verdict is "marginal"; it should not be less than the error of the multipliers.
 
     Raises
     ------
     InputError
-        If there are none, one is not finite, or the tolerance is not a number from 0 on.
+        If there are no multipliers, one is not finite, or the tolerance is negative or not finite.
     """
     values = np.atleast_1d(np.asarray(multipliers, dtype=complex))
     if values.ndim != 1 or len(values) == 0 or not np.isfinite(values).all():
@@ -142,7 +142,7 @@ def verdict(multipliers: ArrayLike, tolerance: float = TOLERANCE) -> StabilityVe
 
 
 def crossing(multiplier: complex, angle: float = REAL_ANGLE) -> Crossing:
-    """Return the kind of crossing of a multiplier; one counts as real within an angle (rad)."""
+    """Return the kind of crossing of a multiplier, which counts as real within ``angle`` (rad) of the real axis."""
     if abs(np.angle(multiplier)) <= angle:
         return Crossing.FOLD
     if abs(np.angle(-multiplier)) <= angle:
@@ -156,8 +156,8 @@ def liouville(trace: ArrayLike, period: float = 2.0 * pi) -> float:
     Parameters
     ----------
     trace : array_like, shape (n,)
-        Trace of the Jacobian matrix at equal steps over one period, the end left out. The trapezoidal rule, exact here to
-        within the trace's harmonics of order n and more.
+        Trace of the Jacobian matrix at equal steps over one period, the end left out. It is integrated by the trapezoidal
+        rule, whose error comes only from harmonics of order n and more.
     period : float
         In the unit of the independent variable: rad, or s.
 
@@ -180,8 +180,8 @@ def crossing_test(monodromy: NDArray[np.float64], crossing: Crossing | int) -> N
     monodromy : ndarray, shape (..., n, n)
     crossing : Crossing or int
         +1 for a fold, -1 for a period doubling: det(I - multiplier Phi), positive if all multipliers are inside the unit
-        circle, negative if one real multiplier has passed it. For a torus the product, over all pairs of
-        multipliers, of their product less one.
+        circle, negative if one real multiplier has passed it. For a torus: the product over all pairs of multipliers
+        mu_i, mu_j of (mu_i mu_j - 1).
 
     Returns
     -------

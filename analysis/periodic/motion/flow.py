@@ -18,18 +18,18 @@ from ...numerics.codegen import MAKING, MachineCode
 from ...numerics.vectors import LANES
 from ...run import MOTOR, constants, kloss, traced
 
-# Functions of a flow, by their numbers among its addresses; those in lanes begin at IN_LANES, in the same order
+# Indices of the functions of a flow in its addresses; the functions in lanes begin at IN_LANES, in the same order
 PLAIN, VARIATIONAL, DIRECTIONAL, GAP, STATE = range(5)
 _NAMES = ("plain", "variational", "directional", "gap", "state")
 IN_LANES = len(_NAMES)
 
 
 class Crank(NamedTuple):
-    """A freedom that turns: its number, the channel of its commanded rate and that of the torque on it, None if missing."""
+    """A freedom that turns without end."""
 
-    freedom: int
-    command: int | None
-    torque: int | None
+    freedom: int  # number of the freedom
+    command: int | None  # channel of its commanded rate, if there is one
+    torque: int | None  # channel of the torque on it, if there is one
 
 
 @cache
@@ -87,9 +87,9 @@ def _names(mechanism: Mechanism, crank: Crank) -> list[str]:
 class Flow:
     """A mechanism as a flow over its crank's angle, driven in one way.
 
-    Other cranks turn at a ratio to it: a commanded one exactly, one under a torque, or a link that nothing drives, on average.
-    Of these y contains the angle minus the ratio times the crank angle, which is periodic. The ratio of a link that only swings
-    is 0.
+    Other cranks turn at a ratio to this crank: a commanded crank exactly, a crank under a torque or a link that nothing drives
+    on average. If such a freedom is free, y contains its angle minus the ratio times the crank angle, which is periodic. The
+    ratio of a link that only swings is 0.
 
     Parameters
     ----------
@@ -101,7 +101,7 @@ class Flow:
     base : int
         Turns of the crank after which all cranks have made whole turns, and all links that go round.
     commons : int
-        Common periods of the cranks alone in that time.
+        Number of common periods of the cranks alone in ``base`` turns.
 
     Attributes
     ----------
@@ -124,7 +124,7 @@ class Flow:
     size : int
         Number of components of y.
     rest : ndarray, shape (n,)
-        The coordinates with which a mechanism starts by default, without rates.
+        y with the coordinates at which the mechanism starts by default, and rates of zero.
     ways : ndarray, shape (n,)
         Increase of each component after which the motion is the same: a whole turn of an angle; 0 where there is none.
     """
@@ -175,16 +175,16 @@ class Flow:
 
     @property
     def period(self) -> float:
-        """Return the crank angle (rad) of the common period of all that goes round: one turn if that is the crank alone."""
+        """Return the crank angle (rad) of the common period of all freedoms that go round: one turn if only the crank does."""
         return self.mechanism.freedoms[self.crank].period * self.base
 
     @property
     def turns(self) -> int:
-        """Return the turns of the crank in the common period: several with other cranks, or with gears that come back later."""
+        """Return the turns of the crank in the common period: several if other cranks or gears repeat only after several."""
         return max(1, round(self.period / (2.0 * pi)))
 
     def addresses(self, *which: int, switched: bool = False) -> NDArray[np.int64]:
-        """Return the addresses of the compiled functions ``which``, with the mechanism's switch on or off."""
+        """Return the addresses of all functions; those with the indices ``which`` are compiled, with the switch on or off."""
         with MAKING:
             for n in which:
                 if (switched, n) not in self._code:
@@ -220,11 +220,11 @@ class Flow:
         return tuple(x)
 
     def within(self, away: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return differences of y, shape (..., n), without whole turns."""
+        """Return differences of y, shape (..., n), with whole turns of angles removed."""
         return away - self._whole(away)
 
     def nearest(self, y: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return of the y that are whole turns apart the one that is nearest to rest."""
+        """Return y with its angles changed by whole turns so that they are nearest to `rest`."""
         return y - self._whole(y - self.rest)
 
     def _whole(self, away: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -232,7 +232,7 @@ class Flow:
         return whole
 
     def paces(self, drive: NDArray[np.float64]) -> dict[str, float]:
-        """Return the ratios by FMI names of those coordinates of y that go round, from the numbers of the drive."""
+        """Return the ratio of each coordinate of y that goes round, by FMI name, from the numbers of the drive."""
         freedoms = self.mechanism.freedoms
         return {freedoms[n].coordinate: float(r) for n, r in self._ratios(drive).items() if n in self.free and r}
 
@@ -245,15 +245,16 @@ class Flow:
         return y
 
     def _ratios(self, drive: Any) -> dict[int, Any]:
-        """Return the ratios of the other cranks by the numbers of their freedoms."""
+        """Return the ratios of the freedoms `others`, by their numbers."""
         return {n: drive[self.held + len(self.mechanism.freedoms) + i] for i, n in enumerate(self.others)}
 
-    @cache  # noqa: B019 - flows are kept for good themselves
+    @cache  # noqa: B019 - flows themselves are never discarded
     def function(self, which: int, switched: bool = False) -> Any:
-        """Return a ``casadi.Function`` of angle, z, modes, drive with its direction, and constants with theirs.
+        """Return one of the functions of the flow as a ``casadi.Function``.
 
-        ``plain``: dy/dangle. ``variational``: with the columns of dy/dy0. ``directional``: with that of dy/dlambda after
-        them. ``gap``: how far the links are from the limit of assembly. ``state``: the state of a run and the channels.
+        Its arguments are the angle, z, the modes, the drive and its derivative by lambda, the constants and their derivative by
+        lambda. ``plain`` gives dy/dangle, ``variational`` also the rates of the columns dy/dy0, ``directional`` also those of
+        dy/dlambda; ``gap`` the clearance to the limit of assembly, ``state`` the state of a run and the channels.
         """
         casadi = symbolic.library()
         n, m = self.size, self.mechanism
@@ -296,9 +297,9 @@ class Flow:
         return casadi.Function(_NAMES[which], arguments, [casadi.densify(r) for r in results], {"cse": True})
 
     def function_in_lanes(self, which: int, switched: bool = False) -> Any:
-        """Return one of the functions for several angles at once: (y, angle) is in the place of z, and time in that of angle.
+        """Return one of the functions in the form for several angles at once, with the arguments (unused, (y, angle), ...).
 
-        The columns of dy/dy0 are the identity and that of dy/dlambda is zero, so that those of the result are the derivatives
+        The columns dy/dy0 are set to the identity and dy/dlambda to zero, so that the columns of the result are the derivatives
         of the rates.
         """
         casadi = symbolic.library()

@@ -2,9 +2,9 @@
 
 The independent variable is the angle of the mechanism's cyclic freedom, the crank, so that the period is known beforehand
 whatever drives it. The state y has the coordinates of the other free freedoms, their rates, and under a torque the crank's
-rate. The angle runs from 0: the map over a period is the Poincare map of the section there. The columns of dy/dy0, and if
-asked for dy/dlambda for a parameter lambda, are integrated with y. The right-hand sides and their exact derivatives are
-traced from the equations (`flow`); the integrator is the one that `simulate` uses.
+rate. The map over a period is the Poincare map of the section at crank angle 0. The columns of dy/dy0, and dy/dlambda for a
+parameter lambda if it is wanted, are integrated with y. The right-hand sides and their exact derivatives are traced from the
+equations (`flow`); the integrator is the one that `simulate` uses.
 """
 
 from __future__ import annotations
@@ -34,9 +34,9 @@ class Status(IntEnum):
     DIVERGED = 6
 
 
-# the same as plain numbers, for the compiled code
+# the statuses as plain integers, for the compiled code
 DONE, LIMIT, NO_STEP, STALLED, DIVERGED = (int(status) for status in Status)
-#: Each failure in words.
+#: Message for each status that is a failure.
 REASONS = {
     Status.LIMIT: "the links come to the limit of assembly, or to where friction may jam them, within the period",
     Status.NO_STEP: "the integrator cannot meet its tolerance",
@@ -52,14 +52,14 @@ _LEAST_FRACTION, _LEAST_SEARCHED = 1.0 / 4096.0, 1.0 / 64.0
 
 
 class Section(NamedTuple):
-    """A flow with its numbers, and the direction of a parameter lambda for derivatives."""
+    """The data of a flow that the kernels take, with derivatives with respect to a parameter lambda."""
 
     equations: NDArray[np.int64]  # addresses of the flow's functions
     modes: NDArray[np.float64]
     drive: NDArray[np.float64]  # numbers of the drive, then their derivatives by lambda
-    p: NDArray[np.float64]  # constants of the equations, likewise
+    p: NDArray[np.float64]  # constants of the equations, then their derivatives by lambda
     scale: NDArray[np.float64]  # magnitudes of y, shape (n,)
-    ways: NDArray[np.float64]  # whole turns of its angles, or 0, likewise
+    ways: NDArray[np.float64]  # whole turn of each component of y that is an angle, otherwise 0, shape (n,)
     along: float  # magnitude of lambda
     tolerance: float  # bound of the local error of a step
     torque: bool  # whether the crank's rate is the last component of y
@@ -70,22 +70,22 @@ SECTION = types.NamedTuple((int64[::1], VECTOR, VECTOR, VECTOR, VECTOR, VECTOR, 
 
 @part
 def numbered(section, drive, p, scale, tolerance):
-    """Return the section with other numbers."""
+    """Return the section with new numbers of the drive, constants, scale and tolerance, and 1 for the magnitude of lambda."""
     return Section(section.equations, section.modes, drive, p, scale, section.ways, 1.0, tolerance, section.torque)
 
 
 class Room(NamedTuple):
-    """Work space of the integrator: stages, z after a step, magnitudes of z, clearance."""
+    """Work space of the integrator for z, which is y followed by the columns of its derivatives."""
 
-    k: NDArray[np.float64]
-    y: NDArray[np.float64]
-    sizes: NDArray[np.float64]
-    gap: NDArray[np.float64]
+    k: NDArray[np.float64]  # rates at the stages, shape (16, z)
+    y: NDArray[np.float64]  # z after a step
+    sizes: NDArray[np.float64]  # magnitudes of z
+    gap: NDArray[np.float64]  # clearance to the limit of assembly, shape (1,)
 
 
 @part
 def make_room(section, columns):
-    """Make work space for y and a number of columns of derivatives."""
+    """Make the work space for y and ``columns`` columns of derivatives."""
     n = section.scale.shape[0]
     sizes = np.empty(n * (1 + columns))
     for i in range(n):
@@ -103,15 +103,15 @@ def _clearance(section, angle, z, room):
 
 @inner
 def _take(section, equation, angle, end, slowest, z, room, carry):
-    """Take an accepted step from z, whose rates are room.k[0], to ``end`` at most; return the status and the new angle.
+    """Try steps from z until the error of one is accepted; return the status and the new angle.
 
-    z after the step is room.y.
+    The step ends at ``end`` at the latest. The rates of z are in ``room.k[0]``; z after the step is written into ``room.y``.
     """
     n = section.scale.shape[0]
     flow = Flow(equation, section.modes, section.p, room.sizes)
     proposed = carry[0]
     while True:
-        # no sliver of a step before the end
+        # no tiny last step before the end
         last = angle + 1.001 * proposed >= end
         h = end - angle if last else proposed
         error = attempt(flow, 0.0, angle, h, z, room, section.drive, -1, None) / section.tolerance
@@ -147,7 +147,10 @@ def _enter(section, equation, angle, z, room):
 
 @inner
 def advance(section, begin, end, z, room, carry):
-    """Integrate z over a range of crank angles; carry[0] is the first step and becomes the next one, carry[1] counts steps."""
+    """Integrate z in place from one crank angle to another; return a `Status`.
+
+    ``carry[0]`` is the first step size (rad) and becomes the proposed next one; ``carry[1]`` counts steps.
+    """
     n = section.scale.shape[0]
     size = z.shape[0]
     equation = section.equations[PLAIN if size == n else VARIATIONAL if size == n * (1 + n) else DIRECTIONAL]
@@ -164,7 +167,7 @@ def advance(section, begin, end, z, room, carry):
 
 @inner
 def start_piece(n, start, z):
-    """Write the initial values of a piece into z: y, the identity, zeros along lambda."""
+    """Write the initial values of a piece into z: y = ``start``, the identity for dy/dy0, zeros for dy/dlambda."""
     for i in range(z.shape[0]):
         z[i] = 0.0
     for i in range(n):
@@ -175,14 +178,14 @@ def start_piece(n, start, z):
 
 @inner
 def difference(a, b, out):
-    """Write a - b into ``out``, as many components as it has."""
+    """Write a - b into ``out``, for as many components as ``out`` has."""
     for i in range(out.shape[0]):
         out[i] = a[i] - b[i]
 
 
 @inner
 def difference_within(a, b, ways, out):
-    """Write a - b into ``out``, without whole turns."""
+    """Write a - b into ``out``, with whole turns removed from differences of angles."""
     for i in range(out.shape[0]):
         out[i] = a[i] - b[i]
         if ways[i] > 0.0:
@@ -245,7 +248,7 @@ def eliminate(system, size):
 
 @inner
 def correct_start(start, end, z, system, correction):
-    """Compute Newton's correction of a start for y(end) = y(0); return whether there is one.
+    """Compute Newton's correction of a start for y(end) = y(0); return whether the linear system has a solution.
 
     ``z`` gives the derivatives dy/dy0, and ``end`` gives y at the end; they may come from different starts.
     """
@@ -260,28 +263,27 @@ def correct_start(start, end, z, system, correction):
     return solved
 
 
-#: Result of a step of a search that needs another integration.
+#: Result of `newton_next` and `deflated_next` if another integration is needed.
 GOING = -1
-# Numbers of a search: iterations, fraction of the correction that is tried, its size, the residual
+# Indices into `Hunt.numbers`: iterations, fraction of the correction that is tried, size of the correction, residual
 _ITERATION, _FRACTION, _SIZE, _RESIDUAL = range(4)
 
 
 class Hunt(NamedTuple):
-    """The state of Newton's method between integrations: last start, the one to integrate from, correction from the last to
-    it, work space; z at the end from the last; see the numbers above."""
+    """The state of Newton's method between integrations."""
 
-    start: NDArray[np.float64]
-    trial: NDArray[np.float64]
-    correction: NDArray[np.float64]
-    following: NDArray[np.float64]
-    system: NDArray[np.float64]
-    last: NDArray[np.float64]
-    numbers: NDArray[np.float64]
+    start: NDArray[np.float64]  # last accepted start
+    trial: NDArray[np.float64]  # start of the next integration
+    correction: NDArray[np.float64]  # correction of ``start``
+    following: NDArray[np.float64]  # work space: the next correction
+    system: NDArray[np.float64]  # work space: the linear system
+    last: NDArray[np.float64]  # z at the end of the integration from ``start``
+    numbers: NDArray[np.float64]  # see the indices above
 
 
 @part
 def make_hunt(n):
-    """Make room for the state of a search."""
+    """Make the state of a search for y of n components."""
     return Hunt(
         np.zeros(n), np.zeros(n), np.zeros(n), np.zeros(n), np.zeros((n, n + 1)), np.zeros(n * (1 + n)), np.zeros(4)
     )
@@ -298,7 +300,7 @@ def begin_hunt(start, hunt):
 
 @inner
 def newton_next(section, most, status, z, hunt):
-    """Go on with Newton's method after an integration from ``hunt.trial`` to z; return GOING or a `Status`.
+    """Continue Newton's method after an integration from ``hunt.trial`` to z; return GOING or a `Status`.
 
     A correction is taken in part if the next one, found with the same matrix, would not be smaller (Deuflhard's natural
     monotonicity test), or if it leads out of the domain.
@@ -341,7 +343,7 @@ def newton_next(section, most, status, z, hunt):
 
 @inner
 def deflated_next(section, most, reach, status, known, z, hunt):
-    """Go on as `newton_next` with the known orbits divided out; see `search`."""
+    """Continue as `newton_next` does, with the known orbits divided out; return GOING or a `Status`; see `search`."""
     scale, n = section.scale, section.scale.shape[0]
     start, trial, correction, _, system, _, numbers = hunt
     if status != DONE:
@@ -450,11 +452,11 @@ def deflated(section, end, most, reach, start, known, z, room, carry):
     purpose="the search for coexisting motions",
 )
 def search(section, end, most, reach, start, known, z):
-    """Find a periodic orbit that is none of the known ones, by Newton's method with these divided out.
+    """Find a periodic orbit that is not among the known ones, by Newton's method with the known orbits divided out.
 
-    The residual is multiplied by 1 + 1/d^2 for each known orbit at the distance d, so that the known ones are no zeros any more
-    (deflation: Brown and Gearhart 1971; Farrell, Birkisson and Funke 2015). Its Newton correction is a multiple of the
-    correction of the residual itself.
+    The residual is multiplied by 1 + 1/d^2 for each known orbit at the distance d, so that the known orbits are no longer zeros
+    (deflation: Brown and Gearhart 1971; Farrell, Birkisson and Funke 2015). The Newton correction of this product is a multiple
+    of the correction of the residual itself.
 
     Parameters
     ----------
@@ -463,7 +465,7 @@ def search(section, end, most, reach, start, known, z):
     start : ndarray, shape (n,)
         Guess of y at crank angle 0; the solution, to the tolerance of the search, when it returns DONE.
     known : ndarray, shape (m, n)
-        Starts of the known orbits; with none it is Newton's method.
+        Starts of the known orbits; with none this is Newton's method.
     z : ndarray, shape (n (1 + n),)
         Work space.
 
@@ -475,8 +477,10 @@ def search(section, end, most, reach, start, known, z):
 
 @kernel(int64(SECTION, float64, float64, int64, VECTOR), purpose="the settling of motions")
 def settle(section, turn, change, most, start):
-    """Follow the motion from ``start``, which is overwritten, until a turn changes y, whole turns of links aside, by less
-    than ``change``."""
+    """Follow a motion until y changes by less than ``change`` over a turn, or for ``most`` turns; return a `Status`.
+
+    Whole turns of links do not count as a change. ``start`` is overwritten with y after the last turn.
+    """
     room = make_room(section, 0)
     z = start.copy()
     carry = np.array([0.1, 0.0])
@@ -551,7 +555,7 @@ def segments(section, angles, starts, rows):
     angles : ndarray, shape (k + 1,)
         Crank angles at which the pieces begin, and the end of the last (rad).
     starts : ndarray, shape (k, n)
-        y at the beginning of each.
+        y at the beginning of each piece.
     rows : ndarray, shape (k, n (1 + columns))
         Written: y at the end of each piece, then dy/dy0 by columns (columns = n), then dy/dlambda (n + 1), as far as there is
         room for them.

@@ -47,13 +47,13 @@ from .variables import Family
 FloatArray = NDArray[np.float64]
 #: Largest correction relative to the scale at which a solution counts as found.
 ORBIT_TOLERANCE = 100.0 * INTEGRATOR_TOLERANCE
-#: Search for motions far from a guess: tolerance, iterations at most, and the greatest correction in the scale of y. What it
-#: finds is solved again.
+#: Search for motions far from a guess: tolerance, iterations at most, and the greatest correction relative to the scale of y.
+#: A motion that is found is solved again with the full tolerance.
 SEARCH_TOLERANCE, SEARCH_ITERATIONS, REACH = 1e-6, 30, 1.0
-#: Pieces of a common period in which motions near an even turning are sought.
+#: Pieces of a common period in the search for motions near a uniform rotation.
 EVEN_PIECES = 12
-#: Sets of starts if Newton's method fails from the guess, and starts of each, a power of two: near a resonance of small
-#: damping one in some forty leads to the motion.
+#: Sets of starts if Newton's method fails from the guess, and starts in each set, a power of two: near a resonance with small
+#: damping about one start in forty leads to the motion.
 SETS, STARTS = 4, 64
 #: Newton iterations at most.
 MOST_ITERATIONS = 40
@@ -92,7 +92,7 @@ class Turn:
         Output whose amplitude is returned by default: the first free coordinate, such as ``slider.position``, or the
         crank's speed if nothing else is free.
     rounding : float
-        Amplitude of ``swing`` that is no more than rounding.
+        Amplitude of ``swing`` up to which it counts as a rounding error.
     angles : frozenset of str
         Outputs that are angles.
 
@@ -123,8 +123,8 @@ class Turn:
     def amplitude(self) -> float:
         """Half the distance between the least and the greatest value of ``swing``, such as a slider position (m).
 
-        Of a coordinate that goes round it is that of the deviation from an even turning. It is zero where it is no more than
-        rounding, as of a pendulum that hangs still.
+        For a coordinate that goes round, the deviation from a uniform rotation is taken. The amplitude is zero if it is no more
+        than a rounding error, as for a pendulum that hangs still.
 
         The Fourier series of the turn is evaluated on a grid eight times as fine, and parabolas are laid through its greatest
         and its least values: good to a millionth of the amplitude if the samples are enough for the series.
@@ -140,7 +140,7 @@ class Turn:
         return size if size > self.rounding else 0.0
 
     def around(self, name: str) -> FloatArray:
-        """Return an output about its mean increase, which an angle has that goes round; shape (n,)."""
+        """Return an output; from an angle that goes round, its mean increase is subtracted; shape (n,)."""
         values = self[name]
         if name not in self.angles:
             return values
@@ -149,9 +149,9 @@ class Turn:
         return followed[:-1] - increase * np.arange(len(values)) / len(values) if increase else values
 
     def harmonic(self, name: str, order: float) -> float:
-        """Return the amplitude of a harmonic of an output; its order counts per turn of the crank: 1/2 has two turns.
+        """Return the amplitude of a harmonic of an output; ``order`` is its cycles per turn of the crank.
 
-        Of a coordinate that goes round it is that of the deviation from an even turning.
+        For a coordinate that goes round, the deviation from a uniform rotation is taken.
 
         Raises
         ------
@@ -194,7 +194,7 @@ class PeriodicOrbit(Shown):
     parameters : parameters of a mechanism
     drive : Drive
     turns : int
-        Common periods of the cranks and gears in one period, of each of which `crank_turns` counts the turns of the crank.
+        Number of common periods, `Flow.period`, in one period of the motion; `crank_turns` is the number of turns of the crank.
     start : ndarray, shape (n,)
         y at crank angle 0: coordinates and rates of the free freedoms other than the crank, of a five-bar u (m) and u'
         (m/s), and under a torque the crank speed (rad/s).
@@ -222,7 +222,7 @@ class PeriodicOrbit(Shown):
     stations: Stations | None = None
     others: int | None = None
     nearest: float | None = None
-    # what has been computed of `point`, `scale`, `multipliers` and `amplitude`
+    # cached values of `point`, `scale`, `multipliers` and `amplitude`
     _kept: dict[str, Any] = field(default_factory=dict, init=False)
 
     def __post_init__(self) -> None:
@@ -265,17 +265,17 @@ class PeriodicOrbit(Shown):
 
     @property
     def periods(self) -> int:
-        """Common periods of the cranks and gears in a period of the motion; links that go round may need several."""
+        """Number of common periods of the cranks and gears in a period of the motion: several if links go round slowly."""
         return self.turns * self.flow.commons
 
     @property
     def crank_turns(self) -> int:
-        """Turns of the crank in a period of the motion: of each common period several with gears or other cranks."""
+        """Number of turns of the crank in a period of the motion."""
         return self.turns * self.flow.turns
 
     @property
     def rounds(self) -> dict[str, int]:
-        """Whole turns in a period of the motion, by coordinates, of links that nothing drives and that go round."""
+        """Whole turns in a period of the motion of links that nothing drives and that go round, by their coordinates."""
         paces, way = self.flow.paces(self.point.vector), self.flow.period * self.turns
         swinging = {f.coordinate: f.period for f in self.flow.mechanism.freedoms if f.swings}
         return {name: round(paces[name] * way / swinging[name]) for name in paces if name in swinging}
@@ -299,11 +299,11 @@ class PeriodicOrbit(Shown):
         return float(abs(self.multipliers[0]))
 
     def verdict(self, tolerance: float = TOLERANCE) -> StabilityVerdict:
-        """Return whether small deviations die out, with the margin."""
+        """Return the verdict on stability, whether small deviations die out, with the margin."""
         return verdict(self.multipliers, tolerance)
 
     def sample(self, angles: FloatArray) -> FloatArray:
-        """Return states of a run and channels at increasing crank angles (rad), shape (m, states + inputs).
+        """Return the state of a run and the channels at increasing crank angles (rad), shape (m, states + inputs).
 
         Raises OrbitError if the motion cannot be followed.
         """
@@ -361,8 +361,8 @@ class PeriodicOrbit(Shown):
     def determinant_by_liouville(self, samples: int = 512) -> float:
         """Return the determinant of the monodromy matrix from the trace of the rates' Jacobian along the orbit.
 
-        It does not use the variational equations, and so checks them. With Coulomb friction the trace peaks sharply where the
-        slider turns round: it then takes some ten thousand samples.
+        It does not use the variational equations, and therefore is a check of them. With Coulomb friction the trace has sharp
+        peaks where the slider reverses: some ten thousand samples are then needed.
         """
         flow, turn, p = self.flow, self.turn(samples), self.point.constants
         y = flow.unknowns(turn.states, self.point.vector).T
@@ -371,10 +371,13 @@ class PeriodicOrbit(Shown):
         return liouville(np.asarray(traces).ravel(), flow.period * self.turns)
 
     def passages(self) -> FloatArray:
-        """Return y at the beginning of each turn, or common period, any of which may be the start; shape (turns, n)."""
+        """Return y at the beginning of each common period of the cranks and gears; shape (periods, n).
+
+        The same motion could start from each of them.
+        """
         passed, flow, paces = [self.start], self.flow, self.flow.paces(self.point.vector)
         angles = np.array([0.0, flow.period / flow.commons])
-        # y counts from an even turning that is a part of a turn on there
+        # angles in y are relative to a uniform rotation, which has gone on by this angle
         ahead = angles[1] * np.array([paces.get(name, 0.0) for name, _ in flow.components])
         for _ in range(self.periods - 1):
             passed.append(self.point.shoot(angles, passed[-1][None, :]).y[0] + ahead)
@@ -397,19 +400,19 @@ def orbit_of(
     start: ArrayLike | None = None,
     settle: bool = True,
 ) -> PeriodicOrbit:
-    """Find a periodic motion: the one to which Newton's method leads.
+    """Find the periodic motion to which Newton's method leads.
 
     Parameters
     ----------
     parameters, drive
     turns : int
-        Turns of the crank in one period; where gears or other cranks make their common period longer, these.
+        Turns of the crank in one period; if gears or other cranks have a longer common period, the number of common periods.
     start : array_like, shape (n,), optional
         Guess of y at crank angle 0; without it the coordinates with which the mechanism starts, at rest. If a link that nothing
         drives goes round from there, a motion is sought first in which it does so in each period.
     settle : bool
-        Whether other starts are tried if Newton's method fails from the guess: the state to which the motion settles by
-        itself, and those of `starts_of`.
+        Whether other starts are tried if Newton's method fails from the guess: the state to which the motion settles, and the
+        states of `starts_of`.
 
     Raises
     ------
@@ -423,7 +426,7 @@ def orbit_of(
     require_turns(turns, point, guess)
     _check_assembly(point, guess)
     try:
-        return _solve_as_it_goes(point, turns, guess)
+        return _solve_with_rounds(point, turns, guess)
     except OrbitError as error:
         if not settle:
             raise
@@ -431,7 +434,7 @@ def orbit_of(
     status, settled = settle_motion(point, guess, tolerance=1e-8, change=SETTLED, turns=SETTLING_TURNS)
     if status is Status.DONE:
         try:
-            return _solve_as_it_goes(point, turns, settled)
+            return _solve_with_rounds(point, turns, settled)
         except OrbitError:
             pass
     for number in range(SETS):
@@ -451,7 +454,7 @@ def settle_motion(
 ) -> tuple[Status, FloatArray]:
     """Integrate from ``start`` until a turn changes y by less than ``change``, or for ``turns`` turns at most.
 
-    Whole turns of links do not count; the result is the one that is nearest to rest.
+    Whole turns of links do not count as a change. Return the status and the last y, with whole turns removed.
     """
     settled, flow = start.copy(), point.flow
     section = point.section(start, PLAIN, tolerance=tolerance)
@@ -459,9 +462,12 @@ def settle_motion(
     return Status(status), flow.nearest(settled)
 
 
-def _solve_as_it_goes(point: OperatingPoint, turns: int, start: FloatArray) -> PeriodicOrbit:
-    """Find a motion by Newton's method, in which links go round as they do after the start; or else as the drive says."""
-    rounds = _rounds_from(point, start, turns)
+def _solve_with_rounds(point: OperatingPoint, turns: int, start: FloatArray) -> PeriodicOrbit:
+    """Find a motion by Newton's method in which links go round as often as they do in the period after the start.
+
+    If there is none, find one in which they go round as the drive says.
+    """
+    rounds = _count_rounds(point, start, turns)
     if rounds:
         drive, own = point.drive.with_rounds(point.mechanism, rounds, turns)
         with suppress(OrbitError):
@@ -469,13 +475,13 @@ def _solve_as_it_goes(point: OperatingPoint, turns: int, start: FloatArray) -> P
     return solve_orbit(point, turns, start)
 
 
-def _rounds_from(point: OperatingPoint, start: FloatArray, turns: int) -> dict[str, int]:
-    """Return how often links that nothing drives go round in the period after a start, unless the drive says it.
+def _count_rounds(point: OperatingPoint, start: FloatArray, turns: int) -> dict[str, int]:
+    """Return how often links that nothing drives, and for which the drive has no ratio, go round in the period after a start.
 
     Returns
     -------
     dict of str to int
-        By coordinates, without those that only swing.
+        Whole turns by coordinate, without the links that only swing.
     """
     flow, freedoms = point.flow, point.mechanism.freedoms
     swinging = [
@@ -490,14 +496,14 @@ def _rounds_from(point: OperatingPoint, start: FloatArray, turns: int) -> dict[s
 def approach(
     point: OperatingPoint, turns: int, place: FloatArray, known: FloatArray | None = None
 ) -> FloatArray | None:
-    """Search a periodic motion from far away and return its start, to the tolerance of a search; None if there is none.
+    """Search for a periodic motion far from the guess; return its start, accurate to SEARCH_TOLERANCE, or None.
 
     Parameters
     ----------
     place : ndarray, shape (n,)
         Guess of the start.
     known : ndarray, shape (m, n), optional
-        Starts of motions that are divided out.
+        Starts of known motions, which are divided out.
     """
     n, start = point.flow.size, place.copy()
     status = kernels.search(
@@ -513,12 +519,12 @@ def approach(
 
 
 def approach_even(point: OperatingPoint, turns: int, place: FloatArray) -> FloatArray | None:
-    """Search a motion near an even turning, however unstable, by multiple shooting; return its start, None if there is none.
+    """Search for a motion near a uniform rotation, however unstable, by multiple shooting; return its start, or None.
 
     Parameters
     ----------
     place : ndarray, shape (n,)
-        y of the even turning, which stays the same.
+        y of the uniform rotation, the same at all crank angles.
     """
     k, n = EVEN_PIECES * turns * point.flow.commons, point.flow.size
     angles, starts, scale = (
@@ -546,7 +552,7 @@ def approach_even(point: OperatingPoint, turns: int, place: FloatArray) -> Float
 def first_guess(flow: Flow, drive: Drive, start: ArrayLike | None, speed: float | None = None) -> FloatArray:
     """Return the guess for Newton's method: ``start``, or else rest at the coordinates with which the mechanism starts.
 
-    The crank then has the speed of the prescribed drive, or under a torque ``speed`` (rad/s) or one of the motor.
+    At rest the crank has the prescribed speed; under a torque it has ``speed`` (rad/s), or a speed within the motor's range.
 
     Raises InputError if ``start`` does not have the components of the state, or is missing and needed.
     """
@@ -578,11 +584,12 @@ def first_guess(flow: Flow, drive: Drive, start: ArrayLike | None, speed: float 
 def resting(
     parameters: Parameters, drive: Drive, initial: Any, speed: float | None = None, *, other: str = ""
 ) -> list[float]:
-    """Return a guess of a periodic motion: rest at the coordinates of a start.
+    """Return a guess of y for a periodic motion: rest at the coordinates of ``initial``.
 
-    Under a torque the crank has ``speed`` (rad/s), or else that of the start if it is above zero, or else one of the motor.
+    Under a torque the crank has ``speed`` (rad/s), or else the speed in ``initial`` if it is above zero, or else one within the
+    motor's range.
 
-    Raises InputError if it has none; ``other`` is where else one can be given.
+    Raises InputError if there is none of these speeds; ``other`` is appended to the message: where else one can be given.
     """
     mechanism = mechanism_of(parameters)
     flow, ratios, state = drive.flow(mechanism), drive.turning(mechanism), mechanism.state(initial)
@@ -593,7 +600,7 @@ def resting(
             name = mechanism.freedoms[flow.crank].initial[1]
             raise InputError(f"under a torque the crank's speed is guessed: give initial.{name}, above zero{other}")
     guess = first_guess(flow, drive, None, speed)
-    # of another crank what it has beyond its ratio to the crank
+    # the angle of another crank minus its ratio times the crank angle
     guess[: len(flow.free)] = [state[n] - ratios.get(n, 0) * state[flow.crank] for n in flow.free]
     return [float(value) for value in guess]
 
@@ -661,7 +668,8 @@ def trial_orbit(
 ) -> tuple[PeriodicOrbit, FloatArray]:
     """Follow one period from a start; return it as an orbit, even if it does not close, and y(T) - y(0).
 
-    ``path`` is the period as one piece, followed from the last motion. Raises OrbitError if it cannot be followed.
+    ``path`` is a discretisation of the period as one piece, which may start from the last motion. Raises OrbitError if the
+    period cannot be followed.
     """
     path = path or Discretisation(np.array([0.0, point.flow.period * turns]), False)
     ends = path.ends(point, start[None, :])
@@ -701,18 +709,18 @@ class OrbitEquations:
         (mechanism, drive), (other, last) = self._bounds
         flow = drive.flow(mechanism_of(mechanism))
         self.angles = np.array([0.0, flow.period * turns]) if angles is None else angles
-        # each piece with the next one, shape (k, n, k, n): the part of the Jacobian that stays the same
+        # derivatives by the beginnings of the next pieces, shape (k, n, k, n): the constant part of the Jacobian
         k, n = len(self.angles) - 1, flow.size
         self._joined: FloatArray = np.zeros((k, n, k, n))
         self._joined[np.arange(k), :, (np.arange(k) + 1) % k] = -np.eye(n)
         self._discretised = Discretisation(self.angles, collocation_serves((drive, last), (mechanism, other)))
-        # a number of the drive varies: the equations' numbers are linear in it
+        # if only the drive varies, its numbers are linear in the parameter: one derivative serves all values
         self._direction = family.direction(high, low, high) if mechanism is other else None
 
     def scale(self, start: FloatArray) -> FloatArray:
-        """Return the magnitudes of the unknowns: the greater ones of the two ends of the range."""
+        """Return the magnitudes of the unknowns: the larger of those at the two ends of the range."""
         scale = np.max([operating_point(*bound).scale(start) for bound in self._bounds], axis=0)
-        # an arc has the length of the mean square over the pieces
+        # arc length is measured by the mean square over the pieces
         pieces = len(self.angles) - 1
         return np.asarray(np.tile(scale * np.sqrt(pieces), pieces))
 

@@ -43,13 +43,13 @@ from .orbit import (
 )
 
 FloatArray = NDArray[np.float64]
-#: Turns for which a motion that lost its stability is followed to the next steady one, and the change per turn that ends it.
+#: Turns for which a motion is integrated to the next steady motion at most, and the change per turn below which it is steady.
 JUMP_TURNS, SETTLED = 5000, 1e-9
 #: Relative change of the amplitude from one speed to the next beyond which the step is halved, and halvings at most.
 FAR, HALVINGS = 0.25, 6
 #: Periods, in turns, that a steady motion may have.
 PERIODS = (1, 2, 3, 4)
-#: Disturbance of an unstable motion, relative to the scale, from which the steady one is sought.
+#: Disturbance of an unstable motion, relative to the scale, with which the search for a steady motion starts again.
 _DISTURBANCE = 1e-3
 
 
@@ -118,7 +118,7 @@ def sweep(
 ) -> Sweep:
     """Step through crank speeds as a machine does: each steady motion starts from the last one.
 
-    Under an induction motor they are the synchronous speeds of its field, set by a frequency converter. If the last motion is
+    Under an induction motor these are the synchronous speeds of its field, set by a frequency converter. If the last motion is
     lost or unstable at the new speed, the mechanism is integrated for up to 5000 turns to the next steady motion: a jump.
     Rising and falling speeds may lead to different motions.
 
@@ -149,15 +149,15 @@ def sweep(
     flags: list[str] = []
     jumps: list[Jump] = []
     drive = drive or Drive(speed=float(grid[0]))
-    first = _paced(drive, float(grid[0]))
+    first = _with_speed(drive, float(grid[0]))
     state = first_guess(first.flow(mechanism_of(parameters)), first, start)
     last: PeriodicOrbit | None = None
     for speed in grid.tolist():
-        orbit = None if last is None else _continued(parameters, speed, last)
+        orbit = None if last is None else _follow(parameters, speed, last)
         flag = ""
         if orbit is None:
             try:
-                orbit = _settled(operating_point(parameters, _paced(drive, speed)), state)
+                orbit = _settle(operating_point(parameters, _with_speed(drive, speed)), state)
             except OrbitError as error:
                 flag = str(error)
             if orbit is not None and last is not None:
@@ -180,31 +180,31 @@ def sweep(
     return Sweep(speed=grid, orbits=tuple(orbits), flags=tuple(flags), jumps=tuple(jumps))
 
 
-def _paced(drive: Drive, speed: float) -> Drive:
+def _with_speed(drive: Drive, speed: float) -> Drive:
     """Return the drive with this prescribed speed, or with its motor at this synchronous speed."""
     if drive.speed is None and drive.motor is not None:
         return replace(drive, motor=replace(drive.motor, synchronous_speed=speed))
     return replace(drive, speed=speed, torque=0.0, motor=None)
 
 
-def _pace(drive: Drive) -> float | None:
+def _speed_of_drive(drive: Drive) -> float | None:
     """Return the prescribed speed, or the synchronous speed of the motor; None under a constant torque."""
     if drive.speed is None and drive.motor is not None:
         return float(drive.motor.synchronous_speed)
     return None if drive.speed is None else float(drive.speed)
 
 
-def _continued(
+def _follow(
     parameters: Parameters, speed: float, last: PeriodicOrbit, halvings: int = HALVINGS
 ) -> PeriodicOrbit | None:
     """Follow a stable motion to another speed; return None if it is lost on the way.
 
-    A neighbour that differs much may be another motion, to which Newton's method jumped: the step is then halved.
+    If the motion found differs much, Newton's method may have jumped to another motion: the step is then halved.
     """
-    before = _pace(last.drive)
+    before = _speed_of_drive(last.drive)
     assert before is not None
     try:
-        orbit = orbit_of(parameters, _paced(last.drive, speed), turns=last.turns, start=last.start, settle=False)
+        orbit = orbit_of(parameters, _with_speed(last.drive, speed), turns=last.turns, start=last.start, settle=False)
     except OrbitError:
         orbit = None
     if orbit is not None:
@@ -213,14 +213,14 @@ def _continued(
             return orbit
     if halvings == 0:
         return None
-    middle = _continued(parameters, 0.5 * (before + speed), last, halvings - 1)
-    return None if middle is None else _continued(parameters, speed, middle, halvings - 1)
+    middle = _follow(parameters, 0.5 * (before + speed), last, halvings - 1)
+    return None if middle is None else _follow(parameters, speed, middle, halvings - 1)
 
 
-def _settled(point: OperatingPoint, state: FloatArray) -> PeriodicOrbit:
+def _settle(point: OperatingPoint, state: FloatArray) -> PeriodicOrbit:
     """Return the steady motion on which the mechanism settles from a state at crank angle 0.
 
-    From an unstable motion, as of a pendulum that hangs still, a small disturbance leads on.
+    If it settles on an unstable motion, such as that of a pendulum that hangs still, it is disturbed and followed once more.
     """
     scale, disturbed = point.scale(state), state
     for _ in range(2):
@@ -249,13 +249,13 @@ def _settled(point: OperatingPoint, state: FloatArray) -> PeriodicOrbit:
     raise OrbitError(reason, point.flow, start, residual, 0)
 
 
-#: Starts of the two methods in a round, and rounds at most.
+#: Starts of each of the two methods in a round, and rounds at most.
 MANY, DEFLATED, ROUNDS = 64, 16, 2
 #: Distance, relative to the scale, below which a motion that a search without deflation approaches counts as known.
 _NEAR = 1e-4
 #: Speeds of a slow run up from rest: the first relative to the last, and their number.
 _FIRST_SPEED, _SPEEDS = 0.2, 80
-#: Distance of a motion from the one on which a machine has settled, relative to the scale, beyond which it is another.
+#: Distance between two motions, relative to the scale, above which they are different: see `_reached`.
 _ARRIVED = 1e-2
 
 
@@ -271,12 +271,12 @@ class Orbits(Shown):
         Whether the two methods found the same motions and ``index`` is ``index_of_all``; if not, there may be more.
     index : int
         Sum of the signs of det(I - monodromy matrix) over these motions and those whose period divides theirs, each counted
-        once per turn. Motions come and go in pairs of opposite signs: if every motion stays clear of the limit of assembly,
-        another sum than ``index_of_all`` means that one was missed, or lost at that limit. For several numbers of turns it is
-        the first such sum.
+        once per turn. Motions come and go in pairs of opposite signs: if every motion stays clear of the limit of assembly, a
+        sum other than ``index_of_all`` means that a motion was missed, or lost at that limit. For several numbers of turns it
+        is the first sum that differs from ``index_of_all``.
     index_of_all : int
-        The index of all motions: 1, or 0 if a link may go round, for which there is another motion to each, as a pendulum
-        hangs and stands.
+        The index of all motions: 1; or 0 if a link may go round, as the motions then come in pairs, like those of a pendulum
+        that hangs and one that stands.
     """
 
     orbits: tuple[PeriodicOrbit, ...]
@@ -301,7 +301,7 @@ class Orbits(Shown):
 
 @takes_published()
 def unsought(parameters: Parameters, drive: Drive) -> str:
-    """Return what an error adds on motions that no search finds, in which swinging links go round; empty without such links."""
+    """Return what an error message adds about motions that are not sought, in which swinging links go round; may be empty."""
     flow = drive.flow(mechanism_of(parameters))
     names = _swinging(flow)
     if not names:
@@ -329,7 +329,7 @@ def find_orbit(
     start: ArrayLike | None = None,
     settle: bool = True,
 ) -> PeriodicOrbit:
-    """Find a periodic motion of the full nonlinear mechanism; of several, the one that a machine reaches in run-up.
+    """Find a periodic motion of the full nonlinear mechanism; if there are several, the one that a machine reaches in run-up.
 
     Parameters
     ----------
@@ -387,9 +387,9 @@ def find_orbit(
     if not found.orbits:
         if first is None:
             raise failure
-        # it repeats itself after fewer turns, and so after these
+        # the motion repeats itself after fewer turns than were asked for
         return replace(first, others=0)
-    met = _met(found, drive, turns, first, start)
+    met = _reached(found, drive, turns, first, start)
     return replace(met, others=sum(orbit is not met for orbit in found.orbits))
 
 
@@ -455,8 +455,8 @@ def orbits_of(
 ) -> Orbits:
     """Find all periodic motions under a `Drive`, ``known`` ones included: see `find_orbits`.
 
-    Of links that nothing drives those that go round are sought, too, one link at a time and in a turn once at most, unless the
-    drive says how often they go round.
+    Motions in which a link that nothing drives goes round are sought, too, for one link at a time and with at most one round in
+    a turn, unless the drive says how often it goes round.
     """
     if not isinstance(turns, int):
         return joined([orbits_of(parameters, drive, turns=number, start=start) for number in sorted(set(turns))])
@@ -491,7 +491,7 @@ def _orbits_of(
         many.add(orbit)
     places = [guess, *many.places(MANY, 0)]
     if whole == 0:
-        # what goes round evenly may stand where it hangs
+        # motions near a uniform rotation may begin at other angles of the link
         even, free = guess.copy(), len(point.flow.free)
         even[free : 2 * free] = even_rates(point.drive, point.flow, guess)
         near = (approach_even(point, turns, even + share * point.flow.ways) for share in (0.0, 0.25, 0.5, 0.75))
@@ -518,7 +518,7 @@ def _orbits_of(
 
 
 def joined(parts: Sequence[Orbits]) -> Orbits:
-    """Return the motions of several searches, by amplitude."""
+    """Join the results of several searches into one."""
     whole = parts[0].index_of_all
     return Orbits(
         orbits=tuple(sorted((o for part in parts for o in part.orbits), key=lambda orbit: orbit.amplitude)),
@@ -534,7 +534,7 @@ class _Found:
     def __init__(self, point: OperatingPoint, turns: int, guess: FloatArray) -> None:
         self.point, self.turns, self.guess, self.scale = point, turns, guess, point.scale(guess)
         self.orbits: list[PeriodicOrbit] = []
-        #: Starts of all of them, of a motion of several turns one for each turn; motions of shorter periods included.
+        #: Starts of all motions, one for each turn of a motion; motions of shorter periods are included.
         self.known = np.empty((0, len(guess)))
         #: See `Orbits`.
         self.index = 0
@@ -549,7 +549,7 @@ class _Found:
         return bool((away.max(axis=1) < near).any()) if len(away) else False
 
     def seek(self, place: FloatArray, *, divide: bool) -> bool:
-        """Search from a place; return whether a new motion was found."""
+        """Search from a guess, with the known motions divided out if ``divide``; return whether a new motion was found."""
         start = approach(self.point, self.turns, place, self.known if divide else None)
         if start is None or (not divide and self.knows(start, _NEAR)):
             return False
@@ -573,13 +573,13 @@ class _Found:
         return True
 
     def same_as(self, other: _Found) -> bool:
-        """Return whether both have the same motions."""
+        """Return whether this method and another one have found the same motions."""
         if len(self.orbits) != len(other.orbits):
             return False
         return all(other.knows(orbit.start) for orbit in self.orbits)
 
     def between(self) -> list[FloatArray]:
-        """Return starts between each two motions, where a third often lies, and around each motion."""
+        """Return starts between the motions of each pair, where a third motion often lies, and around each motion."""
         places = [
             a + share * (b - a) for n, a in enumerate(self.known) for b in self.known[:n] for share in (0.25, 0.5, 0.75)
         ]
@@ -587,13 +587,13 @@ class _Found:
         return places + [a + share * (b - a) for a in self.known for b in around for share in (0.1, 0.3)]
 
 
-def _met(
+def _reached(
     found: Orbits, drive: Drive, turns: int, first: PeriodicOrbit | None, start: ArrayLike | None
 ) -> PeriodicOrbit:
-    """Return the motion that a machine reaches; if none is stable, ``first``; without that, the smallest.
+    """Return the stable motion that a machine reaches; if none is stable, ``first``, or the smallest motion if that is None.
 
-    A machine may settle on a motion of several turns where those of one turn are sought. If a link may go round, and what is
-    stable is of another kind, ``first`` is returned, too.
+    The stable motion nearest to the one on which the machine settles is returned. If a link may go round and none of the stable
+    motions is near to it, the result is ``first``.
     """
     stable = found.stable
     if not stable:
@@ -602,14 +602,14 @@ def _met(
         return stable[0]
     point = operating_point(stable[0].parameters, drive)
     guess = first_guess(point.flow, drive, start)
-    arrived, pace = None, None if drive.speed is None and start is not None else _pace(drive)
+    arrived, pace = None, None if drive.speed is None and start is not None else _speed_of_drive(drive)
     if pace is not None and pace > 0.0 and turns == 1:
         last = sweep(point.parameters, np.geomspace(_FIRST_SPEED * pace, pace, _SPEEDS), drive=drive).orbits[-1]
         if last is not None and last.periods == 1:
             arrived = last
     if arrived is None:
         with suppress(OrbitError):
-            arrived = _settled(point, guess)
+            arrived = _settle(point, guess)
     if arrived is None:
         return stable[0]
     scale = point.scale(guess)

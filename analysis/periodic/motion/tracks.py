@@ -1,7 +1,7 @@
 """Integrate several motions of one mechanism at once, each in its own lane: functions of compiled kernels.
 
-Each lane has its own start, tolerance, step size and end; mechanism and drive are the same. A kernel begins lanes, steps all
-until one ends, and gives that another start. The steps are those of `kernels.advance`.
+Each lane has its own start, tolerance, step size and end; mechanism and drive are the same. A kernel begins all lanes, steps
+them until the motion in one ends, and gives this lane another start. The steps are those of `kernels.advance`.
 """
 
 from __future__ import annotations
@@ -21,31 +21,29 @@ from ...run.stepping_in_lanes import errors_in_lanes, stage_in_lanes
 from .flow import GAP, IN_LANES, PLAIN, VARIATIONAL
 from .kernels import DONE, LEAST_STEP, LIMIT, NO_STEP, STALL, STALLED, start_piece
 
-#: Further states of a lane, beside a `Status`, with which a motion has ended.
+#: Statuses of a lane whose motion has not ended, or that has none; a motion ends with a `Status`.
 RUNNING, IDLE = -1, -2
 
 
 class Tracks(NamedTuple):
-    """Work space of the lanes. In lanes: z, which is y and the columns of its derivatives, at the beginning of a step and at a
-    stage; arguments and values of the flow; stages; the magnitudes of z. A number of each lane: error, angle, its end, step and
-    the next one, tolerance, least speed, clearance; status. Not in lanes: z of one lane."""
+    """Work space of the lanes, for z, which is y and the columns of its derivatives: arrays in lanes, then numbers of lanes."""
 
-    x: NDArray[np.float64]
-    y: NDArray[np.float64]
-    argument: NDArray[np.float64]
-    out: NDArray[np.float64]
-    k: NDArray[np.float64]
-    sizes: NDArray[np.float64]
-    error: NDArray[np.float64]
-    angle: NDArray[np.float64]
-    end: NDArray[np.float64]
-    h: NDArray[np.float64]
-    step: NDArray[np.float64]
-    tolerance: NDArray[np.float64]
-    slowest: NDArray[np.float64]
-    gap: NDArray[np.float64]
+    x: NDArray[np.float64]  # z at the beginning of a step
+    y: NDArray[np.float64]  # z at a stage, then at the end of a step
+    argument: NDArray[np.float64]  # arguments of the flow
+    out: NDArray[np.float64]  # values of the flow
+    k: NDArray[np.float64]  # rates at the stages
+    sizes: NDArray[np.float64]  # magnitudes of z
+    error: NDArray[np.float64]  # error of a step; this and the following have shape (LANES,)
+    angle: NDArray[np.float64]  # crank angle (rad)
+    end: NDArray[np.float64]  # crank angle at which the motion ends (rad)
+    h: NDArray[np.float64]  # step (rad)
+    step: NDArray[np.float64]  # proposed next step (rad)
+    tolerance: NDArray[np.float64]  # bound of the error
+    slowest: NDArray[np.float64]  # crank speed below which the crank counts as stalled (rad/s)
+    gap: NDArray[np.float64]  # clearance to the limit of assembly
     status: NDArray[np.int64]
-    z: NDArray[np.float64]
+    z: NDArray[np.float64]  # z of one lane
 
 
 @part
@@ -78,7 +76,7 @@ def _clearance(section, z, angle, v):
 
 @inner
 def begin(lane, section, start, end, tolerance, v):
-    """Begin a motion in a lane, from the angle 0 to an end; its status tells if it ends at once."""
+    """Begin a motion in a lane, from the crank angle 0 to ``end``, and set its status: RUNNING, or a failure at the start."""
     n = start.shape[0]
     start_piece(n, start, v.z)
     put(lane, LANES, v.z, v.x)
@@ -101,7 +99,7 @@ def _set_argument(node, n, z, v):
 
 @inner
 def _rates(section, s, z, v):
-    """Compute the rates of z at a stage."""
+    """Compute the rates of z at stage s."""
     n = section.scale.shape[0]
     columns = z.shape[0] // (n * LANES) - 1
     equation = section.equations[IN_LANES + (VARIATIONAL if columns else PLAIN)]
@@ -118,7 +116,7 @@ def _rates(section, s, z, v):
 
 @inner
 def _attempt(section, v):
-    """Take a step in all lanes into ``v.y``, with its error and the clearance after it."""
+    """Take a step in all lanes; write z after it into ``v.y``, and its error and the clearance."""
     _rates(section, 0, v.x, v)
     for s in range(1, STAGES):
         stage_in_lanes(s, v.x, v.k, v.h, v.y)
@@ -131,7 +129,7 @@ def _attempt(section, v):
 
 @inner
 def _judge(lane, section, last, v):
-    """Accept the step of a lane or make it shorter; return whether its motion has ended."""
+    """Accept the step of a lane or make it shorter; return whether its motion has ended; ``last``: it goes to the end."""
     h, n = v.h[lane], section.scale.shape[0]
     error = v.error[lane] / v.tolerance[lane]
     if not error <= 1.0:
@@ -157,9 +155,9 @@ def _judge(lane, section, last, v):
 
 @inner
 def advance_tracks(section, v):
-    """Step all lanes until the motion of one has ended; return False at once if none runs.
+    """Step all lanes until the motion in one has ended; return False at once if no lane is running.
 
-    Of a motion whose status is DONE, z at its end is in ``v.x``.
+    If the status of a lane is DONE, z at the end of its motion is in ``v.x``.
     """
     ended = running = False
     while not ended:
@@ -168,7 +166,7 @@ def advance_tracks(section, v):
             v.h[lane] = 0.0
             if v.status[lane] == RUNNING:
                 running = True
-                # no sliver of a step before the end
+                # no tiny last step before the end
                 rest = v.end[lane] - v.angle[lane]
                 v.h[lane] = rest if 1.001 * v.step[lane] >= rest else v.step[lane]
         if not running:

@@ -41,7 +41,7 @@ def _crank_inputs(mechanism: Mechanism) -> dict[str, tuple[str, int]]:
 
 @cache
 def of_the_motor(mechanism: Mechanism) -> dict[str, tuple[str, str]]:
-    """Return the field and unit of each parameter of the motors on cranks by name, in the order of `Drive.vector`."""
+    """Return the field of `InductionMotor` and the unit of each motor parameter by FMI name, in the order of `Drive.vector`."""
     units = {"breakdown_torque": "N.m", "breakdown_slip": "1", "synchronous_speed": "rad/s"}
     torques = [mechanism.channels[n].name for n in mechanism.torques]
     return {f"{name}.{field}": (field, unit) for name in torques for field, unit in units.items()}
@@ -75,7 +75,7 @@ def default_variable(mechanism: Mechanism, drive: Drive | None = None) -> str:
     Raises
     ------
     InputError
-        If it cannot be prescribed; or if the mechanism has several cranks, and there is no drive that says which.
+        If this speed cannot be prescribed; or if the mechanism has several cranks, and there is no drive that says which.
     """
     name = speed_name(mechanism, drive)
     if name is None:
@@ -92,7 +92,8 @@ def require_variable(parameters: Parameters, drive: Drive, name: str) -> None:
     UnknownNameError
         If there is no parameter of that name.
     InputError
-        If it does not act in this drive: a speed under a torque, a torque at prescribed speed, a motor's where there is none.
+        If it does not act in this drive: a speed under a torque, a torque at prescribed speed, a motor parameter without a
+        motor.
     """
     require_drive(drive)
     mechanism = mechanism_of(parameters)
@@ -101,15 +102,15 @@ def require_variable(parameters: Parameters, drive: Drive, name: str) -> None:
     if what == "speed" or freedom == drive.reference(mechanism).freedom:
         if (what == "speed") != drive.speed_drive:
             raise InputError(f"{name} cannot vary: the drive is by {'speed' if drive.speed_drive else 'torque'}")
-        if what == "speed" and not _ratio_of(mechanism, drive, freedom):
+        if what == "speed" and not _crank_ratio(mechanism, drive, freedom):
             raise InputError(f"{name} cannot vary: this crank is not commanded to turn")
     elif name in forces_of(mechanism):
         require_acting(drive, mechanism, forces_of(mechanism)[name])
-    if name in of_the_motor(mechanism) and _motor_of(mechanism, drive, name) is None:
+    if name in of_the_motor(mechanism) and _find_motor(mechanism, drive, name) is None:
         raise InputError(f"{name} cannot vary: no motor drives the crank")
 
 
-def _ratio_of(mechanism: Mechanism, drive: Drive, freedom: int) -> float:
+def _crank_ratio(mechanism: Mechanism, drive: Drive, freedom: int) -> float:
     """Return the turns of a commanded crank per turn of the drive's crank; 0 if it is held or not commanded."""
     if freedom == drive.reference(mechanism).freedom:
         return 1.0
@@ -117,8 +118,8 @@ def _ratio_of(mechanism: Mechanism, drive: Drive, freedom: int) -> float:
     return float(drive.turning(mechanism).get(freedom, 0)) if commanded else 0.0
 
 
-def _motor_of(mechanism: Mechanism, drive: Drive, name: str) -> InductionMotor | None:
-    """Return the motor to which a motor parameter, given by name, belongs."""
+def _find_motor(mechanism: Mechanism, drive: Drive, name: str) -> InductionMotor | None:
+    """Return the motor to which a motor parameter, given by FMI name, belongs; None if there is none."""
     torque = name.rpartition(".")[0]
     own = drive.reference(mechanism).torque
     return drive.motor if own is not None and mechanism.channels[own].name == torque else drive.motors.get(torque)
@@ -152,11 +153,11 @@ def value_of(parameters: Parameters, drive: Drive, name: str) -> float:
     mechanism = mechanism_of(parameters)
     what, freedom = _crank_inputs(mechanism).get(name, ("", -1))
     if what == "speed":
-        return float("nan") if drive.speed is None else float(drive.speed) * _ratio_of(mechanism, drive, freedom)
+        return float("nan") if drive.speed is None else float(drive.speed) * _crank_ratio(mechanism, drive, freedom)
     if what == "torque" and freedom == drive.reference(mechanism).freedom:
         return float(drive.torque)
     if name in of_the_motor(mechanism):
-        return float(getattr(_motor_of(mechanism, drive, name), of_the_motor(mechanism)[name][0], np.nan))
+        return float(getattr(_find_motor(mechanism, drive, name), of_the_motor(mechanism)[name][0], np.nan))
     if name in forces_of(mechanism):
         return float(drive.forces.get(name, 0.0))
     return float(getattr(parameters, field_name(name)))
@@ -170,7 +171,7 @@ def format_value(name: str, value: float, unit: str) -> str:
 
 @lru_cache(maxsize=64)
 def _replaced(parameters: Parameters, *values: tuple[str, float]) -> Parameters:
-    """Return parameters with new values, cached: a row of a chart over the speed has one mechanism."""
+    """Return parameters with new values; cached, since all points in a row of a chart over the speed share one mechanism."""
     return replace(parameters, **dict(values))
 
 
@@ -188,12 +189,12 @@ def with_values(parameters: Parameters, drive: Drive, values: Mapping[str, float
         what, freedom = of_cranks.get(name, ("", -1))
         if what == "speed":
             # all commanded speeds keep their ratios
-            of_drive["speed"] = value / _ratio_of(mechanism, drive, freedom)
+            of_drive["speed"] = value / _crank_ratio(mechanism, drive, freedom)
         elif what == "torque" and freedom == own:
             of_drive["torque"] = value
         elif name in of_motor:
             torque = name.rpartition(".")[0]
-            motor = motors.get(torque) or _motor_of(mechanism, drive, name)
+            motor = motors.get(torque) or _find_motor(mechanism, drive, name)
             if motor is not None:
                 motors[torque] = replace(motor, **{of_motor[name][0]: value})
         elif name in forces:
@@ -215,7 +216,7 @@ def with_values(parameters: Parameters, drive: Drive, values: Mapping[str, float
 
 @dataclass(frozen=True, slots=True)
 class NamedPlane:
-    """The plane of two parameters, by name: see `plane`."""
+    """A plane of two parameters, given by FMI name: see `plane`."""
 
     parameters: Parameters
     drive: Drive
@@ -223,13 +224,13 @@ class NamedPlane:
     y: str
 
     def __call__(self, first: float, second: float) -> Operation:
-        """Return the mechanism and drive at a point."""
+        """Return the mechanism and drive at the values ``first`` of x and ``second`` of y."""
         return with_values(self.parameters, self.drive, {self.x: first, self.y: second})
 
 
 @takes_published()
 def plane(parameters: Parameters, drive: Drive, x: str, y: str) -> Plane:
-    """Return the plane of two parameters, with all others fixed.
+    """Return a function that gives the mechanism and drive for values of two parameters, with all others fixed.
 
     Parameters
     ----------
@@ -244,7 +245,7 @@ def plane(parameters: Parameters, drive: Drive, x: str, y: str) -> Plane:
     UnknownNameError
         If there is no parameter of that name.
     InputError
-        If both axes are the same, or both speeds of cranks, or one does not act in this drive.
+        If the two axes are the same, if they are the speeds of two cranks, or if one does not act in this drive.
     """
     if x == y:
         raise InputError(f"both axes are {x!r}: a chart needs two parameters")
@@ -255,10 +256,10 @@ def plane(parameters: Parameters, drive: Drive, x: str, y: str) -> Plane:
     return NamedPlane(parameters, drive, x, y)
 
 
-#: Relative step of the difference by which the constants are differentiated with respect to the parameter. The constants
-#: are smooth functions of it, most of them linear, and the derivative steers Newton's method only.
+#: Relative step of the finite difference that differentiates the constants with respect to the parameter. The constants are
+#: smooth functions of it, most of them linear, and the derivative is used only in Newton's method.
 _DIFFERENCE = 1e-6
-#: What varies: an FMI name, or a function of one number.
+#: What varies: a parameter by its FMI name, or a function from a number to a mechanism and drive.
 Vary = str | Callable[[float], Operation]
 
 
@@ -307,12 +308,12 @@ class Family:
         return with_values(self.parameters, self.drive, {self.vary: value})
 
     def with_ratios(self, ratios: Mapping[str, Any]) -> Family:
-        """Return the motions in which other cranks and links go round so often for each turn of the crank: see `Drive`."""
+        """Return the family with other ratios: turns of the other cranks and links per turn of the crank, see `Drive`."""
         if ratios == self.drive.ratios:
             return self
         drive = replace(self.drive, ratios=ratios)
         return replace(
-            self, drive=drive, vary=partial(_turning, self.vary, ratios) if callable(self.vary) else self.vary
+            self, drive=drive, vary=partial(_with_ratios, self.vary, ratios) if callable(self.vary) else self.vary
         )
 
     def format_value(self, value: float) -> str:
@@ -320,7 +321,7 @@ class Family:
         return format_value(self.name, value, self.unit)
 
     def direction(self, value: float, low: float, high: float) -> Direction:
-        """Differentiate mechanism and drive with respect to the parameter, by differences inside the parameter's range."""
+        """Differentiate the numbers of the drive and the constants by the parameter, with finite differences in its range."""
         step = _DIFFERENCE * max(abs(value), 1e-3 * (high - low))
         a, b = max(value - step, low), min(value + step, high)
         mechanism = mechanism_of(self.parameters)
@@ -328,7 +329,7 @@ class Family:
         return Direction((vectors[1] - vectors[0]) / (b - a), (numbers[1] - numbers[0]) / (b - a))
 
 
-def _turning(vary: Callable[[float], Operation], ratios: Mapping[str, Any], value: float) -> Operation:
+def _with_ratios(vary: Callable[[float], Operation], ratios: Mapping[str, Any], value: float) -> Operation:
     """Return the mechanism and drive at a value of a parameter, with other ratios."""
     parameters, drive = vary(value)
     return parameters, replace(drive, ratios=ratios)
@@ -339,7 +340,7 @@ FloatArray = NDArray[np.float64]
 
 @takes_published()
 def gradient_names(parameters: Parameters, drive: Drive) -> tuple[str, ...]:
-    """Return the FMI names of all parameters by which motions are differentiated: of the drive and of the mechanism.
+    """Return the FMI names of all parameters, of the drive and of the mechanism, by which motions are differentiated.
 
     A parameter at zero that would switch on further equations, such as friction by contact forces, is left out; it can be
     named explicitly.
@@ -358,14 +359,17 @@ def gradient_names(parameters: Parameters, drive: Drive) -> tuple[str, ...]:
 
 
 class Along(NamedTuple):
-    """First derivatives of the constants with respect to parameters, and second ones with respect to a further one; (P, m)."""
+    """Derivatives of the P constants with respect to m parameters."""
 
-    p: FloatArray
-    p_along: FloatArray
+    p: FloatArray  # first derivatives, shape (P, m)
+    p_along: FloatArray  # derivatives of ``p`` with respect to one further parameter, (P, m)
 
 
 def along_parameters(parameters: Parameters, names: Sequence[str], along: str = "") -> Along:
-    """Compute the derivatives of the constants by parameters given by FMI name; zero for parameters of the drive."""
+    """Compute the derivatives of the constants by parameters given by FMI name; zero for parameters of the drive.
+
+    ``along`` is the FMI name of the further parameter for the second derivatives.
+    """
     mechanism = mechanism_of(parameters)
     own = [float(getattr(parameters, field.name)) for field in fields(parameters)]
     known = {fmi_name(field.name): number for number, field in enumerate(fields(parameters))}
@@ -382,22 +386,25 @@ def along_parameters(parameters: Parameters, names: Sequence[str], along: str = 
 
 
 def places_of(flow: Flow, drive: Drive, name: str) -> dict[int, float] | None:
-    """Return the numbers of the drive that are multiples of a parameter, by their places in `Drive.vector`, with the factors.
+    """Return the numbers of the drive that are multiples of a parameter, as indices into `Drive.vector` with the factors.
 
-    None for a parameter of the mechanism.
+    For a parameter of the mechanism the result is None.
     """
     mechanism = flow.mechanism
     places = (*mechanism.input_names, *of_the_motor(mechanism))
     what, freedom = _crank_inputs(mechanism).get(name, ("", -1))
     if what == "speed":
-        own = _ratio_of(mechanism, drive, freedom)
+        own = _crank_ratio(mechanism, drive, freedom)
         channels = ({flow.crank: flow.command} | flow.commanded).items()
-        return {c: _ratio_of(mechanism, drive, number) / own for number, c in channels if c is not None}
+        return {c: _crank_ratio(mechanism, drive, number) / own for number, c in channels if c is not None}
     return {places.index(name): 1.0} if name in places else None
 
 
 def stacked(drive: Drive, flow: Flow, names: Sequence[str], p: FloatArray) -> FloatArray:
-    """Stack the derivatives of the numbers of the drive on those of the constants, ``p``; shape (c, m)."""
+    """Return the derivatives of the numbers of the drive by parameters, with those of the constants, ``p``, below them.
+
+    The shape is (numbers of the drive + constants, m).
+    """
     found = np.zeros((flow.drive_size, p.shape[1]))
     for column, name in enumerate(names):
         for place, factor in (places_of(flow, drive, name) or {}).items():
@@ -407,7 +414,10 @@ def stacked(drive: Drive, flow: Flow, names: Sequence[str], p: FloatArray) -> Fl
 
 @cache
 def _constants(mechanism: Mechanism) -> Any:
-    """Return a function of parameters and a direction: the constants' derivatives, and their derivatives along it."""
+    """Return a ``casadi.Function`` of parameters and a direction.
+
+    Its values are the Jacobian of the constants by the parameters, and the derivative of this Jacobian along the direction.
+    """
     casadi = symbolic.library()
     traced = of_parameters(mechanism)
     k = casadi.vertcat(*traced.parameters.constants())
