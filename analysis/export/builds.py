@@ -40,7 +40,7 @@ def build_all(
     *,
     publish_to: Path | str | None = None,
 ) -> Iterator[Built]:
-    """Build FMUs, one after the other, each valid and, where it can run here, tried out.
+    """Build FMUs one after the other; validate each, and try it out if it can run on this platform.
 
     Parameters
     ----------

@@ -220,8 +220,8 @@ def _with_solution(
 ) -> tuple[list[Any], Any, Any]:
     """Return outputs, derivative and clearance with symbols for the solution of the contact forces; the symbols; the solution.
 
-    They apply one more sweep of Newton's method to the symbols, so that their derivatives are those of the solution. If
-    ``smooth``, for differentiation, the root of a sum of squares has the derivative 0 where it is 0, instead of 0/0.
+    The expressions apply one more sweep of Newton's method to the symbols, so that their derivatives are those of the
+    solution. If ``smooth``, for differentiation, the root of a sum of squares has the derivative 0 at 0, instead of 0/0.
     """
     casadi = symbolic.library()
     found: dict[str, tuple[Any, Any]] = {}

@@ -280,7 +280,7 @@ class Mechanism:
         Modules of the equations and of all functions that they call; the last is in the package that has ``MECHANISM``.
     equations : Equations
     check_assembly : callable
-        ``check_assembly(parameters, x)`` raises AssemblyError if the links cannot be joined with the least clearance.
+        ``check_assembly(parameters, x)`` raises AssemblyError unless the links can be joined with clearance `LIMIT_SINE`.
     error_scale : callable
         ``error_scale(parameters, x)``: magnitudes of the state's components below which the integrator's error is absolute,
         by arithmetic without branches.
@@ -367,7 +367,7 @@ class Mechanism:
         return self.equations.applied(modes, (0.0,) * len(self.channels), p)
 
     def check_state(self, parameters: Any, x: Sequence[float], i: Any, p: Any) -> None:
-        """Check that the links can be joined and do not jam, both with the least clearance.
+        """Check that the links can be joined and do not jam, with a clearance of at least `limits.LIMIT_SINE`.
 
         Raises
         ------

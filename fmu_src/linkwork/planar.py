@@ -609,7 +609,7 @@ UNJOINED = Unjoined(
 
 
 def check_clearance(places: Callable[..., Any], x: Sequence[float], p: Any, where: str) -> None:
-    """Check that the bodies can be joined in state x with the least clearance; ``where`` describes the state in words.
+    """Check that the bodies can be joined in state x; ``places`` computes their poses, ``where`` describes x in words.
 
     Raises
     ------

@@ -19,7 +19,7 @@ UNJOINED = Unjoined(
 
 
 def check_assembly(parameters: FiveBarParameters, crank_angle: float, slider_position: float) -> None:
-    """Check that the links can be joined at a configuration with the least clearance from the limit of assembly.
+    """Check that the links can be joined at a configuration, with a clearance of at least `LIMIT_SINE`.
 
     Raises
     ------

@@ -68,7 +68,7 @@ def position(th2: float, u: float, p: Constants) -> Position:
     ValueError
         If the links cannot be joined (square root of a negative number); NaN in compiled code.
     ZeroDivisionError
-        If B meets D, where the coupler's direction is undetermined.
+        If B coincides with D, so that the coupler's direction is undetermined.
     """
     c2 = cos(th2)
     s2 = sin(th2)

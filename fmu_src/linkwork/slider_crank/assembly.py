@@ -19,7 +19,7 @@ UNJOINED = Unjoined(
 
 
 def check_assembly(parameters: SliderCrankParameters, crank_angle: float, shift: float) -> None:
-    """Check that the rod reaches the guide at a configuration with the least clearance from the limit of assembly.
+    """Check that the rod reaches the guide at a configuration, with a clearance of at least `LIMIT_SINE`.
 
     Parameters
     ----------
