@@ -34,7 +34,7 @@ WAYS = {
     "updates": Way("updates", fmi=3),
     "rollback": Way("rollback"),
 }
-#: Steps of a decade relative to its first, which each of them divides.
+#: Steps of a decade relative to its first step; each divides the first.
 _DECADE = (1.0, 0.5, 0.2)
 #: Errors below this are due to the parts' own integrators, not to the coupling.
 _FLOOR = 1e-8
@@ -68,7 +68,7 @@ class Convergence:
     def order(self, way: str) -> float:
         """Return the order of a coupling: the slope of log error over log step by regression; NaN with fewer than two errors.
 
-        It leaves out errors above 0.1, where the step is too long for the system, and those of the parts' own integrators.
+        Errors above 0.1, where the step is too long for the system, and errors of the parts' own integrators are left out.
         """
         good = np.isfinite(self.errors[way]) & (self.errors[way] > _FLOOR) & (self.errors[way] < 0.1)
         if np.count_nonzero(good) < 2:
@@ -125,7 +125,7 @@ def convergence(
             )
     right = Joined(system).run(stop_time, steps[0])
     wirings = {way: (system if WAYS[way].rates else system.without_rates()).wiring(fmi=WAYS[way].fmi) for way in ways}
-    # accelerations leap where a controller takes a sample
+    # accelerations jump where a controller takes a sample
     ports = next(iter(wirings.values()))
     sources = dict.fromkeys(system.connections.values())
     names = [str(s) for s in sources if not ports.port(s).unit.endswith("/s2") and str(s) in right.values]

@@ -1,4 +1,4 @@
-"""A system as a file describes it: parts by what they are, connections, a run; from it come the FMUs and their wiring."""
+"""Read a system from a file that describes parts, connections and a run, and build its FMUs and their wiring."""
 
 from __future__ import annotations
 
@@ -28,27 +28,27 @@ from ..units import quantity
 from .wiring import End, Part, Wiring, WiringError
 
 HERE = resources.files(__package__)
-#: Described linkages that are partners of mechanisms.
+#: Described linkages that can be connected to mechanisms.
 PARTNERS = ("induction-motor", "flywheel-gear", "line-shaft", "press-load")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PartTable:
-    """A part: one of the first five, and what it starts with.
+    """A part: a case, a partner, a controller or an FMU, and its start values.
 
     Attributes
     ----------
     case : str
-        A published set, or a case file or linkage: its parameters and its state at the start.
+        A published set, or a case file or linkage file: it gives the parameters and the initial state.
     partner : str
         One of `PARTNERS`.
     controller : str
         One of `CONTROLLERS`.
     fmu : str
-        An FMU of any make, of FMI 2.0.
+        An FMU of FMI 2.0 or 3.0, from any tool.
     values : mapping
-        Parameters and inputs at the start by their FMI names; texts with units, or numbers in SI. Those of a table, ``table_0``
-        and so on, may be a list.
+        Parameters and inputs at the start by their FMI names; texts with units, or numbers in SI. A list ``table`` gives
+        ``table_0``, ``table_1`` and so on.
     """
 
     case: str = entry(files.text, "")
@@ -95,7 +95,7 @@ class System:
         The output that each input is connected to.
     run : RunTable
     folder : path
-        Against which file names are read.
+        Folder to which file names are relative.
     """
 
     title: str = entry(files.text, "")
@@ -106,7 +106,7 @@ class System:
 
     @cached_property
     def members(self) -> dict[str, Member]:
-        """The parts, with their mechanisms and the values they start with."""
+        """The parts by name, with their mechanisms and start values."""
         return {name: self._member(name, table) for name, table in self.parts.items()}
 
     def _member(self, name: str, table: PartTable) -> Member:
@@ -120,7 +120,7 @@ class System:
             return Member(name=name, values=values, fmu=self.folder / table.fmu)
         if table.controller:
             rows = {row.name: row.unit for row in CONTROLLERS[table.controller].rows} | {"sample_time": "s"}
-            return Member(name=name, values=_read(table.values, rows, where), controller=table.controller)
+            return Member(name=name, values=_read_values(table.values, rows, where), controller=table.controller)
         parameters, initial, inputs = self._case(table)
         mechanism = mechanism_of(parameters)
         values = {fmi_name(key): float(value) for key, value in asdict(parameters).items()}
@@ -128,7 +128,7 @@ class System:
         units = {v.name: v.unit or "1" for v in mechanism.variables if v.causality in ("parameter", "input")}
         return Member(
             name=name,
-            values=values | inputs | self._modes(name, mechanism, inputs) | _read(table.values, units, where),
+            values=values | inputs | self._modes(name, mechanism, inputs) | _read_values(table.values, units, where),
             mechanism=mechanism,
         )
 
@@ -138,7 +138,7 @@ class System:
             made = load_linkage(Path(str(HERE / "partners" / f"{table.partner}.toml")))
             case = published_case(made.name)
         elif Path(table.case).suffix in (".toml", ".json"):
-            # how long the case would run alone is of no account, and may be missing
+            # the stop time of the case itself is not used, and may be missing
             tables = files.read_tables(self.folder / table.case) | {"run": {"stop_time": self.run.stop_time}}
             case = case_from(tables, folder=(self.folder / table.case).parent)
         else:
@@ -148,7 +148,7 @@ class System:
         return case.parameters, case.initial, {k: float(v) for k, v in given.items() if isinstance(v, int | float)}
 
     def _modes(self, name: str, mechanism: Mechanism, inputs: Mapping[str, float]) -> dict[str, float]:
-        """Return the mode of each freedom: that of the input that is connected, or else that of the case."""
+        """Return the mode of each freedom: that of its connected input, or that of the case if none is connected."""
         found = {}
         for number, freedom in enumerate(mechanism.freedoms):
             if freedom.mode is None:
@@ -161,7 +161,7 @@ class System:
         return found
 
     def wiring(self, folder: str | Path | None = None, *, fmi: int = 2) -> Wiring:
-        """Return the wiring of the system, its FMUs built in a folder, by default one of the user's cache.
+        """Build the FMUs of the system in a folder, by default in the user's cache, and return the wiring.
 
         Parameters
         ----------
@@ -174,7 +174,7 @@ class System:
         BuildError
             If an FMU cannot be built.
         WiringError, UnknownNameError
-            If a connection cannot be right.
+            If a connection is not valid.
         """
         place = code_folder("systems") if folder is None else Path(folder)
         parts = {name: Part.of(name, member.built(place, fmi), member.values) for name, member in self.members.items()}
@@ -200,7 +200,7 @@ class System:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Member:
-    """A part as it is described: one of a mechanism, a controller and an FMU, and the values it starts with (SI)."""
+    """A part: its mechanism, controller or FMU, and its start values (SI)."""
 
     name: str
     values: Mapping[str, float]
@@ -209,7 +209,7 @@ class Member:
     fmu: Path | None = None
 
     def built(self, folder: Path, fmi: int = 2) -> Path:
-        """Return its FMU, built if it is not there."""
+        """Return the path of its FMU, which is built below ``folder`` if it is not there."""
         kinds = {2: NATIVE, 3: NATIVE_FMI3}
         if fmi not in kinds:
             raise ParameterError("fmi", fmi, "be 2 or 3")
@@ -230,8 +230,8 @@ def _number(value: Any, name: str) -> float:
     return float(value)
 
 
-def _read(values: Mapping[str, Any], units: Mapping[str, str], where: str) -> dict[str, float]:
-    """Read values by FMI name, each of its unit; a list has the values of ``name_0`` and so on."""
+def _read_values(values: Mapping[str, Any], units: Mapping[str, str], where: str) -> dict[str, float]:
+    """Read values by FMI name, in the unit of each; a list gives the values of ``name_0``, ``name_1`` and so on."""
     values = dict(values)
     for key in [key for key, value in values.items() if isinstance(value, list)]:
         names = [name for name in units if re.fullmatch(re.escape(key) + r"_\d+", name)]
@@ -241,11 +241,11 @@ def _read(values: Mapping[str, Any], units: Mapping[str, str], where: str) -> di
     for key in values:
         if key not in units:
             raise unknown_name(key, units, f"variable {key}, of {where}")
-    return {key: _of_unit(value, units[key], f"{where}.{key}") for key, value in values.items()}
+    return {key: _in_unit(value, units[key], f"{where}.{key}") for key, value in values.items()}
 
 
-def _of_unit(value: Any, unit: str, name: str) -> float:
-    # what controllers have beyond mechanics is given in SI
+def _in_unit(value: Any, unit: str, name: str) -> float:
+    # values with other than mechanical units, which controllers have, are given in SI
     return (
         quantity(value, unit, name) if not {"A", "N/(m.s)"} & set(UNITS.get(unit, {unit: 1})) else _number(value, name)
     )

@@ -14,7 +14,7 @@ from ..files import write_text
 from .wiring import Part, Wiring, WiringError
 
 _HOST, _CONTROLLERS = "host.c", "controllers.h"
-#: NO_HEAP leaves out of the FMUs what they have for hosts that give them no memory.
+#: Options of the compiler. NO_HEAP leaves out the code by which FMUs allocate memory if the host gives them none.
 OPTIONS = (
     "-std=c11", "-O2", "-ffp-contract=off", "-fno-sanitize=undefined", "-Wall", "-Wextra", "-Werror", "-DNO_HEAP",
 )  # fmt: skip

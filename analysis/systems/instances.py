@@ -108,9 +108,9 @@ class Instance:
         slopes : float array or None
             Slopes over the step; None if the inputs are held.
         middle : float
-            Time (s) at which a part that accepts no slopes evaluates the lines; it holds these values for the whole step.
+            Time from the start of the step (s). A part that accepts no slopes holds the values at this time for the whole step.
         updated : bool
-            Whether an FMI 3.0 part follows the lines by intermediate updates.
+            Whether an FMI 3.0 part follows the slopes by intermediate updates.
         """
         references = [self.part.ports[name].reference for name in names]
         lines = slopes is not None and self._interpolates
@@ -174,7 +174,7 @@ class Instance3(Instance):
         return np.array(self._fmu.getFloat64(self._references))
 
     def put(self, names: Sequence[str], values: Floats, slopes: Floats | None, *, middle: float, updated: bool) -> None:
-        """Set inputs for a step as `Instance.put` does; without updates they are held at the values in the middle of it."""
+        """Set inputs for a step as `Instance.put` does; without updates they are held at their values at ``middle``."""
         references = [self.part.ports[name].reference for name in names]
         self._values, self._slopes = values, np.zeros(len(values)) if slopes is None else slopes
         self._lines = bool(references) and slopes is not None and updated
@@ -184,7 +184,7 @@ class Instance3(Instance):
             self._fmu.setFloat64(references, self._last.tolist())
 
     def at_end(self, step: float) -> Floats:
-        """Return the values of the inputs at the end of a step: those of the last update, or the ends of their lines."""
+        """Return the values of the inputs at the end of a step: those of the last update, or those that the slopes give."""
         return self._last if self._lines else self._values + step * self._slopes
 
     def step(self, time: float, step: float) -> None:

@@ -28,7 +28,7 @@ from .wiring import End, WiringError
 
 
 class _Model:
-    """A mechanism of the system: its symbols, its constants, its initial state."""
+    """A mechanism of the system: its traced equations, its constants, its initial state."""
 
     def __init__(self, member: Member, mechanism: Mechanism) -> None:
         self.mechanism, values = mechanism, member.values
@@ -120,7 +120,7 @@ class Joined:
             slopes += slope
             outputs |= {End(name, out): v for out, v in zip(m.output_names, casadi.vertsplit(of(model.traced.outputs)))}
         open_ends = [end for end in wires if end.part in self.models]
-        found = self._settled(casadi, [wires[end] for end in open_ends], [outputs[end] for end in open_ends])
+        found = self._solve_connections(casadi, [wires[end] for end in open_ends], [outputs[end] for end in open_ends])
         self.names = list(outputs)
 
         def closed(what: list[Any]) -> Any:
@@ -131,7 +131,7 @@ class Joined:
         self._outputs = casadi.Function("outputs", symbols, [closed(list(outputs.values()))], {"cse": True})
         self.start = np.concatenate([model.start for model in self.models.values()])
 
-    def _settled(self, casadi: Any, symbols: list[Any], values: list[Any]) -> Any:
+    def _solve_connections(self, casadi: Any, symbols: list[Any], values: list[Any]) -> Any:
         """Solve the connections: return the connected values as expressions of the states alone."""
         if not symbols:
             return casadi.SX(0, 1)
@@ -159,7 +159,7 @@ class Joined:
         marks = np.unique(np.concatenate([period * np.arange(round(stop_time / period) + 1), [stop_time]]))
         x, rows, kept = self.start, [], []
         for begin, end in pairwise(marks):
-            held = self._sampled(float(begin), x)
+            held = self._sample(float(begin), x)
             inside = times[(times >= begin - 1e-9 * step) & (times < end - 1e-9 * step)]
             found = solve_ivp(
                 lambda t, x, held=held: self._slope(x, held).full().ravel(), (begin, end), x, "DOP853",
@@ -172,7 +172,7 @@ class Joined:
             kept += list(inside)
             rows += [self._outputs(state, held).full().ravel() for state in found.y.T[:-1]]
             x = found.y[:, -1]
-        rows.append(self._outputs(x, self._sampled(float(marks[-1]), x)).full().ravel())
+        rows.append(self._outputs(x, self._sample(float(marks[-1]), x)).full().ravel())
         values = np.array(rows)
         return SystemRun(
             time=np.array([*kept, stop_time]),
@@ -180,26 +180,26 @@ class Joined:
             coupling="joined",
         )
 
-    def _sampled(self, t: float, x: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Sample the controllers that are due at t; return the held outputs of all. Each sees the others' outputs before t."""
+    def _sample(self, t: float, x: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Sample the controllers that are due at t, each with the others' outputs before t; return the outputs of all."""
         due = {name: c for name, c in self.controllers.items() if c.count * c.sample_time <= t + 1e-6 * c.sample_time}
-        # at the start what one controller is told by another settles after as many rounds as there are
+        # at the start the values that controllers exchange settle after as many rounds as there are controllers
         for _ in due if t == 0.0 else ():
-            self._tell(due, x)
+            self._set_inputs(due, x)
             for controller in due.values():
                 controller.preview()
-        self._tell(due, x)
+        self._set_inputs(due, x)
         for controller in due.values():
             controller.sample(t)
             controller.count += 1
-        return self._held()
+        return self._held_outputs()
 
-    def _held(self) -> NDArray[np.float64]:
+    def _held_outputs(self) -> NDArray[np.float64]:
         return np.array([getattr(self.controllers[end.part], end.port) for end in self.given])
 
-    def _tell(self, controllers: Mapping[str, Controller], x: NDArray[np.float64]) -> None:
+    def _set_inputs(self, controllers: Mapping[str, Controller], x: NDArray[np.float64]) -> None:
         """Set the inputs of controllers to the values of the connected outputs."""
-        held = self._held()
+        held = self._held_outputs()
         told = dict(zip(self.names, self._outputs(x, held).full().ravel())) | dict(zip(self.given, held))
         for target, source in self.system.connections.items():
             if target.part in controllers:

@@ -27,7 +27,7 @@ class Box(NamedTuple):
 
 
 def boxes(wiring: Wiring) -> dict[str, Box]:
-    """Return the box of each part; four and more parts stand in columns of two."""
+    """Return the box of each part; four or more parts are placed in columns of two."""
     placed: dict[str, Box] = {}
     names = list(wiring.parts)
     rows = 1 if len(names) < 4 else 2

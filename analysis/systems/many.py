@@ -27,7 +27,7 @@ _BATCH = 16
 
 
 class SystemRunsEnded(LinkworkError):
-    """The runs were interrupted, or workers were lost; ``runs`` has the finished ones, which a given folder keeps."""
+    """The runs were interrupted, or workers were lost; ``runs`` has the finished runs, and ``folder``, if given, keeps them."""
 
     def __init__(self, reason: str, runs: SystemRuns, folder: Path | None) -> None:
         self.runs = runs
@@ -48,7 +48,7 @@ class SystemRuns:
     samples : (N, K, M) float array
         Values by run, output and time; see `output`.
     lengths : (N,) int array
-        Number of samples of each run; 0 if it was not begun or could not begin.
+        Number of samples of each run; 0 if it has not begun or could not begin.
     messages : mapping of int to str
         Message of the part that ended a run early or could not begin, by the number of the run.
     """
@@ -134,7 +134,7 @@ def run_many(
     task = _Task(
         parts, tuple(wiring.connections.items()), tuple(vary), sets, tuple(outputs), (coupling, step, stop_time, every)
     )
-    kept = _Kept(task, len(time), None if folder is None else Path(folder))
+    kept = _Storage(task, len(time), None if folder is None else Path(folder))
     runs = SystemRuns(time=time, names=task.names, samples=kept.samples, lengths=kept.lengths, messages=kept.messages)
     todo = [n for n in range(len(sets)) if kept.lengths[n] == 0 and n not in kept.messages]
     batches = [todo[k : k + _BATCH] for k in range(0, len(todo), _BATCH)]
@@ -152,7 +152,7 @@ def run_many(
 
 
 def _sets(wiring: Wiring, vary: Mapping[str, ArrayLike]) -> NDArray[np.float64]:
-    """Check the varied values and return them, by run and variable."""
+    """Check the varied values and return them as an array by run and variable."""
     arrays = {name: np.atleast_1d(np.asarray(values, dtype=float)) for name, values in vary.items()}
     known = [f"{n}.{v}" for n, p in wiring.parts.items() for k in ("parameter", "input") for v in p.named(k)]
     for name in arrays:
@@ -164,8 +164,8 @@ def _sets(wiring: Wiring, vary: Mapping[str, ArrayLike]) -> NDArray[np.float64]:
     return np.column_stack(list(arrays.values()))
 
 
-class _Kept:
-    """Storage of samples, lengths and messages, in memory or in a folder, from which finished runs are read."""
+class _Storage:
+    """Storage of samples, lengths and messages in memory, or in a folder, of which finished runs are read first."""
 
     def __init__(self, task: _Task, count: int, folder: Path | None) -> None:
         self.folder, self.messages = folder, dict[int, str]()

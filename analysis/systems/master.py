@@ -34,8 +34,8 @@ COUPLINGS = {
 #: Controller of the communication step: proportional and integral gain; least and greatest growth of a step; least and greatest
 #: step relative to the first one (Sadjina et al., section 5).
 _GAINS, _GROWTH, _STEPS = (0.2, 0.15), (0.2, 1.5), (1e-3, 1e2)
-#: Decay per step of the reference power for the residuals: it remembers some fifty steps, so that zeros of a power do not
-#: matter.
+#: Decay per step of the power to which residuals are compared: it remembers some fifty steps, so that zeros of the power
+#: do not matter.
 _MEMORY = 0.98
 
 
@@ -122,14 +122,14 @@ class _Together:
             self.ends = [End(name, output) for name, each in self.instances.items() for output in each.outputs]
             index = {end: number for number, end in enumerate(self.ends)}
             self.targets = t = {target: number for number, target in enumerate(wiring.connections)}
-            #: Of each connected input its output, and the names and numbers of each part's connected inputs.
+            #: For each connected input the number of its output; for each part the names and numbers of its connected inputs.
             self.sources = np.array([index[source] for source in wiring.connections.values()], dtype=int)
             self.own = {
                 name: ([t.port for t in self.targets if t.part == name],
                        np.array([n for t, n in self.targets.items() if t.part == name], dtype=int))
                 for name in self.instances
             }  # fmt: skip
-            #: Parts whose outputs change at instants only.
+            #: Parts whose outputs change only at discrete instants.
             self.sampled = {
                 name
                 for name, part in wiring.parts.items()
@@ -137,7 +137,7 @@ class _Together:
             }
             for instance in self.instances.values():
                 instance.begin()
-            # what depends directly on an input settles after as many rounds as there are parts
+            # outputs that depend directly on inputs settle after as many rounds as there are parts
             for _ in self.instances:
                 self.outputs = self._read()
                 self._exchange(self.outputs)
@@ -155,9 +155,9 @@ class _Together:
             for port in part.ports.values()
             if port.rate_of and port.causality == "output"
         }
-        #: Of each connected input the output with its rate, or the source itself where none is known.
+        #: For each connected input the output that is the rate of its source, or the source itself if none is known.
         self.rates = np.array([rates.get(s, index[s]) for s in wiring.connections.values()], dtype=int)
-        #: Connected inputs with a slope: none where the rate is an input, too, or the source is held.
+        #: Whether each connected input has a slope: not if its rate is connected, too, or its source is held.
         self.moving = np.array(
             [
                 not (wiring.port(source).held or wiring.rate_input(target) in wiring.connections)
@@ -165,11 +165,11 @@ class _Together:
             ],
             dtype=bool,
         )
-        #: Of each connected input the connected one with its rate, itself where there is none; what it moves with over a step.
+        #: For each connected input the connected input that is its rate over a step, or itself if there is none.
         self.partner = np.array(
             [self.targets.get(wiring.rate_input(t) or t, number) for t, number in self.targets.items()], dtype=int
         )
-        #: Numbers of each power bond's outputs and inputs: effort, flow, and what they are connected to.
+        #: For each power bond the numbers of the outputs effort and flow, and of the inputs to which they are connected.
         numbers = [(index[b.effort], index[b.flow], t[b.effort_to], t[b.flow_to]) for b in bonds]
         self.bonds = np.array(numbers, dtype=int).reshape(-1, 4).T
         self.outputs = self.before = self._read()
@@ -185,44 +185,44 @@ class _Together:
         values = outputs[self.sources]
         for name, (ports, numbers) in self.own.items():
             own = None if slopes is None else slopes[numbers]
-            # what is sampled is sampled at the start of a step
+            # sampled parts take their inputs at the start of a step
             later = middle if name not in self.sampled else 0.0
             self.instances[name].put(ports, values[numbers], own, middle=later, updated=updated)
 
     def _slopes(self) -> Floats:
-        """Return the slopes of all connected inputs; without a known rate they are those of the step before."""
+        """Return the slopes of all connected inputs; if a rate is not known, the slope of the step before is used."""
         found = self.outputs[self.rates]
         unknown = self.rates == self.sources
         found[unknown] = (self.outputs - self.before)[self.sources[unknown]] / self.last
         return np.where(self.moving, found, 0.0)
 
     def step(self, coupling: str, time: float, step: float) -> None:
-        """Take a step."""
+        """Take a communication step of length ``step`` (s) from ``time`` (s) with all parts."""
         before, slopes = self.outputs, None if coupling == "hold" else self._slopes()
         states = {name: each.saved() for name, each in self.instances.items()} if coupling == "rollback" else {}
         try:
             self._exchange(before, slopes, middle=0.5 * step, updated=coupling == "updates")
-            self._go(time, step)
+            self._step_all(time, step)
             if coupling == "rollback":
                 there = self._read()
                 for name, state in states.items():
                     self.instances[name].restore(state)
                 slopes = np.where(self.moving, (there - before)[self.sources] / step, 0.0)
                 self._exchange(before, slopes, middle=0.5 * step)
-                self._go(time, step)
+                self._step_all(time, step)
         finally:
             for name, state in states.items():
                 self.instances[name].forget(state)
-        self._note_given(before, slopes, step)
+        self._keep_end_values(before, slopes, step)
         self.reached = self._read()
         self.before, self.outputs, self.last = before, self.reached, step
         if coupling != "hold":
-            # what depends directly on inputs belongs to those that begin here; masters that hold inputs do not look again
+            # outputs that depend directly on inputs are read again with the new inputs; masters that hold inputs do not do this
             self._exchange(self.reached)
             self.outputs = self._read()
 
-    def _note_given(self, before: Floats, slopes: Floats | None, step: float) -> None:
-        """Keep the values of the inputs at the end of a step; an input whose rate is connected, too, moves at that rate."""
+    def _keep_end_values(self, before: Floats, slopes: Floats | None, step: float) -> None:
+        """Store the values of the inputs at the end of a step; an input whose rate is connected, too, moves at that rate."""
         values = before[self.sources]
         self.given = values.copy()
         for name, (_, numbers) in self.own.items():
@@ -231,7 +231,7 @@ class _Together:
         rates = values if slopes is None else values + 0.5 * step * slopes
         self.given[paired] = (values + step * rates[self.partner])[paired]
 
-    def _go(self, time: float, step: float) -> None:
+    def _step_all(self, time: float, step: float) -> None:
         for name, instance in self.instances.items():
             self.stepping = name
             instance.step(time, step)
@@ -248,7 +248,7 @@ class _Together:
 
 
 class _Stepper:
-    """Controller of the communication step: constant, or such that the coupling adds about a given share of the work."""
+    """Controller of the communication step, which is constant, or such that the coupling adds about a share of the work."""
 
     def __init__(self, step: float, stop_time: float, share: float | None) -> None:
         self.step, self.stop_time, self.share = step, stop_time, share
@@ -259,7 +259,7 @@ class _Stepper:
         if self.share is None:
             end = (self.number + 1) * self.step
         else:
-            # the last two steps share what is left
+            # the last two steps share the remaining time
             left = self.stop_time - time
             end = self.stop_time if left <= 1.0001 * self.step else time + min(self.step, 0.5 * left)
         self.number += 1
@@ -271,7 +271,7 @@ class _Stepper:
         return round(self.stop_time / self.first)
 
     def learn(self, powers: Floats, flows: Floats) -> None:
-        """Adapt the step to the power residuals and the powers of the last one, by PI control of the share of added work."""
+        """Adapt the step to the power residuals and transmitted powers of the last step, by PI control of the added share."""
         if self.share is None:
             return
         self.scale = max(_MEMORY * self.scale, float(np.sqrt(np.mean(flows**2))))
@@ -304,8 +304,8 @@ def run_system(
     step, stop_time : float, optional
         Communication step and end (s); by default the wiring's.
     share : float, optional
-        Wanted power residual, such as 1e-3, as a fraction of the power that the bonds transmitted lately: it controls the
-        steps, of which ``step`` is the first.
+        Wanted power residual, such as 1e-3, as a fraction of the power that the bonds transmitted recently. It controls the
+        length of the steps, and ``step`` is the first of them.
     progress : bool
 
     Returns
@@ -318,8 +318,8 @@ def run_system(
     CosimulationError
         If a part cannot be loaded or initialised.
     InputError
-        If the step is not positive and below the stop time, a part cannot restore the state at the start of a step, or
-        ``share`` is given but there is no power bond.
+        If the step is not positive or exceeds the stop time, if ``rollback`` is chosen and a part cannot restore its state, or
+        if ``share`` is not positive or there is no power bond for it.
     """
     if coupling not in COUPLINGS:
         raise unknown_name(coupling, COUPLINGS, f"coupling {coupling!r}")
@@ -354,7 +354,7 @@ def run_system(
                 try:
                     together.step(coupling, times[-1], length)
                 except FMICallException as error:
-                    status, message = 3, _said(together, times[-1], error)
+                    status, message = 3, _refusal(together, times[-1], error)
                     break
                 times.append(end)
                 rows.append(together.outputs)
@@ -384,7 +384,7 @@ def run_system(
     return run
 
 
-def _said(together: _Together, time: float, error: FMICallException) -> str:
-    """Return the message that a part refused a step, with the last logged text; FMPy passes all FMUs' texts to one of them."""
+def _refusal(together: _Together, time: float, error: FMICallException) -> str:
+    """Return the message that a part refused a step, with the last text of any FMU: FMPy passes all texts to one of them."""
     said = [text for instance in together.instances.values() for text in instance.messages]
     return f"{together.stepping} refused the step from t = {time:.9g} s: {said[-1] if said else error}"

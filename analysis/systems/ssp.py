@@ -32,7 +32,7 @@ common = lazy("pyssp_standard.common_content_ssc")
 unit = lazy("pyssp_standard.unit")
 etree = lazy("lxml.etree")
 _NAMESPACE = "{http://ssp-standard.org/SSP1/SystemStructureDescription}"
-#: Type of the annotation of the experiment with the communication step, for which the standard has no place.
+#: Type of the experiment's annotation with the communication step, for which the standard has no place.
 _STEP = "linkwork.communication-step"
 #: Elements that the library ignores silently.
 _UNREAD = ("LinearTransformation", "BooleanMappingTransformation", "IntegerMappingTransformation", "SignalDictionaries")
@@ -70,7 +70,7 @@ def write_ssp(wiring: Wiring, path: str | Path) -> Path:
                 structure.default_experiment.start_time, structure.default_experiment.stop_time = 0.0, wiring.stop_time
                 for name in _units(wiring):
                     structure.units.add_unit(unit.Unit(name, unit.BaseUnit(_base(name))))
-            _complete(archive.unpacked_path / "SystemStructure.ssd", wiring)
+            _complete_structure(archive.unpacked_path / "SystemStructure.ssd", wiring)
         shutil.copy(made, target)
     return final
 
@@ -115,8 +115,8 @@ def _component(part: Part, source: str, ports: Mapping[str, Iterable[str]]) -> A
     return component
 
 
-def _complete(path: Path, wiring: Wiring) -> None:
-    """Add the geometry of parts and connectors, and move the units before the experiment, as the schema requires."""
+def _complete_structure(path: Path, wiring: Wiring) -> None:
+    """Add communication step and geometry, and move the units before the experiment, as the schema requires."""
     tree = etree.parse(path)
     root, placed = tree.getroot(), boxes(wiring)
     found = {node.tag: node for node in root}
@@ -135,13 +135,13 @@ def _complete(path: Path, wiring: Wiring) -> None:
         edges = {"x1": box.left, "y1": box.bottom, "x2": box.right, "y2": box.top}
         geometry = etree.Element(f"{_NAMESPACE}ElementGeometry", {key: repr(value) for key, value in edges.items()})
         connectors = element.find(f"{_NAMESPACE}Connectors")
-        # a part without a connected port has none
+        # a part without connected ports has no connectors
         element.insert(0 if connectors is None else element.index(connectors) + 1, geometry)
     tree.write(path, xml_declaration=True, encoding="utf-8")
 
 
 def _values(path: Path, part: Part) -> Path:
-    """Write the start values of a part; values of an enumeration by the names of its items."""
+    """Write the start values of a part, those of an enumeration by the names of its items, and return the path."""
     ports = [part.ports[name] for name in part.values]
     with lazy("pyssp_standard.ssv").SSV(path, mode="w") as values:
         for port in ports:
@@ -162,7 +162,7 @@ def _values(path: Path, part: Part) -> Path:
             values.enumerations.add_enumeration(common.Enumeration(name, rows))
     tree = etree.parse(path)
     for node in tree.getroot().findall(f"{{{tree.getroot().nsmap['ssc']}}}Enumerations"):
-        # the library puts them last, and into another namespace than the schema
+        # the library puts enumerations last, and into another namespace than the schema
         node.tag = f"{{{tree.getroot().nsmap['ssv']}}}Enumerations"
         tree.getroot().insert(1, node)
         tree.write(path, xml_declaration=True, encoding="utf-8")
@@ -170,7 +170,7 @@ def _values(path: Path, part: Part) -> Path:
 
 
 def read_ssp(path: str | Path) -> Wiring:
-    """Read a system from an ``.ssp``: FMUs on one level, connections, start values from ``.ssv``, renamed by ``.ssm``.
+    """Read a system from an ``.ssp``: FMUs on one level, connections, start values from ``.ssv`` with names mapped by ``.ssm``.
 
     Raises
     ------
@@ -203,7 +203,7 @@ def read_ssp(path: str | Path) -> Wiring:
             fmu = folder / Path(element.source).name
             put(fmu, (archive.unpacked_path / element.source).read_bytes())
             bindings = [*(element.parameter_bindings or ()), *(system.parameter_bindings or ())]
-            texts = _bound(archive.unpacked_path, bindings, element.name, own=len(element.parameter_bindings or ()))
+            texts = _starts(archive.unpacked_path, bindings, element.name, own=len(element.parameter_bindings or ()))
             part = Part.of(element.name, fmu, {})
             values = {
                 key: _as_number(text, part.ports.get(key), f"{element.name}.{key}") for key, text in texts.items()
@@ -226,8 +226,8 @@ def read_ssp(path: str | Path) -> Wiring:
     return Wiring(title=structure.name, parts=parts, connections=connections, stop_time=stop_time, step=step)
 
 
-def _bound(folder: Path, bindings: Iterable[Any], name: str, own: int) -> dict[str, str]:
-    """Return a part's start values as text: from its own bindings, and from the system's, which begin with its name."""
+def _starts(folder: Path, bindings: Iterable[Any], name: str, own: int) -> dict[str, str]:
+    """Return a part's start values as text: first from its ``own`` first bindings, then from the system's for its name."""
     found: dict[str, str] = {}
     for number, binding in enumerate(bindings):
         inline, prefix = binding.ssv is not None, binding.prefix or ""

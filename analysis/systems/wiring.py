@@ -1,4 +1,4 @@
-"""Wire the FMUs of a system: parts with ports, connections between them, and the checks of these."""
+"""Wire the FMUs of a system: parts with ports, connections between ports, and checks of the connections."""
 
 from __future__ import annotations
 
@@ -65,7 +65,7 @@ class Part:
     feeds : mapping of str to tuple of str
         Inputs on which an output depends directly, by the name of the output.
     description : object
-        FMPy's reading of the model description.
+        Model description as read by FMPy.
     """
 
     name: str
@@ -111,7 +111,7 @@ class Part:
         for known in values:
             if known not in settable:
                 raise unknown_name(known, settable, f"parameter or input {known} of {name}")
-        # a Python FMU says nothing of dependencies, and answers at its next step
+        # a Python FMU states no dependencies, and its outputs follow its inputs at the next step
         feeds = {
             unknown.variable.name: tuple(v.name for v in unknown.dependencies if v.causality == "input")
             for unknown in description.outputs
@@ -130,7 +130,7 @@ def _items(variable: Any) -> tuple[tuple[int, str], ...]:
 
 
 class Bond(NamedTuple):
-    """Power bond: two connections in opposite directions whose product is a power, an effort and a flow."""
+    """Power bond: an effort and a flow whose product is a power, connected in opposite directions between two parts."""
 
     effort: End
     effort_to: End
