@@ -11,7 +11,15 @@ from numpy.typing import NDArray
 
 import analysis.synthesis as syn
 from analysis.synthesis.search.polish import sum_of_squares
-from analysis.synthesis.search.scan import SHAPES, Candidates, _bounded, _placed, _shapes, _timed, scan
+from analysis.synthesis.search.scan import (
+    SHAPES,
+    Candidates,
+    _allowed_shapes,
+    _clip_sizes,
+    _place_shapes,
+    _place_timed,
+    scan,
+)
 from analysis.synthesis.search.start import make_linkage
 from analysis.synthesis.task.limits import Limits, make_limits
 from analysis.synthesis.task.task import Normal
@@ -53,7 +61,7 @@ class TestVariableProjection:
     def test_place_size_direction_and_coupler_point_follow_from_shape_and_phase(self) -> None:
         rotation = syn.turn(16)
         normal, limits = stated(syn.TimedPath(points=KNOWN.path(rotation), rotation=rotation))
-        found = _placed(normal, limits, shape(KNOWN, phase=1.1 / (2.0 * pi)), 1, 0)
+        found = _place_shapes(normal, limits, shape(KNOWN, phase=1.1 / (2.0 * pi)), 1, 0)
         assert found.quality[0] == pytest.approx(0.0, abs=1e-10)
         same(first(found, normal), KNOWN)
 
@@ -62,7 +70,7 @@ class TestVariableProjection:
         task = syn.TimedPath(points=KNOWN.path(rotation), rotation=rotation)
         normal, limits = stated(task, point_distance=(0.0, 0.2))
         links, point = np.array([[1.0, 0.4, 0.9, 0.8, 0.0]]), np.array([0.5j])
-        size, scale = _bounded(np.array([50.0j]), links, point, limits)
+        size, scale = _clip_sizes(np.array([50.0j]), links, point, limits)
         assert size[0] * 0.5 * normal.unit == pytest.approx(0.2)
         assert scale[0] == pytest.approx(1j * size[0])
 
@@ -70,14 +78,14 @@ class TestVariableProjection:
         rotation = np.linspace(0.0, 4.0, 9)
         angle = KNOWN.coupler_angle(rotation) + 0.9
         normal, limits = stated(syn.Motion(points=KNOWN.path(rotation), angle=angle, rotation=rotation))
-        found = _placed(normal, limits, shape(KNOWN, phase=1.1 / (2.0 * pi)), 1, 0)
+        found = _place_shapes(normal, limits, shape(KNOWN, phase=1.1 / (2.0 * pi)), 1, 0)
         assert found.quality[0] == pytest.approx(0.0, abs=1e-10)
         same(first(found, normal), replace(KNOWN, output_angle=0.9))
 
     def test_rotations_of_untimed_points_are_in_order_and_go_all_round(self) -> None:
         normal, limits = stated(syn.PrecisionPoints(points=KNOWN.path(syn.turn(5))))
         shapes = np.tile(shape(KNOWN), (200, 1))
-        found = _timed(normal, limits, shapes, 1, np.random.default_rng(3)).rotation
+        found = _place_timed(normal, limits, shapes, 1, np.random.default_rng(3)).rotation
         assert found is not None
         steps = np.diff(found, axis=1)
         assert ((steps > 0.0).all(axis=1) | (steps < 0.0).all(axis=1)).all()
@@ -90,11 +98,11 @@ class TestVariableProjection:
         angle = KNOWN.rocker_angle(rotation) + 0.4
         row = shape(KNOWN, phase=1.1 / (2.0 * pi))
         normal, limits = stated(syn.RockerFunction(angle=angle, rotation=rotation, mounting=True))
-        found = _placed(normal, limits, row, 1, 0)
+        found = _place_shapes(normal, limits, row, 1, 0)
         assert found.quality[0] == pytest.approx(0.0, abs=1e-20)
         assert found.q[0, 10] == pytest.approx(0.4)
         normal, limits = stated(syn.RockerFunction(angle=angle, rotation=rotation))
-        assert _placed(normal, limits, row, 1, 0).quality[0] == pytest.approx(12 * 0.4**2)
+        assert _place_shapes(normal, limits, row, 1, 0).quality[0] == pytest.approx(12 * 0.4**2)
 
     def test_it_is_the_weighted_least_squares_optimum(self) -> None:
         """Of a target no linkage meets: no small change of place, size, direction and coupler point is better."""
@@ -102,7 +110,7 @@ class TestVariableProjection:
         points = random.normal(size=(10, 2))
         weights = random.uniform(0.2, 3.0, 10)
         normal, limits = stated(syn.TimedPath(points=points, weights=weights))
-        found = _placed(normal, limits, shape(KNOWN, phase=0.3), 1, 0)
+        found = _place_shapes(normal, limits, shape(KNOWN, phase=0.3), 1, 0)
         best = first(found, normal)
         task = syn.TimedPath(points=points, weights=weights)
         error = syn.evaluate(task, best).error
@@ -126,7 +134,7 @@ class TestVariableProjection:
             syn.LargestLink(length=0.3),
             syn.Assembly(branch=1),
         )
-        found = _placed(normal, limits, shape(KNOWN, phase=1.1 / (2.0 * pi)), 1, 0)
+        found = _place_shapes(normal, limits, shape(KNOWN, phase=1.1 / (2.0 * pi)), 1, 0)
         linkage = first(found, normal)
         assert linkage.largest_link == pytest.approx(0.3)
         assert linkage.point_distance <= 0.3
@@ -151,7 +159,7 @@ class TestUntimed:
             syn.UntimedPath(path=syn.TargetPath(points=points, closed=True)), syn.LargestLink(length=2.0)
         )
         row = shape(KNOWN, distance=self.DISTANCE, direction=0.7 / (2.0 * pi))
-        found = _placed(normal, limits, row, 1, 0)
+        found = _place_shapes(normal, limits, row, 1, 0)
         linkage = first(found, normal)
         # to the accuracy of polylines of 64 points
         assert found.quality[0] < 1e-3 * normal.n
@@ -173,7 +181,7 @@ class TestUntimed:
             syn.UntimedPath(path=syn.TargetPath(points=points, closed=False)), syn.LargestLink(length=2.0)
         )
         row = shape(KNOWN, distance=self.DISTANCE, direction=0.7 / (2.0 * pi))
-        found = _placed(normal, limits, row, 1, 0)
+        found = _place_shapes(normal, limits, row, 1, 0)
         assert found.rotation is not None
         assert np.all(np.sign(np.diff(found.rotation[0])) == way)
         apart = np.abs(
@@ -197,7 +205,7 @@ class TestShapes:
     def test_only_the_type_asked_for_is_tried(self, type_: str) -> None:
         task = syn.TimedPath(points=KNOWN.path(syn.turn(8)))
         _, limits = stated(task, syn.Grashof(type=type_))
-        rows = np.vstack(list(_shapes(limits, 0, 300)))
+        rows = np.vstack(list(_allowed_shapes(limits, 0, 300)))
         # about one in a hundred is a drag link
         assert len(rows) > 100
         for l2, l3, l4 in rows[:, :3]:
@@ -207,7 +215,7 @@ class TestShapes:
     def test_only_transmission_angles_asked_for_are_tried_within_the_ranges(self) -> None:
         task = syn.TimedPath(points=KNOWN.path(syn.turn(8)))
         _, limits = stated(task, syn.LeastTransmission(angle=0.9))
-        rows = np.vstack(list(_shapes(limits, 0, 300)))
+        rows = np.vstack(list(_allowed_shapes(limits, 0, 300)))
         for l2, l3, l4 in rows[:, :3]:
             linkage = syn.Linkage(ground_length=1.0, crank_length=l2, coupler_length=l3, rocker_length=l4)
             assert linkage.least_transmission >= 0.9 - 1e-12
@@ -218,7 +226,7 @@ class TestShapes:
     def test_shapes_that_no_size_can_fit_are_left_out(self) -> None:
         task = syn.TimedPath(points=KNOWN.path(syn.turn(8)))
         _, limits = stated(task, ground_length=(0.3, 0.5), crank_length=(0.2, 0.25))
-        rows = np.vstack(list(_shapes(limits, 0, 300)))
+        rows = np.vstack(list(_allowed_shapes(limits, 0, 300)))
         assert rows[:, 0].min() >= 0.4 - 1e-12
         assert rows[:, 0].max() <= 0.25 / 0.3 + 1e-12
 

@@ -123,7 +123,9 @@ def test_the_constraints_of_the_greatest_distance_have_exact_slopes() -> None:
     z, parameters = program.at(make_start(known, normal, rotation=np.linspace(0.0, 2.0 * pi, normal.n)))
     curve, slopes = refinement.traced(z, parameters)
     some = [np.arange(len(near.distance)) for near in refinement.apart(curve)]
-    down = _Descent(refinement, z, parameters, refinement._stretched(curve, slopes), refinement.measure(curve), some)
+    down = _Descent(
+        refinement, z, parameters, refinement._scaled_directions(curve, slopes), refinement.measure(curve), some
+    )
     (held,) = (c for c in down.constraints() if c["type"] == "ineq")
     y = down.begin() + 1e-3 * np.random.default_rng(1).normal(size=len(down.begin()))
     exact = held["jac"](y)

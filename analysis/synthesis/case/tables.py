@@ -147,7 +147,7 @@ def _weights(value: Any, rotation: FloatArray | None, n: int = 0) -> FloatArray 
 # The task
 
 
-def _source(table: Any, sources: tuple[str, ...]) -> str:
+def _only_source(table: Any, sources: tuple[str, ...]) -> str:
     """Return the name of the one entry among ``sources`` that gives the target; raise InputError unless there is just one."""
     there = [name for name in sources if getattr(table, name) is not None]
     if len(there) != 1:
@@ -157,7 +157,7 @@ def _source(table: Any, sources: tuple[str, ...]) -> str:
     return there[0]
 
 
-def _only_with(table: Any, names: tuple[str, ...], source: str) -> None:
+def _refuse_entries(table: Any, names: tuple[str, ...], source: str) -> None:
     for name in names:
         if getattr(table, name) is not None:
             raise ParameterError(f"task.{name}", getattr(table, name), f"come with task.{source} only")
@@ -194,13 +194,13 @@ class _Curve(_Formula):
     turn: float | None = entry(Quantity("rad"), None)
     shift: Any = entry(unchanged, None)
 
-    def _placed(self, folder: Path) -> tuple[FloatArray, bool]:
+    def _target_points(self, folder: Path) -> tuple[FloatArray, bool]:
         """Return the points in m, and whether their curve is closed."""
-        source = _source(self, ("points", "file", "x"))
+        source = _only_source(self, ("points", "file", "x"))
         if source != "x":
-            _only_with(self, ("y", "n", "start", "end"), "x")
+            _refuse_entries(self, ("y", "n", "start", "end"), "x")
         if source != "file":
-            _only_with(self, ("name",), "file")
+            _refuse_entries(self, ("name",), "file")
         if source == "points":
             found, closed = read_plane_points(self.points, "task.points", self.unit), True
         elif source == "file":
@@ -224,7 +224,7 @@ class TimedPathTable(_Curve):
     weights: Any = entry(unchanged, None)
 
     def task(self, folder: Path) -> Task:
-        points, _ = self._placed(folder)
+        points, _ = self._target_points(folder)
         rotation = _rotation(self.rotation, len(points))
         at = turn(len(points)) if rotation is None else rotation
         return TimedPath(points=points, rotation=rotation, weights=_weights(self.weights, at), objective=self.objective)
@@ -241,7 +241,7 @@ class UntimedPathTable(_Curve):
     weights: Any = entry(unchanged, None)
 
     def task(self, folder: Path) -> Task:
-        points, closed = self._placed(folder)
+        points, closed = self._target_points(folder)
         path = TargetPath(points=points, closed=closed)
         if self.smoothing is not None:
             if self.straight is not None:
@@ -270,7 +270,7 @@ class PrecisionPointsTable(_Curve):
 
     def _body(self, folder: Path) -> dict[str, Any]:
         """Return the points and directions of a body, rotated and shifted together."""
-        points, _ = self._placed(folder)
+        points, _ = self._target_points(folder)
         rotation = _rotation(self.rotation, len(points))
         angle = None
         if self.angle is not None:
@@ -311,10 +311,10 @@ class RockerFunctionTable(_Formula):
 
     def task(self, folder: Path) -> Task:
         written = isinstance(self.angle, str)
-        if _source(self, ("angle", "file")) == "file" or written:
-            _only_with(self, ("rotation",), "angle as a list")
+        if _only_source(self, ("angle", "file")) == "file" or written:
+            _refuse_entries(self, ("rotation",), "angle as a list")
         if not written:
-            _only_with(self, ("n", "start", "end"), "angle as a formula")
+            _refuse_entries(self, ("n", "start", "end"), "angle as a formula")
         unit = self.angle_unit or "rad"
         rotation: FloatArray | None
         if written:
@@ -343,11 +343,11 @@ class SliderFunctionTable(_Formula):
 
     def task(self, folder: Path) -> Task:
         if isinstance(self.position, str):
-            _only_with(self, ("rotation",), "position as a list")
+            _refuse_entries(self, ("rotation",), "position as a list")
             rotation, numbers = function_from_formula(self.position, **self._range())
             position = quantity(f"1 {self.unit or 'm'}", "m", "task.unit") * numbers
         else:
-            _only_with(self, ("n", "start", "end"), "position as a formula")
+            _refuse_entries(self, ("n", "start", "end"), "position as a formula")
             position = np.array(Many(Quantity("m", bare=self.unit))(self.position, "task.position"))
             given = _rotation(self.rotation, len(position))
             rotation = turn(len(position)) if given is None else given
@@ -364,7 +364,7 @@ class QuickReturnTable:
     time_ratio: float = entry(Quantity("1", least=1.0), 1.0)
 
     def task(self, folder: Path) -> Task:
-        if _source(self, ("stroke", "swing")) == "swing":
+        if _only_source(self, ("stroke", "swing")) == "swing":
             return QuickSwing(swing=float(self.swing or 0.0), time_ratio=self.time_ratio)
         return QuickReturn(stroke=float(self.stroke or 0.0), time_ratio=self.time_ratio)
 

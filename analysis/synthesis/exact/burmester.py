@@ -185,11 +185,11 @@ def guidance(task: Task, count: int = 6) -> Guidance | GuidanceMap:
     >>> print(found.describe())
     4 of 4 possible links guide the body; 6 four-bars, driven from either side: 7 of 12 sound
     """
-    task, p, angle = _poses(task)
+    task, p, angle = _read_poses(task)
     return _guide_five_poses(task, p, angle) if len(p) == 5 else _guide_four_poses(task, p, angle, count)
 
 
-def _poses(task: Task) -> tuple[Poses, ComplexArray, FloatArray]:
+def _read_poses(task: Task) -> tuple[Poses, ComplexArray, FloatArray]:
     """Return the task, and positions and angles of its four or five poses; raises InputError as `guidance` does."""
     if not isinstance(task, PrecisionPoints | Motion) or task.angle is None:
         raise InputError(f"{type(task).__name__}: poses are wanted, points with the body's angle at each")
@@ -228,13 +228,13 @@ def dyads_of_five(p: ComplexArray, angle: FloatArray) -> tuple[ComplexArray, Com
         If the conditions are not independent.
     """
     rows = _conditions(p, angle)
-    plane = _kernel(rows, 3)
+    plane = _null_space(rows, 3)
     # a random rotation, always the same, so that no root lies at infinity of the plane's coordinates
     turned, _ = np.linalg.qr(np.random.default_rng(1888).standard_normal((3, 3)))
     plane = plane @ turned
     first, second = (plane.T @ form @ plane for form in _FORMS)
-    found = np.array([plane @ root for root in _meeting(first, second)])
-    solved = np.array([_polished(rows, v[1:5] / v[0]) for v in found])
+    found = np.array([plane @ root for root in _intersect_conics(first, second)])
+    solved = np.array([_refine_dyad(rows, v[1:5] / v[0]) for v in found])
     return solved[:, :2], solved[:, 2:]
 
 
@@ -258,7 +258,7 @@ def _forms() -> tuple[FloatArray, FloatArray]:
 _FORMS = _forms()
 
 
-def _kernel(rows: FloatArray, size: int) -> FloatArray:
+def _null_space(rows: FloatArray, size: int) -> FloatArray:
     """Return a basis of the null space of the rows, in ``size`` columns.
 
     Raises InputError if the rows are dependent, so that the null space is larger.
@@ -272,7 +272,7 @@ def _kernel(rows: FloatArray, size: int) -> FloatArray:
     return right[-size:].T
 
 
-def _meeting(first: FloatArray, second: FloatArray) -> ComplexArray:
+def _intersect_conics(first: FloatArray, second: FloatArray) -> ComplexArray:
     """Intersect two conics by the resultant of their quadratics in x; return points (x, y, 1) in rows, shape (4, 3)."""
 
     def quadratics(y: complex) -> list[tuple[complex, complex, complex]]:
@@ -298,7 +298,7 @@ def _meeting(first: FloatArray, second: FloatArray) -> ComplexArray:
     return np.array(places)
 
 
-def _polished(rows: FloatArray, v: ComplexArray) -> ComplexArray:
+def _refine_dyad(rows: FloatArray, v: ComplexArray) -> ComplexArray:
     """Refine a solution v = (zx, zy, mx, my) of the conditions of five poses by Newton's method."""
     for _ in range(8):
         zx, zy, mx, my = v
@@ -400,7 +400,7 @@ def dyads_of_four(p: ComplexArray, angle: FloatArray) -> tuple[ComplexArray, Com
     Raises InputError if the poses are not independent.
     """
     rows = _conditions(p, angle)
-    _kernel(rows, 4)
+    _null_space(rows, 4)
     e = np.exp(1j * (angle[1:] - angle[0]))
     chosen = int(np.argmax(np.abs(e - 1.0)))
     pole = -(p[chosen + 1] - p[0]) / (e[chosen] - 1.0)
@@ -409,10 +409,10 @@ def dyads_of_four(p: ComplexArray, angle: FloatArray) -> tuple[ComplexArray, Com
     farther: list[complex] = []
     for direction in np.exp(1j * pi * (np.arange(CURVE_POINTS) + 0.5) / CURVE_POINTS):
         # the line of the chosen pose vanishes at the pole, so that it is proportional to the distance from there
-        along = _lines(rows[chosen], pole + direction)
+        along = _pivot_line(rows[chosen], pole + direction)
 
         def cubic(way: float, direction: complex = direction, along: FloatArray = along) -> float:
-            met = [_lines(rows[j], pole + way * direction) for j in others]
+            met = [_pivot_line(rows[j], pole + way * direction) for j in others]
             return float(np.linalg.det(np.array([along, *met])))
 
         back, here, ahead = cubic(-1.0), cubic(0.0), cubic(1.0)
@@ -421,13 +421,13 @@ def dyads_of_four(p: ComplexArray, angle: FloatArray) -> tuple[ComplexArray, Com
             if abs(way.imag) <= REAL:
                 branch.append(pole + way.real * direction)
     z = np.array(nearer + farther)
-    lines = np.array([[_lines(row, at) for row in rows] for at in z])
+    lines = np.array([[_pivot_line(row, at) for row in rows] for at in z])
     m = np.array([np.linalg.lstsq(a[:, :2], -a[:, 2], rcond=None)[0] for a in lines]) @ np.array([1.0, 1j])
     near = (np.abs(z) < 1e3) & (np.abs(m) < 1e3)
     return z[near], m[near]
 
 
-def _lines(row: FloatArray, z: complex) -> FloatArray:
+def _pivot_line(row: FloatArray, z: complex) -> FloatArray:
     """Return (a, b, c) of a pose's condition a mx + b my + c = 0 on the pivot m of a point z; each is linear in z."""
     turned = complex(-row[5], row[6]) * z
     constant = row[0] + row[1] * z.real + row[2] * z.imag
@@ -437,7 +437,7 @@ def _lines(row: FloatArray, z: complex) -> FloatArray:
 def _guide_four_poses(task: Poses, p: ComplexArray, angle: FloatArray, count: int) -> GuidanceMap:
     unit = normal_form(task).unit
     z, m = dyads_of_four(p / unit, angle)
-    sound, transmission = _pairs(p / unit - p[0] / unit, np.exp(1j * (angle - angle[0])), z, m)
+    sound, transmission = _check_pairs(p / unit - p[0] / unit, np.exp(1j * (angle - angle[0])), z, m)
     pivots, points = p[0] + unit * m, p[0] + unit * z
     chosen: list[tuple[int, int]] = []
     for place in np.argsort(-transmission, axis=None)[: int(sound.sum())]:
@@ -458,7 +458,9 @@ def _guide_four_poses(task: Poses, p: ComplexArray, angle: FloatArray, count: in
     )
 
 
-def _pairs(p: ComplexArray, e: ComplexArray, z: ComplexArray, m: ComplexArray) -> tuple[NDArray[np.bool_], FloatArray]:
+def _check_pairs(
+    p: ComplexArray, e: ComplexArray, z: ComplexArray, m: ComplexArray
+) -> tuple[NDArray[np.bool_], FloatArray]:
     """Check every pair of crank (row) and rocker (column); return ``sound`` and ``transmission`` of `GuidanceMap`."""
     places = p[:, None] + e[:, None] * z
     arms = places - m

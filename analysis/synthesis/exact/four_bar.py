@@ -63,9 +63,9 @@ class Generators(Exact):
         return f"{linkages} through the {points}: {len(self.sound)} sound"
 
 
-_MANY = (
-    "the points of the function are not independent, as those of a constant, or of a rocker that turns with the crank, are not: "
-    "infinitely many linkages have them. Change a point"
+_DEPENDENT_POINTS = (
+    "the points of the function are not independent, as those of a constant, or of a rocker that turns with the crank, are "
+    "not: infinitely many linkages have them. Change a point"
 )
 
 
@@ -138,7 +138,7 @@ def _roots(rows: Callable[[float], FloatArray]) -> list[float]:
     samples = [rows(0.5 * at) for at in turn(3)]
     scale = np.linalg.svd(np.array(samples), compute_uv=False)
     if (scale[:, -1] < INDEPENDENT * scale[:, 0]).all():
-        raise InputError(_MANY)  # it is zero at every angle
+        raise InputError(_DEPENDENT_POINTS)  # the determinant is zero at every angle
     terms = np.fft.fft(np.linalg.det(samples)) / 3.0
     # the powers -1 ... 1 of exp(2 i angle), the highest first
     found = np.roots(terms[[1, 0, 2]])
@@ -155,7 +155,7 @@ def _links(th2: FloatArray, th4: FloatArray, crank_phase: float, mounting: float
     rows = _rows(th2, th4)
     scale = np.linalg.svd(rows[:, :3], compute_uv=False)
     if scale[-1] < INDEPENDENT * scale[0]:
-        raise InputError(_MANY)
+        raise InputError(_DEPENDENT_POINTS)
     r1, r2, r3 = np.linalg.lstsq(rows[:, :3], -rows[:, 3], rcond=None)[0].tolist()
     if min(abs(r1), abs(r2)) < INDEPENDENT:
         return None
@@ -178,7 +178,7 @@ def _five_point_links(phi: FloatArray, psi: FloatArray) -> list[Links | None]:
     try:
         parts = dyads_of_five(places, psi - phi)
     except InputError:
-        raise InputError(_MANY) from None
+        raise InputError(_DEPENDENT_POINTS) from None
     real = np.abs(np.hstack(parts).imag).max(axis=1) <= REAL
     z, m = (part[real].real @ np.array([1.0, 1j]) for part in parts)
     m = places[0] + m
@@ -254,7 +254,7 @@ def cognates(linkage: Linkage, rotation: ArrayLike = 0.0) -> tuple[Linkage, Link
     >>> np.allclose(cognates(four_bar)[0].path(phi), four_bar.path(phi), rtol=0.0, atol=1e-15)
     True
     """
-    k = _place_on_coupler(linkage)
+    k = _checked_coupler_ratio(linkage)
     pins = {name: complex(*place) for name, place in linkage.pins(float(np.asarray(rotation))).items()}
     a, b, c, d, p = (pins[name] for name in "ABCDP")
     g = a + k * (d - a)
@@ -300,17 +300,17 @@ def alternatives(solution: Solution) -> tuple[Solution, ...]:
     made = [Solution.of(task, same, stations)]
     way = np.interp(np.arange((len(stations) - 1) * BETWEEN + 1) / BETWEEN, np.arange(len(stations)), stations)
     coupler, rocker = linkage.coupler_angle(way), linkage.rocker_angle(way)
-    for cognate, angle, sides in zip(others, (coupler, rocker), _sides(linkage, way)):
+    for cognate, angle, sides in zip(others, (coupler, rocker), _cognate_sides(linkage, way)):
         made.append(exact_solution(task, cognate, (angle - angle[0])[::BETWEEN], sides))
     return ranked(made)
 
 
-def _sides(linkage: Linkage, rotation: FloatArray) -> tuple[FloatArray, FloatArray]:
+def _cognate_sides(linkage: Linkage, rotation: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Return the assemblies of the cognates with the pivots A and G, driven at A and driven at G, at the crank rotations.
 
     An assembly is +1 with C to the left of B -> D, -1 to the right.
     """
-    k = _place_on_coupler(linkage)
+    k = _checked_coupler_ratio(linkage)
     g = linkage.directions(rotation)
     # positions relative to A, with the ground link along the real axis
     b = linkage.crank_length * np.exp(1j * (rotation + linkage.crank_phase))
@@ -327,33 +327,33 @@ def _sides(linkage: Linkage, rotation: FloatArray) -> tuple[FloatArray, FloatArr
 def has_cognates(solution: Solution) -> bool:
     """Return whether a solution has cognates: a path traced by a four-bar whose coupler point is neither B nor C."""
     linkage = solution.linkage
-    return _is_path(solution.task) and linkage.kind == "four-bar" and linkage.pivot is None and _off_pins(linkage)
+    return _is_path(solution.task) and linkage.kind == "four-bar" and linkage.pivot is None and _is_off_pins(linkage)
 
 
 def _is_path(task: Task) -> bool:
     return not isinstance(task, RockerFunction) and getattr(task, "angle", None) is None
 
 
-def _off_pins(linkage: Linkage) -> bool:
-    return min(abs(k := _ratio(linkage)), abs(1.0 - k)) > 1e-9
+def _is_off_pins(linkage: Linkage) -> bool:
+    return min(abs(k := _coupler_ratio(linkage)), abs(1.0 - k)) > 1e-9
 
 
-def _ratio(linkage: Linkage) -> complex:
+def _coupler_ratio(linkage: Linkage) -> complex:
     """Return (P - B)/(C - B)."""
     return linkage.point_distance / linkage.coupler_length * complex(np.exp(1j * linkage.point_angle))
 
 
-def _place_on_coupler(linkage: Linkage) -> complex:
+def _checked_coupler_ratio(linkage: Linkage) -> complex:
     """Return (P - B)/(C - B); raises ParameterError as `cognates`."""
     if linkage.kind != "four-bar" or linkage.pivot is not None:
         raise ParameterError("pivot", linkage.pivot, "be fixed: only a four-bar has cognates")
-    if not _off_pins(linkage):
+    if not _is_off_pins(linkage):
         raise ParameterError(
             "point_distance",
             linkage.point_distance,
             "put the coupler point off B and C, whose curves are circles, in m",
         )
-    return _ratio(linkage)
+    return _coupler_ratio(linkage)
 
 
 def _pinned_four_bar(a: complex, b: complex, c: complex, d: complex, p: complex) -> Linkage:

@@ -137,11 +137,11 @@ def quick_returns(
         raise InfeasibleError("both assemblies are asked for at once")
     cosine: Callable[[float], float]
     if isinstance(task, QuickReturn):
-        ends = _ends(task, bounds, constraints)
+        ends = _dimension_ranges(task, bounds, constraints)
         asked, kind = f"a stroke of {1e3 * float(task.stroke):g} mm", "slider-crank"
-        cosine, couplers = partial(_cosine, task=task, ends=ends), ends["coupler_length"]
+        cosine, couplers = partial(_transmission_cosine, task=task, ends=ends), ends["coupler_length"]
     else:
-        shape = _Swing(task, bounds, constraints)
+        shape = _SwingShapes(task, bounds, constraints)
         asked, kind = f"a swing of {degrees(float(task.swing)):g} deg", "crank-rocker"
         cosine, couplers = shape.cosine, shape.couplers
     asked += f" and a time ratio of {task.time_ratio:g}"
@@ -154,7 +154,8 @@ def quick_returns(
             f"{degrees(acos(cosine(l3))):.4g} deg"
         )
     made = [
-        _linkage(task, l3, b) if isinstance(task, QuickReturn) else shape.linkage(l3, b) for b in branches or (1, -1)
+        _make_slider_crank(task, l3, b) if isinstance(task, QuickReturn) else shape.linkage(l3, b)
+        for b in branches or (1, -1)
     ]
     return ranked([Solution.of(task, linkage) for linkage in made])
 
@@ -173,7 +174,7 @@ def _best_coupler(cosine: Callable[[float], float], ends: tuple[float, float]) -
     return float(min((couplers[best], float(found.x)), key=cosine))
 
 
-class _Swing:
+class _SwingShapes:
     """Crank-rockers with a given swing and time ratio; ``l3`` is the ratio of coupler to rocker, bounds determine the size."""
 
     def __init__(self, task: QuickSwing, bounds: Any, constraints: Sequence[Any]) -> None:
@@ -235,7 +236,7 @@ class _Swing:
         return min(begun, key=lambda one: Solution.of(self.task, one).error)
 
 
-def _ends(task: QuickReturn, bounds: Any, constraints: Sequence[Any]) -> dict[str, tuple[float, float]]:
+def _dimension_ranges(task: QuickReturn, bounds: Any, constraints: Sequence[Any]) -> dict[str, tuple[float, float]]:
     """Return the least and greatest length of offset, crank and coupler, by name (m)."""
     cap = min(
         (float(c.length) for c in constraints if isinstance(c, LargestLink)), default=LARGEST * float(task.stroke)
@@ -265,7 +266,7 @@ def _lengths(l3: float, turned: float, h: float) -> tuple[float, float]:
     return max(l3 * l3 - l2 * l2, 0.0) * sin(turned) / h, l2
 
 
-def _cosine(l3: float, task: QuickReturn, ends: Mapping[str, tuple[float, float]]) -> float:
+def _transmission_cosine(l3: float, task: QuickReturn, ends: Mapping[str, tuple[float, float]]) -> float:
     """Return the cosine of the least transmission angle over a turn; 1 without a linkage, or if a bound is violated."""
     l1, l2 = _lengths(l3, task.advance, float(task.stroke))
     for name, value in (("ground_length", l1), ("crank_length", l2)):
@@ -275,7 +276,7 @@ def _cosine(l3: float, task: QuickReturn, ends: Mapping[str, tuple[float, float]
     return min(1.0, (l1 + l2) / l3)
 
 
-def _linkage(task: QuickReturn, l3: float, branch: int) -> SliderCrank:
+def _make_slider_crank(task: QuickReturn, l3: float, branch: int) -> SliderCrank:
     """Build the slider-crank with its guide below the shaft: with a counter-clockwise crank the stroke to the right is slow."""
     l1, l2 = _lengths(l3, task.advance, float(task.stroke))
     far, near = (sqrt(max((l3 + side * l2) ** 2 - l1 * l1, 0.0)) for side in (1.0, -1.0))

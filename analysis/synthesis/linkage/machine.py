@@ -220,7 +220,7 @@ def pin_functions(
         Type of the linkage; for a slider-crank the force at D is that of the guide on the slider.
     """
     casadi = symbolic.library()
-    kind, plant, law = _traced()
+    kind, plant, law = _trace_plant()
     line = make.density * make.width * make.thickness
     links = {name: getattr(d, name) for name in ("ground_length", "crank_length", "coupler_length", "rocker_length")}
     far = FAR * d.coupler_length
@@ -266,7 +266,7 @@ def pin_functions(
 
 
 @cache
-def _traced() -> tuple[Any, Any, Any]:
+def _trace_plant() -> tuple[Any, Any, Any]:
     """Return the class of the plant's parameters, the plant's functions, and `bodies`, for CasADi symbols."""
     casadi = symbolic.library()
     plant = of_parameters(FIVE_BAR)
@@ -348,7 +348,7 @@ def pin_forces(
         raise ParameterError("pivot", linkage.pivot, "be fixed: of a moved one see motion.inverse_dynamics")
     begin, end = (0.0, 2.0 * pi) if rotation is None else rotation
     if not run:
-        return _held(linkage, make, np.linspace(begin, end, SAMPLES + 1))
+        return _evaluate_forces(linkage, make, np.linspace(begin, end, SAMPLES + 1))
     made = make.moving(linkage)
     heavy = HEAVY * (made.crank_mass + made.coupler_mass + made.rocker_mass)
     parameters = replace(made, slider_mass=heavy, slider_stiffness=0.0, slider_damping=0.0, slider_coulomb_friction=0.0)
@@ -367,7 +367,7 @@ def pin_forces(
     return PinForces(rotation=begin + make.speed * done.time, force=force, moved=moved)
 
 
-def _held(linkage: Linkage, make: Make, rotation: FloatArray) -> PinForces:
+def _evaluate_forces(linkage: Linkage, make: Make, rotation: FloatArray) -> PinForces:
     """Compute the pin forces at crank rotations from the plant's equations, with its slider held."""
     casadi, d = symbolic.library(), SimpleNamespace(**linkage.values())
     straight = on_line(linkage.coupler_length, linkage.point_distance, linkage.point_angle)

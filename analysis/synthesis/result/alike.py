@@ -26,7 +26,7 @@ def grouped(solutions: Sequence[Solution]) -> tuple[Solution, ...]:
     """
     groups: list[list[Solution]] = []
     for solution in solutions:
-        group = next((g for g in groups if _alike(g[0], solution) is not None), None)
+        group = next((g for g in groups if _compare_linkages(g[0], solution) is not None), None)
         if group is None:
             groups.append([solution])
         else:
@@ -36,29 +36,29 @@ def grouped(solutions: Sequence[Solution]) -> tuple[Solution, ...]:
 
 def format_variants(solution: Solution) -> str:
     """Format the number of mirror images and near copies that a solution represents, as in "2 mirror images, 1 near copy"."""
-    mirrored = sum(_alike(solution, other) == -1 for other in solution.variants)
+    mirrored = sum(_compare_linkages(solution, other) == -1 for other in solution.variants)
     counts = (("mirror image", mirrored), ("near copy", len(solution.variants) - mirrored))
     return ", ".join(format_count(count, name) for name, count in counts if count)
 
 
-def _alike(one: Solution, other: Solution) -> int | None:
+def _compare_linkages(one: Solution, other: Solution) -> int | None:
     """Return 1 if two linkages are near copies, -1 if one is near the other's mirror image, otherwise None."""
     a, b = one.linkage, other.linkage
-    if a.kind != b.kind or _gears(a) is None or _gears(a) != _gears(b):
+    if a.kind != b.kind or _gear_ratio(a) is None or _gear_ratio(a) != _gear_ratio(b):
         return None
     links = [np.array([abs(getattr(x, name)) for name in x.links]) for x in (a, b)]
     if isinstance(one.task, RockerFunction):
         links = [lengths / lengths.max() for lengths in links]
     if (np.abs(np.log(links[0] / links[1])) > np.log(RATIO)).any():
         return None
-    own, *_ = _sides(a)
-    for side in _sides(b):
+    own, *_ = _coupler_sides(a)
+    for side in _coupler_sides(b):
         if np.abs(_shape(a, own) - _shape(b, side)).max() <= SHARE:
             return own * side
     return None
 
 
-def _gears(linkage: Linkage) -> float | None:
+def _gear_ratio(linkage: Linkage) -> float | None:
     """Return the gear ratio of a second crank, 0 for a fixed rocker pivot, None for a commanded pivot."""
     pivot = linkage.pivot
     if pivot is None:
@@ -66,7 +66,7 @@ def _gears(linkage: Linkage) -> float | None:
     return pivot.ratio if isinstance(pivot, SecondCrank) and pivot.series.order == 0 else None
 
 
-def _sides(linkage: Linkage) -> tuple[int, ...]:
+def _coupler_sides(linkage: Linkage) -> tuple[int, ...]:
     """Return +1 if C lies to the left of B -> D, -1 to the right; both, its own first, for a guide with almost no offset."""
     if not isinstance(linkage, SliderCrank):
         return (linkage.branch,)

@@ -34,11 +34,11 @@ def description(linkage: Linkage, make: Make, *, rotation: float = 0.0, directio
     """
     a1, shaft = linkage.ground_angle, complex(linkage.pivot_x, linkage.pivot_y)
     end = shaft + rect(linkage.ground_length, a1)
-    bodies = {"crank": _bar("AB", linkage.crank_length, make, make.crank_mass)}
-    bodies["coupler"] = _bar("BC", linkage.coupler_length, make, make.coupler_mass)
+    bodies = {"crank": _bar_table("AB", linkage.crank_length, make, make.crank_mass)}
+    bodies["coupler"] = _bar_table("BC", linkage.coupler_length, make, make.coupler_mass)
     if linkage.point_distance and not linkage.point_is_pin:
         point = rect(linkage.point_distance, linkage.point_angle)
-        bodies["coupler"] |= {"points": {"P": _place(point)}, **_with_arm(linkage, make)}
+        bodies["coupler"] |= {"points": {"P": _point_entry(point)}, **_coupler_masses(linkage, make)}
         del bodies["coupler"]["section"]
     # the angle is not wrapped to a turn, because the position of gears depends on whole turns
     start = a1 + float(linkage.crank_angle(rotation))
@@ -47,7 +47,10 @@ def description(linkage: Linkage, make: Make, *, rotation: float = 0.0, directio
         "name": _NAME,
         "source": "found by synthesis",
         "gravity": with_unit(make.gravity, "m/s2"),
-        "ground": {"A": _place(shaft), "E" if linkage.pivot or isinstance(linkage, SliderCrank) else "D": _place(end)},
+        "ground": {
+            "A": _point_entry(shaft),
+            "E" if linkage.pivot or isinstance(linkage, SliderCrank) else "D": _point_entry(end),
+        },
         "bodies": bodies,
         "freedoms": {"crank": crank},
         "assembly": {"C": linkage.branch},
@@ -56,7 +59,7 @@ def description(linkage: Linkage, make: Make, *, rotation: float = 0.0, directio
         bodies["block"] = {"points": {"C": [0, 0]}, "mass": with_unit(make.block, "kg")}
         tables["slides"] = {"guide": {"body": "block", "through": "E", "direction": with_unit(a1 + 0.5 * pi, "rad")}}
     else:
-        bodies["rocker"] = _bar("DC", linkage.rocker_length, make, make.rocker_mass)
+        bodies["rocker"] = _bar_table("DC", linkage.rocker_length, make, make.rocker_mass)
     second = linkage.pivot
     if isinstance(second, SliderMotion):
         along = with_unit(a1 + second.guide_angle, "rad")
@@ -65,7 +68,7 @@ def description(linkage: Linkage, make: Make, *, rotation: float = 0.0, directio
         position = with_unit(float(second.series(rotation)), "m")
         tables["freedoms"]["pivot"] = {"joint": "guide", "start": position, "driven": True}
     elif second is not None:
-        bodies["second"] = _bar("ED", second.length, make, None)
+        bodies["second"] = _bar_table("ED", second.length, make, None)
     if isinstance(second, SecondCrank) and second.series.order:
         angle = with_unit(a1 + float(second.angle(rotation)), "rad")
         tables["freedoms"]["pivot"] = {"joint": "E", "start": angle, "driven": True}
@@ -80,18 +83,18 @@ def description(linkage: Linkage, make: Make, *, rotation: float = 0.0, directio
             }
         }
     if any(make.load):
-        tables["loads"] = [_loaded(linkage)]
+        tables["loads"] = [_load_point(linkage)]
     return tables
 
 
 def loads(linkage: Linkage, make: Make) -> dict[str, Any]:
-    """Return the table with the values of the load of ``make``, by the point on which it acts; empty without a load."""
+    """Return the table with the load of ``make``, by the name of the point on which it acts; empty without a load."""
     values = {f"load_{axis}": with_unit(force, "N") for axis, force in zip("xy", make.load)}
-    return {_loaded(linkage): values} if any(make.load) else {}
+    return {_load_point(linkage): values} if any(make.load) else {}
 
 
-def _loaded(linkage: Linkage) -> str:
-    """Return the name of the point on which the load acts: the coupler point, or the pin that it is."""
+def _load_point(linkage: Linkage) -> str:
+    """Return the name of the point on which the load acts: P, or the pin B or C if the coupler point is that pin."""
     if linkage.point_is_pin:
         return "C"
     return "P" if linkage.point_distance else "B"
@@ -120,8 +123,8 @@ def drives(linkage: Linkage, make: Make, *, rotation: float = 0.0, direction: fl
     return {"crankDrive": {"speed": with_unit(speed, "rad/s")}, "pivotDrive": {"speed": waves}}
 
 
-def _with_arm(linkage: Linkage, make: Make) -> dict[str, Any]:
-    """Return mass, centre of mass and moment of inertia of a coupler with an arm to its point, as its plant has them."""
+def _coupler_masses(linkage: Linkage, make: Make) -> dict[str, Any]:
+    """Return mass, centre of mass and moment of inertia of a coupler with an arm to its point, as in the plant."""
     line = make.density * make.width * make.thickness
     r, a2 = linkage.point_distance, linkage.point_angle
     straight = on_line(linkage.coupler_length, r, a2)
@@ -131,17 +134,17 @@ def _with_arm(linkage: Linkage, make: Make) -> dict[str, Any]:
     centre = rect(made["coupler_cog_distance"], made["coupler_cog_angle"])
     return {
         "mass": with_unit(made["coupler_mass"], "kg"),
-        "cog": _place(centre),
+        "cog": _point_entry(centre),
         "inertia": with_unit(made["coupler_inertia"], "kg.m2"),
     }
 
 
-def _place(z: complex) -> list[Any]:
+def _point_entry(z: complex) -> list[Any]:
     """Return a point in the form of a file; exact zeros stay the number 0."""
     return [0 if c == 0.0 else with_unit(c, "m") for c in (z.real, z.imag)]
 
 
-def _bar(ends: str, length: float, make: Make, mass: float | None) -> dict[str, Any]:
+def _bar_table(ends: str, length: float, make: Make, mass: float | None) -> dict[str, Any]:
     """Return the table of a bar with the section of ``make``, and its mass if it is given."""
     section = {"kind": "bar", "width": with_unit(make.width, "m"), "thickness": with_unit(make.thickness, "m")}
     table = {"bar": list(ends), "length": with_unit(length, "m"), "section": section | {"material": make.density}}

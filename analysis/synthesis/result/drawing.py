@@ -246,12 +246,14 @@ def drawing(solution: Solution, rotation: float | None = None, *, poses: int = 0
         lines=tuple(lines),
         circles=tuple(circles),
         polylines=tuple(polylines),
-        dimensions=tuple(_links(pins, solution.linkage, height, [LineString(one.points) for one in polylines])),
+        dimensions=tuple(
+            _link_dimensions(pins, solution.linkage, height, [LineString(one.points) for one in polylines])
+        ),
         texts=tuple(texts),
     )
 
 
-def _links(
+def _link_dimensions(
     pins: Mapping[str, Point], linkage: Linkage, height: float, others: Sequence[LineString]
 ) -> Iterator[Dimension]:
     """Yield the dimension of each link, beside it and clear of other lines; for a slider-crank also the guide's offset."""
@@ -264,10 +266,10 @@ def _links(
 
     def covered(one: Dimension) -> tuple[int, int]:
         """Count the overlaps of a dimension with links and, three times each, other dimensions; then those with lines."""
-        room, strokes = _room(one), _strokes(one)
+        room, strokes = _number_box(one), _dimension_lines(one)
         count = sum(room.intersects(link) for link in links)
-        count += 3 * sum(room.intersects(shape(other)) for other in placed for shape in (_room, _strokes))
-        count += 3 * sum(strokes.intersects(_room(other)) for other in placed)
+        count += 3 * sum(room.intersects(shape(other)) for other in placed for shape in (_number_box, _dimension_lines))
+        count += 3 * sum(strokes.intersects(_number_box(other)) for other in placed)
         return int(count), sum(bool(room.intersects(line)) for line in others)
 
     # short links last: they have the fewest places
@@ -283,12 +285,12 @@ def _links(
     yield from placed
 
 
-def _strokes(dimension: Dimension) -> Any:
+def _dimension_lines(dimension: Dimension) -> Any:
     """Return the lines of a dimension: the dimension line and the two extension lines."""
     return LineString([dimension.start, *dimension.line, dimension.end])
 
 
-def _room(dimension: Dimension) -> Any:
+def _number_box(dimension: Dimension) -> Any:
     """Return the box that the number of a dimension needs, with gaps around it, on either side of the dimension line."""
     (x0, y0), (x1, y1) = dimension.line
     middle, way = np.array([x0 + x1, y0 + y1]) / 2.0, np.array([x1 - x0, y1 - y0]) / hypot(x1 - x0, y1 - y0)
@@ -353,7 +355,7 @@ def plates(solution: Solution, *, width: float, thickness: float, pin: float, ti
         ]
         dimensions += [
             Dimension(layer="dimension", start=here, end=there, offset=offset, height=height)
-            for here, there, offset in _beside(places, width)
+            for here, there, offset in _hole_dimensions(places, width)
         ]
         label = f"{name}: {1e3 * width:g} x {1e3 * thickness:g} mm, holes {1e3 * pin:g} mm"
         if name == "second crank" and isinstance(linkage, FiveBar):
@@ -371,7 +373,7 @@ def plates(solution: Solution, *, width: float, thickness: float, pin: float, ti
     )
 
 
-def _beside(places: NDArray[np.complex128], width: float) -> Iterator[tuple[Point, Point, float]]:
+def _hole_dimensions(places: NDArray[np.complex128], width: float) -> Iterator[tuple[Point, Point, float]]:
     """Yield the ends and the offset (m) of the dimension between each two distinct holes.
 
     The dimensions lie outside the plate and not over one another.

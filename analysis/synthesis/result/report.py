@@ -29,7 +29,7 @@ LENGTH_STEP, ANGLE_STEP = 1e-4, radians(0.1)
 PIVOT_ANGLES = ("guide_angle", "second_crank_phase")
 #: Error relative to the target above which a solution is called poor; improvement to suggest for each kind of linkage.
 POOR = 0.05
-_BETTER = {
+_IMPROVEMENTS = {
     "four-bar": "a geared five-bar (search.kinds) or a moved rocker pivot has more dimensions for it",
     "slider-crank": "a four-bar or a geared five-bar (search.kinds) has more dimensions for it",
     "geared-five-bar": "other ratios of its gears (search.gears), or a smoother or smaller target, may do better",
@@ -111,7 +111,7 @@ def _residuals(linkage: Linkage, normal: Normal, at: FloatArray, across: bool) -
 
     The residuals of points are those in x and y or, if ``across``, those along the normals of the curve.
     """
-    columns = [column for _, _, column in _pivot(linkage, at)]
+    columns = [column for _, _, column in _pivot_dimensions(linkage, at)]
     angular = normal.angle is not None
     parts, blocks = [], []
     if normal.points is not None:
@@ -159,7 +159,7 @@ def sensitivities(solution: Solution) -> tuple[Sensitivity, ...]:
     slopes = 2.0 * jacobian.T @ (weights * residual)
     stations = len(normal_form(solution.task).weights)
     shifts = np.sqrt((jacobian**2).sum(axis=0) / stations)
-    values = _values(solution.linkage)
+    values = _dimension_values(solution.linkage)
     # a rocker's angle depends neither on the position of the linkage nor on its coupler point
     idle = (
         set(PLACES) - {*LINKS, "crank_phase"}
@@ -191,17 +191,19 @@ def rounded(solution: Solution, length: float | None = None, angle: float = ANGL
         if not (np.isfinite(step) and step > 0.0):
             raise InputError(f"step of {what} is {step}: it must be greater than zero")
     linkage = solution.linkage
-    steps = {name: angle if name in (*ANGLES, *PIVOT_ANGLES) else length for name in _made(linkage)}
+    steps = {name: angle if name in (*ANGLES, *PIVOT_ANGLES) else length for name in _manufactured(linkage)}
     rounded_to = linkage
-    for name, value in _made(linkage).items():
+    for name, value in _manufactured(linkage).items():
         whole = round(value / steps[name])
         # a link is not rounded to zero
-        rounded_to = _with(rounded_to, name, steps[name] * (max(whole, 1) if _is_link(linkage, name) else whole))
+        rounded_to = _replace_dimension(
+            rounded_to, name, steps[name] * (max(whole, 1) if _is_link(linkage, name) else whole)
+        )
     error = evaluate(solution.task, rounded_to, solution.evaluation.rotation).error
-    return Rounding(linkage=rounded_to, error=error, expected=_expected(solution, steps))
+    return Rounding(linkage=rounded_to, error=error, expected=_expected_error(solution, steps))
 
 
-def _expected(solution: Solution, steps: Mapping[str, float]) -> float:
+def _expected_error(solution: Solution, steps: Mapping[str, float]) -> float:
     """Return the mean quality function if the dimensions have random errors, uniform within half a step."""
     task, linkage = solution.task, solution.linkage
     area = isinstance(task, UntimedPath) and task.measure == "area"
@@ -232,10 +234,12 @@ def _expected(solution: Solution, steps: Mapping[str, float]) -> float:
         if area:
             continue
         small = DIFFERENCE * (1.0 if name in (*ANGLES, *PIVOT_ANGLES) else linkage.largest_link)
-        value = _made(linkage)[name]
+        value = _manufactured(linkage)[name]
         if _is_link(linkage, name):
             small = min(small, 0.1 * value)
-        ahead, behind = (residuals(_with(linkage, name, value + side * small))[0][:, k] for side in (1.0, -1.0))
+        ahead, behind = (
+            residuals(_replace_dimension(linkage, name, value + side * small))[0][:, k] for side in (1.0, -1.0)
+        )
         shift += 0.5 * variance * (ahead - behind) / (2.0 * small)
     if area:
         # an area: each distance is a normal variable, with its value as the mean and its spread as the standard deviation
@@ -262,7 +266,7 @@ def costs(solution: Solution, length: float, angle: float) -> dict[str, float]:
         Growth of the quality function by name of the dimension, without those of a slider's motion.
     """
     linkage, grown = solution.linkage, {}
-    for name, value in _made(linkage).items():
+    for name, value in _manufactured(linkage).items():
         if name == "guide_angle":
             continue
         step = angle if name in (*ANGLES, *PIVOT_ANGLES) else length
@@ -270,7 +274,8 @@ def costs(solution: Solution, length: float, angle: float) -> dict[str, float]:
         link = _is_link(linkage, name)
         ends = [value + side * step for side in (-1.0, 1.0) if not link or value + side * step > 0.0]
         grown[name] = max(
-            evaluate(solution.task, _with(linkage, name, end), solution.evaluation.rotation).error for end in ends
+            evaluate(solution.task, _replace_dimension(linkage, name, end), solution.evaluation.rotation).error
+            for end in ends
         )
     return {name: error - solution.error for name, error in grown.items()}
 
@@ -293,10 +298,10 @@ def _mean_absolute(mean: FloatArray, spread: FloatArray) -> FloatArray:
 def _names(linkage: Linkage, normal: Normal) -> list[str]:
     """Return the names of the dimensions with respect to which derivatives are computed, in order."""
     mounted = [] if normal.angle is None else ["output_angle"]
-    return [*PLACES, *mounted, *(name for name, _, _ in _pivot(linkage, np.zeros(1)))]
+    return [*PLACES, *mounted, *(name for name, _, _ in _pivot_dimensions(linkage, np.zeros(1)))]
 
 
-def _pivot(linkage: Linkage, at: FloatArray) -> list[tuple[str, float, tuple[FloatArray, FloatArray]]]:
+def _pivot_dimensions(linkage: Linkage, at: FloatArray) -> list[tuple[str, float, tuple[FloatArray, FloatArray]]]:
     """Return, for each dimension of a moving pivot, name, value, and derivatives of D's displacement at crank rotations."""
     pivot = linkage.pivot
     if isinstance(pivot, SliderMotion):
@@ -317,18 +322,18 @@ def _pivot(linkage: Linkage, at: FloatArray) -> list[tuple[str, float, tuple[Flo
     return found
 
 
-def _values(linkage: Linkage) -> dict[str, float]:
-    return linkage.values() | {name: value for name, value, _ in _pivot(linkage, np.zeros(1))}
+def _dimension_values(linkage: Linkage) -> dict[str, float]:
+    return linkage.values() | {name: value for name, value, _ in _pivot_dimensions(linkage, np.zeros(1))}
 
 
-def _made(linkage: Linkage) -> dict[str, float]:
+def _manufactured(linkage: Linkage) -> dict[str, float]:
     """Return, by name, the dimensions that are manufactured and can have errors, without those of a commanded motion."""
-    values = _values(linkage)
+    values = _dimension_values(linkage)
     made = (*LENGTHS, *ANGLES, SECOND_LENGTH, *PIVOT_ANGLES)
     return {name: values[name] for name in made if name in values and name not in linkage.absent}
 
 
-def _with(linkage: Linkage, name: str, value: float) -> Linkage:
+def _replace_dimension(linkage: Linkage, name: str, value: float) -> Linkage:
     """Return the linkage with another value of one dimension."""
     if name in (*LENGTHS, *ANGLES):
         changed: dict[str, Any] = {name: value}
@@ -359,7 +364,7 @@ def quality_name(task: Task) -> str:
     return f"sum of {'weighted ' if weighted else ''}squared {what}"
 
 
-def _met(solution: Solution) -> bool:
+def _meets_task(solution: Solution) -> bool:
     """Return whether a solution meets its task exactly, apart from rounding."""
     return error_unit(solution.task)[0] * solution.evaluation.worst < ROUNDING
 
@@ -378,7 +383,7 @@ def headline(solution: Solution) -> str:
     scale, length = error_unit(solution.task)
     v = solution.verdicts
     low, high = degrees(v.least_transmission), degrees(v.greatest_transmission)
-    error, worst = (0.0, 0.0) if _met(solution) else (factor * solution.error, scale * solution.evaluation.worst)
+    error, worst = (0.0, 0.0) if _meets_task(solution) else (factor * solution.error, scale * solution.evaluation.worst)
     return (
         f"{quality_name(solution.task)} {f'{error:.4g}' if error < 1e4 else f'{error:.0f}'} {unit}\n"
         f"worst error {worst:.3g} {length}, largest link {1e3 * solution.largest_link:.4g} mm\n"
@@ -402,7 +407,7 @@ def format_poor(solution: Solution) -> str:
     else:
         of = "swing" if isinstance(task, RockerFunction) else "size"
         said = f"the rms error is {100.0 * share:.2g} % of the target's {of}"
-    better = _BETTER[solution.linkage.kind]
+    better = _IMPROVEMENTS[solution.linkage.kind]
     if solution.linkage.pivot is not None and solution.linkage.kind == "four-bar":
         better = "more harmonics of its pivot's motion, or a smoother or smaller target, may do better"
     elif isinstance(task, SliderFunction):
@@ -457,20 +462,20 @@ class Assessment:
             f"largest link {1e3 * solution.largest_link:.6g} mm"
         )
         if pivot is None:
-            head += _slider_line(linkage) + _limits(linkage, solution.rotation)
+            head += _slider_line(linkage) + _limit_lines(linkage, solution.rotation)
         elif isinstance(pivot, SliderMotion):
             head += f"\nslider at D: stroke {1e3 * pivot.stroke:.6g} mm"
         else:
             head += f"\nsecond crank at D: {format_ratio(pivot.ratio)} turns for one of the first"
         if pivot is not None:
-            head += _places("toggles", toggles(linkage))
+            head += _rotation_line("toggles", toggles(linkage))
         if straight := solution.straight():
             head += f"\n{straight}"
         if solution.variants:
             head += f"\nalso found: {format_variants(solution)}"
         if self.poor:
             head += f"\n{self.poor}"
-        return "\n\n".join([head, table(self.dimensions), self.rounding, table(_stations(solution))]) + "\n"
+        return "\n\n".join([head, table(self.dimensions), self.rounding, table(_station_rows(solution))]) + "\n"
 
 
 def assess(solution: Solution, violated: Callable[[Solution], str] | None = None) -> Assessment:
@@ -508,7 +513,7 @@ def quality_cells(solution: Solution, digits: int = 5) -> tuple[str, str, str]:
     """Return quality function, rms error and greatest error of a solution as text; "0" if only rounding is left."""
     factor, scale = quality_unit(solution.task)[0], error_unit(solution.task)[0]
     found = solution.evaluation
-    if _met(solution):
+    if _meets_task(solution):
         return "0", "0", "0"
     return f"{factor * solution.error:.{digits}g}", f"{scale * found.rms:.4g}", f"{scale * found.worst:.4g}"
 
@@ -521,13 +526,13 @@ def _slider_line(linkage: Linkage) -> str:
     return line + (f": stroke {1e3 * float(stroke(linkage)):.6g} mm" if linkage.turns_fully else "")
 
 
-def _limits(linkage: Linkage, rotation: NDArray[np.float64]) -> str:
+def _limit_lines(linkage: Linkage, rotation: NDArray[np.float64]) -> str:
     """Return lines with dead centres, toggles, time ratio and mechanical advantage of a four-bar or slider-crank.
 
     The mechanical advantage is the least one over the crank rotations.
     """
     last, motions, what = linkage.driven
-    lines = _places(f"{last} at rest", dead_centres(linkage)) + _places("toggles", toggles(linkage))
+    lines = _rotation_line(f"{last} at rest", dead_centres(linkage)) + _rotation_line("toggles", toggles(linkage))
     ratio = time_ratio(linkage)
     if ratio is not None:
         lines += f"\ntime ratio of the {last}'s {motions} {ratio:.4g}"
@@ -537,7 +542,7 @@ def _limits(linkage: Linkage, rotation: NDArray[np.float64]) -> str:
     return lines
 
 
-def _places(what: str, places: Sequence[float]) -> str:
+def _rotation_line(what: str, places: Sequence[float]) -> str:
     """Return a line with crank rotations in degrees; empty if there are none."""
     return f"\n{what} at crank rotations of {', '.join(f'{degrees(at):.2f}' for at in places)} deg" if places else ""
 
@@ -569,7 +574,7 @@ def format_transmission(verdicts: Verdicts) -> str:
     return f"{degrees(verdicts.least_transmission):.1f} to {degrees(verdicts.greatest_transmission):.1f}"
 
 
-def _stations(solution: Solution) -> list[list[str]]:
+def _station_rows(solution: Solution) -> list[list[str]]:
     """Return the rows of the table of errors, one for each target, in mm and degrees."""
     columns = solution.columns()
     heads = [name.replace("[m]", "[mm]").replace("[rad]", "[deg]") for name in columns]

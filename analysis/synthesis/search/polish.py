@@ -147,7 +147,7 @@ def polish(
         cores = search.cores
         size = 1 if cores == 1 else min(MOST, max(1, -(-len(items) // (3 * cores))))
         # a polisher holds compiled solvers, which cannot be sent to a process: each part of the work makes its own
-        step = getattr(worker, name) if cores == 1 else partial(_apart, name, normal, limits, pivot)
+        step = getattr(worker, name) if cores == 1 else partial(_call_polisher, name, normal, limits, pivot)
         parts, interrupted = over_cores(step, [items[k : k + size] for k in range(0, len(items), size)], search, what)
         return [answer for part in parts for answer in part], interrupted
 
@@ -176,7 +176,7 @@ def polish(
     else:
         begin = kept_answers([worker.measured(answer) for answer in [*kept, *begun]])
         laps = RACE["open area" if normal.quality == "area" and not normal.closed else normal.quality]
-        kept, interrupted = _raced(spread, begin, given, laps)
+        kept, interrupted = _refine_in_laps(spread, begin, given, laps)
     if limits.least is not None and not interrupted:
         best = distinct(kept_answers(kept) or kept_answers(found), ONWARDS, pivot)
         kept, interrupted = spread("least", best, f"making least the {limits.least.along.name}")
@@ -186,7 +186,7 @@ def polish(
     return replace(Polished.of(found, kept_answers(kept), interrupted, begun), done=len(starts))
 
 
-def _raced(
+def _refine_in_laps(
     spread: Callable[[str, Sequence[Any], str], tuple[list[Answer], bool]],
     kept: Sequence[Answer],
     given: Sequence[Answer],
@@ -214,7 +214,7 @@ def kept_answers(answers: Sequence[Answer]) -> list[Answer]:
 
 
 @ONE_THREAD
-def _apart(name: str, normal: Normal, limits: Limits, pivot: PivotUnknown | None, item: Any) -> Any:
+def _call_polisher(name: str, normal: Normal, limits: Limits, pivot: PivotUnknown | None, item: Any) -> Any:
     """Call a method of a new `Polisher` by its name; for use in another process or thread."""
     return getattr(Polisher(normal, limits, pivot), name)(item)
 
@@ -272,7 +272,9 @@ class Polisher:
     def fit(self, start: Start) -> Answer:
         """Minimise the squared errors from a start; if precision points are met, then maximise the transmission angle."""
         fitted = self.by_least_squares
-        return self.best_exact(fit_least_squares(self.normal, self.limits, start) if fitted else self._solved(start))
+        return self.best_exact(
+            fit_least_squares(self.normal, self.limits, start) if fitted else self._solve_squares(start)
+        )
 
     def best_exact(self, answer: Answer) -> Answer:
         """Maximise the transmission angle from an answer that meets its precision points; return other answers unchanged."""
@@ -286,7 +288,7 @@ class Polisher:
         """Fit each of the starts."""
         return [self.fit(start) for start in starts]
 
-    def _solved(self, start: Start) -> Answer:
+    def _solve_squares(self, start: Start) -> Answer:
         """Solve by IPOPT, for a region in its nearest triangles, and again from the best answer while it improves."""
         program = self.program("squares")
         if all(len(triangles) == 1 for _, triangles in self.limits.regions):
@@ -327,9 +329,9 @@ class Polisher:
 
     def least(self, answers: Sequence[Answer]) -> list[Answer]:
         """Minimise the objective that replaces the error, from answers with small errors."""
-        return [self._least(answer) for answer in answers]
+        return [self._minimise_objective(answer) for answer in answers]
 
-    def _least(self, answer: Answer) -> Answer:
+    def _minimise_objective(self, answer: Answer) -> Answer:
         program = self.program("least", exact=True)
         size = program.greatest(answer.start)
         found = program.solve(answer.start, size=size)
@@ -355,9 +357,9 @@ class Polisher:
 
     def onwards(self, items: Sequence[tuple[Answer, int]]) -> list[Answer]:
         """Minimise the area or the greatest error, from pairs of an answer and its limit of iterations."""
-        return [self._onwards(*item) for item in items]
+        return [self._minimise_measure(*item) for item in items]
 
-    def _onwards(self, answer: Answer, iterations: int) -> Answer:
+    def _minimise_measure(self, answer: Answer, iterations: int) -> Answer:
         if self.normal.outline is not None:
             refinement = self.refinement
             found = refinement.refined(answer, iterations=iterations)

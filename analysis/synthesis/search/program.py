@@ -46,12 +46,12 @@ class Program(Statement):
     """A synthesis as a nonlinear program with its solver; the arguments are those of `Statement`."""
 
     @cached_property
-    def _value(self) -> Any:
+    def _evaluate(self) -> Any:
         """Return objective and constraints as a CasADi function, whose values are finite if a start can be evaluated."""
         return self._casadi.Function("value", [self._nlp["x"], self._nlp["p"]], [self._nlp["f"], self._nlp["g"]])
 
     @cached_property
-    def _begin(self) -> Any:
+    def _initial_values(self) -> Any:
         """Return the starting values of the auxiliary unknowns, a greatest value or the middle of a range, as a function."""
         casadi = self._casadi
         return casadi.Function(
@@ -59,13 +59,13 @@ class Program(Statement):
         )
 
     @cached_property
-    def _curvature(self) -> Any:
+    def _differentiate_motions(self) -> Any:
         """Return a function: the first two derivatives of the pivot's bounded motions at the extremes in the parameters."""
-        function = self._casadi.Function("curvature", [self._nlp["x"], self._nlp["p"]], self._bent)
+        function = self._casadi.Function("curvature", [self._nlp["x"], self._nlp["p"]], self._peak_derivatives)
         return lambda z, parameters: function.call([z, parameters])
 
     @cached_property
-    def _slopes(self) -> Any:
+    def _differentiate(self) -> Any:
         """Return the gradient of the objective and the Jacobian of the constraints, dense, as a CasADi function."""
         casadi, (x, p, f, g) = self._casadi, (self._nlp[name] for name in "xpfg")
         both = [casadi.densify(casadi.jacobian(e, x)) for e in (casadi.SX(f), g)]
@@ -73,20 +73,20 @@ class Program(Statement):
 
     def stated(self, z: FloatArray, parameters: FloatArray) -> tuple[float, FloatArray]:
         """Return objective and constraints, with bounds `g_low` and `g_high`, at unknowns and parameters as from `at`."""
-        objective, constraints = self._value(z, parameters)
+        objective, constraints = self._evaluate(z, parameters)
         return float(objective), np.asarray(constraints).ravel()
 
     def slopes_at(self, z: FloatArray, parameters: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return the gradient of the objective, shape (k,), and the Jacobian of the constraints, shape (m, k)."""
-        gradient, jacobian = (np.asarray(value) for value in self._slopes(z, parameters))
+        gradient, jacobian = (np.asarray(value) for value in self._differentiate(z, parameters))
         return gradient.ravel(), jacobian
 
     def stations(self, z: FloatArray, parameters: FloatArray) -> FloatArray:
         """Return the crank rotations of the stations at unknowns and parameters."""
-        return np.asarray(self._stations(z, parameters)).ravel()
+        return np.asarray(self._station_rotations(z, parameters)).ravel()
 
     @cached_property
-    def _stations(self) -> Any:
+    def _station_rotations(self) -> Any:
         x, p = self._nlp["x"], self._nlp["p"]
         return self._casadi.Function("stations", [x, p], [self._casadi.SX(self._phi)])
 
@@ -96,7 +96,7 @@ class Program(Statement):
         casadi, x, p = self._casadi, self._nlp["x"], self._nlp["p"]
         share = casadi.SX.sym("share")
         first, last = self._ends
-        place = casadi.vertcat(*self._point_at(first + share * (last - first)))
+        place = casadi.vertcat(*self._point(first + share * (last - first)))
         return casadi.Function("point", [x, p, share], [place, casadi.densify(casadi.jacobian(place, x))])
 
     def _solver(self, iterations: int, near: bool) -> Any:
@@ -139,7 +139,7 @@ class Program(Statement):
 
     def greatest(self, start: Start) -> float:
         """Return, at a start, the greatest value of the function that is minimised instead of an error."""
-        return float(np.asarray(self._begin(*self.at(start))).ravel()[0])
+        return float(np.asarray(self._initial_values(*self.at(start))).ravel()[0])
 
     def at(
         self,
@@ -168,15 +168,15 @@ class Program(Statement):
         z = np.concatenate([*known, np.zeros(len(self._initial))])
         harmonics = 0 if self.pivot is None else self.pivot.harmonics
         count = len(self._peaks)
-        along = [np.zeros(further.shape) for _, further in self._along] if places is None else places[count:]
+        along = [np.zeros(further.shape) for _, further in self._along_functions] if places is None else places[count:]
         if share is None:
             share = cos(pi * harmonics / max(GRID, 16 * harmonics)) if places is None else 1.0 - HELD
-        held = [np.zeros(self._held)] * count if places is None else places[:count]
+        held = [np.zeros(self._peak_count)] * count if places is None else places[:count]
         chosen = [nearest[0] for nearest in self.nearest_pieces(z)] if pieces is None else pieces
         parameters = np.concatenate(
             [
                 [float(start.branch), direction, size, share],
-                *(part for own in held for part in (own, np.zeros(self._held))),
+                *(part for own in held for part in (own, np.zeros(self._peak_count))),
                 *(own.ravel(order="F") for own in along),
                 _grashof_rows(self.limits.grashof, z[2:6]).ravel(order="F"),
                 *(half_planes(triangles[k]).ravel(order="F") for (_, triangles), k in zip(self.limits.regions, chosen)),
@@ -185,9 +185,9 @@ class Program(Statement):
         z = np.clip(z, self.low, self.high)
         if self._initial and (places is not None or self.objective != "squares"):
             # a first fit of squares starts farther away, and finds the middles itself
-            z[-len(self._initial) :] = np.asarray(self._begin(z, parameters)).ravel()
+            z[-len(self._initial) :] = np.asarray(self._initial_values(z, parameters)).ravel()
         if self._peaks and places is not None:
-            for number, derivatives in enumerate(self._curvature(z, parameters)):
+            for number, derivatives in enumerate(self._differentiate_motions(z, parameters)):
                 slope, bend = np.asarray(derivatives).reshape(-1, 2).T
                 true = (np.abs(slope) < 1e-6) & (np.abs(bend) > 1e-3)
                 begin = 4 + (2 * number + 1) * 2 * harmonics
@@ -285,9 +285,9 @@ class Program(Statement):
 
         The extremes are those of the pivot's motion, and of functions that are bounded along the crank's rotation.
         """
-        if not (self._peaks or self._along):
+        if not (self._peaks or self._along_functions):
             return answer
-        first = self.kept(answer.start) if self._along else answer
+        first = self.kept(answer.start) if self._along_functions else answer
         least = first if self.objective in SOUGHT else answer
 
         def better(found: Answer) -> Answer:
@@ -310,7 +310,7 @@ class Program(Statement):
         Extremes of a motion or of one of its derivatives are roots of the next derivative, a trigonometric polynomial.
         """
         if not self._peaks:
-            return self._greatest(start)
+            return self._peak_rotations(start)
         harmonics = np.arange(1, self.pivot.harmonics + 1) if self.pivot else np.empty(0)
         waves = 0.5 * (start.pivot[2::2] - 1j * start.pivot[3::2])
         found = []
@@ -320,13 +320,13 @@ class Program(Statement):
             places = np.zeros(2 * len(harmonics))
             places[: len(roots)] = np.angle(roots)
             found.append(places)
-        return found + self._greatest(start)
+        return found + self._peak_rotations(start)
 
-    def _greatest(self, start: Start) -> list[FloatArray]:
+    def _peak_rotations(self, start: Start) -> list[FloatArray]:
         """Return the rotations at which each function `Along` has its greatest values; see `find_peaks`."""
         values = dict(zip(UNKNOWNS, start.q.tolist())) | {"branch": float(start.branch)}
         p = physical(SimpleNamespace(**values), self.normal.unit, self.normal.origin)
-        return [find_peaks(along, p, FURTHER) for along, _ in self._along]
+        return [find_peaks(along, p, FURTHER) for along, _ in self._along_functions]
 
 
 def _grashof_rows(type_: str | None, links: FloatArray) -> FloatArray:

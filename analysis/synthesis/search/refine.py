@@ -71,14 +71,14 @@ class Refinement:
         assert normal.outline is not None
         #: Bound of the greatest distance, if the program minimises something else; otherwise None.
         self.limit = program.least.error if program.objective == "least curve" else None
-        self._target = TargetPath(points=_rows(normal.outline).T, closed=normal.closed)
+        self._target = TargetPath(points=_coordinates(normal.outline).T, closed=normal.closed)
         self._shares = np.linspace(0.0, 1.0, CURVE, endpoint=not normal.closed)
         self._trace = program.trace.map(CURVE)
         weights = normal.outline_weights
         even = bool((weights == weights[0]).all())
         self._scale = float(weights[0]) if even else 1.0
         self._by_area = normal.closed and even
-        self._outline = _rows(normal.outline)
+        self._outline = _coordinates(normal.outline)
         self._line, self._weights = divided(normal.outline, weights / self._scale, normal.closed)
         self.free = np.nonzero(program.high > program.low)[0]
         if normal.closed and program.pivot is None:
@@ -112,7 +112,7 @@ class Refinement:
         lengths = np.maximum(np.hypot(*steps), 1e-300)
         missed, away = self.apart(curve)
         w = self._weights * np.hypot(*np.diff(ring(self._line.T, closed), axis=0).T)
-        v = self._weights[_nearest(_middles(curve, closed), self._line, closed)[1]]
+        v = self._weights[_nearest(_midpoints(curve, closed), self._line, closed)[1]]
         for near, weight in ((missed, w), (away, v * lengths)):
             np.add.at(gradient.T, near.before, (weight * near.early).T)
             np.add.at(gradient.T, near.after, (weight * near.late).T)
@@ -129,14 +129,14 @@ class Refinement:
         A piece is represented by its middle; if the greatest distance is minimised, the target's corners count as well.
         """
         closed, n = self.normal.closed, curve.shape[1]
-        middles = _middles(self._line, closed)
+        middles = _midpoints(self._line, closed)
         if self.normal.quality == "worst":
             # the corners are farthest off
             middles = np.hstack([self._outline, middles])
         distance, before, share, foot = _nearest(middles, curve, closed)
         along = (foot - middles) / np.maximum(distance, 1e-300)
         missed = Near(distance, before, (before + 1) % n, (1.0 - share) * along, share * along)
-        middles = _middles(curve, closed)
+        middles = _midpoints(curve, closed)
         distance, _, _, foot = _nearest(middles, self._line, closed)
         half = 0.5 * (middles - foot) / np.maximum(distance, 1e-300)
         before = np.arange(len(distance))
@@ -179,14 +179,14 @@ class Refinement:
             if value < best[0][0] and program.judged(z, parameters, answer.start).feasible:
                 best[0] = (value, z)
 
-        for some in self._rounds():
+        for some in self._distance_choices():
             z = best[0][1]
             curve, slopes = self.traced(z, parameters)
             scale = max(self.measure(curve), 1e-9)
             if self.limit is not None:
                 # the path is judged at other points of the curves: tighten the bound by the excess
                 scale *= self.limit / (self.limit + self.over(curve))
-            down = _Descent(self, z, parameters, self._stretched(curve, slopes), scale, some(curve))
+            down = _Descent(self, z, parameters, self._scaled_directions(curve, slopes), scale, some(curve))
             found = minimize(
                 down.value, down.begin(), jac=True, method="SLSQP", constraints=down.constraints(),
                 callback=lambda y, down=down: seen(down.unknowns(y)),
@@ -202,7 +202,7 @@ class Refinement:
         start = replace(ended.start, rotation=self.met(ended.start, z, parameters), quality=quality)
         return replace(ended, start=start, converged=bool(found.success), iterations=int(found.nit))
 
-    def _rounds(self) -> Sequence[Callable[[FloatArray], Sequence[Any]]]:
+    def _distance_choices(self) -> Sequence[Callable[[FloatArray], Sequence[Any]]]:
         """Return, for each round, a function that chooses the distances to constrain: first a few, then the large ones."""
         if self.normal.quality != "worst":
             return (lambda _: (),)
@@ -219,7 +219,7 @@ class Refinement:
 
         return few, great, great
 
-    def _stretched(self, curve: FloatArray, slopes: FloatArray) -> FloatArray:
+    def _scaled_directions(self, curve: FloatArray, slopes: FloatArray) -> FloatArray:
         """Return directions of the unknowns, shape (k, free); each moves the curve across itself by 1, root mean square."""
         tangent = np.roll(curve, -1, axis=1) - np.roll(curve, 1, axis=1)
         normal = np.array([-tangent[1], tangent[0]]) / np.maximum(np.hypot(*tangent), 1e-300)
@@ -284,21 +284,21 @@ class _Descent:
         size: float,
         some: Sequence[Any],
     ) -> None:
-        self._of, self._program = refinement, refinement.program
+        self._refinement, self._program = refinement, refinement.program
         self._z0, self._stretch, self._size = z0, size * stretch, size
         if refinement.limit is not None:
             # the unknown that is minimised is a direction of its own
             self._stretch = np.column_stack([self._stretch, np.eye(len(z0))[refinement.program.own]])
-        self._some = some
-        self._held = refinement.normal.quality == "worst"
-        self._bound = self._held and refinement.limit is None
+        self._chosen = some
+        self._bounds_distances = refinement.normal.quality == "worst"
+        self._bound_unknown = self._bounds_distances and refinement.limit is None
         # SLSQP asks for each twice at the same unknowns: for the measure and for the constraints
-        self.curve = _remembered(lambda z: refinement.traced(z, parameters))
-        self._stated = _remembered(lambda z: refinement.program.stated(z, parameters))
-        self._steep = _remembered(lambda z: refinement.program.slopes_at(z, parameters))
+        self.curve = _cache_last(lambda z: refinement.traced(z, parameters))
+        self._evaluate = _cache_last(lambda z: refinement.program.stated(z, parameters))
+        self._differentiate = _cache_last(lambda z: refinement.program.slopes_at(z, parameters))
 
     def begin(self) -> FloatArray:
-        y = np.zeros(self._stretch.shape[1] + self._bound)
+        y = np.zeros(self._stretch.shape[1] + self._bound_unknown)
         y[self._stretch.shape[1] :] = 1.0
         return y
 
@@ -309,22 +309,22 @@ class _Descent:
 
     def value(self, y: FloatArray) -> tuple[float, FloatArray]:
         """Return the function that is minimised, and its gradient; a large value if the links cannot be joined."""
-        if self._bound:
+        if self._bound_unknown:
             return float(y[-1]), np.append(np.zeros(len(y) - 1), 1.0)
         z = self.unknowns(y)
         curve, slopes = self.curve(z)
         if not (np.isfinite(curve).all() and np.isfinite(slopes).all()):
             return 1e3, np.zeros(len(y))
-        added, _ = self._stated(z)
-        if self._of.limit is not None:
-            return added, self._steep(z)[0] @ self._stretch
-        area, gradient = self._of.area(curve)
-        whole = np.einsum("an,ank->k", gradient, slopes) + self._steep(z)[0]
+        added, _ = self._evaluate(z)
+        if self._refinement.limit is not None:
+            return added, self._differentiate(z)[0] @ self._stretch
+        area, gradient = self._refinement.area(curve)
+        whole = np.einsum("an,ank->k", gradient, slopes) + self._differentiate(z)[0]
         return (area + added) / self._size, whole @ self._stretch / self._size
 
-    def _near(self, z: FloatArray) -> list[tuple[Near, Any]]:
+    def _bounded_distances(self, z: FloatArray) -> list[tuple[Near, Any]]:
         """Return the two sets of distances of `Refinement.apart`, each with the indices of those that are bounded."""
-        return list(zip(self._of.apart(self.curve(z)[0]), self._some))
+        return list(zip(self._refinement.apart(self.curve(z)[0]), self._chosen))
 
     def constraints(self) -> list[dict[str, Any]]:
         """Return the constraints for SLSQP: those of the program, its bounds, and the bound of the distances."""
@@ -332,7 +332,7 @@ class _Descent:
         low, high = program.g_low, program.g_high
         equal = low == high
         above, below = np.isfinite(low) & ~equal, np.isfinite(high) & ~equal
-        free = self._of.free
+        free = self._refinement.free
         lower, upper = free[np.isfinite(program.low[free])], free[np.isfinite(program.high[free])]
         width = len(self.begin())
 
@@ -342,29 +342,29 @@ class _Descent:
 
         def values(y: FloatArray) -> FloatArray:
             z = self._z0 + self._stretch @ y[: self._stretch.shape[1]]
-            g = self._stated(z)[1]
+            g = self._evaluate(z)[1]
             parts = [(g - low)[above], (high - g)[below], (z - program.low)[lower], (program.high - z)[upper]]
-            if self._held:
+            if self._bounds_distances:
                 # if the bound is no unknown, the distances are bounded by the size
-                bound = y[-1] if self._bound else 1.0
-                parts += [bound - near.distance[k] / self._size for near, k in self._near(z)]
+                bound = y[-1] if self._bound_unknown else 1.0
+                parts += [bound - near.distance[k] / self._size for near, k in self._bounded_distances(z)]
             kept: FloatArray = np.nan_to_num(np.concatenate(parts), nan=-1e3, neginf=-1e3)
             return kept
 
         def slopes(y: FloatArray) -> FloatArray:
             z = self._z0 + self._stretch @ y[: self._stretch.shape[1]]
-            j = self._steep(z)[1]
+            j = self._differentiate(z)[1]
             eye = np.eye(len(z))
             rows = padded(np.vstack([j[above], -j[below], eye[lower], -eye[upper]]))
-            if not self._held:
+            if not self._bounds_distances:
                 return rows
             jacobian = self.curve(z)[1]
             parts = []
-            for near, k in self._near(z):
+            for near, k in self._bounded_distances(z):
                 grown = np.einsum("ak,akz->kz", near.early[:, k], jacobian[:, near.before[k]])
                 grown += np.einsum("ak,akz->kz", near.late[:, k], jacobian[:, near.after[k]])
                 part = padded(-grown / self._size)
-                part[:, -1] = 1.0 if self._bound else part[:, -1]
+                part[:, -1] = 1.0 if self._bound_unknown else part[:, -1]
                 parts.append(part)
             every: FloatArray = np.nan_to_num(np.vstack([rows, *parts]))
             return every
@@ -374,14 +374,14 @@ class _Descent:
             found.append(
                 {
                     "type": "eq",
-                    "fun": lambda y: (self._stated(self.unknowns(y))[1] - low)[equal],
-                    "jac": lambda y: padded(self._steep(self.unknowns(y))[1][equal]),
+                    "fun": lambda y: (self._evaluate(self.unknowns(y))[1] - low)[equal],
+                    "jac": lambda y: padded(self._differentiate(self.unknowns(y))[1][equal]),
                 }
             )
         return found
 
 
-def _remembered(function: Callable[[FloatArray], Made]) -> Callable[[FloatArray], Made]:
+def _cache_last(function: Callable[[FloatArray], Made]) -> Callable[[FloatArray], Made]:
     """Return the function with a cache of its last value, for a second call with the same unknowns."""
     last: list[tuple[bytes, Made]] = []
 
@@ -394,11 +394,11 @@ def _remembered(function: Callable[[FloatArray], Made]) -> Callable[[FloatArray]
     return called
 
 
-def _rows(points: NDArray[np.complex128]) -> FloatArray:
+def _coordinates(points: NDArray[np.complex128]) -> FloatArray:
     return np.ascontiguousarray([points.real, points.imag])
 
 
-def _middles(line: FloatArray, closed: bool) -> FloatArray:
+def _midpoints(line: FloatArray, closed: bool) -> FloatArray:
     """Return the midpoints of the pieces of a polyline, rows x, y."""
     both = 0.5 * (line + np.roll(line, -1, axis=1))
     return np.ascontiguousarray(both if closed else both[:, :-1])
@@ -425,4 +425,4 @@ def divided(outline: NDArray[np.complex128], weights: FloatArray, closed: bool) 
     where = np.arange(len(points))
     middles = begin + 0.5 / np.repeat(counts, counts)
     ends = begin if closed else np.append(begin, len(lengths))
-    return _rows(np.interp(ends, where, points)), np.interp(middles, where, around)
+    return _coordinates(np.interp(ends, where, points)), np.interp(middles, where, around)

@@ -134,7 +134,7 @@ class _FiveBarShapes(_FourBarShapes):
             rows = np.flatnonzero(allowed)
             l1, l2, l3, l4, l5 = links[rows].T
             phi = 2.0 * pi * np.arange(begin, AROUND, step)[:, None] / AROUND
-            second = np.exp(1j * _second(shapes[rows], 0.0, limits)) * l5 * np.exp(1j * turned[1] * phi)
+            second = np.exp(1j * _second_phase(shapes[rows], 0.0, limits)) * l5 * np.exp(1j * turned[1] * phi)
             off = l1 + second - l2 * np.exp(1j * turned[0] * phi)
             d2 = off.real**2 + off.imag**2
             for excess in Linkage.transmission_excess(l3, l4, d2.min(axis=0), d2.max(axis=0), cos(max(least, TURNING))):
@@ -168,19 +168,21 @@ def scan(normal: Normal, limits: Limits, *, seed: int, candidates: int, starts: 
     placed = 0
     with shown(False, float(candidates), f"trying {candidates:,} shapes") as show:
         for number, branch in enumerate(limits.branches):
-            chunks = _shapes(limits, seed + 7919 * number, max(1, candidates // len(limits.branches)))
+            chunks = _allowed_shapes(limits, seed + 7919 * number, max(1, candidates // len(limits.branches)))
             if normal.outline is not None:
-                chunks = _filled(chunks)
+                chunks = _merge_chunks(chunks)
             for chunk, shapes in enumerate(chunks):
                 show(float(placed))
-                found.append(_placed(normal, limits, shapes, branch, np.random.default_rng([seed, chunk, branch + 1])))
+                found.append(
+                    _place_shapes(normal, limits, shapes, branch, np.random.default_rng([seed, chunk, branch + 1]))
+                )
                 placed += len(shapes)
     if not found:
-        raise InfeasibleError(f"no shape of {limits.linkage.kind} {_why(limits, seed)}")
-    return _apart(found, starts, limits)
+        raise InfeasibleError(f"no shape of {limits.linkage.kind} {_impossible_limit(limits, seed)}")
+    return _distinct_starts(found, starts, limits)
 
 
-def _shapes(limits: Limits, seed: int, count: int) -> Iterator[FloatArray]:
+def _allowed_shapes(limits: Limits, seed: int, count: int) -> Iterator[FloatArray]:
     """Yield allowed shapes, with the other sampled numbers in [0, 1), in chunks.
 
     A row has the ratios (l2/l1, l3/l1, l4/l1), for a slider-crank (l1/l3, l2/l3, 1), followed by six numbers.
@@ -190,14 +192,14 @@ def _shapes(limits: Limits, seed: int, count: int) -> Iterator[FloatArray]:
     while kept < count and tried < 64 * count:
         unit = sequence.random(CHUNK)
         tried += CHUNK
-        shapes = _stretched(unit, limits)
-        shapes = shapes[_allowed(shapes, limits)][: count - kept]
+        shapes = _sample_shapes(unit, limits)
+        shapes = shapes[_is_allowed(shapes, limits)][: count - kept]
         kept += len(shapes)
         if len(shapes):
             yield shapes
 
 
-def _filled(chunks: Iterator[FloatArray]) -> Iterator[FloatArray]:
+def _merge_chunks(chunks: Iterator[FloatArray]) -> Iterator[FloatArray]:
     """Yield the same rows in chunks of at least `CHUNK`: of the curves of a chunk only the best are placed."""
     rows: list[FloatArray] = []
     for chunk in chunks:
@@ -209,7 +211,7 @@ def _filled(chunks: Iterator[FloatArray]) -> Iterator[FloatArray]:
         yield np.vstack(rows)
 
 
-def _why(limits: Limits, seed: int) -> str:
+def _impossible_limit(limits: Limits, seed: int) -> str:
     """Return, in words, the limit that alone leaves no shape, or all limits if only together they leave none."""
     free = replace(limits, low=np.full(len(limits.low), 1e-9), high=np.full(len(limits.high), 1e9))
     alone = {"is within the bounds of the links": replace(limits, turn=None, grashof=None)}
@@ -220,19 +222,19 @@ def _why(limits: Limits, seed: int) -> str:
         alone[f"is a {limits.grashof}"] = replace(free, turn=None)
     unit = qmc.Sobol(9, seed=seed).random(CHUNK)
     for words, one in alone.items():
-        if not _allowed(_stretched(unit, one), one).any():
+        if not _is_allowed(_sample_shapes(unit, one), one).any():
             return words
     return " and ".join(alone)
 
 
-def _stretched(unit: FloatArray, limits: Limits) -> FloatArray:
-    """Map rows of numbers in [0, 1) to rows of `_shapes`."""
-    low, high = np.log(_ratios(limits)).T
+def _sample_shapes(unit: FloatArray, limits: Limits) -> FloatArray:
+    """Map rows of numbers in [0, 1) to rows of `_allowed_shapes`."""
+    low, high = np.log(_ratio_ranges(limits)).T
     return np.hstack([np.exp(low + (high - low) * unit[:, :3]), unit[:, 3:]])
 
 
-def _ratios(limits: Limits) -> FloatArray:
-    """Return the least and greatest ratios of `_shapes`, shape (3, 2), within the bounds of the links."""
+def _ratio_ranges(limits: Limits) -> FloatArray:
+    """Return the least and greatest ratios of `_allowed_shapes`, shape (3, 2), within the bounds of the links."""
     own = _SHAPES[limits.linkage.kind]
     base, of = own.base, own.others
     given = np.column_stack([limits.low[of] / limits.high[base], limits.high[of] / limits.low[base]])
@@ -247,7 +249,7 @@ def _links(shapes: FloatArray, limits: Limits) -> FloatArray:
     return _SHAPES[limits.linkage.kind].links(shapes, limits)
 
 
-def _allowed(shapes: FloatArray, limits: Limits) -> NDArray[np.bool_]:
+def _is_allowed(shapes: FloatArray, limits: Limits) -> NDArray[np.bool_]:
     """Return which shapes meet transmission angle and Grashof type and, for some size, the bounds of their links."""
     sized = _SHAPES[limits.linkage.kind].links(shapes, limits)
     links = sized[:, :4]
@@ -262,18 +264,18 @@ def _allowed(shapes: FloatArray, limits: Limits) -> NDArray[np.bool_]:
         else:
             shortest = BY_SHORTEST.index(limits.grashof)
             allowed &= (excess < 0.0) & (links.argmin(axis=1) == shortest)
-    least, most = _sizes(sized, limits)
+    least, most = _size_range(sized, limits)
     # fixed links leave a single size, apart from rounding
     return allowed & (least <= most * (1.0 + 1e-9))
 
 
-def _second(shapes: FloatArray, phase: FloatArray | float, limits: Limits) -> FloatArray:
+def _second_phase(shapes: FloatArray, phase: FloatArray | float, limits: Limits) -> FloatArray:
     """Return the second crank's phase: a sampled angle plus what keeps the curve independent of the first crank's phase."""
     turned: FloatArray = 2.0 * pi * shapes[:, 7] + limits.ratio * phase
     return turned
 
 
-def _sizes(links: FloatArray, limits: Limits) -> tuple[FloatArray, FloatArray]:
+def _size_range(links: FloatArray, limits: Limits) -> tuple[FloatArray, FloatArray]:
     """Return the least and greatest factor with which all links are within their bounds."""
     second = limits.second or (0.0, inf)
     there = links > 0.0
@@ -283,20 +285,22 @@ def _sizes(links: FloatArray, limits: Limits) -> tuple[FloatArray, FloatArray]:
     return np.where(there, low, 0.0).max(axis=1), np.where(there, high, inf).min(axis=1)
 
 
-def _placed(normal: Normal, limits: Limits, shapes: FloatArray, branch: int, random: np.random.Generator) -> Candidates:
+def _place_shapes(
+    normal: Normal, limits: Limits, shapes: FloatArray, branch: int, random: np.random.Generator
+) -> Candidates:
     if normal.of_rocker:
-        found = _functions(normal, limits, shapes, branch)
+        found = _place_functions(normal, limits, shapes, branch)
     elif normal.of_slider:
-        found = _slides(normal, limits, shapes, branch)
+        found = _place_slider_functions(normal, limits, shapes, branch)
     elif normal.timed or normal.angle is not None or normal.exact:
-        found = _timed(normal, limits, shapes, branch, None if normal.timed else random)
+        found = _place_timed(normal, limits, shapes, branch, None if normal.timed else random)
     else:
-        found = _paths(normal, limits, shapes, branch)
+        found = _place_paths(normal, limits, shapes, branch)
     if limits.second is None:
         return found
     links = _SHAPES[limits.linkage.kind].links(shapes, limits)
     second = links[:, 4] * found.q[:, 4] / links[:, 2]
-    return replace(found, pivot=np.column_stack([second, _second(shapes, found.q[:, 8], limits)]))
+    return replace(found, pivot=np.column_stack([second, _second_phase(shapes, found.q[:, 8], limits)]))
 
 
 def _directions(
@@ -313,7 +317,7 @@ def _directions(
     """
     first, second = limits.gears
     links = _SHAPES[limits.linkage.kind].links(shapes, limits)
-    phases = [phase + first * turned, links[:, 4], _second(shapes, phase, limits) + second * turned]
+    phases = [phase + first * turned, links[:, 4], _second_phase(shapes, phase, limits) + second * turned]
     rows = np.column_stack([links[:, :4], *phases])
     coupler = np.empty((len(shapes), len(rotation)), dtype=complex)
     rocker = np.empty_like(coupler)
@@ -322,7 +326,7 @@ def _directions(
     return coupler, rocker
 
 
-def _functions(normal: Normal, limits: Limits, shapes: FloatArray, branch: int) -> Candidates:
+def _place_functions(normal: Normal, limits: Limits, shapes: FloatArray, branch: int) -> Candidates:
     """Place rocker functions: the phase is sampled, the mounting angle follows."""
     assert normal.rotation is not None
     assert normal.angle is not None
@@ -335,7 +339,7 @@ def _functions(normal: Normal, limits: Limits, shapes: FloatArray, branch: int) 
         left *= np.exp(-1j * offset)[:, None]
     quality = (normal.weights * np.angle(left) ** 2).sum(axis=1)
     links = _SHAPES[limits.linkage.kind].links(shapes, limits)
-    least, most = _sizes(links, limits)
+    least, most = _size_range(links, limits)
     size = np.sqrt(np.maximum(least, 1e-12) * most)
     q = np.zeros((len(shapes), 11))
     q[:, 2:6] = size[:, None] * links[:, :4]
@@ -343,7 +347,7 @@ def _functions(normal: Normal, limits: Limits, shapes: FloatArray, branch: int) 
     return Candidates(quality=quality, q=q, rotation=None, branch=branch)
 
 
-def _slides(normal: Normal, limits: Limits, shapes: FloatArray, branch: int) -> Candidates:
+def _place_slider_functions(normal: Normal, limits: Limits, shapes: FloatArray, branch: int) -> Candidates:
     """Place slider functions: shape and phase are sampled; size and position of the shaft follow."""
     assert normal.rotation is not None
     assert normal.points is not None
@@ -354,7 +358,7 @@ def _slides(normal: Normal, limits: Limits, shapes: FloatArray, branch: int) -> 
     mean, wanted = travelled @ w / w.sum(), float(x @ w / w.sum())
     off = travelled - mean[:, None]
     factor = off @ (w * (x - wanted)) / (off**2 @ w)
-    least, most = _sizes(links, limits)
+    least, most = _size_range(links, limits)
     size = np.clip(np.abs(factor), least, most)
     # seen from the shaft, the slider's position increases to the left
     side = -np.sign(factor)
@@ -367,7 +371,7 @@ def _slides(normal: Normal, limits: Limits, shapes: FloatArray, branch: int) -> 
     return Candidates(quality=quality, q=q, rotation=None, branch=branch)
 
 
-def _timed(
+def _place_timed(
     normal: Normal, limits: Limits, shapes: FloatArray, branch: int, random: np.random.Generator | None
 ) -> Candidates:
     """Place timed paths and motions by variable projection; untimed ones at random rotations, in order."""
@@ -388,15 +392,15 @@ def _timed(
     crank = np.exp(1j * (phase[:, None] + limits.gears[0] * rotation))
     basis = np.stack([np.ones_like(crank), crank, coupler], axis=1)
     w, p = normal.weights, normal.points
-    z = _projected(basis, p, w)
+    z = _solve_projection(basis, p, w)
     # the size is clipped to the links' bounds, and the other unknowns are computed again
-    least, most = _sizes(links, limits)
+    least, most = _size_range(links, limits)
     size = np.abs(z[:, 1]) / links[:, 1]
     bounded = np.clip(size, np.maximum(least, 1e-9), most)
     outside = bounded != size
     if outside.any():
         z[outside, 1] *= (bounded / np.maximum(size, 1e-300))[outside]
-        rest = _projected(basis[outside][:, [0, 2]], p - z[outside, 1, None] * basis[outside, 1], w)
+        rest = _solve_projection(basis[outside][:, [0, 2]], p - z[outside, 1, None] * basis[outside, 1], w)
         z[outside, 0], z[outside, 2] = rest[:, 0], rest[:, 1]
     far = np.abs(z[:, 2]) > limits.high[6]
     z[far, 2] *= limits.high[6] / np.abs(z[far, 2])
@@ -414,7 +418,7 @@ def _timed(
     )
 
 
-def _projected(basis: ComplexArray, p: ComplexArray, w: FloatArray) -> ComplexArray:
+def _solve_projection(basis: ComplexArray, p: ComplexArray, w: FloatArray) -> ComplexArray:
     """Solve p = z . basis for every row by weighted least squares; basis (m, k, n), p (n,) or (m, n); z (m, k)."""
     weighted = basis.conj() * w
     gram = weighted @ basis.transpose(0, 2, 1)
@@ -427,7 +431,7 @@ def _projected(basis: ComplexArray, p: ComplexArray, w: FloatArray) -> ComplexAr
     return solved
 
 
-def _paths(normal: Normal, limits: Limits, shapes: FloatArray, branch: int) -> Candidates:
+def _place_paths(normal: Normal, limits: Limits, shapes: FloatArray, branch: int) -> Candidates:
     """Place untimed paths: coupler curves are laid over the target by a similarity transformation."""
     links = _SHAPES[limits.linkage.kind].links(shapes, limits)
     rotation = np.linspace(0.0, 2.0 * pi, CURVE, endpoint=False)
@@ -439,19 +443,19 @@ def _paths(normal: Normal, limits: Limits, shapes: FloatArray, branch: int) -> C
     distance[: len(shapes) // PINNED] = 0.0
     point = distance * np.exp(2j * pi * shapes[:, 5])
     curves = links[:, 1:2] * np.exp(1j * limits.gears[0] * rotation) + point[:, None] * coupler
-    return (_closed_paths if normal.closed else _open_paths)(normal, limits, links, curves, point, branch)
+    return (_place_closed_paths if normal.closed else _place_open_paths)(normal, limits, links, curves, point, branch)
 
 
-def _closed_paths(
+def _place_closed_paths(
     normal: Normal, limits: Limits, links: FloatArray, curves: ComplexArray, point: ComplexArray, branch: int
 ) -> Candidates:
     assert normal.points is not None
     # a crank that does not turn fully closes no curve
     broken = np.logical_not(np.isfinite(curves).all(axis=1))
     curves = np.where(broken.reshape(-1, 1), 1.0 + 0.0j + np.arange(CURVE), curves)
-    target, _ = _even(normal.points[None, :], EVEN)
+    target, _ = _resample_evenly(normal.points[None, :], EVEN)
     goal = target[0] - target[0].mean()
-    even, turned = _even(curves, EVEN)
+    even, turned = _resample_evenly(curves, EVEN)
     mean = even.mean(axis=1)
     even = even - mean[:, None]
     energy = (np.abs(even) ** 2).sum(axis=1)
@@ -473,7 +477,7 @@ def _closed_paths(
         way = np.where(better, direction, way)
         product = np.where(better, value, product)
     scale = product / energy
-    bounded, scale = _bounded(scale, links, point, limits)
+    bounded, scale = _clip_sizes(scale, links, point, limits)
     misfit = (np.abs(goal) ** 2).sum() - 2.0 * (scale.conj() * product).real + np.abs(scale) ** 2 * energy
     misfit[broken] = inf
     place = target[0].mean() - scale * mean
@@ -489,11 +493,11 @@ def _closed_paths(
         rotations[i] -= 2.0 * pi * np.floor(rotations[i, 0] / (2.0 * pi))
     quality = np.full(len(curves), inf)
     quality[chosen] = misfit[chosen] * normal.weights.sum() / EVEN
-    q = _vectors(links, bounded, scale, place, point)
+    q = _pack_unknowns(links, bounded, scale, place, point)
     return Candidates(quality=quality, q=q, rotation=rotations, branch=branch)
 
 
-def _open_paths(
+def _place_open_paths(
     normal: Normal, limits: Limits, links: FloatArray, curves: ComplexArray, point: ComplexArray, branch: int
 ) -> Candidates:
     assert normal.points is not None
@@ -523,27 +527,27 @@ def _open_paths(
         rotations[i] = np.interp(at, length, angles)
         piece = np.interp(at, length, part.real) + 1j * np.interp(at, length, part.imag)
         basis = np.stack([np.ones_like(piece), piece])[None]
-        place, scale = _projected(basis, normal.points, normal.weights)[0]
-        bounded, scales = _bounded(np.array([scale]), links[i : i + 1], point[i : i + 1], limits)
+        place, scale = _solve_projection(basis, normal.points, normal.weights)[0]
+        bounded, scales = _clip_sizes(np.array([scale]), links[i : i + 1], point[i : i + 1], limits)
         if scales[0] != scale:
             place = (normal.weights * (normal.points - scales[0] * piece)).sum() / normal.weights.sum()
         quality[i] = (normal.weights * np.abs(place + scales[0] * piece - normal.points) ** 2).sum()
-        q[i] = _vectors(links[i : i + 1], bounded, scales, np.array([place]), point[i : i + 1])[0]
+        q[i] = _pack_unknowns(links[i : i + 1], bounded, scales, np.array([place]), point[i : i + 1])[0]
     return Candidates(quality=quality, q=q, rotation=rotations, branch=branch)
 
 
-def _bounded(
+def _clip_sizes(
     scale: ComplexArray, links: FloatArray, point: ComplexArray, limits: Limits
 ) -> tuple[FloatArray, ComplexArray]:
     """Return sizes, shape (m,), and complex scales, clipped to the bounds of links and coupler point."""
-    least, most = _sizes(links, limits)
+    least, most = _size_range(links, limits)
     most = np.minimum(most, limits.high[6] / np.maximum(np.abs(point), 1e-300))
     size = np.abs(scale)
     bounded = np.clip(size, np.maximum(least, 1e-9), np.maximum(most, np.maximum(least, 1e-9)))
     return bounded, scale * bounded / np.maximum(size, 1e-300)
 
 
-def _vectors(
+def _pack_unknowns(
     links: FloatArray, size: FloatArray, scale: ComplexArray, place: ComplexArray, point: ComplexArray
 ) -> FloatArray:
     """Return the unknowns of linkages, shape (m, 11), from sizes, scales, positions and coupler points."""
@@ -552,7 +556,7 @@ def _vectors(
     return np.column_stack([place.real, place.imag, sized, size * np.abs(point), *angles])
 
 
-def _even(curves: ComplexArray, k: int) -> tuple[ComplexArray, FloatArray]:
+def _resample_evenly(curves: ComplexArray, k: int) -> tuple[ComplexArray, FloatArray]:
     """Resample closed curves at equal arc lengths, shape (m, k); return the crank rotation at each of these points, too."""
     m, n = curves.shape
     ring = np.hstack([curves, curves[:, :1]])
@@ -570,7 +574,7 @@ def _even(curves: ComplexArray, k: int) -> tuple[ComplexArray, FloatArray]:
     return points, 2.0 * pi * (index + share) / n
 
 
-def _apart(found: list[Candidates], starts: int, limits: Limits) -> list[Start]:
+def _distinct_starts(found: list[Candidates], starts: int, limits: Limits) -> list[Start]:
     """Return the best candidates as starts, none of them within `APART` of a better one."""
     best = [
         Start(

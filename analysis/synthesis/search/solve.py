@@ -191,8 +191,8 @@ def synthesize(
     task = reweighted(task, weights)
     kinds = usual_kinds(task) if kinds is None else kinds
     if isinstance(task, QuickReturn | QuickSwing):
-        return _in_closed_form(task, bounds, constraints, kinds, search, begun)
-    task = _searched_task(task, constraints, pivot, search)
+        return _solve_in_closed_form(task, bounds, constraints, kinds, search, begun)
+    task = _prepare_task(task, constraints, pivot, search)
     normal = search_form(task, pivot)
     every = limits_by_kind(task, normal, bounds, constraints, kinds, gears)
     if tuple(kinds) != ("four-bar",) and pivot is not None:
@@ -213,7 +213,7 @@ def synthesize(
         how = replace(search, starts=-(-search.starts // share), candidates=-(-search.candidates // share))
         total += (len(given) + how.starts) * (1 if limits.sound(normal) is None else 2)
         try:
-            part = _searched(normal, limits, given, own, how)
+            part = _search_kind(normal, limits, given, own, how)
         except InfeasibleError as error:
             refused = refused or error
             continue
@@ -226,11 +226,11 @@ def synthesize(
             break
     if refused is not None and not found:
         raise refused
-    together = found[0] if len(found) == 1 else _together(found, search.solutions)
-    return _result(task, together, done, total, search, begun)
+    together = found[0] if len(found) == 1 else _merge_kinds(found, search.solutions)
+    return _make_result(task, together, done, total, search, begun)
 
 
-def _in_closed_form(
+def _solve_in_closed_form(
     task: QuickReturn | QuickSwing,
     bounds: Any,
     constraints: Sequence[Any],
@@ -248,7 +248,7 @@ def _in_closed_form(
     )
 
 
-def _searched(
+def _search_kind(
     normal: Normal, limits: Limits, guesses: Sequence[Solution], pivot: PivotUnknown | None, search: Search
 ) -> Polished:
     """Search for one kind of linkage, from the starts of a scan and from guesses.
@@ -270,12 +270,12 @@ def _searched(
     if done.interrupted or sound is None:
         return done
     try:
-        return _searched(normal, sound, guesses, pivot, search).joined(done)
+        return _search_kind(normal, sound, guesses, pivot, search).joined(done)
     except InfeasibleError:
         return done
 
 
-def _together(found: Sequence[Sequence[Solution]], count: int) -> tuple[Solution, ...]:
+def _merge_kinds(found: Sequence[Sequence[Solution]], count: int) -> tuple[Solution, ...]:
     """Return the best ``count`` solutions, which include the best one of each kind."""
     every = ranked([s for part in found for s in part])
     first = {s.linkage.kind: s for s in reversed(every)}.values()
@@ -315,7 +315,7 @@ def improve(
     if search.starts < 1 and not guesses:
         raise InputError(f"{search.starts} starts and no guess: there must be at least one of either")
     begun = perf_counter()
-    task = _searched_task(task, constraints, pivot, search)
+    task = _prepare_task(task, constraints, pivot, search)
     normal = search_form(task, pivot)
     limits = make_limits(task, normal, bounds, constraints)
     base, *begin = (start_of(of, normal, pivot) for of in (linkage, *guesses))
@@ -330,10 +330,10 @@ def improve(
         return replace(made, variants=tuple(map(put_back, s.variants)))
 
     found = tuple(map(put_back, make_solutions(task, normal, limits, done, pivot, search.solutions)))
-    return _result(task, found, done, len(begin), search, begun)
+    return _make_result(task, found, done, len(begin), search, begun)
 
 
-def _searched_task(task: Task, constraints: Sequence[Any], pivot: PivotUnknown | None, search: Search) -> Task:
+def _prepare_task(task: Task, constraints: Sequence[Any], pivot: PivotUnknown | None, search: Search) -> Task:
     """Return the task for the search: if a function other than an error is minimised, errors are measured by the greatest.
 
     Raises InputError if a constraint does not apply to a moving pivot.
@@ -346,7 +346,7 @@ def _searched_task(task: Task, constraints: Sequence[Any], pivot: PivotUnknown |
     return replace(task, objective="worst")
 
 
-def _result(
+def _make_result(
     task: Task, found: tuple[Solution, ...], done: Polished, total: int, search: Search, begun: float
 ) -> Synthesis:
     """Return the result of a search with its number of starts and duration; raise an error if it has no solution."""
@@ -383,7 +383,7 @@ def make_solutions(
             Solution.of(
                 task,
                 as_asked(task, make_linkage(a.start, normal, pivot, limits)),
-                _stations(task, normal, a.start.rotation),
+                _task_rotations(task, normal, a.start.rotation),
             )
             for a in answers
         )
@@ -401,7 +401,7 @@ def make_solutions(
     return grouped(solutions)[:count]
 
 
-def _stations(task: Task, normal: Normal, rotation: NDArray[np.float64] | None) -> NDArray[np.float64] | None:
+def _task_rotations(task: Task, normal: Normal, rotation: NDArray[np.float64] | None) -> NDArray[np.float64] | None:
     """Return the crank rotations of the task's stations, interpolated from those of a search that has other stations."""
     own = normal_form(task)
     if rotation is None or len(rotation) == own.n:

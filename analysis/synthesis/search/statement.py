@@ -111,12 +111,12 @@ class Statement:
         self._unknowns: list[tuple[Any, FloatArray, FloatArray]] = []
         self._initial: list[Any] = []
         #: For each bounded motion of the pivot, or derivative of it: the order of the derivative, and parameters for the
-        #: rotations of its extremes and for the curvature there; in `_bent` the first two derivatives of the motion there.
+        #: rotations of its extremes and for the curvature there; their number; the first two derivatives there.
         self._peaks: list[tuple[int, Any, Any]] = []
-        self._held = 2 * pivot.harmonics if pivot is not None and exact else 0
-        self._bent: list[Any] = []
+        self._peak_count = 2 * pivot.harmonics if pivot is not None and exact else 0
+        self._peak_derivatives: list[Any] = []
         #: Functions bounded along the crank's rotation, and parameters for the further rotations at which they are bounded.
-        self._along: list[tuple[Along, Any]] = []
+        self._along_functions: list[tuple[Along, Any]] = []
         self._constraints: list[tuple[Any, float, float, Label]] = []
         self.knots: list[int] = list(range(normal.n))
         self._solvers: dict[tuple[int, bool], Any] = {}
@@ -130,41 +130,41 @@ class Statement:
         v = self._unknown("v", *pivot_bounds(pivot, normal.unit))
         phi: Any = casadi.DM(normal.rotation) if normal.timed else None
         knots: Any = None
-        self._whole = objective in ("curve", "least curve")
-        if not normal.timed and not self._whole:
+        self._by_curve = objective in ("curve", "least curve")
+        if not normal.timed and not self._by_curve:
             phi = self._unknown("phi", np.full(normal.n, -inf), np.full(normal.n, inf))
-            self._ordered(phi, direction)
+            self._order_stations(phi, direction)
         elif not normal.timed:
-            phi, knots = self._way_of_path(direction)
+            phi, knots = self._path_rotations(direction)
         p = SimpleNamespace(**{name: q[k] for k, name in enumerate(UNKNOWNS)}, branch=branch)
         self._phi = phi
-        self._point_at: Callable[[Any], Any] = lambda at: self._closed(p, v, at, branch)[1]
+        self._point: Callable[[Any], Any] = lambda at: self._close_loop(p, v, at, branch)[1]
         self._ends = (0.0, 2.0 * pi) if normal.closed or knots is None else (knots[0], knots[-1])
         quality = self._quality(p, v, phi, branch, size)
         tilt: Any = None
         if objective == "transmission":
             # the largest |cos mu| of all, which is minimised
-            tilt = self._extra("tilt", 0.0, 0.0, cos(TURNING))
+            tilt = self._auxiliary("tilt", 0.0, 0.0, cos(TURNING))
             quality = tilt + 1e-3 * casadi.sumsqr(q[2:6])
-        self._assembled(p, v, phi, tilt)
-        self._shaped(p, grashof, planes)
+        self._constrain_transmission(p, v, phi, tilt)
+        self._constrain_shape(p, grashof, planes)
         for require in limits.requires:
-            value = self._traced(require, p) / require.scale
-            self._within(value, 0.0 if require.equal else -inf, 0.0, require.name, require.unit, require.scale)
+            value = self._trace(require, p) / require.scale
+            self._constrain(value, 0.0 if require.equal else -inf, 0.0, require.name, require.unit, require.scale)
         if isinstance(pivot, SliderUnknown):
-            quality = quality + self._slider(pivot, p.ground_length, v)
+            quality = quality + self._constrain_slider(pivot, p.ground_length, v)
         if isinstance(pivot, CrankUnknown) and isfinite(pivot.speed):
-            self._bounded(
+            self._bound_motion(
                 lambda x: _series(casadi, v[2:], x, mean=False, order=1) / pivot.speed, 1, "speed of the second crank"
             )
-        self._close(quality, [branch, direction, size, self._share], [grashof, *planes])
+        self._assemble(quality, [branch, direction, size, self._share], [grashof, *planes])
 
-    def _close(self, quality: Any, numbers: Sequence[Any], tables: Sequence[Any]) -> None:
+    def _assemble(self, quality: Any, numbers: Sequence[Any], tables: Sequence[Any]) -> None:
         """Assemble the program, its bounds and the names of its constraints."""
         casadi = self._casadi
         peaks = [
             *(symbol for _, *both in self._peaks for symbol in both),
-            *(casadi.vec(further) for _, further in self._along),
+            *(casadi.vec(further) for _, further in self._along_functions),
         ]
         parameters = casadi.vertcat(*numbers, *peaks, *map(casadi.vec, tables))
         z, lows, highs = zip(*self._unknowns)
@@ -181,7 +181,7 @@ class Statement:
         self._unknowns.append((symbol, low, high))
         return symbol
 
-    def _extra(self, name: str, initial: Any, low: float = -inf, high: float = inf) -> Any:
+    def _auxiliary(self, name: str, initial: Any, low: float = -inf, high: float = inf) -> Any:
         """Add an auxiliary unknown, such as a greatest value or the middle of a range, with its starting value."""
         self._initial.append(initial)
         return self._unknown(name, np.array([low]), np.array([high]))
@@ -192,7 +192,7 @@ class Statement:
         assert self.limits.least is not None
         return self.limits.least
 
-    def _traced(self, require: Require, p: Any) -> Any:
+    def _trace(self, require: Require, p: Any) -> Any:
         """Return a required function in CasADi symbols; an `Along` also at the rotations given by parameters."""
         casadi, values = self._casadi, physical(p, self.normal.unit, self.normal.origin)
         if not isinstance(require, Along):
@@ -200,10 +200,10 @@ class Statement:
         held = traced(require, values, casadi.DM(require.rotation))
         if require.ends is None:
             return casadi.vec(held)
-        places = casadi.SX.sym(f"places{len(self._along)}", FURTHER)
+        places = casadi.SX.sym(f"places{len(self._along_functions)}", FURTHER)
         further = traced(require, values, places)
-        bends = casadi.SX.sym(f"bends{len(self._along)}", *further.shape)
-        self._along.append((require, casadi.horzcat(places, bends)))
+        bends = casadi.SX.sym(f"bends{len(self._along_functions)}", *further.shape)
+        self._along_functions.append((require, casadi.horzcat(places, bends)))
         # height of the peak near each place to second order, which follows the peak as it moves
         ones = casadi.DM.ones(FURTHER)
         slope = casadi.horzcat(*(casadi.jtimes(column, places, ones) for column in casadi.horzsplit(further)))
@@ -211,7 +211,7 @@ class Statement:
 
     # Objective
 
-    def _closed(self, p: Any, v: Any, phi: Any, branch: Any) -> tuple[Any, Any]:
+    def _close_loop(self, p: Any, v: Any, phi: Any, branch: Any) -> tuple[Any, Any]:
         """Return the directions of the links and the coupler point (x, y) at rotations, by the plant's loop closure."""
         casadi = self._casadi
         th2 = self._turns[0] * phi + p.crank_phase
@@ -246,7 +246,7 @@ class Statement:
     def _quality(self, p: Any, v: Any, phi: Any, branch: Any, size: Any) -> Any:
         """Return the objective, and add the constraints that belong to it."""
         casadi, normal = self._casadi, self.normal
-        g, point = self._closed(p, v, phi, branch)
+        g, point = self._close_loop(p, v, phi, branch)
         ex: Any = None
         ey: Any = None
         if normal.points is not None:
@@ -262,27 +262,29 @@ class Statement:
         if self.objective == "transmission":
             for value, unit in ((ex, "mm"), (ey, "mm"), (turned, "deg")):
                 if value is not None:
-                    self._within(value, 0.0, 0.0, "the stations", unit)
+                    self._constrain(value, 0.0, 0.0, "the stations", unit)
             return quality
-        if not self._whole:
+        if not self._by_curve:
             squares: Any = 0.0 if ex is None else ex**2 + ey**2
             if turned is not None:
                 squares = squares + (normal.leverage * turned) ** 2
             squares = casadi.DM(normal.weights) * squares
             quality = casadi.sum1(squares)
         if self.objective == "worst":
-            greatest = self._extra("greatest", casadi.sqrt(casadi.mmax(squares)) / size, 0.0)
-            self._at_most(squares / size**2 - greatest**2, "greatest error", "")
+            greatest = self._auxiliary("greatest", casadi.sqrt(casadi.mmax(squares)) / size, 0.0)
+            self._constrain_nonpositive(squares / size**2 - greatest**2, "greatest error", "")
             return greatest
         if self.objective in SOUGHT:
-            if not self._whole:
+            if not self._by_curve:
                 most = self.least.error
                 smooth = casadi.sqrt(squares + (SMOOTH * most) ** 2) - most * hypot(1.0, SMOOTH)
-                self._at_most(smooth / most, ERROR, "deg" if normal.of_rocker else "mm", self._in_words(most))
-            values = self._traced(self.least.along, p)
-            greatest = self._extra("greatest", casadi.mmax(values) / size, 0.0)
-            self._at_most(values / size - greatest, self.least.along.name, "")
-            return greatest + (self._straight_part(p, v, phi, branch, ex, ey) if self._whole else 0.0)
+                self._constrain_nonpositive(
+                    smooth / most, ERROR, "deg" if normal.of_rocker else "mm", self._display_factor(most)
+                )
+            values = self._trace(self.least.along, p)
+            greatest = self._auxiliary("greatest", casadi.mmax(values) / size, 0.0)
+            self._constrain_nonpositive(values / size - greatest, self.least.along.name, "")
+            return greatest + (self._straight_part(p, v, phi, branch, ex, ey) if self._by_curve else 0.0)
         return quality + self._straight_part(p, v, phi, branch, ex, ey)
 
     def _straight_part(self, p: Any, v: Any, phi: Any, branch: Any, ex: Any, ey: Any) -> Any:
@@ -294,35 +296,35 @@ class Statement:
         line = points[straight.end] - points[straight.start]
         line /= abs(line)
         spent = phi[straight.end] - phi[straight.start]
-        self._within(spent, -straight.rotation, straight.rotation, "crank rotation of the straight part", "deg")
-        if self._whole:
+        self._constrain(spent, -straight.rotation, straight.rotation, "crank rotation of the straight part", "deg")
+        if self._by_curve:
             # the ends may be off the target's only across the line
             for k in (straight.start, straight.end):
-                self._within(ex[k] * line.real + ey[k] * line.imag, 0.0, 0.0, "ends of the straight part")
+                self._constrain(ex[k] * line.real + ey[k] * line.imag, 0.0, 0.0, "ends of the straight part")
         if straight.flatness is None:
             off = (ey * line.real - ex * line.imag)[part]
             return (straight.weight - 1.0) * casadi.sumsqr(off)
         # along the straight line through the part's ends, at the stations and in between
-        x, y = self._closed(p, v, self._way(phi[part])[0], branch)[1]
+        x, y = self._close_loop(p, v, self._dense_rotations(phi[part])[0], branch)[1]
         begin = points[straight.start]
         away = (y - begin.imag) * line.real - (x - begin.real) * line.imag
-        level = self._extra("level", 0.5 * (casadi.mmin(away) + casadi.mmax(away)))
+        level = self._auxiliary("level", 0.5 * (casadi.mmin(away) + casadi.mmax(away)))
         half = 0.5 * straight.flatness
-        self._within(away - level, -half, half, "flatness of the straight part")
+        self._constrain(away - level, -half, half, "flatness of the straight part")
         return 0.0
 
     # Constraints
 
-    def _in_words(self, share: float) -> float:
+    def _display_factor(self, share: float) -> float:
         """Return the factor that converts an error, relative to ``share`` (units), to mm or, of a rocker, degrees."""
         return share * (degrees(1.0) if self.normal.of_rocker else 1e3 * self.normal.unit)
 
     def excess(self, violation: float) -> dict[str, Any]:
         """Return the fields of an `Answer` whose greatest error exceeds its bound by ``violation`` (units)."""
-        label = Label(ERROR, self._in_words(1.0), "deg" if self.normal.of_rocker else "mm")
+        label = Label(ERROR, self._display_factor(1.0), "deg" if self.normal.of_rocker else "mm")
         return {"violation": violation, "worst": ERROR, "excess": label.measured(violation, np.empty(0))}
 
-    def _within(
+    def _constrain(
         self, value: Any, low: float, high: float, name: str, unit: str = "mm", factor: float | None = None
     ) -> None:
         """Constrain a value between bounds; ``factor`` converts it to its unit, by default from units of length or rad."""
@@ -330,21 +332,21 @@ class Statement:
         label = Label(name, usual.get(unit, 1.0) if factor is None else factor, unit, self.limits.linkage)
         self._constraints.append((value, low, high, label))
 
-    def _at_most(self, value: Any, name: str, unit: str = "mm", factor: float | None = None) -> None:
-        self._within(value, -inf, 0.0, name, unit, factor)
+    def _constrain_nonpositive(self, value: Any, name: str, unit: str = "mm", factor: float | None = None) -> None:
+        self._constrain(value, -inf, 0.0, name, unit, factor)
 
-    def _ordered(self, phi: Any, direction: Any) -> None:
+    def _order_stations(self, phi: Any, direction: Any) -> None:
         """Constrain the rotations of the stations to be in order and within a turn."""
         n = self.normal.n
         least = ADVANCE * 2.0 * pi / n
         steps = direction * (phi[1:] - phi[:-1])
         most = GAP * 2.0 * pi / n
-        self._within(steps, least, most, "order of the stations", "deg")
+        self._constrain(steps, least, most, "order of the stations", "deg")
         total = direction * (phi[n - 1] - phi[0])
         closing = (2.0 * pi - most, 2.0 * pi - least) if self.normal.closed else (-inf, 2.0 * pi)
-        self._within(total, *closing, "stations within a turn", "deg")
+        self._constrain(total, *closing, "stations within a turn", "deg")
 
-    def _way_of_path(self, direction: Any) -> tuple[Any, Any]:
+    def _path_rotations(self, direction: Any) -> tuple[Any, Any]:
         """Return the rotations of a path's stations, at equal steps between a few unknown ones; return those, too."""
         casadi, normal = self._casadi, self.normal
         ends = set() if normal.closed else {0, normal.n - 1}
@@ -354,9 +356,9 @@ class Statement:
             return casadi.DM(turn(normal.n)), None
         knots = self._unknown("knots", np.full(len(fixed), -inf), np.full(len(fixed), inf))
         steps = direction * (knots[1:] - knots[:-1])
-        self._within(steps, LEAST_WAY, 2.0 * pi, "order of the stations", "deg")
+        self._constrain(steps, LEAST_WAY, 2.0 * pi, "order of the stations", "deg")
         most = 2.0 * pi - (LEAST_WAY if normal.closed else 0.0)
-        self._within(direction * (knots[-1] - knots[0]), LEAST_WAY, most, "stations within a turn", "deg")
+        self._constrain(direction * (knots[-1] - knots[0]), LEAST_WAY, most, "stations within a turn", "deg")
         # hat functions interpolate between the knots; in a closed path the first knot follows the last, a turn later
         at = [*fixed, fixed[0] + normal.n] if normal.closed else fixed
         where = np.arange(fixed[0], fixed[0] + normal.n)
@@ -369,33 +371,33 @@ class Statement:
             phi = phi + again * (knots[0] + 2.0 * pi * direction) - 2.0 * pi * direction * casadi.DM(lap)
         return phi, knots
 
-    def _shaped(self, p: Any, grashof: Any, planes: Sequence[Any]) -> None:
+    def _constrain_shape(self, p: Any, grashof: Any, planes: Sequence[Any]) -> None:
         """Constrain the links to the Grashof type, and the fixed pivots to their regions."""
         casadi, limits = self._casadi, self.limits
         if limits.grashof:
             links = casadi.vertcat(p.ground_length, p.crank_length, p.coupler_length, p.rocker_length)
             margin = MARGIN * casadi.sum1(links) * casadi.sum2(casadi.fabs(grashof)) / 4.0
-            self._at_most(casadi.mtimes(grashof, links) + margin, f"Grashof type {limits.grashof}")
+            self._constrain_nonpositive(casadi.mtimes(grashof, links) + margin, f"Grashof type {limits.grashof}")
         for (name, _), plane in zip(limits.regions, planes):
             x, y = p.pivot_x, p.pivot_y
             if name == "D":
                 x = x + p.ground_length * casadi.cos(p.ground_angle)
                 y = y + p.ground_length * casadi.sin(p.ground_angle)
-            self._at_most(casadi.mtimes(plane, casadi.vertcat(x, y, 1.0)), f"region of pivot {name}")
+            self._constrain_nonpositive(casadi.mtimes(plane, casadi.vertcat(x, y, 1.0)), f"region of pivot {name}")
 
-    def _assembled(self, p: Any, v: Any, phi: Any, tilt: Any) -> None:
+    def _constrain_transmission(self, p: Any, v: Any, phi: Any, tilt: Any) -> None:
         """Constrain the transmission angle over a turn, over the task, or both."""
         casadi, limits = self._casadi, self.limits
         l1, l2 = p.ground_length, p.crank_length
         if limits.turn is not None and self.pivot is None:
             # with a fixed pivot its extremes are where the crank lies along the ground link
-            self._transmitting(p, (l1 - l2) ** 2, (l1 + l2) ** 2, limits.turn, tilt)
+            self._bound_transmission(p, (l1 - l2) ** 2, (l1 + l2) ** 2, limits.turn, tilt)
         elif limits.turn is not None:
             # closer rotations for gears whose cranks turn several times
-            d2 = self._reach(p, v, casadi.DM(turn(GRID * max(1, max(map(abs, self._turns)) // 2))))
-            self._transmitting(p, d2, d2, limits.turn + BETWEEN, tilt)
+            d2 = self._squared_reach(p, v, casadi.DM(turn(GRID * max(1, max(map(abs, self._turns)) // 2))))
+            self._bound_transmission(p, d2, d2, limits.turn + BETWEEN, tilt)
         if limits.way is not None or (tilt is not None and limits.turn is None):
-            x, step = self._way(phi)
+            x, step = self._dense_rotations(phi)
             slack = limits.linkage.slack(l1, l2, casadi.cos(0.5 * step))
             if self._judged and self.pivot is None:
                 # in each step also the rotation nearest to the crank along the ground link; none beyond the end
@@ -403,21 +405,21 @@ class Statement:
                 turned = casadi.sign(step) * (x + p.crank_phase) / pi
                 nearest = casadi.fmin(pi * (casadi.floor(turned) + 1.0 - turned), casadi.fabs(step))
                 x, slack = casadi.vertcat(x, x + casadi.sign(step) * nearest), 0.0
-            d2 = self._reach(p, v, x)
+            d2 = self._squared_reach(p, v, x)
             # an extreme between two of these rotations differs from the values there by no more than the slack
-            self._transmitting(p, d2 - slack, d2 + slack, limits.way or 0.0, tilt)
+            self._bound_transmission(p, d2 - slack, d2 + slack, limits.way or 0.0, tilt)
 
-    def _transmitting(self, p: Any, nearest: Any, farthest: Any, least: float, tilt: Any) -> None:
+    def _bound_transmission(self, p: Any, nearest: Any, farthest: Any, least: float, tilt: Any) -> None:
         """Constrain |cos mu| below cos(least) and, if given, below ``tilt``, from squares of the least and greatest BD."""
         least = least if self._judged else max(least, TURNING)
         for cosine in (cos(least), *([] if tilt is None else [tilt])):
             links = p.coupler_length, p.rocker_length
             for excess in self.limits.linkage.transmission_excess(*links, nearest, farthest, cosine):
-                self._at_most(
+                self._constrain_nonpositive(
                     excess, "transmission angle", "transmission", acos(cosine) if isinstance(cosine, float) else 0.0
                 )
 
-    def _reach(self, p: Any, v: Any, x: Any) -> Any:
+    def _squared_reach(self, p: Any, v: Any, x: Any) -> Any:
         """Return the square of the distance from crank pin to rocker pivot, or to the guide, at rotations."""
         casadi = self._casadi
         dx, dy = self._displacement(v, x)
@@ -426,14 +428,14 @@ class Statement:
         by = dy - p.crank_length * casadi.sin(th2)
         return self.limits.linkage.square(bx, by)
 
-    def _way(self, phi: Any) -> tuple[Any, Any]:
+    def _dense_rotations(self, phi: Any) -> tuple[Any, Any]:
         """Return the rotations of the stations, followed by rotations between them, and the step from each to the next."""
         steps = (phi[1:] - phi[:-1]) / self._parts
         between = [phi[:-1] + k * steps for k in range(1, self._parts)]
         casadi = self._casadi
         return casadi.vertcat(phi, *between), casadi.vertcat(steps, steps[-1], *[steps] * len(between))
 
-    def _slider(self, pivot: SliderUnknown, ground: Any, v: Any) -> Any:
+    def _constrain_slider(self, pivot: SliderUnknown, ground: Any, v: Any) -> Any:
         """Constrain the slider's motion; return the term of its smoothness in the quality."""
         casadi, unit = self._casadi, self.normal.unit
 
@@ -442,31 +444,33 @@ class Statement:
 
         if pivot.position is None:
             u = position(casadi.DM(turn(max(GRID, 16 * pivot.harmonics))))
-            self._at_most(u - ground, "slider position")
-            self._at_most(-u - ground, "slider position")
+            self._constrain_nonpositive(u - ground, "slider position")
+            self._constrain_nonpositive(-u - ground, "slider position")
         else:
             low, high = (end / unit for end in pivot.position)
             middle, half = 0.5 * (low + high), 0.5 * (high - low)
-            self._bounded(lambda x: (position(x) - middle) / half, 0, "slider position", "mm", 1e3 * unit * half, half)
+            self._bound_motion(
+                lambda x: (position(x) - middle) / half, 0, "slider position", "mm", 1e3 * unit * half, half
+            )
         if isfinite(pivot.stroke):
-            centre = self._extra("middle", 0.0)
+            centre = self._auxiliary("middle", 0.0)
             reach = 0.5 * pivot.stroke / unit
             # the bound is violated at both ends: the stroke is too long by twice as much
-            self._bounded(lambda x: (position(x) - centre) / reach, 0, "stroke", "mm", 1e3 * pivot.stroke, reach)
+            self._bound_motion(lambda x: (position(x) - centre) / reach, 0, "stroke", "mm", 1e3 * pivot.stroke, reach)
             u = position(casadi.vertcat(casadi.DM(turn(max(GRID, 16 * pivot.harmonics))), self._peaks[-1][1]))
             self._initial[-1] = 0.5 * (casadi.mmin(u) + casadi.mmax(u))
-        self._rate(v, 1, pivot.speed, "slider speed", "mm/rad")
-        self._rate(v, 2, pivot.acceleration, "slider acceleration", "mm/rad2")
+        self._bound_derivative(v, 1, pivot.speed, "slider speed", "mm/rad")
+        self._bound_derivative(v, 2, pivot.acceleration, "slider acceleration", "mm/rad2")
         if not pivot.smoothness:
             return 0.0
         x = casadi.DM(turn(max(GRID, 16 * pivot.harmonics)))
         return pivot.smoothness * casadi.sumsqr(_series(casadi, v[1:], x, order=2)) / x.numel()
 
-    def _rate(self, v: Any, order: int, bound: float, name: str, unit: str) -> None:
+    def _bound_derivative(self, v: Any, order: int, bound: float, name: str, unit: str) -> None:
         """Bound the magnitude of a derivative of the slider's position (m/rad, m/rad2)."""
         if isfinite(bound):
             scale = self.normal.unit / bound
-            self._bounded(
+            self._bound_motion(
                 lambda x: scale * _series(self._casadi, v[1:], x, order=order),
                 order,
                 name,
@@ -475,7 +479,7 @@ class Statement:
                 1.0 / scale,
             )
 
-    def _bounded(
+    def _bound_motion(
         self, value: Callable[[Any], Any], order: int, name: str, unit: str = "", factor: float = 1.0, size: float = 1.0
     ) -> None:
         """Constrain a trigonometric polynomial of the crank's rotation to [-1, 1]; IPOPT gets it multiplied by ``size``.
@@ -487,18 +491,18 @@ class Statement:
         """
         casadi, harmonics = self._casadi, self.pivot.harmonics if self.pivot else 0
         number = len(self._peaks)
-        places, bends = (casadi.SX.sym(f"{what}{number}", self._held) for what in ("places", "bends"))
+        places, bends = (casadi.SX.sym(f"{what}{number}", self._peak_count) for what in ("places", "bends"))
         self._peaks.append((order, places, bends))
         grid = value(casadi.DM(turn(max(GRID, 16 * harmonics))))
-        if not self._held:
-            self._within(size * grid / self._share, -size, size, name, unit, factor / size)
+        if not self._peak_count:
+            self._constrain(size * grid / self._share, -size, size, name, unit, factor / size)
             return
-        held, ones = value(places), casadi.DM.ones(self._held)
+        held, ones = value(places), casadi.DM.ones(self._peak_count)
         slope = casadi.jtimes(held, places, ones)
-        self._bent.append(casadi.horzcat(slope, casadi.jtimes(slope, places, ones)))
+        self._peak_derivatives.append(casadi.horzcat(slope, casadi.jtimes(slope, places, ones)))
         # height of the peak near each place to second order, which follows the peak as it moves
         every = casadi.vertcat(grid, held + bends * slope**2)
-        self._within(size * every / self._share, -size, size, name, unit, factor / size)
+        self._constrain(size * every / self._share, -size, size, name, unit, factor / size)
 
 
 def _series(casadi: Any, coefficients: Any, x: Any, *, mean: bool = True, order: int = 0) -> Any:

@@ -309,7 +309,7 @@ Constraint = Demand | LeastTransmission | FullTurn | Grashof | LargestLink | Ass
 USUAL: tuple[Constraint, ...] = (LeastTransmission(),)
 
 
-def _kinds() -> list[str]:
+def _constraint_names() -> list[str]:
     """Return the class names of all constraints."""
     found, below = [kind.__name__ for kind in get_args(Constraint)[1:]], [Demand]
     while below:
@@ -362,7 +362,7 @@ def advance(d: Any) -> Any:
     return angles[0] - angles[1]
 
 
-def _time_ratio(asked: TimeRatio) -> tuple[Require, ...]:
+def _slider_time_ratio(asked: TimeRatio) -> tuple[Require, ...]:
     """Return functions that bound the time ratio of a slider-crank, (pi + advance)/(pi - advance)."""
     low, high = (
         pi * (ratio - 1.0) / (ratio + 1.0) if isfinite(ratio) else pi for ratio in (asked.least, asked.greatest)

@@ -65,7 +65,7 @@ def formula(text: str, variable: str = "t") -> Callable[[ArrayLike], FloatArray]
     InputError
         If the text is no such formula; the message names the wrong part.
     """
-    tree = _parsed(text)
+    tree = _parse(text)
 
     def refused(node: ast.AST, reason: str) -> InputError:
         return InputError(f"in the formula {text!r}: {ast.unparse(node)!r} {reason}")
@@ -122,7 +122,7 @@ def formula(text: str, variable: str = "t") -> Callable[[ArrayLike], FloatArray]
     return evaluated
 
 
-def _parsed(text: str) -> ast.expr:
+def _parse(text: str) -> ast.expr:
     if not isinstance(text, str):
         raise InputError(f"a formula must be a text, not {text!r}")
     if len(text) > _LONGEST:
@@ -256,7 +256,7 @@ def chebyshev_spacing(low: float, high: float, n: int) -> FloatArray:
     return places
 
 
-_COMPARED: Mapping[type[ast.cmpop], tuple[int, bool]] = {
+_COMPARISONS: Mapping[type[ast.cmpop], tuple[int, bool]] = {
     ast.LtE: (1, False),
     ast.Lt: (1, False),
     ast.GtE: (-1, False),
@@ -265,7 +265,7 @@ _COMPARED: Mapping[type[ast.cmpop], tuple[int, bool]] = {
 }
 #: Longest requirement, in characters.
 _LONGEST_TEXT = 1000
-_REQUIRED = ("sin", "cos", "tan", "asin", "acos", "atan", "atan2", "sqrt", "exp", "log", "hypot")
+_REQUIREMENT_FUNCTIONS = ("sin", "cos", "tan", "asin", "acos", "atan", "atan2", "sqrt", "exp", "log", "hypot")
 _MEASURE = re.compile(
     r"(?<![\w.])(\d+\.?\d*(?:[eE][-+]?\d+)?|\.\d+(?:[eE][-+]?\d+)?)\s*(um|mm|cm|m|km|in|ft|deg|rad)\b"
 )
@@ -296,10 +296,10 @@ def requirement(text: Any, name: str = "constraints.require") -> Require:
     except (SyntaxError, ValueError, RecursionError, MemoryError) as error:
         reason = error.msg if isinstance(error, SyntaxError) else str(error)
         raise InputError(f"the requirement {text!r} cannot be read: {reason}") from None
-    if not (isinstance(tree, ast.Compare) and len(tree.ops) == 1 and type(tree.ops[0]) in _COMPARED):
+    if not (isinstance(tree, ast.Compare) and len(tree.ops) == 1 and type(tree.ops[0]) in _COMPARISONS):
         raise InputError(f"the requirement {text!r} is no comparison: it must have two sides about <=, >= or ==")
     numbers: list[float] = []
-    sign, equal = _COMPARED[type(tree.ops[0])]
+    sign, equal = _COMPARISONS[type(tree.ops[0])]
     sides = (tree.left, tree.comparators[0])
     try:
         for side in sides:
@@ -330,15 +330,15 @@ def _check_side(node: ast.AST, text: str, numbers: list[float]) -> None:
             numbers.append(float(number))
         case ast.Name(id=name):
             if name not in (*UNKNOWNS, "pi"):
-                raise unknown_name(name, (*UNKNOWNS, "pi", *_REQUIRED))
+                raise unknown_name(name, (*UNKNOWNS, "pi", *_REQUIREMENT_FUNCTIONS))
         case ast.BinOp(left=left, op=ast.Add() | ast.Sub() | ast.Mult() | ast.Div() | ast.Pow(), right=right):
             _check_side(left, text, numbers)
             _check_side(right, text, numbers)
         case ast.UnaryOp(op=ast.USub() | ast.UAdd(), operand=operand):
             _check_side(operand, text, numbers)
         case ast.Call(func=ast.Name(id=name), args=args, keywords=[]) if args:
-            if name not in _REQUIRED:
-                raise unknown_name(name, _REQUIRED)
+            if name not in _REQUIREMENT_FUNCTIONS:
+                raise unknown_name(name, _REQUIREMENT_FUNCTIONS)
             for arg in args:
                 _check_side(arg, text, numbers)
         case _:
@@ -363,7 +363,7 @@ def _compile_dimensions(tree: ast.expr) -> Callable[[Any], Any]:
     body = ast.Expression(body=ast.Lambda(args=argument, body=_Dimensions().visit(tree)))
     code = compile(ast.fix_missing_locations(body), "<requirement>", "eval")
     inner = next(c for c in code.co_consts if isinstance(c, CodeType))
-    space = {"__builtins__": {}, "pi": pi, **{name: getattr(math, name) for name in _REQUIRED}}
+    space = {"__builtins__": {}, "pi": pi, **{name: getattr(math, name) for name in _REQUIREMENT_FUNCTIONS}}
     return FunctionType(inner, space, "requirement")
 
 
@@ -406,7 +406,7 @@ def traced(require: Require, values: SimpleNamespace, *rotation: Any) -> Any:
     if require.symbolic:
         return casadi.SX(require.function(values, *rotation))
     try:
-        value = casadi.SX(_rebound(require.function, {})(values))
+        value = casadi.SX(_replace_modules(require.function, {})(values))
     except Exception as error:
         raise InputError(
             f"{require.name} cannot be traced ({type(error).__name__}: {error}): it must be arithmetic and functions of math, "
@@ -450,7 +450,7 @@ def find_peaks(along: Along, values: SimpleNamespace, count: int) -> FloatArray:
     return np.array(places + places[:1] * (count - len(places)))
 
 
-def _rebound(value: Any, seen: dict[int, Any]) -> Any:
+def _replace_modules(value: Any, seen: dict[int, Any]) -> Any:
     """Return a copy of a user's function that calls CasADi instead of `math` and NumPy, as do the functions that it calls."""
     casadi = symbolic.library()
     if isinstance(value, ModuleType) and value.__name__ in ("math", "numpy"):
@@ -468,14 +468,18 @@ def _rebound(value: Any, seen: dict[int, Any]) -> Any:
         f.__kwdefaults__ = value.__kwdefaults__
         seen[id(value)] = f
         space.update(
-            {name: _rebound(x, seen) for name, x in value.__globals__.items() if name in _asked_names(value.__code__)}
+            {
+                name: _replace_modules(x, seen)
+                for name, x in value.__globals__.items()
+                if name in _global_names(value.__code__)
+            }
         )
         space["__builtins__"] = value.__globals__.get("__builtins__", builtins)
         for cell, old in zip(cells, value.__closure__ or ()):
-            cell.cell_contents = _rebound(old.cell_contents, seen)
+            cell.cell_contents = _replace_modules(old.cell_contents, seen)
     return seen[id(value)]
 
 
-def _asked_names(code: CodeType) -> set[str]:
+def _global_names(code: CodeType) -> set[str]:
     """Return the global names that code, or code nested in it, may use."""
-    return {*code.co_names}.union(*(_asked_names(c) for c in code.co_consts if isinstance(c, CodeType)))
+    return {*code.co_names}.union(*(_global_names(c) for c in code.co_consts if isinstance(c, CodeType)))

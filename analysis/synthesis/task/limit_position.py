@@ -294,7 +294,7 @@ class MechanicalAdvantage(Demand):
 
 @in_si(at="rad")
 @dataclass(frozen=True, slots=True, kw_only=True)
-class _Place(Demand):
+class _LimitPosition(Demand):
     """Two links are collinear at a crank rotation, or somewhere within a range of rotations.
 
     Attributes
@@ -320,7 +320,7 @@ class _Place(Demand):
     def _require(self, function: Callable[[Any], Any], *, equal: bool = False) -> Require:
         return Require(function=function, equal=equal, name=f"{self.position} {self._name()}", symbolic=True)
 
-    def _between(self, way: Way, distance: Callable[[Any, float], Any]) -> tuple[Require, ...]:
+    def _require_sign_change(self, way: Way, distance: Callable[[Any, float], Any]) -> tuple[Require, ...]:
         """Require that a function changes its sign within the range, so that its zero, the limit position, lies there."""
         way.timed(f"a {self._name()} at crank rotations")
         low, high = self.at
@@ -329,7 +329,7 @@ class _Place(Demand):
         return (self._require(lambda d: distance(d, low) * distance(d, high)),)
 
 
-class DeadCentre(_Place):
+class DeadCentre(_LimitPosition):
     """There is a dead centre, with crank and coupler collinear, at a crank rotation or within a range.
 
     Attributes
@@ -361,10 +361,10 @@ class DeadCentre(_Place):
             return -d.branch * s if stretched else d.branch * s
 
         sides = [self._require(partial(aside, rotation=end)) for end in dict.fromkeys(self.at)]
-        return (*self._between(way, closes), *sides)
+        return (*self._require_sign_change(way, closes), *sides)
 
 
-class Toggle(_Place):
+class Toggle(_LimitPosition):
     """There is a toggle, in which the crank can turn no further, at a crank rotation or within a range.
 
     In a slider-crank's toggle the coupler is perpendicular to the guide and points away from A, or towards it.
@@ -391,7 +391,7 @@ class Toggle(_Place):
             c = symbolic.library().cos(rotation + d.crank_phase)
             return POSITIONS[way.linkage.kind].toggle_gap(d, c, 1.0 if self.position == "stretched" else -1.0)
 
-        return self._between(way, closes)
+        return self._require_sign_change(way, closes)
 
 
 @in_si(between="rad")

@@ -34,8 +34,8 @@ from .constraint import (
     Stroke,
     TimeRatio,
     Way,
-    _kinds,
-    _time_ratio,
+    _constraint_names,
+    _slider_time_ratio,
 )
 from .task import Normal, RockerFunction, SliderFunction, Task
 
@@ -155,15 +155,15 @@ def make_limits(
             raise unknown_name(name, sorted(UNKNOWNS), f"dimension {name!r}, which is to have bounds")
     for c in constraints:
         if not isinstance(c, Constraint):
-            raise InputError(f"constraint {c!r} is none: use {', '.join(_kinds())}")
-    given = _ends(task, normal, bounds, constraints)
+            raise InputError(f"constraint {c!r} is none: use {', '.join(_constraint_names())}")
+    given = _dimension_ranges(task, normal, bounds, constraints)
     _check_links(given, constraints, linkage)
     _check_reach(given, normal, constraints)
     lows, highs = (np.array([given[name][end] for name in UNKNOWNS]) for end in (0, 1))
     shift, scale = np.zeros(len(UNKNOWNS)), np.ones(len(UNKNOWNS))
     shift[:2] = normal.origin.real, normal.origin.imag
     scale[:7] = normal.unit
-    turn, way, grashof = _turning(constraints)
+    turn, way, grashof = _transmission_limits(constraints)
     if way is not None and normal.whole_turn and grashof not in _SWINGING:
         turn, way = max(turn or 0.0, way), None
     straight = given["point_distance"][1] == 0.0 or given["point_angle"] in ((0.0, 0.0), (pi, pi), (-pi, -pi))
@@ -186,13 +186,13 @@ def make_limits(
             for c in constraints
             if isinstance(c, PivotRegion)
         ),
-        requires=tuple(r for c in constraints for r in _required(c, over)),
+        requires=tuple(r for c in constraints for r in _required_functions(c, over)),
         linkage=linkage,
         least=least[0] if least else None,
     )
 
 
-def _ends(
+def _dimension_ranges(
     task: Task, normal: Normal, bounds: Mapping[str, tuple[float, float]], constraints: Sequence[Constraint]
 ) -> dict[str, tuple[float, float]]:
     """Return the least and greatest value of every unknown (m, rad), as given or by default."""
@@ -211,7 +211,9 @@ def _ends(
         usual |= dict.fromkeys(("pivot_x", "pivot_y", "point_distance", "ground_angle", "point_angle"), (0.0, 0.0))
         if not caps and not set(LINKS) & set(bounds):
             usual["ground_length"] = GROUND, GROUND
-    ends = {name: _ordered(name, bounds[name], usual[name]) if name in bounds else usual[name] for name in UNKNOWNS}
+    ends = {
+        name: _complete_bounds(name, bounds[name], usual[name]) if name in bounds else usual[name] for name in UNKNOWNS
+    }
     for name in (*LINKS, "point_distance"):
         low, high = ends[name]
         if name in LINKS and high <= 0.0:
@@ -227,13 +229,13 @@ def _ends(
     return ends
 
 
-def _required(constraint: Constraint, way: Way) -> tuple[Require, ...]:
+def _required_functions(constraint: Constraint, way: Way) -> tuple[Require, ...]:
     if isinstance(constraint, Demand):
         return constraint.requires(way)
     return (constraint,) if isinstance(constraint, Require) else ()
 
 
-def _turning(constraints: Sequence[Constraint]) -> tuple[float | None, float | None, str | None]:
+def _transmission_limits(constraints: Sequence[Constraint]) -> tuple[float | None, float | None, str | None]:
     """Return the least transmission angles over a turn and during the task, and the Grashof type; see `Limits`."""
     turn, way = (
         max((c.angle for c in constraints if isinstance(c, LeastTransmission) and c.over == over), default=None)
@@ -259,7 +261,9 @@ def _turning(constraints: Sequence[Constraint]) -> tuple[float | None, float | N
     return turn, way, type_
 
 
-def _ordered(name: str, ends: tuple[float | None, float | None], usual: tuple[float, float]) -> tuple[float, float]:
+def _complete_bounds(
+    name: str, ends: tuple[float | None, float | None], usual: tuple[float, float]
+) -> tuple[float, float]:
     """Return bounds as given, with the default for an end that is None or infinite."""
     try:
         low, high = (e if end is None or np.isinf(end) else float(end) for end, e in zip(ends, usual, strict=True))
@@ -328,7 +332,7 @@ def _check_reach(given: Mapping[str, tuple[float, float]], normal: Normal, const
 GEARS = (1.0, -1.0, 2.0, -2.0, 0.5, -0.5)
 #: Constraints that apply to any linkage, and all that apply to each kind.
 _ANY: tuple[type, ...] = (LeastTransmission, FullTurn, LargestLink, Assembly, PivotRegion, Require)
-_KEPT: Mapping[Kind, tuple[type, ...]] = {
+_SUPPORTED: Mapping[Kind, tuple[type, ...]] = {
     "four-bar": get_args(Constraint),
     "slider-crank": (*_ANY, Demand, Stroke),
     "geared-five-bar": _ANY,
@@ -391,9 +395,11 @@ def _check_task(kind: Kind, task: Task) -> None:
 def _check_constraints(kind: Kind, constraints: Sequence[Any]) -> None:
     for c in constraints:
         known = isinstance(c, Constraint | Stroke)
-        if (known and not isinstance(c, _KEPT[kind])) or (kind == "slider-crank" and getattr(c, "pivot", None) == "D"):
+        if (known and not isinstance(c, _SUPPORTED[kind])) or (
+            kind == "slider-crank" and getattr(c, "pivot", None) == "D"
+        ):
             name = "a region of pivot D" if isinstance(c, PivotRegion) else type(c).__name__
-            able = [other for other, kept in _KEPT.items() if isinstance(c, kept) and other != kind]
+            able = [other for other, kept in _SUPPORTED.items() if isinstance(c, kept) and other != kind]
             why = "" if kind == "slider-crank" or not isinstance(c, Demand) else f" ({_NO_DEMANDS})"
             raise InputError(f"a {kind} cannot keep {name}{why}: leave it out, or ask for {' or '.join(able)} alone")
 
@@ -404,7 +410,7 @@ def _slider_crank_limits(task: Task, normal: Normal, bounds: Any, constraints: S
         if isinstance(c, Stroke):
             own += c.requires()
         elif isinstance(c, TimeRatio):
-            own += _time_ratio(c)
+            own += _slider_time_ratio(c)
         else:
             own.append(c)
     if any(isinstance(c, Stroke | TimeRatio) for c in constraints):

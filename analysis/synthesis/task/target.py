@@ -398,7 +398,7 @@ def distance_to(curve: ArrayLike, points: ArrayLike, *, closed: bool = True) -> 
     return distances
 
 
-def _cut(vertices: FloatArray) -> tuple[FloatArray, float]:
+def _cut_into_pieces(vertices: FloatArray) -> tuple[FloatArray, float]:
     """Divide a polyline into `PIECES` pieces of equal length; return their midpoints, shape (PIECES, 2), and its length."""
     length = float(arc_lengths(vertices)[-1])
     return along(vertices, (np.arange(PIECES) + 0.5) * (length / PIECES)), length
@@ -438,11 +438,11 @@ def area_between(curve: ArrayLike, target: TargetPath, *, closed: bool = True) -
     points = plane_points(curve, "the curve", 3 if closed else 2)
     if closed and target.closed:
         return even_odd_area(target.points, points)
-    middles, length = _cut(ring(target.points, target.closed))
+    middles, length = _cut_into_pieces(ring(target.points, target.closed))
     missed = length * float(distance_to(points, middles, closed=closed).mean())
     if closed:
         return missed
-    middles, length = _cut(points)
+    middles, length = _cut_into_pieces(points)
     return 0.5 * (missed + length * float(distance_to(target.points, middles, closed=target.closed).mean()))
 
 
@@ -463,11 +463,11 @@ def hausdorff(curve: ArrayLike, target: TargetPath, *, closed: bool = True) -> f
         As for `area_between`.
     """
     points = plane_points(curve, "the curve", 3 if closed else 2)
-    seen = np.vstack([target.points, _cut(ring(target.points, target.closed))[0]])
+    seen = np.vstack([target.points, _cut_into_pieces(ring(target.points, target.closed))[0]])
     largest = float(distance_to(points, seen, closed=closed).max())
     if closed and not target.closed:
         return largest
-    seen = np.vstack([points, _cut(ring(points, closed))[0]])
+    seen = np.vstack([points, _cut_into_pieces(ring(points, closed))[0]])
     return max(largest, float(distance_to(target.points, seen, closed=target.closed).max()))
 
 
@@ -518,7 +518,7 @@ def straightness(part: ArrayLike, *, direction: float | None = None) -> Straight
     points = plane_points(part, "the part", 2)
     points = points - points[0]
     if direction is None:
-        direction = _narrowest(points)
+        direction = _narrowest_direction(points)
     elif not isfinite(direction):
         raise InputError(f"the direction is {direction!r}: it must be finite")
     distance, across = (points @ np.array([[cos(direction), -sin(direction)], [sin(direction), cos(direction)]])).T
@@ -532,7 +532,7 @@ def straightness(part: ArrayLike, *, direction: float | None = None) -> Straight
     )
 
 
-def _narrowest(points: FloatArray) -> float:
+def _narrowest_direction(points: FloatArray) -> float:
     """Return the direction of the narrowest strip that contains the points."""
     import shapely
 

@@ -35,13 +35,15 @@ def _points(values: ArrayLike, what: str, least: int) -> FloatArray:
     points = np.array(values, dtype=float)
     if points.ndim != 2 or points.shape[1] != 2:
         raise InputError(f"{what} have the shape {points.shape}: they must be n points of two coordinates, (n, 2)")
-    _finite(points, what)
+    _check_finite(points, what)
     if len(points) < least:
         raise InputError(f"{what}: {len(points)} are too few, there must be at least {least}")
     return points
 
 
-def _different(points: FloatArray, what: str, rotation: ArrayLike | None, angle: FloatArray | None = None) -> None:
+def _check_different(
+    points: FloatArray, what: str, rotation: ArrayLike | None, angle: FloatArray | None = None
+) -> None:
     """Raise InputError if two successive targets are the same and have no crank rotations: a dwell needs crank rotations."""
     same = (np.diff(points, axis=0) == 0.0).all(axis=1)
     if angle is not None:
@@ -54,12 +56,12 @@ def _different(points: FloatArray, what: str, rotation: ArrayLike | None, angle:
         )
 
 
-def _extended(points: FloatArray, what: str) -> None:
+def _check_extent(points: FloatArray, what: str) -> None:
     if not _extent(points) > 0.0:
         raise InputError(f"all {what} are the same, {points[0].tolist()} m: a path has an extent")
 
 
-def _finite(values: FloatArray, what: str) -> None:
+def _check_finite(values: FloatArray, what: str) -> None:
     bad = np.argwhere(~np.isfinite(values))
     if len(bad):
         raise InputError(f"{what}: number {int(bad[0][0])} is {values[tuple(bad[0])]}: it must be finite")
@@ -69,7 +71,7 @@ def _numbers(values: ArrayLike, what: str, n: int) -> FloatArray:
     numbers = np.array(values, dtype=float)
     if numbers.shape != (n,):
         raise InputError(f"{what} have the shape {numbers.shape}: there must be one for each of the {n} targets")
-    _finite(numbers, what)
+    _check_finite(numbers, what)
     return numbers
 
 
@@ -105,7 +107,7 @@ def _check_objective(objective: str) -> None:
         raise InputError(f"objective is {objective!r}: it must be 'error' or 'worst'")
 
 
-def _set(task: Any, **values: Any) -> None:
+def _set_fields(task: Any, **values: Any) -> None:
     """Set fields of a frozen task during its construction."""
     for name, value in values.items():
         object.__setattr__(task, name, value)
@@ -142,9 +144,9 @@ class TimedPath:
         _check_objective(self.objective)
         # any number of linkages pass two points exactly
         points = _points(self.points, "target points", 3)
-        _extended(points, "target points")
+        _check_extent(points, "target points")
         n = len(points)
-        _set(self, points=points, rotation=_rotation(self.rotation, n), weights=_weights(self.weights, n))
+        _set_fields(self, points=points, rotation=_rotation(self.rotation, n), weights=_weights(self.weights, n))
 
 
 @in_si(position="m", rotation="rad")
@@ -170,7 +172,7 @@ class SliderFunction(TimedPath):
         position = np.array(self.position, dtype=float)
         if position.ndim != 1:
             raise InputError(f"target positions have the shape {position.shape}: they must be a list")
-        _set(self, position=position, points=np.column_stack([position, np.zeros(len(position))]))
+        _set_fields(self, position=position, points=np.column_stack([position, np.zeros(len(position))]))
         TimedPath.__post_init__(self)
 
 
@@ -248,7 +250,7 @@ class UntimedPath:
             raise InputError(
                 f"the straight part ends at point {self.straight.end}, the path has {len(self.path.points)}"
             )
-        _set(self, weights=_weights(self.weights, len(self.path.points)))
+        _set_fields(self, weights=_weights(self.weights, len(self.path.points)))
 
 
 @in_si(angle="rad", rotation="rad")
@@ -279,13 +281,13 @@ class RockerFunction:
         angle = np.array(self.angle, dtype=float)
         if angle.ndim != 1 or len(angle) < 3:
             raise InputError(f"target angles have the shape {angle.shape}: they must be a list of at least 3")
-        _finite(angle, "target angles")
+        _check_finite(angle, "target angles")
         if not np.ptp(angle) > 0.0:
             raise InputError(
                 f"all target angles are the same, {angle[0]:.6g} rad: a rocker that stands still needs no linkage"
             )
         n = len(angle)
-        _set(self, angle=angle, rotation=_rotation(self.rotation, n), weights=_weights(self.weights, n))
+        _set_fields(self, angle=angle, rotation=_rotation(self.rotation, n), weights=_weights(self.weights, n))
 
 
 @in_si(points="m", angle="rad", rotation="rad", length="m")
@@ -322,11 +324,11 @@ class Motion:
         points = _points(self.points, "target points", 2)
         n = len(points)
         angle = _numbers(self.angle, "target angles", n)
-        _different(points, "target poses", self.rotation, angle)
-        _set(self, points=points, angle=angle, length=_leverage(self.length, points))
+        _check_different(points, "target poses", self.rotation, angle)
+        _set_fields(self, points=points, angle=angle, length=_leverage(self.length, points))
         if self.rotation is not None:
-            _set(self, rotation=_rotation(self.rotation, n))
-        _set(self, weights=_weights(self.weights, n))
+            _set_fields(self, rotation=_rotation(self.rotation, n))
+        _set_fields(self, weights=_weights(self.weights, n))
 
 
 @in_si(points="m", angle="rad", rotation="rad")
@@ -359,14 +361,14 @@ class PrecisionPoints:
         _check_objective(self.objective)
         points = _points(self.points, "precision points", 2)
         angle = None if self.angle is None else _numbers(self.angle, "target angles", len(points))
-        _different(points, "precision points", self.rotation, angle)
-        _set(self, points=points)
+        _check_different(points, "precision points", self.rotation, angle)
+        _set_fields(self, points=points)
         if self.rotation is not None:
-            _set(self, rotation=_rotation(self.rotation, len(points)))
+            _set_fields(self, rotation=_rotation(self.rotation, len(points)))
         if angle is None:
-            _extended(points, "precision points")
+            _check_extent(points, "precision points")
         else:
-            _set(self, angle=angle, length=_leverage(self.length, points))
+            _set_fields(self, angle=angle, length=_leverage(self.length, points))
 
 
 Task = TimedPath | UntimedPath | RockerFunction | Motion | PrecisionPoints
