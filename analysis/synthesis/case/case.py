@@ -249,7 +249,7 @@ class SynthesisCase:
         return synthesize(self.task, self.bounds, self.constraints, search=search, kinds=kinds, gears=gears)
 
     def violated(self, solution: Solution) -> str:
-        """Return, as text, which constraint a linkage violates most and by how much; empty for none, or in closed form."""
+        """Return, as text, which constraint a linkage violates most and by how much; empty if none, or in closed form."""
         closed = isinstance(self.task, QuickReturn | QuickSwing)
         return "" if closed else violated(solution, self.bounds, self.constraints)
 

@@ -424,7 +424,7 @@ class Linkage:
 
     @property
     def least_transmission(self) -> float:
-        """Return the least deviation of the transmission angle from 0 and pi over a turn (rad); 0 if it cannot turn fully."""
+        """Return the transmission angle's least deviation from 0 and pi over a turn (rad); 0 without a full turn."""
         low, high = self.transmission_range()
         return min(low, pi - high)
 

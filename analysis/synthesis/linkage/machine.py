@@ -40,7 +40,7 @@ class Make:
     Attributes
     ----------
     density : float
-        kg/m3.
+        Density of the bars (kg/m3).
     width, thickness : float
         Width and thickness of every bar (m).
     pin : float, optional
@@ -49,9 +49,9 @@ class Make:
         Properties of the slider that carries D (kg, N/m, N.s/m); by default those of a block on a spring so stiff that D
         hardly moves.
     slider_coulomb_friction : float
-        N.
+        Coulomb friction of the slider (N).
     gravity : float
-        m/s2.
+        Acceleration of gravity (m/s2).
     speed : float
         Crank speed (rad/s).
     crank_mass, coupler_mass, rocker_mass : float, optional

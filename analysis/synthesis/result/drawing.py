@@ -265,7 +265,7 @@ def _link_dimensions(
     placed: list[Dimension] = []
 
     def covered(one: Dimension) -> tuple[int, int]:
-        """Count the overlaps of a dimension with links and, three times each, other dimensions; then those with lines."""
+        """Return the number of overlaps with links and, counted three times, dimensions; and the number with lines."""
         room, strokes = _number_box(one), _dimension_lines(one)
         count = sum(room.intersects(link) for link in links)
         count += 3 * sum(room.intersects(shape(other)) for other in placed for shape in (_number_box, _dimension_lines))

@@ -47,7 +47,7 @@ class Sensitivity:
     name : str
         Field of `Linkage`, or of its pivot's motion.
     value : float
-        m or rad.
+        Value of the dimension (m or rad).
     slope : float
         Derivative of the sum of weighted squared errors with respect to the dimension; it is zero at an optimum of the sum
         inside the bounds. The sum is the quality function, or replaces it for a path whose quality function is an area.

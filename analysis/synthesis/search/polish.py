@@ -222,7 +222,7 @@ def _call_polisher(name: str, normal: Normal, limits: Limits, pivot: PivotUnknow
 def distinct(
     answers: Sequence[Answer], count: int, pivot: PivotUnknown | None = None, *, distance: float = DIFFERENT
 ) -> list[Answer]:
-    """Return the first ``count`` answers that differ by ``distance`` in links, relative to the longest, point or pivot."""
+    """Return the first ``count`` answers that differ by ``distance`` in a dimension; lengths relative to the longest link."""
 
     def mark(answer: Answer) -> FloatArray:
         q, v = answer.start.q, answer.start.pivot
@@ -289,7 +289,7 @@ class Polisher:
         return [self.fit(start) for start in starts]
 
     def _solve_squares(self, start: Start) -> Answer:
-        """Solve by IPOPT, for a region in its nearest triangles, and again from the best answer while it improves."""
+        """Minimise the squared errors by IPOPT, in the nearest triangles of each region, until the answer stops improving."""
         program = self.program("squares")
         if all(len(triangles) == 1 for _, triangles in self.limits.regions):
             return program.solve(start)
@@ -476,7 +476,7 @@ def sum_of_squares(normal: Normal, start: Start) -> float:
 
 
 def fit_least_squares(normal: Normal, limits: Limits, start: Start) -> Answer:
-    """Fit within bounds by SciPy's trust region reflective method, with the exact Jacobian of the compiled kernels."""
+    """Minimise the squared errors within bounds by SciPy's trust region method, with the exact Jacobian of the kernels."""
     free = np.nonzero(limits.high > limits.low)[0]
     timed, n = normal.timed, normal.n
     base = inside(start.q, limits.low, limits.high)

@@ -60,7 +60,7 @@ class Program(Statement):
 
     @cached_property
     def _differentiate_motions(self) -> Any:
-        """Return a function: the first two derivatives of the pivot's bounded motions at the extremes in the parameters."""
+        """Return a function that computes the first two derivatives of the pivot's bounded motions at given extremes."""
         function = self._casadi.Function("curvature", [self._nlp["x"], self._nlp["p"]], self._peak_derivatives)
         return lambda z, parameters: function.call([z, parameters])
 
@@ -92,7 +92,7 @@ class Program(Statement):
 
     @cached_property
     def trace(self) -> Any:
-        """Return a function: the coupler point at a fraction of a path's crank rotation, (2, 1), and its derivatives."""
+        """Return a CasADi function: the coupler point, (2, 1), at a fraction of a path's rotation, and its derivatives."""
         casadi, x, p = self._casadi, self._nlp["x"], self._nlp["p"]
         share = casadi.SX.sym("share")
         first, last = self._ends

@@ -270,7 +270,7 @@ def _is_allowed(shapes: FloatArray, limits: Limits) -> NDArray[np.bool_]:
 
 
 def _second_phase(shapes: FloatArray, phase: FloatArray | float, limits: Limits) -> FloatArray:
-    """Return the second crank's phase: a sampled angle plus what keeps the curve independent of the first crank's phase."""
+    """Return the second crank's phase: a sampled angle plus ratio times ``phase``, which then does not affect the curve."""
     turned: FloatArray = 2.0 * pi * shapes[:, 7] + limits.ratio * phase
     return turned
 
@@ -327,7 +327,7 @@ def _directions(
 
 
 def _place_functions(normal: Normal, limits: Limits, shapes: FloatArray, branch: int) -> Candidates:
-    """Place rocker functions: the phase is sampled, the mounting angle follows."""
+    """Place rocker functions: shape and phase are sampled; the mounting angle follows."""
     assert normal.rotation is not None
     assert normal.angle is not None
     phase = 2.0 * pi * shapes[:, 3]

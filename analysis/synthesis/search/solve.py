@@ -66,7 +66,9 @@ class Synthesis(Shown):
     solutions : tuple of Solution
         Those without defects first, then by error. Each also represents its mirror images and near copies, its ``variants``.
     method : str
+        How they were found: "scan" or "closed form".
     seed : int
+        Seed of the search.
     starts : int
         Number of searches that were run.
     seconds : float
@@ -334,7 +336,7 @@ def improve(
 
 
 def _prepare_task(task: Task, constraints: Sequence[Any], pivot: PivotUnknown | None, search: Search) -> Task:
-    """Return the task for the search: if a function other than an error is minimised, errors are measured by the greatest.
+    """Return the task for the search; its objective is the greatest error if a function other than an error is minimised.
 
     Raises InputError if a constraint does not apply to a moving pivot.
     """

@@ -107,6 +107,7 @@ class Start:
     q : ndarray, shape (11,)
         Values of `UNKNOWNS`.
     branch : int
+        Assembly, as in `Linkage`.
     pivot : ndarray
         Unknowns of a moving pivot: guide angle and mean position, or length and phase of a second crank; then cosine and sine
         coefficient of each harmonic.

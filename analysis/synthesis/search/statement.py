@@ -316,7 +316,7 @@ class Statement:
     # Constraints
 
     def _display_factor(self, share: float) -> float:
-        """Return the factor that converts an error, relative to ``share`` (units), to mm or, of a rocker, degrees."""
+        """Return the factor to mm, or to degrees for a rocker function, of an error in multiples of ``share`` units."""
         return share * (degrees(1.0) if self.normal.of_rocker else 1e3 * self.normal.unit)
 
     def excess(self, violation: float) -> dict[str, Any]:
@@ -347,7 +347,7 @@ class Statement:
         self._constrain(total, *closing, "stations within a turn", "deg")
 
     def _path_rotations(self, direction: Any) -> tuple[Any, Any]:
-        """Return the rotations of a path's stations, at equal steps between a few unknown ones; return those, too."""
+        """Return the rotations of a path's stations, at equal steps between a few unknown rotations, and the unknown ones."""
         casadi, normal = self._casadi, self.normal
         ends = set() if normal.closed else {0, normal.n - 1}
         part = () if normal.straight is None else (normal.straight.start, normal.straight.end)

@@ -45,7 +45,7 @@ class LeastTransmission:
     Attributes
     ----------
     angle : float
-        rad.
+        Least deviation (rad).
     over : "turn" or "task"
         Over a full turn, so that the crank can turn fully, or only during the task.
     """
@@ -415,7 +415,7 @@ class MaxPinForce(_Forces):
     Attributes
     ----------
     force : float
-        N.
+        Greatest force (N).
     make : Make
         Masses, gravity, load, and the constant speed of the crank.
     pins : str

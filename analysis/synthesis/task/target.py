@@ -66,7 +66,7 @@ def arc_lengths(vertices: FloatArray) -> FloatArray:
 
 
 def halves(lengths: FloatArray, closed: bool) -> FloatArray:
-    """Return, for each point of a polyline, half the total length of its segments that meet there, from their lengths."""
+    """Return, for each point of a polyline, half the total length of the segments that meet there, from all lengths."""
     before = np.roll(lengths, 1) if closed else np.append(0.0, lengths)
     after = lengths if closed else np.append(lengths, 0.0)
     both: FloatArray = 0.5 * (before + after)
@@ -109,7 +109,7 @@ class TargetPath:
     Attributes
     ----------
     points : ndarray, shape (n, 2)
-        m; a closed curve does not repeat its first point at the end.
+        Points in order (m); a closed curve does not repeat its first point at the end.
     closed : bool
         Whether the last point is joined to the first.
 

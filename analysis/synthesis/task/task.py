@@ -476,7 +476,7 @@ class Normal:
 
     @property
     def shares(self) -> FloatArray:
-        """Return the arc length up to each station of the polyline through all, divided by its total length, shape (n,)."""
+        """Return the arc length from the first station to each one as a fraction of the polyline's length, shape (n,)."""
         assert self.points is not None
         steps = np.abs(np.diff(np.append(self.points, self.points[0]) if self.closed else self.points))
         length = np.concatenate([[0.0], np.cumsum(steps)])
