@@ -1,9 +1,9 @@
 """Trace boundaries of instability over two parameters, and find the damping that removes a region of instability.
 
 A fold, a period doubling or a torus point of a branch becomes a curve when a second parameter varies: for example the speed at
-which a machine jumps, over the damping. `follow_crossing` follows it by arclength in orbit and both parameters together, so
-that it continues through the cusp where two folds meet and vanish. `line_branches` finds the branches on a line of a chart,
-including isolas, from which such curves begin.
+which a machine jumps as a function of the damping. `follow_crossing` follows it by arclength in the space of the orbit and the
+two parameters, so that it continues through the cusp where two folds meet and vanish. `line_branches` finds the branches on a
+line of a chart, including isolas, from which such curves begin.
 
 A test function of a point of a plane is negative in a region of instability and zero on its boundary, where a Floquet
 multiplier of the mechanism's own periodic orbit is +1 or -1 (`orbit_test`). `numerics.boundaries` traces its zeros, and
@@ -32,7 +32,8 @@ from ..response.branch import GREATEST, Branch, follow_both, passes, reason_to_l
 from .coexistence import Coexistence, coexistence
 from .grid import Grid
 
-#: Steps of the differences, relative to the scales: the multipliers are good to about 1e-10. They steer Newton's method only.
+#: Steps of the finite differences, relative to the scales, for multipliers that are accurate to about 1e-10. The differences
+#: are used only in Newton's method.
 _DIFFERENCE = 1e-7
 
 
@@ -69,7 +70,7 @@ def follow_crossing(
     widest: float = 4e-2,
     most_points: int = 300,
 ) -> CrossingCurve:
-    """Follow a curve of folds, period doublings or torus points through a plane, to both sides, up to the edges of a box.
+    """Follow a curve of folds, period doublings or torus points in both directions, up to the edges of a box in a plane.
 
     Parameters
     ----------
@@ -83,10 +84,10 @@ def follow_crossing(
     x, y : (float, float)
         The box.
     first, greatest, widest : float
-        First and greatest step in scaled arc length: each side of the box has length 1, and the crank's length counts as 1;
-        and the greatest step along either side.
+        First and greatest step in scaled arc length, in which each side of the box has length 1 and the crank's length counts
+        as 1; and the greatest step along one side of the box.
     most_points : int
-        Points at most to either side.
+        Points at most in each direction.
 
     Raises
     ------
@@ -111,7 +112,7 @@ def follow_crossing(
 
 
 def _evaluate(at: Plane, turns: int, kind: Crossing, scale: NDArray[np.float64], settings: Settings) -> Evaluate:
-    """Return G = (y(T) - y(0), test) of the unknowns (y(0), x) and the parameter y, with its derivatives."""
+    """Return the function G = (y(T) - y(0), test) of the unknowns (y(0), x) and the parameter y, with its derivatives."""
     n = len(scale) - 1
     (low, high), (bottom, top) = settings.bounds[n], (settings.low, settings.high)
     corners = [operating_point(*at(a, b)) for a in (low, high) for b in (bottom, top)]
@@ -121,7 +122,7 @@ def _evaluate(at: Plane, turns: int, kind: Crossing, scale: NDArray[np.float64],
     def values(z: NDArray[np.float64]) -> tuple[NDArray[np.float64], PeriodicOrbit]:
         point = operating_point(*at(float(z[n]), float(z[n + 1])))
         orbit, shift = trial_orbit(point, z[:n], turns, path)
-        # the test has no dimension; it gets the scale of x, in whose row it stands
+        # the dimensionless test is multiplied by the scale of x, to which its row belongs
         return np.append(shift, scale[n] * crossing_test(orbit.monodromy, kind)), orbit
 
     steps = _DIFFERENCE * np.append(scale, settings.high - settings.low)
@@ -133,7 +134,7 @@ def _evaluate(at: Plane, turns: int, kind: Crossing, scale: NDArray[np.float64],
         columns = np.empty((n + 1, n + 2))
         for j, step in enumerate(steps):
             there = z.copy()
-            # into the box, where there is a mechanism for certain
+            # step into the box, in which the mechanism is known to exist
             there[j] += step if z[j] + step <= most[j] else -step
             columns[:, j] = (values(there)[0] - here) / (there[j] - z[j])
         columns[:n, :n] = orbit.monodromy - np.eye(n)
@@ -142,7 +143,7 @@ def _evaluate(at: Plane, turns: int, kind: Crossing, scale: NDArray[np.float64],
     return evaluation
 
 
-#: Points of a line at which all motions are sought; points of a branch at most to either side, and its greatest step.
+#: Points of a line at which all motions are sought; points of a branch at most in each direction, and its greatest step.
 POINTS, BRANCH_POINTS, STEP = 17, 600, 5e-2
 
 
@@ -156,10 +157,10 @@ def line_branches(
     start: ArrayLike | None = None,
     watch: Callable[[float], None] = lambda share: None,
 ) -> tuple[list[Branch], Coexistence, list[str]]:
-    """Find all motions on the line y = const and follow them to both sides, until branches pass through all of them.
+    """Find all motions on the line y = const and follow them in both directions, until branches pass through all of them.
 
-    A motion is followed as long as deviations grow less than a thousandfold per turn. Folds and period doublings beyond that,
-    next to the limit of assembly, come in pairs with slivers of stability between them that no machine stays in.
+    A motion is followed as long as deviations grow less than a thousandfold per turn. Beyond that, next to the limit of
+    assembly, folds and period doublings come in pairs; the ranges of stability between them are too narrow for any machine.
 
     Parameters
     ----------
@@ -169,7 +170,7 @@ def line_branches(
         Range of the line.
     y : float
     name, unit : str
-        Of x.
+        Name and unit of x.
     start : array_like, shape (n,), optional
         See `coexistence`.
     watch : callable, optional
@@ -179,7 +180,7 @@ def line_branches(
     -------
     branches : list of Branch
     found : Coexistence
-        The motions from which they were followed.
+        The motions from which the branches were followed.
     lost : list of str
         One sentence for each motion that could not be followed.
     """
@@ -221,13 +222,15 @@ Monodromy = Callable[[float, float], NDArray[np.float64]]
 def orbit_monodromy(operation: Plane, *, start: ArrayLike | None = None, near: Grid | None = None) -> Monodromy:
     """Return a function that gives the monodromy matrix of the periodic orbit of one turn at a point of a plane.
 
-    Each orbit is sought from the one found last, so that neighbouring points stay on one branch, then from those around it
-    on a grid, then from all starts of `orbit_of`. Points are remembered.
+    Each orbit is sought from the orbit found last, so that neighbouring points stay on one branch, then from the orbits at the
+    nearest points of a grid, then from all starts of `orbit_of`. Results are cached.
 
     Parameters
     ----------
+    operation : callable
+        See `plane`.
     start : array_like, shape (n,), optional
-        Guess of the first: see `find_orbit`.
+        Guess of the first orbit: see `find_orbit`.
     near : Grid, optional
         A grid over the same plane.
     """
@@ -266,7 +269,7 @@ def orbit_test(operation: Plane, multiplier: int, *, start: ArrayLike | None = N
 
 
 class RemovalError(LinkworkError):
-    """The removing damping does not lie in the range given."""
+    """The damping that removes a region does not lie in the given range."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -280,7 +283,7 @@ class RemovingDamping:
     x : float
         The other parameter at the tip of the region.
     residual : float
-        The test function there.
+        Value of the test function at the tip.
     """
 
     damping: float

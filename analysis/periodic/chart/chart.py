@@ -54,13 +54,13 @@ from .boundary import (
 from .coexistence import Coexistence, coexistence
 from .grid import Grid, grid, points_to_confirm
 
-#: Default range of crank speeds relative to the natural frequency, and of others relative to the present value.
+#: Default range of a crank speed relative to the natural frequency, and of another parameter relative to its present value.
 _SPEEDS, _OTHERS = (0.3, 2.5), (0.1, 2.0)
 #: Lines x = const and y = const of a chart on which boundaries are sought, and samples on each.
 LINES, SAMPLES = (2, 5), 120
-#: Share of the chart's ranges below which what is left of a boundary that cannot be followed is not drawn.
+#: Extent, relative to the chart's ranges, below which a boundary that could not be followed to its end is not drawn.
 STUB = 1e-3
-#: Distance of two starts, relative to crank length and speed, up to which neighbours on a grid belong to one motion.
+#: Distance of two starts, relative to the scale of y, below which neighbours on a grid belong to one motion.
 SAME_MOTION = 0.4
 #: Distance, with the box scaled to 1 by 1, at which a point lies on a boundary.
 SAME = 5e-3
@@ -80,11 +80,11 @@ class Axis:
     name : str
         FMI name.
     unit : str
-        For printing and drawing.
+        Unit for printing and drawing.
     factor : float
-        From SI to that unit.
+        Factor from SI to ``unit``.
     si : str
-        The unit in SI.
+        SI unit.
     """
 
     name: str
@@ -98,7 +98,7 @@ class Axis:
         return f"{self.name} [{self.unit}]"
 
     def format_value(self, value: float) -> str:
-        """Return a value in SI with the parameter's name and unit."""
+        """Format a value in SI with the parameter's name and unit."""
         return format_value(self.name, value, self.si)
 
 
@@ -155,7 +155,7 @@ class StabilityChart(Shown):
     runs : tuple of Run
         Long runs at three points.
     most : int
-        Greatest number of stable motions at a point of the lines searched, or of ``beside``.
+        Greatest number of stable motions found at one point of the lines that were searched, or of ``beside``.
     beside : Coexistence or None
         All motions at every point, if they were asked for.
     problems : tuple of str
@@ -236,12 +236,13 @@ def stability_chart(
     parameters : parameters of a mechanism
         Or a published set or its name.
     drive : Drive, optional
-        Speed, or torque, and constant forces, unless they are axes. A published set needs none: it is driven at its speed.
+        Speed, or torque, and constant forces, unless they are axes. For a published set it may be left out: the set is then
+        driven at its own speed.
     names : (str, str), optional
-        FMI names of the parameters along x and y; by default the crank speed and the damping of the first freedom beside the
-        crank, of a five-bar ``drive.speed`` and ``slider.damping``.
+        FMI names of the parameters along x and y; by default the crank speed and the damping of the first freedom other than
+        the crank, for a five-bar ``drive.speed`` and ``slider.damping``.
     ranges : ((float, float), (float, float)), optional
-        Their ranges, in SI or as text such as "420 rpm"; see `default_range`.
+        Ranges of the two parameters, in SI or as text such as "420 rpm"; see `default_range`.
     points : int
         Points of the grid along each axis.
     start : array_like, shape (n,), optional
@@ -254,7 +255,7 @@ def stability_chart(
     n_jobs, progress
         See `grid`.
     first : callable, optional
-        Called with the chart as soon as its grid is there, for example to show it: boundaries and long runs take longer.
+        Called with the chart as soon as its grid is computed, for example to show it: boundaries and long runs take longer.
 
     Returns
     -------
@@ -266,7 +267,7 @@ def stability_chart(
     InputError, ParameterError
         If the drive, a name, a range or the number of points is not usable.
     GridInterrupted
-        On Ctrl-C; the same call goes on from the rows that are kept.
+        On Ctrl-C; the same call continues from the rows that are kept.
 
     Examples
     --------
@@ -303,7 +304,7 @@ def stability_chart(
 
 
 def _steps(coexisting: bool) -> Iterator[str]:
-    """Yield the texts of the steps of a chart, numbered."""
+    """Yield the texts for the progress bars of the steps of a chart, numbered."""
     names = ["grid", *(["all motions"] if coexisting else []), "boundaries", "branches of other motions", "long runs"]
     yield from (f"step {number} of {len(names)}, {name}" for number, name in enumerate(names, start=1))
 
@@ -328,7 +329,7 @@ class _Survey:
     def chart(
         self, beside: Mapping[str, Monodromy], around: Coexistence | None, progress: bool, steps: Iterator[str]
     ) -> StabilityChart:
-        """Find the boundaries of the true orbit, of the motions ``beside``, and of others; make the long runs."""
+        """Find the boundaries of the true orbit, of the motions ``beside``, and of other motions; make the long runs."""
         true = orbit_monodromy(self.operation, start=self.start, near=self.grid)
         # at a fold the true orbit ends, and its test function with it: folds are found on branches
         tests = [(TRUE_ORBIT, true, Crossing.PERIOD_DOUBLING)]
@@ -363,11 +364,11 @@ class _Survey:
         )
 
     def place(self, x: float, y: float) -> str:
-        """Return a point of the chart in words."""
+        """Format a point of the chart, with names and units."""
         return ", ".join(axis.format_value(value) for axis, value in zip(self.axes, (x, y)))
 
     def note_missing_orbits(self) -> None:
-        """Report the points of the grid without an orbit."""
+        """Add to the problems how many points of the grid have no orbit."""
         places: NDArray[np.int64] = np.argwhere(np.ma.getmaskarray(self.grid.largest))
         if len(places):
             row, column = places[0].tolist()
@@ -377,7 +378,7 @@ class _Survey:
             )
 
     def trace(self, motion: str, matrix: Monodromy, kind: Crossing) -> None:
-        """Find and trace the boundaries of a kind by their test function."""
+        """Find and trace the boundaries of one kind by their test function."""
         result = chart(plane_test(matrix, kind), self.box, lines=LINES, samples=SAMPLES)
         self.traced += [Traced(points=b.points, motion=motion, kind=kind, ends=b.ends) for b in result.boundaries]
         if result.gaps:
@@ -392,7 +393,7 @@ class _Survey:
         lost: list[str] = []
         with shown(progress and bool(ys), float(len(ys)), what) as show:
             for number, y in enumerate(ys):
-                # half of a line is its branches, half the boundaries from them
+                # the branches count as one half of the progress on a line, the boundaries as the other
                 branches, found, failed = line_branches(
                     self.operation,
                     self.box.x,
@@ -436,7 +437,8 @@ class _Survey:
             self.problems.append(f"{what} is not followed: {lost[0].message}")
             return
         own = np.mean([_belongs(self.grid, orbit, at) for orbit, at in zip(curve.orbits, curve.points.tolist())])
-        # of two folds that meet in a cusp only one ends the grid's motion; near a jump a coarse grid may have the other motion
+        # if two folds meet in a cusp, the grid's motion ends at only one of them: a part of the curve is enough; near a jump a
+        # coarse grid may have the other motion
         true = own > 0.0 if curve.kind is Crossing.FOLD else own > 0.5
         self.traced.append(
             Traced(
@@ -479,7 +481,7 @@ class _Survey:
                 self.runs.append(Run(x=x, y=y, confirmation=check))
 
     def removals(self, matrix: Monodromy) -> tuple[str, ...]:
-        """Return a sentence on the damping that removes each region of a true motion, if damping is one of the axes."""
+        """Return a sentence for each region of a motion of the mechanism on the damping that removes it, if that is an axis."""
         names = [axis.name for axis in self.axes]
         if self.damping not in names:
             return ()
@@ -521,15 +523,17 @@ class _Survey:
 
 
 def unmet_lines(beside: Coexistence, lines: Sequence[float], boundaries: Sequence[NDArray[np.float64]]) -> list[float]:
-    """Return lines y = const through the regions of one number of stable motions that no line or boundary has met.
+    """Return lines y = const through the regions that no line or boundary has met.
+
+    A region is a connected set of grid points with the same number of stable motions.
 
     Parameters
     ----------
     beside : Coexistence
     lines : sequence of float
-        Lines that were searched.
+        Lines y = const that were searched.
     boundaries : sequence of ndarray, shape (n, 2)
-        Known boundaries: a region that one of them passes within a cell needs no line.
+        Known boundaries: a region within one cell of a boundary needs no line.
     """
     cell = [np.diff(axis[:2]).sum() for axis in (beside.x, beside.y)]
     found: list[float] = []
@@ -546,7 +550,7 @@ def unmet_lines(beside: Coexistence, lines: Sequence[float], boundaries: Sequenc
 
 
 def _belongs(found: Grid, orbit: PeriodicOrbit, place: Sequence[float]) -> bool:
-    """Return whether an orbit belongs to the motion of a grid, by the starts at the points around its place."""
+    """Return whether an orbit belongs to the motion of a grid: whether its start is near one at a point around ``place``."""
     scale = orbit.scale
     distance = np.linalg.norm((found.around(*place) - orbit.start) / scale, axis=1)
     return bool(np.any(distance < SAME_MOTION))
@@ -554,12 +558,12 @@ def _belongs(found: Grid, orbit: PeriodicOrbit, place: Sequence[float]) -> bool:
 
 @takes_published()
 def default_range(parameters: Parameters, drive: Drive, name: str) -> tuple[float, float]:
-    """Return the range of an axis by default: speeds around the natural frequency, others around the present value.
+    """Return the default range of an axis: a speed around the natural frequency, others around the present value.
 
     Raises
     ------
     InputError
-        If there is no value, or no such axis.
+        If the present value is not above zero, or the parameter cannot vary in this drive.
     """
     require_variable(parameters, drive, name)
     if name in speed_names(mechanism_of(parameters)):
@@ -576,7 +580,7 @@ def default_range(parameters: Parameters, drive: Drive, name: str) -> tuple[floa
 
 
 def damping_name(mechanism: Mechanism) -> str:
-    """Return the FMI name of the damping of the first freedom beside the crank, or else of any damping.
+    """Return the FMI name of the damping of the first freedom other than the crank, or else of any damping.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""Find coexisting motions: the stable ones at each point of a plane, and the basins of attraction of each motion."""
+"""Find coexisting motions: all motions at each point of a plane, and the basin of attraction of each stable motion."""
 
 from __future__ import annotations
 
@@ -31,14 +31,14 @@ from .kernels import LOST, MOST_ORBITS, UNSETTLED, Motions
 from .rows import PointRow, row_of
 
 FloatArray = NDArray[np.float64]
-#: Starts from which the motions of a point are sought, after those of its neighbour: a power of two.
+#: Number of starts from which the motions of a point are sought, after the motions of its neighbour: a power of two.
 STARTS = 16
-#: Samples of a turn for an amplitude.
+#: Samples of a turn from which an amplitude is computed.
 SAMPLES = 64
-#: Bound of the integrator's local error of a basin, distance from a motion, relative to the scale, at which a start has
-#: arrived, and turns at most.
+#: For basins: bound of the integrator's local error, distance from a motion, relative to the scale, below which a start has
+#: settled on it, and turns at most.
 _TOLERANCE, _NEAR, _TURNS = 1e-6, 1e-2, 3000
-# Functions of the flow for a search and for a basin, beside GAP
+# Functions of the flow for a search and for a basin, in addition to GAP
 _SEARCHED = PLAIN, IN_LANES + VARIATIONAL, IN_LANES + GAP
 _FOLLOWED = IN_LANES + PLAIN, IN_LANES + GAP
 
@@ -51,11 +51,11 @@ class Coexistence:
     ----------
     x, y : ndarray, shapes (nx,) and (ny,)
     largest : masked array, shape (ny, nx, k)
-        Largest modulus of the Floquet multipliers of each motion, by amplitude; masked after the last.
+        Largest modulus of the Floquet multipliers of each motion, sorted by amplitude; masked after the last motion.
     amplitude : masked array, shape (ny, nx, k)
-        Half the range of the first free coordinate, of a slider position (m).
+        Half the range of the first free coordinate, such as a slider position (m).
     starts : ndarray, shape (ny, nx, k, n)
-        y at crank angle 0; NaN after the last.
+        y at crank angle 0; NaN after the last motion.
     swing : (str, str)
         Coordinate whose amplitude is given, and its unit.
     computed : int
@@ -125,10 +125,10 @@ def coexistence(
 ) -> Coexistence:
     """Find all periodic motions of one turn at every point of a grid.
 
-    The motions of each point are sought from those of its neighbour in the row, then from `STARTS` starts with the known ones
-    divided out. A motion that exists only in a short part of a row may be missed; `find_orbits` searches one point closely.
-    Of a link that nothing drives these are the motions in which it swings, or goes round as often as the drive says:
-    `find_orbits` finds both. The rows are distributed over workers and kept as in `grid`.
+    The motions of each point are sought from those of its neighbour in the row, then from `STARTS` starts with the known
+    motions divided out. A motion that exists only in a short part of a row may be missed; `find_orbits` searches one point
+    closely. A link that nothing drives swings in these motions, or goes round as often as the drive says; `find_orbits` finds
+    motions of both kinds. The rows are distributed over workers and kept as in `grid`.
 
     Parameters
     ----------
@@ -170,9 +170,9 @@ def coexistence(
 
 
 def _compute_motions(guesses: FloatArray, row: PointRow) -> FloatArray:
-    """Return largest multiplier, amplitude and start of each motion of the points of a row, by amplitude; NaN after the last.
+    """Return largest multiplier, amplitude and start of each motion at the m points of a row, shape (m, MOST_ORBITS, n + 2).
 
-    The shape is (m, MOST_ORBITS, n + 2).
+    The motions of a point are sorted by amplitude; entries after the last motion are NaN.
     """
     m, n = row.scales.shape
     shapes = (m, MOST_ORBITS, n), (m, MOST_ORBITS, n * n), (m, MOST_ORBITS, SAMPLES)
@@ -185,7 +185,7 @@ def _compute_motions(guesses: FloatArray, row: PointRow) -> FloatArray:
     largest = np.full((m, MOST_ORBITS), np.nan)
     found = np.arange(MOST_ORBITS) < counts[:, None]
     largest[found] = np.abs(multipliers(monodromies[found].reshape(-1, n, n)))[:, 0]
-    # the series of the samples on a finer grid, as `Turn.amplitude` takes it
+    # the Fourier series of the samples on a finer grid, as in `Turn.amplitude`
     fine = np.fft.irfft(np.fft.rfft(swings, axis=2), 8 * SAMPLES, axis=2) * 8.0
     amplitude = 0.5 * np.ptp(fine, axis=2)
     order = np.argsort(np.where(found, amplitude, np.inf), axis=1, kind="stable")
@@ -196,12 +196,13 @@ def _compute_motions(guesses: FloatArray, row: PointRow) -> FloatArray:
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Basins(Shown):
-    """The motion on which each start at crank angle 0 settles.
+    """Basins of attraction: the motion on which each start at crank angle 0 settles.
 
     Attributes
     ----------
     position, rate : ndarray, shapes (nx,) and (ny,)
-        Starts of the first free coordinate, of a slider (m), and of its rate (m/s); the rest of y is that of the first motion.
+        Initial values of the first free coordinate, for a slider in m, and of its rate (m/s); the other components of y are
+        those of the first motion.
     ends : ndarray of int, shape (ny, nx)
         Number of the stable motion in ``motions``; -1 if the links reach the limit of assembly, -2 if the run reaches no
         motion within the turns that are followed.
@@ -230,7 +231,7 @@ class Basins(Shown):
         return self.found.stable
 
     def share(self, end: int) -> float:
-        """Return the share of the starts with this end."""
+        """Return the share of the starts whose number in ``ends`` is ``end``."""
         return float(np.mean(self.ends == end))
 
     def to_csv(self, path: str | Path) -> Path:
@@ -249,7 +250,7 @@ class Basins(Shown):
 
     @property
     def labels(self) -> tuple[str, str]:
-        """Names of both axes with units."""
+        """Names of the two axes with units."""
         (name, unit), (rate, rate_unit) = self._components()
         return f"{name} [{unit}]", f"{rate} [{rate_unit}]"
 
@@ -283,7 +284,7 @@ def basins(
         Ranges of the first free coordinate and of its rate at crank angle 0, in SI or as text such as "5 mm"; by default as
         far as the mechanism can be assembled.
     start : array_like, shape (n,), optional
-        Under a torque a guess of y with the crank speed; see `find_orbits`.
+        Under a torque, a guess of y that includes the crank speed; see `find_orbits`.
     found : Orbits, optional
         Motions that `find_orbits` has found here; they are not sought again.
     folder, n_jobs, progress
@@ -296,7 +297,7 @@ def basins(
     ParameterError
         If a range is not two quantities, or ``points`` is no whole number.
     GridInterrupted
-        On Ctrl-C; the same call goes on from the rows that are kept.
+        On Ctrl-C; the same call continues from the rows that are kept.
 
     Examples
     --------
@@ -329,7 +330,7 @@ def basins(
         if not (np.isfinite(low) and np.isfinite(high) and low < high):
             raise InputError(f"the range of the {name} is {low} to {high}: it must be finite and increasing")
     across, up = (np.linspace(low, high, points) for low, high in spans)
-    # a motion of several turns is met at the beginning of any of them, one in which a link goes round at its own
+    # a start may settle on a motion of several turns at the beginning of any of its turns
     passed = [orbit.passages() for orbit in motions]
     known, owner = np.vstack(passed), np.repeat(np.arange(len(motions)), [len(starts) for starts in passed])
     point, code = operating_point(parameters, drive), row_code(kernels.settle_starts)
@@ -346,12 +347,12 @@ def basins(
 
 
 def turns_sought(flow: Flow, turns: int) -> str:
-    """Return the crank's turns in up to so many common periods in words: "one turn", "up to 4 turns"."""
+    """Return in words the crank's turns in up to ``turns`` common periods: "one turn", "up to 4 turns"."""
     return ("" if turns == 1 else "up to ") + format_turns(turns * flow.turns)
 
 
 def _ends(point: OperatingPoint, known: FloatArray, across: FloatArray, rate: float) -> FloatArray:
-    """Return the ends of a row of starts."""
+    """Return where a row of starts with the same rate ends: a number in ``known``, LOST or UNSETTLED, shape (points,)."""
     starts = np.tile(known[0], (len(across), 1))
     starts[:, 0], starts[:, point.flow.size // 2] = across, rate
     ends = np.zeros(len(across), dtype=np.int64)

@@ -1,4 +1,4 @@
-"""Compute grids of the largest Floquet multiplier, a periodic orbit per point: on all cores, kept on disk, resumable."""
+"""Compute grids of the largest Floquet multiplier, one periodic orbit per point, on all cores; rows are kept on disk."""
 
 from __future__ import annotations
 
@@ -35,9 +35,9 @@ from .rows import PointRow, row_of, rows_of
 
 FloatArray = NDArray[np.float64]
 Item = TypeVar("Item")
-#: Starts from which the orbit of a point is sought if it is not found from its neighbour: a power of two.
+#: Number of starts from which the orbit of a point is sought if it is not found from its neighbour: a power of two.
 STARTS = 32
-# Functions of the flow that find an orbit, beside GAP
+# Functions of the flow that find an orbit, in addition to GAP
 _USED = PLAIN, VARIATIONAL, IN_LANES + VARIATIONAL, IN_LANES + GAP
 
 
@@ -55,9 +55,10 @@ def largest_multipliers(
 
     Parameters
     ----------
-    rows, drives : sequences of m
+    rows, drives : sequences of length m
+        Parameters and drive of each mechanism.
     guesses : array_like, shape (n,) or (k, n), optional
-        Start of the first, and others if nothing is found from there; see `find_orbit`.
+        Guess of y for the first mechanism, and further guesses if no orbit is found from there; see `find_orbit`.
     turns : int
     tolerance : float
         Bound of the integrator's local error.
@@ -65,9 +66,9 @@ def largest_multipliers(
     Returns
     -------
     values : ndarray, shape (m,)
-        Largest modulus of the multipliers; NaN if there is none.
+        Largest modulus of the multipliers; NaN if no orbit was found.
     starts : ndarray, shape (m, n)
-        y at crank angle 0; NaN if there is none.
+        y at crank angle 0; NaN if no orbit was found.
     status : ndarray of int, shape (m,)
         `kernels.Status`: 0 if an orbit was found.
     """
@@ -93,11 +94,12 @@ def _solve_row(
 
 
 class GridInterrupted(Interrupted):
-    """A grid was interrupted; the finished rows are kept, and the same call goes on from them.
+    """A grid was interrupted; the finished rows are kept, and the same call continues from them.
 
     Attributes
     ----------
     done, rows : int
+        Number of rows that are finished, and of all rows.
     """
 
     def __init__(self, done: int, rows: int, folder: Path) -> None:
@@ -137,7 +139,7 @@ class Grid:
         return REASONS.get(Status(self.status[row, column]), "")
 
     def around(self, x: float, y: float) -> FloatArray:
-        """Return the starts of the orbits at the points around a place, the nearest first; shape (k, n)."""
+        """Return the starts of the orbits at the nine or fewer grid points around (x, y), roughly nearest first; (k, n)."""
         across, up = (np.argsort(np.abs(axis - value))[:3] for axis, value in ((self.x, x), (self.y, y)))
         starts = self.starts[np.ix_(up, across)].reshape(-1, self.starts.shape[-1])
         kept: FloatArray = starts[~np.isnan(starts).any(axis=1)]
@@ -172,23 +174,23 @@ def grid(
 ) -> Grid:
     """Compute the largest Floquet multiplier at every point of a grid.
 
-    The rows are distributed over workers; each becomes a file in the cache, under a name made from all it depends on:
-    mechanisms, drives, guess, tolerance and machine code. An interrupted grid goes on from the rows that are there.
+    The rows are distributed over workers. Each row becomes a file in the cache; its name is a hash of all that the row depends
+    on: mechanisms, drives, guess, tolerance and machine code. An interrupted grid continues from the rows in the cache.
 
     Parameters
     ----------
     operation : callable
         See `plane`.
     x, y : array_like, shapes (nx,) and (ny,)
-        Values of the axes: in SI, or texts with units if they are of named parameters.
+        Values of the axes: in SI, or as texts with units if the plane is one of named parameters.
     start : array_like, shape (n,), optional
-        Guess of the first orbit of each row; see `find_orbit`. If it leads to none, others are tried.
+        Guess of the first orbit of each row; see `find_orbit`. If it leads to no orbit, other guesses are tried.
     tolerance : float
         Bound of the integrator's local error.
     folder : path, optional
         Folder of the cache; `grid_folder` by default.
     n_jobs : int, optional
-        Processes, -1 for one per core; inside `joblib.parallel_config` of a cluster, all of its cores.
+        Number of processes, -1 for one per core; inside `joblib.parallel_config` of a cluster, all of its cores.
     progress : bool
         Show a progress bar.
     what : str
@@ -199,7 +201,7 @@ def grid(
     InputError
         If an axis is empty or not finite, or there are no cores.
     ParameterError
-        If a point is no mechanism, or a text no quantity.
+        If the parameters at a point are not valid, or a text on an axis is no quantity.
     GridInterrupted
         On Ctrl-C.
     """
@@ -223,7 +225,7 @@ def grid(
 
 
 def _compute_row(guesses: FloatArray, tolerance: float, row: PointRow) -> FloatArray:
-    """Compute a row, with the columns multiplier, start and status."""
+    """Compute a row of a grid, shape (m, n + 2): largest multiplier, start and status of each point."""
     values, starts, status = _solve_row(row, guesses, tolerance)
     return np.column_stack([values, starts, status])
 
@@ -234,7 +236,7 @@ def _compute_row(guesses: FloatArray, tolerance: float, row: PointRow) -> FloatA
 def grid_points(
     operation: Plane, x: ArrayLike, y: ArrayLike, start: ArrayLike | None, count: int
 ) -> tuple[FloatArray, FloatArray, list[PointRow], FloatArray]:
-    """Return the values of the axes of a grid, its operating points by rows, and the guesses for each row, shape (k, n).
+    """Return the values of the axes x and y of a grid, its operating points by rows, and the guesses for each row, (k, n).
 
     Raises InputError if an axis is empty or not finite, ParameterError if a text on an axis is no quantity.
     """
@@ -249,7 +251,7 @@ def grid_points(
 
 
 def _axis(name: str, values: ArrayLike) -> FloatArray:
-    """Return the values of an axis as an array; raises InputError if they are not finite numbers, at least one."""
+    """Return the values of an axis as an array; raise InputError if there are none, or one is not a finite number."""
     with suppress(TypeError, ValueError):
         axis = np.array(values, dtype=float, ndmin=1)
         if axis.ndim == 1 and len(axis) > 0 and np.isfinite(axis).all():
@@ -258,7 +260,7 @@ def _axis(name: str, values: ArrayLike) -> FloatArray:
 
 
 def row_code(*functions: Any) -> tuple[str, ...]:
-    """Return the code that computes a row: fingerprints of compiled functions, and all Python sources of this package."""
+    """Return texts that identify the code: fingerprints of compiled functions, and all Python sources of this package."""
     sources = (path.read_text(encoding="utf-8") for path in sorted(Path(__file__).parents[1].rglob("*.py")))
     return *map(fingerprint, functions), *sources
 
@@ -270,15 +272,15 @@ def row_name(
     code: Sequence[str],
     *numbers: float,
 ) -> str:
-    """Return the name under which a row is kept: a hash of all it depends on.
+    """Return the name under which a row is kept: a hash of all that the row depends on.
 
     Parameters
     ----------
     row : PointRow
     guesses : ndarray, shape (k, n)
-        Starts; the first gives the magnitudes of y.
+        Guesses of y; the first gives the magnitudes of y.
     functions : sequence of int
-        Numbers of the flow's functions that are called.
+        Indices of the flow's functions that are called.
     code : sequence of str
         See `row_code`.
     *numbers : float
@@ -293,7 +295,7 @@ def row_name(
 
 @dataclass(frozen=True, slots=True)
 class Keeping:
-    """Computation of rows on several workers, and their storage on disk.
+    """Settings for the computation of rows on several workers, and for their storage on disk.
 
     Attributes
     ----------
@@ -327,7 +329,7 @@ class Keeping:
         names : sequence of str
             Names of the items in the cache: see `row_name`.
         shape : tuple of int
-            Of each array.
+            Shape of each result.
 
         Returns
         -------
@@ -344,7 +346,7 @@ class Keeping:
         """
         check_jobs(self.n_jobs)
         where = grid_folder() if self.folder is None else Path(self.folder)
-        with suppress(OSError):  # said once the first row cannot be kept
+        with suppress(OSError):  # the warning follows when the first row cannot be kept
             where.mkdir(parents=True, exist_ok=True)
         paths = [where / f"{name}.row" for name in names]
         rows: dict[Path, FloatArray] = {}
@@ -385,13 +387,13 @@ MEASURABLE = 1e-2
 def points_to_confirm(found: Grid) -> list[tuple[int, int]]:
     """Choose three points of a grid for long runs: the most stable, the least stable, and the one nearest to a boundary.
 
-    They lie a tenth of the ranges off the edges, where the picture shows them whole, unless an unstable point is on the edges
-    only. The last has the least margin, to either side, that a long run can still measure.
+    They lie at least a tenth of the ranges inside the edges, so that the figure shows their marks whole, unless unstable points
+    lie only next to the edges. The third point has the least absolute margin that a long run can still measure.
 
     Returns
     -------
     list of (int, int)
-        Rows and columns; fewer than three if fewer points have an orbit.
+        Row and column of each point; there may be fewer than three.
     """
     margin = 1.0 - found.largest
     if margin.count() == 0:

@@ -1,8 +1,8 @@
 """Compute rows of a chart: one or all periodic motions of each mechanism, and basins of attraction; compiled kernels.
 
-Along a row the orbits change smoothly: a polynomial through the last ones predicts the next at every node, and collocation
-corrects it. If that fails (friction, a torque, the limit of assembly, a fold in between), shooting finds the orbit from its
-neighbour on the left, from the one on the right, or from other starts.
+Along a row the orbits change smoothly: a polynomial through the last orbits predicts the next one at every node, and
+collocation corrects it. If that fails (friction, a torque, the limit of assembly, a fold in between), shooting finds the orbit
+from its neighbour on the left, from its neighbour on the right, or from other starts.
 """
 
 from __future__ import annotations
@@ -39,25 +39,26 @@ from ..motion.kernels import (
 )
 from ..motion.tracks import IDLE, RUNNING, advance_tracks, begin, make_tracks, set_scale
 
-#: Elements of a turn, from few to many.
+#: Numbers of elements of a turn that are tried, from few to many.
 COUNTS = np.array([8, 16, 24, 32, 48])
-#: Tail of `collocation.close` below which fewer elements of a turn are taken, relative to the root of the tolerance.
+#: Size of the highest Legendre coefficients, see `collocation.close`, below which fewer elements are taken for the next orbit,
+#: relative to the square root of the tolerance.
 FEWER = 0.7
-#: Orbits of a row that are not tried by collocation after one for which no number of elements sufficed.
+#: Number of orbits of a row that are solved by shooting alone after no number of elements has sufficed for one.
 _PAUSE = 8
 #: Extrapolation by a polynomial through one to four equally spaced values: weights, the last value first.
 _NEXT = np.array([[1.0, 0.0, 0.0, 0.0], [2.0, -1.0, 0.0, 0.0], [3.0, -3.0, 1.0, 0.0], [4.0, -6.0, 4.0, -1.0]])
 PASSED = len(_NEXT)
-#: Periodic motions of a point that are kept at most.
+#: Greatest number of periodic motions of a point that are kept.
 MOST_ORBITS = 8
 
 
 class Points(NamedTuple):
-    """Numbers of the mechanisms of a row, shapes (m, constants), (m, drive) and (m, n), in the form of `Section`."""
+    """Numbers of the m mechanisms of a row, in the form of `Section`."""
 
-    constants: NDArray[np.float64]
-    drives: NDArray[np.float64]
-    scales: NDArray[np.float64]
+    constants: NDArray[np.float64]  # constants of the equations and their derivatives, shape (m, 2 constants)
+    drives: NDArray[np.float64]  # numbers of the drive and their derivatives, (m, 2 drive)
+    scales: NDArray[np.float64]  # magnitudes of y, (m, n)
 
 
 class Search(NamedTuple):
@@ -67,15 +68,15 @@ class Search(NamedTuple):
     turns: int  # turns in a period
     most: int  # Newton iterations at most
     loose: float  # tolerance of the integrator in the search from further starts
-    smooth: bool  # whether collocation serves
+    smooth: bool  # whether collocation can be used
 
 
 class Row(NamedTuple):
-    """The orbits of a row, written where the status is DONE."""
+    """The orbits of a row; entries are written if the status is DONE."""
 
     starts: NDArray[np.float64]  # y at crank angle 0, shape (m, n)
     monodromies: NDArray[np.float64]  # monodromy matrices by columns, (m, n n)
-    status: NDArray[np.int64]  # the `Status` of each, (m,)
+    status: NDArray[np.int64]  # `Status` of the search for each orbit, (m,)
 
 
 class Motions(NamedTuple):
@@ -103,7 +104,7 @@ def point_section(section, points, row, tolerance):
 def divide(section, search, level, start, path, desk, room):
     """Find an orbit by collocation with the fewest elements that suffice, starting at a level of `COUNTS`.
 
-    Returns the level, -1 if there is none, and the tail of the Legendre coefficients.
+    Return the level, -1 if none suffices, and the relative size of the highest Legendre coefficients. ``path`` is (y, w).
     """
     y, w = path
     while level < len(COUNTS):
@@ -126,7 +127,7 @@ def divide(section, search, level, start, path, desk, room):
 
 @inner
 def predict(known, size, path):
-    """Extrapolate the first ``size`` numbers of a vector from the rows below into the first row."""
+    """Extrapolate the first ``size`` numbers of the next ``known`` rows of ``path`` into its first row."""
     for i in range(size):
         path[0, i] = 0.0
         for old in range(known):
@@ -135,7 +136,7 @@ def predict(known, size, path):
 
 @inner
 def shift(size, path):
-    """Move the first ``size`` numbers of each vector down by a row."""
+    """Copy the first ``size`` numbers of each row of ``path`` into the row below it."""
     for old in range(PASSED, 0, -1):
         copy(path[old - 1, :size], path[old, :size])
 
@@ -144,7 +145,7 @@ def shift(size, path):
 def solve_from_left(section, points, search, guess, found, tables):
     """Find the orbits of a row from left to right: by collocation if it converges, otherwise by shooting.
 
-    ``tables`` are of `make_desk`; the caller holds the arrays that are referred to here.
+    ``tables`` is a desk of `make_desk`; the caller keeps its arrays alive while they are used here.
     """
     starts, monodromies, status = found
     n = guess.shape[0]
@@ -153,7 +154,8 @@ def solve_from_left(section, points, search, guess, found, tables):
     report = np.zeros(3)
     start = np.empty(n)
     most_rows = row_count(COUNTS[-1] * search.turns)
-    # this orbit and those before it, the last first: all numbers of one in a row, and by rows of elements in lanes
+    # this orbit, then the orbits before it, the last first; ys and ws have all numbers of an orbit in a row, y and w have them
+    # by rows of elements in lanes
     sizes = n * LANES, NODES * (n // 2) * LANES
     ys, ws = np.zeros((1 + PASSED, most_rows * sizes[0])), np.zeros((1 + PASSED, most_rows * sizes[1]))
     y, w = ys.reshape((1 + PASSED, most_rows, sizes[0])), ws.reshape((1 + PASSED, most_rows, sizes[1]))
@@ -172,7 +174,7 @@ def solve_from_left(section, points, search, guess, found, tables):
             predict(known, rows * sizes[1], ws)
             what, tail = close(own, m, y[0, :rows], w[0, :rows], desk)
             if what == NO_STEP:
-                # more elements; the start is good enough to go on from
+                # try more elements; the start is good enough to continue from
                 take(0, LANES, y[0, 0], start)
                 more, tail = divide(own, search, level + 1, start, (y[0], w[0]), desk, room)
                 level, known = max(more, 0), 0
@@ -181,7 +183,7 @@ def solve_from_left(section, points, search, guess, found, tables):
         if not by_collocation:
             known = 0
             if passed > 1:
-                # the secant through the last two
+                # predict the start by the secant through the last two
                 for i in range(n):
                     start[i] = 2.0 * starts[row - 1, i] - starts[row - 2, i]
             elif passed == 1:
@@ -189,7 +191,7 @@ def solve_from_left(section, points, search, guess, found, tables):
             if passed:
                 what = newton(own, search.end, search.most, start, z, room, carry, report)
             if what != DONE:
-                # from far away, to the tolerance of a search at first
+                # from the guess, which may be far away: first with the loose tolerance of a search
                 copy(guess, start)
                 wide = point_section(section, points, row, search.loose)
                 what = newton(wide, search.end, search.most, start, z, room, carry, report)
@@ -220,14 +222,14 @@ def solve_from_left(section, points, search, guess, found, tables):
             shift(rows * sizes[1], ws)
             known = min(known + 1, PASSED)
             if level > 0 and tail < FEWER * np.sqrt(section.tolerance):
-                # fewer elements for the next orbit, which is begun by shooting
+                # take fewer elements for the next orbit, which shooting begins
                 level -= 1
                 known = 0
 
 
 @part
 def solve_from_right(section, points, search, found):
-    """Find orbits that were not found from the left from their neighbours to the right."""
+    """Find missing orbits from their neighbours on the right, by Newton's method."""
     starts, monodromies, status = found
     n = starts.shape[1]
     z, carry, report = np.empty(n * (1 + n)), np.array([0.1, 0.0]), np.zeros(3)
@@ -243,7 +245,7 @@ def solve_from_right(section, points, search, found):
 
 @part
 def solve_from_guesses(section, points, search, guesses, found):
-    """Find orbits that were not found from a neighbour from the other guesses, and from the left once more."""
+    """Find orbits that are still missing from their neighbours on the left once more, then from the other guesses."""
     starts, monodromies, status = found
     n = starts.shape[1]
     z, carry, report = np.empty(n * (1 + n)), np.array([0.1, 0.0]), np.zeros(3)
@@ -268,7 +270,7 @@ def solve_from_guesses(section, points, search, guesses, found):
 
 @kernel(types.void(SECTION, POINTS, SEARCH, MATRIX, ROW), purpose="grids of periodic motions")
 def solve_row(section, points, search, guesses, found):
-    """Find one orbit of each of a row of mechanisms, each from the last: a row of a chart.
+    """Find one orbit of each mechanism in a row of a chart, starting from the orbit of its neighbour.
 
     Parameters
     ----------
@@ -277,8 +279,8 @@ def solve_row(section, points, search, guesses, found):
     points : Points
     search : Search
     guesses : ndarray, shape (k, n)
-        The first is the start for the first mechanism, and after each failure of Newton's method. An orbit that is not found
-        from a neighbour on either side is sought from the others.
+        Guesses of y. The first guess is used for the first mechanism and after each failure of Newton's method. An orbit that
+        is not found from a neighbour on either side is sought from the other guesses.
     found : Row
         Written.
     """
@@ -295,7 +297,7 @@ def solve_row(section, points, search, guesses, found):
 
 @inner
 def _is_known(start, known, section, away):
-    """Return whether a start is among the known ones, whole turns aside."""
+    """Return whether a start is among the known ones, up to whole turns; ``away`` is work space."""
     found = False
     for k in range(known.shape[0]):
         difference_within(start, known[k], section.ways, away)
@@ -304,13 +306,12 @@ def _is_known(start, known, section, away):
 
 
 class Seekers(NamedTuple):
-    """Searches in lanes: of each its place in the queue, -1 without one, how many motions were known as it began, whether it
-    polishes what it found, and its state, of which each array has a row for each lane."""
+    """Searches, one in each lane."""
 
-    place: NDArray[np.int64]
-    begun: NDArray[np.int64]
-    polishing: NDArray[np.bool_]
-    hunts: Hunt
+    place: NDArray[np.int64]  # number of the start in the queue, -1 if there is no search
+    begun: NDArray[np.int64]  # number of motions that were known when the search began
+    polishing: NDArray[np.bool_]  # whether Newton's method refines a motion that was found
+    hunts: Hunt  # states of Newton's method: each array has a row for each lane
 
 
 @part
@@ -332,23 +333,23 @@ def _hunt(lane, hunts):
 
 
 class Point(NamedTuple):
-    """A point whose motions are sought: the sections to the full and to a looser tolerance, and what is known of it."""
+    """A point whose motions are sought, and the motions found so far."""
 
-    own: Any
-    wide: Any
+    own: Any  # section with the full tolerance
+    wide: Any  # section with the looser tolerance of a search
     search: Search
     before: NDArray[np.float64]  # starts of the motions of the point before, (b, n)
-    guesses: NDArray[np.float64]
-    angles: NDArray[np.float64]
-    starts: NDArray[np.float64]  # of its motions, written, (MOST_ORBITS, n)
-    monodromies: NDArray[np.float64]
-    swings: NDArray[np.float64]
-    count: NDArray[np.int64]  # their number, (1,)
+    guesses: NDArray[np.float64]  # further starts of searches, (k, n)
+    angles: NDArray[np.float64]  # crank angles of the samples (rad)
+    starts: NDArray[np.float64]  # starts of the motions found, (MOST_ORBITS, n)
+    monodromies: NDArray[np.float64]  # as in `Motions`
+    swings: NDArray[np.float64]  # as in `Motions`
+    count: NDArray[np.int64]  # number of motions found, (1,)
 
 
 @inner
 def _begin_search(lane, point, seekers, v):
-    """Begin the search of a lane at its place: from a motion of the point before, or with the known ones divided out."""
+    """Begin the search of a lane: by Newton's method from a motion of the point before, or by deflation from a guess."""
     place, before = seekers.place[lane], point.before.shape[0]
     seekers.polishing[lane] = place < before
     seekers.begun[lane] = point.count[0]
@@ -358,7 +359,7 @@ def _begin_search(lane, point, seekers, v):
 
 @inner
 def _record(lane, point, seekers, v, room, carry):
-    """Add the motion that a lane has found, if it is a new one."""
+    """Add the motion that a lane has found to the motions of the point, if it is new."""
     count, start = point.count[0], seekers.hunts.start[lane]
     single = v.z[: start.shape[0]]
     if count == MOST_ORBITS or _is_known(start, point.starts[:count], point.own, single):
@@ -377,7 +378,7 @@ def _record(lane, point, seekers, v, room, carry):
 
 @inner
 def _go_on(lane, point, seekers, v, room, carry):
-    """Go on with the search of a lane whose integration has ended; it has no place afterwards if it is over."""
+    """Continue the search of a lane whose integration has ended; if the search is over, its place becomes -1."""
     hunt, most, status = _hunt(lane, seekers.hunts), point.search.most, v.status[lane]
     take(lane, LANES, v.x, v.z)
     if seekers.polishing[lane]:
@@ -395,7 +396,7 @@ def _go_on(lane, point, seekers, v, room, carry):
         _record(lane, point, seekers, v, room, carry)
         count = point.count[0]
         if seekers.place[lane] >= point.before.shape[0] and seekers.begun[lane] < count and count < MOST_ORBITS:
-            # from the same guess to another motion: this one, or what another lane found meanwhile, was not divided out
+            # search again from the same guess: the motions found since the search began were not divided out
             _begin_search(lane, point, seekers, v)
         else:
             seekers.place[lane] = -1
@@ -403,7 +404,7 @@ def _go_on(lane, point, seekers, v, room, carry):
 
 @part
 def _search_point(point, seekers, tables, room, carry):
-    """Find the motions of a point: from those of the point before, then from all guesses, in lanes."""
+    """Find the motions of a point, in lanes: from the motions of the point before, then from all guesses."""
     v, before = refer(tables), point.before.shape[0]
     place = 0
     for bound in (before, before + point.guesses.shape[0]):
@@ -428,9 +429,10 @@ def _search_point(point, seekers, tables, room, carry):
 
 @kernel(types.void(SECTION, POINTS, SEARCH, VECTOR, MATRIX, MOTIONS), purpose="grids of coexisting motions")
 def solve_all(section, points, search, angles, guesses, found):
-    """Find all orbits of each of a row of mechanisms.
+    """Find all orbits of each mechanism in a row of a chart.
 
-    The orbits of each point are sought from those of the point before, then from every guess with the known ones divided out.
+    The orbits of each point are sought from the orbits of the point before, then from every guess with the known orbits divided
+    out.
 
     Parameters
     ----------
@@ -456,13 +458,13 @@ def solve_all(section, points, search, angles, guesses, found):
         _search_point(point, seekers, tables, make_room(own, 0), carry)
 
 
-#: Ends of a start that settles on no known motion: at the limit of assembly, or not within the turns.
+#: Results for a start that settles on no known motion: it comes to the limit of assembly, or does not settle in the turns.
 LOST, UNSETTLED = -1, -2
 
 
 @inner
 def _arrived(z, known, near, section, away):
-    """Return the number of the known motion that a state is near to, whole turns aside; UNSETTLED if there is none."""
+    """Return the number of the known motion that a state is near to, up to whole turns; UNSETTLED if there is none."""
     end = UNSETTLED
     for k in range(known.shape[0]):
         difference_within(z, known[k], section.ways, away)
@@ -473,9 +475,9 @@ def _arrived(z, known, near, section, away):
 
 @part
 def _settle(section, turn, near, most, starts, known, ends, tables):
-    """Do the work of `settle_starts`, which holds the arrays that are referred to here."""
+    """Do the work of `settle_starts`, which keeps the arrays of ``tables`` alive while they are used here."""
     v, away = refer(tables), np.empty(starts.shape[1])
-    # of each lane its row, or -1, and the turns that it has made
+    # for each lane: the number of its start, or -1, and the turns that it has made
     rows, turns = np.full(LANES, -1), np.zeros(LANES, np.int64)
     following, running = 0, True
     while running:
@@ -514,6 +516,7 @@ def settle_starts(section, turn, near, most, starts, known, ends):
     most : int
         Turns at most.
     starts, known : ndarray, shapes (m, n) and (k, n)
+        y at crank angle 0 of each start, and of the known motions.
     ends : ndarray of int64, shape (m,)
         Written: number of the known motion, or `LOST` or `UNSETTLED`.
     """

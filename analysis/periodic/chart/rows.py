@@ -1,4 +1,4 @@
-"""The operating points of a row of a chart as arrays, for the kernels that solve the row."""
+"""Collect the operating points of a row of a chart in arrays, for the kernels that solve the row."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ class PointRow:
     constants, vectors, scales : ndarray, shapes (m, constants), (m, drive) and (m, n)
         Constants of the equations, numbers of the drive, and magnitudes of y.
     smooth : bool
-        Whether collocation serves at all points.
+        Whether collocation can be used at all points.
     """
 
     first: OperatingPoint
@@ -49,7 +49,7 @@ class PointRow:
 
     @property
     def switched(self) -> bool:
-        """Whether any point switches on the equation that some mechanisms need."""
+        """Whether the mechanism's switch is on at any point: see `Mechanism.switched`."""
         place = self.first.mechanism.switch_place
         return place >= 0 and bool(self.constants[:, place].any())
 
@@ -66,9 +66,9 @@ class PointRow:
 
 
 def row_of(points: Sequence[OperatingPoint], start: FloatArray) -> PointRow:
-    """Return points as a row, with magnitudes of y at a start.
+    """Return operating points as a row; the magnitudes of y are those at ``start``.
 
-    Raises InputError if they are not driven in the same way.
+    Raises InputError if the points are not driven in the same way.
     """
     if any(point.flow is not points[0].flow for point in points):
         raise InputError(
@@ -84,19 +84,19 @@ def row_of(points: Sequence[OperatingPoint], start: FloatArray) -> PointRow:
 
 
 def rows_of(operation: Plane, xs: FloatArray, ys: FloatArray, start: FloatArray) -> list[PointRow]:
-    """Return the operating points of a grid by rows: those of named parameters at once, others one by one."""
+    """Return the operating points of a grid by rows; in a plane of named parameters a whole row is computed at once."""
     if isinstance(operation, NamedPlane):
         return [_row_at(operation, xs, y, start) for y in ys.tolist()]
     return [row_of([operating_point(*operation(x, y)) for x in xs.tolist()], start) for y in ys.tolist()]
 
 
 def _row_at(operation: NamedPlane, xs: FloatArray, y: float, start: FloatArray) -> PointRow:
-    """Return a row of a plane of named parameters."""
+    """Return the row at ``y`` of a plane of named parameters."""
     first = operating_point(*operation(float(xs[0]), y))
     flow, mechanism = first.flow, first.mechanism
     vectors = np.tile(first.vector, (len(xs), 1))
     sets: Sequence[Parameters] = [first.parameters]
-    # both ends: a value that the drive refuses is one of them, and a friction that is not zero
+    # the two ends suffice: if the drive refuses a value, or a friction is not zero, this is so at one of them
     ends = [operating_point(*operation(x, y)) for x in (float(xs.min()), float(xs.max()))]
     factors = places_of(flow, first.drive, operation.x)
     if factors is None:

@@ -1,8 +1,8 @@
 """Derive advice for a machine from branches: values of the parameter to avoid, jumps at folds, and greatest amplitudes.
 
 An arc is a part of a branch along which the parameter only rises or only falls and stability stays the same. At a fold where a
-stable arc ends, the machine jumps to another arc. If several stable arcs overlap, the machine's history decides which one it
-follows; if there is none, no motion on the branches is stable.
+stable arc ends, the machine jumps to another arc. If several stable arcs overlap, the machine's history decides which arc it
+follows. Where there is no stable arc, no motion on the branches is stable.
 """
 
 from __future__ import annotations
@@ -30,12 +30,12 @@ from .branch import Branch
 
 #: A resonance extends to the half-power points, at which the amplitude is this share of the peak.
 HALF_POWER = 1.0 / sqrt(2.0)
-#: Prominence of a peak, relative to its height, from which on it counts.
+#: Least prominence, relative to the height, at which a peak counts.
 _PROMINENCE = 1e-3
 #: Relative difference up to which two arcs are one curve that was followed twice.
 _SAME = 1e-2
-#: Relative rounding error of the parameter; share of the range below which an interval does not count, as a doubled branch
-#: begins a step beyond its doubling.
+#: Relative rounding error of the parameter; share of the range below which an interval does not count: such a short interval
+#: arises because a doubled branch begins a step beyond its doubling.
 _ROUNDING, _SLIVER = 1e-6, 1e-4
 FloatArray = NDArray[np.float64]
 Interval = tuple[float, float]
@@ -52,7 +52,7 @@ class Risk(Enum):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Avoided:
-    """A range of the parameter, of a speed in rad/s, that a machine should avoid, and the reason."""
+    """A range of the parameter (rad/s if it is a speed) that a machine should avoid, and the reason."""
 
     low: float
     high: float
@@ -71,7 +71,7 @@ class FoldJump:
     before : float
         Amplitude of the motion that ends.
     after : tuple of float
-        Amplitudes of the stable motions beyond; several if the branches do not decide between them, none if none was followed.
+        Amplitudes of the stable motions to which the machine may jump; empty if no such motion was followed.
     """
 
     parameter: float
@@ -91,7 +91,7 @@ class Arc:
     stable : bool
         Whether no deviation grows.
     parameter, amplitude : ndarray, shape (m,)
-        By rising parameter, from special point to special point.
+        Values along the arc, by rising parameter.
     start : ndarray, shape (m, n)
         Starts of the orbits.
     cut : (bool, bool)
@@ -111,12 +111,12 @@ class Arc:
         return float(self.parameter[0]), float(self.parameter[-1])
 
     def same_as(self, other: Arc) -> bool:
-        """Return whether two arcs are one curve where they overlap, as when a branch was followed from both ends."""
+        """Return whether two arcs are the same curve where they overlap, because a branch was followed from both ends."""
         low, high = _overlap(self, other)
         if self.turns != other.turns or low >= high:
             return False
         places = np.linspace(low, high, 7)[1:-1]
-        # a period of several turns may begin with any of them
+        # a period of several turns may begin with any turn: compare amplitudes
         own, others = (a.start if a.turns == 1 else a.amplitude[:, None] for a in (self, other))
         size = np.abs(own).max(axis=0) + 1e-300
         apart = [
@@ -127,7 +127,7 @@ class Arc:
 
 
 def arcs(branches: Iterable[Branch]) -> tuple[Arc, ...]:
-    """Return the arcs of branches, in their order."""
+    """Divide branches into arcs, in the order of the branches."""
     return tuple(arc for branch in branches for arc in _branch_arcs(branch))
 
 
@@ -138,7 +138,7 @@ def _branch_arcs(branch: Branch) -> list[Arc]:
     amplitude = np.insert(branch.amplitude, places, [orbit.amplitude for orbit in special])
     start = np.array([orbit.start for orbit in branch.orbits])
     start = np.insert(start, places, [orbit.start for orbit in special], axis=0) if special else start
-    # at a special point itself a multiplier is on the unit circle: its neighbours judge
+    # at a special point a multiplier is on the unit circle: stability is taken from the neighbouring points
     holds = np.insert(branch.largest_multiplier <= 1.0 + TOLERANCE, places, True)
     stable = holds[1:] & holds[:-1]
     if len(places) > 1:
@@ -168,7 +168,7 @@ def _branch_arcs(branch: Branch) -> list[Arc]:
 
 
 def fold_jumps(branches: Sequence[Branch]) -> tuple[FoldJump, ...]:
-    """Return the jumps at the folds at which a stable motion ends, by parameter."""
+    """Return the jumps at the folds at which a stable motion ends, sorted by parameter."""
     stable = [arc for arc in arcs(branches) if arc.stable]
     found: list[FoldJump] = []
     # a motion of twice the period begins at a doubling, where its branch turns back on itself: no motion ends there
@@ -182,11 +182,11 @@ def fold_jumps(branches: Sequence[Branch]) -> tuple[FoldJump, ...]:
                 continue
             beyond: list[Arc] = []
             for other in (o for o in stable if o.span[0] < value < o.span[1]):
-                # what was followed twice is one motion
+                # a motion that was followed twice counts once
                 if not any(other.same_as(known) for known in (arc, *beyond)):
                     beyond.append(other)
             after = sorted(float(np.interp(value, other.parameter, other.amplitude)) for other in beyond)
-            # and so is a fold that was met from both sides
+            # and so does a fold that was met from both sides
             if not any(
                 abs(value - other.parameter) < _ROUNDING * abs(value)
                 and abs(amplitude - other.before) < _SAME * amplitude
@@ -214,16 +214,16 @@ def ranges_to_avoid(branches: Sequence[Branch], low: float, high: float) -> tupl
 
 
 def _overlap(a: Arc, b: Arc) -> Interval:
-    """Return the range of both arcs; its end lies below its beginning if there is none."""
+    """Return the range in which two arcs overlap; its end lies below its beginning if they do not."""
     return max(a.span[0], b.span[0]), min(a.span[1], b.span[1])
 
 
 def _resonances(arc: Arc) -> list[Interval]:
-    """Return the half-power bands of the peaks of an arc, also of an end where it is largest and loses its stability."""
+    """Return the half-power bands of the peaks of an arc, and of an end at which its amplitude is greatest and it goes on."""
     a = arc.amplitude
     tops = [top for top, prominence in peaks(a) if prominence > _PROMINENCE * a[top]]
     bands = [tuple(_band_end(arc, top, way) for way in (-1, 1)) for top in tops]
-    # at an end the amplitude must have fallen, or it may be no more than a place on a slope
+    # an end counts only if the amplitude falls below half power on the arc; otherwise it may be a point on a slope
     for end, cut, way in ((0, arc.cut[0], 1), (len(a) - 1, arc.cut[1], -1)):
         if arc.turns == 1 and cut and a[end] == a.max() and a.min() < HALF_POWER * a[end]:
             bands.append(tuple(sorted((float(arc.parameter[end]), _band_end(arc, end, way)))))
@@ -231,7 +231,7 @@ def _resonances(arc: Arc) -> list[Interval]:
 
 
 def _band_end(arc: Arc, top: int, way: int) -> float:
-    """Return the half-power point of a peak to one side; infinite if the amplitude rises above the peak before."""
+    """Return the half-power point of a peak on one side; infinite if the amplitude first rises above the peak."""
     a, x = arc.amplitude, arc.parameter
     level, i = HALF_POWER * a[top], top
     while 0 <= i + way < len(a):
@@ -239,7 +239,7 @@ def _band_end(arc: Arc, top: int, way: int) -> float:
         if a[i] > a[top]:
             return inf
         if a[i] < level:
-            # by the cubic through the points about it, as far as it is between these two
+            # by the cubic through the four points around it, limited to the interval between these two
             about = slice(max(min(i, i - way) - 1, 0), max(i, i - way) + 2)
             places = a[about].tolist()
             weights = [prod((level - b) / (c - b) for b in places if b != c) for c in places]
@@ -259,17 +259,17 @@ def _union(intervals: Iterable[Interval], least: float) -> list[Interval]:
 
 
 def _gaps(intervals: Sequence[Interval], low: float, high: float) -> list[Interval]:
-    """Return what intervals in order leave of a range."""
+    """Return the parts of the range from ``low`` to ``high`` that sorted intervals do not cover."""
     ends = [low, *(v for interval in _within(intervals, low, high) for v in interval), high]
     return [(a, b) for a, b in zip(ends[::2], ends[1::2]) if a < b]
 
 
 def _within(intervals: Iterable[Interval], low: float, high: float) -> list[Interval]:
-    """Return the parts of intervals in a range."""
+    """Return the parts of intervals that lie in the range from ``low`` to ``high``."""
     return [(max(a, low), min(b, high)) for a, b in intervals if max(a, low) < min(b, high)]
 
 
-#: Relative error of an amplitude from samples.
+#: Relative error of an amplitude that is computed from samples.
 _SAMPLED = 1e-6
 
 
@@ -282,11 +282,11 @@ class Extremum:
     parameter : float
         Speed (rad/s), or the other parameter that varies.
     amplitude : float
-        m.
+        Amplitude (m).
     stability : Stability
-        Stability of the motion there.
+        Stability of the motion at the extremum.
     orbit : PeriodicOrbit
-        That motion.
+        The motion at the extremum.
     """
 
     parameter: float
@@ -298,8 +298,8 @@ class Extremum:
 def extrema(branch: Branch, sign: int = 1) -> tuple[Extremum, ...]:
     """Find the local maxima (sign +1) or minima (-1) of the amplitude along a branch.
 
-    At the place that `extremum_orbit` finds, the exact derivative of the amplitude by the parameter is zero. If the family is
-    a function of a number, or the amplitude has a kink, Brent's method on the orbits finds the place to 1e-4 of the parameter.
+    Each extremum is found by `extremum_orbit`, where the exact derivative of the amplitude by the parameter is zero. If the
+    family is a function of a number, or the amplitude has a kink, it is found by Brent's method, to 1e-4 of the parameter.
     """
     amplitude = sign * branch.amplitude
     found = []
@@ -307,7 +307,7 @@ def extrema(branch: Branch, sign: int = 1) -> tuple[Extremum, ...]:
         if prominence < _PROMINENCE * abs(amplitude[i]):
             continue
         a, c = sorted((float(branch.parameter[i - 1]), float(branch.parameter[i + 1])))
-        # at a fold the parameter turns back: it is no extremum over the parameter
+        # at a fold the parameter turns back: this is no extremum over the parameter
         if not a < branch.parameter[i] < c:
             continue
         place, orbit = _locate_extremum(branch.family, branch.orbits[i], a, float(branch.parameter[i]), c, sign)
@@ -320,7 +320,7 @@ def extrema(branch: Branch, sign: int = 1) -> tuple[Extremum, ...]:
 def _locate_extremum(
     family: Family, orbit: PeriodicOrbit, a: float, begin: float, c: float, sign: int
 ) -> tuple[float, PeriodicOrbit]:
-    """Find the extremum between a and c and the motion there, from a motion between them."""
+    """Return the extremum between a and c and the motion there, starting from the motion at the parameter ``begin``."""
     if isinstance(family.vary, str):
         try:
             rested = extremum_orbit(orbit, family.vary)
@@ -366,7 +366,7 @@ def special_gradient(
     InputError
         If the family's parameter is a function.
     LinkworkError
-        If the place has no derivative, as where two folds meet.
+        If the parameter at the point has no derivative, as where two folds meet.
     """
     if not isinstance(family.vary, str):
         raise InputError(f"{family.name} is a function: gradients are along a parameter with an FMI name")

@@ -31,9 +31,9 @@ from ..motion.variables import Family
 from ..stability.nonlinear import SpecialPoint
 
 #: First step along a branch in scaled arc length; greatest step while the parameter hardly changes; angle between the tangents
-#: of two points (rad) up to which steps grow: 150 points are enough to draw a full circle.
+#: of two points (rad) up to which steps grow: 0.04 gives about 150 points on a full circle.
 _FIRST, _LONGEST, _ROUND = 5e-3, 2e-2, 0.04
-#: Distance from a period doubling at which the doubled branch is begun, relative to the crank's length.
+#: Distance from a period doubling at which the branch of twice the period begins, relative to the crank's length.
 _SWITCH = 2e-3
 #: A branch ends when the links come this close to the limit of assembly (least sine, as `LIMIT_SINE`), or when its largest
 #: multiplier passes this value.
@@ -53,8 +53,8 @@ class Branch(Shown):
     orbits : tuple of PeriodicOrbit
     special : tuple of SpecialPoint
     reached, closed : bool
-        Whether the branch was followed to an end of the range, to its own beginning, or to a branch of half its period; and
-        whether it came back to its own beginning.
+        Whether the branch was followed to an end of the range, to its own beginning, or to a branch of half its period; whether
+        it came back to its own beginning.
     reason : str
         Reason why the branch ended. If it was lost, its last point is the last good one.
     """
@@ -67,7 +67,7 @@ class Branch(Shown):
     reached: bool
     closed: bool
     reason: str
-    # computed by `columns`
+    # cache of `columns`
     _table: dict[str, NDArray[np.float64]] = field(default_factory=dict, init=False, repr=False)
 
     def __repr__(self) -> str:
@@ -90,7 +90,7 @@ class Branch(Shown):
 
     @property
     def amplitude(self) -> NDArray[np.float64]:
-        """Half the range of the first free coordinate at each point, of a slider position (m); shape (m,)."""
+        """Half the range of the first free coordinate at each point, such as a slider position (m); shape (m,)."""
         label, unit = self.orbits[0].swing
         return self.columns()[f"amplitude of {label} [{unit}]"]
 
@@ -100,15 +100,15 @@ class Branch(Shown):
         return np.array([orbit.largest for orbit in self.orbits])
 
     def stability(self, tolerance: float = TOLERANCE) -> tuple[Stability, ...]:
-        """Return the verdict at each point."""
+        """Return the stability of each orbit."""
         return tuple(orbit.verdict(tolerance).stability for orbit in self.orbits)
 
     def columns(self) -> Mapping[str, NDArray[np.float64]]:
         """Return the quantities along the branch, by name with unit, each of shape (m,).
 
-        The parameter, mean speed, turns in a period; amplitude, mean and first harmonics of the first free coordinate, a
-        five-bar's u; largest multiplier, stability; and of the outputs that the mechanism has, mean and greatest crank torque,
-        greatest forces in pins, guide and bearings, least transmission sine.
+        They are the parameter, the mean speed and the turns in a period; amplitude, mean and first three harmonics of the first
+        free coordinate, for a five-bar u; largest multiplier and stability; and, if the mechanism has these outputs, mean and
+        greatest crank torque, greatest forces in pins, guide and bearings, and the least sine of the transmission angle.
         """
         if not self._table:
             turns = [orbit.turn() for orbit in self.orbits]
@@ -135,7 +135,7 @@ FORCE = "greatest force in "
 
 
 def _turn_columns(orbit: PeriodicOrbit, first: Turn) -> dict[str, Callable[[Turn], float]]:
-    """Return the columns that come from the outputs over a period, each with the function that computes it."""
+    """Return the functions that compute columns from the outputs over a period, by the names of the columns."""
     mechanism = mechanism_of(orbit.parameters)
     rate = next(v for v in mechanism.variables if v.name == mechanism.freedoms[orbit.flow.crank].rate)
     swing, what = first.swing, "{} [{}]".format(*orbit.swing)
@@ -186,15 +186,15 @@ def follow(
     ----------
     family : Family
     orbit : PeriodicOrbit
-        At the value of the parameter.
+        An orbit on the branch.
     value : float
         Value of the parameter at the orbit, between ``low`` and ``high``.
     low, high : float
         Range of the parameter.
     direction : int
-        +1 to higher values at first, -1 to lower.
+        +1 to follow it to higher values at first, -1 to lower values.
     greatest : float
-        Greatest step of the parameter, relative to its range; narrow resonances need small ones.
+        Greatest step of the parameter, relative to its range; narrow resonances need small steps.
     most_points : int
     watch : callable, optional
         Called with the parameter of every point.
@@ -204,12 +204,12 @@ def follow(
     Returns
     -------
     Branch
-        As far as it could be followed; ``reason`` says why it ended.
+        The branch as far as it could be followed; ``reason`` says why it ended.
 
     Raises
     ------
     ContinuationError
-        If the orbit is not on the family.
+        If the orbit is no member of the family.
     """
     settings = _settings(low, high, greatest, most_points)
     follower = _follower(family, orbit, settings)
@@ -269,7 +269,7 @@ def switch(
 
 
 def follow_both(family: Family, orbit: PeriodicOrbit, value: float, *, low: float, high: float, **how: Any) -> Branch:
-    """Follow the whole branch through an orbit, to both sides: see `follow`."""
+    """Follow the whole branch through an orbit, in both directions: see `follow`."""
     up = follow(family, orbit, value, low=low, high=high, **how)
     if up.closed:
         return up
@@ -313,7 +313,7 @@ def _growth(orbit: PeriodicOrbit) -> float:
 
 
 def _divided(family: Family, last: Point, settings: Settings) -> tuple[Follower, Point]:
-    """Return a follower of the same curve by multiple shooting, and its first point, from the last point so far."""
+    """Divide the period into pieces: return a follower by multiple shooting, and its first point at the last point so far."""
     orbit: PeriodicOrbit = last.data
     places = orbit.flow.unknowns(orbit.turn(PLACES * orbit.periods).states, orbit.point.vector)
     angles, starts = choose_pieces(orbit.point, places, orbit.turns)
@@ -325,7 +325,7 @@ def _divided(family: Family, last: Point, settings: Settings) -> tuple[Follower,
 
 
 def reason_to_leave(point: Point, largest: float = GREATEST_MULTIPLIER) -> str:
-    """Return why a branch is not followed beyond a point; empty if it is."""
+    """Return the reason why a branch is not followed beyond a point; empty if it is followed."""
     orbit = point.data
     if orbit.largest > largest:
         return (
@@ -370,7 +370,7 @@ def _branch(
             first, watch=None if watch is None else lambda point: watch(point.parameter), leave=leave
         )
         if merged:
-            # beyond it are the same motions, begun half a period later
+            # beyond this point come the same motions, begun half a period later
             curve = replace(curve, points=curve.points[:-1], steps=curve.steps[:-1])
         pieces.append((follower, curve))
         last, left = curve.points[-1], settings.most_points - len(curve.points) + 1
@@ -398,7 +398,10 @@ def _branch(
 
 
 def _meets_half(before: Point, after: Point) -> bool:
-    """Return whether a branch meets one of half the period between two points: it turns back there with halves exchanged."""
+    """Return whether a branch meets a branch of half its period between two points.
+
+    It then turns back on itself with the two halves of the period exchanged.
+    """
     turns = after.data.turns
     if turns % 2 or not before.tangent[-1] * after.tangent[-1] < 0.0:
         return False
@@ -410,8 +413,8 @@ def _meets_half(before: Point, after: Point) -> bool:
 
 
 def _tests(point: Point) -> dict[Crossing, float]:
-    """Return functions of a point that change sign where a multiplier crosses the unit circle."""
-    # det(M - 1) is zero where a branch is crossed as well; the parameter turns back at a fold only
+    """Return the value of a test function for each kind of crossing; it changes sign where a multiplier crosses the circle."""
+    # det(M - 1) is also zero where two branches cross; the parameter turns back only at a fold
     return {
         kind: float(point.tangent[-1]) if kind is Crossing.FOLD else float(crossing_test(point.data.monodromy, kind))
         for kind in Crossing
@@ -421,13 +424,13 @@ def _tests(point: Point) -> dict[Crossing, float]:
 def _special_points(
     curve: Curve, follower: Follower, pieces: Sequence[tuple[Follower, Curve]] = ()
 ) -> list[SpecialPoint]:
-    """Locate the special points of a piece of a branch, numbered after the pieces before it."""
+    """Locate the special points of a piece of a branch; their ``after`` counts the points of the pieces before it, too."""
     passed = sum(len(piece.points) - 1 for _, piece in pieces)
     found: list[tuple[int, float, SpecialPoint]] = []
     values = [_tests(point) for point in curve.points]
     for i, length in enumerate(curve.steps):
         for kind in Crossing:
-            # the product of two multipliers at prescribed speed follows from the damping alone and crosses nothing
+            # at prescribed speed the product of two multipliers depends on the damping alone and crosses no value
             if (
                 kind is Crossing.TORUS
                 and curve.points[i].data.drive.speed_drive
@@ -446,7 +449,7 @@ def _special_points(
 
 
 def describe(branches: Sequence[Branch]) -> str:
-    """Return one line on branches of a family: range, orbits, stability, greatest amplitude and its place."""
+    """Describe branches of a family in one line: range, number of orbits, stability, greatest amplitude and where it is."""
     family, (name, unit) = branches[0].family, branches[0].orbits[0].flow.components[0]
     span = format_range(np.concatenate([branch.parameter for branch in branches]), family.unit)
     words = dict.fromkeys(word.value for branch in branches for word in branch.stability())
@@ -459,9 +462,9 @@ def describe(branches: Sequence[Branch]) -> str:
     )
 
 
-#: Largest multiplier with which a motion is followed.
+#: Greatest modulus of the multipliers up to which a motion is followed.
 GREATEST = 1e3
-#: Distance from the polygon of a branch, in scaled arc length, up to which a motion lies on it.
+#: Distance from the polygon of a branch, in scaled arc length, below which a motion lies on the branch.
 _ON = 2e-3
 
 
@@ -476,7 +479,10 @@ def distance(points: NDArray[np.float64], place: NDArray[np.float64]) -> float:
 
 
 def passes(branch: Branch, value: float, motion: NDArray[np.float64], width: float) -> bool:
-    """Return whether a branch passes through a motion, given by its start, or through one that is whole turns from it."""
+    """Return whether a branch passes through a motion, given by its start, up to whole turns of links.
+
+    ``value`` is the parameter of the motion, and ``width`` the length that is scaled to 1 on the axis of the parameter.
+    """
     ends = [branch.orbits[i] for i in (branch.parameter.argmin(), branch.parameter.argmax())]
     scale = np.append(np.max([o.scale for o in ends], axis=0), width)
     points = np.column_stack([[orbit.start for orbit in branch.orbits], branch.parameter])

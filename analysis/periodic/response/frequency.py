@@ -1,8 +1,8 @@
 """Compute the frequency response: at which speeds the mechanism resonates, how strongly, and with which harmonics.
 
 `frequency_response` follows the periodic motions of the full nonlinear mechanism over a range of speeds, past folds, from both
-ends of the range, and switches to the motions of twice the period, and from those again. `with_isolas` adds the motions to
-which no branch leads: isolas, which are closed curves over the parameter, and branches that reach neither end of the range.
+ends of the range. At period doublings it switches to the motions of twice the period, repeatedly if wanted. `with_isolas` adds
+the motions to which no branch leads: closed curves over the parameter, and branches that reach neither end of the range.
 `natural_frequency` is the classical estimate, from the mean effective mass.
 """
 
@@ -49,36 +49,36 @@ from ..stability import SpecialPoint
 from .advice import Avoided, Extremum, FoldJump, extrema, fold_jumps, ranges_to_avoid
 from .branch import GREATEST, GREATEST_MULTIPLIER, Branch, describe, follow, follow_both, passes, switch
 
-#: Crank angles over which the effective mass is averaged.
+#: Number of crank angles over which the effective mass is averaged.
 MASS_SAMPLES = 1024
-#: Generator of a lattice of as many points: next to the golden section of their number, and odd.
+#: Generator of a lattice of MASS_SAMPLES points over the angles of several cranks: the odd number next to their golden section.
 LATTICE = 633
 
 
 def oscillating(mechanism: Mechanism) -> tuple[int, ...]:
-    """Return the numbers of the freedoms that are not a crank's."""
+    """Return the numbers of the freedoms that are not cranks."""
     return tuple(number for number in range(len(mechanism.freedoms)) if number not in mechanism.cyclic)
 
 
 def first_freedom(mechanism: Mechanism) -> int:
-    """Return the number of the first freedom that is not a crank's; raises ParameterError if there is none."""
+    """Return the number of the first freedom that is not a crank; raises ParameterError if there is none."""
     for number in oscillating(mechanism):
         return number
     raise ParameterError("mechanism", mechanism.name, "have a second freedom for a natural frequency")
 
 
 def stiffness_name(mechanism: Mechanism) -> str:
-    """Return the FMI name of the stiffness of the first freedom's spring, such as ``slider.stiffness``; empty without one."""
+    """Return the FMI name of the stiffness of the first freedom's spring, such as ``slider.stiffness``, or ""."""
     return next(iter(mechanism.names("stiffness", mechanism.freedoms[first_freedom(mechanism)].coordinate)), "")
 
 
 def _means(parameters: Parameters) -> tuple[float, float]:
-    """Return mean effective mass (kg) and stiffness (N/m) of the first freedom at its zero over a turn."""
+    """Return the effective mass (kg) and stiffness (N/m) of the first freedom at its zero position, averaged over a turn."""
     mechanism = mechanism_of(parameters)
     cranks, freedom = cranks_of(mechanism), first_freedom(mechanism)
     if not cranks:
         raise InputError(f"a {mechanism.name} has no freedom that turns: it has no mean over a turn")
-    # of several cranks the points of a lattice, which fill all pairs of angles evenly
+    # for several cranks: the points of a lattice, which fill all combinations of angles evenly
     turn = np.linspace(0.0, 1.0, MASS_SAMPLES, endpoint=False)
     angles = [
         mechanism.freedoms[crank.freedom].period * turn[np.arange(MASS_SAMPLES) * LATTICE**n % MASS_SAMPLES]
@@ -96,29 +96,29 @@ def _means(parameters: Parameters) -> tuple[float, float]:
 
 @takes_published()
 def mean_effective_mass(parameters: Parameters) -> float:
-    """Return the mean effective mass of the first freedom beside the crank over a turn, at its zero (kg): a five-bar's m22.
+    """Return the mean effective mass (kg) over a turn of the first freedom other than the crank: the mean m22 of a five-bar.
 
     Raises
     ------
     AssemblyError
-        If the links cannot be joined there over the whole turn.
+        If the links cannot be joined over the whole turn with this freedom at its zero position.
     """
     return _means(parameters)[0]
 
 
 @takes_published()
 def natural_frequency(parameters: Parameters) -> float:
-    """Compute the natural frequency of the first freedom beside the crank on its spring (rad/s), from its mean effective mass.
+    """Compute the natural frequency (rad/s) of the first freedom other than the crank, from its mean effective mass.
 
-    The stiffness is the mechanism's parameter for it, such as ``slider.stiffness``; without such a parameter it is the mean
-    over a turn of the second derivative of the energy.
+    The stiffness is the parameter of its spring, such as ``slider.stiffness``; without such a parameter it is the mean over a
+    turn of the second derivative of the energy.
 
     Raises
     ------
     ParameterError
         If there is no spring.
     AssemblyError
-        If the crank cannot make a turn with that freedom held at its zero.
+        If the crank cannot make a turn with this freedom held at its zero position.
 
     Examples
     --------
@@ -139,8 +139,8 @@ def natural_frequency(parameters: Parameters) -> float:
     return sqrt(stiffness / mass)
 
 
-#: A branch of four times the period and more ends when its largest multiplier passes this value: it has doubled once more, or
-#: folded, and a machine will have left it for another motion.
+#: A branch of at least four times the period ends when its largest multiplier passes this value: its motion has then doubled
+#: once more, or folded, and a machine has left it for another motion.
 STRAYED = 4.0
 
 
@@ -155,8 +155,8 @@ class Response(Shown):
     Attributes
     ----------
     branches : tuple of Branch
-        First the branch from the low end, then the branch from the high end if it is another one, then the branches of twice
-        the period, of four times and so on, then the branches connected with none of these.
+        First the branch from the low end, then the branch from the high end if it is a different one, then the branches of
+        twice the period, of four times the period and so on, then branches that are connected with none of these.
     low, high : float
         Range of the parameter.
     problems : tuple of str
@@ -184,7 +184,7 @@ class Response(Shown):
 
     @property
     def sought_at(self) -> str:
-        """At how many values of the parameter all motions were sought, in words: more of them may find more motions."""
+        """Number of values of the parameter at which all motions were sought, in words; more values may find more motions."""
         return f"{format_count(self.sought, 'value')} of {self.family.name}"
 
     @property
@@ -196,7 +196,7 @@ class Response(Shown):
     def speeds_to_avoid(self) -> tuple[Avoided, ...]:
         """Ranges of the speed, or of the parameter that varies, that a machine should avoid, each with its reason.
 
-        They follow from the branches. A stable motion that no branch leads to is among them only after `with_isolas`.
+        They follow from the branches. A stable motion that no branch leads to is taken into account only after `with_isolas`.
         """
         return ranges_to_avoid(self.branches, self.low, self.high)
 
@@ -267,26 +267,27 @@ def frequency_response(
     low, high : float or str
         Range of the parameter: speed in rad/s, torque in N.m, else in the unit of the FMI contract; or text such as "420 rpm".
     drive : Drive, optional
-        Needed if another parameter than the speed varies. A published set is driven at its speed.
+        Needed if a parameter other than the speed varies. A published set is by default driven at its own speed.
     vary : str
         The speed of the crank by default, ``drive.torque`` (the mean speed is then part of the solution: ``start`` is
         needed), or any parameter that `Family` can vary.
     start : array_like, optional
         Guess of the orbit's start at the low end; see `find_orbit`.
     doublings : int
-        How often the period is doubled: 1 for the motions of twice the period from each period doubling, 2 for those of four
-        times as well, and so on. From the second on a branch ends when its multiplier passes `STRAYED`.
+        How often the period is doubled: 1 for the motions of twice the period from each period doubling, 2 for the motions of
+        four times the period as well, and so on. From the second doubling on a branch ends when its largest multiplier passes
+        `STRAYED`.
     most_points : int
         Points of a branch at most.
     greatest_step : float
-        Greatest step of the parameter, relative to the range. Narrow resonances need small ones.
+        Greatest step of the parameter, relative to the range. Narrow resonances need small steps.
     progress : bool
 
     Returns
     -------
     Response
-        ``problems`` names every branch that could not be followed. Motions to which no branch leads are not sought; that would
-        take one to ten times as long: see `with_isolas`.
+        ``problems`` names every branch that could not be followed. Motions to which no branch leads are not sought; the search
+        would take one to ten times as long: see `with_isolas`.
 
     Raises
     ------
@@ -344,7 +345,7 @@ class _Search:
     failures: list[OrbitError] = field(default_factory=list)
 
     def follow_from_both_ends(self, start: ArrayLike | None, most_points: int, show: Callable[[float], None]) -> None:
-        """Follow the branch from the low end, and the one from the high end if it is another."""
+        """Follow the branch from the low end, and the branch from the high end if it is a different one."""
         done = 0.0
 
         def watch(value: float) -> None:
@@ -383,7 +384,7 @@ class _Search:
                 break
 
     def follow_doublings(self, times: int) -> None:
-        """Follow the branches of twice the period, and from these again, ``times`` deep, each from one of its ends only."""
+        """Follow the branches of twice the period, and so on ``times`` times, each branch from only one of its ends."""
         ends: list[tuple[int, float, NDArray[np.float64]]] = []
 
         def is_end(special: SpecialPoint) -> bool:
@@ -451,7 +452,7 @@ class _Search:
                 self.problems.append(ending(branch))
 
     def _knows(self, orbit: PeriodicOrbit, value: float) -> bool:
-        """Return whether a branch passes through a motion, whichever of its turns comes first."""
+        """Return whether a branch passes through a motion, whichever turn of the motion comes first."""
         own = [branch for branch in self.branches if branch.turns == orbit.turns]
         starts = orbit.passages()
         return any(passes(branch, value, start, self.high - self.low) for branch in own for start in starts)
@@ -464,7 +465,7 @@ class _Search:
 
 
 def ending(branch: Branch) -> str:
-    """Return a sentence on a branch that was not followed to its end."""
+    """Return a sentence that says how far a branch was followed, and why not to its end."""
     first, last = (branch.family.format_value(float(branch.parameter[i])) for i in (0, -1))
     period = "" if branch.periods == 1 else f"with a period of {branch.crank_turns} turns "
     return f"the branch {period}from {first} is followed to {last} only: {branch.reason}"
@@ -488,19 +489,19 @@ def with_isolas(
 ) -> Response:
     """Add motions to a response that are not connected to any of its branches.
 
-    All motions are sought at some values of the parameter; motions that exist only between these are not found. From one that
-    lies on no branch, a new branch is followed to both sides until it closes or ends. Motions whose deviations grow more than a
-    thousandfold per turn are left out.
+    All motions are sought at some values of the parameter; motions that exist only between these values are not found. From a
+    motion that lies on no branch, a new branch is followed in both directions until it closes or ends. Motions whose deviations
+    grow more than a thousandfold per turn are left out.
 
     Motions of several turns are stable only in narrow ranges between a fold and a period doubling. Beyond the doubling they
-    exist on, ever more unstable, over a range some ten times as wide, where the search can find them. They are followed as long
-    as deviations grow less than `GREATEST_OF_SEVERAL` times per period.
+    continue to exist, more and more unstable, over a range some ten times as wide, where the search can find them. They are
+    followed as long as deviations grow less than `GREATEST_OF_SEVERAL` times per period.
 
     Parameters
     ----------
     response : Response
     places : int
-        Values of the parameter, evenly spaced inside the range, at which all motions are sought.
+        Number of values of the parameter, evenly spaced inside the range, at which all motions are sought.
     turns : int
         Greatest number of turns, or of common periods, in the period of the motions that are sought.
     greatest_step, progress

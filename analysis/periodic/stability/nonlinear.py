@@ -2,9 +2,9 @@
 
 On the centre manifold of a special point the map over a period is one of three normal forms (Y. A. Kuznetsov, Elements of
 Applied Bifurcation Theory, 3rd ed., Springer 2004, sections 5.4 and 8.7). The sign of one coefficient decides: beyond a
-supercritical period doubling or torus point a stable motion grows out of the old one; beyond a subcritical one the mechanism
-jumps. The second and third derivatives of the map are differences of it along eigenvectors. `confirm_form` and `confirm`
-compare normal form and verdict with long runs of the mechanism.
+supercritical period doubling or torus point a stable motion grows out of the old one; beyond a subcritical point the mechanism
+jumps. The second and third derivatives of the map are computed by finite differences along eigenvectors. `confirm_form`
+compares the normal form, and `confirm` the verdict, with a long run of the mechanism.
 """
 
 from __future__ import annotations
@@ -41,7 +41,7 @@ class SpecialPoint:
     parameter : float
     orbit : PeriodicOrbit
     after : int
-        Number of the branch's point after which it lies.
+        Index of the point of the branch after which the special point lies.
     """
 
     kind: Crossing
@@ -50,17 +50,18 @@ class SpecialPoint:
     after: int
 
 
-#: Step of the differences, relative to the scale of y, the relative uncertainty down to which it is halved, and halvings at
-#: most: the map over many turns bends within a thousandth of the scale, near the limit of assembly within a millionth.
+#: Step of the finite differences, relative to the scale of y; relative uncertainty of the result below which it is no longer
+#: halved; halvings at most. The map over many turns may bend within a thousandth of the scale, near the limit of assembly
+#: within a millionth.
 _STEP, _CERTAIN, _HALVINGS = 8e-3, 1e-2, 16
-#: Distance of the multiplier from its crossing of the unit circle up to which the point counts as located: next to the limit of
-#: assembly the multiplier crosses from -1 to 1 within the rounding of the parameter.
+#: Distance of the multiplier from the crossing of the unit circle up to which the point counts as located: next to the limit of
+#: assembly the multiplier may change from -1 to 1 within the rounding error of the parameter.
 _LOCATED = 1e-2
 #: Relative uncertainty of a coefficient above which its sign is not settled.
 UNSETTLED = 0.5
 _UNSETTLED = "not settled"
-#: Run that confirms a normal form: distance of the multiplier from the unit circle, at least and at most; square of the
-#: distance from the old motion aimed at; turns.
+#: Run that confirms a normal form: least and greatest distance of the multiplier from the unit circle; square of the distance
+#: from the old motion that is wanted; turns.
 _BEYOND, _SMALL, _TURNS = (2e-3, 2e-2), 0.04, 6000
 FloatArray = NDArray[np.float64]
 Form = Callable[..., NDArray[np.complex128]]
@@ -74,10 +75,10 @@ class NormalForm:
     ----------
     kind : Crossing
     coefficient : float
-        In the scale of y: for a fold half the second derivative along the eigenvector; for a period doubling the cubic
-        coefficient, positive if supercritical; for a torus the first Lyapunov coefficient, negative if supercritical.
+        With y in units of its scale: for a fold half the second derivative along the eigenvector; for a period doubling the
+        cubic coefficient, positive if supercritical; for a torus the first Lyapunov coefficient, negative if supercritical.
     uncertainty : float
-        Change of the coefficient when the step of the differences is halved; infinite if the point is not located.
+        Change of the coefficient when the step of the finite differences is halved; infinite if the point is not located.
     words : str
         "supercritical", "subcritical", or "not settled" if the coefficient is uncertain or the multiplier crosses the circle
         too fast for the point to be located; for a fold, the side on which the two motions exist.
@@ -90,30 +91,30 @@ class NormalForm:
 
 
 class Forms(NamedTuple):
-    """Second and third derivatives of a map at its fixed point zero as multilinear forms, by differences.
+    """Second and third derivatives of a map at its fixed point zero as multilinear forms B and C, by finite differences.
 
     Attributes
     ----------
     of : callable
-        The map, (n,) to (n,).
+        The map, from shape (n,) to (n,).
     matrix : ndarray, shape (n, n)
-        Its derivative at zero.
+        First derivative of the map at zero.
     """
 
     of: Callable[[FloatArray], FloatArray]
     matrix: FloatArray
 
     def second(self, x: FloatArray, h: float) -> FloatArray:
-        """Return B(x, x)."""
+        """Return B(x, x) with the step h."""
         return (self.of(h * x) + self.of(-h * x) - 2.0 * self.of(0.0 * x)) / h**2
 
     def third(self, x: FloatArray, h: float) -> FloatArray:
-        """Return C(x, x, x)."""
+        """Return C(x, x, x) with the step h."""
         of = self.of
         return (of(2.0 * h * x) - 2.0 * of(h * x) + 2.0 * of(-h * x) - of(-2.0 * h * x)) / (2.0 * h**3)
 
     def complex(self, h: float) -> tuple[Form, Form]:
-        """Return B(u, v) and C(u, v, w) of complex vectors, by polarisation of the real forms."""
+        """Return the functions B(u, v) and C(u, v, w) of complex vectors, by polarisation of the real forms."""
 
         def b_real(u: FloatArray, v: FloatArray) -> FloatArray:
             return (self.second(u + v, h) - self.second(u - v, h)) / 4.0
@@ -130,7 +131,7 @@ class Forms(NamedTuple):
 
 
 def _forms(orbit: PeriodicOrbit) -> Forms:
-    """Return the forms of the map over a period, in scaled components relative to the orbit."""
+    """Return the forms of the map over a period, for deviations from the orbit in units of the scale."""
     scale, point = orbit.scale, orbit.point
 
     def after(x: FloatArray) -> FloatArray:
@@ -154,7 +155,7 @@ def _complex_form(form: Callable[..., FloatArray], count: int) -> Form:
 
 
 def _eigenvectors(matrix: FloatArray, value: complex) -> tuple[NDArray[np.complex128], NDArray[np.complex128], complex]:
-    """Return right and left eigenvectors, with product 1, of the multiplier nearest to ``value``, and this multiplier."""
+    """Return right and left eigenvector, with the product 1, of the eigenvalue nearest to ``value``, and this eigenvalue."""
     values, right = np.linalg.eig(matrix.astype(complex))
     n = int(np.abs(values - value).argmin())
     adjoint, left = np.linalg.eig(matrix.T.astype(complex))
@@ -170,7 +171,7 @@ def normal_form(family: Family, special: SpecialPoint) -> NormalForm:
     Raises
     ------
     OrbitError
-        If the map cannot be followed next to the point.
+        If the mechanism cannot be followed over a period next to the orbit.
     """
     of = _forms(special.orbit)
     multiplier = complex(special.orbit.multipliers[0])
@@ -189,7 +190,7 @@ def normal_form(family: Family, special: SpecialPoint) -> NormalForm:
 
 
 def _extrapolated(at: Callable[[float], float]) -> tuple[float, float]:
-    """Extrapolate a coefficient from halved steps to step zero; return the value with the least uncertainty, and that."""
+    """Extrapolate a coefficient, a function of the step, to step zero; return the least uncertain value and its uncertainty."""
     found: list[tuple[float, float]] = []
     values: list[float] = []
     change = 0.0
@@ -197,7 +198,7 @@ def _extrapolated(at: Callable[[float], float]) -> tuple[float, float]:
         try:
             values.append(at(_STEP * 0.5**number))
         except OrbitError as error:
-            # so far from the motion the links come to the limit of assembly; just within, two values may agree by chance
+            # with this step the links come to the limit of assembly; with slightly smaller ones two values may agree by chance
             failure, change = error, np.inf
             continue
         if len(values) > 1:
@@ -220,7 +221,7 @@ def form_coefficient(of: Forms, kind: Crossing, multiplier: complex, h: float) -
     of : Forms
     kind : Crossing
     multiplier : complex
-        For a torus, one of the pair on the unit circle.
+        For a torus: one multiplier of the pair on the unit circle.
     h : float
         Step of the differences.
     """
@@ -241,7 +242,7 @@ def form_coefficient(of: Forms, kind: Crossing, multiplier: complex, h: float) -
     second = of.second(q, h)
     if kind is Crossing.FOLD:
         return float(0.5 * p @ second)
-    # B(q, w) by polarisation, with steps of one length
+    # B(q, w) by polarisation, with w scaled to the length of q
     w = np.linalg.solve(unit - matrix, second)
     length = float(np.linalg.norm(w)) or 1.0
     mixed = length * (of.second(q + w / length, h) - of.second(q - w / length, h)) / 4.0
@@ -265,9 +266,10 @@ class FormRun:
     Attributes
     ----------
     parameter : float
-        Its value in the run.
+        Value of the parameter in the run.
     distance : float
-        Greatest distance from the old motion over the last turns, in the scale of y; infinite if the run ended early.
+        Greatest distance from the old motion over the last periods, relative to the scale of y; infinite if the run ended
+        early.
     expected : float
         Distance that the normal form predicts for a supercritical point.
     """
@@ -277,7 +279,11 @@ class FormRun:
     expected: float
 
     def agrees(self, form: NormalForm) -> bool:
-        """Return whether the run follows the form: at its distance, within a factor of two, or away if it is subcritical."""
+        """Return whether the run agrees with the normal form.
+
+        Its distance must be the expected one within a factor of two if the form is supercritical, and more than three times the
+        expected one if it is subcritical.
+        """
         if form.words == "supercritical":
             return 0.5 * self.expected < self.distance < 2.0 * self.expected
         return form.words == "subcritical" and self.distance > 3.0 * self.expected
@@ -340,7 +346,7 @@ class Outcome(Enum):
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Confirmation:
-    """A verdict, and a long run of the nonlinear mechanism that starts near the periodic orbit.
+    """A verdict on a periodic orbit, and a long run of the nonlinear mechanism that starts near the orbit.
 
     Attributes
     ----------
@@ -349,11 +355,12 @@ class Confirmation:
     outcome : Outcome
     growth : float
         Growth factor of the deviation per turn, along the direction of the leading multiplier, by regression over the turns
-        before it vanishes in rounding errors or exceeds a hundredth of the crank; a bound if that happens within a turn.
+        before the deviation is lost in rounding errors or exceeds a hundredth of the scale of y; a bound if that happens within
+        a turn.
     deviations : ndarray, shape (n,)
-        Distance from the orbit at crank angle 0 of each turn, relative to the first one, to the end of the run.
+        Distance from the orbit at crank angle 0 of each turn, relative to the first distance, up to the end of the run.
     message : str
-        Why the run ended early; empty if it did not.
+        Reason why the run ended early; empty if it did not.
     """
 
     verdict: StabilityVerdict
@@ -366,7 +373,7 @@ class Confirmation:
     def agrees(self) -> bool:
         """Whether the run confirms the verdict; the deviation of a marginal motion must neither decay nor grow.
 
-        If the margin is too small for the number of turns, the measured growth must be that of the multiplier.
+        If the margin is too small for an outcome within the turns, the measured growth must agree with the multiplier.
         """
         expected = {
             Stability.STABLE: Outcome.DECAYS,
@@ -379,13 +386,14 @@ class Confirmation:
         return self.outcome is Outcome.BOUNDED and abs(self.growth - 1.0 + self.verdict.margin) < 0.1 * margin
 
 
-#: Start of a long run: distance from the orbit relative to the crank's length, and the range over which growth is measured.
+#: Initial distance of a long run from the orbit, relative to the scale of y; least and greatest distance at which growth is
+#: measured.
 DISTURBANCE, NOISE, LINEAR = 1e-5, 1e-8, 1e-2
 #: Deviation below which it counts as zero.
 TINY = 1e-300
-#: Turns of a run at least, and at most.
+#: Least and greatest number of turns of a run.
 FEWEST_TURNS, MOST_TURNS = 1000, 20_000
-#: Growth or decay of the deviation over a run from which on it counts.
+#: Factor of growth or decay of the deviation over a run above which the deviation counts as growing or decaying.
 NOTABLE = 3.0
 
 
@@ -410,7 +418,7 @@ def confirm(
     start : array_like, shape (n,), optional
         Guess of the orbit.
     disturbance : float
-        Distance from the orbit at the start relative to the crank's length, in the direction of greatest growth.
+        Distance from the orbit at the start, relative to the scale of y, in the direction of greatest growth.
     tolerance : float
         Tolerance of the verdict.
 
@@ -439,7 +447,7 @@ def confirm(
     away = (passed - orbit.start) / scale
     size = np.linalg.norm(away, axis=1)
     outside = np.flatnonzero((size > LINEAR) | (size < NOISE))
-    # one turn counts even where the deviation is lost in it: the motion decays or grows by at least as much
+    # one turn counts even if the deviation leaves the range in it: the motion decays or grows by at least as much
     used = np.maximum(np.abs(away @ measure), TINY)[: max(2, outside[0]) if len(outside) else None]
     if len(used) < 2:
         raise LinkworkError(f"the run beside the orbit ends within a turn: {message}")
@@ -453,7 +461,7 @@ def confirm(
 
 
 def _passages(point: OperatingPoint, start: FloatArray, turns: int) -> tuple[FloatArray, str]:
-    """Run the mechanism and return y at crank angle 0 of each turn, and why the run ended early."""
+    """Run the mechanism; return y at crank angle 0 of each turn, shape (turns + 1, n), and why the run ended early, or ""."""
     if point.drive.speed is not None:
         mechanism, flow = point.mechanism, point.flow
         x, count = flow.state(start, point.vector), len(mechanism.freedoms)
@@ -482,10 +490,10 @@ def _passages(point: OperatingPoint, start: FloatArray, turns: int) -> tuple[Flo
 
 
 def _leading(orbit: PeriodicOrbit, scale: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.complex128]]:
-    """Return the direction of greatest growth, of unit length, and the vector that measures it, both scaled.
+    """Return the direction of greatest growth, of unit length, and a vector that measures the growth, both scaled.
 
-    The vector is the left eigenvector of the largest multiplier: the product with it grows by the same factor each turn, while
-    for a complex pair the distance itself oscillates.
+    The vector is the left eigenvector of the largest multiplier: the product of the deviation with it grows by the same factor
+    in each turn, whereas for a complex pair the distance itself oscillates.
     """
     scaled = orbit.monodromy * scale / scale[:, None]
     values, left, right = scipy.linalg.eig(scaled, left=True)
@@ -495,5 +503,5 @@ def _leading(orbit: PeriodicOrbit, scale: NDArray[np.float64]) -> tuple[NDArray[
 
 
 def _growth(size: NDArray[np.float64]) -> float:
-    """Return the growth factor per turn, by regression of the logarithms."""
+    """Return the growth factor per turn of sizes at successive turns, by linear regression of their logarithms."""
     return exp(float(np.polyfit(np.arange(len(size)), np.log(size), 1)[0]))

@@ -26,7 +26,7 @@ from ..motion.variables import along_parameters, gradient_names, require_variabl
 from .variations import Place, Variations
 
 FloatArray = NDArray[np.float64]
-#: Newton steps to a special point at most, relative size of the last step, and greatest relative distance of the point.
+#: Newton steps to a special point at most, relative size of the last step, and greatest relative distance to the point.
 _STEPS, _LAST, _FAR = 12, 1e-7, 0.25
 #: Product of unit left and right eigenvectors below which a multiplier is double and has no derivative.
 _DOUBLE = 1e-6
@@ -75,7 +75,7 @@ class Gradient:
         return dict(zip(self.names, (self.by * self.at / self.value).tolist()))
 
     def movers(self, count: int = 3) -> tuple[str, ...]:
-        """Return the parameters with the greatest elasticities, the greatest first."""
+        """Return the names of the parameters with the greatest elasticities in absolute value, the greatest first."""
         shares = {name: abs(value) for name, value in self.elasticities.items() if value != 0.0}
         return tuple(sorted(shares, key=lambda name: -shares[name])[:count])
 
@@ -89,7 +89,7 @@ class PointGradient:
     along : str
         FMI name of the branch's parameter, such as ``drive.speed``.
     place : Gradient
-        Gradient of that parameter's value at the point, with respect to the other parameters.
+        Gradient of the value of the branch's parameter at the point, with respect to the other parameters.
     amplitude : Gradient
         Gradient of the amplitude of the motion at the point.
     orbit : PeriodicOrbit
@@ -111,9 +111,9 @@ class MotionGradient:
     names : tuple of str
         FMI names of the m parameters.
     values : ndarray, shape (m,)
-        Their values.
+        Values of the parameters.
     along : ndarray, shape (c, m)
-        Derivatives of the numbers of the drive, followed by the constants of the equations.
+        Derivatives by the parameters of the numbers of the drive and, below them, of the constants of the equations.
     """
 
     def __init__(self, orbit: PeriodicOrbit, names: Sequence[str] | None = None) -> None:
@@ -136,7 +136,7 @@ class MotionGradient:
 
     @property
     def forcing(self) -> FloatArray:
-        """Derivatives of the rates by the parameters at fixed y; shape (k, s, n, m)."""
+        """Derivatives of the rates by the parameters at fixed y, at the nodes of `variations`; shape (k, s, n, m)."""
         return self.variations.forcing
 
     @cached_property
@@ -165,13 +165,13 @@ class MotionGradient:
 
     @property
     def speed(self) -> Gradient:
-        """Gradient of the crank's mean speed (rad/s), which is part of the motion under a torque."""
+        """Gradient of the crank's mean speed (rad/s), which under a torque is part of the solution."""
         way = self.orbit.flow.period * self.orbit.turns
         return self._gradient(way / self.period.value, -way / self.period.value**2 * self.period.by)
 
     @cached_property
     def _swing(self) -> tuple[tuple[float, float, Place], ...]:
-        """Sign, value and place of the greatest and of the least value of the first component of y."""
+        """The greatest and the least value of the first component of y, each as (sign +1 or -1, value, place)."""
         found = []
         for sign in (1.0, -1.0):
             value, place = self.variations.greatest(sign * self.variations.y[..., 0])
@@ -180,17 +180,17 @@ class MotionGradient:
 
     @cached_property
     def amplitude(self) -> Gradient:
-        """Gradient of half the range of the first free coordinate, as `PeriodicOrbit.amplitude`."""
+        """Gradient of `PeriodicOrbit.amplitude`, half the range of the first free coordinate."""
         return self.amplitude_along(self._solution[0])
 
     def amplitude_along(self, solution: FloatArray) -> Gradient:
         """Return the gradient of the amplitude for given derivatives of the motion, shape (k, s, n, m)."""
-        # the place of an extremum does not count to first order
+        # to first order the value of an extremum does not depend on its place
         by = [0.5 * sign * place.weights @ solution[place.panel, :, 0, :] for sign, _, place in self._swing]
         return self._gradient(0.5 * (self._swing[0][1] - self._swing[1][1]), by[0] + by[1])
 
     def amplitude_curvature(self, along: str) -> Gradient:
-        """Return the gradient of the amplitude's derivative by one of the parameters."""
+        """Return the gradient of the derivative of the amplitude with respect to the parameter ``along``."""
         v, solution = self.variations, self._solution[0]
         number = self.names.index(along)
         by_y, by_constant = v.second(solution[..., number], self.along[:, number])
@@ -203,7 +203,7 @@ class MotionGradient:
         second, rates = v.periodic(forcing)[0], v.by_y @ solution + self.forcing
         total = np.zeros(len(self.names))
         for sign, _, place in self._swing:
-            # the place moves so that the rate there stays zero
+            # the place of the extremum moves so that the rate there stays zero
             curvature = v.slope(place.panel, v.rates[place.panel, :, 0], place.position)
             rate = place.weights @ rates[place.panel, :, 0, :]
             total += 0.5 * sign * (place.weights @ second[place.panel, :, 0, :] - rate[number] * rate / curvature)
@@ -220,7 +220,7 @@ class MotionGradient:
         return self._extreme(self._numbers(name, False), -1.0)
 
     def peak(self, name: str) -> Gradient:
-        """Return the gradient of the greatest modulus of an output or a joint's force: ``drive.applied_torque``, ``pin.A``."""
+        """Return the gradient of the greatest modulus of an output (``drive.applied_torque``) or joint force (``pin.A``)."""
         return self._extreme(self._numbers(name, True), 0.0)
 
     def _numbers(self, name: str, joints: bool) -> list[int]:
@@ -237,14 +237,17 @@ class MotionGradient:
         return self.variations.outputs()
 
     def _extreme(self, numbers: list[int], sign: float) -> Gradient:
-        """Return the gradient of the greatest (sign 1) or least (-1) value of an output, or of the greatest modulus (0)."""
+        """Return the gradient of the greatest (sign 1) or least (-1) value of an output, or of the greatest modulus (0).
+
+        ``numbers`` are the outputs; for the modulus of a force they are its components.
+        """
         values = self._outputs[..., numbers]
         value, place = self.variations.greatest(sign * values[..., 0] if sign else values)
         by = np.zeros(len(self.names))
         for column, number in enumerate(numbers):
             by_y, by_constant = self.variations.output_derivatives(place.panel, number)
             change = np.einsum("sn,snm->sm", by_y, self._solution[0][place.panel]) + by_constant @ self.along
-            # the place of an extremum does not count to first order
+            # to first order the value of an extremum does not depend on its place
             share = sign or place.weights @ values[place.panel, :, column] / value
             by += share * (place.weights @ change)
         return self._gradient(value, by) if sign == 0.0 else self._gradient(sign * value, sign * by)
@@ -263,7 +266,7 @@ class MotionGradient:
 
     @cached_property
     def multipliers(self) -> NDArray[np.complex128]:
-        """Derivatives of the Floquet multipliers in the order of the orbit's, shape (n, m).
+        """Derivatives of the Floquet multipliers, in the order of `PeriodicOrbit.multipliers`, shape (n, m).
 
         Raises
         ------
@@ -283,7 +286,7 @@ class MotionGradient:
     def test(self, kind: Crossing) -> Gradient:
         """Return the gradient of a function that is zero where a multiplier crosses the unit circle: see `crossing_test`.
 
-        It is smooth even where two multipliers meet; their moduli are not.
+        The function is smooth even where two multipliers meet, whereas their moduli are not.
         """
         matrix, by = _singular(self.orbit.monodromy, self.monodromy, kind)
         total = np.zeros(len(self.names))
@@ -313,9 +316,9 @@ def motion_gradient(orbit: PeriodicOrbit, names: Sequence[str] | None = None) ->
     Raises
     ------
     UnknownNameError
-        If there is no parameter of a name.
+        If a name is not that of a parameter.
     InputError
-        If one does not act in this drive.
+        If a parameter does not act in this drive.
     LinkworkError
         If the variational equations cannot be resolved.
 
@@ -355,7 +358,7 @@ def extremum_gradient(orbit: PeriodicOrbit, along: str, names: Sequence[str] | N
     others = _others(orbit, along, names)
     motion = MotionGradient(extremum_orbit(orbit, along), (*others, along))
     slopes = motion.amplitude_curvature(along).by
-    # at the extremum the amplitude does not change with its place
+    # at the extremum the amplitude does not change with the parameter ``along``
     amplitude, at = motion.amplitude, motion.values[:-1]
     return PointGradient(
         along=along,
@@ -411,10 +414,10 @@ def boundary_gradient(orbit: PeriodicOrbit, kind: Crossing, names: Sequence[str]
     Parameters
     ----------
     orbit : PeriodicOrbit
-        The motion with a multiplier on the unit circle, as a `CrossingCurve` has them.
+        A motion with a multiplier on the unit circle, such as an orbit of a `CrossingCurve`.
     kind : Crossing
     names : sequence of str
-        The parameters, such as both axes of a chart.
+        FMI names of the parameters, such as the two axes of a chart.
 
     Returns
     -------
@@ -439,7 +442,7 @@ _Step = Callable[[MotionGradient], tuple[FloatArray, float]]
 def _locate_motion(orbit: PeriodicOrbit, along: str, step_of: _Step, what: str) -> PeriodicOrbit:
     """Find the special point near a motion by Newton's method and return the motion there.
 
-    Raises LinkworkError if Newton's method goes elsewhere.
+    Raises LinkworkError if Newton's method does not converge to a point near the motion.
     """
     begun = value_of(orbit.parameters, orbit.drive, along)
     for _ in range(_STEPS):
@@ -447,7 +450,7 @@ def _locate_motion(orbit: PeriodicOrbit, along: str, step_of: _Step, what: str) 
         try:
             change, step = step_of(motion)
         except (np.linalg.LinAlgError, ZeroDivisionError):
-            # what is sought does not depend on the parameter
+            # the condition does not depend on the parameter
             break
         value = float(motion.values[0]) + step
         if not abs(value - begun) < _FAR * abs(begun):
@@ -466,7 +469,7 @@ def _locate_motion(orbit: PeriodicOrbit, along: str, step_of: _Step, what: str) 
 def _extremum_step(motion: MotionGradient) -> tuple[FloatArray, float]:
     (along,) = motion.names
     size, slope, curvature = motion.amplitude.value, motion.amplitude[along], motion.amplitude_curvature(along)[along]
-    # near a resonance 1 / amplitude^2 is nearly a parabola, near a minimum amplitude^2 is
+    # near a resonance 1 / amplitude^2 is nearly a parabola, near a minimum amplitude^2 is nearly one
     peaked = 3.0 * slope**2 - size * curvature
     step = slope * size / (peaked if peaked > 0.0 else -(slope**2) - size * curvature)
     return motion.start[:, 0] * step, step
@@ -479,11 +482,11 @@ def _crossing_step(motion: MotionGradient, kind: Crossing) -> tuple[FloatArray, 
 
 
 def _fold_step(motion: MotionGradient) -> tuple[FloatArray, float]:
-    """Step to the fold: the map over a period has a fixed point, and the matrix M - I the singular value zero."""
+    """Return Newton's step to the fold, where the map over a period has a fixed point and the matrix M - I is singular."""
     v, n, orbit = motion.variations, len(motion.orbit.start), motion.orbit
     left, right = _null_vectors(v)
     by_y, by_constant = v.second(v.fundamental @ right)
-    # of the motion, by its start and by the parameter
+    # derivatives of the motion by its start and by the parameter
     columns = np.concatenate([v.fundamental, v.from_start(np.zeros((n, 1)), v.forcing)], axis=-1)
     along = np.hstack([np.zeros((len(motion.along), n)), motion.along])
     matrix = np.vstack(
@@ -507,7 +510,7 @@ def _test(motion: MotionGradient, kind: Crossing) -> FloatArray:
 
 
 def _singular(matrix: FloatArray, by: FloatArray, kind: Crossing) -> tuple[FloatArray, FloatArray]:
-    """Return a matrix, (n, n), that is singular at a crossing, and its derivatives, (n, n, m), from the monodromy matrix."""
+    """Return a square matrix that is singular at a crossing, and its derivatives, (..., m), from the monodromy matrix."""
     if kind is not Crossing.TORUS:
         sign = 1.0 if kind is Crossing.FOLD else -1.0
         return np.eye(len(matrix)) - sign * matrix, -sign * by
@@ -530,14 +533,14 @@ def _null_vectors(v: Variations) -> tuple[FloatArray, FloatArray]:
 def _fold_motion(motion: MotionGradient, shift: FloatArray) -> FloatArray:
     """Return the derivatives of the motion at a fold that moves by ``shift`` along the last parameter; shape (k, s, n, m).
 
-    The first-order equations determine it up to a multiple of the eigenvector. The second-order equations determine the
+    The first-order equations determine them up to a multiple of the eigenvector. The second-order equations determine this
     multiple, since the multiplier stays +1. The last column is zero.
     """
     v, n, m = motion.variations, len(motion.variations.scale), len(shift)
     left, right = _null_vectors(v)
     moved = np.vstack([np.eye(m), shift]) if m else np.zeros((1, 0))
     forcing, along = v.forcing @ moved, motion.along @ moved
-    # bordered by both vectors the matrix is regular
+    # bordered by the left and the right eigenvector the matrix is regular
     matrix = np.block(
         [[v.monodromy - np.eye(n), (left * v.scale**2)[:, None]], [(right / v.scale**2)[None, :], np.zeros((1, 1))]]
     )

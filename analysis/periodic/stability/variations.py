@@ -1,12 +1,12 @@
 """Solve the variational equations of a periodic motion, to second order and with parameters, by Gauss collocation.
 
-The turn is divided into panels on which the motion is a polynomial to within rounding. On a panel the linear equations
-d' = A d + r are solved at Gauss's points for any number of right-hand sides at once, by the implicit Runge-Kutta method of
-those points (E. Hairer, S. P. Norsett and G. Wanner, Solving Ordinary Differential Equations I, section II.7). The panels are
-joined by the condition that the motion is periodic, which works as well for unstable motions. The motion itself is that of the
-orbit, sampled: in contrast to `motion.collocation`, which solves for the motion, these equations take any forcing r, friction
-and torques. The derivatives A of the rates, those by constants, and the second derivatives along a direction are traced from
-the equations.
+The period is divided into panels on which the motion is a polynomial to within rounding. On a panel the linear equations
+d' = A d + r are solved at Gauss points for any number of right-hand sides at once, by the implicit Runge-Kutta method of these
+points (E. Hairer, S. P. Norsett and G. Wanner, Solving Ordinary Differential Equations I, section II.7). The panels are joined
+by the condition that the solution is periodic, which works for unstable motions, too. The motion itself is sampled from the
+orbit. `motion.collocation` solves for the motion; the equations here, in contrast, allow any forcing r, friction and torques.
+The derivatives A of the rates, the derivatives by constants, and the second derivatives along a direction are traced from the
+equations.
 """
 
 from __future__ import annotations
@@ -30,30 +30,31 @@ from ..motion.flow import PLAIN, STATE, Flow
 from ..motion.orbit import PeriodicOrbit
 
 FloatArray = NDArray[np.float64]
-#: Gauss points of a panel; panels of a turn to begin with; halvings of a panel at most.
+#: Gauss points of a panel; panels of a turn at first; halvings of a panel at most.
 _POINTS, _PANELS, _HALVINGS = 8, 32, 16
 #: Size of the last coefficients over a panel above which it is halved: of the rates and their derivatives, in the scale of y,
 #: and of the effect of a parameter, relative to its greatest.
 _RESOLVED, _EFFECT = 1e-10, 1e-8
 #: Imaginary part below which a root counts as real.
 _REAL = 1e-9
-#: Change of the rates by a parameter, relative to that by the motion for changes as large as both are, that is rounding.
+#: Effect of a parameter on the rates, relative to the effect of the motion, below which it counts as a rounding error; both are
+#: for changes as large as the quantities themselves.
 _NO_EFFECT = 1e-10
-#: Difference of the monodromy matrix from the orbit's, relative to its greatest entry, that is an error.
+#: Difference of the monodromy matrix from the orbit's, relative to its greatest entry, above which an error is raised.
 _AGREES = 1e-6
 #: Least singular value, relative to the norm, up to which a matrix is singular to within rounding.
 _ROUNDING = 1e-15
 _GAUSS = gauss(_POINTS)
-#: Legendre's polynomials on a grid of a panel with both ends.
+#: Legendre polynomials on a grid over a panel, its two ends included.
 _GRID = legendre.legvander(np.linspace(-1.0, 1.0, 4 * _POINTS + 1), _POINTS - 1)
 
 
 class Place(NamedTuple):
-    """A point of the period: its panel, its position there from -1 to 1, and the weights by which the nodes interpolate."""
+    """A point of the period."""
 
-    panel: int
-    position: float
-    weights: FloatArray
+    panel: int  # number of its panel
+    position: float  # position on the panel, from -1 to 1
+    weights: FloatArray  # weights of the values at the nodes that interpolate at the point, shape (s,)
 
 
 class Variations:
@@ -77,11 +78,11 @@ class Variations:
     y, rates : ndarray, shape (k, s, n)
         The motion and its derivative by the angle.
     by_y : ndarray, shape (k, s, n, n)
-        Derivatives of the rates.
+        Derivatives of the rates with respect to y.
     by_constant : ndarray, shape (k, s, n, c)
-        The same with respect to the numbers of the drive and, after them, the constants.
+        Derivatives of the rates with respect to the numbers of the drive and, after them, the constants.
     forcing : ndarray, shape (k, s, n, m)
-        Derivatives of the rates with respect to the parameters, the motion held.
+        Derivatives of the rates with respect to the parameters, at fixed y.
     monodromy : ndarray, shape (n, n)
     """
 
@@ -97,7 +98,7 @@ class Variations:
             )
 
     def _divide(self, along: FloatArray) -> None:
-        """Choose panels on which motion, derivatives and forcing are resolved."""
+        """Choose panels that resolve the motion, its derivatives and the forcing."""
         flow = self.flow
         edges = np.linspace(0.0, flow.period * self.orbit.turns, _PANELS * self.orbit.periods + 1)
         if self.orbit.stations is not None:
@@ -114,7 +115,7 @@ class Variations:
             self.rates, first = self._first()
             self.by_y, self.by_constant = first[..., : flow.size], first[..., flow.size :]
             self.forcing = self.by_constant @ along
-            # a parameter counts by its greatest effect; on a motion that stands still many have none but rounding
+            # effects are relative to the greatest one of a parameter; in a motion at rest many are only rounding errors
             effect = np.abs(self.forcing / self.scale[:, None]).max(axis=(0, 1, 2), initial=1e-300)
             effect = np.maximum(effect, least * np.abs(self.by_y / relative).max())
             rough = np.zeros(len(self.h), dtype=bool)
@@ -137,7 +138,7 @@ class Variations:
     def _call(
         self, name: str, size: int, direction: FloatArray | None = None, along: FloatArray | None = None
     ) -> FloatArray:
-        """Evaluate a function of `_code` at the nodes, along a direction of y and of the constants; shape (k, s, size)."""
+        """Evaluate a function of `_code` at the nodes, along a direction of y and one of the constants; shape (k, s, size)."""
         direction = np.zeros_like(self.y) if direction is None else direction
         along = np.zeros(self.constants) if along is None else along
         arguments = np.concatenate([self.y, direction, self.angles[..., None]], axis=-1)
@@ -162,7 +163,7 @@ class Variations:
         return self.flow.drive_size + len(self._p)
 
     def _first(self) -> tuple[FloatArray, FloatArray]:
-        """Return the rates at the nodes and their first derivatives."""
+        """Return the rates at the nodes, (k, s, n), and their derivatives by y and by the constants, (k, s, n, n + c)."""
         n, width = self.flow.size, self.flow.size + self.constants
         found = self._call("first", n * (1 + width))
         return found[..., :n], found[..., n:].reshape(*self.angles.shape, width, n).swapaxes(-1, -2)
@@ -173,9 +174,9 @@ class Variations:
         Parameters
         ----------
         direction : ndarray, shape (k, s, n)
-            Of the motion.
+            Direction of y at the nodes.
         along : ndarray, shape (c,), optional
-            Of the numbers of the drive and the constants.
+            Direction of the numbers of the drive and the constants; zero without it.
         """
         n, width = self.flow.size, self.flow.size + self.constants
         found = self._call("second", n * width, direction, along)
@@ -185,20 +186,20 @@ class Variations:
     # Linear equations
 
     def _solve_panels(self) -> None:
-        """Solve d' = A d + r on each panel for d at its beginning and for r."""
+        """Compute the matrices that give d on each panel, for d' = A d + r, from d at its beginning and from r."""
         n, k = self.flow.size, len(self.h)
         size = _POINTS * n
         integrals = self.h[:, None, None] * _GAUSS.integrals
         matrix = np.eye(size) - np.einsum("kij,kjab->kiajb", integrals, self.by_y).reshape(k, size, size)
         inverse = np.linalg.inv(matrix)
-        #: from r, and from d at the beginning, to d at the nodes
+        #: matrices from r, and from d at the beginning, to d at the nodes
         self._to_nodes = np.einsum("kxia,kij->kxja", inverse.reshape(k, size, _POINTS, n), integrals).reshape(
             k, size, size
         )
         self._from_start = inverse.reshape(k, size, _POINTS, n).sum(axis=2)
         weights = self.h[:, None] * _GAUSS.weights
         weighted = np.einsum("ki,kiab->kaib", weights, self.by_y).reshape(k, n, size)
-        #: from r, and from d at the beginning, to d at the end
+        #: matrices from r, and from d at the beginning, to d at the end
         self._to_end = weighted @ self._to_nodes + np.einsum("ki,ab->kaib", weights, np.eye(n)).reshape(k, n, size)
         self.steps = np.eye(n) + weighted @ self._from_start
         starts = np.empty((k, n, n))
@@ -244,7 +245,7 @@ class Variations:
         Raises
         ------
         LinkworkError
-            If there is none, exactly at a fold.
+            If there is no such solution: exactly at a fold.
         """
         starts = _solve_cyclic(self.steps, self._gains(forcing))
         return self._at_nodes(starts, forcing), starts[0]
@@ -257,21 +258,21 @@ class Variations:
         return found
 
     def slope(self, panel: int, values: FloatArray, position: float) -> float:
-        """Return the derivative by the angle of values at the nodes of a panel, shape (s,)."""
+        """Return the derivative by the angle, at a position on a panel, of values at its nodes, shape (s,)."""
         series = legendre.legder(_GAUSS.coefficients @ values)
         return float(legendre.legval(position, series) * 2.0 / self.h[panel])
 
     def greatest(self, values: FloatArray) -> tuple[float, Place]:
-        """Return the greatest value over the period of values (k, s) at the nodes, and its place.
+        """Return the greatest value over the period of a quantity with given values at the nodes, shape (k, s), and its place.
 
-        Of vectors, shape (k, s, c), the greatest modulus.
+        For a vector quantity, shape (k, s, c), it is the greatest modulus.
         """
         vectors = values.ndim == 3
         coefficients = np.einsum("is,ks...->ki...", _GAUSS.coefficients, values)
         on_grid = np.einsum("gi,ki...->kg...", _GRID, coefficients)
         first = int(((on_grid**2).sum(axis=-1) if vectors else on_grid).max(axis=1).argmax())
         found = []
-        # next to an end of a panel the rounding decides which one it is
+        # next to an end of a panel rounding errors decide on which panel the greatest value lies
         for panel in (first - 1, first, (first + 1) % len(self.h)):
             series = coefficients[panel]
             if vectors:
@@ -301,16 +302,16 @@ class Variations:
 
 
 def _solve_cyclic(steps: FloatArray, gains: FloatArray) -> FloatArray:
-    """Solve for d at the beginning of each panel, shape (k, n, m), so that each panel ends where the next one begins.
+    """Solve for d at the beginning of each panel, shape (k, n, m), so that d is continuous over the closed period.
 
-    Pairs of panels are merged step by step: orthogonal rotations eliminate d between them, so that neither growth nor decay
-    accumulates.
+    ``steps`` and ``gains`` give d at the end of a panel: step @ d + gain. Pairs of panels are merged repeatedly: orthogonal
+    rotations eliminate d between the two, so that neither growth nor decay accumulates.
     """
     count, n, _ = gains.shape
-    # empty panels make their number a power of two
+    # panels of length zero make their number a power of two
     more = (1 << (count - 1).bit_length()) - count
     whole = np.broadcast_to(np.eye(n), (count + more, n, n))
-    # a d + b (d at the next) = right
+    # a d + b (d at the beginning of the next panel) = right
     a, b = np.concatenate([-steps, -whole[:more]]), whole
     right = np.pad(gains, ((0, more), (0, 0), (0, 0)))
     levels = []
@@ -332,7 +333,7 @@ def _solve_cyclic(steps: FloatArray, gains: FloatArray) -> FloatArray:
 
 
 class _Symbols(NamedTuple):
-    """Symbols of a flow's variables, and its functions of them."""
+    """Symbols of a flow's variables and of their directions (``d...``), and expressions of its rates and outputs."""
 
     y: Any
     dy: Any
@@ -370,9 +371,10 @@ def _symbols(flow: Flow, switched: bool) -> _Symbols:
 
 @cache
 def _code(flow: Flow, switched: bool, name: str) -> MachineCode:
-    """Return machine code of the rates with their first derivatives, of these along a direction, or of the outputs.
+    """Return machine code of the rates and their derivatives, of these derivatives along a direction, or of the outputs.
 
-    All are functions of (y, a direction of it, the angle), modes, drive and constants with their directions.
+    ``name`` is "first", "second" or "outputs". The arguments are (y, its direction, the angle), the modes, and the drive and
+    the constants, each with its direction.
     """
     casadi = symbolic.library()
     with MAKING:
