@@ -1,7 +1,7 @@
 """The ``linkwork`` command.
 
-Exit codes: 0 done; 1 an input was wrong, one sentence says which; 2 the command line was wrong; 3 a run ended early (its data
-are kept); 4 a check failed; 130 interrupted from the keyboard (what was computed is kept).
+Exit codes: 0 done; 1 an input was wrong, and a sentence says which; 2 the command line was wrong; 3 a run ended early (its data
+are kept); 4 a check failed; 130 interrupted from the keyboard (results so far are kept).
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from .codes import ENDED_EARLY as ENDED_EARLY
 from .codes import INTERRUPTED as INTERRUPTED
 from .codes import WRONG as WRONG
 
-#: Every command: the module of this package that has it, as a function of its name, and its line in ``linkwork --help``.
+#: Every command by name: the module of this package that defines it, and its line in ``linkwork --help``.
 COMMANDS = {
     "basins": ("motions", "Find all periodic motions, and which start ends in which."),
     "build": ("making", "Build and validate the FMUs."),
@@ -47,7 +47,7 @@ COMMANDS = {
 
 
 class Commands(click.Group):
-    """A group whose errors are sentences like those of the commands, and which knows what was nearly meant."""
+    """A group of commands that reports errors as sentences, and suggests the nearest command for an unknown one."""
 
     def resolve_command(
         self, ctx: click.Context, args: list[str]
@@ -59,11 +59,11 @@ class Commands(click.Group):
         return super().resolve_command(ctx, args)
 
     def main(self, *arguments: Any, standalone_mode: bool = True, **extra: Any) -> Any:
-        """Run the command line; what is wrong with it is reported in the style of every other error."""
+        """Run the command line; report errors of the command line in the style of all other errors."""
         plain: Any = super().main
         if not standalone_mode:
             return plain(*arguments, standalone_mode=False, **extra)
-        # imports and results are many objects that stay: looking through them again and again takes a tenth of a command's time
+        # imports and results are many long-lived objects: searching them for garbage takes a tenth of a command's time
         gc.set_threshold(50_000, 20, 100)
         try:
             sys.exit(plain(*arguments, standalone_mode=False, **extra) or 0)
@@ -81,7 +81,7 @@ class Commands(click.Group):
 
 
 def _sentence(error: click.ClickException) -> str:
-    """Return Click's message as one sentence in small letters, with a pointer to the help."""
+    """Return Click's message as one sentence that starts in lower case, with a reference to the help."""
     text = error.format_message().strip().removesuffix(".").replace(". Did you mean", "; did you mean")
     # S1, a4 and the like stay as they are
     if text[1:2].islower() or text[1:2] == " ":

@@ -1,4 +1,4 @@
-"""``python -m analysis.cli``."""
+"""Run the ``linkwork`` command as ``python -m analysis.cli``."""
 
 from . import main
 

@@ -1,4 +1,4 @@
-"""What the commands share: options, console output, exit codes, and the case that a command is about."""
+"""Functions that the commands share: options, console output, exit codes, and reading the case of a command."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ from .codes import ENDED_EARLY as ENDED_EARLY
 from .codes import INTERRUPTED as INTERRUPTED
 from .codes import WRONG as WRONG
 
-#: Wide enough for the tables where the output goes to a file or a pipe.
+#: If the output goes to a file or a pipe, the width is enough for the tables.
 console = Console(emoji=False) if sys.stdout.isatty() else Console(emoji=False, width=120)
 errors = Console(emoji=False, stderr=True)
 
@@ -39,17 +39,17 @@ def visible(text: str) -> str:
 
 
 def plain(text: str) -> Text:
-    """Return a text for a table as it was typed, without reading markup or emoji codes in it."""
+    """Return a text for a table in which markup and emoji codes have no effect."""
     return Text(visible(text))
 
 
-#: A number in a sentence, and one with a unit of the mechanisms' equations; quoted ones are as the user wrote them.
+#: Patterns of a number in a sentence, and of a number with a unit in SI; numbers in quotes are left out.
 NUMBER = r"-?\d+(?:\.\d+)?(?:e[-+]?\d+)?"
 _QUANTITY = re.compile(rf"(?<![-'\w.])({NUMBER}) (N\.m|N|m)(?!\w|[./](?!rad\b)\w)")
 
 
 def in_units(text: str, shown: Callable[[str], tuple[str, float]]) -> str:
-    """Return a sentence about a mechanism with lengths, forces and torques in other units: ``shown`` gives name and factor."""
+    """Return a sentence with its lengths, forces and torques in other units; ``shown`` maps a unit to (name, factor)."""
 
     def converted(found: re.Match[str]) -> str:
         unit, factor = shown(found[2])
@@ -64,20 +64,20 @@ def print_error(text: str, style: str = "yellow") -> None:
 
 
 def print_written(paths: Iterable[Path]) -> None:
-    """Name the files that were written."""
+    """Print the names of the files that were written."""
     for path in paths:
         say(f"wrote {path}")
 
 
 def handled(command: Callable[..., Any]) -> Callable[..., Any]:
-    """Turn Linkwork's errors into a sentence and an exit code, and protect files that the command did not write."""
+    """Decorate a command: report errors as a sentence and an exit code, and protect files that the command did not write."""
 
     @wraps(command)
     def run(*arguments: Any, **options: Any) -> Any:
         from ..files import written_by
 
         context = click.get_current_context()
-        # without the name of the program, which may be that of Python
+        # without the name of the program, which may be python
         names = context.command_path.removeprefix(context.find_root().command_path)
         with written_by(names.strip(), bool(context.meta.get(_FORCE))) as writing:
             try:
@@ -108,7 +108,7 @@ def handled(command: Callable[..., Any]) -> Callable[..., Any]:
 
 
 def check_tolerance(context: click.Context, parameter: click.Parameter, value: float | None) -> float | None:
-    """Check the value of a tolerance option, as its callback; NaN is refused too."""
+    """Check the value of a tolerance option (a callback of Click); NaN is refused too."""
     if value is not None and not 0.0 < value <= 1.0:
         raise click.BadParameter(f"{value} is not between 0 and 1")
     return value
@@ -127,11 +127,11 @@ def tolerance_option(*names: str, default: float | None = None, help: str) -> Ca
 
 
 def check_place(context: click.Context, parameter: click.Parameter, value: str | None) -> str | None:
-    """Check, as a callback of an option, that a folder or a file can be made, before anything is computed."""
+    """Check that the folder or file of an option can be written (a callback of Click), before anything is computed."""
     if value is None:
         return value
     place = Path(value)
-    # a file is replaced by another one in its folder
+    # a file is replaced by a new one, for which its folder must be writable
     there = next(path for path in ((place, *place.parents) if place.is_dir() else place.parents) if path.exists())
     if not there.is_dir():
         raise click.BadParameter(f"{value} cannot be made: {there} is no folder")
@@ -149,14 +149,14 @@ def out_option(default: str = "out", help: str = "Folder for CSV and plots.") ->
 
 #: Seconds within which the scheduler of a cluster must answer.
 _PATIENCE = 10
-#: Where the context of a command keeps the option --force.
+#: Key under which the context of a command stores the option --force.
 _FORCE = "linkwork.force"
 force_option = click.option(
     "--force",
     is_flag=True,
     expose_value=False,
     callback=lambda context, _, value: context.meta.update({_FORCE: value}),
-    help="Write over files that this command did not write, too.",
+    help="Overwrite files that this command did not write, too.",
 )
 
 
@@ -196,14 +196,14 @@ def workers_options(default: int | None = None) -> Callable[..., Any]:
         default=default,
         show_default=default is not None,
         callback=_number_of_jobs,
-        help="Processes on this machine; -1 for one a core.",
+        help="Processes on this machine; -1 for one per core.",
     )
     scheduler = click.option(
         "--scheduler",
         metavar="ADDRESS",
         expose_value=False,
         callback=_join,
-        help="Of a Dask cluster, such as tcp://10.0.0.5:8786: run on its cores instead.",
+        help="Run on the cores of a Dask cluster with this scheduler, such as tcp://10.0.0.5:8786.",
     )
     return lambda command: jobs(scheduler(command))
 
@@ -223,7 +223,7 @@ def set_option(example: str) -> Callable[..., Any]:
 
 
 def _check_libraries(*names: str) -> None:
-    """Check that libraries are installed, as a callback of an option must."""
+    """Raise Click's BadParameter if one of the libraries is not installed."""
     try:
         require(*names)
     except MissingLibraryError as error:
@@ -240,12 +240,12 @@ html_option = click.option(
     "--html",
     is_flag=True,
     callback=_require_plotly,
-    help="Write the plot as a page with values under the pointer, too; needs Plotly.",
+    help="Write the plot also as a page with values under the pointer; needs Plotly.",
 )
 
 
 def save_picture(picture: Any, path: str | Path, *, html: bool) -> list[Path]:
-    """Write a picture as PNG, and as a page beside it if that is asked for; ``path`` is without the ending."""
+    """Write a picture as PNG, and with ``html`` also as a page; ``path`` has no ending. Return the paths written."""
     from .. import figures
     from ..files import save_figure, write_text
 
@@ -256,7 +256,7 @@ def save_picture(picture: Any, path: str | Path, *, html: bool) -> list[Path]:
 
 
 def plotted(wanted: bool, result: Any, path: str | Path, **options: Any) -> list[Path]:
-    """Plot a result into a file if plots are wanted, and return the paths written."""
+    """Plot a result to a file if plots are ``wanted``, and return the paths written."""
     from .. import figures
     from ..files import save_figure
 
@@ -267,17 +267,17 @@ plot_option = click.option("--plot/--no-plot", default=True, show_default=True, 
 
 
 def case_options(published: Iterable[str]) -> Callable[..., Any]:
-    """Add the argument CASE and the options --published, for these sets, and --set, which `chosen_case` takes."""
+    """Return a decorator that adds the argument CASE and the options --published and --set, see `chosen_case`."""
     options = (
         click.argument("case", required=False, type=click.Path(exists=True, dir_okay=False)),
-        click.option("--published", metavar="NAME", help=f"A published set instead: {', '.join(published)}."),
+        click.option("--published", metavar="NAME", help=f"A published set instead of a case: {', '.join(published)}."),
         set_option("slider.stiffness='2e6 dyn/cm' or drive.speed='300 rpm'; bare numbers are in SI"),
     )
     return lambda command: reduce(lambda done, option: option(done), reversed(options), command)
 
 
 def number_or_text(text: str) -> bool | int | float | str:
-    """Read a value from the command line: true, false, a bare number in SI, or else a text with its unit."""
+    """Read a value from the command line: true, false or a bare number (in SI); any other text is returned as it is."""
     if text in ("true", "false"):
         return text == "true"
     for kind in (int, float):
@@ -295,14 +295,14 @@ def unknown(name: str, known: Iterable[str], words: str) -> click.UsageError:
     return click.UsageError(str(unknown_name(name, known, words)))
 
 
-#: What a file of tables may be about, and the command that takes it.
+#: Kinds of files with tables: description, and the command that reads the file.
 RUN = "a case of a run", "linkwork run"
 PARAMETERS = "a file of parameters alone", "linkwork info"
 SYNTHESIS = "a synthesis case", "linkwork synthesize"
 SLIDER_MOTION = "a case of a slider's motion", "linkwork slider-motion"
 TUNING = "a case of a tuning", "linkwork tune"
 SYSTEM = "a system of parts", "linkwork system run"
-#: What no command takes for a case, by the ending of the file.
+#: Descriptions of files that are no cases, by ending.
 _OTHERS = {
     ".fmu": "an FMU: linkwork info {0} describes it, linkwork run CASE --fmu {0} runs it",
     ".csv": "a table of numbers: a case names it as the file of an input or a task",
@@ -313,7 +313,7 @@ _OTHERS = {
 
 
 def kind_of(tables: Mapping[str, Any]) -> tuple[str, str] | None:
-    """Return the kind of a case file, judged by the names of its tables; None if they do not show it."""
+    """Return the kind of a case file, such as `RUN`, by the names of its tables; None if they do not tell."""
     from ..linkages import described_in
     from ..mechanisms import MECHANISMS
     from ..run import COMMON, acting_on
@@ -337,19 +337,20 @@ def kind_of(tables: Mapping[str, Any]) -> tuple[str, str] | None:
 
 
 def check_kind(path: str, *wanted: tuple[str, str], settings: Iterable[str] = ()) -> None:
-    """Check that a file is of a kind that the command takes.
+    """Check that a file is of a kind that the command reads.
 
     Parameters
     ----------
     path : str
-    *wanted : kinds
+    *wanted : (str, str)
+        The kinds that the command reads, such as `RUN`.
     settings : iterable of str
-        Dotted names that the command line sets besides.
+        Dotted names of entries that the command line adds.
 
     Raises
     ------
     InputError
-        If it is of another kind, with the command that takes it, or cannot be read.
+        If the file cannot be read, or is of another kind; the message names the command for it.
     """
     from ..files import read_tables
 
@@ -363,14 +364,14 @@ def check_kind(path: str, *wanted: tuple[str, str], settings: Iterable[str] = ()
 
 
 def quantity(text: str, unit: str, option: str) -> float:
-    """Return the value of an option in SI, from a text with its unit or a bare number."""
+    """Return the value of an option in SI, from a text with its unit or a bare number in SI."""
     from .. import units
 
     return units.quantity(number_or_text(text), unit, option)
 
 
 def changes(settings: Sequence[str], read: Callable[[str], Any], example: str) -> dict[str, Any]:
-    """Return values by dotted name from the options ``--set NAME=VALUE``."""
+    """Return the values of the options ``--set NAME=VALUE`` by name; ``read`` converts the texts, ``example`` is for errors."""
     values: dict[str, Any] = {}
     for setting in settings:
         name, equals, text = setting.partition("=")
@@ -381,7 +382,7 @@ def changes(settings: Sequence[str], read: Callable[[str], Any], example: str) -
 
 
 def chosen_case(file: str | None, published: str | None, settings: Sequence[str]) -> Any:
-    """Return the case of a file or of a published set, with the changes of ``--set``."""
+    """Return the case of a file or of a published set with the changes of ``--set``, and print its warnings."""
     from ..run import case_from, in_sentences, load_case, published_case
 
     if (file is None) == (published is None):
@@ -400,7 +401,7 @@ def chosen_case(file: str | None, published: str | None, settings: Sequence[str]
 
 
 def say(text: str) -> None:
-    """Print a sentence as it is, in one line."""
+    """Print a sentence in one line, without markup or colours."""
     console.print(visible(text), markup=False, highlight=False, soft_wrap=True)
 
 
@@ -419,14 +420,14 @@ def show_table(
     ----------
     title : str
     headings : sequence of str
-        Of the columns; none for a list of names and values.
+        Headings of the columns; none for a list of names and values.
     rows : iterable of sequence of str
     words : collection of str
-        The headings of columns of words, which are aligned to the left; the others are of numbers.
+        Headings of columns of words, which are aligned to the left; all other columns are numbers.
     unwrapped : collection of str
-        The headings of columns that are kept in one line.
+        Headings of columns that are not wrapped.
     styles : iterable of str, optional
-        Of the rows, in rich's terms.
+        Styles of the rows, as rich names them.
     """
     grid = Table(title=plain(title), title_justify="left", show_header=bool(headings))
     for heading in headings:

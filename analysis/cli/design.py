@@ -1,4 +1,4 @@
-"""Commands about design: linkages that trace what is asked for."""
+"""The command that synthesizes linkages, and functions that commands about synthesis share."""
 
 from __future__ import annotations
 
@@ -33,12 +33,12 @@ from .common import (
 if TYPE_CHECKING:
     from ..synthesis import Assessment, Make, PinForces, Solution, TradeOff
 
-#: Further positions in a drawing.
+#: Number of further positions in a drawing.
 POSES = 6
 
 
 def settings_of(settings: Sequence[str]) -> dict[str, Any]:
-    """Return the overrides of a case file given as NAME=VALUE; a value is read as TOML, or else as text with a unit."""
+    """Return the overrides of a case file given as NAME=VALUE; a value that is not TOML is a text with a unit."""
 
     def value(text: str) -> Any:
         try:
@@ -50,23 +50,27 @@ def settings_of(settings: Sequence[str]) -> dict[str, Any]:
 
 
 def leave_if_stopped(stopped: Interrupted | None, kept: str) -> None:
-    """End with the exit code of a search that was stopped from the keyboard, saying what is kept of it."""
+    """Exit with the code for an interruption, if there was one, and say in ``kept`` which results are kept."""
     if stopped is not None:
         print_error(f"{stopped}; {kept}")
         sys.exit(INTERRUPTED)
 
 
 def search_options(command: Callable[..., Any]) -> Callable[..., Any]:
-    """Add the options that all commands with a search share."""
+    """Add the options that all commands with a search have."""
     for option in (
-        click.option("--plots/--no-plots", "--plot/--no-plot", default=True, show_default=True, help="Whether to write plots."),
+        click.option(
+            "--plots/--no-plots", "--plot/--no-plot", default=True, show_default=True, help="Whether to write plots."
+        ),
         out_option(help="Folder for the results."),
         workers_options(),
-        click.option("--seed", type=click.IntRange(0), help="Of the search: the same seed gives the same linkages."),
+        click.option(
+            "--seed", type=click.IntRange(0), help="Seed of the search: the same seed gives the same linkages."
+        ),
         click.option(
             "--objective",
             type=click.Choice(("error", "worst")),
-            help="The objective: the quality function of the task, or the greatest error; in place of the case's.",
+            help="The objective instead of the case's: error, the quality function of the task, or worst, the greatest error.",
         ),
     ):
         command = option(command)
@@ -74,7 +78,7 @@ def search_options(command: Callable[..., Any]) -> Callable[..., Any]:
 
 
 def overrides_of(settings: Sequence[str], **options: Any) -> dict[str, Any]:
-    """Return the overrides of a case file from ``--set`` and from the given options, ``table__name=value``."""
+    """Return the overrides of a case file from ``--set`` and from other options, given as ``table__name=value``."""
     given = {name.replace("__", "."): value for name, value in options.items() if value is not None}
     return settings_of(settings) | given
 
@@ -85,9 +89,9 @@ def print_solutions(
     forces: Sequence[PinForces] | None = None,
     violated: Callable[[Solution], str] | None = None,
 ) -> None:
-    """Print ranked solutions as a table, in mm and degrees, with the greatest force on their pins where that is known.
+    """Print ranked solutions as a table, in mm and degrees, with their greatest pin forces if ``forces`` are given.
 
-    ``violated`` returns the constraint that a linkage violates, empty if it keeps all; those that violate one are marked.
+    ``violated`` returns the constraint that a linkage violates, or an empty text; such linkages are marked.
     """
     from ..synthesis import format_transmission, format_variants, quality_cells, quality_headings
 
@@ -116,14 +120,14 @@ def print_solutions(
 
 
 def print_best(best: Assessment) -> None:
-    """Print the dimensions of a solution, and what an error in each costs."""
+    """Print the dimensions of a solution, and the effect of an error in each of them."""
     head, *rows = best.dimensions
     show_table("the first of them", head, rows, words=head[:1])
     console.print(best.rounding, highlight=False, soft_wrap=True)
 
 
 def write_described(best: Assessment, folder: Path, title: str, *, curve: str, text: str, drawn: str) -> list[Path]:
-    """Write the curve of a solution, its report, and its drawing as DXF and SVG, under these names; return the paths."""
+    """Write curve, report and drawing (DXF and SVG) of a solution to files with these stems; return the paths."""
     from ..files import save_drawing, write_text
     from ..synthesis import drawing
 
@@ -134,7 +138,7 @@ def write_described(best: Assessment, folder: Path, title: str, *, curve: str, t
 
 
 def write_linkages(solutions: Sequence[Solution], folder: Path, title: str, *, make: Make) -> list[Path]:
-    """Write the linkages as descriptions that run: the first, and of the others, with their ranks, the sound ones."""
+    """Write the first linkage, and the sound ones of the others, as case files that run; return the paths."""
     from ..files import write_tables
 
     names = [(s, "linkage.toml" if rank == 1 else f"linkage-{rank}.toml") for rank, s in enumerate(solutions, start=1)]
@@ -146,7 +150,7 @@ def write_linkages(solutions: Sequence[Solution], folder: Path, title: str, *, m
 
 
 def write_solution(best: Assessment, folder: Path, title: str, *, make: Make, plots: bool, animate: bool) -> list[Path]:
-    """Write everything about one solution: drawing, curve, report, parameters and a case that runs; return the paths."""
+    """Write all files of one solution: drawings, plates, curve, report, parameters, a case to run, plots; return the paths."""
     from .. import figures
     from ..files import save_drawing, save_figure, write_tables
     from ..run import save_parameters
@@ -176,7 +180,7 @@ def write_solution(best: Assessment, folder: Path, title: str, *, make: Make, pl
 
 
 def _forces(solution: Solution, make: Make) -> PinForces | None:
-    """Return the pin forces at constant speed; None if the plant has no such linkage, or it is not joined on its way."""
+    """Return the pin forces at constant speed; None if the pivot is moved, or the linkage has a circuit or branch defect."""
     from ..synthesis import pin_forces
 
     if solution.linkage.pivot is not None or not (solution.verdicts.circuit and solution.verdicts.branch):
@@ -188,7 +192,7 @@ def _forces(solution: Solution, make: Make) -> PinForces | None:
 @click.argument("case", type=click.Path(exists=True, dir_okay=False))
 @set_option("constraints.largest_link='300 mm' or task.n=36; lists as in TOML")
 @search_options
-@click.option("--animate", is_flag=True, help="Write a GIF of the first linkage over a turn, too.")
+@click.option("--animate", is_flag=True, help="Write also a GIF of the first linkage over a turn.")
 @handled
 def synthesize(
     case: str,
@@ -200,11 +204,11 @@ def synthesize(
     plots: bool,
     animate: bool,
 ) -> None:
-    """Find linkages that do what a CASE file (TOML or JSON) asks for: a path, a function, a quick return, a motion.
+    """Find linkages for the task of a CASE file (TOML or JSON): a path, a function, a quick return or a motion.
 
-    Four-bars, slider-cranks and geared five-bars, as search.kinds says. Writes the ranked linkages, and of the first its
-    drawing and plates (DXF, SVG), a sheet (PDF), curve, report, plots, the FMU's parameters, and a case that
-    'linkwork run' runs.
+    search.kinds selects four-bars, slider-cranks and geared five-bars. The command writes the ranked linkages, and for the
+    first one drawing and plates (DXF, SVG), a sheet (PDF), curve, report, plots, the FMU's parameters, and a case for
+    'linkwork run'.
 
     \b
     Examples:

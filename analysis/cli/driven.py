@@ -1,4 +1,4 @@
-"""What commands about a driven case share: how it is driven, and what they say of its motions."""
+"""Options and functions that commands about the periodic motions of a case share."""
 
 from __future__ import annotations
 
@@ -30,7 +30,11 @@ from .common import (
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Chosen:
-    """The case that a command is about, and how it is driven there."""
+    """The case of a command, with options on its drive.
+
+    ``stem`` is the first part of the names of files, ``speed`` and ``guess_speed`` are texts of the options or None, ``folder``
+    is that of the results.
+    """
 
     case: Any
     stem: str
@@ -39,7 +43,7 @@ class Chosen:
     folder: Path
 
     def drive(self, speed: str | None = None) -> Any:
-        """Return the drive of the case with its constant forces; a given speed replaces the drive of the crank."""
+        """Return the drive of the case with its constant forces; a given speed, as text, replaces the drive of the crank."""
         from ..periodic import NothingFreeError, VaryingInputError, drive_of
 
         speed = speed or self.speed
@@ -48,7 +52,7 @@ class Chosen:
             print_error("note: the speed is prescribed; the case's torque is left out")
         try:
             drive = drive_of(self.case.parameters, self.case.inputs, self.case.initial, speed=value)
-            # that something is free is asked first
+            # raises an error if nothing is free
             drive.flow(mechanism_of(self.case.parameters))
             return drive
         except NothingFreeError as error:
@@ -63,7 +67,7 @@ class Chosen:
             raise InputError(f"{self.case.title}: {error}{hint}") from None
 
     def start(self, drive: Any) -> list[float]:
-        """Return a guess of the orbit's start: rest at the coordinates of the case, with a crank speed under a torque."""
+        """Return a guess of the orbit's start: the case's coordinates at rest, and with a torque drive a crank speed."""
         from ..periodic import resting
 
         speed = None if self.guess_speed is None else quantity(self.guess_speed, "rad/s", "--guess-speed")
@@ -73,7 +77,7 @@ class Chosen:
         return resting(self.case.parameters, drive, self.case.initial, speed, other=other)
 
     def finish(self, written: Sequence[Path], problems: Sequence[str], *, interrupted: bool = False) -> None:
-        """Report the files and what could not be computed, and exit with what that means."""
+        """Report written files and problems; exit with an error code if there are problems or the command was interrupted."""
         print_written(written)
         for problem in problems:
             print_error(f"note: {problem}")
@@ -82,7 +86,7 @@ class Chosen:
 
 
 def about_a_case(command: Callable[..., None]) -> Callable[..., None]:
-    """Add the options of a command about a case, which it receives as one `Chosen`."""
+    """Add the options that select a case and its drive to a command, which receives them as one `Chosen`."""
 
     @handled
     @wraps(command)
@@ -100,9 +104,9 @@ def about_a_case(command: Callable[..., None]) -> Callable[..., None]:
         command(Chosen(case=chosen, stem=stem, speed=speed, guess_speed=guess_speed, folder=Path(out)), **options)
 
     for option in (
-        out_option(help="Folder."),
+        out_option(help="Folder for the results."),
         click.option("--guess-speed", metavar="SPEED", help="Guess of the crank speed, for a case driven by a torque."),
-        click.option("--speed", metavar="SPEED", help="Prescribe this crank speed in the place of the case's drive."),
+        click.option("--speed", metavar="SPEED", help="Prescribe this crank speed instead of the case's drive."),
         case_options(PUBLISHED),
     ):
         with_case = option(with_case)
@@ -110,7 +114,7 @@ def about_a_case(command: Callable[..., None]) -> Callable[..., None]:
 
 
 def swing_of(orbit: Any) -> tuple[str, float, str]:
-    """Return the coordinate whose amplitude is printed, with factor and unit: millimetres for lengths."""
+    """Return the name of the coordinate whose amplitude is printed, the factor from SI to the printed unit, and this unit."""
     what, si = orbit.swing
     unit, factor = display_of(si)
     return what, factor, unit

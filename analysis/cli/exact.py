@@ -1,4 +1,4 @@
-"""The command about linkages in closed form: all of them, or that there is none."""
+"""The command that finds all linkages of a task in closed form, or reports that there is none."""
 
 from __future__ import annotations
 
@@ -27,18 +27,20 @@ from .design import overrides_of, print_best, print_solutions, write_described, 
 @click.argument("case", type=click.Path(exists=True, dir_okay=False))
 @set_option("task.n=4")
 @click.option(
-    "--crank-phase", metavar="ANGLE", help="Of a function: the crank's angle from the ground link at rotation 0."
+    "--crank-phase", metavar="ANGLE", help="For a function: the crank's angle from the ground link at rotation 0."
 )
-@click.option("--count", type=click.IntRange(1), default=6, show_default=True, help="Linkages of four poses to report.")
+@click.option(
+    "--count", type=click.IntRange(1), default=6, show_default=True, help="Number of linkages to report for four poses."
+)
 @click.option("--plots/--no-plots", "--plot/--no-plot", default=True, show_default=True, help="Whether to write plots.")
 @out_option(help="Folder for the results.")
 @handled
 def exact(case: str, settings: Sequence[str], crank_phase: str | None, count: int, plots: bool, out: str) -> None:
     """Find every four-bar that does exactly what a CASE file (TOML or JSON) asks for at a few points.
 
-    Five poses of a body have up to six four-bars, four a curve of dyads (Burmester); three to five points of a function of the
-    rocker have up to four (Freudenstein). Each is judged; where none is sound, none exists. Bounds and constraints of
-    the case are not applied. Ends with 3 where no linkage is sound.
+    Five poses of a body have up to six four-bars; four poses have a curve of dyads (Burmester). Three to five points of a
+    rocker function have up to four four-bars (Freudenstein). Each is checked for defects; if none is sound, no sound four-bar
+    exists. Bounds and constraints of the case are ignored. The exit code is 3 if no linkage is sound.
 
     \b
     Examples:

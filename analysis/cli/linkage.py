@@ -1,4 +1,4 @@
-"""`linkwork linkage`: what a described linkage is, how it moves, its picture and its equations."""
+"""`linkwork linkage`: report structure and motion of a described linkage, draw it, and print its equations."""
 
 from __future__ import annotations
 
@@ -18,9 +18,9 @@ if TYPE_CHECKING:
 
 @click.command()
 @click.argument("file", type=click.Path(exists=True, dir_okay=False))
-@click.option("--equations", is_flag=True, help="Print the equations, as the FMU carries them, and nothing else.")
+@click.option("--equations", is_flag=True, help="Print only the equations, as the FMU contains them.")
 @out_option(help="Folder for the picture.")
-@click.option("--animation", is_flag=True, help="Write an animation too.")
+@click.option("--animation", is_flag=True, help="Write also an animation.")
 @handled
 def linkage(file: str, equations: bool, out: str, animation: bool) -> None:
     """Describe the linkage of a FILE: structure, freedoms, dyads in order, range of motion, dead centres; and draw it.
@@ -51,7 +51,7 @@ def linkage(file: str, equations: bool, out: str, animation: bool) -> None:
 
 
 def _print_structure(package: Package) -> None:
-    """Print the joints, the freedoms and the steps by which the bodies follow."""
+    """Print the number of bodies, joints and freedoms, and the steps that give the positions of the bodies."""
     from ..linkages import Dyad, Geared, Racked
 
     d, structure = package.description, package.structure
@@ -80,7 +80,7 @@ def _print_structure(package: Package) -> None:
 
 
 def _print_reach(made: Mechanism) -> None:
-    """Print the range of each freedom."""
+    """Print the range of each freedom, with the other freedoms at their start."""
     from ..linkages import reach
 
     rows = []
@@ -99,7 +99,7 @@ def _print_reach(made: Mechanism) -> None:
 
 
 def _print_dead_centres(package: Package) -> None:
-    """Print the places of each freedom at which a body on the ground stands still."""
+    """Print the values of each freedom at which a body jointed to the ground is at rest."""
     from ..linkages import dead_centres
     from ..units import display_of
 

@@ -1,4 +1,4 @@
-"""Commands that make what one begins with: FMUs, examples, case files."""
+"""Commands that build the FMUs and copy the examples."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ EXAMPLES = (PACKAGE.parent / "examples", PACKAGE / "_examples")
 
 
 def _several(context: click.Context, parameter: click.Parameter, values: Sequence[str]) -> tuple[str, ...]:
-    """Read an option that can be given several times, or once with commas."""
+    """Read an option that can be given several times, or once with commas (a callback of Click)."""
     return tuple(name for value in values for name in value.split(",") if name)
 
 
@@ -36,14 +36,14 @@ def _several(context: click.Context, parameter: click.Parameter, values: Sequenc
     multiple=True,
     callback=_several,
     metavar="KIND,...",
-    help="Kinds of FMU: python, native, native-fmi3; by default all that can be built here, the native ones with Zig.",
+    help="Kinds of FMU: python, native, native-fmi3; by default all that can be built here. The native ones need Zig.",
 )
 @click.option(
     "--platforms",
     multiple=True,
     callback=_several,
     metavar="PLATFORM,...",
-    help="What native FMUs are compiled for: all, or some of x86_64-linux, aarch64-linux, x86_64-windows, x86_64-darwin, "
+    help="Platforms of native FMUs: all, or some of x86_64-linux, aarch64-linux, x86_64-windows, x86_64-darwin, "
     "aarch64-darwin, and wasm32-wasip2 for FMI 3.0; by default this one.",
 )
 @click.option(
@@ -57,7 +57,7 @@ def _several(context: click.Context, parameter: click.Parameter, values: Sequenc
 def build(
     models: Sequence[str], dest: str, kinds: Sequence[str], platforms: Sequence[str], publish: str | None
 ) -> None:
-    """Build and validate FMUs: of every mechanism, or those named, such as FiveBarSlider, or described in a file.
+    """Build and validate the FMUs of all mechanisms, or of those named, such as FiveBarSlider, or described in a file.
 
     \b
     Examples:
@@ -82,7 +82,7 @@ def build(
 @click.option(
     "--dest", default="examples", show_default=True, type=click.Path(file_okay=False), help="Folder for the examples."
 )
-@click.option("--force", is_flag=True, help="Write over files of the same name.")
+@click.option("--force", is_flag=True, help="Overwrite files of the same name.")
 @handled
 def examples(dest: str, force: bool) -> None:
     """Copy the examples to a folder: case files of every kind, a drawn curve, scripts.

@@ -1,4 +1,4 @@
-"""The command about all periodic motions at one speed."""
+"""The command that finds all periodic motions at one speed, and their basins of attraction."""
 
 from __future__ import annotations
 
@@ -23,13 +23,15 @@ if TYPE_CHECKING:
     default=4,
     show_default=True,
     type=click.IntRange(1, 16),
-    help="Motions of up to so many turns are sought, or common periods of gears or several cranks.",
+    help="Greatest number of turns in a period of the motions sought; of gears or several cranks, of common periods.",
 )
-@click.option("--points", default=200, show_default=True, type=click.IntRange(2, 4000), help="Starts along each axis.")
+@click.option(
+    "--points", default=200, show_default=True, type=click.IntRange(2, 4000), help="Number of starts along each axis."
+)
 @click.option(
     "--position", nargs=2, metavar="FROM TO", help="Range of the first free coordinate, such as '-5 cm' '5 cm'."
 )
-@click.option("--rate", nargs=2, metavar="FROM TO", help="Range of its rate.")
+@click.option("--rate", nargs=2, metavar="FROM TO", help="Range of the rate of this coordinate.")
 @workers_options(default=-1)
 @html_option
 def basins(
@@ -41,10 +43,10 @@ def basins(
     jobs: int,
     html: bool,
 ) -> None:
-    """Report all periodic motions of a CASE file's or a published set's mechanism at one speed, and which start ends in which.
+    """Report all periodic motions of a CASE file or a published set at one speed, and the motion to which each start leads.
 
-    The picture is over the position and the rate of the first free coordinate, of a five-bar the slider, at crank angle 0.
-    Computed rows are kept: a picture that was interrupted goes on.
+    The axes of the picture are position and rate of the first free coordinate (the slider of a five-bar) at crank angle 0.
+    Computed rows are kept, so that an interrupted picture is continued.
 
     \b
     Examples:
@@ -89,7 +91,10 @@ def basins(
 
 
 def _motions(title: str, found: Sequence[Orbits], common: int) -> None:
-    """Print all motions at one speed by the turns of their periods, multiples of ``common``, and whether others may exist."""
+    """Print a table of all motions found at one speed, and whether there may be others.
+
+    ``found`` has the motions of 1, 2, ... common periods, each of ``common`` turns.
+    """
     from ..periodic import Stability
 
     headings = ("motion", "turns", "amplitude", "stability", "largest multiplier")

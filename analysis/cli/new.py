@@ -1,4 +1,4 @@
-"""`linkwork new`: case files to begin with, written from the tables that read them, so that they hold every entry there is."""
+"""`linkwork new`: write case files to start from, generated from the tables that read them, so that no entry is missing."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ _HEAD = """\
 # Every quantity is a number in SI or a text with its unit, such as "5 cm" or "420 rpm". Entries behind a # may be left out:
 # they have their defaults, or examples of what may stand there.
 """
-#: A task of each kind that is done within seconds; what else its table takes is written from the table.
+#: Entries of an example task of each kind, which is solved within seconds; other entries are written from the table.
 _TASKS: Mapping[str, Mapping[str, Any]] = {
     "timed-path": {"x": "20 + 10*cos(t)", "y": "15 + 5*sin(t)", "unit": "cm", "n": 72},
     "untimed-path": {"x": "20 + 10*cos(t)", "y": "15 + 5*sin(t)", "unit": "cm", "n": 72},
@@ -38,7 +38,7 @@ _TASKS: Mapping[str, Mapping[str, Any]] = {
     "precision-points": {"points": [[0, 0], [20, 15], [40, 20], [60, 15], [80, 0]], "unit": "mm"},
 }
 _CONSTRAINTS: Mapping[str, Any] = {"largest_link": "1 m", "least_transmission_angle": "30 deg"}
-#: What tables have to hold whose readers depend on the task.
+#: Example entries of tables whose readers depend on the task.
 _REQUIRED: Mapping[str, Mapping[str, Any]] = {
     "trade_off": {"over": "size", "limits": ["50 cm", "1 m"]},
     "strategy": {"tolerance": "1 deg"},
@@ -47,7 +47,7 @@ _REQUIRED: Mapping[str, Mapping[str, Any]] = {
 }
 
 
-#: A wish that is met within seconds.
+#: Example of a tuning that succeeds within seconds.
 _WISH: Mapping[str, Any] = {
     "speeds": ["570 rpm", "600 rpm"],
     "change": {"slider.stiffness": "10 %"},
@@ -55,7 +55,7 @@ _WISH: Mapping[str, Any] = {
 }
 
 
-#: The section of the links of a new case: their masses follow from it.
+#: Section of the links of a new case, from which their masses follow.
 _SECTION = {"kind": "bar", "width": "30 mm", "thickness": "8 mm", "material": "steel"}
 _OF_SECTIONS = """\
 # Masses, centres of mass and moments of inertia of {links} follow from their lengths and sections: say
@@ -80,7 +80,7 @@ def kinds() -> dict[str, str]:
 
 
 def case_text(kind: str, file: str, *, parameters: bool = False) -> str:
-    """Return the text of a case file of a kind; for a mechanism with ``parameters``, of the parameters alone."""
+    """Return the text of a case file of a kind; with ``parameters`` it has only the parameters of a mechanism."""
     if kind == LINKAGE:
         from ..linkages import TEXT
 
@@ -99,7 +99,7 @@ def case_text(kind: str, file: str, *, parameters: bool = False) -> str:
 
 
 def _grouped(rows: Mapping[str, str]) -> Iterator[str]:
-    """Group lines by the table of their dotted names, lines without a table first."""
+    """Yield lines grouped by the tables of their dotted names, lines without a table first."""
     for group in dict.fromkeys(sorted((name.rpartition(".")[0] for name in rows), key=bool)):
         if group:
             yield f"\n[{group}]"
@@ -115,7 +115,7 @@ def _value(variable: Any, value: Any) -> Any:
 
 
 def _parameter_rows(mechanism: Mechanism, *, sections: bool) -> dict[str, str]:
-    """Return the rows of the parameters of the first published set; with ``sections`` these give the masses of links."""
+    """Return the lines of the first published set's parameters by name; with ``sections`` masses follow from sections."""
     from ..files import line
     from ..run import parameters_from
 
@@ -137,8 +137,8 @@ def _parameter_rows(mechanism: Mechanism, *, sections: bool) -> dict[str, str]:
     }
 
 
-def _whose_masses(mechanism: Mechanism) -> str:
-    """Say where the numbers of a new case come from."""
+def _mass_comments(mechanism: Mechanism) -> str:
+    """Return comments on the sections of links, and on the source of the other numbers of a new case."""
     from ..linkages import SECTIONS
     from ..sections import DENSITIES
 
@@ -161,7 +161,7 @@ def _parameters(mechanism: Mechanism) -> Iterator[str]:
 
 
 def _run(mechanism: Mechanism, file: str) -> Iterator[str]:
-    """Return the table of a run of the first published set at its speed, or of one second without inputs."""
+    """Yield the lines of a run of the first published set at its speed, or of one second if it has no drive."""
     from ..files import entries, in_words, line
     from ..run import RunTable, acting_on, signal_kinds
 
@@ -173,7 +173,7 @@ def _run(mechanism: Mechanism, file: str) -> Iterator[str]:
     for kind, table in signal_kinds("N.m", Path()).items():
         yield f"#   {kind}{' (of torques)' if kind in of_torques else ''}: {', '.join(table.readers)}"
     if mechanism.links:
-        yield _whose_masses(mechanism)
+        yield _mass_comments(mechanism)
     yield f'mechanism = "{mechanism.name}"'
     yield line("title", Path(file).stem, "of tables and pictures", active=True)
     rows = _parameter_rows(mechanism, sections=True)
@@ -208,7 +208,7 @@ def _tuning(file: str) -> Iterator[str]:
 
 
 def _synthesis(kind: str, file: str) -> Iterator[str]:
-    """Return the tables of a synthesis task, or of a task and the motion of its slider."""
+    """Yield the lines of a synthesis task, or of a task and the motion of its slider."""
     from ..files import Quantity, entries, line
     from ..slider import TABLES as MOTION
     from ..synthesis import ANGLES, BOUNDS, KINDS, LENGTHS, TABLES
@@ -241,15 +241,14 @@ def _synthesis(kind: str, file: str) -> Iterator[str]:
 @click.argument("kind", metavar="KIND", required=False)
 @click.argument("file", required=False, type=click.Path(dir_okay=False))
 @click.option(
-    "--parameters", is_flag=True, help="Of a mechanism: its parameters alone, as 'linkwork slider-crank' takes them."
+    "--parameters", is_flag=True, help="For a mechanism: only its parameters, as 'linkwork slider-crank' reads them."
 )
-@click.option("--force", is_flag=True, help="Write over a file of the same name.")
+@click.option("--force", is_flag=True, help="Overwrite a file of the same name.")
 @handled
 def new(kind: str | None, file: str | None, parameters: bool, force: bool) -> None:
-    """Write a case file to begin with, every entry explained, which runs as it is. Without a KIND they are listed.
+    """Write a case file to start from, with every entry explained, which runs as it is. Without KIND the kinds are listed.
 
-    KIND is a mechanism, for a run of it, or a task: of a synthesis, of a slider's motion, or a tuning; or "linkage", for a
-    linkage of your own.
+    KIND is a mechanism (for a run), a synthesis task, "slider-motion", "tuning", or "linkage" (for a linkage of your own).
 
     \b
     Examples:

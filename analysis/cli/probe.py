@@ -27,7 +27,11 @@ from .common import (
 @click.command()
 @click.argument("fmu", type=click.Path(exists=True, dir_okay=False))
 @click.option(
-    "--calls", default=20_000, show_default=True, type=click.IntRange(1), help="Random calls for each interface."
+    "--calls",
+    default=20_000,
+    show_default=True,
+    type=click.IntRange(1),
+    help="Number of random calls for each interface.",
 )
 @click.option("--seed", default=0, show_default=True, help="The same seed makes the same calls.")
 @click.option(
@@ -36,18 +40,26 @@ from .common import (
     default=600.0,
     show_default=True,
     type=click.FloatRange(0.0),
-    help="No new random calls after so many s.",
+    help="Start no new random calls after this time (s).",
 )
 @click.option(
-    "--interface", type=click.Choice(["cs", "me"]), help="One interface only: co-simulation or model exchange."
+    "--interface",
+    type=click.Choice(["cs", "me"]),
+    help="Probe only this interface: co-simulation (cs) or model exchange (me).",
 )
 @click.option(
-    "--hang", default=10.0, show_default=True, type=click.FloatRange(0.1), help="A call that takes so many s hangs."
+    "--hang",
+    default=10.0,
+    show_default=True,
+    type=click.FloatRange(0.1),
+    help="A call that takes longer than this (s) counts as hanging.",
 )
-@click.option("--check", "checks", multiple=True, metavar="CHECK", help="Only this check; can be given often.")
+@click.option(
+    "--check", "checks", multiple=True, metavar="CHECK", help="Run only this check; can be given several times."
+)
 @click.option("--out", type=click.Path(dir_okay=False), callback=check_place, help="File for the report: .md or .json.")
 @force_option
-@click.option("--strict", is_flag=True, help="Fail on what is questionable, too.")
+@click.option("--strict", is_flag=True, help="Fail also on questionable findings.")
 @click.option(
     "--replay",
     "case",
@@ -69,7 +81,7 @@ def probe(
 ) -> None:
     """Probe an FMU of any make: random calls, legal and forbidden, saved states, derivatives, ranges, leaks, folders.
 
-    The FMU runs in processes of its own, so that its crash is a finding. The exit code is 4 if something crashes or is wrong.
+    The FMU runs in separate processes, so that a crash is a finding. The exit code is 4 if something crashes or is wrong.
 
     \b
     Examples:
@@ -107,7 +119,7 @@ def probe(
 
 
 def _write(report: Report, path: Path) -> Path:
-    """Write the report, in the form that the ending of the file says."""
+    """Write the report as Markdown or JSON, according to the ending of the path, and return the path."""
     if path.suffix != ".md":
         return write_tables(path, report.to_dict())
     return write_text(path, report.to_markdown())

@@ -1,4 +1,4 @@
-"""The command about the decaying record of a freedom on its spring."""
+"""The command that finds damping and natural frequency from a decaying record."""
 
 from __future__ import annotations
 
@@ -17,25 +17,24 @@ from .common import console, folder_of, handled, out_option, plot_option, print_
 @click.option("--time", "time", metavar="NAME", help="Column of the times; by default the first.")
 @click.option("--position", metavar="NAME", help="Column of the positions; by default the second.")
 @click.option("--time-unit", default="s", show_default=True, help="Unit of the times.")
-@click.option("--unit", default="m", show_default=True, help="Unit of the positions: for a force of friction.")
-@click.option("--from", "first", metavar="TIME", help="Leave out what is before, such as '0.2 s': the impulse.")
-@click.option("--to", "last", metavar="TIME", help="Leave out what is after.")
+@click.option("--unit", default="m", show_default=True, help="Unit of the positions, needed for the force of friction.")
+@click.option("--from", "first", metavar="TIME", help="Ignore samples before this time, such as '0.2 s': the impulse.")
+@click.option("--to", "last", metavar="TIME", help="Ignore samples after this time.")
 @click.option(
     "--mass", metavar="MASS", help="Moving mass, such as '600 g': gives the damping coefficient and the stiffness."
 )
-@click.option("--friction", is_flag=True, help="Fit dry friction beside the damper.")
-@click.option("--least-swing", type=float, help="Smallest swing that counts, as a part of the range; 0.1 by default.")
+@click.option("--friction", is_flag=True, help="Fit dry friction in addition to the damper.")
+@click.option("--least-swing", type=float, help="Smallest swing that is used, relative to the range; 0.1 by default.")
 @plot_option
 @out_option()
 @handled
 def decrement(
     record: str, time: str | None, position: str | None, mass: str | None, out: str, plot: bool, **options: Any
 ) -> None:
-    """Damping and natural frequency from the decaying record of a freedom on its spring: the logarithmic decrement.
+    """Find damping and natural frequency from the decaying record of a freedom on its spring, by the logarithmic decrement.
 
-    RECORD is a CSV file of times and positions after an impulse, or after a release. The turning points are fitted by least
-    squares, with the offset of the record; +- is the standard error. Dry friction shows by a decrement that grows from cycle to
-    cycle.
+    RECORD is a CSV file of times and positions after an impulse or a release. The turning points and the offset of the record
+    are fitted by least squares; +- is the standard error. With dry friction the decrement grows from cycle to cycle.
 
     \b
     Examples:
@@ -67,7 +66,9 @@ def decrement(
         ("", "value", "+-", "unit"),
         [
             (name, f"{value:.6g}", f"{error:.2g}", unit)
-            for name, value, error, unit in _found(decay, kg, metre if options["friction"] else None, options["unit"])
+            for name, value, error, unit in _result_rows(
+                decay, kg, metre if options["friction"] else None, options["unit"]
+            )
         ],
         words=("", "unit"),
     )
@@ -85,8 +86,11 @@ def decrement(
     print_written(written)
 
 
-def _found(decay: Any, kg: float | None, metre: float | None, unit: str) -> list[tuple[str, float, float, str]]:
-    """Return the rows of a fitted decay: names, values, standard errors, units; friction if the unit ``metre`` is given."""
+def _result_rows(decay: Any, kg: float | None, metre: float | None, unit: str) -> list[tuple[str, float, float, str]]:
+    """Return the rows of a fitted decay as (name, value, standard error, unit).
+
+    With a mass ``kg`` they have damping and stiffness; with ``metre``, the length of ``unit`` in m, they have friction.
+    """
     natural, error = decay.natural_frequency, decay.natural_frequency_error
     rows = [
         ("logarithmic decrement", decay.decrement, decay.decrement_error, ""),

@@ -1,4 +1,4 @@
-"""Commands that run and check cases and FMUs, describe them, and make the theses' figures."""
+"""Commands that run cases, check FMUs, describe both, and make the theses' figures."""
 
 from __future__ import annotations
 
@@ -44,14 +44,14 @@ from .common import (
     visible,
 )
 
-#: Share of the largest value in the same unit below which a value is rounding, and printed as zero.
+#: A value below this share of the largest value in the same unit is rounding, and printed as zero.
 _ROUNDING = 1e-12
-#: Where the FMUs of the mechanisms are looked for.
+#: Folder in which the FMUs of the mechanisms are looked for.
 DEFAULT_FOLDER = Path("build")
 
 
 class Given(TypedDict):
-    """Entries of a case that are given on the command line."""
+    """Options that replace entries of a case; None if not given."""
 
     stop_time: str | None
     step: str | None
@@ -60,11 +60,13 @@ class Given(TypedDict):
 
 @click.command()
 @case_options(PUBLISHED)
-@click.option("--fmu", type=click.Path(exists=True, dir_okay=False), help="Run through this FMU instead of in process.")
+@click.option(
+    "--fmu", type=click.Path(exists=True, dir_okay=False), help="Run this FMU instead of the in-process solver."
+)
 @click.option(
     "--interface",
-    help="How the FMU is run: co-simulation with its inputs held over each step, as by default, linear-co-simulation (linear "
-    "over it), or model-exchange under CVode.",
+    help="How the FMU is run: co-simulation (the default) with inputs held over each step, linear-co-simulation with linear "
+    "inputs over each step, or model-exchange under CVode.",
 )
 @click.option(
     "--method",
@@ -109,7 +111,7 @@ def run(
     if any(setting.startswith("run.revolutions=") for setting in settings) and "stop_time" in changed:
         raise click.UsageError("give --stop-time or --set run.revolutions, not both")
     if "stop_time" in changed and (case is not None or settings):
-        # it takes the place of the file's revolutions
+        # it replaces the revolutions of the file
         settings = (*settings, f"run.stop_time={changed['stop_time']!r}")
     chosen = chosen_case(case, published, settings)
     if fmu is not None and method != "compiled":
@@ -153,7 +155,7 @@ def run(
 
 
 def _bare_speeds(file: str | None, settings: Sequence[str], case: Any) -> list[str]:
-    """Return a note for each speed given as a bare number: its value in rad/s and the question whether rpm was meant."""
+    """Return a note for each speed given as a number without unit, which asks whether rpm was meant instead of rad/s."""
     from ..files import flattened, read_tables
     from ..mechanisms import mechanism_of
     from ..run import acting_on
@@ -172,7 +174,7 @@ def _bare_speeds(file: str | None, settings: Sequence[str], case: Any) -> list[s
 
 
 def _print_extremes(title: str, result: Any) -> None:
-    """Print least, greatest and last value of each output of a run, and its events."""
+    """Print least, greatest and last value of each output of a run, and the events of the run."""
     headings = ("output", "unit", "least", "greatest", "at the end")
     columns = [(name, si, (x.min(), x.max(), x[-1])) for name, x, si in _with_magnitudes(result)]
     largest: dict[str, float] = {}
@@ -194,7 +196,7 @@ def _print_extremes(title: str, result: Any) -> None:
 
 
 def _with_magnitudes(result: Any) -> Iterator[tuple[str, Any, str]]:
-    """Yield name, values and SI unit of each output of a run, and after a joint's forces their magnitude."""
+    """Yield name, values and SI unit of each output of a run; after the force components of a joint yield their magnitude."""
     import numpy as np
 
     from ..mechanisms import mechanism_of
@@ -215,16 +217,18 @@ def _with_magnitudes(result: Any) -> Iterator[tuple[str, Any, str]]:
     type=click.Path(dir_okay=False),
     help="The FMU to check; by default those of every kind of each case's mechanism in build, such as build/FiveBarSlider.fmu.",
 )
-@click.option("--interface", "only", help="co-simulation or model-exchange; by default every one that the FMU has.")
-@click.option("--all", "everything", is_flag=True, help="All standard cases (of the FMU's mechanism), not one of each.")
+@click.option("--interface", "only", help="co-simulation or model-exchange; by default all that the FMU has.")
+@click.option(
+    "--all", "everything", is_flag=True, help="All standard cases (of the FMU's mechanism), not one per mechanism."
+)
 @click.option(
     "--method",
     "methods",
     multiple=True,
     default=("compiled",),
     show_default=True,
-    help="In-process method: compiled, Hamming, or one of SciPy's solve_ivp; can be given often. Model exchange, which brings "
-    "CVode, is held against the first of them alone.",
+    help="In-process method: compiled, Hamming, or one of SciPy's solve_ivp; can be given several times. Model exchange, which "
+    "uses CVode, is compared with the first one only.",
 )
 @tolerance_option(default=1e-6, help="Largest relative difference that passes.")
 @out_option()
@@ -240,8 +244,8 @@ def check(
 ) -> None:
     """Compare FMUs with the in-process solver, output by output. CASES are names of standard cases or case files.
 
-    Of several kinds of FMU and interfaces one line each is printed, and all outputs of those that fail; of a single one all
-    outputs.
+    For several FMUs or interfaces one line each is printed, and all outputs of those that fail; for a single one all outputs
+    are printed.
 
     \b
     Examples:
@@ -254,11 +258,11 @@ def check(
     from ..run import check as compare_case
 
     failed, count = [], 0
-    for name, case in _cases_to_check(cases, fmu, everything):
+    for name, case in _find_cases(cases, fmu, everything):
         model = mechanism_of(case.parameters).fmu
         runs = [
             (path, interface, words, method)
-            for path, interface, words in _fmus_to_check(model, fmu, only)
+            for path, interface, words in _find_fmus(model, fmu, only)
             for method in (methods if interface == "co-simulation" else methods[:1])
         ]
         lines, verdicts = [], []
@@ -295,8 +299,8 @@ def check(
     console.print(f"{count} of {count} checks pass", style="green", highlight=False)
 
 
-def _fmus_to_check(model: str, fmu: str | None, only: str | None) -> list[tuple[Path, str, str]]:
-    """Return the FMUs of a model, each with its interfaces, or the requested one, by name and in words."""
+def _find_fmus(model: str, fmu: str | None, only: str | None) -> list[tuple[Path, str, str]]:
+    """Return the FMUs of a model, or the given one, with each interface to check: (path, interface, interface in words)."""
     from ..run import CHECKED, offered
 
     if only is not None and only not in CHECKED:
@@ -310,10 +314,10 @@ def _fmus_to_check(model: str, fmu: str | None, only: str | None) -> list[tuple[
     return found
 
 
-def _cases_to_check(names: Sequence[str], fmu: str | None, everything: bool) -> list[tuple[str, Any]]:
-    """Return the standard cases and case files of these names; without names the first case of each mechanism, or all.
+def _find_cases(names: Sequence[str], fmu: str | None, everything: bool) -> list[tuple[str, Any]]:
+    """Return names and cases: the named standard cases and case files, without names one standard case per mechanism or all.
 
-    Where an FMU is named, the standard cases are those of its mechanism.
+    If an FMU is given, the standard cases are those of its mechanism.
     """
     from ..mechanisms import mechanism_of
     from ..run import CASES, load_case
@@ -338,7 +342,7 @@ def _cases_to_check(names: Sequence[str], fmu: str | None, everything: bool) -> 
 
 
 def _model_name(path: Path) -> str | None:
-    """Return the name of the model in an FMU; None if it cannot be read, which the check reports."""
+    """Return the name of the model in an FMU; None if the FMU cannot be read, which the check reports later."""
     from ..files import check_fmu
     from ..run import read_description
 
@@ -350,7 +354,7 @@ def _model_name(path: Path) -> str | None:
 
 
 def _write_comparison(stem: Path, case: Any, in_process: Any, through_fmu: Any) -> None:
-    """Write both runs of a check and their plot, and report a run that ended early."""
+    """Write both runs of a check as CSV and their comparison as a plot; report runs that ended early."""
     from .. import figures
     from ..files import save_figure
     from ..mechanisms import mechanism_of
@@ -392,7 +396,7 @@ def _print_comparison(title: str, comparison: Any) -> None:
 @click.argument("what", required=False)
 @handled
 def info(what: str | None) -> None:
-    """Describe the mechanisms and published sets, one of them, a parameter or case file, or an FMU.
+    """Describe all mechanisms and published sets, or one of them, a parameter file, a case file or an FMU.
 
     \b
     Examples:
@@ -432,7 +436,7 @@ def info(what: str | None) -> None:
 
 
 def _print_mechanism(mechanism: Any) -> None:
-    """Print what a case file may say of a mechanism: parameters, state at the start, and what acts."""
+    """Print the entries of a case file for a mechanism: parameters, initial state and inputs."""
     from ..run import acting_on
 
     what = acting_on(mechanism)
@@ -449,7 +453,7 @@ def _print_mechanism(mechanism: Any) -> None:
 
 
 def _print_parameters(title: str, parameters: Any) -> None:
-    """Print a table of parameters, and whether a five-bar's crank turns fully."""
+    """Print a table of parameters, and for a five-bar whether the crank turns fully."""
     import numpy as np
 
     from linkwork.five_bar.kinematics import assembly_square
@@ -472,7 +476,7 @@ def _print_parameters(title: str, parameters: Any) -> None:
 
 
 def _print_fmu(path: Path) -> None:
-    """Print the variables of an FMU and whether it is valid; exits where it is not."""
+    """Print the variables of an FMU and whether it is valid; exit with an error code if it is not."""
     from fmpy.validation import validate_fmu
 
     from ..files import check_fmu
@@ -507,8 +511,8 @@ def _print_fmu(path: Path) -> None:
 @click.option("--list", "listing", is_flag=True, help="Only list the figures, with what each is about.")
 @handled
 def figures(numbers: Sequence[str], out: str, settings: Sequence[str], listing: bool) -> None:
-    """Make the theses' figures, a still and an animation of the linkage: plots, CSV, and each statement with its verdict.
-    NUMBERS such as 3.2 (Youssef) or R5 (Rahman's figure 5); all by default.
+    """Make the theses' figures, a picture and an animation of the linkage: plots, CSV, and each statement with its verdict.
+    NUMBERS are such as 3.2 (Youssef) or R5 (Rahman's figure 5); all figures by default.
 
     \b
     Examples:

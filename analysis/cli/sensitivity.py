@@ -1,4 +1,4 @@
-"""Which parameters move the special points of a response, for the command line."""
+"""Report which parameters move the special points of a response most, for the command line."""
 
 from __future__ import annotations
 
@@ -13,27 +13,27 @@ from linkwork.errors import LinkworkError
 from .common import console, print_error, show_table
 from .driven import swing_of
 
-#: Parameters that are named of a point.
+#: Number of parameters that are printed for each point.
 _NAMED = 4
 
 
 def report_sensitivity(response: Any, factor: float, unit: str, path: str) -> list[Path]:
-    """Print what moves each special point and its amplitude most, and write all elasticities as a table.
+    """Print the parameters that move each special point and its amplitude most; write all elasticities and return the paths.
 
     Parameters
     ----------
     response : Response
     factor, unit
-        In which values of the parameter of the response are printed.
+        Factor from SI and unit in which the parameter of the response is printed.
     path : str
-        Of the table: a row a point, in the order printed.
+        Path of the table, with a row for each point in the order printed.
     """
     from ..files import write_csv
     from ..periodic import gradient_names, special_gradient, value_of
 
     family = response.family
     operation = family.parameters, family.drive
-    # a percent of nothing is nothing
+    # elasticities of a parameter that is zero are zero
     names = [name for name in gradient_names(*operation) if name != family.vary and value_of(*operation, name) != 0.0]
     what, size, length = swing_of(response.branches[0].orbits[0])
     rows, shown = [], []

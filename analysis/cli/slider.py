@@ -1,4 +1,4 @@
-"""The command about the motion of the slider: where a four-bar is not enough, what moves its pivot, and what that takes."""
+"""The command that finds a slider motion for a linkage that does its task too badly, and the drive for this motion."""
 
 from __future__ import annotations
 
@@ -37,7 +37,9 @@ if TYPE_CHECKING:
 @click.command("slider-motion")
 @click.argument("case", type=click.Path(exists=True, dir_okay=False))
 @set_option("slider.stroke='30 mm' or slider.harmonics='[1, 2, 3]'")
-@click.option("--harmonics", type=click.IntRange(0), help="Of the slider's motion, in place of the case's.")
+@click.option(
+    "--harmonics", type=click.IntRange(0), help="Number of harmonics of the slider's motion, instead of the case's."
+)
 @search_options
 @handled
 def slider_motion(
@@ -50,11 +52,11 @@ def slider_motion(
     out: str,
     plots: bool,
 ) -> None:
-    """Move the rocker pivot of a linkage by a slider, so that it does the task of a CASE file (TOML or JSON) better.
+    """Move the rocker pivot of a linkage with a slider, so that it does the task of a CASE file (TOML or JSON) better.
 
-    With a table [strategy] the simplest mechanism within a tolerance is sought, with the reason for each step. With [drive] the
-    force, torque, power and pin forces of the motion follow, and a case that 'linkwork run' runs; with [tracking] a run under
-    control.
+    With a table [strategy] the simplest mechanism within a tolerance is sought, and each step is explained. With [drive] the
+    force, torque, power and pin forces of the motion are computed, and a case for 'linkwork run' is written; with [tracking]
+    the motion is run under control.
 
     \b
     Examples:
@@ -88,7 +90,7 @@ def slider_motion(
 
 
 def _strategy(chosen: SliderCase) -> tuple[Any, Interrupted | None]:
-    """Return the simplest mechanism within the tolerance, and the interruption of the search if there was one."""
+    """Find the simplest mechanism within the tolerance; return its solution, and the interruption of the search or None."""
     from ..slider import StrategyInterrupted
 
     stopped = None
@@ -108,7 +110,7 @@ def _strategy(chosen: SliderCase) -> tuple[Any, Interrupted | None]:
 
 
 def _moved(chosen: SliderCase) -> tuple[Any, Interrupted | None]:
-    """Return the best motion for each number of harmonics beside the fixed pivot, and the interruption if there was one."""
+    """Find the best motion for each number of harmonics; return the best of all, and the interruption of the search or None."""
     from ..synthesis import SynthesisInterrupted
 
     stopped = None
@@ -130,7 +132,7 @@ def _moved(chosen: SliderCase) -> tuple[Any, Interrupted | None]:
 
 
 def _print_motions(title: str, solutions: Sequence[Solution]) -> None:
-    """Print the fixed pivot and the motions, one row each, in mm and degrees."""
+    """Print the solutions with fixed pivot and with moved pivot, one row each, in mm and degrees."""
     from ..slider import greatest_derivative
     from ..synthesis import SliderMotion, format_transmission, quality_cells, quality_headings, quality_name
 
@@ -176,7 +178,7 @@ def _write_solution(solution: Solution, folder: Path, case: SliderCase, plots: b
 
 
 def _motion_columns(series: FourierSeries, rotation: Any) -> dict[str, Any]:
-    """Return columns of the slider's position and of its derivatives with respect to the crank's rotation."""
+    """Return columns of the slider position and its derivatives by the crank rotation, by name with unit."""
     columns = {"crank rotation [rad]": rotation, "slider position [m]": series(rotation)}
     columns["du/dphi [m/rad]"] = series.derivative()(rotation)
     columns["d2u/dphi2 [m/rad2]"] = series.derivative().derivative()(rotation)
@@ -187,7 +189,7 @@ def _motion_columns(series: FourierSeries, rotation: Any) -> dict[str, Any]:
 
 
 def _dynamics(chosen: SliderCase, solution: Solution, folder: Path, plots: bool) -> list[Path]:
-    """Compute force, torque and pin forces; write a case to run, and run it under control if requested."""
+    """Compute and write force, torque and pin forces, and a case to run; run it under control if requested; return paths."""
     from ..files import write_csv, write_tables
     from ..run import save_parameters
     from ..slider import run_case

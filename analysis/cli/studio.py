@@ -1,4 +1,4 @@
-"""`linkwork studio`: the page on which a mechanism moves, can be dragged, and tells the truth."""
+"""`linkwork studio`: open the page on which a mechanism moves and can be dragged."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ from .common import (
     set_option,
 )
 
-#: What is set where there is a screen, or a browser was chosen.
+#: Environment variables that are set if there is a screen, or if a browser was chosen.
 _SCREENS = ("DISPLAY", "WAYLAND_DISPLAY", "BROWSER")
 
 
@@ -38,11 +38,11 @@ _SCREENS = ("DISPLAY", "WAYLAND_DISPLAY", "BROWSER")
     "--out",
     type=click.Path(dir_okay=False),
     callback=check_place,
-    help="Write the page here as a file, and serve nothing.",
+    help="Write the page to this file, and serve nothing.",
 )
 @click.option("--browser/--no-browser", default=True, show_default=True, help="Whether to open a browser.")
 @click.option(
-    "--port", type=click.IntRange(0, 65535), default=0, help="On which the page is served; by default one that is free."
+    "--port", type=click.IntRange(0, 65535), default=0, help="Port on which the page is served; by default a free one."
 )
 @set_option("slider.stiffness='2e6 dyn/cm' or drive.speed='300 rpm'; bare numbers are in SI")
 @force_option
@@ -51,9 +51,9 @@ def studio(what: str | None, out: str | None, browser: bool, port: int, settings
     """Open the page on which a mechanism moves and can be dragged.
 
     WHAT is a case file, a file of parameters such as linkwork synthesize writes, or the name of a published set; without it the
-    page opens with a five-bar. It is served to this machine alone until Ctrl-C, with Python behind it: linkages for a path that
-    is drawn, the slider's motion, tuning, runs of the FMU and its export. With --out it is one file that needs no network and
-    no Python, and has all but those.
+    page opens with a five-bar. The page is served only to this machine, until Ctrl-C. Python finds linkages for a drawn path
+    and slider motions, tunes, runs the FMU and exports it. With --out the page is one file that needs neither network nor
+    Python, and can do everything else.
 
     \b
     Examples:
@@ -76,14 +76,14 @@ def studio(what: str | None, out: str | None, browser: bool, port: int, settings
     say(f"the studio is at {server.address}")
     print_error("it is served to this machine alone; Ctrl-C stops it")
     if browser:
-        # one in the terminal comes back when it is left, and until then the page is to be served
+        # a browser in the terminal returns only when it is closed, and the page must be served until then
         threading.Thread(target=_open, args=(server.address,), daemon=True).start()
     server.run()
     print_error("the studio is closed")
 
 
 def _open(address: str) -> None:
-    """Open a browser; without a screen those that are found draw in the terminal, where the page cannot be."""
+    """Open a browser if there is a screen; otherwise print a note, as browsers in a terminal cannot show the page."""
     screen = sys.platform in ("win32", "darwin") or any(os.environ.get(name) for name in _SCREENS)
     if not (screen and webbrowser.open(address)):
         print_error("note: there is no browser here: open the address in one, or write the page as a file with --out")
@@ -105,6 +105,6 @@ def _state(what: str | None, overrides: dict[str, Any]) -> dict[str, Any]:
     check_kind(what, RUN, PARAMETERS)
     tables = read_tables(what)
     if "run" not in tables and not any(name.startswith("run.") for name in overrides):
-        # of parameters alone: how long they are run is no part of them
+        # a file of parameters does not say how long a run is
         overrides = {"run.stop_time": 1.0} | overrides
     return state_of(load_case(what, overrides))

@@ -1,4 +1,4 @@
-"""`linkwork system`: systems of FMUs, from a description or a file of SSP."""
+"""`linkwork system`: run, check, draw and build systems of FMUs, from a description or an SSP file."""
 
 from __future__ import annotations
 
@@ -27,9 +27,9 @@ if TYPE_CHECKING:
 
 @click.group("system", cls=Commands)
 def system() -> None:
-    """Systems of FMUs: mechanisms with motors, shafts, loads and controllers.
+    """Run and build systems of FMUs: mechanisms with motors, shafts, loads and controllers.
 
-    A FILE is a description (.toml) or an archive of SSP 1.0 (.ssp).
+    FILE is a description (.toml) or an SSP 1.0 archive (.ssp).
 
     \b
     Examples:
@@ -50,7 +50,7 @@ _FMI = click.option(
     type=click.Choice(["2", "3"]),
     default="2",
     show_default=True,
-    help="Version of FMI of the mechanisms' FMUs; of a file of SSP it is what they are.",
+    help="FMI version of the mechanisms' FMUs; has no effect on an SSP file.",
 )
 
 
@@ -65,7 +65,7 @@ def _wiring(file: str, fmi: str = "2") -> Wiring:
 @click.argument("file", required=False, type=click.Path(dir_okay=False))
 @handled
 def new(name: str | None, file: str | None) -> None:
-    """Write the description of a system to begin with, by its NAME; without a name list them."""
+    """Write the description of the example system NAME; without NAME list the example systems."""
     from ..files import read_tables, unknown_name, write_text
     from ..systems import library
 
@@ -90,7 +90,7 @@ def new(name: str | None, file: str | None) -> None:
 @out_option(help="Folder for the archive.")
 @handled
 def build(file: str, fmi: str, out: str) -> None:
-    """Build the FMUs of a system and write it as an archive of SSP 1.0, with FMI 3.0 of SSP 2.0."""
+    """Build the FMUs of a system and write it as an SSP 1.0 archive; with --fmi 3 as SSP 2.0."""
     from ..systems import write_ssp
 
     say(f"wrote {write_ssp(_wiring(file, fmi), folder_of(out) / f'{Path(file).stem}.ssp')}")
@@ -104,7 +104,7 @@ def build(file: str, fmi: str, out: str) -> None:
     "--coupling",
     default="hold",
     show_default=True,
-    help="How inputs go over a step: hold, derivatives, updates, rollback.",
+    help="How inputs are continued over a step: hold, derivatives, updates, rollback.",
 )
 @click.option(
     "--share",
@@ -125,7 +125,7 @@ def run(
     out: str,
     plot: bool,
 ) -> None:
-    """Run a system: a table of its connected outputs, all outputs as CSV, a plot."""
+    """Run a system: print a table of its connected outputs, write all outputs as CSV, and a plot."""
     from ..files import write_csv
     from ..systems import run_system
     from ..units import display_of
@@ -167,14 +167,16 @@ def run(
 @system.command()
 @_FILE
 @click.option("--stop", help="End of the runs, such as '0.2 s'.")
-@click.option("--decades", type=click.IntRange(1, 4), default=2, show_default=True, help="Decades of steps.")
+@click.option(
+    "--decades", type=click.IntRange(1, 4), default=2, show_default=True, help="Decades of communication steps."
+)
 @out_option(help="Folder for the plot.")
 @plot_option
 @handled
 def check(file: str, stop: str | None, decades: int, out: str, plot: bool) -> None:
-    """Check the wiring of a system; of a description measure the error of each coupling over the step, too.
+    """Check the wiring of a system; for a description also measure the error of each coupling over the communication step.
 
-    The truth that errors are relative to is the system as one model, by SciPy at a tolerance of 1e-12.
+    The reference for the errors is the system as one model, solved by SciPy with a tolerance of 1e-12.
     """
     from ..systems import convergence, load_system
 
@@ -227,7 +229,7 @@ def draw(file: str, out: str) -> None:
 
 @system.command()
 @_FILE
-@out_option(help="Folder for the folder of the host.")
+@out_option(help="Folder in which the host's folder is made.")
 @handled
 def host(file: str, out: str) -> None:
     """Build a system as one program in C for real-time targets: no heap, no Python, step times and missed deadlines."""

@@ -36,12 +36,12 @@ from .design import settings_of
 @out_option()
 @handled
 def tune(case: str, settings: Sequence[str], as_json: bool, plot: bool, out: str) -> None:
-    """Change parameters of a CASE file (TOML or JSON) least, so that a range of speeds is as its table [tune] wishes.
+    """Find the least change of parameters of a CASE file (TOML or JSON) that gives a range of speeds the properties in [tune].
 
-    No resonance, jump or unstable motion in the range, outputs below their limits, or the least damping with which this is
-    so. What is found is verified: the response is followed anew, a row of a chart computed, and all motions are sought.
-    Writes a case with the changed parameters, the result as JSON, and a picture. A wish that cannot be met is answered with
-    the nearest to it, and exit code 4.
+    These are: no resonance, jump or unstable motion in the range, outputs below their limits, or the least damping with which
+    this holds. The result is verified: the response is followed again, a row of a chart is computed, and all motions are
+    sought. The command writes a case with the changed parameters, the result as JSON, and a picture. If the requirements
+    cannot be met, it gives the nearest result, and the exit code is 4.
 
     \b
     Examples:
@@ -86,7 +86,7 @@ def _print(title: str, tuned: Any) -> None:
     wish = tuned.wish
     rows = []
     for name, before, after in zip(wish.names, wish.present.tolist(), tuned.values.tolist()):
-        # a percent of nothing is nothing
+        # a change from zero has no percentage
         unit, factor = display_of(unit_of(mechanism_of(wish.parameters), name))
         change = f"{100.0 * (after / before - 1.0):+.4g} %" if before else f"{factor * after:+.4g} {unit}"
         changed = change if after != before else "none"

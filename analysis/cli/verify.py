@@ -1,4 +1,4 @@
-"""The command that verifies an FMU by what it carries."""
+"""The command that verifies an FMU by the experiments that it contains."""
 
 from __future__ import annotations
 
@@ -11,19 +11,17 @@ from .common import CHECK_FAILED, console, handled, print_error, show_table, tol
 
 @click.command()
 @click.argument("fmu", type=click.Path(exists=True, dir_okay=False))
-@tolerance_option(
-    help="Greatest relative difference; by default what the FMU states, or 100 times the solver's tolerance."
-)
+@tolerance_option(help="Greatest relative difference; by default that of the FMU, or 100 times the solver's tolerance.")
 @click.option("--rebuild", is_flag=True, help="Compile an FMU of Linkwork again from its own sources, and compare.")
 @handled
 def verify(fmu: str, tolerance: float | None, rebuild: bool) -> None:
-    """Run the experiments that an FMU of any make carries (FMI-LS-REF), and compare with its reference results.
+    """Run the experiments that an FMU of any make contains (FMI-LS-REF), and compare with its reference results.
 
-    The largest difference of each experiment is shown, relative to the variable's scale. The exit code is 4 if one is too
-    large.
+    The largest difference of each experiment is shown, relative to the variable's scale. The exit code is 4 if a difference is
+    too large.
 
-    With --rebuild the files of an FMU of Linkwork are compared with its bill of materials, and its libraries with those that
-    its sources give here.
+    With --rebuild the files of an FMU of Linkwork are compared with its bill of materials, and its libraries with those
+    compiled here from its sources.
 
     \b
     Examples:
@@ -67,7 +65,7 @@ def verify(fmu: str, tolerance: float | None, rebuild: bool) -> None:
 
 
 def _rebuild(fmu: str) -> None:
-    """Print whether each part of an FMU comes again from its sources; exits where one does not."""
+    """Print whether each part of an FMU can be rebuilt identically from its sources; exit with an error code if not."""
     from ..export import rebuild as rebuild_fmu
 
     with console.status("building"):

@@ -1,4 +1,4 @@
-"""Commands about vibration: where a mechanism resonates, where it is unstable, and what a decaying record shows."""
+"""Commands about vibration: where a mechanism resonates, and where its periodic motion is unstable."""
 
 from __future__ import annotations
 
@@ -28,12 +28,12 @@ from .common import (
 from .driven import Chosen, about_a_case, swing_of
 from .sensitivity import report_sensitivity
 
-#: Range of speeds where none is given, relative to the natural frequency: beyond twice, where parametric resonance begins.
+#: Default range of speeds relative to the natural frequency; it contains 2, near which parametric resonance begins.
 _RANGE = (0.15, 2.3)
 
 
 def _require_range(parameters: Any, low: float, high: float, name: str, first: str, last: str) -> None:
-    """Refuse a range that is none, in the words of the command line."""
+    """Raise a usage error if a range does not increase, or if speeds in it are not above zero; it names the options."""
     from ..periodic import format_value, speed_names, unit_of
 
     unit = unit_of(mechanism_of(parameters), name)
@@ -50,7 +50,7 @@ def _require_range(parameters: Any, low: float, high: float, name: str, first: s
 @click.option(
     "--vary",
     metavar="NAME",
-    help="What varies, by its FMI name; by default the crank speed; of several commanded cranks the first, whose ratios stay.",
+    help="FMI name of what varies; by default the crank speed, of several commanded cranks the first, with constant ratios.",
 )
 @click.option(
     "--from", "low", metavar="VALUE", help="Beginning of the range, such as '100 rpm'; bare numbers are in SI."
@@ -61,25 +61,25 @@ def _require_range(parameters: Any, low: float, high: float, name: str, first: s
     default=3,
     show_default=True,
     type=click.IntRange(0, 6),
-    help="How often in a row motions of twice the period are followed.",
+    help="Number of successive period doublings that are followed.",
 )
 @click.option(
     "--places",
     default=5,
     show_default=True,
     type=click.IntRange(min=0),
-    help="Values of the range at which all motions are sought, to find those that no branch leads to.",
+    help="Number of values in the range at which all motions are sought, to find those that no branch leads to.",
 )
 @click.option(
     "--turns",
     default=1,
     show_default=True,
     type=click.IntRange(1, 16),
-    help="Motions of up to so many turns, or common periods, are sought there; for more than one take some 24 places.",
+    help="Greatest number of turns, or common periods, of the motions sought there; for more than one take some 24 places.",
 )
 @plot_option
 @html_option
-@click.option("--sensitivity", is_flag=True, help="Report which parameters move each maximum, fold and the like most.")
+@click.option("--sensitivity", is_flag=True, help="Report the parameters that move each maximum, fold and so on most.")
 def resonance(
     chosen: Chosen,
     vary: str | None,
@@ -92,12 +92,12 @@ def resonance(
     html: bool,
     sensitivity: bool,
 ) -> None:
-    """Follow the periodic motions of a CASE file's or a published set's mechanism over the speed, or another parameter.
+    """Follow the periodic motions of a CASE file or a published set over the speed, or over another parameter.
 
     A closed branch that is connected with no other is an isola; its end reads "closed".
 
-    Writes amplitude, harmonics, crank torque and pin forces along the curve, and reports natural frequency, maxima, folds,
-    period doublings, the speeds to avoid, and the classical approximations beside the true motion.
+    The command writes amplitude, harmonics, crank torque and pin forces along the branches, and reports natural frequency,
+    maxima, folds, period doublings, the speeds to avoid, and the classical approximations beside the true motion.
 
     \b
     Examples:
@@ -121,15 +121,15 @@ def resonance(
 
     parameters, title = chosen.case.parameters, chosen.case.title
     mechanism = mechanism_of(parameters)
-    # of several cranks the case says which are commanded; they keep the ratios of their speeds
+    # if there are several cranks, the case says which are commanded; the ratios of their speeds are kept
     vary = vary or default_variable(mechanism, chosen.drive() if len(mechanism.cyclic) > 1 else None)
     over_speed = vary in speed_names(mechanism)
     if over_speed and chosen.speed is not None:
         raise click.UsageError(
             "--speed prescribes a speed, but it is the speed that varies: give --from and --to, or --vary"
         )
-    natural = _natural(parameters) if over_speed else None
-    ends = _ends(parameters, vary, low, high, natural)
+    natural = _natural_frequency(parameters) if over_speed else None
+    ends = _range_ends(parameters, vary, low, high, natural)
     drive = chosen.drive(f"{ends[0]} rad/s" if over_speed else None)
     start = chosen.start(drive)
     interrupted = False
@@ -148,12 +148,12 @@ def resonance(
             f"{natural:.5g} rad/s",
             highlight=False,
         )
-    _branches(title, response, factor, unit)
+    _print_branches(title, response, factor, unit)
     stem = folder_of(chosen.folder) / f"{chosen.stem}-resonance"
     written = [response.to_csv(f"{stem}.csv")]
     table = approximations(response) if over_speed and mechanism is FIVE_BAR else None
-    _extrema(response, factor, unit, table)
-    _avoid(response, factor, unit)
+    _print_extrema(response, factor, unit, table)
+    _print_ranges_to_avoid(response, factor, unit)
     if table is not None:
         written.append(write_csv(f"{stem}-approximations.csv", table.columns()))
     if sensitivity:
@@ -164,8 +164,8 @@ def resonance(
     chosen.finish(written, response.problems, interrupted=interrupted)
 
 
-def _natural(parameters: Any) -> float | None:
-    """Return the natural frequency; None without a spring."""
+def _natural_frequency(parameters: Any) -> float | None:
+    """Return the natural frequency (rad/s); None without a spring."""
     from ..periodic import natural_frequency
 
     try:
@@ -174,8 +174,10 @@ def _natural(parameters: Any) -> float | None:
         return None
 
 
-def _ends(parameters: Any, vary: str, low: str | None, high: str | None, natural: float | None) -> tuple[float, float]:
-    """Return the range to follow, by default around the natural frequency."""
+def _range_ends(
+    parameters: Any, vary: str, low: str | None, high: str | None, natural: float | None
+) -> tuple[float, float]:
+    """Return the ends of the range to follow in SI, by default about the natural frequency (rad/s)."""
     from ..periodic import speed_names, unit_of
 
     unit = unit_of(mechanism_of(parameters), vary)
@@ -191,7 +193,7 @@ def _ends(parameters: Any, vary: str, low: str | None, high: str | None, natural
     return ends[0], ends[1]
 
 
-def _branches(title: str, response: Any, factor: float, unit: str) -> None:
+def _print_branches(title: str, response: Any, factor: float, unit: str) -> None:
     from ..periodic import speed_names
 
     events_heading = f"what happens on it, at [{unit}]"
@@ -201,7 +203,10 @@ def _branches(title: str, response: Any, factor: float, unit: str) -> None:
         words = [s.value for s in branch.stability()]
         shares = ", ".join(f"{words.count(word) / len(words):.0%} {word}" for word in dict.fromkeys(words))
         shares += "".join(f", {name} goes round {times:+d}" for name, times in branch.orbits[0].rounds.items())
-        events = [f"{s.kind.value} at {factor * s.parameter:.6g} ({_form(branch.family, s)})" for s in branch.special]
+        events = [
+            f"{s.kind.value} at {factor * s.parameter:.6g} ({_normal_form_in_words(branch.family, s)})"
+            for s in branch.special
+        ]
         begins, ends = (f"{factor * branch.parameter[end]:.6g}" for end in (0, -1))
         ends = "closed" if branch.closed else ends
         rows.append((str(number), str(branch.crank_turns), str(len(branch)), begins, ends, shares, "; ".join(events)))
@@ -213,8 +218,8 @@ def _branches(title: str, response: Any, factor: float, unit: str) -> None:
     show_table(table, headings, rows, words=headings[-1:])
 
 
-def _form(family: Any, special: Any) -> str:
-    """Return in words whether stability is lost gently or with a jump."""
+def _normal_form_in_words(family: Any, special: Any) -> str:
+    """Return in words whether stability is lost gently or with a jump at a special point."""
     from ..periodic import OrbitError, normal_form
 
     try:
@@ -223,12 +228,12 @@ def _form(family: Any, special: Any) -> str:
         return "normal form not found"
 
 
-def _friction(parameters: Any) -> bool:
-    """Return whether there is friction that is not viscous."""
+def _has_dry_friction(parameters: Any) -> bool:
+    """Return whether the mechanism has friction that is not viscous."""
     return any(getattr(parameters, field_name(name)) for name in mechanism_of(parameters).names("friction"))
 
 
-def _extrema(response: Any, factor: float, unit: str, table: Any) -> None:
+def _print_extrema(response: Any, factor: float, unit: str, table: Any) -> None:
     entries = [("maximum", e) for e in response.maxima()] + [("minimum", e) for e in response.minima()]
     if not entries:
         console.print(
@@ -238,7 +243,7 @@ def _extrema(response: Any, factor: float, unit: str, table: Any) -> None:
     what, size, length = swing_of(response.branches[0].orbits[0])
     names = () if table is None else tuple(table.amplitudes)
     headings = ("", f"at [{unit}]", f"amplitude [{length}]", "motion", *(f"{name} [{length}]" for name in names))
-    if table is not None and _friction(response.family.parameters):
+    if table is not None and _has_dry_friction(response.family.parameters):
         console.print("the approximations are of the mechanism without its Coulomb friction", highlight=False)
     entries.sort(key=lambda entry: entry[1].parameter)
     beside = [] if table is None else list(table.at([extremum.parameter for _, extremum in entries]).values())
@@ -255,8 +260,8 @@ def _extrema(response: Any, factor: float, unit: str, table: Any) -> None:
     show_table(f"where the amplitude of {what} is largest and least", headings, rows, words=("", "motion"))
 
 
-def _avoid(response: Any, factor: float, unit: str) -> None:
-    """Print the ranges to avoid and the jumps at folds in words."""
+def _print_ranges_to_avoid(response: Any, factor: float, unit: str) -> None:
+    """Print the ranges of speed, or of the parameter, to avoid, and the jumps at folds."""
     ranges = response.speeds_to_avoid
     words = "speeds" if response.family.unit == "rad/s" else f"values of {response.family.name}"
     if response.caution:
@@ -290,15 +295,25 @@ def _avoid(response: Any, factor: float, unit: str) -> None:
 @click.command()
 @about_a_case
 @click.option("--x", "x", metavar="NAME", help="Parameter along x, by its FMI name; by default the crank speed.")
-@click.option("--x-range", nargs=2, metavar="FROM TO", help="Its range, such as '100 rpm' '1500 rpm'.")
+@click.option("--x-range", nargs=2, metavar="FROM TO", help="Range of x, such as '100 rpm' '1500 rpm'.")
 @click.option(
     "--y", "y", metavar="NAME", help="Parameter along y; by default the damping of the first freedom beside the crank."
 )
-@click.option("--y-range", nargs=2, metavar="FROM TO", help="Its range, such as 0 '2e4 dyn.s/cm'.")
+@click.option("--y-range", nargs=2, metavar="FROM TO", help="Range of y, such as 0 '2e4 dyn.s/cm'.")
 @click.option("--points", default=80, show_default=True, type=click.IntRange(2, 2000), help="Points along each axis.")
 @workers_options(default=-1)
-@click.option("--chart/--no-chart", "charted", default=True, show_default=True, help="Chart, or the verdict alone.")
-@click.option("--coexisting", is_flag=True, help="Seek all motions of every point: how many are stable, and how large.")
+@click.option(
+    "--chart/--no-chart",
+    "charted",
+    default=True,
+    show_default=True,
+    help="Whether to compute the chart, not only the verdict.",
+)
+@click.option(
+    "--coexisting",
+    is_flag=True,
+    help="Seek all motions at every point, to show how many are stable, and their amplitudes.",
+)
 @html_option
 def stability(
     chosen: Chosen,
@@ -312,11 +327,12 @@ def stability(
     coexisting: bool,
     html: bool,
 ) -> None:
-    """Report whether the periodic motion of a CASE file's or a published set's mechanism is stable, and chart where it is not.
+    """Report whether the periodic motion of a CASE file or a published set is stable, and chart where it is unstable.
 
     The verdict is on the motion at one speed, with its margin. The chart has the largest Floquet multiplier of the true orbit
-    at every point, the boundaries of instability traced, that of the linear equation beside it, and three points confirmed by
-    long nonlinear runs. The picture of the grid is written first. Computed rows are kept: a chart that was interrupted goes on.
+    at every point, the boundaries of instability, that of the linear equation for comparison, and three points confirmed by
+    long nonlinear runs. The picture of the grid is written first. Computed rows are kept, so that an interrupted chart is
+    continued.
 
     \b
     Examples:
@@ -343,7 +359,7 @@ def stability(
             except LinkworkError as error:
                 if own is not None or texts is not None:
                     raise
-                # of an axis that nobody chose: the verdict does not need it
+                # the user chose nothing on this axis: the verdict does not need it
                 missing = InputError(f"no chart over {name}, as {option} is not given: {error}")
     _report_verdict(chosen.case.title, parameters, drive, start)
     if missing is not None:
@@ -353,7 +369,7 @@ def stability(
     stem = folder_of(chosen.folder) / f"{chosen.stem}-stability"
 
     def picture_first(found: Any) -> None:
-        """Write the picture of the grid: its boundaries take longer."""
+        """Write the picture of the grid without its boundaries, which take longer."""
         print_written(save_picture(figures.picture(found, title=chosen.case.title), stem, html=html))
         say("its boundaries follow; after Ctrl-C the picture stays without them")
 
@@ -370,8 +386,8 @@ def stability(
         progress=console.is_terminal,
         first=picture_first,
     )
-    _regions(found)
-    _runs(found)
+    _print_regions(found)
+    _print_runs(found)
     more = [] if found.beside is None else [found.beside.to_csv(f"{stem}-coexisting.csv")]
     picture = figures.picture(found, title=chosen.case.title)
     written = [
@@ -396,20 +412,20 @@ def _axis_range(
 
 
 def _report_verdict(title: str, parameters: Any, drive: Any, start: Any) -> None:
-    """Print the verdict on the motion at one speed beside the verdict of the linear equation."""
+    """Print the verdict on the motion at one speed, and for a five-bar that of the linear equation."""
     from ..periodic import orbit_of
     from ..youssef import linear_verdict
 
     orbit = orbit_of(parameters, drive, start=start)
     turn, (_, size, unit) = orbit.turn(), swing_of(orbit)
     values = ", ".join(f"{m.real:.6g}{m.imag:+.6g}i" if m.imag else f"{m.real:.6g}" for m in orbit.multipliers)
-    # with other cranks that turn in a ratio the period is that of all; a free crank has no speed but the mean
+    # other cranks in a ratio have a common period; a free crank has only a mean speed
     rpm = drive.speed / RAD_S_PER_RPM if drive.speed_drive else 60.0 * turn.turns / turn.period
     lines = [
         f"{title} at {rpm:.6g} rpm: {orbit.verdict()}",
         f"Floquet multipliers {values}; amplitude {size * turn.amplitude:.5g} {unit}",
     ]
-    friction = _friction(parameters)
+    friction = _has_dry_friction(parameters)
     if drive.speed_drive and not friction and mechanism_of(parameters) is FIVE_BAR:
         lines.append(f"by the linear equation about u = 0, as in the thesis: {linear_verdict(parameters, drive)}")
     console.print("\n".join(lines), highlight=False, soft_wrap=True)
@@ -420,7 +436,7 @@ def _report_verdict(title: str, parameters: Any, drive: Any, start: Any) -> None
         )
 
 
-def _regions(found: Any) -> None:
+def _print_regions(found: Any) -> None:
     from ..periodic import TRUE_ORBIT, Crossing
 
     x, y = found.axes
@@ -453,11 +469,11 @@ def _regions(found: Any) -> None:
 
 
 def _headings(*axes: Any) -> list[str]:
-    """Return the names of axes with units, which a narrow terminal breaks between words."""
+    """Return the names of axes with units, in words, between which a narrow terminal can break lines."""
     return [f"{axis.name.replace('.', ' ')} [{axis.unit}]" for axis in axes]
 
 
-def _runs(found: Any) -> None:
+def _print_runs(found: Any) -> None:
     x, y = found.axes
     headings = (*_headings(x, y), "verdict", "multiplier", "run", "growth a turn", "")
     rows = [

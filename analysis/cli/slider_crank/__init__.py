@@ -1,4 +1,4 @@
-"""Commands about the generalised slider-crank: what it can do, its forces, its tolerances, the dual-number method, pictures."""
+"""Commands about the generalised slider-crank: assembly, forces, tolerances, the dual-number method, pictures."""
 
 from __future__ import annotations
 
@@ -13,9 +13,9 @@ from .tolerances import tolerances
 
 @click.group("slider-crank", cls=Commands)
 def slider_crank() -> None:
-    """The generalised slider-crank of Rahman's thesis: offset, shifted along its crank axis, twisted.
+    """Analyse the generalised slider-crank of Rahman's thesis: offset, shifted along its crank axis, twisted.
 
-    Each command takes a file of parameters (TOML or JSON, with mechanism = "slider-crank") or a published case, and changes of
+    Each command takes a file of parameters (TOML or JSON, with mechanism = "slider-crank") or a published case, and changes to
     it. Lengths, angles, speeds and so on are texts with a unit, such as '10 in' or '310 deg'; bare numbers are in SI.
 
     \b

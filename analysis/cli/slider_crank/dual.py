@@ -1,4 +1,4 @@
-"""`linkwork slider-crank dual`: the thesis's dual-number method held against vector mechanics."""
+"""`linkwork slider-crank dual`: compare the thesis's dual-number method with vector mechanics."""
 
 from __future__ import annotations
 
@@ -17,20 +17,18 @@ from ..common import CHECK_FAILED, console, folder_of, print_error, print_writte
 from .options import Chosen, Problem, about_mechanism, out_option, with_problem
 
 
-@click.command(short_help="Hold the thesis's dual-number method against vector mechanics.")
+@click.command(short_help="Compare the thesis's dual-number method with vector mechanics.")
 @about_mechanism
 @with_problem(points=361)
 @tolerance_option(default=1e-9, help="Largest relative difference that passes.")
-@click.option(
-    "--two-rotations", is_flag=True, help="Show instead where the thesis's own closure ends, and how far open."
-)
+@click.option("--two-rotations", is_flag=True, help="Show instead the closure error of the thesis's own method.")
 @out_option
 def dual(chosen: Chosen, problem: Problem, tolerance: float, two_rotations: bool, out: str) -> None:
     """Compare the thesis's dual-number method with vector mechanics, quantity by quantity.
 
-    The loop is closed by dual matrices with true ball joints, forces by dual momenta. Differences are relative to the largest
-    quantity of the same unit. --two-rotations shows the thesis's own form, which gives each ball joint two rotations and
-    settles on loops that are not closed.
+    Dual matrices with true ball joints close the loop, and dual momenta give the forces. Differences are relative to the
+    largest quantity of the same unit. --two-rotations shows the thesis's own form, which gives each ball joint two rotations
+    and converges to loops that are not closed.
 
     \b
     Examples:
@@ -77,7 +75,7 @@ def dual(chosen: Chosen, problem: Problem, tolerance: float, two_rotations: bool
 
 
 def _show_two_rotations(chosen: Chosen, points: int, folder: Path) -> None:
-    """Show where the thesis's iteration ends over the turn."""
+    """Print and write the closure errors with which the thesis's iteration ends over the turn."""
     from ...files import write_csv
 
     angle = np.linspace(0.0, tau, points)

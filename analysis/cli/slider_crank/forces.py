@@ -1,4 +1,4 @@
-"""`linkwork slider-crank forces`: all joint forces over a turn."""
+"""`linkwork slider-crank forces`: compute all joint forces over a turn."""
 
 from __future__ import annotations
 
@@ -28,16 +28,16 @@ if TYPE_CHECKING:
     multiple=True,
     default=(1,),
     show_default=True,
-    help="Of the components shown: 1 ground, 2 crank, 3 rod, 4 guide; can be given often.",
+    help="Frame of the components shown: 1 ground, 2 crank, 3 rod, 4 guide; can be given several times.",
 )
 @out_option
 @plot_option
 def forces(chosen: Chosen, problem: Problem, frames: Sequence[int], out: str, plot: bool) -> None:
-    """Find all joint forces over a turn: with the torque given the slider's force, with the load given the torque.
+    """Find all joint forces over a turn, and the slider force if the torque is given, or the torque if the load is given.
 
-    With the torque given there is no finite slider force at the dead centres, and where the crank cannot turn fully all
-    forces grow without bound towards the limits of assembly. These places are listed with the reason; extremes are of what is
-    more than 10 deg from them.
+    If the torque is given, there is no finite slider force at the dead centres. If the crank cannot turn fully, all forces grow
+    without bound towards the limits of assembly. These angles are listed with the reason; extremes are taken more than 10 deg
+    away from them.
 
     \b
     Examples:
@@ -68,7 +68,7 @@ def forces(chosen: Chosen, problem: Problem, frames: Sequence[int], out: str, pl
 
 
 def _extremes(turn: ForceTurn, frames: Sequence[int], units: Units) -> Sequence[Sequence[str]]:
-    """Return least and greatest values with their angles, singular and masked places left out."""
+    """Return the rows of least and greatest values with their angles, without those near singular angles."""
     quantities: list[tuple[str, str, Any]] = [
         ("slider position", "m", turn.slider_position),
         ("crank torque", "N.m", turn.torque),
@@ -95,7 +95,7 @@ def _extremes(turn: ForceTurn, frames: Sequence[int], units: Units) -> Sequence[
     for name, si, values, ends in found:
         cells = [name, units.name(si)]
         for i in ends:
-            # what is rounding beside the greatest of its kind is none
+            # a value that is rounding compared with the greatest of its unit is zero
             value = 0.0 if abs(values[i]) <= 1e-12 * size[si] else values[i] * units.per(si)
             cells += [f"{value:.6g}", f"{degrees(turn.angle[i]):.1f}"]
         rows.append(cells)
@@ -103,7 +103,7 @@ def _extremes(turn: ForceTurn, frames: Sequence[int], units: Units) -> Sequence[
 
 
 def _special_places(turn: ForceTurn, units: Units) -> list[str]:
-    """Return sentences on dead centres, on limits of assembly, and on forces that are undetermined there."""
+    """Return sentences on dead centres and limits of assembly, and on the forces that are not determined there."""
     without = f"grows without bound towards it; within {sc.CLEAR_DEG:g} deg it is not among the extremes"
     sentences = [
         f"dead centre at {angle_text(d.crank_angle)}, slider at {units.length(d.slider_position)}"

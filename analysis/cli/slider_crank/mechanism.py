@@ -1,4 +1,4 @@
-"""`linkwork slider-crank info` and `picture`: where a mechanism can be assembled, and how it looks."""
+"""`linkwork slider-crank info` and `picture`: report where a mechanism can be assembled, and draw it."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from .options import Chosen, about_mechanism, angle_text, out_option
 @click.command(short_help="Report assembly, dead centres and stroke.")
 @about_mechanism
 def info(chosen: Chosen) -> None:
-    """Report where the mechanism can be assembled, its dead centres, its stroke, and how far its crank may shift.
+    """Report where the mechanism can be assembled, its dead centres, its stroke, and the greatest shift of its crank.
 
     \b
     Examples:
@@ -72,10 +72,12 @@ def info(chosen: Chosen) -> None:
 @click.command(short_help="Draw the mechanism in space.")
 @about_mechanism
 @click.option("--angle", default="30 deg", show_default=True, metavar="ANGLE", help="Crank angle of the picture.")
-@click.option("--view", nargs=2, metavar="ELEVATION AZIMUTH", help="Of the eye, such as '22 deg' '-112 deg'.")
-@click.option("--range", "with_range", is_flag=True, help="Draw also where it can be assembled.")
-@click.option("--animate", is_flag=True, help="Write also an animation, GIF.")
-@click.option("--frames", type=click.IntRange(2), default=48, show_default=True, help="Pictures in the animation.")
+@click.option("--view", nargs=2, metavar="ELEVATION AZIMUTH", help="Direction of the eye, such as '22 deg' '-112 deg'.")
+@click.option("--range", "with_range", is_flag=True, help="Draw also the range of assembly.")
+@click.option("--animate", is_flag=True, help="Write also an animation (GIF).")
+@click.option(
+    "--frames", type=click.IntRange(2), default=48, show_default=True, help="Number of frames of the animation."
+)
 @out_option
 def picture(
     chosen: Chosen,

@@ -1,4 +1,4 @@
-"""Options that the commands about the slider-crank share: which mechanism, in which units, under which force or torque."""
+"""Options that the commands about the slider-crank share: mechanism, units, and force or torque."""
 
 from __future__ import annotations
 
@@ -26,32 +26,32 @@ from ..common import NUMBER, PARAMETERS, changes, check_kind, handled, in_units,
 if TYPE_CHECKING:
     from ...slider_crank import ForceTurn, PeriodicShift, ShiftLaw
 
-#: The case that everything starts from where no other is named.
+#: The published case that is used by default.
 DEFAULT = "rahman-a4-10-s1-3.5"
 
 Command = Callable[..., Any]
 
 
 class Units:
-    """Numbers as texts in the units of the output; in SI lengths are in millimetres, and in either system angles in degrees."""
+    """Units of the output, "SI" (lengths in mm) or "inch"; angles are in degrees in both systems."""
 
     def __init__(self, system: str) -> None:
         self.system = system
         self._table = {**sc.shown_units(system), "rad": sc.UNITS["inch"]["rad"]}
 
     def name(self, si: str) -> str:
-        """Return the name of the unit."""
+        """Return the name of the output's unit for a unit of SI."""
         return self._table.get(si, (si, 1.0))[0]
 
     def per(self, si: str) -> float:
-        """Return the number of these units in one SI unit."""
+        """Return the factor from a unit of SI to the output's unit."""
         return 1.0 / self._table.get(si, (si, 1.0))[1]
 
     def length(self, value: float) -> str:
         return f"{value * self.per('m'):.6g} {self.name('m')}"
 
     def in_error(self, text: str) -> str:
-        """Return the message of an error in these units; quoted texts stay as the user wrote them."""
+        """Return the message of an error with its quantities in these units; texts in quotes are not changed."""
         variables = SLIDER_CRANK.mechanism_variables
 
         def parameter(found: re.Match[str]) -> str:
@@ -64,7 +64,10 @@ class Units:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Chosen:
-    """The mechanism that a command is about: its name for files, its title, how it shifts, its speed; and the units."""
+    """The mechanism of a command.
+
+    ``name`` is for files; ``shift`` (m) is constant unless there is a ``groove``, "shaft" or "apart"; ``speed`` is in rad/s.
+    """
 
     name: str
     title: str
@@ -76,27 +79,27 @@ class Chosen:
 
     @property
     def law(self) -> PeriodicShift:
-        """Return the shift over the crank angle, for ranges and pictures."""
+        """The shift over the crank angle, for ranges of assembly and pictures."""
         if self.groove is None:
             return sc.constant_shift(self.shift)
         return sc.groove_shift(self.parameters)
 
     @property
     def force_law(self) -> ShiftLaw:
-        """Return the shift over the crank angle, for the force problems."""
+        """The shift over the crank angle, for force problems."""
         p = self.parameters
         if self.groove is None:
             return sc.ConstantShift(self.shift)
         return sc.GrooveShift(p.groove_amplitude, p.groove_ratio, in_shaft=self.groove == "shaft")
 
     def shift_at(self, crank_angle: Any) -> Any:
-        """Return the shift at crank angles (m)."""
+        """Return the shift (m) at crank angles (rad)."""
         return self.force_law.at(crank_angle, 0.0, 0.0).shift
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _MechanismOptions:
-    """What the command line says of the mechanism."""
+    """Options on the mechanism as they were given on the command line."""
 
     file: str | None
     published: str | None
@@ -109,7 +112,7 @@ class _MechanismOptions:
     speed: str | None = None
 
     def choose(self, *, paced: bool) -> Chosen:
-        """Return the chosen mechanism; ``paced`` tells whether the speed matters.
+        """Return the chosen mechanism; ``paced`` says whether the speed has an effect.
 
         Raises LinkworkError if a file, a name or a value is wrong.
         """
@@ -160,7 +163,7 @@ class _MechanismOptions:
         )
 
     def _check_groove(self, p: SliderCrankParameters, values: Mapping[str, Any]) -> None:
-        """Make sure that the options about a groove have an effect."""
+        """Raise a usage error if options about a groove have no effect."""
         if self.groove is None:
             for name in values:
                 if name.startswith("groove."):
@@ -172,7 +175,7 @@ class _MechanismOptions:
             )
 
     def _note_defaults(self, p: SliderCrankParameters, start: str, speed: float | None) -> None:
-        """Say which values are used that neither the file nor the command line gives."""
+        """Print the default values that are used because neither the file nor the command line gives them."""
         used = []
         if self.shift is None and self.groove is None:
             used.append(f"S1 = {start} (--shift)")
@@ -185,7 +188,7 @@ class _MechanismOptions:
 
 
 def _title(units: Units, p: SliderCrankParameters, shift: float, groove: str | None) -> str:
-    """Return a title for a mechanism without one."""
+    """Return a title with offset, shift or groove, and twist of a mechanism."""
     moved = f"S1 = {units.length(shift)}"
     if groove is not None:
         moved = f"SS1 = {units.length(p.groove_amplitude)}, alpha = {p.groove_ratio:g}"
@@ -194,13 +197,13 @@ def _title(units: Units, p: SliderCrankParameters, shift: float, groove: str | N
 
 @dataclass(frozen=True, slots=True)
 class Problem:
-    """A force problem: the ``torque`` (N.m) or ``load`` (N) that is given, and at how many crank angles."""
+    """A force problem: the given ``torque`` (N.m) or ``load`` (N), and the number of crank angles."""
 
     given: Mapping[str, float]
     points: int
 
     def turn(self, chosen: Chosen, *, at: float | None = None) -> ForceTurn:
-        """Solve over the turn and ``at`` one angle, as far as the mechanism can be assembled there."""
+        """Solve the problem over a turn, and ``at`` one more crank angle (rad), wherever the mechanism can be assembled."""
         angles = np.linspace(0.0, tau, self.points)
         if at is not None and np.abs(angles - at).min() > 1e-9:
             angles = np.sort(np.append(angles, at))
@@ -227,8 +230,8 @@ _MECHANISM_OPTIONS = (
     click.option(
         "--groove",
         type=click.Choice(["shaft", "apart"]),
-        help="S1 = groove.amplitude sin(groove.ratio theta1): made by a groove in the crank's shaft as in the FMU, or by "
-        "something apart from the crank as in the thesis.",
+        help="S1 = groove.amplitude sin(groove.ratio theta1), produced by a groove in the crank's shaft, as in the FMU, or by "
+        "something apart from the crank, as in the thesis.",
     ),
     click.option(
         "--set",
@@ -243,8 +246,8 @@ _MECHANISM_OPTIONS = (
         type=click.Choice(["SI", "inch"]),
         default="SI",
         show_default=True,
-        help="Units of tables, pictures and errors, in which SI has millimetres, and of CSV files, in which it has metres "
-        "as those of a run; inch: inches, pounds force and degrees.",
+        help="Units of the output. SI: millimetres in tables, pictures and errors, metres in CSV files, as in those of a run; "
+        "inch: inches, pounds force and degrees.",
     ),
 )
 speed_option = click.option("--speed", metavar="SPEED", help="Crank speed, such as '50 rpm'.")
@@ -253,7 +256,7 @@ plot_option = click.option("--plot/--no-plot", default=True, show_default=True, 
 
 
 def about_mechanism(command: Command) -> Command:
-    """Give a command the options that choose a mechanism; in their place it takes ``chosen``."""
+    """Add the options that choose a mechanism to a command, which receives them as one argument ``chosen``."""
 
     @wraps(command)
     @handled
@@ -271,7 +274,7 @@ def about_mechanism(command: Command) -> Command:
 
 
 def with_problem(points: int) -> Callable[[Command], Command]:
-    """Give a command the options of the speed and of a force problem; in place of the latter it takes ``problem``."""
+    """Return a decorator that adds the options --speed and, passed to the command as ``problem``, those of a force problem."""
 
     def decorate(command: Command) -> Command:
         @wraps(command)
@@ -289,11 +292,15 @@ def with_problem(points: int) -> Callable[[Command], Command]:
                 type=click.IntRange(2),
                 default=points,
                 show_default=True,
-                help="Crank angles over the turn.",
+                help="Number of crank angles over the turn.",
             ),
-            click.option("--load", metavar="FORCE", help="On the slider; the crank's torque is sought. 0 by default."),
             click.option(
-                "--torque", metavar="TORQUE", help="On the crank; the slider's force is sought. Such as '100 lbf*in'."
+                "--load", metavar="FORCE", help="Load on the slider; the crank torque is sought. 0 by default."
+            ),
+            click.option(
+                "--torque",
+                metavar="TORQUE",
+                help="Torque on the crank, such as '100 lbf*in'; the slider force is sought.",
             ),
             speed_option,
         ):
@@ -304,7 +311,7 @@ def with_problem(points: int) -> Callable[[Command], Command]:
 
 
 def note(text: str) -> None:
-    """Write what a reader must know beside the results, to standard error."""
+    """Print a note on standard error."""
     print_error(f"note: {text}")
 
 

@@ -1,4 +1,4 @@
-"""`linkwork slider-crank tolerances`: what manufacturing tolerances do."""
+"""`linkwork slider-crank tolerances`: report the effect of manufacturing tolerances."""
 
 from __future__ import annotations
 
@@ -19,20 +19,20 @@ from .options import Chosen, Problem, Units, about_mechanism, note, out_option, 
 if TYPE_CHECKING:
     from ...slider_crank import ForceTurn, MonteCarlo, Sensitivities, Tolerance
 
-#: What is in error by default, and the half widths of lengths and of the twist.
+#: Quantities with an error by default, and their half widths by unit.
 _TOLERANCES = ("crank.length", "rod.length", "guide.offset", "shift.position", "guide.twist")
 _WIDTHS = {"m": "0.25 mm", "rad": "0.1 deg"}
 
 
 class Sampling(TypedDict):
-    """Of the Monte Carlo."""
+    """Options of the Monte Carlo simulation: number of samples, seed, number of processes."""
 
     samples: int
     seed: int
     jobs: int | None
 
 
-@click.command(short_help="Report what manufacturing tolerances do.")
+@click.command(short_help="Report the effect of manufacturing tolerances.")
 @about_mechanism
 @with_problem(points=73)
 @click.option(
@@ -40,15 +40,15 @@ class Sampling(TypedDict):
     "widths",
     multiple=True,
     metavar="NAME=HALF_WIDTH",
-    help="What is in error and by how much, such as guide.offset='0.5 mm' or guide.twist='0.2 deg'; can be given often. By "
-    "default the lengths by 0.25 mm and the twist by 0.1 deg.",
+    help="A quantity and the half width of its error, such as guide.offset='0.5 mm' or guide.twist='0.2 deg'; can be given "
+    "several times. By default 0.25 mm for the lengths and 0.1 deg for the twist.",
 )
 @click.option(
     "--distribution",
     type=click.Choice(["normal", "uniform", "triangular"]),
     default="normal",
     show_default=True,
-    help="Of the errors; a normal one has three standard deviations in the half width.",
+    help="Distribution of the errors; for a normal one the half width is three standard deviations.",
 )
 @click.option(
     "--quantity",
@@ -57,10 +57,12 @@ class Sampling(TypedDict):
     default=("slider.position",),
     show_default=True,
     metavar="NAME",
-    help="An output of the FMU, such as crank_pin.fz, or slider.load; can be given often.",
+    help="An output of the FMU, such as crank_pin.fz, or slider.load; can be given several times.",
 )
 @click.option("--angle", default="30 deg", show_default=True, metavar="ANGLE", help="Crank angle of the histogram.")
-@click.option("--samples", type=click.IntRange(2), default=100_000, show_default=True, help="Of the Monte Carlo.")
+@click.option(
+    "--samples", type=click.IntRange(2), default=100_000, show_default=True, help="Number of Monte Carlo samples."
+)
 @click.option(
     "--seed", type=click.IntRange(0), default=0, show_default=True, help="The same seed gives the same samples."
 )
@@ -78,7 +80,7 @@ def tolerances(
     plot: bool,
     **sampling: Unpack[Sampling],
 ) -> None:
-    """Report what manufacturing tolerances do: exact sensitivities, a linear estimate, and a Monte Carlo beside it.
+    """Report the effect of manufacturing tolerances: exact sensitivities, a linear estimate, and a Monte Carlo simulation.
 
     \b
     Examples:
@@ -104,7 +106,7 @@ def tolerances(
         note(
             f"it cannot be assembled at {degrees(at):.6g} deg: the nearest of the angles, {here}, is taken in its place"
         )
-    rows, slopes = _slopes(exact, allowed, place, units)
+    rows, slopes = _sensitivity_table(exact, allowed, place, units)
     headings = ("quantity", "to", "unit", f"at {here}", "greatest", "at [deg]")
     show_table(f"{chosen.title}: sensitivities", headings, rows, words=("quantity", "to", "unit"))
     samples, seed, jobs = sampling["samples"], sampling["seed"], sampling["jobs"]
@@ -130,9 +132,9 @@ def _degrees(turn: ForceTurn, i: int) -> float:
 
 
 def _in_the_turn(angle: float, chosen: Chosen) -> float:
-    """Return the same crank angle between 0 and 360 deg.
+    """Return the same crank angle (rad) between 0 and 2 pi.
 
-    Raises InputError if it is outside of them and the shift there is another than a turn before or after.
+    Raises InputError if it is outside of this turn and the shift there differs from that in this turn.
     """
     if 0.0 <= angle <= tau:
         return angle
@@ -157,10 +159,10 @@ def _tolerance(text: str, distribution: str) -> Tolerance:
     return sc.Tolerance(name, half_width=width, distribution=distribution)
 
 
-def _slopes(
+def _sensitivity_table(
     exact: Sensitivities, allowed: Sequence[Tolerance], place: int, units: Units
 ) -> tuple[Sequence[Sequence[str]], dict[str, Any]]:
-    """Return the rows of the table of sensitivities and the columns of its file."""
+    """Return the rows of the table of sensitivities, and the columns of its file by name with unit."""
     turn, rows = exact.turn, []
     columns: dict[str, Any] = {"crank angle [deg]": np.degrees(turn.angle)}
     for name in exact.derivatives:
@@ -169,15 +171,15 @@ def _slopes(
         effect = max(float(np.ma.abs(exact.derivative(name, t.name)).max()) * t.extent for t in allowed)
         for t in allowed:
             below = sc.ERRORS[t.name]
-            unit, scale = _ratio(units.name(si), units.name(below)), units.per(si) / units.per(below)
+            unit, scale = _unit_quotient(units.name(si), units.name(below)), units.per(si) / units.per(below)
             values = exact.derivative(name, t.name) * scale
             columns[f"d {name} / d {t.name} [{unit}]"] = values.filled(np.nan)
             greatest = np.where(clear, np.ma.abs(values).filled(-1.0), -1.0)
             top = int(np.argmax(greatest))
-            # what is rounding beside the greatest effect of any tolerance is none
+            # a value that is rounding compared with the greatest effect of any tolerance is zero
             tiny = 1e-12 * effect / t.extent * scale
             here, most = (_number(values[i] if np.ma.abs(values[i]) > tiny else values[i] * 0.0) for i in (place, top))
-            # none may be clear of poles and limits
+            # perhaps no angle is clear of poles and limits
             ends = (most, f"{_degrees(turn, top):.1f}") if greatest[top] >= 0.0 else ("none", "")
             rows.append((name, t.name, unit, here, *ends))
     return rows, columns
@@ -187,13 +189,13 @@ def _number(value: Any, digits: int = 6) -> str:
     return "none" if np.ma.is_masked(value) else f"{value:.{digits}g}"
 
 
-def _ratio(above: str, below: str) -> str:
-    """Return the text of a unit divided by another."""
+def _unit_quotient(above: str, below: str) -> str:
+    """Return the quotient of two units as text."""
     return f"{above}/({below})" if "." in below or "/" in below else f"{above}/{below}"
 
 
 def _spread_columns(found: MonteCarlo, units: Units) -> dict[str, Any]:
-    """Return all columns of a Monte Carlo analysis over the turn."""
+    """Return the results of a Monte Carlo simulation over the turn as columns by name with unit."""
     columns: dict[str, Any] = {"crank angle [deg]": np.degrees(found.turn.angle)}
     for name, spread in found.spreads.items():
         si, linear = sc.QUANTITIES[name], found.estimates[name]
@@ -212,7 +214,7 @@ def _spread_columns(found: MonteCarlo, units: Units) -> dict[str, Any]:
 
 
 def _show_spread(found: MonteCarlo, place: int, title: str, units: Units) -> None:
-    """Print the estimates and the samples at one crank angle."""
+    """Print the linear estimate and the statistics of the samples at one crank angle."""
     rows = []
     for name, spread in found.spreads.items():
         si, linear = sc.QUANTITIES[name], found.estimates[name]
