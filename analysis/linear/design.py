@@ -1,7 +1,7 @@
-"""Controllers of one coordinate by the force (or torque) on it, designed on a linear model.
+"""Design controllers of one coordinate by the force (or torque) on it, on a linear model.
 
-Every design is one law of the deviations x from an operating point x0 with the force F0, at a reference r of the coordinate u
-whose own operating point is x0 + x_s (r - u0), F0 + F_s (r - u0) on the linear model:
+The operating point is the state x0 with the force F0. At a reference r of the coordinate u, the equilibrium of the linear model
+is the state x0 + x_s (r - u0) with the force F0 + F_s (r - u0). Every design is a law of the deviation of the state x from it:
 
     F = F0 + F_s (r - u0) - k (x - x0 - x_s (r - u0)) - k_i * integral of (u - r)
 
@@ -38,7 +38,7 @@ class DesignError(LinkworkError):
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Design:
-    """A control law for a force, with poles and margins on the linear model, in units of a force and a position.
+    """A control law for a force, with poles and margins on the linear model; the units are those of a force and a position.
 
     Attributes
     ----------
@@ -49,9 +49,9 @@ class Design:
     channel : str
         FMI name of the force.
     freedom : int
-        Number of the driven and controlled freedom.
+        Number of the freedom that is controlled, on which the force acts.
     gains : ndarray, shape (2 n,)
-        Gains k of the model's state (q, q'), in N per unit of each.
+        Gains k of the model's state (q, q'), in N per unit of each component.
     integral_gain : float
         k_i (N/(m.s)); zero if there is no integral action.
     target, target_slope : ndarray, shape (2 n,)
@@ -61,9 +61,9 @@ class Design:
     poles : ndarray
         Poles of the closed loop (1/s), by magnitude.
     gain_margin : float
-        Factor on the force up to which the loop stays stable, infinite if there is none.
+        Factor by which the loop's gain can grow until the loop loses its stability; infinite if it never does.
     phase_margin : float
-        rad; infinite if the loop's gain nowhere crosses 1.
+        Phase margin (rad); infinite if the loop's gain nowhere crosses 1.
     crossover : float
         Highest frequency at which the loop's gain is 1 (rad/s); zero if there is none.
     delay_margin : float
@@ -118,7 +118,7 @@ class Design:
         return control.ss(a - b @ row, b, c, whole.D, **names)
 
     def sampled_poles(self, period: float) -> NDArray[np.complex128]:
-        """Compute the poles (in z) of the linear model under the law sampled every ``period`` s and held."""
+        """Compute the poles (in z) of the closed loop if the law is sampled every ``period`` s and its force is held."""
         check_period(period)
         a, b = self.plant.a, self.plant.b
         held = control.sample_system(control.ss(a, b, np.eye(len(a)), np.zeros((len(a), 1))), period, method="zoh")
@@ -133,7 +133,7 @@ class Design:
         return sorted_by_magnitude(np.linalg.eigvals(kept))
 
     def continuous(self, reference: float) -> Function:
-        """Return the law without sampling, as the force among `analysis.run.Inputs`.
+        """Return the law without sampling, as a force for `analysis.run.Inputs`.
 
         Raises
         ------
@@ -155,7 +155,7 @@ class Design:
         return Function(force)
 
     def plant_values(self, values: FloatArray) -> FloatArray:
-        """Return values by the model's state as values by all coordinates and rates, zero for states it lacks."""
+        """Extend values for the components of the model's state to all coordinates and rates; zero for the other components."""
         whole = np.zeros(2 * len(self.model.mechanism.freedoms))
         whole[self.model.places] = values
         return whole
@@ -182,7 +182,7 @@ class _Plant:
         return whole, np.vstack([self.b, [[0.0]]])
 
     def feedback_matrices(self, gains: FloatArray, integral_gain: float) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Return A, B and the row of the gains, with the integral as the last state if it has a gain."""
+        """Return A, B and the gains as a row, shape (1, states); the integral is the last state if it has a gain."""
         if integral_gain:
             return *self.integrating(), np.append(gains, integral_gain)[None, :]
         return self.a, self.b, gains[None, :]
@@ -193,7 +193,7 @@ class _Plant:
 
 
 def _design(method: str, model: LinearModel, channel: str | None, gains: FloatArray, integral_gain: float) -> Design:
-    """Build the design with these gains after a check of its stability."""
+    """Check the stability of the closed loop with these gains, and return the design; raises DesignError if it is unstable."""
     plant, freedoms = _Plant(model, channel), model.mechanism.freedoms
     for n in model.layout.free:
         if freedoms[n].period and model.state[len(freedoms) + n] != 0.0:
@@ -209,7 +209,7 @@ def _design(method: str, model: LinearModel, channel: str | None, gains: FloatAr
         raise DesignError(
             f"{method}: the closed loop is not stable, its poles are {np.array2string(poles, precision=4)} 1/s"
         )
-    # where the linear model stays with the coordinate 1 further on
+    # equilibrium of the linear model with the coordinate at 1
     n = len(plant.a)
     border = np.zeros((n + 1, n + 1))
     border[:n, :n], border[:n, n:], border[n, plant.place] = plant.a, plant.b, 1.0
@@ -221,7 +221,7 @@ def _design(method: str, model: LinearModel, channel: str | None, gains: FloatAr
         ) from None
     gain, phase, _, _, crossings, _ = control.stability_margins(loop, returnall=True)
     phase, crossings = np.atleast_1d(np.radians(phase)), np.atleast_1d(crossings)
-    # a margin below zero is one of a loop that needs its gain: as a delay it is a turn less that
+    # a delay can only lower the phase: to a negative margin a turn is added
     delays = np.where(phase > 0.0, phase, phase + 2.0 * pi) / crossings
     gains_up = [float(value) for value in np.atleast_1d(gain) if value > 1.0]
     return Design(
@@ -258,12 +258,12 @@ def design_lqr(
     model : LinearModel
         Model of an equilibrium, or mean model of a periodic motion.
     q : mapping or array_like
-        Weights by name of the state, zero if left out; or the diagonal of Q, or Q. A weight of 1e6 r of a position lets a
-        deviation of 1 mm cost as much as a force of 1 N.
+        Weights by the names of the states, zero if left out; or the diagonal of Q; or Q. With the weight 1e6 r for a position,
+        a deviation of 1 mm costs as much as a force of 1 N.
     r : float
         Weight of the force.
     integral : float
-        Weight of the integral of the coordinate (1/s2); above zero the law has integral action.
+        Weight of the integral of the coordinate (1/s2); if it is above zero, the law has integral action.
     channel : str, optional
         FMI name of the force; by default the force on the last free freedom (`LinearModel.force_channel`).
 
@@ -322,16 +322,17 @@ def design_pid(
     damping: float = 0.7,
     channel: str | None = None,
 ) -> Design:
-    """Design a PID, its derivative part on the measured velocity, by the three poles of the closed loop.
+    """Design a PID controller by the three poles of the closed loop; the derivative part acts on the measured velocity.
 
     Parameters
     ----------
     model : LinearModel
         A model with one free freedom, such as a five-bar in speed drive.
     poles : sequence of 3 complex, optional
-        1/s, real or in conjugate pairs, left of the imaginary axis.
+        Poles (1/s), real or in conjugate pairs, left of the imaginary axis.
     bandwidth, damping : float
-        Instead of poles (rad/s): they are -bandwidth times 1 and damping +- i sqrt(1 - damping^2).
+        Instead of poles: bandwidth in rad/s and damping ratio. The poles are -bandwidth and
+        -bandwidth (damping +- i sqrt(1 - damping^2)).
     channel : str, optional
         FMI name of the force; by default the force on the last free freedom (`LinearModel.force_channel`).
 
@@ -367,7 +368,7 @@ def design_pid(
             f"poles {wanted.tolist()}: there must be three, real or conjugate, left of the imaginary axis"
         )
     _, a2, a1, a0 = polynomial.real.tolist()
-    # m s^3 + (c + f k_d) s^2 + (k + f k_p) s + f k_i = m (s^3 + a2 s^2 + a1 s + a0), f the force of a unit of the channel
+    # m s^3 + (c + f k_d) s^2 + (k + f k_p) s + f k_i = m (s^3 + a2 s^2 + a1 s + a0), with f the force per unit of the channel
     plant = _Plant(model, channel)
     m, c, k = (float(matrix[0, 0]) for matrix in (model.M, model.C, model.K))
     f = float(model.F[0, model.input_names.index(plant.channel)])
@@ -380,22 +381,23 @@ def design_pi(
 ) -> Design:
     """Design a PI controller with crossover at ``bandwidth`` and at least a given phase margin.
 
-    If an integral alone leaves more than the phase margin, there is no proportional part.
+    If an integral part alone gives more than this phase margin, there is no proportional part.
 
     Parameters
     ----------
     model : LinearModel
     bandwidth : float
-        Crossover (rad/s).
+        Crossover frequency (rad/s).
     phase_margin : float
-        rad.
+        Least phase margin (rad).
     channel : str, optional
         FMI name of the force; by default the force on the last free freedom (`LinearModel.force_channel`).
 
     Raises
     ------
     DesignError
-        If no PI meets the requirements: a PI has no phase lead, which a sprung mass needs near its resonance and above.
+        If no PI controller meets the requirements: it gives no phase lead, which a sprung mass needs near its resonance and
+        above.
 
     Examples
     --------
@@ -438,7 +440,7 @@ def _check_positive(name: str, value: float, unit: str) -> None:
 
 
 def check_period(period: float) -> None:
-    """Make sure that a sampling period (s) is finite and above zero.
+    """Check that a sampling period (s) is finite and above zero.
 
     Raises
     ------

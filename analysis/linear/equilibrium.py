@@ -1,6 +1,6 @@
-"""Equilibria of a mechanism, free or with some of its freedoms held.
+"""Find equilibria of a mechanism, free or with some of its freedoms held.
 
-They are found by Newton's method on the generalised forces at rest, M a, with exact derivatives by CasADi
+Newton's method is applied to the generalised forces at rest, M a, with exact derivatives by CasADi
 (`analysis.run.expressions`).
 """
 
@@ -28,9 +28,9 @@ from ..run import Inputs, expressions, given, takes_published
 from ..units import Amount, in_si
 from .model import FloatArray, Layout, Modes, layout, sampled_channels
 
-#: Grid points of the search for equilibria: over a turn of a cyclic freedom, and over the reach of another.
+#: Grid points of the search for equilibria: over a turn of a cyclic freedom, and over the reach of any other freedom.
 GRID = (48, 81)
-#: Largest imbalance of an equilibrium, relative to the forces that balance.
+#: Largest imbalance of an equilibrium, relative to the forces that balance each other.
 BALANCE = 1e-12
 MOST_ITERATIONS = 60
 
@@ -41,11 +41,11 @@ class EquilibriumError(LinkworkError):
 
 @cache
 def _statics(mechanism: Mechanism, modes: Modes) -> tuple[Any, Any]:
-    """Return two CasADi functions of coordinates, channels and constants: statics alone, and with derivatives.
+    """Return two CasADi functions of coordinates, channels and constants: statics alone, and statics with derivatives.
 
-    The first result of both is the generalised forces at rest on the free freedoms. The first function also returns the
-    clearance; the second the negative derivatives of the forces by these freedoms, and the generalised forces of unit forces of
-    the channels. Friction, the purpose of a mechanism's switch, does not act at rest.
+    The first result of either function is the generalised forces at rest on the free freedoms. The first function also returns
+    the clearance; the second also returns the negative derivatives of the forces by the free coordinates, and the derivatives
+    by the forces of the channels. Friction, which a mechanism's switch turns on, does not act at rest.
     """
     casadi, traces, its = symbolic.library(), expressions(mechanism), layout(mechanism, modes)
     x, mode_symbols, u, p = traces.symbols
@@ -74,23 +74,23 @@ class Equilibrium:
     Attributes
     ----------
     parameters
-        Of the mechanism.
+        Parameters of the mechanism.
     coordinates : ndarray
-        Of all freedoms.
+        Coordinates of all freedoms (rad, m).
     inputs : Inputs
         Acting inputs; a held freedom has the commanded rate 0.
     holding : dict
-        Generalised force (N.m or N) that holds each held freedom, by its coordinate.
+        Generalised force (N.m or N) that holds each held freedom, by the name of its coordinate.
     stiffness : ndarray
-        Negative derivative of the generalised forces by the free and held freedoms.
+        Negative derivatives of the generalised forces on the free and held freedoms by their coordinates.
     residual : float
-        Largest imbalance, relative to the forces that balance.
+        Norm of the imbalance, relative to the forces that balance each other.
     iterations : int
         Iterations of Newton's method.
 
     Notes
     -----
-    ``rest["slider.position"]`` is an output of the mechanism there.
+    ``rest["slider.position"]`` is an output of the mechanism in this configuration.
     """
 
     parameters: Parameters
@@ -120,7 +120,7 @@ class Equilibrium:
 
     @property
     def initial(self) -> InitialState:
-        """Start of a run in this configuration."""
+        """Initial state of a run that starts in this configuration."""
         mechanism = mechanism_of(self.parameters)
         names = [freedom.initial[0] for freedom in mechanism.freedoms]
         return mechanism.initial(**dict(zip(names, self.coordinates.tolist())))
@@ -135,7 +135,7 @@ class Equilibrium:
 
     @property
     def potential(self) -> float:
-        """Potential energy of springs, gravity and the constant forces (J); a force's part counts from displacement 0."""
+        """Potential energy (J) of springs, gravity and the constant forces; that of a force is zero at displacement 0."""
         mechanism = mechanism_of(self.parameters)
         work = 0.0
         for channel in mechanism.channels:
@@ -153,13 +153,13 @@ class _Balance:
     Attributes
     ----------
     modes : tuple of int
-        Modes in which held freedoms are free, under no force: their unbalanced forces are the holding forces.
+        Modes in which held freedoms count as free, under no force: the unbalanced forces on them are the holding forces.
     its : Layout
-        Layout in these modes: the free and the held freedoms.
+        Layout in these modes: its free freedoms are the free and the held freedoms.
     free : list of int
-        Places of the free freedoms among them.
+        Indices of the free freedoms in ``its.free``.
     scale : ndarray
-        Scales of their coordinates.
+        Scales of the coordinates of ``its.free``.
     """
 
     parameters: Parameters
@@ -204,7 +204,10 @@ class _Balance:
         return np.array([*self.parameters.constants(), 0.0])
 
     def imbalance(self, coordinates: FloatArray) -> FloatArray:
-        """Return norms of the forces on the free freedoms at coordinates (freedoms, n), infinite beyond the limit."""
+        """Return the norms of the scaled forces on the free freedoms, shape (n,), at coordinates of shape (freedoms, n).
+
+        A norm is infinite beyond the limit of assembly.
+        """
         n = coordinates.shape[1]
         columns = (np.tile(value[:, None], n) for value in (self.channels, self.constants))
         forces, clearance = map(np.asarray, _statics(self.mechanism, self.modes)[0].map(n)(coordinates, *columns))
@@ -213,7 +216,7 @@ class _Balance:
         return np.where(joined, norms, np.inf)
 
     def solve(self, guess: FloatArray) -> Equilibrium:
-        """Find an equilibrium by Newton's method, with halved steps where the imbalance would grow.
+        """Find an equilibrium by Newton's method; a step is halved while the imbalance would grow.
 
         Raises EquilibriumError if it does not converge.
         """
@@ -226,12 +229,12 @@ class _Balance:
             size = self._size(q, stiffness, of_inputs)
             scale = self.scale[self.free]
             scaled = scale[:, None] * stiffness[np.ix_(self.free, self.free)] * scale
-            # where the equilibrium is neutral the shortest of the steps that reach it is taken
+            # if the equilibrium is neutral, the shortest step that reaches it is taken
             step = scale * np.linalg.lstsq(scaled, scale * forces[self.free, 0], rcond=1e-10)[0]
             trials = np.tile(q[:, None], 40)
             trials[moved] += step[:, None] * 0.5 ** np.arange(40)
             after = self.imbalance(trials)
-            # as long as a step still brings much more it is taken
+            # go on as long as a step still reduces the imbalance much
             if before <= BALANCE * size and not np.any(after < 0.1 * before):
                 return self._found(q, forces[:, 0], stiffness, before / size if size else 0.0, iteration)
             if not np.any(after < before):
@@ -243,7 +246,7 @@ class _Balance:
         )
 
     def _size(self, q: FloatArray, stiffness: FloatArray, of_inputs: FloatArray) -> float:
-        """Return the magnitude of the generalised forces that have to balance (N.m)."""
+        """Return the magnitude, in units of energy, of the generalised forces that have to balance each other (N.m)."""
         # a cyclic freedom has no displacement that loads a spring
         far = [0.0 if self.mechanism.freedoms[n].period else abs(q[n]) for n in self.its.free]
         elastic = self.scale @ np.abs(stiffness) @ (self.scale + far)
@@ -252,7 +255,7 @@ class _Balance:
     def _found(
         self, q: FloatArray, forces: FloatArray, stiffness: FloatArray, residual: float, iterations: int
     ) -> Equilibrium:
-        # a freedom that is tied to another goes where that takes it
+        # `start` sets a freedom that is tied to another
         applied = self.mechanism.equations.applied(
             tuple(map(float, self.modes)), tuple(self.channels.tolist()), self.parameters.constants()
         )
@@ -270,7 +273,7 @@ class _Balance:
         return (*q.tolist(), *[0.0] * (self.mechanism.size - len(q)))
 
     def starts(self, held: FloatArray) -> list[FloatArray]:
-        """Return the points of a grid over all configurations with less imbalance than their neighbours."""
+        """Return the points of a grid over all configurations that have no more imbalance than their neighbours."""
         lengths = [
             abs(getattr(self.parameters, field.name))
             for field in fields(self.parameters)
@@ -293,7 +296,7 @@ class _Balance:
 def _balance_with_held(
     parameters: Parameters, inputs: Inputs | None, held: Mapping[str, float] | None
 ) -> tuple[_Balance, FloatArray]:
-    """Return the equations of rest, and coordinates with the values of held freedoms and zero elsewhere."""
+    """Return the equations of rest, and all coordinates, with the given values for held freedoms and zero elsewhere."""
     mechanism = mechanism_of(parameters)
     inputs, _ = given(mechanism, inputs, None)
     coordinates = np.zeros(len(mechanism.freedoms))
@@ -313,12 +316,12 @@ def _balance_with_held(
 def find_equilibria(
     parameters: Parameters, inputs: Inputs | None = None, *, held: Mapping[str, Amount] | None = None
 ) -> tuple[Equilibrium, ...]:
-    """Find equilibria from a grid over all configurations, sorted by potential energy.
+    """Find the equilibria of a mechanism from a grid over all configurations, sorted by potential energy.
 
     Parameters
     ----------
     parameters
-        Of the mechanism.
+        Parameters of the mechanism.
     inputs : Inputs, optional
         Constant forces; by default none. A freedom whose rate is commanded, which must be 0, is held.
     held : mapping, optional
@@ -327,7 +330,7 @@ def find_equilibria(
     Returns
     -------
     tuple of Equilibrium
-        Angles of cyclic freedoms in (-pi, pi]. Where the equilibria are not isolated, some of them.
+        The equilibria, with angles of cyclic freedoms in (-pi, pi]. If they are not isolated, only some of them are found.
 
     Raises
     ------
@@ -369,8 +372,8 @@ def find_equilibrium(
     parameters, inputs, held
         As for `find_equilibria`.
     guess : array_like, optional
-        All coordinates (rad, m) to start from; those of held freedoms are not used. By default the stable equilibrium of least
-        potential energy is returned, or the lowest of all if none is stable.
+        All coordinates (rad, m) to start from; those of held freedoms are not used. Without a guess the stable equilibrium of
+        least potential energy is returned, or that of least potential energy if none is stable.
 
     Raises
     ------
@@ -379,7 +382,7 @@ def find_equilibrium(
     AssemblyError
         If the links cannot be joined at the guess.
     EquilibriumError
-        If there is no equilibrium, or none is found from the guess; the message has the imbalance and the place.
+        If there is no equilibrium, or none is found from the guess; the message then has the imbalance and the configuration.
 
     Examples
     --------

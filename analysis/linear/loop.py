@@ -1,7 +1,7 @@
-"""Simulation of a sampled controller around the nonlinear plant or its linear model.
+"""Simulate a closed loop of a sampled controller and the nonlinear plant or its linear model.
 
-`control_loop` runs a law sampled and held over the steps of the plant or of its FMU, as a controller beside it does;
-`predict_loop` runs the same controller on the linear model.
+In `control_loop` the controller samples the plant, or its FMU, and holds its force for each step, as a digital controller does.
+`predict_loop` runs the same controller with the linear model.
 """
 
 from __future__ import annotations
@@ -38,21 +38,21 @@ from .design import Design, check_period
 from .model import FloatArray, LinearModel
 from .periodic import PeriodicModel
 
-#: A value, or a function of time (s) that is sampled with the controller.
+#: A constant reference, or a function of time (s) that is sampled with the controller.
 Reference = float | Callable[[float], float]
 #: Largest product of a step of the linear model's Runge-Kutta method with its fastest rate.
 FINE_STEP = 0.03
-#: How far from rest, relative to the mechanism's scales and stiffness, a model may be that a loop is predicted on.
+#: Greatest rate and acceleration, relative to the mechanism's scales and stiffness, of the state of a model for `predict_loop`.
 AT_REST = 1e-6
 
 
 def saturate(force: float, limit: float) -> float:
-    """Return a force clipped to a limit either way."""
+    """Return a force clipped to the range from -limit to limit."""
     return min(max(force, -limit), limit)
 
 
 def check_limit(limit: float) -> None:
-    """Make sure that a limit of a force (N) is above zero.
+    """Check that a limit of a force (N) is above zero.
 
     Raises
     ------
@@ -74,15 +74,15 @@ def peak(values: FloatArray) -> float:
 
 
 class SampledController:
-    """A design run with a sampling period: it measures, computes the force, and holds it for a period.
+    """A design as a sampled controller: it measures, computes the force, and holds it for a period.
 
     Parameters
     ----------
     design : Design
     period : float
-        s.
+        Sampling period (s).
     limit : float
-        Largest force either way (N). At the limit the integral does not grow further against it.
+        Largest magnitude of the force (N). While the force is at the limit, the integral does not grow further.
     """
 
     def __init__(self, design: Design, period: float, *, limit: float = inf) -> None:
@@ -108,7 +108,7 @@ class SampledController:
         return self.design.method
 
     def force(self, measured: Sequence[float], reference: float) -> float:
-        """Return the force for the next period from coordinates, rates and the coordinate's reference."""
+        """Return the force for the next period from all measured coordinates, then rates, and the reference."""
         step = reference - self._target[self._place]
         wanted = self.holding_force(reference)
         for gain, value, target, slope in zip(self._gains, measured, self._target, self._slope):
@@ -122,7 +122,7 @@ class SampledController:
     def follow(self, feedforward: float, position_error: float, velocity_error: float) -> float:
         """Return the force for the next period along a moving reference, from the errors of coordinate and rate.
 
-        ``feedforward`` takes the place of the holding force; no gain acts on other freedoms.
+        ``feedforward`` replaces the holding force; the gains of other freedoms are not used.
         """
         k_u, k_v = self._gains[self._place], self._gains[len(self._gains) // 2 + self._place]
         return self._limited(feedforward - k_u * position_error - k_v * velocity_error, position_error)
@@ -131,7 +131,7 @@ class SampledController:
         """Add the integral part, clip the force to the limit, and advance the integral by the error."""
         d = self.design
         wanted -= d.integral_gain * self.integral
-        # a force beyond the limit is not asked for still louder
+        # beyond the limit the integral must not ask for an even larger force
         if abs(wanted) <= self.limit or wanted * d.integral_gain * error > 0.0:
             self.integral += self.period * error
         return saturate(wanted, self.limit)
@@ -146,13 +146,13 @@ class LoopMetrics:
     settling_time : float or None
         Time from the start until the coordinate stays within the band about the reference (s); None if it does not.
     overshoot : float
-        Greatest excursion beyond the reference, as a share of the way to it.
+        Greatest excursion beyond the reference, relative to the initial distance from it.
     peak_force : float
-        Largest force either way (N).
+        Largest magnitude of the force (N).
     rms_error, peak_error : float
-        Deviation from the reference over the window at the end (m).
+        Deviation from the reference over the window at the end of the run (m).
     rms_force : float
-        Force over that window (N).
+        Root mean square of the force over this window (N).
     """
 
     settling_time: float | None
@@ -170,19 +170,19 @@ class LoopResult:
     Attributes
     ----------
     time : ndarray, shape (n,)
-        s.
+        Sampling times (s).
     states : ndarray, shape (n, 2 f)
-        All coordinates, then all rates: of a five-bar (th2, u, th2', u').
+        All coordinates, then all rates: for a five-bar (th2, u, th2', u').
     force, reference : ndarray, shape (n,)
-        N, m; each holds until the next sample.
+        Force (N) and reference (m); each value holds until the next sample.
     freedom : int
         Number of the freedom that is controlled; by default the last.
     trajectory : Trajectory or None
-        All outputs of the plant; a linear model has none.
+        All outputs of the plant; None for a linear model.
     status : int
-        0 if the run reached its end, else the solver.status of the FMI contract.
+        0 if the run reached its end, otherwise the solver.status of the FMI contract.
     message : str
-        Why it ended early; empty if it did not.
+        Reason why the run ended early; empty if it did not.
     """
 
     time: FloatArray
@@ -200,7 +200,7 @@ class LoopResult:
         return self.states[:, : self.states.shape[1] // 2][:, self.freedom]
 
     def end(self, window: float) -> NDArray[np.bool_]:
-        """Return a mask of the samples in the window (s) at the end.
+        """Return a mask of the samples in a window of given length (s) at the end of the run.
 
         Raises
         ------
@@ -217,9 +217,9 @@ class LoopResult:
         Parameters
         ----------
         band : float
-            Half width of the band of settling (m).
+            Half width of the band in which the coordinate counts as settled (m).
         start : float
-            When the reference steps, or control begins (s).
+            Time at which the reference steps, or control begins (s).
         window : float, optional
             Length of the window at the end (s), such as a period of the motion; by default a tenth of the run.
 
@@ -258,7 +258,7 @@ class LoopResult:
 
 
 class Controller(Protocol):
-    """A controller that is sampled every ``period`` s and acts by the force ``channel``."""
+    """A controller that is sampled every ``period`` s and sets the force ``channel``."""
 
     @property
     def period(self) -> float: ...
@@ -275,7 +275,7 @@ class Controller(Protocol):
 
 
 class _Plant(Protocol):
-    """Plant of a closed loop: nonlinear, FMU or linear."""
+    """Plant of a closed loop: the nonlinear plant, its FMU, or a linear model."""
 
     def measure(self) -> Sequence[float]: ...
 
@@ -287,7 +287,7 @@ class _Plant(Protocol):
 def _run_loop(
     plant: _Plant, controller: Controller, reference: Reference, times: FloatArray, freedom: int
 ) -> LoopResult:
-    """Run a closed loop from a reset controller: measure, compute, hold, step."""
+    """Reset the controller and run a closed loop: at each sampling time measure, compute the force, hold it, and step."""
     controller.reset()
     rows: list[tuple[float, ...]] = []
     status, message = 0, ""
@@ -327,7 +327,7 @@ class _Driven:
         self.rows: list[Sequence[float]] = []
 
     def inputs(self, time: float, ahead: float, measured: Sequence[float]) -> dict[str, float]:
-        """Return all inputs by FMI name, the controller's at 0."""
+        """Return all inputs by FMI name, with 0 for the controller's force."""
         x = np.array([*measured, 0.0, 0.0])
         return dict(zip(self.mechanism.input_names, sample(self._encoded, time, x, self._laws, ahead=ahead).tolist()))
 
@@ -372,7 +372,7 @@ class _Fmu(_Driven):
 
 
 def _channel(mechanism: Mechanism, name: str) -> Channel:
-    """Return the channel of the controller's force."""
+    """Return the channel of a controller's force, by its FMI name; raises InputError if it is no force on a freedom."""
     for channel in mechanism.channels:
         if channel.name == name and channel.kind == "force" and channel.freedom >= 0:
             return channel
@@ -392,14 +392,14 @@ def control_loop(
     fmu: str | Path | None = None,
     tolerance: float = 1e-9,
 ) -> LoopResult:
-    """Close a controller around the nonlinear plant, in process or as its FMU.
+    """Run a closed loop of a controller and the nonlinear plant, in this process or as its FMU.
 
     Parameters
     ----------
     parameters
-        Of a mechanism.
+        Parameters of a mechanism.
     controller : Controller
-        Such as a `SampledController`; starts with its integral at zero.
+        A controller such as a `SampledController`; it is reset first.
     reference : float or function of time
         Reference of the controlled coordinate, such as the slider position (m).
     inputs : Inputs, optional
@@ -408,17 +408,16 @@ def control_loop(
     initial
         State at the start.
     stop_time : float
-        s.
+        End of the run (s).
     fmu : path, optional
-        The mechanism's FMU to be run instead of the plant in process.
+        The mechanism's FMU, which is run instead of the plant in this process.
     tolerance : float
         Tolerance of the plant's integrator.
 
     Returns
     -------
     LoopResult
-        A loop in which the motion reaches the limit of assembly, or cannot be followed, ends there with a status, a message
-        and all data up to it.
+        If the motion reaches the limit of assembly, or cannot be followed, the result ends there, with a status and a message.
 
     Raises
     ------
@@ -432,7 +431,7 @@ def control_loop(
     channel = _channel(mechanism, controller.channel)
     if channel.argument in inputs:
         raise InputError(f"{channel.argument} is among the inputs, but it is the controller's")
-    # an argument that is given, be it 0, chooses the mode in which it acts
+    # an argument that is given, even as 0, chooses the mode in which it acts
     inputs = inputs.replace(**{channel.argument: 0.0})
     times = sample_times(stop_time, controller.period)
     if fmu is None:
@@ -536,16 +535,17 @@ def predict_loop(
     deviation: ArrayLike | None = None,
     averaged: bool = False,
 ) -> LoopResult:
-    """Close a controller around the linear model, to predict `control_loop`.
+    """Run a closed loop of a controller and the linear model, to predict `control_loop`.
 
     Parameters
     ----------
     model : LinearModel or PeriodicModel
-        About an equilibrium; or about a periodic motion, to which the deviations are then added, from its first sample on.
+        Model about an equilibrium; or about a periodic motion, to which the deviations are added, from its first sample on.
     controller, reference, stop_time
         As for `control_loop`.
     inputs : Inputs, optional
-        Forces that act; commanded freedoms move as in the motion. By default all forces are those of the motion.
+        Forces that act; commanded freedoms move as at the operating point. By default all forces are those of the operating
+        point.
     deviation : array_like, shape (2 n,), optional
         Deviation of the model's state from its operating point at the start.
     averaged : bool
@@ -571,7 +571,7 @@ def predict_loop(
 
 
 def _check_rest(model: LinearModel) -> None:
-    """Make sure that the model is about an equilibrium."""
+    """Raise InputError if a model is not about an equilibrium."""
     mechanism, n = model.mechanism, len(model.mechanism.freedoms)
     scale = np.array(mechanism.error_scale(model.parameters, (0.0,) * mechanism.size))[:n]
     free, size = list(model.layout.free), len(model.layout.free)

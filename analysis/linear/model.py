@@ -1,13 +1,13 @@
-"""Linear models of a mechanism about one state.
+"""Linearise a mechanism about one state.
 
-In the deviations q of the freedoms that are free, and w of the inputs,
+With the deviations q of the free freedoms and w of the inputs, the linear model is
 
     M q'' + C q' + K q = F w
 
-with the exact derivatives of the mechanism's own equations, traced with CasADi (`analysis.run.expressions`): of the
-accelerations a(q, q', w) they give K = -M da/dq, C = -M da/dq' and F = M da/dw, where M is the Hessian of the energy with
-respect to the rates. Away from an equilibrium the accelerations are not zero, and K holds the derivative of M times them.
-A freedom whose rate is commanded is not part of q; it acts through three inputs: acceleration, speed and coordinate.
+Its matrices are exact derivatives of the mechanism's own equations, traced with CasADi (`analysis.run.expressions`): M is the
+Hessian of the energy with respect to the rates, and from the accelerations a(q, q', w) follow K = -M da/dq, C = -M da/dq' and
+F = M da/dw. Away from an equilibrium the accelerations are not zero, and K = -d(M a)/dq + (dM/dq) a. A freedom whose rate is
+commanded is not part of q; it acts through three inputs: acceleration, speed and coordinate.
 """
 
 from __future__ import annotations
@@ -35,15 +35,15 @@ else:
     control = lazy("control")
 
 FloatArray = NDArray[np.float64]
-#: Values of a mechanism's modes, in its order.
+#: Values of a mechanism's modes, in the mechanism's order.
 Modes = tuple[int, ...]
 
-#: Largest difference of a commanded rate from that of the state, relative to the larger of the two and 1.
+#: Largest difference between a commanded rate and the rate in the state, relative to the larger of the latter and 1.
 SAME_RATE = 1e-6
 
 
 class LinearModelError(LinkworkError):
-    """A linear model cannot give the result."""
+    """The linear model does not have what was asked for, or it could not be computed."""
 
 
 def signal_name(name: str) -> str:
@@ -63,9 +63,9 @@ class Layout:
     forces : tuple of int
         Numbers of the channels whose forces act.
     input_names : tuple of str
-        Of a linear model: the forces, then of each commanded freedom its acceleration, speed and coordinate.
+        Inputs of a linear model: the forces, then the acceleration, speed and coordinate of each commanded freedom.
     state_names : tuple of str
-        Coordinates of the free freedoms, then their rates.
+        States of a linear model: coordinates of the free freedoms, then their rates.
     """
 
     free: tuple[int, ...]
@@ -77,7 +77,7 @@ class Layout:
 
 @cache
 def layout(mechanism: Mechanism, modes: Modes) -> Layout:
-    """Return free and commanded freedoms and acting forces in given modes."""
+    """Return the layout of a mechanism in given modes: free and commanded freedoms, and acting forces."""
     names = {mode.name: mode.arguments[value] for mode, value in zip(mechanism.modes, modes)}
 
     def acts(number: int) -> bool:
@@ -116,7 +116,7 @@ def _channel_name(mechanism: Mechanism, freedom: int, kind: str) -> str:
 
 @cache
 def missing_outputs(mechanism: Mechanism) -> Mapping[str, str]:
-    """Return the outputs that a linear model does not have, with the reason."""
+    """Return the outputs that a linear model does not have, by FMI name, each with the reason."""
     casadi, traces = symbolic.library(), expressions(mechanism)
     x, _, _, p = traces.symbols
     of_the_run = casadi.vertcat(x[2 * len(mechanism.freedoms) :], p[-1])
@@ -131,13 +131,16 @@ def missing_outputs(mechanism: Mechanism) -> Mapping[str, str]:
 
 @cache
 def linear_outputs(mechanism: Mechanism) -> tuple[str, ...]:
-    """Return the outputs of a linear model, in the order of the FMI contract."""
+    """Return the FMI names of the outputs of a linear model, in the order of the FMI contract."""
     return tuple(name for name in mechanism.output_names if name not in missing_outputs(mechanism))
 
 
 @cache
 def _derivatives(mechanism: Mechanism, modes: Modes, switched: bool) -> Any:
-    """Return a CasADi function of state, channels and constants: outputs, accelerations, M, C, K, F, output derivatives."""
+    """Return a CasADi function of state, channels and constants that gives the arrays of `Matrices`.
+
+    They are the outputs, the accelerations, M, C, K, F, and the derivatives of the outputs by the state and by the inputs.
+    """
     casadi, traces, its = symbolic.library(), expressions(mechanism, switched), layout(mechanism, modes)
     x, mode_symbols, u, p = traces.symbols
     n = len(mechanism.freedoms)
@@ -175,16 +178,16 @@ def _derivatives(mechanism: Mechanism, modes: Modes, switched: bool) -> Any:
 class Matrices:
     """Arrays of a linear model, or of many models stacked along the first axis.
 
-    n is the number of freedoms that are free: of a five-bar 2 in torque drive, with q = (crank angle, slider position), and
-    1 in speed drive, with q = (slider position); m is the number of inputs, l of outputs, f of all freedoms. All are
+    n is the number of free freedoms: for a five-bar 2 in torque drive, with q = (crank angle, slider position), and 1 in speed
+    drive, with q = (slider position); m is the number of inputs, l of outputs, f of all freedoms. States and inputs are
     deviations from the operating point, in SI.
 
     Attributes
     ----------
     parameters
-        Of a mechanism.
+        Parameters of a mechanism.
     modes : tuple of int
-        Values of its modes.
+        Values of the mechanism's modes.
     M, C, K : ndarray, shape (..., n, n)
         Inertia, damping and stiffness.
     F : ndarray, shape (..., n, m)
@@ -264,9 +267,9 @@ class LinearModel(Matrices):
     Attributes
     ----------
     state : ndarray
-        Operating point: all coordinates, all rates, work dissipated and supplied; of a mean model the mean over the period.
+        Operating point: all coordinates, all rates, work dissipated and supplied; for a mean model the mean over the period.
     channels : ndarray
-        The mechanism's channels in force there.
+        Values of the mechanism's channels at the operating point.
     """
 
     state: FloatArray
@@ -288,17 +291,17 @@ class LinearModel(Matrices):
 
     @property
     def natural_frequencies(self) -> FloatArray:
-        """Undamped natural frequencies (rad/s), rising: square roots of the positive eigenvalues of M^-1 K."""
+        """Undamped natural frequencies (rad/s), in rising order: square roots of the positive eigenvalues of M^-1 K."""
         squares = np.linalg.eigvals(np.linalg.solve(self.M, self.K))
         return np.sort(np.sqrt(squares.real[(squares.real > 0.0) & (squares.imag == 0.0)]))
 
     def force_channel(self, name: str | None = None) -> tuple[str, int]:
-        """Return a force that drives a free freedom: its name, and the number of the freedom.
+        """Return the FMI name of a force that drives a free freedom, and the number of this freedom.
 
         Parameters
         ----------
         name : str, optional
-            By default the force on the last free freedom: of a five-bar ``slider.force``.
+            FMI name of the force; by default the force on the last free freedom, for a five-bar ``slider.force``.
 
         Raises
         ------
@@ -326,14 +329,14 @@ class LinearModel(Matrices):
         Returns
         -------
         control.StateSpace
-            Its signals carry the FMI names with underscores for dots (`signal_name`), as python-control wants them.
+            Its signals have the FMI names with underscores for dots (`signal_name`), as python-control requires.
 
         Raises
         ------
         UnknownNameError
             If there is no such input or output.
         LinearModelError
-            If an output is one that a linear model does not have (`missing_outputs`).
+            If a linear model does not have one of the outputs (`missing_outputs`).
         """
         chosen = self.input_names if inputs is None else inputs
         wanted = [self.state_names[len(self.state_names) // 2 - 1]] if outputs is None else outputs
@@ -354,7 +357,7 @@ class LinearModel(Matrices):
 
 
 def sorted_by_magnitude(values: ArrayLike) -> NDArray[np.complex128]:
-    """Return complex numbers sorted by magnitude, conjugate pairs by their imaginary parts."""
+    """Return complex numbers sorted by magnitude, those of equal magnitude by their imaginary parts."""
     whole = np.asarray(values, dtype=complex)
     return whole[np.lexsort((whole.imag, np.abs(whole)))]
 
@@ -366,17 +369,17 @@ def _index(name: str, names: tuple[str, ...]) -> int:
 
 
 def constant_inputs(mechanism: Mechanism, modes: Modes, channels: ArrayLike) -> Inputs:
-    """Return inputs with the constants ``channels`` in the given modes."""
+    """Return constant inputs with the values ``channels``, in the given modes."""
     values = dict(zip((channel.argument for channel in mechanism.channels), np.asarray(channels, float).tolist()))
     forces = {mechanism.channels[n].argument for n in layout(mechanism, modes).forces}
     acting = {name: values[name] for name in forces if values[name] != 0.0}
-    # an argument that chooses a mode and is no channel is a flag, such as groove
+    # an argument that chooses a mode without being a channel is a flag, such as groove
     chosen = [mode.arguments[value] for mode, value in zip(mechanism.modes, modes)]
     return Inputs(**acting | {name: values.get(name, True) for name in chosen})
 
 
 def evaluate(parameters: Parameters, modes: Modes, states: FloatArray, channels: FloatArray) -> dict[str, FloatArray]:
-    """Return the arrays of `Matrices` at states (s, size) under channels (s, channels), stacked along the first axis.
+    """Return the arrays of `Matrices` by name, at states (s, size) with channels (s, channels), stacked along the first axis.
 
     Raises InputError if a state or a channel is not finite, or nothing is free; AssemblyError if the links cannot be joined at
     a state.
@@ -403,7 +406,7 @@ def evaluate(parameters: Parameters, modes: Modes, states: FloatArray, channels:
 
     size, inputs = len(its.free), len(its.input_names)
     y, a, m, c, k, f, h, d = map(stack, raw, (1, 1, size, size, size, inputs, 2 * size, inputs))
-    # adding nothing makes a plain zero of -0.0
+    # adding 0.0 changes -0.0 to 0.0
     return {
         "M": m,
         "C": c + 0.0,
@@ -417,7 +420,7 @@ def evaluate(parameters: Parameters, modes: Modes, states: FloatArray, channels:
 
 
 def full_states(mechanism: Mechanism, states: ArrayLike) -> FloatArray:
-    """Return states (n, 2 f) or (n, 2 f + 2) as full states, with zero work if they have none."""
+    """Extend states (n, 2 f) to full states (n, 2 f + 2) by zero work; return full states as they are."""
     array, n = np.array(states, dtype=float), 2 * len(mechanism.freedoms)
     if array.ndim != 2 or array.shape[1] not in (n, mechanism.size) or len(array) == 0:
         raise InputError(
@@ -430,9 +433,10 @@ def full_states(mechanism: Mechanism, states: ArrayLike) -> FloatArray:
 def sampled_channels(
     mechanism: Mechanism, inputs: Inputs | None, times: FloatArray, states: FloatArray
 ) -> tuple[Modes, FloatArray]:
-    """Return modes and channels (s, channels) for inputs at times and states.
+    """Return the modes, and the channels at s times and states, shape (s, channels), under inputs.
 
-    Raises InputError if the inputs belong to another mechanism, are not finite, or command a rate unlike that of the states.
+    Raises InputError if the inputs belong to another mechanism, a state is not finite, or the inputs command a rate that
+    differs from the rate in a state.
     """
     inputs, _ = given(mechanism, inputs, None)
     encoded = encode(inputs, mechanism)
@@ -458,10 +462,10 @@ def linearise(parameters: Parameters, state: ArrayLike, inputs: Inputs | None = 
     Parameters
     ----------
     parameters
-        Of the mechanism; or a published set or its name.
+        Parameters of the mechanism; or a published set or its name.
     state : array_like
-        All coordinates, then all rates, such as `Equilibrium.state`: of a five-bar (th2, u, th2', u'). It need not be an
-        equilibrium: the deviations are then from the motion through it, and the model holds at that instant.
+        All coordinates, then all rates, such as `Equilibrium.state`: for a five-bar (th2, u, th2', u'). It need not be an
+        equilibrium: deviations are then from the motion through this state, and the model holds at this instant.
     inputs : Inputs, optional
         Inputs at time 0, such as `Equilibrium.inputs`; they decide which freedoms are free. None by default.
 
@@ -470,7 +474,7 @@ def linearise(parameters: Parameters, state: ArrayLike, inputs: Inputs | None = 
     InputError
         If state or inputs are not finite, of the wrong shape, or do not go together; or nothing is free.
     AssemblyError
-        If the links cannot be joined there.
+        If the links cannot be joined in this state.
 
     Examples
     --------

@@ -1,4 +1,4 @@
-"""Linear models of a mechanism along a periodic motion."""
+"""Linearise a mechanism along a periodic motion."""
 
 from __future__ import annotations
 
@@ -31,9 +31,9 @@ from .model import (
     sampled_channels,
 )
 
-#: Least samples of a period that carry its harmonics.
+#: Least number of samples of a period.
 LEAST_SAMPLES = 16
-#: Newton steps at most from an angle to the time at which it is reached.
+#: Newton steps at most to find the crank angle at a given time.
 MOST_ITERATIONS = 60
 
 
@@ -51,7 +51,7 @@ class Turn(Protocol):
 
     @property
     def inputs(self) -> FloatArray:
-        """The mechanism's channels, shape (n, channels)."""
+        """Values of the mechanism's channels, shape (n, channels)."""
         ...
 
     @property
@@ -74,11 +74,11 @@ class PeriodicModel(Matrices):
     Attributes
     ----------
     period : float
-        s.
+        Period (s).
     states : ndarray, shape (s, size)
-        The motion at the times k period / s, k = 0 ... s - 1.
+        States of the motion at the times k period / s, k = 0 ... s - 1.
     channels : ndarray, shape (s, channels)
-        The mechanism's channels in force there.
+        Values of the mechanism's channels at these times.
 
     Notes
     -----
@@ -130,7 +130,7 @@ class PeriodicModel(Matrices):
         return lambda t: periodic(t) + t * rates
 
     def _secular(self) -> FloatArray:
-        """Return the mean rates of cyclic freedoms, whole turns in the period; zero for the others."""
+        """Return the mean rates of all freedoms: of a cyclic freedom whole turns per period, of any other zero; shape (f,)."""
         freedoms = self.mechanism.freedoms
         way = self.states[:, len(freedoms) : 2 * len(freedoms)].mean(axis=0) * self.period
         return (
@@ -138,9 +138,9 @@ class PeriodicModel(Matrices):
         )
 
     def check(self) -> None:
-        """Make sure that the rates of the free freedoms are the derivatives of the periodic samples.
+        """Check that the rates of the free freedoms are the derivatives of their coordinates over the period.
 
-        They are not if the period is wrong, the end is sampled twice or the motion has not settled.
+        They are not if the period is wrong, the samples include the end of the period, or the motion has not settled.
 
         Raises
         ------
@@ -163,10 +163,10 @@ class PeriodicModel(Matrices):
                 )
 
     def monodromy(self, tolerance: float = 1e-10) -> FloatArray:
-        """Integrate Phi' = A(t) Phi from the unit matrix over a period; shape (2 n, 2 n).
+        """Compute the monodromy matrix: integrate Phi' = A(t) Phi from the unit matrix over a period; shape (2 n, 2 n).
 
-        A(t) is the trigonometric polynomial through its samples, integrated with SciPy. The eigenvalues are Floquet's
-        multipliers; in torque drive one of them is 1 along a motion of the free plant.
+        A(t) is the trigonometric polynomial through its samples. The eigenvalues are the Floquet multipliers; in torque drive
+        one of them is 1 along a motion of the free plant.
 
         Raises
         ------
@@ -204,17 +204,17 @@ def linearise_along(
     Parameters
     ----------
     parameters
-        Of the mechanism.
+        Parameters of the mechanism.
     motion : array_like, shape (s, states), or an orbit
-        States at evenly spaced times of one period, the end of it left out: all coordinates, then all rates; or an object
-        such as `analysis.periodic.PeriodicOrbit`.
+        States at evenly spaced times of one period, without its end: all coordinates, then all rates; or an object such as
+        `analysis.periodic.PeriodicOrbit`.
     inputs : Inputs, optional
-        Inputs along the motion of an array, which begins at time 0; none by default. A torque or force by a law of the state,
-        such as a motor's or a controller's, enters with its value: the model does not include the derivative of that law.
+        Inputs along the motion if it is an array, which begins at time 0; none by default. If a torque or force is a law of the
+        state, such as a motor's or a controller's, only its value is used: the model does not include the law's derivative.
     period : float, optional
         Period (s); by default the period of the orbit, or one turn for an array at a constant prescribed speed.
     samples : int
-        Number of samples of an orbit; an array has its own.
+        Number of samples of an orbit; it is not used for an array.
 
     Raises
     ------
@@ -222,7 +222,7 @@ def linearise_along(
         If inputs or period are given for an orbit; if the samples are fewer than `LEAST_SAMPLES`, not finite, or not samples
         of a periodic motion evenly spaced in time.
     AssemblyError
-        If the links cannot be joined at one of them.
+        If the links cannot be joined at one of the samples.
     """
     mechanism = mechanism_of(parameters)
     if isinstance(motion, Orbit):
@@ -249,7 +249,7 @@ def linearise_along(
 
 
 def _turn_time(mechanism: Mechanism, modes: Modes, states: FloatArray) -> float:
-    """Return the time of a turn of the freedom with a constant commanded speed."""
+    """Return the time of a turn (s) of the first cyclic freedom with a constant commanded speed."""
     for n in layout(mechanism, modes).commanded:
         rate, speed = states[:, len(mechanism.freedoms) + n], float(states[0, len(mechanism.freedoms) + n])
         if mechanism.freedoms[n].period and speed != 0.0 and np.ptp(rate) <= 1e-9 * abs(speed):
@@ -258,17 +258,17 @@ def _turn_time(mechanism: Mechanism, modes: Modes, states: FloatArray) -> float:
 
 
 def _resample(mechanism: Mechanism, turn: Turn) -> tuple[FloatArray, FloatArray]:
-    """Resample a turn from equal steps of the crank angle to equal steps of time: states and channels."""
+    """Resample a period from equal steps of the crank angle to equal steps of time; return states and channels."""
     n, count, period = len(turn.time), len(mechanism.freedoms), turn.period
     ways = (turn.states[:, :count] - turn.states[0, :count]).T
-    # the turn has equal steps of one crank
+    # the crank is the cyclic freedom whose angle has equal steps
     crank = min(mechanism.cyclic, key=lambda k: float(np.ptp(np.diff(ways[k]))))
     angle, way = ways[crank], ways[crank][-1] * n / (n - 1)
     wanted = period * np.arange(n) / n
     lead = trigonometric(turn.time - wanted, way)
     columns = np.hstack([turn.states[:, : 2 * count], turn.inputs])
     columns[:, crank] = 0.0
-    # of another crank, or a link that goes round, what is periodic: its angle less whole turns
+    # the angle of another crank, or of a link that goes round, is periodic after its mean increase is subtracted
     ratios = {
         k: mechanism.freedoms[k].period * round(ways[k][-1] * n / (n - 1) / mechanism.freedoms[k].period) / way
         for k, freedom in enumerate(mechanism.freedoms)
@@ -302,20 +302,22 @@ def settled_motion(
     samples: int = 128,
     turns: int = 200,
 ) -> FloatArray:
-    """Run a mechanism at constant speed until its motion repeats; return the last turn, or common period of several cranks.
+    """Run a mechanism at constant speed for many turns; return the states of the last turn, after which the motion repeats.
+
+    With several cranks, turns are their common periods.
 
     Parameters
     ----------
     parameters
-        Of the mechanism.
+        Parameters of the mechanism.
     inputs : Inputs
         Constant inputs with the speed of a cyclic freedom, such as ``Inputs(speed=40.0)``.
     initial : optional
-        Start of the run; by default at zero and at rest but for the commanded speed.
+        Initial state of the run; by default all coordinates are zero, and all rates but the commanded speed.
     samples : int
-        States of the last turn, evenly spaced, its end left out.
+        Number of states of the last turn, evenly spaced in time, without its end.
     turns : int
-        Turns that are run.
+        Number of turns of the run.
 
     Returns
     -------
@@ -347,7 +349,7 @@ def settled_motion(
         if own and value:
             ratio = speed_ratio(other.argument, value, channel.argument, speed)
             whole.append((ratio * Fraction(period / own).limit_denominator()).denominator)
-    # all cranks have made whole turns after the common period
+    # the common period, after which all cranks have made whole turns
     turn = lcm(*whole) * period / abs(speed)
     last = turn * (turns - 2 + np.arange(2 * samples + 1) / samples)
     run = simulate(

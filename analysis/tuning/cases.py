@@ -1,4 +1,4 @@
-"""Case files of a tuning: TOML or JSON tables, every quantity with its unit; see `docs/tuning.md`."""
+"""Read and write case files of a tuning: TOML or JSON tables, every quantity with its unit; see `docs/tuning.md`."""
 
 from __future__ import annotations
 
@@ -19,12 +19,12 @@ from ..units import with_unit
 from .result import Tuned
 from .wishes import Limit, Wish
 
-#: The objective where none is given, and how the other begins.
+#: The default objective, and the first word of an objective that names a parameter.
 _LEAST_CHANGE, _LEAST = "least change", "least "
 
 
 def _objective(value: Any, name: str) -> str:
-    """Read the objective: least change, or the least value of a parameter."""
+    """Check the text of an objective, "least change" or "least" and a parameter, and return it."""
     words = text(value, name)
     if words != _LEAST_CHANGE and not words.startswith(_LEAST):
         raise ParameterError(
@@ -70,9 +70,9 @@ class TuningCase:
     title : str
     wish : Wish
     tables : mapping
-        The file without the wish: the mechanism and its inputs.
+        The tables of the file without ``[tune]``: the mechanism and its inputs.
     folder : path
-        Where its files are.
+        Folder to which the names of files in the case are relative.
     """
 
     title: str
@@ -81,7 +81,7 @@ class TuningCase:
     folder: Path
 
     def tuned_tables(self, tuned: Tuned, folder: str | Path) -> dict[str, Any]:
-        """Return the tables of a case with the tuned values, to be written to a folder."""
+        """Return the tables of a case with the tuned values, for a file in ``folder``."""
         mechanism = mechanism_of(self.wish.parameters)
         inputs = {channel.name: name_in_files(mechanism, channel) for channel in mechanism.channels}
         values = zip(self.wish.names, tuned.values.tolist())
@@ -106,7 +106,7 @@ def load_tuning_case(path: str | Path, overrides: Mapping[str, Any] | None = Non
 def tuning_case_from(
     data: Mapping[str, Any], *, folder: Path, title: str = "", overrides: Mapping[str, Any] | None = None
 ) -> TuningCase:
-    """Build a case from the tables of a case file; its files are looked for in ``folder``."""
+    """Build a case from the tables of a case file; names of files in it are relative to ``folder``."""
     tables = overridden({"title": title} | dict(data), overrides or {})
     if "tune" not in tables:
         raise MissingParameterError("tune")

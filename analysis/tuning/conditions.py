@@ -1,8 +1,8 @@
-"""Conditions on the changes: functions that must not be negative, each at one motion of the response.
+"""Define the conditions on the changes of parameters: functions that must not be negative, each of one motion of the response.
 
-The motion, y at crank angle 0 and the level, which is the speed or the other quantity of the range, is picked from its branch
-by one further equation: a plane across the branch, or the loss of stability. As the parameters change it is found again from
-its last place, and so keeps to its branch.
+The level is the value of the speed, or of the other quantity whose range is tuned. A motion is given by y at crank angle 0 and
+its level. It is picked from its branch by one further equation: a plane across the branch, or the loss of stability. When the
+parameters change, it is found again from its last place, so that it stays on its branch.
 """
 
 from __future__ import annotations
@@ -32,16 +32,16 @@ from ..periodic import (
 )
 from .wishes import AMPLITUDE, Limit, Wish
 
-#: Step in which the level is sought at which an output is greatest, relative to the range's size, and steps at most.
+#: Step of the search for the level at which an output is greatest, relative to the range's size, and steps at most.
 _STEP, _CLIMB = 1e-3, 12
-#: Samples that the crank angle of a greatest value may be away from where it was.
+#: Greatest number of samples by which the crank angle of a greatest value may move in a search.
 _UPHILL = 256
 FloatArray = NDArray[np.float64]
 
 #: Newton's method: iterations at most, and the correction relative to the scale at which a place is found.
 ITERATIONS, FOUND = 12, 1e-9
-#: Change of a parameter, relative to it and to its tolerance, that is made in one step; and the correction that a step may
-#: take, relative to the scale.
+#: Greatest change of a parameter in one step, relative to the larger of its value and its tolerance; greatest correction in a
+#: step, relative to the scale.
 STRIDE, REACH = 0.05, 0.3
 #: Halvings of a step, over all steps, after which a place counts as lost.
 _HALVINGS = 3
@@ -54,19 +54,20 @@ class LostError(LinkworkError):
 
 
 class Expansion(NamedTuple):
-    """Derivatives of y(T) - y(0) and the monodromy matrix at a place, by y, the level and the k changes.
+    """Derivatives of y(T) - y(0) and of the monodromy matrix by y at crank angle 0, the level and the k changes.
 
     Attributes
     ----------
     gaps : ndarray, shape (n, n + 1 + k)
         Derivatives of y(T) - y(0).
     monodromy : ndarray, shape (n, n)
+        The monodromy matrix.
     monodromies : ndarray, shape (n + 1 + k, n, n)
-        Its derivatives.
+        Derivatives of the monodromy matrix.
     variations : Variations
-        The variational equations they come from.
+        The variational equations from which the derivatives are computed.
     ways : ndarray, shape (panels, nodes, n, n + 1 + k)
-        Derivatives of the motion over the turn.
+        Derivatives of the motion over the period.
     constants : ndarray, shape (c, n + 1 + k)
         Derivatives of the numbers of the drive and the constants of the equations.
     """
@@ -80,35 +81,38 @@ class Expansion(NamedTuple):
 
 
 def family(wish: Wish, x: FloatArray, spot: Spot | None = None) -> Family:
-    """Return the periodic motions over the level for changes in their tolerances, those like the one at a spot."""
+    """Return the family of periodic motions over the level for changes x in units of the tolerances.
+
+    With a spot, links go round in them as often as in the motion at the spot.
+    """
     parameters, drive = wish.operation(x, wish.span[0])
     found = Family(parameters=parameters, drive=drive, vary=wish.over)
     return found if spot is None else found.with_ratios(spot.ratios)
 
 
 class Spot(NamedTuple):
-    """A motion on the response: the changes, y, the level, the turns of the period, and the ratios of its drive."""
+    """A motion on the response, given by its start."""
 
-    x: FloatArray
-    y: FloatArray
+    x: FloatArray  # the changes in units of the tolerances, shape (k,)
+    y: FloatArray  # y at crank angle 0, shape (n,)
     level: float
-    turns: int
-    ratios: Mapping[str, Any]
+    turns: int  # turns of the period
+    ratios: Mapping[str, Any]  # ratios of the drive
 
 
 def known_spot(wish: Wish, x: FloatArray, orbit: PeriodicOrbit) -> Spot:
-    """Return the changes, start and level of a motion."""
+    """Return the spot of a motion that was found with the changes x."""
     return Spot(x, orbit.start, wish.level(orbit), orbit.turns, orbit.drive.ratios)
 
 
 def motion(wish: Wish, spot: Spot) -> PeriodicOrbit:
-    """Return the motion that begins at a spot, as far as it closes."""
+    """Return the orbit that begins at a spot; its residual says how well it closes."""
     orbit: PeriodicOrbit = OrbitEquations(family(wish, spot.x, spot), spot.turns, *wish.span)(spot.y, spot.level).data
     return orbit
 
 
 def sampled(orbit: PeriodicOrbit) -> Turn:
-    """Return the outputs over the period, each turn with the same number of samples."""
+    """Return the outputs over the period, with `_SAMPLES` samples for each common period."""
     return orbit.turn(_SAMPLES * orbit.periods)
 
 
@@ -129,10 +133,10 @@ def expansion(wish: Wish, spot: Spot) -> Expansion:
 
 
 def margin_matrix(monodromy: FloatArray, kind: Crossing, radius: float = 1.0) -> FloatArray:
-    """Return the matrix A with det(I - A) zero where multipliers cross a circle in this way, positive within."""
+    """Return a matrix A such that det(I - A) is zero when multipliers cross the circle in this way, and positive inside it."""
     if kind is not Crossing.TORUS:
         return monodromy / radius if kind is Crossing.FOLD else -monodromy / radius
-    # the minors of order 2, whose eigenvalues are the products of two multipliers
+    # the matrix of minors of order 2, whose eigenvalues are the products of two multipliers
     pairs = list(combinations(range(len(monodromy)), 2))
     minors = [
         [monodromy[a, c] * monodromy[b, d] - monodromy[a, d] * monodromy[b, c] for c, d in pairs] for a, b in pairs
@@ -154,28 +158,28 @@ def margin_slopes(found: Expansion, kind: Crossing, radius: float = 1.0) -> Floa
 
 
 class Row(Protocol):
-    """Equation that picks a motion from its branch."""
+    """An equation that picks a motion from its branch."""
 
     def value(self, y: FloatArray, level: float, monodromy: FloatArray) -> float:
         """Return the residual of the equation."""
 
     def slopes(self, found: Expansion) -> FloatArray:
-        """Return its derivatives by y, the level and the changes."""
+        """Return the derivatives of the residual by y, the level and the changes, shape (n + 1 + k,)."""
 
     def across(self, found: Callable[[], Expansion]) -> FloatArray:
-        """Return its derivatives by y and the level alone."""
+        """Return the derivatives of the residual by y and the level alone, shape (n + 1,)."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Across:
-    """Plane across the branch: normal . (y, level) = offset; a fixed level if the normal is along it."""
+    """A plane across the branch, normal . (y, level) = offset; it fixes the level if the normal has no other component."""
 
     normal: FloatArray
     offset: float
 
     @classmethod
     def level_plane(cls, wish: Wish, spot: Spot, level: float) -> Across:
-        """Return the plane of a fixed level, for motions like the one at a spot."""
+        """Return the plane of a fixed level, for motions with as many components of y as the spot."""
         return cls(np.append(np.zeros(len(spot.y)), 1.0 / wish.size), level / wish.size)
 
     def value(self, y: FloatArray, level: float, monodromy: FloatArray) -> float:
@@ -190,7 +194,7 @@ class Across:
 
 @dataclass(frozen=True, slots=True)
 class Lost:
-    """Equation of lost stability: a multiplier crosses the unit circle."""
+    """The equation of lost stability: a multiplier is on the unit circle."""
 
     kind: Crossing
 
@@ -206,7 +210,7 @@ class Lost:
 
 
 class Found:
-    """A motion picked from its branch at some parameters, and its derivatives by them."""
+    """A motion that was picked from its branch with some changes, and its derivatives by the changes."""
 
     def __init__(self, wish: Wish, row: Row, spot: Spot) -> None:
         self.spot = spot
@@ -214,7 +218,7 @@ class Found:
 
     @cached_property
     def expansion(self) -> Expansion:
-        """Derivatives by the variational equations."""
+        """Derivatives of y(T) - y(0) and of the monodromy matrix."""
         return expansion(self._wish, self.spot)
 
     @cached_property
@@ -230,13 +234,13 @@ class Found:
         return -np.linalg.solve(rows[:, :n], rows[:, n:])
 
     def along(self, slopes: FloatArray) -> FloatArray:
-        """Return derivatives by the changes from derivatives by y, the level and the changes, shape (..., n + 1 + k)."""
+        """Return total derivatives by the changes, (..., k), from those by y, the level and the changes, (..., n + 1 + k)."""
         n = len(self.spot.y) + 1
         found: FloatArray = slopes[..., n:] + slopes[..., :n] @ self.slopes
         return found
 
     def output_slopes(self, number: int, angle: float) -> FloatArray:
-        """Return the derivatives of an output by the changes, by its number, at a crank angle; shape (k,)."""
+        """Return the derivatives by the changes of an output, given by its number, at a crank angle; shape (k,)."""
         found = self.expansion
         v = found.variations
         angle = float(angle % (self.spot.turns * v.flow.period))
@@ -269,7 +273,7 @@ class Place:
         self._scale = np.append(scale_of(*wish.operation(spot.x, spot.level), spot.y), wish.size)
 
     def at(self, x: FloatArray) -> Found:
-        """Find the motion for changes in their tolerances; raises LostError if it is not found again."""
+        """Find the motion for changes x in units of the tolerances; raises LostError if it is not found again."""
         last = self._last
         moved = np.abs(x - last.x) * self.wish.tolerance
         size = np.maximum(np.abs(self.wish.present), self.wish.tolerance)
@@ -307,7 +311,7 @@ class Place:
             except np.linalg.LinAlgError:
                 raise LostError("its equations are singular there") from None
             z, before, size = z - step, size, float(np.abs(step / self._scale).max())
-            # the second correction may still be the greater one
+            # the second correction may still be greater than the first
             if not np.abs((z - first) / self._scale).max() < REACH or (count > 2 and size > 0.5 * before > FOUND):
                 break
             if size < FOUND:
@@ -319,7 +323,7 @@ class Place:
 
 
 def series(turn: Turn, samples: NDArray[np.float64]) -> Callable[[Any], Any]:
-    """Return samples over a turn as a Fourier series, a function of the crank angle."""
+    """Return the Fourier series through samples over a period, as a function of the crank angle."""
     n = len(samples)
     c = np.fft.rfft(samples) / n
     c[1:] *= 2.0
@@ -330,20 +334,23 @@ def series(turn: Turn, samples: NDArray[np.float64]) -> Callable[[Any], Any]:
 
 
 def curve(turn: Turn, limit: Limit) -> Callable[[Any], Any]:
-    """Return the limited quantity as a function of the crank angle: of a joint the magnitude of the force."""
-    # of its components, which are smooth where the magnitude is not
+    """Return the limited quantity as a function of the crank angle: an output, or the magnitude of the force in a joint."""
+    # series of the components, which are smooth where the magnitude is not
     parts = [series(turn, turn.around(part)) for part in limit.parts]
     return lambda angle: reduce(np.hypot, (part(angle) for part in parts))
 
 
 def reading(turn: Turn, limit: Limit, angles: Sequence[float]) -> float:
-    """Return the limited quantity from its values at its crank angles: see `greatest`."""
+    """Return the value that the limit bounds: the magnitude at one crank angle, or half the difference between two."""
     values = curve(turn, limit)(np.array(angles))
     return float(abs(values[0])) if len(angles) == 1 else 0.5 * float(values[0] - values[1])
 
 
 def greatest(turn: Turn, limit: Limit) -> tuple[float, tuple[float, ...]]:
-    """Return the limited quantity over a turn and its crank angles: one, or those of greatest and least value."""
+    """Return the value that the limit bounds over a period, and its crank angles.
+
+    There is one angle, of the greatest magnitude; for an amplitude there are two, of the greatest and of the least value.
+    """
     samples = reduce(np.hypot, (turn.around(part) for part in limit.parts))
     places = [np.abs(samples).argmax()]
     if limit.output.startswith(AMPLITUDE):
@@ -353,7 +360,7 @@ def greatest(turn: Turn, limit: Limit) -> tuple[float, tuple[float, ...]]:
 
 
 def peak_angles(turn: Turn, limit: Limit, angles: Sequence[float]) -> tuple[float, ...]:
-    """Return the crank angles near given ones at which the limited quantity is greatest."""
+    """Return the crank angles near given ones of the greatest magnitude or, for two angles, of a maximum and a minimum."""
     value, step = curve(turn, limit), float(turn.angle[1] - turn.angle[0])
     signs = (1.0, -1.0) if len(angles) > 1 else (float(np.sign(value(angles[0])) or 1.0),)
     return tuple(_climb(value, angle, step, sign) for angle, sign in zip(angles, signs))
@@ -367,7 +374,7 @@ def _climb(value: Callable[[Any], Any], angle: float, step: float, sign: float) 
             break
         angle += step if c > a else -step
     for _ in range(4):
-        # the top of the parabola through three values
+        # go to the top of the parabola through three values
         a, b, c = value(angle + step * np.array([-1.0, 0.0, 1.0]))
         bend = a - 2.0 * b + c
         if bend == 0.0:
@@ -383,22 +390,22 @@ def _climb(value: Callable[[Any], Any], angle: float, step: float, sign: float) 
 class Condition(Protocol):
     """A function of the changes that must not be negative."""
 
-    #: Violation that counts as none.
+    #: Greatest violation that is accepted.
     slack: float
 
     @property
     def group(self) -> str:
-        """Name of its requirement."""
+        """Name of the requirement to which the condition belongs."""
 
     def value(self, x: FloatArray) -> float:
-        """Return the function; raises LostError if the motion is not found."""
+        """Return the value of the function; raises LostError if the motion is not found."""
 
     def slopes(self, x: FloatArray) -> FloatArray:
-        """Return its derivatives by the changes, shape (k,)."""
+        """Return the derivatives of the function by the changes, shape (k,)."""
 
 
 class Inside:
-    """Condition that no multiplier has crossed a circle in a way: `crossing_margin` is not negative."""
+    """Condition that no multiplier has crossed a circle in a given way: `crossing_margin` is not negative."""
 
     slack = 1e-9
 
@@ -451,9 +458,9 @@ class PeakBeyond:
 
 
 def find_resonance(wish: Wish, x: FloatArray, near: Spot) -> tuple[Gradient, Spot]:
-    """Find the level of a resonance, its derivatives by the parameters that may be changed, and the motion there.
+    """Find a resonance near a motion: return its level with derivatives by the parameters that may be changed, and its spot.
 
-    Raises LinkworkError if there is none near.
+    Raises LinkworkError if there is no resonance near the motion.
     """
     orbit = Place(wish, Across.level_plane(wish, near, near.level), near).at(x).orbit
     found = extremum_gradient(orbit, wish.over, wish.names)
@@ -475,7 +482,7 @@ class Below:
         if self._known is not None and self._known[0] == x.tobytes():
             return self._known[1:]
         found, value = self._reading(x, self._last.level)
-        # the top of a parabola is off by the square of its width
+        # the error of the top of a parabola is proportional to the square of its width
         for step in (_STEP, 0.1 * _STEP):
             found, value = self._uphill(x, found, value, step * self._wish.size)
         turn = sampled(found.orbit)
@@ -484,7 +491,7 @@ class Below:
         return found, turn
 
     def _uphill(self, x: FloatArray, found: Found, value: float, step: float) -> tuple[Found, float]:
-        """Return the motion from which no parabola leads to a greater output."""
+        """Climb by parabolas over the level until the output does not increase; return the motion there and its output."""
         for _ in range(_CLIMB):
             level = found.spot.level
             try:
@@ -519,6 +526,6 @@ class Below:
             if len(self.angles) > 1:
                 total += 0.5 * sign * slopes[0]
             else:
-                # of the magnitude
+                # derivative of the magnitude
                 total += np.array(values) @ np.array(slopes) / np.linalg.norm(values)
         return np.asarray(-total / self.limit.below)

@@ -1,4 +1,4 @@
-"""`tune`: the least change of given parameters that clears a range of speeds, by IPOPT and an exchange of conditions."""
+"""Find the least change of given parameters that clears a range of speeds, by IPOPT and an exchange of conditions."""
 
 from __future__ import annotations
 
@@ -34,11 +34,11 @@ from .result import JUMP, RESONANCE, STABLE, Tuned, Verification, readings, requ
 from .survey import MARGINAL, SOUGHT, Region, Survey, charted, other_motions, survey
 from .wishes import Wish
 
-#: IPOPT's tolerance, iterations at most, and the violation of a condition that counts as none.
+#: IPOPT's tolerance, iterations at most, and the greatest violation of the conditions that is accepted.
 _TOLERANCE, _ITERATIONS, VIOLATION = 1e-9, 60, 1e-8
-#: Points at which a place was not found, after which a program is given up.
+#: Number of points at which a motion was lost, after which a nonlinear program is given up.
 _PATIENCE = 4
-#: Weight of the squares of the other changes where one parameter is minimised, and of all changes where violations are: a
+#: Weight of the squares of the other changes if one parameter is minimised, and of all changes if violations are minimised: a
 #: parameter without effect keeps its value.
 _REST = 1e-6
 
@@ -50,10 +50,10 @@ class Answer:
     Attributes
     ----------
     x : ndarray, shape (k,)
-        The changes in their tolerances.
+        The changes in units of their tolerances.
     objective : float
     violations : mapping
-        Greatest violation of the conditions of each requirement.
+        Greatest violation among the conditions of each requirement, by its name.
     """
 
     x: FloatArray
@@ -62,7 +62,7 @@ class Answer:
 
     @property
     def met(self) -> bool:
-        """Whether all conditions are kept."""
+        """Whether all conditions are satisfied."""
         return self.total <= VIOLATION
 
     @property
@@ -72,7 +72,7 @@ class Answer:
 
 
 def objective(wish: Wish, x: Any) -> Any:
-    """Return the objective: squares of the changes, or a parameter in its tolerance; of numbers or symbols."""
+    """Return the objective for changes x, numbers or symbols: the sum of their squares, or the change of one parameter."""
     squares = symbolic.library().sumsqr(x)
     if not wish.least:
         return squares
@@ -81,9 +81,9 @@ def objective(wish: Wish, x: Any) -> Any:
 
 
 def nearest(wish: Wish, conditions: Sequence[Condition], x: FloatArray) -> Answer:
-    """Find the least change that keeps the conditions; if there is none, the least sum of violations.
+    """Find the least change that satisfies the conditions; if there is none, the change with the least sum of violations.
 
-    Raises LinkworkError if a place is not found even at the start.
+    ``x`` is the change from which IPOPT starts.
     """
     answer = _solve(wish, conditions, x, elastic=False)
     if not answer.met and isfinite(answer.total):
@@ -121,7 +121,7 @@ def _solve(wish: Wish, conditions: Sequence[Condition], x: FloatArray, *, elasti
         max_iter=_ITERATIONS,
         bound_relax_factor=0.0,
         hessian_approximation="limited-memory",
-        # a start in the middle of its bounds is not moved
+        # a start inside its bounds is hardly moved
         bound_push=1e-6,
         bound_frac=1e-6,
         mu_strategy="adaptive",
@@ -138,7 +138,10 @@ def _solve(wish: Wish, conditions: Sequence[Condition], x: FloatArray, *, elasti
 
 
 class _Values:
-    """Values and derivatives of the conditions at the changes, cached for the last point; NaN where a motion is lost."""
+    """Values and derivatives of the conditions as functions of the changes; NaN from the first condition whose motion is lost.
+
+    The results of the last call are cached.
+    """
 
     def __init__(self, conditions: Sequence[Condition]) -> None:
         self.conditions = conditions
@@ -146,7 +149,7 @@ class _Values:
         self._lost = 0
 
     def __call__(self, x: FloatArray, slopes: bool = False) -> tuple[FloatArray, FloatArray]:
-        """Return values (m,) and derivatives (m, k)."""
+        """Return values, shape (m,), and derivatives, (m, k), which are NaN unless ``slopes``."""
         key = x.tobytes()
         if self._last is not None and self._last[0] == key and self._last[1] >= slopes:
             return self._last[2:]
@@ -163,41 +166,41 @@ class _Values:
         return values, rows
 
     def function(self, count: int) -> Callable[[Any], Any]:
-        """Return the values as a CasADi function."""
+        """Return the values as a CasADi function of ``count`` changes."""
         function: Callable[[Any], Any] = symbolic.external("conditions", count, len(self.conditions), self.__call__)
         return function
 
 
-#: Rounds of the exchange at most, and ways that are tried.
+#: Rounds of the exchange at most, and number of combinations of ways that are tried.
 _ROUNDS, _WAYS = 12, 8
-#: Value of a condition that is far from being active.
+#: Value of a condition from which on it is far from being active.
 _FAR = 0.05
-#: Changes spread over their bounds that are tried where no way meets the wish, a power of two; and halvings of the way from the
-#: present values to one of them that meets it. Between positive bounds of more than
-#: this ratio they are spread evenly in the logarithm.
+#: Number of changes spread over their bounds that are tried if no way meets the wish, a power of two; halvings of the distance
+#: from the present values to changes that meet the wish; ratio of positive bounds above which the values are spread evenly in
+#: the logarithm.
 _SPREAD, _BISECTIONS, _WIDE = 16, 6, 10.0
-#: Ways round a region of lost stability, or a resonance: it goes below the range, above it, or vanishes.
+#: Ways to clear the range of a region of lost stability or a resonance: it goes below the range, above it, or vanishes.
 _BELOW, _ABOVE, _REMOVED = -1, 1, 0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Way:
-    """Choice for a region of a kind, or a resonance (kind None): below the range, above it, or removed."""
+    """The way in which a region of lost stability, or a resonance, is to leave the range."""
 
-    kind: Crossing | None
-    level: float
-    side: int
+    kind: Crossing | None  # kind of the region; None for a resonance
+    level: float  # middle of the region, or the resonance
+    side: int  # _BELOW, _ABOVE or _REMOVED
 
 
 @dataclass(slots=True, eq=False)
 class _Search:
-    """State of a tuning: motions beside the response, and the best changes so far."""
+    """State of a tuning: motions that are not on the response, and the best changes so far."""
 
     wish: Wish
     rounds: int = 0
-    #: Places on branches that the response does not meet.
+    #: Motions on branches that the response does not meet.
     more: list[Spot] = field(default_factory=list)
-    #: The best so far: rank (requirements missed, excess, objective), survey, and levels with two stable motions.
+    #: The best so far: rank (whether requirements are missed, excess, objective), survey, and levels with two stable motions.
     best: tuple[tuple[bool, float, float], Survey, tuple[float, ...]] | None = None
 
     def look(self, x: FloatArray) -> Survey:
@@ -212,7 +215,7 @@ class _Search:
         return survey(self.wish, x, own)
 
     def search_others(self, found: Survey) -> tuple[bool, tuple[float, ...]]:
-        """Search motions beside a response: return whether there are new ones, and levels with two stable ones."""
+        """Search for motions off the response: return whether there are new ones, and the levels with two stable motions."""
         new, several = other_motions(found)
         self.more += [known_spot(self.wish, found.x, orbit) for orbit in new]
         return bool(new), several
@@ -230,7 +233,7 @@ class _Search:
 
     @property
     def least(self) -> float:
-        """Least objective so far with all requirements met."""
+        """Least objective so far with which all requirements are met; infinite if there is none."""
         return np.inf if self.best is None or self.best[0][0] else self.best[0][2]
 
 
@@ -251,7 +254,7 @@ def tune(wish: Wish, *, progress: bool = False) -> Tuned:
     Returns
     -------
     Tuned
-        Verified; if the wish cannot be met, the changes with the least sum of excesses.
+        The verified changes; if the wish cannot be met, those with the least sum of excesses.
 
     Raises
     ------
@@ -287,7 +290,7 @@ def tune(wish: Wish, *, progress: bool = False) -> Tuned:
 
 
 def _try_ways(search: _Search, first: Survey, progress: bool) -> None:
-    """Try all combinations of ways from some changes."""
+    """Try the combinations of ways, starting from the changes of a survey, and keep the best result."""
     ways = _ways(first)
     with shown(progress, len(ways), "trying changes") as show:
         for number, way in enumerate(ways):
@@ -298,10 +301,10 @@ def _try_ways(search: _Search, first: Survey, progress: bool) -> None:
 
 
 def _survey_near_solution(search: _Search, first: Survey) -> Survey | None:
-    """Find changes within the bounds that meet the requirements, and return the survey just before them.
+    """Find changes within the bounds that meet the requirements, and return a survey at nearby changes that do not.
 
-    Where all ways from the first changes lose their motions, the ways from there may not. None if no changes of a sample spread
-    over the bounds meet the requirements.
+    If all ways from the first changes lose their motions, ways that start at the nearby changes may succeed. The result is None
+    if no changes of a sample spread over the bounds meet the requirements.
     """
     wish = search.wish
     low, high = wish.scaled(wish.low), wish.scaled(wish.high)
@@ -331,7 +334,7 @@ def _spread(low: FloatArray, high: FloatArray) -> FloatArray:
 
 
 def _try_changes(search: _Search, x: FloatArray) -> tuple[bool, Survey | None]:
-    """Return whether some changes meet all requirements, and the survey."""
+    """Return whether the changes x meet all requirements, and the survey, None if the motions cannot be followed."""
     several: tuple[float, ...] = ()
     try:
         found = search.look(x)
@@ -350,7 +353,7 @@ def _tuned(search: _Search, before: Survey, after: Survey, several: tuple[float,
     wish = search.wish
     largest, level, count = charted(after)
     low, high = (f(*ends) for f, ends in zip((min, max), zip(wish.span, wish.without_resonance)))
-    # a branch that is lost beside the range leaves nothing open in it
+    # a branch that is lost outside the range does not matter
     beside = {ending(b) for b in after.response.branches if not any(low <= b.parameter[end] <= high for end in (0, -1))}
     problems = [sentence for sentence in after.response.problems if sentence not in beside]
     if wish.judged and not largest <= wish.radius + MARGINAL and all(r.excess == 0.0 for r in readings(after).values()):
@@ -384,7 +387,7 @@ def _end(region: Region, side: int) -> SpecialPoint | None:
 
 
 def _ways(found: Survey) -> list[tuple[_Way, ...]]:
-    """Return combinations of ways round all regions and resonances in the range, the nearest first."""
+    """Return combinations of ways to clear the range of all regions and resonances, those with the shortest moves first."""
     wish = found.wish
     low, high = wish.span
     choices: list[list[tuple[float, _Way]]] = []
@@ -422,9 +425,10 @@ def _side(ways: Sequence[_Way], kind: Crossing | None, level: float) -> int | No
 
 
 def _exchange(search: _Search, first: Survey, ways: list[_Way]) -> tuple[Survey, tuple[float, ...]] | None:
-    """Find the least change by these ways, or the nearest to it, and the levels with two stable motions.
+    """Find the least change by the given ways: return its survey, and the levels with two stable motions.
 
-    None where a place is lost, or another way has found a change as small.
+    The requirements may not all be met after the last round. The result is None if a motion is lost, or if another combination
+    of ways has found a change as small.
     """
     wish, found = search.wish, first
     conditions: list[Condition] = []
@@ -437,7 +441,7 @@ def _exchange(search: _Search, first: Survey, ways: list[_Way]) -> tuple[Survey,
                 own, several = search.search_others(found)
                 if not own and (number > 0 or not wish.least):
                     return found, several
-            # a condition far from active is found again if it matters
+            # conditions that are far from active are dropped; they are found again if they matter
             conditions = [c for c in conditions if _value(c, answer) < _FAR] + new
             answer = nearest(wish, conditions, answer.x)
             search.rounds += 1
@@ -450,12 +454,12 @@ def _exchange(search: _Search, first: Survey, ways: list[_Way]) -> tuple[Survey,
 
 
 def _counts(condition: Condition, answer: Answer) -> bool:
-    """Return whether a condition's violation exceeds the known violation of its requirement."""
+    """Return whether the violation of a condition exceeds the violation of its requirement that the answer has anyway."""
     return _value(condition, answer) < -answer.violations.get(condition.group, 0.0) - condition.slack
 
 
 def _value(condition: Condition, answer: Answer) -> float:
-    """Return a condition's value, infinite where its motion is lost."""
+    """Return the value of a condition; infinite if its motion is lost."""
     try:
         return condition.value(answer.x)
     except LinkworkError:
@@ -463,7 +467,7 @@ def _value(condition: Condition, answer: Answer) -> float:
 
 
 def _conditions(found: Survey, ways: list[_Way]) -> Iterator[Condition]:
-    """Yield the conditions that the survey violates; choices for new regions are added to the ways."""
+    """Yield the conditions for all that the survey has found; choices for new regions are added to ``ways``."""
     wish, x = found.wish, found.x
     low, high = wish.span
     gone: list[Region] = []

@@ -1,4 +1,4 @@
-"""Result of a tuning: parameters before and after, requirement by requirement, and how it was verified."""
+"""Describe the result of a tuning: parameters before and after, the state of each requirement, and the verification."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from .wishes import Wish
 
 #: Names of the requirements; a limit is named by its text.
 RESONANCE, JUMP, STABLE = "no resonance", "no jump", "stable motion"
-#: Violation of a limit, relative to it, that counts as none.
+#: Greatest violation of a limit, relative to the limit, that is accepted.
 NO_EXCESS = 1e-6
 
 
@@ -27,11 +27,11 @@ class Reading:
     Attributes
     ----------
     text : str
-        Description with units.
+        Description with units of what was found.
     excess : float
-        Amount by which the requirement is missed, zero if it is met: distance of a resonance or jump from the nearer end, and
-        width without a stable motion, relative to the range's middle; excess of the largest multiplier; relative excess of a
-        limit.
+        Amount by which the requirement is missed, zero if it is met. For a resonance or a jump it is the distance from the
+        nearer end of the range, and for missing stable motions the width without one, both divided by the middle of the range;
+        for the largest multiplier the excess, for a limit the relative excess.
     missed : str
         Description of the excess; empty if the requirement is met.
     """
@@ -57,7 +57,7 @@ class Requirement:
 
 
 def wished(wish: Wish) -> dict[str, str]:
-    """Return the requirements of a wish with a description of each."""
+    """Return a description of each requirement of a wish, by its name."""
     found: dict[str, str] = {}
     if wish.no_resonance:
         found[RESONANCE] = f"none from {wish.say(*wish.without_resonance, joint=' to ')}"
@@ -70,7 +70,7 @@ def wished(wish: Wish) -> dict[str, str]:
 
 
 def readings(found: Survey, several: Sequence[float] = ()) -> dict[str, Reading]:
-    """Return the state of each requirement; ``several`` are levels with two stable motions."""
+    """Return the state of each requirement by its name; ``several`` are levels with two stable motions."""
     wish, result = found.wish, {}
     if wish.no_resonance:
         peaks = [(spot.level, spot.level) for spot in found.peaks]
@@ -115,7 +115,7 @@ def _stable_everywhere(found: Survey) -> Reading:
 def _interval_reading(
     wish: Wish, intervals: Sequence[tuple[float, float]], words: str, span: tuple[float, float]
 ) -> Reading:
-    """Return the state of a requirement that excludes intervals of levels from a span."""
+    """Return the state of a requirement that a span be free of intervals, given the intervals found."""
     if not intervals:
         return Reading(text="none")
     low, high = span
@@ -142,7 +142,7 @@ class Verification:
     orbits : int
         Number of motions of the response over the range.
     charted, largest, place : int, float, str
-        Points of a chart's row over the range, the largest multiplier on it, and its level.
+        Number of points of a chart's row over the range, the largest multiplier on it, and the level of this multiplier.
     sought : int
         Number of levels at which all motions were sought.
     several : str
@@ -172,13 +172,13 @@ class Verification:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Tuned(Shown):
-    """The least change that meets a wish; if there is none, the nearest to it.
+    """The least change that meets a wish; if there is none, the change that misses it least.
 
     Attributes
     ----------
     wish : Wish
     x : ndarray, shape (k,)
-        The changes in their tolerances.
+        The changes in units of their tolerances.
     requirements : tuple of Requirement
     before, after : Survey
     verification : Verification
@@ -224,7 +224,7 @@ class Tuned(Shown):
         )
 
     def tables(self) -> dict[str, Any]:
-        """Return everything as nested tables, for a file; numbers in SI."""
+        """Return the result as nested tables, for a file; numbers are in SI."""
         wish, v = self.wish, self.verification
         return {
             "met": self.met,

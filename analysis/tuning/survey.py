@@ -1,4 +1,4 @@
-"""Survey of a range of speeds: resonances, lost stability and greatest outputs on the response followed over it."""
+"""Survey a range of speeds: find resonances, lost stability and greatest outputs on the response followed over it."""
 
 from __future__ import annotations
 
@@ -44,21 +44,23 @@ from .conditions import (
 )
 from .wishes import Limit, Wish
 
-#: Greatest step along the response, in scaled arc length, and how far it is followed beside the range, relative to its width.
+#: Greatest step along the response, relative to the range that is followed, and how far the response is followed beyond each
+#: end of the range, relative to its width.
 STEP, BESIDE = 2e-2, 0.4
-#: The same of a branch that the response does not meet.
+#: How far a branch that the response does not meet is followed beyond each end of the range, relative to its width.
 FAR = 4.0
-#: Least values of a test function along a branch, and greatest ones of an output, that are looked at more closely, at most.
+#: Greatest number of least values of a test function along a branch, and of greatest values of an output, that are refined.
 _LEAST, _MOST = 3, 4
-#: Test function above which no multiplier is near to its circle.
+#: Value of a test function above which no multiplier is near to the circle.
 _NEAR = 0.5
-#: Distance in level and in multipliers that counts as none: of the range's ends, and of the unit circle.
+#: Distances that are neglected: of a level from an end of the range, relative to its middle, and of a multiplier from the unit
+#: circle.
 AT_THE_END, MARGINAL = 1e-7, 1e-6
-#: Width of a part of the range without a stable motion that counts as none, relative to the range's middle.
+#: Width of a part of the range without a stable motion that is neglected, relative to the range's middle.
 NO_GAP = 1e-6
-#: Numbers of speeds: of the search for all motions, and of the row of a chart.
+#: Number of levels at which all motions are sought, and number of points of the row of a chart.
 SOUGHT, _CHARTED = 5, 201
-#: Distance of the first point of a doubled branch from its doubling, relative to the range and to the scale.
+#: Greatest distance of the first point of a doubled branch from its doubling, relative to the range and to the scale.
 NEXT = 0.05
 
 
@@ -70,15 +72,15 @@ class Region:
     ----------
     kind : Crossing
     low, high : float
-        Its least and greatest level, as far as it was followed.
+        Least and greatest level of the region, as far as it was followed.
     first, last : SpecialPoint or None
-        Special points at its ends, if they were met.
+        Special points at the ends of the region, if they were met.
     worst : Spot
-        Motion with the least test function.
+        Motion with the least value of the test function.
     across : Across
-        Equation that picks that motion.
+        Equation that picks this motion from the branch.
     value : float
-        Its test function.
+        Value of the test function at this motion.
     """
 
     kind: Crossing
@@ -93,21 +95,21 @@ class Region:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Least:
-    """Minimum of a test function along a branch inside the range, at a fixed level; see `conditions.crossing_margin`."""
+    """A minimum of a test function along a branch inside the range."""
 
     kind: Crossing
-    spot: Spot
-    value: float
+    spot: Spot  # the motion at the minimum
+    value: float  # value of the test function, see `conditions.crossing_margin`
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Greatest:
-    """Maximum of an output in the range, at a level and crank angles."""
+    """A maximum over the range of an output that has a limit."""
 
     limit: Limit
-    value: float
-    spot: Spot
-    angles: tuple[float, ...]
+    value: float  # the maximum (SI)
+    spot: Spot  # the motion with the maximum
+    angles: tuple[float, ...]  # crank angles of the maximum (rad), see `conditions.greatest`
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -118,18 +120,19 @@ class Survey:
     ----------
     wish : Wish
     x : ndarray, shape (k,)
-        The changes in their tolerances.
+        The changes in units of their tolerances.
     response : Response
-        Response over the range and beside it.
+        Response over the range and beyond its ends.
     regions : tuple of Region
         Regions of lost stability that reach into the range.
     peaks : tuple of Spot
-        Resonances in the range or its margin.
+        Resonances in the range or the margin beside it.
     least : tuple of Least
+        Minima of the test functions, as far as the wish is concerned with them.
     greatest : tuple of Greatest
-        Greatest values of each limited output.
+        Maxima of each limited output.
     largest : (float, float)
-        The largest Floquet multiplier in the range, and its level.
+        Modulus of the largest Floquet multiplier in the range, and the level of this multiplier.
     unstable : tuple of (float, float)
         Parts of the range without a stable motion.
     """
@@ -157,9 +160,9 @@ def survey(wish: Wish, x: FloatArray, more: Sequence[PeriodicOrbit] = ()) -> Sur
     ----------
     wish : Wish
     x : ndarray, shape (k,)
-        Changes in their tolerances.
+        Changes in units of their tolerances.
     more : sequence of PeriodicOrbit
-        Motions on other branches, which are followed too.
+        Motions on other branches, which are followed, too.
 
     Raises
     ------
@@ -191,10 +194,10 @@ def survey(wish: Wish, x: FloatArray, more: Sequence[PeriodicOrbit] = ()) -> Sur
     if wish.judged or unstable:
         least = tuple(found for branch in branches for found in _least(wish, x, branch))
     if not wish.judged:
-        # a motion beside a stable one may be unstable
+        # if the wish allows it, unstable motions may lie beside stable ones
         without = [found for found in least if any(low <= found.spot.level <= high for low, high in unstable)]
         least = tuple(found for found in without if found.value < 0.0)
-    # that at the least test functions is there to the last digit
+    # include the motions at the minima of the test functions, which lie between the points of the branches
     brought = [(found.spot.level, motion(wish, found.spot)) for found in least]
     largest = max((orbit.largest, level) for branch in [*motions, brought] for level, orbit in branch)
     return Survey(
@@ -221,7 +224,7 @@ def _without_stable_motion(wish: Wish, branches: Sequence[Branch]) -> Iterator[t
 
 
 def _stable_stretches(branch: Branch) -> Iterator[tuple[float, float]]:
-    """Yield the least and greatest level of each pair of neighbouring points, of their stable part."""
+    """Yield the least and greatest level of the stable part between each two neighbouring points of a branch."""
     stable = [orbit.largest <= 1.0 + MARGINAL for orbit in branch.orbits]
     lost = {special.after: special.parameter for special in branch.special}
     for i in range(len(branch) - 1):
@@ -239,7 +242,7 @@ def _inside(wish: Wish, level: Any) -> Any:
 
 
 def _ends(wish: Wish, beside: float) -> tuple[float, float]:
-    """Return the range widened by a share of its width, on the same side of zero."""
+    """Return the range widened at both ends by ``beside`` times its width, without crossing zero."""
     low, high = wish.span
     wide = beside * (high - low)
     return max(low - wide, 0.5 * low) if low > 0.0 else low - wide, min(
@@ -258,7 +261,7 @@ def _overlap(wish: Wish, low: float, high: float, span: tuple[float, float]) -> 
 
 
 def _add_branch(wish: Wish, response: Response, orbit: PeriodicOrbit) -> Response:
-    """Return the response with the branch of a motion on no other branch, followed both ways."""
+    """Return the response with the branch of a motion added, followed in both directions, unless a branch has the motion."""
     if _meets(wish, response, orbit):
         return response
     level, (low, high) = wish.level(orbit), _ends(wish, FAR)
@@ -273,7 +276,7 @@ def _add_branch(wish: Wish, response: Response, orbit: PeriodicOrbit) -> Respons
 
 
 def _meets(wish: Wish, response: Response, orbit: PeriodicOrbit) -> bool:
-    """Return whether a motion is on one of the branches; one of several turns may begin at any of them."""
+    """Return whether a motion is on one of the branches, whichever turn of the motion comes first."""
     level, width = wish.level(orbit), response.high - response.low
     starts = orbit.passages()
     own = [branch for branch in response.branches if branch.turns == orbit.turns]
@@ -288,7 +291,7 @@ def _tests(branch: Branch, kind: Crossing, radius: float = 1.0) -> FloatArray:
 
 
 def _kinds(branch: Branch) -> Iterator[Crossing]:
-    """Yield the ways in which multipliers can cross: a pair needs two multipliers."""
+    """Yield the ways in which multipliers can cross the circle: a complex pair needs two multipliers."""
     for kind in Crossing:
         if kind is not Crossing.TORUS or len(branch.orbits[0].start) > 1:
             yield kind
@@ -297,16 +300,19 @@ def _kinds(branch: Branch) -> Iterator[Crossing]:
 def _parts(
     wish: Wish, branch: Branch, kind: Crossing, response: Response
 ) -> Iterator[tuple[SpecialPoint | None, Any, SpecialPoint | None]]:
-    """Yield the parts of a branch between sign changes of a test function, with the points at their ends."""
+    """Yield the parts of a branch between sign changes of a test function.
+
+    Each is (special point at its beginning or None, indices of its points, special point at its end or None).
+    """
     special = [s for s in branch.special if s.kind is kind]
     ends = [-1, *(s.after for s in special), len(branch) - 1]
     points: list[SpecialPoint | None] = [None, *special, None]
     if kind is Crossing.FOLD and branch.periods > 1:
-        # it begins, and may end, where a motion of half the period has the multiplier -1
+        # such a branch begins, and may end, where a motion of half the period has the multiplier -1
         points[0], points[-1] = (_doubling(wish, branch.orbits[i], response) for i in (0, -1))
     parts = [np.arange(begin + 1, end + 1) for begin, end in pairwise(ends)]
     if branch.closed and special:
-        # the last point is the first
+        # the last point of a closed branch is its first
         parts = [*parts[1:-1], np.concatenate([parts[-1], parts[0][1:]])]
         points = [*special, special[0]]
     for number, part in enumerate(parts):
@@ -327,7 +333,7 @@ def _doubling(wish: Wish, orbit: PeriodicOrbit, response: Response) -> SpecialPo
 
 
 def _regions(wish: Wish, x: FloatArray, branch: Branch, response: Response) -> Iterator[Region]:
-    """Yield the regions of negative test functions along a branch."""
+    """Yield the regions of a branch in which a test function is negative."""
     for kind in _kinds(branch):
         tests = _tests(branch, kind)
         for first, part, last in _parts(wish, branch, kind, response):
@@ -351,7 +357,11 @@ def _regions(wish: Wish, x: FloatArray, branch: Branch, response: Response) -> I
 def _lowest(
     wish: Wish, x: FloatArray, branch: Branch, kind: Crossing, i: int, radius: float, *, at_level: bool
 ) -> tuple[Spot, Across, float]:
-    """Find the minimum of a test function near a point of a branch: at fixed levels of the range, or across it."""
+    """Find the minimum of a test function near point ``i`` of a branch.
+
+    Motions are picked by levels in the range if ``at_level``, otherwise by planes across the branch. Return the motion, the
+    equation that picks it, and the value of the test function.
+    """
     orbit, before, after = branch.orbits[i], max(i - 1, 0), min(i + 1, len(branch) - 1)
     spot = known_spot(wish, x, orbit)
     scale = np.append(scale_of(orbit.parameters, orbit.drive, orbit.start), wish.size)
@@ -379,7 +389,7 @@ def _lowest(
             offsets = [(float(best.fun), float(best.x)), (test(low), low), (test(high), high)]
             value, offset = min([*offsets, *([(value, offset)] if low <= offset <= high else [])])
         except LinkworkError:
-            pass  # next to the limit of assembly a neighbour may not be found: the point itself stands
+            pass  # next to the limit of assembly a neighbour may not be found: keep the point itself
     row = across(offset)
     return Place(wish, row, spot).at(x).spot, row, value
 
@@ -392,7 +402,7 @@ def _least(wish: Wish, x: FloatArray, branch: Branch) -> Iterator[Least]:
     for kind in _kinds(branch):
         tests = _tests(branch, kind, wish.radius)
         if kind is Crossing.FOLD:
-            # the part between two folds is a region of its own
+            # the part between two folds is a region: see `_regions`
             tests = np.where(_tests(branch, kind) < 0.0, np.inf, tests)
         found = []
         within = np.where(_inside(wish, branch.parameter), tests, np.inf)
@@ -457,7 +467,7 @@ def _refine_maximum(wish: Wish, limit: Limit, near: Spot) -> Greatest:
 
 
 def other_motions(found: Survey) -> tuple[tuple[PeriodicOrbit, ...], tuple[float, ...]]:
-    """Search all motions at `SOUGHT` levels: return those on no branch, and the levels with two stable ones."""
+    """Search for all motions at `SOUGHT` levels: return the motions on no branch, and the levels with two stable motions."""
     wish = found.wish
     new: list[PeriodicOrbit] = []
     several: list[float] = []
@@ -467,7 +477,7 @@ def other_motions(found: Survey) -> tuple[tuple[PeriodicOrbit, ...], tuple[float
         start = None if wish.over in speed_names(wish.mechanism) else near.start
         for turns in range(1, wish.turns + 1):
             there: Orbits = orbits_of(parameters, drive, turns=turns, start=start)
-            # a motion from which deviations grow more than that is none that a machine comes near
+            # a machine does not come near a motion from which deviations grow faster
             new += [o for o in there.orbits if o.largest < GREATEST and not _meets(wish, found.response, o)]
             stable += len(there.stable)
         if stable > 1:
@@ -482,7 +492,10 @@ def _nearest(wish: Wish, response: Response, level: float) -> PeriodicOrbit:
 
 
 def charted(found: Survey) -> tuple[float, float, int]:
-    """Compute a row of a chart over the range: largest multiplier (infinite without a motion), its level, point count."""
+    """Compute a row of a chart over the range; return its largest multiplier, the level of this multiplier, number of points.
+
+    The multiplier is infinite if no motion was found at some point.
+    """
     wish = found.wish
     levels = np.linspace(*wish.span, _CHARTED)
     rows: list[Any] = []

@@ -1,4 +1,4 @@
-"""Wishes: requirements on a range of speeds, and the parameters that may be changed to meet them."""
+"""Define wishes: requirements on a range of speeds, and the parameters that may be changed to meet them."""
 
 from __future__ import annotations
 
@@ -45,11 +45,11 @@ class Change:
     name : str
         FMI name, such as ``slider.stiffness``, ``slider.force`` or ``drive.torque.breakdown_torque``.
     low, high : float
-        Bounds of its value (SI).
+        Bounds of the value (SI).
     tolerance : float
-        Unit in which its change is measured (SI).
+        Unit in which the change is measured (SI).
     given : str or float
-        The tolerance as written, if the bounds follow from it; else empty.
+        The tolerance as the user wrote it, if the bounds follow from it; otherwise empty.
     """
 
     name: str
@@ -72,7 +72,7 @@ class Limit:
     Attributes
     ----------
     output : str
-        An output of the plant, such as ``drive.applied_torque``; a joint, such as ``pin.C`` or ``A`` of a linkage of one's own,
+        An output of the plant, such as ``drive.applied_torque``; a joint, such as ``pin.C`` or ``A`` of a user's own linkage,
         for the magnitude of the force in it; or ``amplitude of`` an output, for half its range.
     below : float
         The bound (SI).
@@ -91,7 +91,7 @@ class Limit:
         return self.output if self.output.startswith(AMPLITUDE) else f"greatest {self.output}"
 
 
-#: How a limit of half the range of an output begins.
+#: Beginning of `Limit.output` if half the range of an output is limited.
 AMPLITUDE = "amplitude of "
 
 
@@ -105,16 +105,16 @@ class Wish:
         Present parameters; or a published set or its name.
     change : mapping or sequence of Change
         Parameters that may be changed, by FMI name or by field, and acting drive quantities such as a force on the slider, a
-        torque on the crank, or a motor's numbers. Each has a tolerance, such as "5 %" or "10 N/m": the greatest change either
-        way, and the unit in which the change is measured; or a range (least, greatest), measured in half its width; or both, as
-        a mapping with ``tolerance`` and ``between``.
+        torque on the crank, or a motor's numbers. Each has a tolerance, such as "5 %" or "10 N/m", which is the greatest change
+        in either direction and the unit in which the change is measured; or a range (least, greatest), half of whose width is
+        this unit; or both, as a mapping with ``tolerance`` and ``between``.
     speeds : (float, float), optional
         Range of the crank's prescribed speed: rad/s, or texts such as "900 rpm".
     over : str
-        FMI name of another drive quantity of the range, such as ``drive.torque`` or ``slider.force``, or of a motor's number,
-        such as ``drive.torque.synchronous_speed``.
+        FMI name of another drive quantity whose range is tuned, such as ``drive.torque`` or ``slider.force``, or of a motor's
+        number, such as ``drive.torque.synchronous_speed``.
     between : (float, float), optional
-        Range of that quantity: in SI, or texts.
+        Range of the quantity ``over``: in SI, or texts.
     drive : Drive, optional
         All that drives the mechanism; needed without a range of speeds.
     start : array_like, optional
@@ -122,19 +122,19 @@ class Wish:
     turns : int
         Greatest number of turns of the crank in a period that is examined.
     no_resonance : bool
-        No maximum of the amplitude of a motion of one turn lies in the range, nor within ``resonance_margin`` of it.
+        No maximum of the amplitude of a motion of one turn lies in the range, or within ``resonance_margin`` of it.
     resonance_margin : float
         Distance of a resonance from either end of the range, as a share of the value at that end; 0.02 by default.
     no_jump : bool
-        No fold lies in the range, and nowhere in it is there a second stable motion.
+        No fold lies in the range, and nowhere in the range is there a second stable motion.
     no_unstable : bool
-        No unstable motion lies in the range. Without it unstable motions may lie beside stable ones, but everywhere in the
-        range there must be a stable one.
+        No unstable motion lies in the range. If it is False, unstable motions may lie beside stable ones, but everywhere in the
+        range there must be a stable motion.
     least_margin : float
         The largest Floquet multiplier is at most 1 - ``least_margin``.
     limits : sequence of Limit
     least : str
-        Parameter to be minimised; without it the sum of the squares of the changes is minimised, each in its tolerance.
+        Parameter to be minimised; without it the sum of the squares of the changes is minimised, each divided by its tolerance.
 
     Raises
     ------
@@ -196,7 +196,7 @@ class Wish:
         self._check_bounds()
 
     def _check_bounds(self) -> None:
-        """Make sure that mechanism and drive take the bounds of what may be changed."""
+        """Raise ParameterError if mechanism or drive do not allow the bounds of the parameters that may be changed."""
         assert self.drive is not None
         for change in self.change:
             for value in (change.low, change.high):
@@ -216,7 +216,7 @@ class Wish:
             self.operation(x, self.span[0])
 
     def _required_over(self) -> str:
-        """Return the name of the range's quantity after a check of the arguments about the range."""
+        """Check the arguments about the range, and return the FMI name of the quantity that it is of."""
         speed = speed_name(self.mechanism, self.drive)
         if (self.speeds is None) == (self.between is None) or (self.between is None) == bool(self.over):
             raise InputError(
@@ -247,11 +247,11 @@ class Wish:
         return float(low), float(high)
 
     def level(self, orbit: PeriodicOrbit) -> float:
-        """Return the level of a motion in the range."""
+        """Return the level of a motion: its value of the quantity ``over``."""
         return value_of(orbit.parameters, orbit.drive, self.over)
 
     def say(self, *levels: float, joint: str = ", ") -> str:
-        """Return values of the range's quantity as text with the unit; speeds in rpm."""
+        """Format levels as text with the unit; speeds in rpm."""
         unit = unit_of(self.mechanism, self.over)
         factor, unit = (RAD_S_PER_RPM, "rpm") if unit == "rad/s" else (1.0, unit)
         return f"{joint.join(f'{level / factor:.6g}' for level in levels)} {unit}"
@@ -268,7 +268,7 @@ class Wish:
 
     @property
     def radius(self) -> float:
-        """Bound of the largest multiplier."""
+        """Upper bound of the modulus of the largest multiplier."""
         return 1.0 - self.least_margin
 
     @property
@@ -310,11 +310,11 @@ class Wish:
         return np.array([change.tolerance for change in self.change])
 
     def scaled(self, values: FloatArray) -> FloatArray:
-        """Return values as changes in their tolerances."""
+        """Return the changes from the present to given values, in units of the tolerances."""
         return (values - self.present) / self.tolerance
 
     def operation(self, x: FloatArray, level: float) -> Operation:
-        """Return mechanism and drive with changes in their tolerances, at a level of the range."""
+        """Return mechanism and drive with changes x in units of the tolerances, at a level of the range."""
         assert self.drive is not None
         values = np.clip(self.present + x * self.tolerance, self.low, self.high).tolist()
         return with_values(self.parameters, self.drive, {**dict(zip(self.names, values)), self.over: level})
@@ -332,7 +332,7 @@ def _span(mechanism: Mechanism, over: str, given: Any) -> tuple[float, float]:
 
 
 def _changeable(mechanism: Mechanism, name: str) -> str:
-    """Return the FMI name of a parameter or drive quantity, given by that name or its field."""
+    """Return the FMI name of a parameter or drive quantity, given by its FMI name or its field."""
     known = {field_name(n): n for n in variable_names(mechanism)}
     found = known.get(field_name(name))
     if found is None:
@@ -355,7 +355,7 @@ def _changes(operation: Operation, over: str, given: Any) -> tuple[Change, ...]:
 
 
 def _named(given: Mapping[str, Any], mechanism: Mechanism, prefix: str = "") -> dict[str, Any]:
-    """Return the entries about parameters by FMI name, from nested tables or dotted names."""
+    """Flatten a mapping of parameters, with nested tables or dotted names, into a mapping by FMI name."""
     parts = [name.split(".") for name in variable_names(mechanism)]
     groups = {".".join(part[:n]) for part in parts for n in range(1, len(part))}
     found: dict[str, Any] = {}
@@ -389,7 +389,7 @@ def _change(operation: Operation, name: str, value: Any) -> Change:
 
 
 def _tolerance(value: Any, unit: str, now: float, name: str) -> float:
-    """Return a tolerance in SI; per cent are a share of the present value."""
+    """Return a tolerance in SI; a percentage is of the present value ``now``."""
     if isinstance(value, str) and value.rstrip().endswith("%"):
         found = quantity(value, "1", name) * abs(now)
         if now == 0.0:
@@ -402,11 +402,11 @@ def _tolerance(value: Any, unit: str, now: float, name: str) -> float:
 
 
 def _checked(mechanism: Mechanism, limit: Limit) -> Limit:
-    """Return a limit in SI, with its unit and its outputs."""
+    """Check a limit; return it in SI, with its unit and its outputs filled in."""
     name = limit.output.removeprefix(AMPLITUDE)
     units = {v.name: v.unit for v in mechanism.variables if v.name in mechanism.output_names}
     known = {output: (output,) for output in units} | (mechanism.joints if name == limit.output else {})
-    joint = name.removesuffix(" force")  # as the table of a run has it
+    joint = name.removesuffix(" force")  # the name of the force in the table of a run
     if joint != name and joint in known:
         raise ParameterError("output", limit.output, f"be {joint!r}, the name of the joint, for the force in it")
     if name not in known:
