@@ -381,7 +381,7 @@ class Motion:
             rows += ["if not p.rough:", "    return b.clearance", f"m, held_ones = masses(b, p), {held}"]
             rows.append(f"response = responses(b, m, rubbing(b, p), mass_matrix(m, {self.n}), held_ones, p)")
             margin = "lesser(b.clearance, jamming_margin(response))"
-        doc = "Compute the least sine of all dyads, negative in the wrong assembly, or the smaller margin to jamming."
+        doc = "Compute the least sine of the transmission angles of all dyads, or the margin to jamming if that is smaller."
         yield function(f"clearance(x: {numbers}, i: Applied, p: Constants) -> float", doc, [*rows, f"return {margin}"])
 
     def _energies(self) -> Iterator[str]:
