@@ -1,4 +1,4 @@
-"""What the studio does with Python behind it: a server on this machine alone, a process that works for it, and the jobs."""
+"""Server of the studio, for this machine only: web application, worker process and jobs."""
 
 from .application import BODY, TOKEN, Application, Server
 from .worker import Busy, Worker

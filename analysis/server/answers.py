@@ -1,4 +1,4 @@
-"""What an answer is made of: charts, and files for the browser to save."""
+"""Parts of an answer to the page: charts, and files for the browser to save."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ FloatArray = NDArray[np.float64]
 
 
 def chart(title: str, unit: str, angle: FloatArray, values: FloatArray) -> Answer:
-    """Return a curve over the crank angle (rad)."""
+    """Return a chart of values (n,) in a unit over the crank angle (rad), shape (n,)."""
     return {
         "title": title,
         "unit": unit,
@@ -26,10 +26,10 @@ def chart(title: str, unit: str, angle: FloatArray, values: FloatArray) -> Answe
 
 
 def folder() -> tempfile.TemporaryDirectory[str]:
-    """Return a folder that exists while the job runs."""
+    """Return a temporary folder, which is deleted at the end of its context."""
     return tempfile.TemporaryDirectory(prefix="linkwork-", ignore_cleanup_errors=True)
 
 
 def file(path: Path) -> Answer:
-    """Return a written file for the browser to save."""
+    """Return the content of a file, with its name, for the browser to save."""
     return {"name": path.name, "base64": base64.b64encode(path.read_bytes()).decode()}

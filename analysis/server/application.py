@@ -1,4 +1,4 @@
-"""The server of the studio: on the loopback address alone, for one page that has its token."""
+"""The web server of the studio: it listens on the loopback address only, and serves one page, which must have its token."""
 
 from __future__ import annotations
 
@@ -27,22 +27,23 @@ try:
 except ImportError as error:
     raise MissingLibraryError("waitress") from error
 
-#: The only address that is listened at; bytes of a request's body and of its head, at most; connections at a time, below the
-#: 512 that Windows can wait for.
+#: The only address at which the server listens; greatest size of a request's body and of its head (bytes); greatest number of
+#: connections, below the 512 that Windows can wait for.
 ADDRESS, BODY, HEAD, CONNECTIONS = "127.0.0.1", 512_000, 16_000, 400
-#: Seconds of silence after which a connection is closed, and where more than half of all are open.
+#: Seconds of silence after which a connection is closed; the same if more than half of all connections are open.
 SILENCE, SHORT_SILENCE = 30.0, 2.0
-#: Where the page sends its token.
+#: Header in which the page sends its token.
 TOKEN = "X-Linkwork-Token"
-#: Kinds of jobs: the names of `jobs.JOBS`, whose import takes a second.
+#: Kinds of jobs: the names in `jobs.JOBS`, which is not imported here as this takes a second.
 JOB_KINDS = ("linkages", "slider", "tune", "run", "export")
 _LOST = "the token is missing or wrong: open the address that linkwork studio printed"
-#: Served in the place of the page where the address has no token: the page moves it from there to the browser's storage.
+#: Served instead of the page if the address has no token: its script takes the token from the browser's storage, where the page
+#: has put it.
 _LOST_PAGE = f"""<!doctype html><html lang="en"><meta charset="utf-8"><title>linkwork studio</title><p>{_LOST}</p><script>
 const token = localStorage.getItem("linkwork-token");
 if (token && !location.search) location.replace(`/?token=${{encodeURIComponent(token)}}${{location.hash}}`);
 </script></html>"""
-#: How the page knows that there is a server, and what kinds of linkages it searches.
+#: Tag that tells the page that there is a server, and which kinds of linkages it can search.
 _MARK = f'<meta name="linkwork-server" content="{" ".join(get_args(Kind))}">'
 
 _HEADERS = [
@@ -53,7 +54,7 @@ _HEADERS = [
     ("X-Content-Type-Options", "nosniff"),
     ("X-Frame-Options", "DENY"),
 ]
-#: What a page may load: itself. Its scripts are named by their hashes, beside these.
+#: Content policy of a page: it may load nothing but itself; the hashes of its scripts are inserted.
 _POLICY = (
     "default-src 'none'; script-src 'wasm-unsafe-eval' {}; worker-src blob:; style-src 'unsafe-inline'; "
     "img-src data: blob:; connect-src 'self'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
@@ -63,7 +64,7 @@ _Start = Callable[[str, list[tuple[str, str]]], Any]
 
 
 class _Refused(Exception):
-    """A request that is not served, with the status and the sentence that say why."""
+    """A request that is refused, with the HTTP status and a sentence that give the reason."""
 
     def __init__(self, status: HTTPStatus, sentence: str) -> None:
         self.status, self.sentence = status, sentence
@@ -71,37 +72,37 @@ class _Refused(Exception):
 
 
 class Application:
-    """Serves a page and takes its jobs (WSGI).
+    """WSGI application that serves a page and accepts its jobs.
 
-    Every request must name this machine as its host, which a page that reached it by a name of its own does not; come from no
-    other page; and bring the token, in the address of the page and in a header of its requests. There are two places, the page
-    and its job: what a request names is looked up in that table, and never on a disk.
+    A request must name this machine as its host (a page that reaches it by another name does not), must not come from another
+    page, and must have the token, in the address of the page or in a header. There are two paths, the page and its job; a
+    path is looked up in a table, never on a disk.
 
     Parameters
     ----------
     page : str
-        With the state that it opens with.
+        HTML of the page with its opening state.
     worker : Worker
-        Does the jobs.
+        Worker that does the jobs.
     """
 
     def __init__(self, page: str, worker: Worker) -> None:
         self.worker = worker
         self.token = secrets.token_urlsafe(32)
-        #: Hosts that are this server, known once it listens.
+        #: Host names of this server, set when it listens.
         self.hosts: tuple[str, ...] = ()
         self.page = page.replace("<title>", f"{_MARK}\n<title>", 1).encode()
         self._lost = _LOST_PAGE.encode()
         self._policy = _POLICY.format(_hashes(page + _LOST_PAGE))
         self._places: dict[str, dict[str, Callable[[Mapping[str, Any]], tuple[HTTPStatus, bytes]]]] = {
-            "/": {"GET": self._page},
-            "/job": {"GET": self._look, "POST": self._give, "DELETE": self._cancel},
+            "/": {"GET": self._get_page},
+            "/job": {"GET": self._get_job, "POST": self._post_job, "DELETE": self._delete_job},
         }
 
     def __call__(self, environ: Mapping[str, Any], start: _Start) -> Iterable[bytes]:
         headers = list(_HEADERS)
         try:
-            status, body = self._served(environ)
+            status, body = self._serve(environ)
         except _Refused as refused:
             status, body = refused.status, _json({"sentence": refused.sentence})
         page = body is self.page or body is self._lost
@@ -111,7 +112,7 @@ class Application:
         start(f"{status.value} {status.phrase}", headers)
         return [body]
 
-    def _served(self, environ: Mapping[str, Any]) -> tuple[HTTPStatus, bytes]:
+    def _serve(self, environ: Mapping[str, Any]) -> tuple[HTTPStatus, bytes]:
         if environ.get("HTTP_HOST") not in self.hosts:
             raise _Refused(
                 HTTPStatus.MISDIRECTED_REQUEST,
@@ -141,16 +142,16 @@ class Application:
             return str(environ.get(f"HTTP_{TOKEN.upper().replace('-', '_')}", ""))
         return str(parse_qs(environ.get("QUERY_STRING", "")).get("token", [""])[0])
 
-    def _page(self, environ: Mapping[str, Any]) -> tuple[HTTPStatus, bytes]:
+    def _get_page(self, environ: Mapping[str, Any]) -> tuple[HTTPStatus, bytes]:
         return HTTPStatus.OK, self.page
 
-    def _look(self, environ: Mapping[str, Any]) -> tuple[HTTPStatus, bytes]:
+    def _get_job(self, environ: Mapping[str, Any]) -> tuple[HTTPStatus, bytes]:
         return HTTPStatus.OK, _json(self.worker.look())
 
-    def _cancel(self, environ: Mapping[str, Any]) -> tuple[HTTPStatus, bytes]:
+    def _delete_job(self, environ: Mapping[str, Any]) -> tuple[HTTPStatus, bytes]:
         return HTTPStatus.OK, _json(self.worker.cancel())
 
-    def _give(self, environ: Mapping[str, Any]) -> tuple[HTTPStatus, bytes]:
+    def _post_job(self, environ: Mapping[str, Any]) -> tuple[HTTPStatus, bytes]:
         if environ.get("CONTENT_TYPE", "").partition(";")[0].strip() != "application/json":
             raise _Refused(HTTPStatus.UNSUPPORTED_MEDIA_TYPE, "a job is JSON: its Content-Type is application/json")
         try:
@@ -173,25 +174,26 @@ def _json(content: Mapping[str, Any]) -> bytes:
 
 
 def _hashes(page: str) -> str:
-    """Return the hashes of a page's scripts for its content policy."""
+    """Return the hashes of a page's scripts, in quotes, for its content policy."""
     scripts = re.findall(r"<script>(.*?)</script>", page, flags=re.DOTALL)
     found = (base64.b64encode(hashlib.sha256(script.encode()).digest()).decode() for script in scripts)
     return " ".join(f"'sha256-{one}'" for one in found)
 
 
 def hosts_of(port: int) -> tuple[str, ...]:
-    """Return the host names that a browser sends for a server at a port; the usual port is left out."""
+    """Return the hosts that a browser may send for this server at a port; port 80 is not named."""
     return tuple(name if port == 80 else f"{name}:{port}" for name in (ADDRESS, "localhost"))
 
 
 class Server:
-    """An `Application` that listens.
+    """Server for an `Application`, which listens from the start.
 
     Parameters
     ----------
     page : str
+        HTML of the page with its opening state.
     port : int
-        One that is free by default.
+        Port; by default a free one.
 
     Raises
     ------
@@ -228,11 +230,11 @@ class Server:
 
     @property
     def address(self) -> str:
-        """Return the address of the page with its token."""
+        """Address of the page with its token."""
         return f"http://{ADDRESS}:{self.port}/?token={self.application.token}"
 
     def run(self) -> None:
-        """Serve until Ctrl-C, or until `stop` is called from another thread; then end what is being done."""
+        """Serve until Ctrl-C, or until `stop` is called from another thread; then end the worker and its job."""
         try:
             self._server.run()
         finally:
@@ -241,14 +243,14 @@ class Server:
             self._close()
 
     def stop(self) -> None:
-        """End `run`."""
+        """Make `run` return; to be called from another thread."""
         trigger = self._server.trigger
-        with trigger.lock:  # or the loop, woken by an answer just given, closes the trigger before it is pulled
+        with trigger.lock:  # otherwise the loop, woken by an answer, may close the trigger before it is pulled
             trigger.thunks.append(self._close)
             trigger.pull_trigger()
 
     def _close_silent(self, now: float) -> None:
-        """Close connections that have said nothing for some time and wait for no answer; waitress calls this each second."""
+        """Close connections that were silent for some time and wait for no answer; waitress calls this each second."""
         silence = SILENCE if len(self._sockets) < CONNECTIONS // 2 else SHORT_SILENCE
         for channel in self._server.active_channels.values():
             if not channel.requests and channel.last_activity < now - silence:

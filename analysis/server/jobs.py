@@ -1,8 +1,8 @@
-"""The jobs that a page gives: each takes a case and what is wanted of it, and answers with what the page shows.
+"""Jobs of the studio: each takes the case of the page and options, and returns an answer for the page to show.
 
-A request is numbers and names; no text of it is ever a path. An answer is for people, in the units they read: ``words``, a
-``table`` of texts with ``files`` of a row, and by row ``pictures``, ``states`` of the page and ``curves`` in the plane of the
-mechanism; ``charts``, the ``outputs`` of a run of the first state, and ``files`` for the browser to save.
+A request has numbers and names; no text of it is used as a path. An answer is in display units and may have: ``words``, a
+``table`` of texts with ``files`` for each row; for each row ``pictures``, ``states`` of the page and ``curves`` in the plane of
+the mechanism; ``charts``, ``outputs`` of a run of the first state, and ``files`` for the browser to save.
 """
 
 from __future__ import annotations
@@ -23,13 +23,13 @@ from ..tuning import Wish, tune
 from .answers import Answer, file, folder
 from .paths import Linkages, Moved, linkages, moved
 
-#: Rows of a run through the FMU, at most.
+#: Greatest number of rows of a run through the FMU.
 _ROWS = 5000
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Tuning:
-    """A range of speeds (rad/s), what must not lie in it, and what may change by which share of its value."""
+    """Options of tuning: range of speeds (rad/s), parameters that may change and by which share, and what to exclude."""
 
     speeds: tuple[float, float] = entry(Many(Quantity("rad/s", above=0.0), length=2))
     change: tuple[str, ...] = entry(Many(text, least=1))
@@ -41,26 +41,26 @@ class _Tuning:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Run:
-    """A run of the FMU, with rows at so many equal steps."""
+    """Options of a run of the FMU: the number of equal steps, after each of which there is a row."""
 
     rows: int = entry(Whole(1))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Export:
-    """A native FMU with the start values of the page, for this platform or for all of them."""
+    """Options of an export: kind of native FMU, and whether it is for all platforms or only for this one."""
 
     kind: str = entry(Choice([name for name, kind in KINDS.items() if kind is not PYTHON]), "native")
     everywhere: bool = entry(flag, False)
 
 
 def do(kind: str, request: Mapping[str, Any]) -> Answer:
-    """Run a job of `JOBS` with the ``state`` and the ``wanted`` options of a request.
+    """Run a job of `JOBS` with the entries ``state`` and ``wanted`` (options) of a request, and return its answer.
 
     Raises
     ------
     LinkworkError
-        Of whatever kind the job has.
+        Any error of the job.
     """
     wanted, work = JOBS[kind]
     state = request.get("state")
@@ -70,7 +70,7 @@ def do(kind: str, request: Mapping[str, Any]) -> Answer:
 
 
 def _tuned(case: Case, wanted: _Tuning) -> Answer:
-    """Find the least change and return it as a state of the page."""
+    """Find the least change of parameters, and return it as a table and a state of the page."""
     low, high = wanted.speeds
     wish = Wish(
         parameters=case.parameters,
@@ -101,7 +101,7 @@ def _tuned(case: Case, wanted: _Tuning) -> Answer:
 
 
 def _run(case: Case, wanted: _Run) -> Answer:
-    """Run the native FMU, or the Python FMU if Zig is not installed, at the samples of the page."""
+    """Run the native FMU, or without Zig the Python FMU, and return its outputs at the samples of the page."""
     if wanted.rows > _ROWS:
         raise InputError(f"{wanted.rows} rows are more than {_ROWS}: ask for less")
     mechanism = mechanism_of(case.parameters)
@@ -147,7 +147,7 @@ def _exported(case: Case, wanted: _Export) -> Answer:
         return {"words": f"{made.name} starts with the values of the page. {of}", "files": [file(made)]}
 
 
-#: By kind of job: how what is wanted is read, and what does it.
+#: For each kind of job the class of its options, and the function that does it.
 JOBS: dict[str, tuple[type, Callable[[Case, Any], Answer]]] = {
     "linkages": (Linkages, linkages),
     "slider": (Moved, moved),

@@ -1,4 +1,4 @@
-"""Jobs about a path that was drawn: linkages whose coupler point goes along it, and the slider's motion for it."""
+"""Jobs about a drawn path: find linkages whose coupler point follows it, and the slider's motion for it."""
 
 from __future__ import annotations
 
@@ -45,19 +45,19 @@ from ..youssef import require_five_bar
 from .answers import Answer, FloatArray, chart, file, folder
 
 _POINT = Many(Quantity("m"), length=2)
-#: What is to be known of linkages that the page cannot show as they are.
+#: Notes on kinds of linkages that the page cannot show completely.
 _NOTES: dict[Kind, str] = {
     "slider-crank": "The page's slider-crank has no coupler point: its curve is in the small picture.",
     "geared-five-bar": "A geared five-bar is none of the page's mechanisms: its drawing is at real size, and linkwork "
     "synthesize with its own file searches its gears alone.",
 }
-#: The file of a task, and every so many-th point of a curve that is drawn small.
+#: Name of the file of a task; small pictures have every so many-th point of a curve.
 _TASK, _EVERY = "linkages.toml", 4
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Drawn:
-    """A path that was drawn (m), and the searches for it."""
+    """Options of both jobs: points of the drawn path (m), whether it is closed, and the number of starts of the search."""
 
     points: tuple[tuple[float, float], ...] = entry(Many(_POINT, least=3))
     closed: bool = entry(flag, True)
@@ -69,7 +69,7 @@ class _Drawn:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Linkages(_Drawn):
-    """Linkages for it of these kinds, with at least this transmission angle (rad) and no longer link (m)."""
+    """Options of a search for linkages: kinds, least transmission angle (rad) and greatest length of a link (m)."""
 
     kinds: tuple[Kind, ...] = entry(Many(Choice(get_args(Kind)), least=1), ("four-bar",))
     least_transmission: float = entry(Quantity("rad", least=0.0, below=0.5 * pi), LeastTransmission().angle)
@@ -81,7 +81,7 @@ class Linkages(_Drawn):
         return [*found, LargestLink(length=self.longest)] if isfinite(self.longest) else found
 
     def tables(self, title: str, **search: Any) -> dict[str, Any]:
-        """Return the tables of the same search as a case file of `linkwork synthesize`, with all digits."""
+        """Return the search as tables of a case file for `linkwork synthesize`; ``search`` are further entries of [search]."""
         angle: dict[str, Any] = {"least_transmission_angle": self.least_transmission or False}
         turn = {} if self.least_transmission else {"full_turn": True}
         longest = {"largest_link": self.longest} if isfinite(self.longest) else {}
@@ -95,7 +95,7 @@ class Linkages(_Drawn):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Moved(_Drawn):
-    """The slider's motion for it: harmonics up to a number, and the greatest stroke (m)."""
+    """Options of a search for the slider's motion: greatest number of harmonics, and greatest stroke (m)."""
 
     starts: int = entry(Whole(1), 8)
     harmonics: int = entry(Whole(1), 2)
@@ -103,9 +103,9 @@ class Moved(_Drawn):
 
 
 def linkages(case: Case, wanted: Linkages) -> Answer:
-    """Return ranked linkages with drawings, each as a state of the page and with the path in the frame of its ground link.
+    """Find linkages for the drawn path; return them ranked, with pictures, states of the page and the path in their frames.
 
-    A geared five-bar, of which there is no mechanism to run, is a drawing for CAD and a case of its own that is searched for.
+    As a geared five-bar cannot be run, it has a drawing for CAD and a case file instead of a state.
     """
     found = synthesize(
         wanted.task(), constraints=wanted.constraints(), kinds=wanted.kinds, search=Search(starts=wanted.starts)
@@ -128,8 +128,10 @@ def linkages(case: Case, wanted: Linkages) -> Answer:
             title = f"Linkage {rank} for a path that was drawn"
             shown = not isinstance(solution.linkage, FiveBar)
             states.append(_state(solution, title) if shown else None)
-            curves.append(_turned(np.array(wanted.points), solution.linkage).tolist())
-            files.append([] if shown else _kept(solution, wanted, Path(place) / f"linkage-{rank}", title))
+            curves.append(_in_ground_frame(np.array(wanted.points), solution.linkage).tolist())
+            files.append(
+                [] if shown else _files_instead_of_state(solution, wanted, Path(place) / f"linkage-{rank}", title)
+            )
         of = {solution.linkage.kind for solution in found.solutions}
         said = (
             f"{format_count(len(rows), 'linkage')} in {found.seconds:.1f} s, the area between the curves the least first. "
@@ -150,13 +152,13 @@ def linkages(case: Case, wanted: Linkages) -> Answer:
 def _state(solution: Solution, title: str) -> Answer:
     case = case_from(solution.run_case(Make(), title), folder=Path(), title=title)
     state, speed = state_of(case), default_variable(mechanism_of(case.parameters))
-    # the path says nothing of the way in which the crank turns, and the page seeks periodic motions of one way
+    # the path does not say in which direction the crank turns; the page seeks periodic motions with positive speed
     state["values"][speed] = abs(state["values"][speed])
     return state
 
 
-def _kept(solution: Solution, wanted: Linkages, path: Path, title: str) -> list[Answer]:
-    """Return the drawing of a linkage that the page cannot show, and a case that searches its kind and its gears alone."""
+def _files_instead_of_state(solution: Solution, wanted: Linkages, path: Path, title: str) -> list[Answer]:
+    """Return the drawing of a linkage that the page cannot show, and a case that searches only its kind and gear ratio."""
     pivot = solution.linkage.pivot
     assert isinstance(pivot, SecondCrank)
     case = wanted.tables(title, kinds=[solution.linkage.kind], gears=[pivot.ratio])
@@ -165,7 +167,7 @@ def _kept(solution: Solution, wanted: Linkages, path: Path, title: str) -> list[
 
 
 def _picture(solution: Solution) -> Answer:
-    """Return the lines of a small picture in the plane of the path at the first station: links, guide and traced curve."""
+    """Return the lines of a small picture of a linkage at the first station of the path: links, guide and traced curve (m)."""
     scene = LinkageScene(solution)
     pins = scene.pins(float(scene.rotation[0])) or {}
     links = [
@@ -177,7 +179,7 @@ def _picture(solution: Solution) -> Answer:
     guide = [] if scene.guide is None else [scene.guide.tolist()]
     return {
         "links": [[pins[name] for name in link] for link in links if pins] + guide,
-        # of an open path the rest of the curve, which may be far larger, is left out
+        # for an open path the rest of the curve, which may be far larger, is left out
         "curves": [piece[::_EVERY].tolist() for piece in (scene.curves if scene.target_closed else _joined(scene))],
     }
 
@@ -187,8 +189,8 @@ def _joined(scene: LinkageScene) -> list[FloatArray]:
     return [] if traced is None else [traced[np.isfinite(traced).all(axis=1)]]
 
 
-def _turned(points: FloatArray, linkage: Linkage) -> FloatArray:
-    """Return points of the plane in the frame of a linkage's ground link."""
+def _in_ground_frame(points: FloatArray, linkage: Linkage) -> FloatArray:
+    """Return points of the plane in the frame of a linkage's ground link, shape (n, 2)."""
     z = (points[:, 0] + 1j * points[:, 1] - complex(linkage.pivot_x, linkage.pivot_y)) * np.exp(
         -1j * linkage.ground_angle
     )
@@ -196,7 +198,7 @@ def _turned(points: FloatArray, linkage: Linkage) -> FloatArray:
 
 
 def moved(case: Case, wanted: Moved) -> Answer:
-    """Compute the slider's motion with more and more harmonics, links and guide kept, and the force of the last."""
+    """Find the slider's motion for the drawn path with more and more harmonics, and the control force of the last one."""
     p = case.parameters
     require_five_bar(p, "a motion of the slider")
     if p.coupler_point_distance == 0.0:

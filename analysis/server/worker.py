@@ -1,4 +1,4 @@
-"""A process that does one job after another, and is ended within one, with all that it started, if that is cancelled."""
+"""A process that does one job after another; it is killed, with all processes that it started, if a job is cancelled."""
 
 from __future__ import annotations
 
@@ -23,21 +23,20 @@ from linkwork.errors import InputError, LinkworkError
 from ..numerics.workers import end_with
 from ..run import heard_by
 
-#: Seconds between two words of progress, and that an idle process is given to end.
+#: Seconds between two reports of progress; seconds to wait for a killed process.
 _INTERVAL, _PATIENCE = 0.1, 5.0
 _NOTE = "linkwork: "
 _LOST = "the process that worked on it ended, as where memory runs out"
 
 
 class Busy(InputError):
-    """A job is being done already."""
+    """Error for a new job while another one is running."""
 
 
 class Worker:
-    """One job at a time, in a process of its own. It may be called from several threads.
+    """Runs one job at a time in a separate process. Its methods may be called from several threads.
 
-    The process is started with the first job, or by `start`; what it puts in files for the time of a job is in a folder that
-    goes with it.
+    The process is started with the first job, or by `start`; its temporary files are in a folder that is deleted with it.
     """
 
     def __init__(self) -> None:
@@ -49,12 +48,12 @@ class Worker:
         self._number = 0
 
     def start(self) -> None:
-        """Start the process, if there is none: the next job need not wait for its imports.
+        """Start the process if there is none, so that the next job does not wait for its imports.
 
         Raises
         ------
         LinkworkError
-            If the system gives none.
+            If the system cannot start one.
         """
         with self._lock:
             if self._process is not None and self._process.is_alive():
@@ -74,12 +73,12 @@ class Worker:
             self._process = process
 
     def give(self, kind: str, request: Mapping[str, Any]) -> dict[str, Any]:
-        """Begin a job.
+        """Begin a job and return its state, see `look`.
 
         Raises
         ------
         Busy
-            If there is one already.
+            If a job is running.
         """
         with self._lock:
             if self.look()["state"] == "running":
@@ -96,7 +95,7 @@ class Worker:
             return self._job
 
     def look(self) -> dict[str, Any]:
-        """Return the last job's ``state``, idle, running, done, failed or cancelled, and its ``answer``, a text of JSON."""
+        """Return the last job: its ``state`` (idle, running, done, failed or cancelled), and if done its ``answer`` as JSON."""
         with self._lock:
             try:
                 while self._job["state"] == "running" and self._pipe.poll():
@@ -108,12 +107,12 @@ class Worker:
             return self._job
 
     def cancel(self) -> dict[str, Any]:
-        """End the running job at once."""
+        """Kill the running job, and return the last job as `look` does."""
         with self._lock:
             if self.look()["state"] == "running":
                 self._end()
                 self._job = {"state": "cancelled", "job": self._number, "kind": self._job["kind"]}
-                with suppress(LinkworkError):  # the next job says so
+                with suppress(LinkworkError):  # the next job reports it
                     self.start()
             return self._job
 
@@ -129,7 +128,7 @@ class Worker:
     def _end(self) -> None:
         if self._process is not None:
             if os.name == "posix":
-                # the group is its own, with the compilers that it started; before it has made that there is none
+                # its process group contains the compilers that it started; there is none before it has made one
                 with suppress(ProcessLookupError, PermissionError):
                     os.killpg(self._process.pid, signal.SIGKILL)
             self._process.kill()
@@ -144,7 +143,7 @@ class Worker:
 
 
 def _work(pipe: Any, caller: int, folder: str) -> None:
-    """Run job after job in the process until it is ended."""
+    """Run one job after another in the worker's process until it is killed."""
     end_with(caller)
     if os.name == "posix":
         os.setsid()
@@ -160,7 +159,7 @@ def _work(pipe: Any, caller: int, folder: str) -> None:
 
 
 class _Teller:
-    """Sends the progress of a job, not too often."""
+    """Function that sends the progress of a job, at most every `_INTERVAL` seconds."""
 
     def __init__(self, pipe: Any, number: int) -> None:
         self.pipe, self.number, self.last = pipe, number, -1.0
@@ -173,7 +172,7 @@ class _Teller:
 
 
 class _Terminal(io.TextIOBase):
-    """The terminal, from which notes, such as that something is compiled, are progress too."""
+    """Standard error of a job: its notes, such as that something is compiled, are also sent as progress."""
 
     def __init__(self, teller: _Teller) -> None:
         self.teller = teller
@@ -186,7 +185,7 @@ class _Terminal(io.TextIOBase):
 
 
 def _answer(do: Any, kind: str, request: Mapping[str, Any], teller: _Teller) -> dict[str, Any]:
-    """Return the answer of a job."""
+    """Run a job; return its end state with the answer as JSON, or with a sentence on the error."""
     try:
         with heard_by(teller), redirect_stderr(_Terminal(teller)):
             return {"state": "done", "answer": json.dumps(do(kind, request), allow_nan=False)}
