@@ -1,4 +1,4 @@
-"""The studio: a page on which mechanisms move, can be dragged, and tell the truth, by the same equations as WebAssembly."""
+"""The studio: a page on which mechanisms move and can be dragged, with the FMU's equations compiled to WebAssembly."""
 
 from .page import PAGE, address_of, build_page, fresh, page_of
 from .state import OPENING, case_of, given_values, opening_state, state_of

@@ -1,4 +1,4 @@
-"""`python -m analysis.studio` builds the page anew, from what `npm run build` in `studio/` has made."""
+"""Build the page with `python -m analysis.studio`, from the template that `npm run build` in `studio/` has written."""
 
 from .page import main
 

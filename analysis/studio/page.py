@@ -1,4 +1,4 @@
-"""The page in one file: built from `studio/` and the registry, kept beside this module, and opened with a state."""
+"""Build the page, one file beside this module, from `studio/` and the registry of mechanisms, and open it with a state."""
 
 from __future__ import annotations
 
@@ -23,10 +23,10 @@ from .tables import tables_of
 
 #: The built page.
 PAGE = Path(__file__).with_name("page.html")
-#: Of a checkout, and in it the page without its mechanisms, as `npm run build` writes it.
+#: Root of a checkout, and in it the page without mechanisms, as `npm run build` writes it.
 ROOT = SOURCES.parent
 TEMPLATE = ROOT / "studio" / "build" / "page.html"
-#: What the page is made of, by patterns of files of a checkout.
+#: Patterns of the files of a checkout from which the page is made.
 _MADE_OF = (
     "analysis/export/equations_c.py",
     "analysis/export/web.py",
@@ -43,7 +43,7 @@ _HASH = '<meta name="sources" content="{}">'
 
 
 def hash_of_sources() -> str:
-    """Return the hash of all files of the checkout from which the page is made."""
+    """Return the hash (SHA-256) of all files of the checkout from which the page is made."""
     found = hashlib.sha256()
     for path in sorted({path for pattern in _MADE_OF for path in ROOT.glob(pattern) if path.is_file()}):
         found.update(f"{path.relative_to(ROOT).as_posix()}\n".encode())
@@ -52,24 +52,24 @@ def hash_of_sources() -> str:
 
 
 def fresh() -> bool:
-    """Whether the built page is of the sources of this checkout."""
+    """Return whether the page was built from the sources of this checkout."""
     return _HASH.format(hash_of_sources()) in PAGE.read_text(encoding="utf-8")
 
 
 def build_page(template: str | None = None, mechanisms: Iterable[Mechanism] | None = None) -> str:
-    """Build the page with mechanisms, which Zig compiles.
+    """Return the page with mechanisms, which Zig compiles.
 
     Parameters
     ----------
     template : str, optional
-        A page, by default as `npm run build` wrote it: what mechanisms it has are replaced.
+        A page whose mechanisms are replaced; by default the page that `npm run build` wrote.
     mechanisms : iterable of Mechanism, optional
-        All registered ones by default.
+        By default all registered mechanisms.
 
     Raises
     ------
     InputError
-        If `npm run build` has written nothing.
+        If `npm run build` has not written its page.
     """
     if template is None:
         if not TEMPLATE.is_file():
@@ -79,30 +79,30 @@ def build_page(template: str | None = None, mechanisms: Iterable[Mechanism] | No
         )
     made = MECHANISMS.values() if mechanisms is None else mechanisms
     tables = {"version": __version__, "tolerance": TOLERANCE, "mechanisms": [tables_of(m) for m in made]}
-    return _with(_with(template, "tables", tables), "state", opening_state())
+    return _replace_script(_replace_script(template, "tables", tables), "state", opening_state())
 
 
 def page_of(state: Mapping[str, Any]) -> str:
-    """Return the built page with an opening state; only with its mechanism if this is not one of Linkwork's own.
+    """Return the built page with an opening state; if the page lacks the state's mechanism, it has only that one.
 
     Raises
     ------
     BuildError
-        If that one has to be compiled, and cannot be.
+        If the mechanism has to be compiled, and cannot be.
     """
     page = PAGE.read_text(encoding="utf-8")
     if f'"name":"{state["mechanism"]}"' not in page:
         page = build_page(page, [MECHANISMS[state["mechanism"]]])
-    return _with(page, "state", state)
+    return _replace_script(page, "state", state)
 
 
 def address_of(state: Mapping[str, Any], page: str) -> str:
-    """Return the address of the page with a state, as the page itself writes it; start values are left out.
+    """Return the address of the page with a state, in the form that the page itself writes; start values are left out.
 
     Parameters
     ----------
     state : mapping
-        Of a mechanism that the page has.
+        State of a mechanism that the page has.
     page : str
         Address of the page itself.
     """
@@ -113,12 +113,12 @@ def address_of(state: Mapping[str, Any], page: str) -> str:
 
 
 def main() -> None:
-    """Build the page anew."""
+    """Build the page and write it to `PAGE`."""
     write_text(PAGE, build_page())
 
 
-def _with(page: str, script: str, data: Any) -> str:
-    """Return a page with other data in one of its scripts."""
+def _replace_script(page: str, script: str, data: Any) -> str:
+    """Return a page in which the JSON script with the id ``script`` has other data."""
     text = json.dumps(data, separators=(",", ":")).replace("<", "\\u003c")
     pattern = rf'(<script type="application/json" id="{script}">).*?(</script>)'
     return re.sub(pattern, lambda found: found[1] + text + found[2], page, count=1, flags=re.DOTALL)

@@ -1,4 +1,4 @@
-"""What the page opens with: a case, a published set, or a mechanism that shows what there is to see."""
+"""Convert between cases and states of the page; the opening state."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from ..periodic import of_the_motor
 from ..run import Case, InductionMotor, Inputs
 from .tables import NO_MOTOR, given_entries, published_values, values_of
 
-#: What is changed in the first published set of the mechanism that the page opens with: a coupler point.
+#: Values that the opening state changes in the first published set of the five-bar: it has a coupler point.
 OPENING = {"coupler.point_distance": 0.105, "coupler.point_angle": 0.55}
 
 
@@ -38,7 +38,7 @@ def state_of(case: Case) -> dict[str, Any]:
     Raises
     ------
     InputError
-        If an input varies: the page has constant ones, and a motor.
+        If an input varies with time: the page has only constant inputs and a motor.
     """
     mechanism = mechanism_of(case.parameters)
     values = values_of(mechanism, case.parameters, case.initial)
@@ -60,12 +60,12 @@ def state_of(case: Case) -> dict[str, Any]:
 
 
 def case_of(state: Mapping[str, Any]) -> Case:
-    """Return the case for a state of the page; a state has numbers and names alone, so that a page can name no file.
+    """Return the case for a state of the page, which has only numbers and names, so that it cannot refer to a file.
 
     Raises
     ------
     UnknownNameError, ParameterError, InputError
-        If there is no such mechanism, it has no such value, or a value is not one that it can have.
+        If the mechanism does not exist, has no variable of that name, or does not allow a value.
     """
     name = str(state.get("mechanism"))
     if name not in MECHANISMS:
@@ -88,35 +88,35 @@ def case_of(state: Mapping[str, Any]) -> Case:
         parameters=mechanism.parameters(**{field_name(n): of[n] for n in mechanism.mechanism_variables}),
         initial=mechanism.initial(**{n: of[v.name] for n, v in mechanism.initial_variables.items()}),
         inputs=Inputs(**dict.fromkeys(chosen, True) | channels),
-        stop_time=_number(state.get("duration", 1.0), "duration"),
+        stop_time=_finite_number(state.get("duration", 1.0), "duration"),
     )
 
 
 def given_values(mechanism: Mechanism, values: Any) -> dict[str, float]:
-    """Return the values that the page gives a mechanism by FMI name, with start values for the others.
+    """Return all values that the page can set of a mechanism, by FMI name; those not in ``values`` have their start values.
 
     Raises
     ------
     UnknownNameError, ParameterError, InputError
-        If the mechanism has no such value, or it is no finite number.
+        If the mechanism has no variable of that name, or a value is not a finite number.
     """
-    known = _given(mechanism)
+    known = _start_values(mechanism)
     if not isinstance(values, Mapping):
         raise InputError("a state has no values: it must have numbers by the names of the FMU's variables")
     for name in values:
         if name not in known:
             raise unknown_name(str(name), known)
-    return {name: _number(values.get(name, start), name) for name, start in known.items()}
+    return {name: _finite_number(values.get(name, start), name) for name, start in known.items()}
 
 
-def _given(mechanism: Mechanism) -> dict[str, float]:
-    """Start values of all that the page gives a mechanism, a motor included."""
+def _start_values(mechanism: Mechanism) -> dict[str, float]:
+    """Return the start values of all variables that the page can set, a motor's included, by FMI name."""
     given = (entry.variable for entry in given_entries(mechanism))
     motor = {name: NO_MOTOR[field] for name, (field, _) in of_the_motor(mechanism).items()}
     return {v.name: float(v.start) for v in given} | motor
 
 
-def _number(value: Any, name: str) -> float:
+def _finite_number(value: Any, name: str) -> float:
     if isinstance(value, bool) or not isinstance(value, (int, float)) or not isfinite(value):
         raise ParameterError(name, value, "be a finite number")
     return float(value)

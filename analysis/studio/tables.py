@@ -1,4 +1,4 @@
-"""What the page knows of a mechanism: tables from the registry, so that the page itself names none."""
+"""Tables of mechanisms for the page, made from the registry, so that the page itself knows no mechanism."""
 
 from __future__ import annotations
 
@@ -22,14 +22,14 @@ _SECTIONS = {
     **dict.fromkeys(("centre of mass", "kg", "kg.m2"), "Masses"),
 }
 DRIVE = "Drive and loads"
-#: Of a motor that nobody has given, by the field: no torque, a usual slip, and four poles at 50 Hz (rad/s).
+#: Fields of a motor that is not given: no torque, a usual slip, and the speed of four poles at 50 Hz (rad/s).
 NO_MOTOR = {"breakdown_torque": 0.0, "breakdown_slip": 0.2, "synchronous_speed": 50.0 * math.pi}
-#: Tolerance of a run on the page: its numbers are good to more digits than those of a run by default.
+#: Tolerance of a run on the page, smaller than that of a run by default.
 TOLERANCE = 1e-12
 
 
 def tables_of(mechanism: Mechanism) -> dict[str, Any]:
-    """Return the tables of a mechanism that the page needs, with its module."""
+    """Return the tables of a mechanism for the page, and its WebAssembly module."""
     entries = interface(mechanism)
     reference = {entry.variable.name: entry.reference for entry in entries}
     outputs = {v.name: v for v in mechanism.variables if v.name in mechanism.output_names}
@@ -71,21 +71,21 @@ def tables_of(mechanism: Mechanism) -> dict[str, Any]:
 
 
 def published_values(mechanism: Mechanism, known: PublishedSet) -> dict[str, float]:
-    """Return the values of a published set run at its speed, by FMI name."""
+    """Return the values of a published set, driven at its speed, by FMI name."""
     return values_of(mechanism, known.parameters, known.initial) | {
         channel.name: known.drive[channel.argument] for channel in mechanism.channels if channel.argument in known.drive
     }
 
 
 def values_of(mechanism: Mechanism, parameters: Any, initial: Any) -> dict[str, float]:
-    """Return parameters and initial state by FMI name."""
+    """Return the values of parameters and initial state by FMI name."""
     own = {name: getattr(parameters, field_name(name)) for name in mechanism.mechanism_variables}
     start = {variable.name: getattr(initial, name) for name, variable in mechanism.initial_variables.items()}
     return {name: float(value) for name, value in (own | start).items()}
 
 
 def shown_in(variable: Variable) -> tuple[str, float]:
-    """Return the unit in which a quantity is shown, and the factor to it."""
+    """Return the unit in which the page shows a variable, and the factor from SI to this unit."""
     displays = dict(UNITS[variable.unit].displays) if variable.kind == "Real" else {}
     shown = variable.display or ("" if variable.unit == "rad/s" else next(iter(displays), ""))
     unit = shown or variable.unit
@@ -97,7 +97,7 @@ def _unit(variable: Variable) -> dict[str, Any]:
 
 
 def given_entries(mechanism: Mechanism) -> list[Entry]:
-    """Return the interface entries that the page sets, without a motor's and without rates of inputs."""
+    """Return the entries of the interface that the page can set, without those of a motor and without rates of inputs."""
     rates = [channel.name for channel in mechanism.channels if channel.kind == "rate"]
     roles = ("parameter", "mode", "initial", "input")
     return [one for one in interface(mechanism) if one.role in roles and one.variable.name not in rates]
@@ -135,7 +135,7 @@ def _given(mechanism: Mechanism, variable: Variable, reference: int) -> dict[str
 
 
 def _motor(mechanism: Mechanism, crank: int) -> list[dict[str, Any]]:
-    """Return the rows of a motor on the crank, which the page's module keeps under references below 0."""
+    """Return the rows of a motor on the crank, whose references in the page's module are negative."""
     torque = crank_of(mechanism, mechanism.freedoms[crank].coordinate).torque if crank >= 0 else None
     if torque is None:
         return []
@@ -160,7 +160,7 @@ def _motor(mechanism: Mechanism, crank: int) -> list[dict[str, Any]]:
 
 
 def _natural(mechanism: Mechanism, reference: dict[str, int], crank: int) -> int | None:
-    """Return the reference of the stiffness for the natural frequency; -1 if it is in the energy, None if there is none."""
+    """Return the reference of the stiffness for the natural frequency; -1 if it is in the energy, None without a frequency."""
     if crank < 0 or len(mechanism.cyclic) == len(mechanism.freedoms):
         return None
     return reference.get(stiffness_name(mechanism), -1)
@@ -197,16 +197,16 @@ def _picture(mechanism: Mechanism, reference: dict[str, int]) -> dict[str, Any]:
 
 
 def _moving(mechanism: Mechanism) -> list[str]:
-    """Return outputs with a rate and an acceleration, the crank's angle left out."""
+    """Return the names of the outputs that have a rate and an acceleration, except crank angles."""
     rate_of = {v.rate_of: v.name for v in mechanism.variables if v.rate_of}
     crank = [mechanism.freedoms[n].coordinate for n in mechanism.cyclic]
     return [n for n in mechanism.output_names if n in rate_of and rate_of[n] in rate_of and n not in crank]
 
 
 def _charts(mechanism: Mechanism) -> list[dict[str, Any]]:
-    """Return the charts; a curve has the places beyond the state whose root of squares it shows, or one place for itself.
+    """Return the charts of the page; ``of`` lists the number of the output of a curve, or of those whose magnitude it shows.
 
-    The powers stand after the outputs and the joints: see studio.c.
+    Powers are numbered after the outputs and the coordinates of the joints: see studio.c.
     """
     names, variables = list(mechanism.output_names), {v.name: v for v in mechanism.variables}
     power = len(names) + 3 * len(mechanism.drawing.joints if mechanism.drawing else ())

@@ -1,4 +1,4 @@
-"""The page of the studio as a widget of a notebook, whose state Python reads and sets."""
+"""The page of the studio as a widget in a notebook, whose state Python can read and set."""
 
 from __future__ import annotations
 
@@ -21,24 +21,24 @@ except ImportError as error:
 
 
 class Widget(anywidget.AnyWidget):
-    """The studio in a notebook: what is dragged there is known here, and what is changed here moves there.
+    """The studio in a notebook: dragging changes ``state``, and a change of ``state`` in Python moves the mechanism.
 
     Parameters
     ----------
     what : Case or str, optional
         A case, or the name of a published set; a five-bar by default.
     height : int
-        Of the page in the notebook (pixels).
+        Height of the page in the notebook (pixels).
 
     Attributes
     ----------
     state : dict
-        What the page shows: mechanism, title, and values by the names of the FMU's variables, in SI.
+        State of the page: mechanism, title, and values in SI by the names of the FMU's variables.
 
     Raises
     ------
     InputError
-        If there is no such set, or a case has inputs that the page has not.
+        If the published set does not exist, or the case has inputs that the page does not support.
     """
 
     _esm = Path(__file__).with_name("widget.js")
@@ -61,15 +61,15 @@ class Widget(anywidget.AnyWidget):
 
     @property
     def case(self) -> Case:
-        """Return the case that the page shows: parameters, initial state and inputs."""
+        """The case that the page shows: parameters, initial state and inputs."""
         return case_of(self.state)
 
     def change(self, values: Mapping[str, float]) -> None:
-        """Change values, in SI by the names of the FMU's variables.
+        """Change values, given in SI by the names of the FMU's variables.
 
         Raises
         ------
         LinkworkError
-            If the mechanism has no such value, or cannot have it.
+            If the mechanism has no variable of that name, or does not allow the value.
         """
         self.state = dict(self.state) | {"values": dict(self.state["values"]) | dict(values)}
