@@ -7,11 +7,11 @@
 >>> find_orbit("table-3.1", speed="420 rpm").verdict().stability.value
 'stable'
 
-A number is in SI; where it has a unit, a text such as "420 rpm" or "5 cm" will do. Where parameters of a mechanism are taken, a
-published set or its name will do: `PUBLISHED` has them, `variant` changes values of one.
+Numbers are in SI; a quantity with a unit may also be a text such as "420 rpm" or "5 cm". Instead of a mechanism's parameters a
+published set or its name may be given: `PUBLISHED` has the sets, `variant` changes values of one.
 
-The names are those of ``__init__.pyi``; each is imported from its module when it is first used. Those that one asks for are
-listed by ``dir``, with the packages that have the rest; results and errors of a run can be imported from here too.
+``__init__.pyi`` lists the public names; each is imported from its module when it is first used. ``dir`` lists the functions and
+classes to call, and the packages that have the rest; results and errors of a run can be imported from here as well.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ import lazy_loader
 
 __getattr__, _names, __all__ = lazy_loader.attach_stub(__name__, __file__)
 
-#: What one is given and does not ask for.
+#: Names of results and errors, which ``dir`` does not list.
 _RESULTS = {
     "Comparison",
     "CosimulationError",

@@ -1,4 +1,4 @@
-"""Show results: one line where they are printed, with a small picture below it in a notebook."""
+"""Show results in a notebook with a picture, and format ranges and counts."""
 
 from __future__ import annotations
 
@@ -11,14 +11,14 @@ from pkgutil import resolve_name
 
 from linkwork.errors import LinkworkError
 
-#: Function that draws a result, by name, because results do not import the package that draws them.
+#: Name of the function that draws a result; results do not import the package that draws them.
 PICTURES = "analysis.figures:plot"
-#: Pixels to the inch: small enough to be kept in a notebook.
+#: Pixels per inch of the picture, which is small enough to be stored in a notebook.
 DOTS_PER_INCH = 80
 
 
 class Shown:
-    """Base of results that a notebook shows as their `repr`, with a picture below if there is one."""
+    """Base class of results; a notebook shows their `repr`, and a picture below it if there is one."""
 
     __slots__ = ()
 
@@ -34,7 +34,7 @@ class Shown:
 
 
 def format_range(values: Iterable[float], unit: str) -> str:
-    """Format the range of numbers with their unit, ignoring those that are not finite: "-0.01 to 0.02 m"."""
+    """Format the range of finite numbers with their unit: "-0.01 to 0.02 m"."""
     finite = [float(value) for value in values if isfinite(value)]
     if not finite:
         return "no finite value"

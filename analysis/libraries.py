@@ -1,4 +1,4 @@
-"""Libraries that are not installed with Linkwork's core, and what to say where one is missing."""
+"""Optional libraries: import them when they are used, and report a missing one with the command that installs it."""
 
 from __future__ import annotations
 
@@ -15,12 +15,12 @@ from linkwork.errors import LinkworkError
 
 
 class MissingLibraryError(LinkworkError, ImportError):
-    """A library is not installed; the message has the command that installs it, from any index that has the library.
+    """Error for a library that is not installed; the message has the command that installs it.
 
     Attributes
     ----------
     requirement : str
-        What pip is to install, such as ``plotly>=5.24``.
+        Requirement for pip, such as ``plotly>=5.24``.
     extra : str
         Linkwork's extra that the library belongs to; empty for a library of the core.
     """
@@ -37,7 +37,7 @@ def require(*libraries: str) -> None:
     Raises
     ------
     MissingLibraryError
-        For the first one that is not.
+        For the first library that is not installed.
     """
     for library in libraries:
         if find_spec(library) is None:
@@ -45,7 +45,7 @@ def require(*libraries: str) -> None:
 
 
 def lazy(library: str) -> Any:
-    """Return a stand-in for a library, which imports it when it is first used and raises `MissingLibraryError` then."""
+    """Return an object that imports a library when it is first used, and raises `MissingLibraryError` then if it is missing."""
     return _Lazy(library)
 
 
@@ -57,7 +57,7 @@ class _Lazy(ModuleType):
 
 @cache
 def _requirements() -> dict[str, tuple[str, str]]:
-    """Return requirement and extra by the library's name, from the metadata of the installed package."""
+    """Return (requirement, extra) by the name of the library, from the metadata of the installed package."""
     try:
         lines = requires("linkwork") or []
     except PackageNotFoundError:  # a checkout that is only on the path
@@ -69,6 +69,6 @@ def _requirements() -> dict[str, tuple[str, str]]:
         library = re.match(r"[\w-]+", requirement)
         if library:
             extras[extra[1] if extra else ""][library[0].replace("-", "_")] = requirement
-    # the smallest extra that has a library counts, as 'all' and 'dev' repeat the others; the core counts before any
+    # of several extras with a library the smallest is taken, as 'all' and 'dev' repeat the others; the core precedes all
     order = sorted(extras, key=lambda extra: len(extras[extra]) if extra else 0, reverse=True)
     return {library: (requirement, extra) for extra in order for library, requirement in extras[extra].items()}

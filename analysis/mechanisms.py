@@ -1,4 +1,4 @@
-"""The table of known mechanisms, and the check that the parts of a mechanism fit together."""
+"""Registry of the mechanisms, and checks that the parts of a mechanism are consistent."""
 
 from __future__ import annotations
 
@@ -21,23 +21,23 @@ STATUS_NAMES = tuple(v.name for v in status_variables())
 FIVE_BAR = five_bar.MECHANISM
 SLIDER_CRANK = slider_crank.MECHANISM
 
-#: By name; `register` adds one.
+#: The known mechanisms by name; `register` adds one.
 MECHANISMS: dict[str, Mechanism] = {}
 
 
 class MechanismError(LinkworkError):
-    """The parts of a mechanism do not fit together."""
+    """Error for a mechanism whose parts are inconsistent."""
 
 
 def check(mechanism: Mechanism) -> None:
-    """Make sure that the parts of a mechanism fit together.
+    """Check that the parts of a mechanism are consistent.
 
     Raises
     ------
     MechanismError
-        With the first of what does not.
+        If they are not; the message states the first fault.
     """
-    # the later take for granted what the earlier look at
+    # later checks assume that earlier ones found no fault
     for faults in (_faults_of_interface, _faults_of_drives, _faults_of_equations, _faults_of_drawing):
         for fault in faults(mechanism):
             raise MechanismError(f"mechanism {mechanism.name}: {fault}")
@@ -49,7 +49,7 @@ def register(mechanism: Mechanism) -> None:
     Raises
     ------
     MechanismError
-        If its parts do not fit together, or another has its name or its FMU's.
+        If its parts are inconsistent, or another mechanism has its name or the name of its FMU.
     """
     check(mechanism)
     for other in MECHANISMS.values():
@@ -209,8 +209,8 @@ InitialState = Any
 def name_in_files(mechanism: Mechanism, channel: Channel) -> str:
     """Return the name of a channel in case files.
 
-    It is the name of the input, less its table if there are parameters in that table and no other such input has the same
-    last part.
+    It is the name of the input; without its table if this table has parameters, and no other input of such a table has the
+    same last part.
     """
     tables = {name.partition(".")[0] for name in mechanism.mechanism_variables}
     bare = [c.name.rpartition(".")[2] for c in mechanism.channels if c.name.rpartition(".")[0] in tables]
@@ -224,7 +224,7 @@ def mechanism_of(parameters: Parameters) -> Mechanism:
     Raises
     ------
     InputError
-        If they are those of none.
+        If they belong to no known mechanism.
     """
     for mechanism in MECHANISMS.values():
         if isinstance(parameters, mechanism.parameters):
@@ -246,25 +246,25 @@ def output_units() -> dict[str, str]:
 
 
 def wrapping_outputs() -> frozenset[str]:
-    """Return the names of the outputs that are angles of links, which may jump by a turn."""
+    """Return the names of the outputs that are angles of links and may jump by a full turn."""
     return frozenset(v.name for mechanism in MECHANISMS.values() for v in mechanism.variables if v.wraps)
 
 
 def residual_outputs() -> frozenset[str]:
-    """Return the names of the outputs that are zero but for error."""
+    """Return the names of the outputs that are residuals: zero but for numerical errors."""
     return frozenset(name for mechanism in MECHANISMS.values() for name in mechanism.names("residual"))
 
 
 @lru_cache(maxsize=64)
 def input_units(mechanism: Mechanism) -> Mapping[str, str]:
-    """Return the units of the inputs of a mechanism by their arguments, those of rates left out."""
+    """Return the units of a mechanism's inputs by the names of their arguments, except those of rates."""
     units = {v.name: v.unit for v in mechanism.variables}
     return MappingProxyType({c.argument: units[c.name] for c in mechanism.channels if c.kind != "rate"})
 
 
 def variable_units() -> dict[str, str]:
     """Return the unit of every real variable of every mechanism, by its FMI name."""
-    # every `Drive` that is made asks for them
+    # cached, as every new `Drive` calls this
     here = list(map(id, MECHANISMS.values()))
     if here != list(map(id, _units_of)):
         _units_of[:] = MECHANISMS.values()

@@ -1,8 +1,8 @@
-"""Sections of links: mass, centre of mass and moment of inertia of rods, tubes, bars and plates, from their dimensions.
+"""Compute mass, centre of mass and moment of inertia of rods, tubes, bars and plates from their sections.
 
 The closed forms of uniform bodies are those of Meriam and Kraige, Engineering Mechanics: Dynamics, appendix D. Moments of
-inertia are about an axis across the link: normal to the plane in which a planar linkage moves. Every quantity is a number
-in SI or a text with its unit; a density may be the name of a material of `DENSITIES`.
+inertia are about an axis normal to the plane in which a planar linkage moves. Every quantity is a number in SI or a text with
+its unit; a density may be the name of a material of `DENSITIES`.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ def density(value: Amount, name: str = "density") -> float:
     Raises
     ------
     ParameterError
-        If it is no positive density and no known material.
+        If the value is neither a positive density nor a known material.
     """
     if value in DENSITIES:
         return DENSITIES[value]
@@ -52,7 +52,7 @@ def _length(value: Amount) -> float:
 
 @dataclass(frozen=True, slots=True)
 class _Section:
-    """Dimensions of a section in SI, all positive."""
+    """Base of the sections, which converts their dimensions to SI and checks that they are positive."""
 
     def __post_init__(self) -> None:
         for field in fields(self):
@@ -68,9 +68,9 @@ class Rod(_Section):
     Attributes
     ----------
     diameter : float
-        (m).
+        Diameter (m).
     density : float
-        (kg/m3), or the name of a material.
+        Density (kg/m3), or the name of a material.
 
     Raises
     ------
@@ -99,7 +99,7 @@ class Tube(_Section):
     outer, inner : float
         Diameters (m).
     density : float
-        (kg/m3), or the name of a material.
+        Density (kg/m3), or the name of a material.
 
     Raises
     ------
@@ -133,11 +133,11 @@ class Bar(_Section):
     Attributes
     ----------
     width : float
-        In the plane of motion (m).
+        Width in the plane of motion (m).
     thickness : float
-        Normal to that plane (m).
+        Thickness normal to that plane (m).
     density : float
-        (kg/m3), or the name of a material.
+        Density (kg/m3), or the name of a material.
 
     Raises
     ------
@@ -158,12 +158,12 @@ class Bar(_Section):
         return float(self.mass(length) * (self.width**2 + _length(length) ** 2) / 12.0)
 
 
-#: Sections of links between two pins.
+#: Section of a link with two pins.
 Section = Rod | Tube | Bar
 
 
 class MassProperties(NamedTuple):
-    """Mass (kg), centre of mass (m, m), and moment of inertia about it (kg.m2), normal to the plane."""
+    """Mass (kg), centre of mass (m, m), and moment of inertia (kg.m2) about an axis through it, normal to the plane."""
 
     mass: float
     centre: tuple[float, float]
@@ -177,9 +177,9 @@ class Plate(_Section):
     Attributes
     ----------
     thickness : float
-        (m).
+        Thickness (m).
     density : float
-        (kg/m3), or the name of a material.
+        Density (kg/m3), or the name of a material.
 
     Raises
     ------
@@ -191,7 +191,7 @@ class Plate(_Section):
     density: Amount
 
     def properties(self, points: ArrayLike) -> MassProperties:
-        """Return mass, centre of mass and moment of inertia of the plate with these corners.
+        """Return mass, centre of mass and moment of inertia of a plate with the given corners.
 
         The integrals over the area are sums over its edges by Green's theorem: C. Steger, On the calculation of arbitrary
         moments of polygons, report FGBV-96-05, TU Munich, 1996.
@@ -199,7 +199,7 @@ class Plate(_Section):
         Parameters
         ----------
         points : array_like
-            Corners in order, in either sense of rotation, without the first one repeated, shape (n, 2), n >= 3 (m).
+            Corners (m) in order, clockwise or counter-clockwise, without repeating the first, shape (n, 2), n >= 3.
 
         Raises
         ------
@@ -228,7 +228,7 @@ class Plate(_Section):
 
 
 def _crossing(a: Any, b: Any) -> bool:
-    """Return whether edges from a to b cross inside, of shape (n, 2) each."""
+    """Return whether any two edges cross; edge i runs from a[i] to b[i], and a and b have shape (n, 2)."""
 
     def side(p: Any, q: Any, r: Any) -> Any:
         return (q[..., 0] - p[..., 0]) * (r[..., 1] - p[..., 1]) - (q[..., 1] - p[..., 1]) * (r[..., 0] - p[..., 0])

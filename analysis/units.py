@@ -1,4 +1,4 @@
-"""Units: quantities from numbers and texts such as "420 rpm", and the factors of the units that tables and figures use."""
+"""Units: convert numbers and texts such as "420 rpm" to SI, and SI to the units that tables and figures show."""
 
 from __future__ import annotations
 
@@ -19,12 +19,12 @@ from linkwork.variables import UNITS
 
 #: A number in SI, or a text with its unit such as "420 rpm", which `in_si` converts to a float; also an array or list of them.
 Amount = Any
-#: Unit of an argument, units of a mapping's entries by name, or a function that returns these.
+#: Unit of an argument; or the units of a mapping's entries by name, or a function that returns them.
 Units = str | Mapping[str, str] | Callable[[], Mapping[str, str]]
 
 _Callable = TypeVar("_Callable", bound=Callable[..., Any])
 
-#: Magnitude in the units of tables and pictures (mm, deg, N) below which a result is rounding, and shown as zero.
+#: Results below this magnitude in the units of tables and pictures (mm, deg, N) are rounding, and shown as zero.
 ROUNDING = 1e-9
 
 #: Units of length (m).
@@ -50,19 +50,19 @@ _PINT = {
 
 
 def display_of(unit: str) -> tuple[str, float]:
-    """Return the unit in which tables and pictures show a quantity, such as mm for m, and the factor to it."""
+    """Return the unit in which tables and pictures show a quantity, such as mm for m, and the factor from SI to it."""
     displays = UNITS[unit].displays if unit in UNITS else ()
     return displays[0] if displays else (unit, 1.0)
 
 
 def displayed(value: float, unit: str, digits: int = 6) -> str:
-    """Write a number in SI with the unit in which tables show it, such as "700 rpm" or "3 mm"."""
+    """Return a value given in SI as text in the unit in which tables show it, such as "700 rpm" or "3 mm"."""
     shown, factor = display_of(unit)
     return f"{factor * value:.{digits}g}" + ("" if shown == "1" else f" {shown}")
 
 
 def with_unit(value: float, unit: str) -> str:
-    """Write a number in SI as a text that `quantity` reads back exactly."""
+    """Return a number in SI as a text with its unit, which `quantity` reads back exactly."""
     return f"{float(value)!r} {_PINT.get(unit, unit)}"
 
 
@@ -83,15 +83,15 @@ def quantity(value: Any, unit: str, name: str, *, bare: str | None = None) -> fl
     unit : str
         SI unit of the contract, such as ``N.s/m``.
     name : str
-        Name of the quantity, for the error.
+        Name of the quantity for error messages.
     bare : str, optional
         Unit of numbers without a unit, such as ``mm``; by default SI.
 
     Raises
     ------
     ParameterError
-        If it is neither, the unit is missing or has another dimension, or the number is not finite. Hertz is refused for
-        an angular speed, as a cycle is not a radian.
+        If the value is neither a number nor a text, its unit is missing or has another dimension, or the number is not finite.
+        Hertz is refused for an angular speed, as a cycle is not a radian.
     """
     spelled = _PINT.get(unit, unit)
     wanted = f"be a number in {unit}" if unit != "1" else "be a number"
@@ -116,12 +116,12 @@ def quantity(value: Any, unit: str, name: str, *, bare: str | None = None) -> fl
 
 
 def pair(value: Any, unit: str, name: str) -> tuple[float, float]:
-    """Convert two numbers, or texts with a unit, to SI, such as the ends of a range.
+    """Convert a pair of numbers or texts with a unit, such as the ends of a range, to SI.
 
     Raises
     ------
     ParameterError
-        If they are not two; or as `quantity`.
+        If there are not two of them; or as for `quantity`.
     """
     ends: Any = () if isinstance(value, (str, Mapping)) else value
     try:
@@ -132,20 +132,20 @@ def pair(value: Any, unit: str, name: str) -> tuple[float, float]:
 
 
 def si(value: Any, unit: Units, name: str) -> Any:
-    """Convert the texts in a value to numbers in SI, also inside lists, tuples and mappings; other values stay.
+    """Convert texts with units to numbers in SI, also inside lists, tuples and mappings; return other values unchanged.
 
     Parameters
     ----------
     value : object
     unit : str, mapping or function
-        See `Units`. Entries of a mapping whose names have no unit stay, for the caller to refuse.
+        See `Units`. Entries of a mapping without a known unit are not converted; the caller refuses them.
     name : str
-        Name of the value, for the error.
+        Name of the value for error messages.
 
     Raises
     ------
     ParameterError
-        As `quantity`.
+        As for `quantity`.
     """
     if isinstance(value, str):
         return quantity(value, unit, name) if isinstance(unit, str) else value
@@ -174,7 +174,7 @@ def in_si(**units: Units) -> Callable[[_Callable], _Callable]:
             made.__init__ = decorate(made.__init__)  # type: ignore[misc]
             return made
         names = list(signature(made).parameters)
-        # arguments in **options have no place
+        # arguments in **options have no position
         places = {names.index(name): name for name in units if name in names}
 
         @wraps(made)
@@ -200,13 +200,13 @@ _NUMBER = r"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]{1,4})?"
 _FACTOR = r"(?:[^\W\d_]+|[°%])(?:\s*(?:\*\*|\^)\s*-?[0-9]|[²³]|-?[0-9])?"
 _PRODUCT = rf"{_FACTOR}(?:(?:\s*[*/·.]\s*|\s+){_FACTOR})*"
 _GRAMMAR = re.compile(rf"\s*({_NUMBER})\s*({_PRODUCT}(?:\s*/\s*\({_PRODUCT}\))?)?\s*")
-#: Longest text that is read.
+#: Greatest length of a text that is read.
 _LONGEST = 100
-#: Turns a minute, and products written together, as machine builders spell them and pint does not.
+#: Spellings of revolutions per minute, and of products of units, that machine builders use and pint does not know.
 _TURNS = re.compile(r"(?<=[0-9.\s])(?:(?i:rpm|(?:r|rev|U)/min|min\s*(?:\^|\*\*)?\s*-1)|(?<=\s)1/min)(?=\s*$)")
 _WITH_NEWTON = re.compile(r"(?<![^\W\d_])([kmM]?N)([cm]?m)?(s)?(?![^\W\d_])")
 _WITH_GRAM = re.compile(r"(?<![^\W\d_])(k?g)([cm]?m)(?![^\W\d_])")
-#: By SI unit: how else it is spelled, and units in which it is usually given, for the error.
+#: By SI unit: patterns of other spellings; and usual units, for error messages.
 _SPELLINGS = {
     "rad/s": _TURNS,
     **dict.fromkeys(("N.m", "N.m/rad", "N.m.s/rad", "N.s/m"), _WITH_NEWTON),
@@ -230,16 +230,16 @@ _USUAL = {
 _PLAIN = "write a number with a decimal point, without spaces or separators in it"
 
 
-def _respelled(text: str, unit: str) -> str:
-    """Return a quantity's text in pint's spelling: "200 U/min" becomes "200 rpm", "20 Nmm" becomes "20 N*mm"."""
+def _pint_spelling(text: str, unit: str) -> str:
+    """Return the text of a quantity in pint's spelling: "200 U/min" becomes "200 rpm", "20 Nmm" becomes "20 N*mm"."""
     if (pattern := _SPELLINGS.get(unit)) is None:
         return text
     return pattern.sub(lambda found: "*".join(part for part in found.groups() if part) or "rpm", text)
 
 
 def _convert(text: str, unit: str, spelled: str, name: str, wanted: str) -> float:
-    """Convert a text with a unit to SI by pint."""
-    match = _GRAMMAR.fullmatch(_respelled(text, unit)) if len(text) <= _LONGEST else None
+    """Convert a text with a unit to a number in SI with pint; ``wanted`` ends the error "it must ..."."""
+    match = _GRAMMAR.fullmatch(_pint_spelling(text, unit)) if len(text) <= _LONGEST else None
     if match is None:
         shown = text if len(text) <= _LONGEST else f"{text[:_LONGEST]}..."
         raise ParameterError(name, shown, f"{wanted}: {_PLAIN}" + (", and a unit" if unit != "1" else ""))
