@@ -171,7 +171,7 @@ def _samples(low: float, high: float, count: int) -> NDArray[np.float64]:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Box:
-    """A rectangle of a chart: (low, high) of either axis.
+    """A rectangle in a chart: the ranges (low, high) of x and of y.
 
     Raises
     ------

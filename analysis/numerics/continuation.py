@@ -101,7 +101,7 @@ class Point:
         return float(np.linalg.slogdet(np.vstack([self.derivatives, self.tangent]))[0])
 
     def turned(self) -> Point:
-        """Return the same point with the opposite direction."""
+        """Return the same point with the opposite tangent."""
         return replace(self, tangent=-self.tangent)
 
 

@@ -61,7 +61,7 @@ def _power(a: Dual, b: Dual) -> Dual:
 
 
 def _matmul(a: Dual, b: Dual) -> Dual:
-    """Return a @ b, with vectors on either side as in NumPy."""
+    """Return a @ b; a and b may be vectors, as in NumPy."""
     if a.real.ndim == 1:
         return _matmul(a[None, :], b)[..., 0, :] if b.real.ndim > 1 else _matmul(a, b[:, None])[..., 0]
     if b.real.ndim == 1:

@@ -167,7 +167,7 @@ class Vector:
         return self._make(self.build.bitcast(bits, self.value.type))
 
     def longs(self, number: int) -> Any:
-        """Return an integer in each lane."""
+        """Return a vector with the same integer in each lane."""
         return ir.Constant(vector(self.lanes, _LONG), [number] * self.lanes)
 
     def polynomial(self, coefficients: tuple[float, ...]) -> Vector:

@@ -75,7 +75,7 @@ def interruptible() -> Iterator[Heard]:
 
 
 def check_jobs(n_jobs: int | None) -> None:
-    """Check a number of workers.
+    """Check that a number of workers is not 0.
 
     Raises
     ------

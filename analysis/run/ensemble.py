@@ -119,7 +119,7 @@ class Ensemble:
         return {i: self.messages[i] for i in np.flatnonzero(self.status != 0).tolist()}
 
     def output(self, name: str) -> np.ma.MaskedArray[Any, np.dtype[np.float64]]:
-        """Return one output of all runs, shape (m, n), masked after the end of a run that ended early."""
+        """Return one output of all runs, shape (m, n), masked where a run had already ended."""
         shape = (len(self), len(self.time))
         if self.values is not None:
             ended = np.arange(len(self.time)) >= self.counts[:, None]

@@ -80,7 +80,7 @@ class Exchange(CVodeSolver):  # type: ignore[misc]
 
     @property
     def state(self) -> NDArray[np.float64]:
-        """Return the state at the present time."""
+        """Return the states of the FMU at the present time, as CVode has them."""
         return self._array(self.px)
 
     def _array(self, x: Any) -> NDArray[np.float64]:
@@ -156,7 +156,7 @@ class Exchange(CVodeSolver):  # type: ignore[misc]
         return _GOOD
 
     def f(self, t: float, y: Any, ydot: Any, user_data: Any) -> int:
-        """Compute the time derivative of the state."""
+        """Compute the time derivatives of the states; t is CVode's time."""
 
         def work() -> None:
             self.put(self.origin + t, NV_DATA_S(y))

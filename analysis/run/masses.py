@@ -88,7 +88,7 @@ def with_sections(parameters: Parameters, **sections: Section) -> Parameters:
 
 
 def _section_of(link: Link, flat: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the entries of a link's section among the dotted names of a file."""
+    """Return the entries of a link's section from the values of a file by dotted name; empty if it has none."""
     head = f"{link.name}.section"
     if head in flat:
         raise ParameterError(head, flat[head], f"be a table with a kind, of {', '.join(SECTIONS)}")
