@@ -244,11 +244,6 @@ def _ratio_ranges(limits: Limits) -> FloatArray:
     return np.maximum(np.where(both[:, :1] <= both[:, 1:], both, given), 1e-12)
 
 
-def _links(shapes: FloatArray, limits: Limits) -> FloatArray:
-    """Return the rows (l1, l2, l3, l4, l5) of shapes, l4 = 0 without a rocker, l5 = 0 without a second crank."""
-    return _SHAPES[limits.linkage.kind].links(shapes, limits)
-
-
 def _is_allowed(shapes: FloatArray, limits: Limits) -> NDArray[np.bool_]:
     """Return which shapes meet transmission angle and Grashof type and, for some size, the bounds of their links."""
     sized = _SHAPES[limits.linkage.kind].links(shapes, limits)

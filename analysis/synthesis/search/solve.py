@@ -194,7 +194,7 @@ def synthesize(
     kinds = usual_kinds(task) if kinds is None else kinds
     if isinstance(task, QuickReturn | QuickSwing):
         return _solve_in_closed_form(task, bounds, constraints, kinds, search, begun)
-    task = _prepare_task(task, constraints, pivot, search)
+    task = _prepare_task(task, constraints, pivot)
     normal = search_form(task, pivot)
     every = limits_by_kind(task, normal, bounds, constraints, kinds, gears)
     if tuple(kinds) != ("four-bar",) and pivot is not None:
@@ -317,7 +317,7 @@ def improve(
     if search.starts < 1 and not guesses:
         raise InputError(f"{search.starts} starts and no guess: there must be at least one of either")
     begun = perf_counter()
-    task = _prepare_task(task, constraints, pivot, search)
+    task = _prepare_task(task, constraints, pivot)
     normal = search_form(task, pivot)
     limits = make_limits(task, normal, bounds, constraints)
     base, *begin = (start_of(of, normal, pivot) for of in (linkage, *guesses))
@@ -335,7 +335,7 @@ def improve(
     return _make_result(task, found, done, len(begin), search, begun)
 
 
-def _prepare_task(task: Task, constraints: Sequence[Any], pivot: PivotUnknown | None, search: Search) -> Task:
+def _prepare_task(task: Task, constraints: Sequence[Any], pivot: PivotUnknown | None) -> Task:
     """Return the task for the search; its objective is the greatest error if a function other than an error is minimised.
 
     Raises InputError if a constraint does not apply to a moving pivot.
