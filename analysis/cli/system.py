@@ -232,7 +232,7 @@ def draw(file: str, out: str) -> None:
 @out_option(help="Folder in which the host's folder is made.")
 @handled
 def host(file: str, out: str) -> None:
-    """Build a system as one C program for real-time targets, without heap or Python, that reports missed deadlines."""
+    """Build a system as one C program for real-time targets, without heap or Python, with step times and missed deadlines."""
     from ..systems import build_host
 
     made = build_host(_wiring(file), folder_of(out) / f"{Path(file).stem}-host")
