@@ -1,4 +1,4 @@
-"""Probing an FMU of any make: does it do what the standard says, and what does it do when the importer errs?
+"""Probe an FMU of any make: does it follow the FMI standard, and what does it do if the importer makes mistakes?
 
 The FMU runs in processes of its own, so that its crash is a finding and not the end of the probe.
 """

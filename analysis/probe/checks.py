@@ -1,4 +1,4 @@
-"""The checks of the probe, by name."""
+"""List the checks of the probe by name."""
 
 from __future__ import annotations
 
@@ -15,15 +15,12 @@ from .values import bounded_parameters, bounds, derivatives, out_of_bounds, past
 
 
 class Check(NamedTuple):
-    """A check: what it looks for, what runs a case of it, and how many cases it has.
+    """A check of the probe."""
 
-    Without a number of cases it has as many as the calls allow, a share of them.
-    """
-
-    title: str
-    make: Callable[[Context], Case]
-    cases: Callable[[Model], int] | None = None
-    share: float = 0.0
+    title: str  # what the check looks for
+    make: Callable[[Context], Case]  # returns the function that runs one case
+    cases: Callable[[Model], int] | None = None  # number of cases; without it the number of calls limits them
+    share: float = 0.0  # share of the calls that the check gets if it has no number of cases
 
 
 def _is(case: Case) -> Callable[[Context], Case]:
@@ -38,7 +35,7 @@ def _saves(model: Model) -> bool:
     return model.can_save and model.can_serialize
 
 
-#: In the order in which they are made.
+#: The checks, in the order in which they are made.
 CHECKS = {
     "starts": Check(
         "parameters and inputs have their declared starts after the initialization", _is(starts), lambda model: 1

@@ -1,4 +1,7 @@
-"""The process in which the FMU runs: ``python -m analysis.probe.child JOB``. It may crash; its parent reads what it left."""
+"""Run an FMU in a process of its own: ``python -m analysis.probe.child JOB``.
+
+The process may crash; its parent reads the journal and the findings that it has written.
+"""
 
 from __future__ import annotations
 
@@ -15,7 +18,7 @@ from .session import Library, ProbeError
 
 
 def main(path: str) -> int:
-    """Run the cases of a job."""
+    """Run the cases of a job, given by its JSON file; return the exit code of the process."""
     job = json.loads(Path(path).read_text(encoding="utf-8"))
     _no_core_dump()
     context = _context(job)
@@ -71,7 +74,7 @@ def _no_core_dump() -> None:
 if __name__ == "__main__":
     try:
         code = main(sys.argv[1])
-    except Exception:  # told from a crash of the FMU by its exit code
+    except Exception:  # the exit code distinguishes this from a crash of the FMU
         traceback.print_exc()
         code = FAILED
     sys.stderr.flush()

@@ -1,4 +1,4 @@
-"""What a check works with, in the process that runs it."""
+"""Define the context of a check: all that it uses in the process that runs it."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from .journal import Journal
 from .model import Model
 from .session import Library, Session
 
-#: Exit codes of the process of a check: an instance returned Fatal, and the process is of no more use; the probe itself failed.
+#: Exit codes of the process of a check: an instance returned Fatal, so that the process cannot go on; the probe itself failed.
 AFTER_FATAL, FAILED = 3, 70
 
 
@@ -28,14 +28,16 @@ class Context:
     folder : pathlib.Path
         The extracted FMU.
     work : pathlib.Path
-        A folder of the probe for files of its own.
+        A folder for the files of the probe.
     journal : Journal
     findings : pathlib.Path
-        Where findings go, a line of JSON each.
+        File to which findings are appended, one line of JSON each.
     seed : int
+        Seed of the random numbers.
     check : str
+        Name of the check.
     avoided : frozenset of str
-        Faults that crashed often enough.
+        Faults that have crashed the process and are not tried again.
     """
 
     model: Model
@@ -54,7 +56,7 @@ class Context:
         return Session(self.library, self.model, self.journal, self.folder)
 
     def random(self, case: int, check: str = "") -> random.Random:
-        """Return the random numbers of a case of a check (by default this one), the same each time."""
+        """Return the generator of random numbers for a case of a check, by default this check; it is the same each time."""
         return random.Random(f"{self.seed}/{self.model.interface}/{check or self.check}/{case}")
 
     def replay(self) -> str:
@@ -62,7 +64,7 @@ class Context:
         return f"{self.seed}/{self.model.interface}/{self.check}/{self.journal.case}"
 
     def note(self, severity: str, key: str, text: str) -> None:
-        """Note a finding; of one kind only the first, and those with fewer calls, keep their calls."""
+        """Write a finding; its list of calls is left out if an equal finding with as few calls was written before."""
         lines = self.journal.lines()
         best = self._shown.get((severity, key), 1 << 30)
         self._shown[severity, key] = min(best, len(lines))
@@ -70,15 +72,15 @@ class Context:
         self._write(finding | {"replay": self.replay()})
 
     def tell(self, subject: str) -> None:
-        """Say what the case is about, so that a crash can be laid to it."""
+        """Write what the current case is about, so that a crash can be attributed to it."""
         self._write({"subject": subject, "case": self.journal.case})
 
     def say(self, sentence: str) -> None:
-        """Add a sentence to the table of checks: the measured value, or the reason why there is none."""
+        """Add a sentence to the result of the check: a measured value, or the reason why there is none."""
         self._write({"said": sentence})
 
     def finish(self) -> None:
-        """Say that the process came to its end by itself."""
+        """Write that the process has come to its regular end."""
         self._write({"finished": True})
 
     def _write(self, record: dict[str, Any]) -> None:
@@ -86,5 +88,5 @@ class Context:
             file.write(json.dumps(record) + "\n")
 
 
-#: Runs one case of a check.
+#: A function that runs one case of a check, given its number.
 Case = Callable[[Context, int], None]

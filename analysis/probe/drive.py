@@ -1,4 +1,4 @@
-"""An ordinary run of an FMU, step by step, for the checks that compare runs."""
+"""Run an FMU in the ordinary way, step by step, for the checks that compare runs."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from .model import CONDITIONS, Variable
 from .session import ProbeError, Session
 from .walk import access, value
 
-#: What all variables are at one time: by group of functions their values, bit by bit.
+#: Values of all variables at one time, as bytes by group of functions.
 Values = dict[str, bytes]
 #: Values of inputs for one step.
 Inputs = Mapping[Variable, Any]
@@ -23,17 +23,17 @@ _EVENT_ITERATIONS = 100
 
 
 class Run:
-    """A run of one instance: it is initialized when it is made, and each step is one communication step or one of Euler's.
+    """A run of one instance, which the constructor initializes; a step is a communication step, or a step of Euler's method.
 
     Parameters
     ----------
     session : Session
     instantiate : bool
-        False for a session that has an instance, which was reset for example.
+        False for a session that already has an instance, for example one that was reset.
     start : mapping, optional
         Values to set before the initialization.
     stop : float, optional
-        The time at which the run ends, if the FMU is told.
+        Stop time, if it is given to the FMU.
     finish : bool
         False to stay in initialization mode.
     """
@@ -88,7 +88,7 @@ class Run:
         return bool(needed)
 
     def set(self, values: Inputs) -> None:
-        """Set variables."""
+        """Set scalar variables to values."""
         for group in dict.fromkeys(variable.group for variable in values):
             chosen = [variable for variable in values if variable.group == group and variable.size == 1]
             if chosen:
@@ -101,7 +101,7 @@ class Run:
         return arguments[2]
 
     def values(self) -> Values:
-        """Return the values of all variables, bit by bit."""
+        """Return the values of all variables, and the continuous states, as bytes."""
         found = {}
         for group in self.model.groups:
             array = self.get(self.model.named(group))
@@ -111,7 +111,7 @@ class Run:
         return found
 
     def states(self, name: str) -> Any:
-        """Return the continuous states or their derivatives."""
+        """Return the continuous states or their derivatives as a C array; ``name`` is the FMI function."""
         array = (ctypes.c_double * self.model.states)()
         if self.model.states:
             self.session.need(name, array, self.model.states)
@@ -134,7 +134,7 @@ class Run:
         self.time += size
 
     def _euler(self, size: float, inputs: Inputs) -> None:
-        """Make one explicit step, with an event if a time event or a new discrete input needs one."""
+        """Take one step of Euler's explicit method, with an event if a time event or a new discrete input needs one."""
         continuous = {v: x for v, x in inputs.items() if CONDITIONS["5"](v)}
         others = {v: x for v, x in inputs.items() if v not in continuous}
         self.set(continuous)
@@ -158,13 +158,13 @@ class Run:
         return "Derivatives" if self.model.version == 2 else "ContinuousStateDerivatives"
 
     def save(self) -> Any:
-        """Save and return the state."""
+        """Save the state of the FMU and return a pointer to it."""
         state = ctypes.c_void_p()
         self.session.need("GetFMUState", state)
         return state
 
     def restore(self, state: Any, time: float, next_event: float = math.inf) -> None:
-        """Restore a saved state, which belongs to this time."""
+        """Restore a saved state, and the time and the next event that belong to it."""
         self.session.need("SetFMUState", state)
         self.time, self.next_event = time, next_event
 
@@ -174,7 +174,7 @@ class Run:
 
 
 def random_inputs(rng: random.Random, run_model: Any, count: int) -> list[dict[Variable, Any]]:
-    """Return values of the inputs for a number of steps; continuous ones change at each step, others seldom."""
+    """Return values of the inputs for each of ``count`` steps; continuous inputs change at each step, others seldom."""
     inputs = [v for v in run_model.variables if v.causality == "input" and v.size == 1]
     steps = []
     for number in range(count):
@@ -184,12 +184,12 @@ def random_inputs(rng: random.Random, run_model: Any, count: int) -> list[dict[V
 
 
 def step_size(model: Any) -> float:
-    """Return the step of a run: the default one, or a tenth of it if the probe integrates by Euler's method."""
+    """Return the step size of a run (s): that of the model, or a tenth of it if the probe integrates by Euler's method."""
     return float(model.step if model.interface == "cs" else model.step / 10)
 
 
 def differing(one: Values, other: Values, model: Any) -> str:
-    """Return the first variable that differs between two sets of values; empty if none does."""
+    """Return the name of the first variable that differs between two sets of values, with its values; empty if none does."""
     for group, data in one.items():
         if data == other[group]:
             continue

@@ -1,8 +1,8 @@
-"""Calls that the standards forbid: each a change of legal arguments, or a function in a state where it is not allowed.
+"""List calls that the standards forbid: calls with changed arguments, or of a function in a state where it is not allowed.
 
-A fault says what it means when the FMU accepts it: `WRONG` where the standard demands an error, `QUESTIONABLE` where it asks
-for care, `None` where only a crash or a hang counts. `ACCEPT` is for unusual calls that are allowed: an error is then what is
-questionable.
+Each fault has the severity of the finding if the FMU accepts the call: `WRONG` if the standard demands an error, `QUESTIONABLE`
+if it asks for care, `None` if only a crash or a hang is a finding. `ACCEPT` marks unusual calls that are allowed: an error is
+then questionable.
 """
 
 from __future__ import annotations
@@ -24,19 +24,19 @@ from .walk import Walk, access, byte_array, references
 ACCEPT = "accept"
 NAN, INF = math.nan, math.inf
 
-#: Changes a list of legal arguments; None where the fault does not apply here.
+#: A function that changes a list of legal arguments; it returns None if the fault does not apply.
 Change = Callable[[Walk, str, list[Any]], list[Any] | None]
 
 
 @dataclass(frozen=True, slots=True)
 class Fault:
-    """A forbidden call: the function, what is wrong with it, and what it means when it is accepted."""
+    """A forbidden call."""
 
-    function: str
-    what: str
-    accepted: str | None
-    change: Change
-    state: str | None = None  # where the call is made; None: wherever the function is allowed
+    function: str  # name without prefix
+    what: str  # what is wrong with the call
+    accepted: str | None  # severity of the finding if the call is accepted, or `ACCEPT`
+    change: Change  # makes the wrong arguments from legal ones
+    state: str | None = None  # state in which the call is made; None: any state in which the function is allowed
 
     @property
     def key(self) -> str:
@@ -44,7 +44,7 @@ class Fault:
 
 
 def put(position: int, value: Any) -> Change:
-    """Put another value at a position, counted from the end if negative."""
+    """Return a change that puts another value at a position of the arguments, counted from the end if negative."""
 
     def change(walk: Walk, name: str, arguments: list[Any]) -> list[Any] | None:
         if len(arguments) <= position:
@@ -80,13 +80,13 @@ def _other_type(walk: Walk, name: str, arguments: list[Any]) -> list[Any] | None
 
 def _not_settable(walk: Walk, name: str, arguments: list[Any]) -> list[Any] | None:
     cell = walk.cell(name)
-    allowed = CONDITIONS["5" if cell == "i" else cell]  # FMI 3.0 is of two minds about states in continuous-time mode
+    allowed = CONDITIONS["5" if cell == "i" else cell]  # FMI 3.0 contradicts itself on states in continuous-time mode
     forbidden = [v for v in walk.model.variables if v.group == name[3:] and not allowed(v)]
     return _setting(walk, forbidden)
 
 
 def _setting(walk: Walk, variables: list[Variable]) -> list[Any] | None:
-    """Return the arguments that set one of these variables."""
+    """Return arguments that set one of these variables, chosen at random; None if there are none."""
     chosen = [walk.rng.choice(variables)] if variables else []
     return access(walk.model, chosen, walk.values(chosen)) if chosen else None
 
@@ -97,7 +97,7 @@ def _constant(walk: Walk, name: str, arguments: list[Any]) -> list[Any] | None:
 
 
 def _longer(walk: Walk, name: str, arguments: list[Any]) -> list[Any]:
-    """Return a count that is one too large, with an array that has room for it."""
+    """Return arguments with a count that is one too large, and an array that has room for it."""
     array = arguments[-2]
     longer = (array._type_ * (len(array) + 1))()
     longer[: len(array)] = list(array)
@@ -122,7 +122,7 @@ def _unknown_category(walk: Walk, name: str, arguments: list[Any]) -> list[Any]:
 
 
 def _start(position: int, value: float) -> Change:
-    """Change the time or the tolerance at the start: of SetupExperiment (FMI 2) or EnterInitializationMode (FMI 3)."""
+    """Return a change of the time or tolerance at the start, in SetupExperiment (FMI 2) or EnterInitializationMode (FMI 3)."""
 
     def change(walk: Walk, name: str, arguments: list[Any]) -> list[Any] | None:
         if len(arguments) != 5:
@@ -139,7 +139,7 @@ _VECTORS = (
 )
 _SLOPES = "GetRealOutputDerivatives|GetOutputDerivatives|SetRealInputDerivatives"
 
-#: function (a pattern over names without prefix), what is wrong, the meaning of acceptance, the change
+#: Function (a pattern of names without prefix), what is wrong, severity if the call is accepted, change of the arguments
 FAULTS: tuple[tuple[str, str, str | None, Change], ...] = (
     ("[GS]et{type}", "unknown value reference", WRONG, put(0, _unknown)),
     ("[GS]et{type}", "value reference of another type", WRONG, _other_type),
@@ -202,7 +202,7 @@ FAULTS: tuple[tuple[str, str, str | None, Change], ...] = (
 )  # fmt: skip
 
 
-#: What FMI 3.0 says in so many words and FMI 2.0 does not.
+#: Faults that FMI 3.0 forbids explicitly and FMI 2.0 does not.
 _DEMANDED_IN_3 = ("step of zero",)
 
 
@@ -230,13 +230,13 @@ def catalogue(walk: Walk) -> list[Fault]:
 
 @dataclass(frozen=True, slots=True)
 class BadStart:
-    """A forbidden or unusual instantiation: another argument, or another function."""
+    """A forbidden or unusual instantiation: with another argument, or by another function."""
 
-    what: str
-    accepted: str | None
-    position: int
-    value: Any
-    function: str | None = None
+    what: str  # what is wrong with it
+    accepted: str | None  # severity of the finding if it is accepted, or `ACCEPT`
+    position: int  # position of the argument
+    value: Any  # its wrong value
+    function: str | None = None  # another function, if not the usual one
 
     @property
     def key(self) -> str:
@@ -270,5 +270,5 @@ def bad_starts(model: Model) -> list[BadStart]:
 
 
 def refused(status: int) -> bool:
-    """Whether a status refuses a call."""
+    """Return whether a status means that the call was refused."""
     return status > WARNING

@@ -1,4 +1,4 @@
-"""Findings, how serious they are, and the report of a probe."""
+"""Define findings with their severities, and the report of a probe."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ SEVERITIES = (CRASH, WRONG, QUESTIONABLE)
 
 
 class Note(Protocol):
-    """Takes a finding: how serious, a key (what it is about, and its kind), and a sentence."""
+    """A function that takes a finding: its severity, a key (what it is about, and its kind), and a sentence."""
 
     def __call__(self, severity: str, key: str, text: str) -> None: ...
 
@@ -25,15 +25,15 @@ class Finding:
     severity : str
         One of `SEVERITIES`.
     key : str
-        Interface, what it is about, and kind; findings of one key are one.
+        Interface, what the finding is about, and its kind; findings with the same key and severity are counted as one.
     text : str
-        A sentence.
+        The finding as a sentence.
     calls : list of str
         The calls of the shortest case that shows it.
     replay : str
-        What `--replay` takes.
+        Name of this case, as `--replay` takes it.
     count : int
-        How many cases show it.
+        Number of cases that show it.
     """
 
     severity: str
@@ -56,14 +56,14 @@ class Finding:
 
 @dataclass(slots=True, kw_only=True)
 class Outcome:
-    """What became of one check: how many cases and calls, and a sentence of what was measured or why it was not made."""
+    """The result of one check on one interface."""
 
     check: str
     interface: str
-    cases: int
-    calls: int
+    cases: int  # number of cases that were run
+    calls: int  # number of calls that were made
     seconds: float
-    said: str = ""
+    said: str = ""  # what was measured, or why the check was not made
 
 
 @dataclass(slots=True, kw_only=True)
@@ -85,7 +85,7 @@ class Report:
         return [finding for finding in self.findings if finding.severity in severities]
 
     def add(self, finding: Finding) -> None:
-        """Add a finding, or count it where one of its kind is known; the shorter list of calls is kept."""
+        """Add a finding; if one with the same severity and key is known, count it there and keep the shorter list of calls."""
         for known in self.findings:
             if (known.severity, known.key) == (finding.severity, finding.key):
                 known.count += finding.count
@@ -123,5 +123,5 @@ class Report:
 
 
 def last_calls(calls: Sequence[str], most: int) -> list[str]:
-    """Return the last calls of a list, with a line that counts those left out."""
+    """Return at most the last ``most`` calls of a list, after a line that counts the calls left out."""
     return list(calls) if len(calls) <= most else [f"... {len(calls) - most} calls", *calls[-most:]]

@@ -1,4 +1,4 @@
-"""A file of the calls of the case at hand, written before each call is made, so that it survives a crash of the process."""
+"""Keep a file of the calls of the current case; each is written before it is made, so that it survives a crash."""
 
 from __future__ import annotations
 
@@ -7,21 +7,21 @@ import struct
 from pathlib import Path
 from typing import NamedTuple
 
-#: Bytes of text; a longer case keeps its latest calls.
+#: Greatest number of bytes of text; of a longer case only the latest calls are kept.
 _ROOM = 1 << 17
 _HEADER = struct.Struct("<qqq")
 
 
 class Entry(NamedTuple):
-    """What a journal says: the number of the case, how many calls were begun in all, and the latest ones as text."""
+    """The content of a journal."""
 
-    case: int
-    calls: int
-    lines: list[str]
+    case: int  # number of the current case
+    calls: int  # number of calls that were begun in all cases
+    lines: list[str]  # the latest calls of the current case
 
 
 class Journal:
-    """A journal that this process writes."""
+    """A journal that the current process writes."""
 
     def __init__(self, path: Path) -> None:
         path.write_bytes(bytes(_HEADER.size + _ROOM))
@@ -34,17 +34,17 @@ class Journal:
         self.begin(-1)
 
     def begin(self, case: int) -> None:
-        """Start a case: its calls take the place of those of the case before."""
+        """Start a case: its calls replace those of the previous case."""
         self.case, self._end, self.fatal = case, 0, False
         self._mark()
 
     def call(self, text: str) -> None:
-        """Note the next call before it is made."""
+        """Write a line for the next call, before it is made."""
         self.calls += 1
         self.write("\n" + text)
 
     def write(self, text: str) -> None:
-        """Add to the line of the latest call."""
+        """Append text to the line of the latest call."""
         data = text.encode("utf-8", "backslashreplace")[: _ROOM // 4]
         if self._end + len(data) > _ROOM:
             kept = self._text()[-_ROOM // 4 :]
@@ -67,7 +67,7 @@ class Journal:
 
 
 def read(path: Path) -> Entry:
-    """Read the journal that another process left; case -1 if none was begun."""
+    """Read the journal that another process has left; the case is -1 if none was begun."""
     data = path.read_bytes() if path.exists() else b""
     if len(data) < _HEADER.size:
         return Entry(-1, 0, [])

@@ -1,4 +1,4 @@
-"""Memory that is not given back over many lives of an instance, and over many steps and saved states of one."""
+"""Check for memory leaks over many lives of instances, and over many steps and saved states of one instance."""
 
 from __future__ import annotations
 
@@ -13,24 +13,24 @@ from .context import Context
 from .drive import Run, step_size
 from .findings import WRONG
 
-#: Seconds and repetitions that a measurement takes at most.
+#: Greatest time (s) and number of repetitions of a measurement.
 _SECONDS, _MOST = 6.0, 4000
 
 
 class Memory(NamedTuple):
-    """Memory of this process in bytes: what its allocator has given out, and what is resident; 0 where it is not known."""
+    """Memory of this process in bytes."""
 
-    heap: int
-    resident: int
+    heap: int  # memory that the C library's allocator has given out; 0 if it is not known
+    resident: int  # resident memory
 
 
-#: Growth that is called a leak: for each repetition, and in all, because the probe and Python's allocator grow a little.
+#: Growth above which there is a leak: per repetition, and in total, because the probe and Python's allocator grow a little.
 _EACH = Memory(heap=8, resident=64)
 _LEAST = Memory(heap=16 * 1024, resident=192 * 1024)
 
 
 class _MallInfo(ctypes.Structure):
-    """What glibc's mallinfo2 returns; its fields are sizes."""
+    """The structure that glibc's mallinfo2 returns; its fields are sizes."""
 
     _fields_ = [
         (name, ctypes.c_size_t)
@@ -50,7 +50,7 @@ class _MallInfo(ctypes.Structure):
 
 
 def memory() -> Memory | None:
-    """Return the memory of this process; None if the system has no simple way to tell it."""
+    """Return the memory of this process; None on a system without ``/proc``."""
     status = Path("/proc/self/statm")
     if not status.exists():
         return None
@@ -82,7 +82,7 @@ def leaks(context: Context, case: int) -> None:
 
 
 def _measure(repeat: Callable[[], None]) -> tuple[int, Memory]:
-    """Return the repetitions in the second half of a measurement, and the growth of the memory over them."""
+    """Call ``repeat`` many times; return the number of calls in the second half, and the growth of the memory over them."""
     until = time.monotonic() + _SECONDS / 2
     warm = 0
     while warm < 20 or (warm < _MOST // 2 and time.monotonic() < until):

@@ -1,11 +1,11 @@
-"""The standards' state machines: which function may be called in which state, and where it leads.
+"""Define the state machines of the FMI standards: which function may be called in which state, and the state after it.
 
 The tables are those of FMI 2.0.4 (3.2.3 for model exchange, 4.2.4 for co-simulation) and, for FMI 3.0, the functions that 2.3,
-3.2 and 4.2 list as allowed in each state. Two states are finer than the standard's, because it says the same in words: `ready`
-is instantiated after `SetupExperiment`, and `settled` is the event mode after an update that needs no other. In FMI 3.0
+3.2 and 4.2 list as allowed in each state. Two states of the standard are divided, as it describes in words: `ready` is
+instantiated after `SetupExperiment`, and `settled` is the event mode after an update that needs no further one. In FMI 3.0
 `error` is the state Terminated, into which an error leads.
 
-A cell holds `x`: allowed; `.`: not allowed; `?`: not judged, because the standard leaves it open; `e`: allowed if the importer
+A cell is `x`: allowed; `.`: not allowed; `?`: not judged, because the standard leaves it open; `e`: allowed if the importer
 uses the event mode; another letter or a digit: allowed for some variables, see `model.CONDITIONS`, where the digits are the
 standard's footnotes.
 """
@@ -130,7 +130,7 @@ GetNumberOfEventIndicators   x ? x x ? ?
 FLOATS = ("Float32", "Float64")
 DISCRETE = ("Int8", "UInt8", "Int16", "UInt16", "Int32", "UInt32", "Int64", "UInt64", "Boolean", "String")
 
-#: Where a function leads that returns OK; what is not here leaves the state as it is.
+#: State after a function that has returned OK; other functions do not change the state.
 LEADS_TO = {
     "SetupExperiment": "ready",
     "EnterInitializationMode": "initialization",
@@ -146,20 +146,20 @@ LEADS_TO = {
 
 @dataclass(frozen=True, slots=True)
 class Machine:
-    """The table of one interface: `allowed[function][state]` is a cell; `states` in order."""
+    """The state machine of one interface."""
 
-    version: int
-    interface: str
+    version: int  # of FMI: 2 or 3
+    interface: str  # cs or me
     states: tuple[str, ...]
-    allowed: dict[str, dict[str, str]]
+    allowed: dict[str, dict[str, str]]  # the cell of each function and state
 
     def cell(self, function: str, state: str, event_mode: bool = False) -> str:
-        """Return the cell of a function in a state, with `e` decided."""
+        """Return the cell of a function in a state; `e` is replaced by `x` or `.`, depending on ``event_mode``."""
         cell = self.allowed[function][state]
         return ("x" if event_mode else ".") if cell == "e" else cell
 
     def follow(self, function: str, state: str, event_mode: bool = False) -> str:
-        """Return the state after a call that returned OK."""
+        """Return the state after a call of a function that has returned OK."""
         if function == "ExitInitializationMode":
             return "event" if self.interface == "me" or event_mode else "step"
         following = LEADS_TO.get(function, state)
@@ -186,7 +186,7 @@ def _machine(version: int, interface: str, common: str, table: str) -> Machine:
     allowed = {row.split()[0]: dict(zip(states, row.split()[1:], strict=True)) for row in rows}
     allowed |= {row.split()[0]: dict.fromkeys(states, row.split()[1]) for row in common.strip().splitlines()}
     if version == 3:
-        # every variable can be read in every state, in Instantiated those with a start; a function for each type
+        # there are functions for each type; every variable can be read in every state, in Instantiated only those with a start
         last = {"cs": "6", "me": "i"}[interface]
         for kind in (*FLOATS, *DISCRETE):
             allowed["Get" + kind] = dict.fromkeys(states, "x") | {"instantiated": "s"}

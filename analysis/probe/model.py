@@ -1,4 +1,4 @@
-"""What the probe has to know of an FMU: its variables by type and by what may be done to them, its states and capabilities."""
+"""Read what the probe has to know about an FMU: variables by type and by the calls allowed for them, states, capabilities."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from xml.etree import ElementTree
 
 from linkwork.errors import InputError
 
-#: The functions and the C type of each type of variable, for FMI 2 and FMI 3.
+#: Group of functions and C type of each type of variable, for FMI 2 and FMI 3.
 TYPES: dict[int, dict[str, tuple[str, Any]]] = {
     2: {
         "Real": ("Real", ctypes.c_double),
@@ -38,11 +38,11 @@ TYPES: dict[int, dict[str, tuple[str, Any]]] = {
 
 @dataclass(frozen=True, slots=True)
 class Variable:
-    """A variable of the model description, with its numbers read."""
+    """A variable of the model description, with its numbers converted."""
 
     name: str
     reference: int
-    group: str  # of functions: SetReal, SetFloat64, ...
+    group: str  # end of the names of its functions: Real for SetReal, Float64 for SetFloat64, ...
     causality: str
     variability: str
     initial: str | None
@@ -62,7 +62,7 @@ def _settable(variable: Variable) -> bool:
     return variable.variability != "constant" and variable.causality not in ("independent", "structuralParameter")
 
 
-#: The standard's footnotes: for which variables a cell of the table of functions lets the call through.
+#: The variables for which a cell of the table of functions allows the call, as in the standard's footnotes.
 CONDITIONS: dict[str, Callable[[Variable], bool]] = {
     "1": lambda v: _settable(v) and (v.initial in ("exact", "approx") or v.causality == "input"),
     "2": lambda v: v.causality == "output",
@@ -70,7 +70,7 @@ CONDITIONS: dict[str, Callable[[Variable], bool]] = {
     "4": lambda v: v.causality == "input" or (v.causality == "parameter" and v.variability == "tunable"),
     "5": lambda v: (v.causality == "input" and v.variability == "continuous") or v.is_state,
     "6": lambda v: v.causality == "input" or (v.causality == "parameter" and v.variability == "tunable"),
-    # of our own: what FMI 3.0 lets through without doubt
+    # conditions of the probe: what FMI 3.0 allows without doubt
     "s": lambda v: v.causality in ("input", "parameter") or v.initial == "exact",
     "i": lambda v: v.causality == "input" and v.variability == "continuous",
     "x": lambda v: True,
@@ -79,10 +79,10 @@ CONDITIONS: dict[str, Callable[[Variable], bool]] = {
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Model:
-    """One interface of an FMU."""
+    """One interface of an FMU, with its variables and capabilities."""
 
-    version: int
-    interface: str
+    version: int  # of FMI: 2 or 3
+    interface: str  # cs or me
     name: str
     identifier: str
     token: str
@@ -104,11 +104,11 @@ class Model:
     other_interface: bool
     once: bool  # can be instantiated only once in a process
     initial_unknowns: frozenset[str]
-    #: (unknown, known) pairs of the model structure that are Real: derivatives and outputs
+    #: Each Real derivative and output with the Real inputs and states on which it may depend.
     dependencies: tuple[tuple[Variable, tuple[Variable, ...]], ...] = field(repr=False)
 
     def named(self, group: str, condition: str = "x") -> list[Variable]:
-        """Return the variables of a group of functions that meet a condition."""
+        """Return the variables of a group of functions that meet one of `CONDITIONS`."""
         meets = CONDITIONS[condition]
         if condition == "2":
             return [v for v in self.variables if v.group == group and (meets(v) or v.name in self.initial_unknowns)]
@@ -129,7 +129,7 @@ def interfaces(description: Any) -> list[str]:
 
 
 def read_model(folder: Path, interface: str) -> Model:
-    """Read the interface of an extracted FMU."""
+    """Read one interface, cs or me, of an extracted FMU."""
     from fmpy import read_model_description
 
     description = read_model_description(str(folder), validate=False)
@@ -239,7 +239,7 @@ def _variable(variable: Any, version: int, is_state: bool) -> Variable:
 
 
 def _capabilities(folder: Path, interface: str) -> set[str]:
-    """Return the true flags of an interface from the file, since FMPy does not read all of them."""
+    """Return the names of the flags of an interface that are true, from the XML file, since FMPy does not read all of them."""
     root = ElementTree.parse(folder / "modelDescription.xml").getroot()
     element = root.find({"cs": "CoSimulation", "me": "ModelExchange"}[interface])
     return set() if element is None else {name for name, value in element.items() if value in ("true", "1")}

@@ -1,4 +1,4 @@
-"""Folders and resource locations that are unusual and allowed: an FMU must work wherever it is extracted to."""
+"""Check that an FMU works wherever it is extracted to: in folders with unusual names, with unusual resource locations."""
 
 from __future__ import annotations
 
@@ -29,7 +29,8 @@ FOLDERS = (
     "~tilde",
 )
 
-#: Other ways to say where the resources are: a name, how bad a refusal is, and the text from the path and its quoted form.
+#: Other forms of the location of the resources: name, severity of a refusal, and the text made from the path and its quoted
+#: form.
 _URIS = (
     ("file:/path", WRONG, lambda path, quoted: f"file:{quoted}".encode()),
     ("file://localhost/path", WRONG, lambda path, quoted: f"file://localhost{quoted}".encode()),
@@ -60,12 +61,12 @@ def _all(part: str) -> str:
 
 
 def count(model: Model) -> int:
-    """Return the number of places."""
+    """Return the number of folders and resource locations that are tried."""
     return len(FOLDERS) + len(_URIS if model.version == 2 else _PATHS)
 
 
 def places(context: Context, case: int) -> None:
-    """Run the FMU shortly in a folder with an unusual name, or with another form of the address of its resources."""
+    """Run the FMU for a short time in a folder with an unusual name, or with another form of the location of its resources."""
     if case < len(FOLDERS):
         _folder(context, FOLDERS[case])
         return

@@ -1,4 +1,4 @@
-"""Checks that compare runs with one another: repeated, reset, beside another instance, restored, serialized, in other steps."""
+"""Compare runs: repeated, after a reset, beside another instance, restored, serialized, and with other steps."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from .findings import QUESTIONABLE, WRONG
 from .walk import byte_array, serialized
 
 _STEPS = 20
-#: Relative difference of a step and two halves that is called questionable.
+#: Relative difference between a step and two half steps above which it is questionable.
 SPLIT_TOLERANCE = 1e-2
 
 
@@ -93,7 +93,7 @@ def restored(context: Context, case: int) -> None:
 
 
 def serialize_here(context: Context, case: int) -> None:
-    """Write the bytes of a state and the run that follows it, for another process; the same state gives the same bytes."""
+    """Check that a state gives the same bytes each time; write them and the run that follows, for another process."""
     steps = random_inputs(context.random(case), context.model, 2 * _STEPS)
     run = Run(context.session())
     _course(run, steps[:_STEPS])
@@ -114,7 +114,7 @@ def serialize_here(context: Context, case: int) -> None:
 
 
 def deserialize_there(context: Context, case: int) -> None:
-    """Continue from a state that another process wrote as bytes."""
+    """Check that a run continued from the bytes of another process gives the same values as in that process."""
     path = context.work / f"serialized-{context.model.interface}-{case}.json"
     if not path.exists():
         context.say("not made: no bytes were written")
@@ -135,7 +135,7 @@ def deserialize_there(context: Context, case: int) -> None:
 
 
 def split(context: Context, case: int) -> None:
-    """Compare one step of h with two of h/2 at constant inputs; measure the largest difference of an output."""
+    """Compare one step h with two steps h/2 at constant inputs; measure the largest difference of an output."""
     model = context.model
     if model.fixed_step:
         context.say("not made: the FMU takes steps of one size only")
@@ -159,7 +159,7 @@ def split(context: Context, case: int) -> None:
     elements = [v for v in outputs for _ in range(v.size)]
     for column, output in enumerate(elements):
         one, two = ([row[column] for row in course] for course in courses)
-        scale = max(*map(abs, one), 1e-6 * abs(output.nominal))  # what is smaller is taken to be rounding
+        scale = max(*map(abs, one), 1e-6 * abs(output.nominal))  # smaller values are taken to be rounding errors
         difference = max(abs(a - b) for a, b in zip(one, two)) / scale
         if difference > worst:
             worst, name = difference, output.name

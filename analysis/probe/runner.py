@@ -1,4 +1,4 @@
-"""The parent of the probe: it starts a process for each check, watches it, and makes findings of what it left."""
+"""Run a probe: start a process for each check, watch it, and collect the findings that it has written."""
 
 from __future__ import annotations
 
@@ -24,13 +24,13 @@ from .findings import CRASH, WRONG, Finding, Outcome, Report
 from .model import interfaces, read_model
 from .session import ProbeError
 
-#: After so many crashes a check ends; a forbidden call that crashed is not tried again.
+#: Number of crashes after which a check ends. A forbidden call that has crashed is not tried again.
 _CRASHES = 100
 
 
 @dataclass(slots=True, kw_only=True)
 class _Job:
-    """One check on one interface, and what has come of it so far."""
+    """One check on one interface, with its results so far."""
 
     check: str
     interface: str
@@ -72,19 +72,19 @@ def probe(
     Parameters
     ----------
     fmu : path
-        FMI 2.0 or 3.0, with a library for this machine.
+        An FMU of FMI 2.0 or 3.0, with a library for this machine.
     calls : int
-        Calls of random sequences for each interface.
+        Number of calls in random sequences for each interface.
     seed : int
-        The same seed makes the same calls.
+        Seed of the random numbers: the same seed makes the same calls.
     seconds : float
-        After this time no more cases of random sequences are begun.
+        Time (s) after which no more cases of random sequences are begun.
     interface : str, optional
-        cs or me; all that the FMU has by default.
+        cs or me; by default all interfaces of the FMU.
     hang : float
-        Seconds after which a call that has not returned is taken to hang.
+        Time (s) after which a call that has not returned is taken to hang.
     checks : sequence of str
-        Only these of `CHECKS`; all by default.
+        Names of `CHECKS` that are made; by default all.
     progress : callable, optional
         Takes the name of each check before it is run.
 
@@ -125,7 +125,7 @@ def probe(
 
 
 def replay(fmu: str | Path, case: str, *, hang: float = 10.0) -> tuple[list[str], list[Finding]]:
-    """Run one case again, named as in a report: its calls, and its findings."""
+    """Run one case again, named as in a report; return its calls and its findings."""
     from .checks import CHECKS
 
     seed, interface, check, number = (case.split("/") + [""] * 4)[:4]
@@ -146,7 +146,7 @@ def replay(fmu: str | Path, case: str, *, hang: float = 10.0) -> tuple[list[str]
 
 
 def _extract(fmu: Path, folder: Path) -> Any:
-    """Extract an FMU and return its description."""
+    """Extract an FMU to a folder and return its model description."""
     from fmpy import extract
 
     from ..run import read_description
@@ -171,7 +171,7 @@ def _chosen(interface: str | None, offered: Sequence[str]) -> Sequence[str]:
 
 
 def _run(job: _Job, report: Report) -> bool:
-    """Run a check to its end, with a new process after each crash; whether the FMU can be loaded at all."""
+    """Run a check to its end, with a new process after each crash; return whether the FMU can be loaded at all."""
     begun = time.monotonic()
     cases = loadable = 0
     while job.first < job.last and not job.stopped:
@@ -188,7 +188,7 @@ def _run(job: _Job, report: Report) -> bool:
 
 
 def _one_process(job: _Job, report: Report, begun: float) -> bool:
-    """Run cases from `job.first` until the process ends, for whatever reason."""
+    """Run cases from `job.first` on in a process until it ends; return False if the FMU cannot be loaded."""
     for path in (job.journal, job.records):
         path.unlink(missing_ok=True)
     order = {
@@ -220,9 +220,12 @@ def _one_process(job: _Job, report: Report, begun: float) -> bool:
 
 
 def _watch(job: _Job) -> tuple[int, bool, str]:
-    """Start the process and wait for its end, or end it where a call does not return; exit code, hang, standard error."""
+    """Start the process and wait for its end, or end it if a call does not return.
+
+    Return its exit code, whether a call did not return, and the end of its standard error.
+    """
     paths = os.pathsep.join(dict.fromkeys([*(path or os.getcwd() for path in sys.path)]))
-    # what was freed or never written is filled, so that an FMU that reads it shows it
+    # freed and uninitialised memory is filled with a pattern, so that the effect of reading it shows
     environment = {**os.environ, "PYTHONPATH": paths, "MALLOC_PERTURB_": "165"}
     stderr = job.work / "stderr"
     with stderr.open("wb") as errors:
@@ -255,7 +258,7 @@ def _records(path: Path) -> list[dict[str, Any]]:
 
 
 def _collect(records: Sequence[dict[str, Any]], job: _Job, report: Report) -> str:
-    """Take the findings of a process; the subject of its last case."""
+    """Add the findings of a process to the report; return the subject of its last case."""
     subject = ""
     for record in records:
         if "severity" in record:

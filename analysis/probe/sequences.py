@@ -1,4 +1,4 @@
-"""Random sequences of calls, legal ones and such with one forbidden call: a case is one life of an instance."""
+"""Make random sequences of calls, all legal or with one forbidden call; a case is one life of an instance."""
 
 from __future__ import annotations
 
@@ -12,12 +12,12 @@ from .findings import QUESTIONABLE, WRONG
 from .session import ERROR, FATAL, OK, Session
 from .walk import Walk, access
 
-#: Calls of a legal life.
+#: Number of calls in a life with legal calls only.
 _LENGTH = 60
 
 
 def legal(context: Context, case: int) -> None:
-    """Run one instance through random legal calls."""
+    """Run one instance through random legal calls, and check that they are accepted."""
     rng = context.random(case)
     session = context.session()
     if not session.instantiate(event_mode=rng.random() < 0.7, early_return=rng.random() < 0.5):
@@ -34,7 +34,7 @@ def legal(context: Context, case: int) -> None:
 
 
 class Forbidden:
-    """Lives with one forbidden call each: every fault of the catalogue in turn."""
+    """A case of lives of instances with one forbidden call each: the faults of the catalogue in turn."""
 
     def __init__(self, context: Context) -> None:
         self.context = context
@@ -46,7 +46,7 @@ class Forbidden:
 
     @property
     def least(self) -> int:
-        """Return the least number of cases, each fault once, whatever number of calls was requested."""
+        """Return the least number of cases, with which each fault is tried once, whatever number of calls was requested."""
         return len(self.faults)
 
     def __call__(self, context: Context, case: int) -> None:
@@ -85,7 +85,7 @@ class Forbidden:
         where = [s for s in reachable if not allowed or machine.cell(fault.function, s, session.event_mode) not in ".?"]
         where.sort(
             key=lambda state: state not in ("step", "continuous")
-        )  # each time in another state, where the run is first
+        )  # each time in another state, first in that of a run
         target = fault.state or (where[again % len(where)] if where else None)
         if target is None or not walk.go(target) or (fault.state and walk.cell(fault.function) != "."):
             return
@@ -122,7 +122,7 @@ class Forbidden:
             walk.state = "error"
 
     def _poisoned(self, walk: Walk, fault: Fault) -> None:
-        """Whether a step with an input that is no number returns OK and outputs that are none."""
+        """Check whether a step with NaN in an input returns OK and outputs that are NaN."""
         outputs = [v for v in walk.model.variables if v.causality == "output" and v.group == fault.function[3:]]
         if not outputs or walk.state != "step" or not walk.call("DoStep"):
             return
@@ -133,7 +133,7 @@ class Forbidden:
 
 
 def _aftermath(walk: Walk) -> None:
-    """Make calls that may follow a forbidden one: read, go on, start anew, end. Only a crash counts."""
+    """Make calls that may follow a forbidden call: read, continue, reset, end. Only a crash is a finding."""
     for _ in range(walk.rng.randint(0, 12)):
         walk.step()
     if walk.state == "error" and walk.rng.random() < 0.5 and walk.session.call("Reset") == OK:

@@ -1,4 +1,4 @@
-"""One instance of an FMU: the functions of its library as FMPy declares them, each call noted before it is made."""
+"""Call the functions of an FMU's library for one instance, as FMPy declares them; each call is noted before it is made."""
 
 from __future__ import annotations
 
@@ -44,10 +44,10 @@ class Library:
         self._dll = made.dll  # its functions carry the argument types that FMPy declares
         self._prefix = f"fmi{model.version}"
         self.messages: list[str] = []
-        #: What an instance calls back; one for all, so that the probe itself keeps nothing of an instance.
+        #: Callbacks, the same for all instances, so that the probe itself keeps no data of an instance.
         self.callbacks: Any
         if model.version == 2:
-            # the logger is variadic: one more argument is taken for the message "%s"; FMPy's type has none
+            # the logger is variadic: one more argument is declared, for the message "%s"; FMPy's type has none
             self._logger = _LOGGER(lambda _e, _n, status, _c, message, more: self._log(message, more))
             self.callbacks = fmi2.fmi2CallbackFunctions(
                 logger=ctypes.cast(self._logger, fmi2.fmi2CallbackLoggerTYPE),
@@ -69,7 +69,7 @@ class Library:
 
 
 class Session:
-    """An instance, or the attempt at one.
+    """An instance of an FMU, or the attempt to make one.
 
     Parameters
     ----------
@@ -77,7 +77,7 @@ class Session:
     model : Model
     journal : Journal
     folder : pathlib.Path
-        Where the FMU was extracted to.
+        Folder to which the FMU was extracted.
     """
 
     def __init__(self, library: Library, model: Model, journal: Journal, folder: Path) -> None:
@@ -89,7 +89,7 @@ class Session:
         self.event_mode = False
 
     def instantiation(self, *, event_mode: bool = False, early_return: bool = False) -> tuple[str, list[Any]]:
-        """Return the function that makes an instance, with its legal arguments, which a fault may change."""
+        """Return the name of the function that makes an instance, and its legal arguments, which a fault may change."""
         model = self.model
         token = model.token.encode()
         self.event_mode = event_mode and model.event_mode
@@ -111,18 +111,18 @@ class Session:
         return "InstantiateCoSimulation", [b"probe", token, path, False, True, *more]
 
     def instantiate(self, arguments: Iterable[Any] | None = None, **options: bool) -> bool:
-        """Make the instance; whether there is one."""
+        """Make the instance; return whether the FMU has made one."""
         name, legal = self.instantiation(**options)
         self.instance = self._make(name, legal if arguments is None else list(arguments))
         self.journal.write(" -> an instance" if self.instance else " -> NULL")
         return bool(self.instance)
 
     def call(self, name: str, *arguments: Any) -> int:
-        """Call a function with the instance as first argument; its status."""
+        """Call a function with the instance as first argument; return its status."""
         return self.call_on(self.instance, name, *arguments)
 
     def call_on(self, instance: Any, name: str, *arguments: Any) -> int:
-        """Call a function with any instance, NULL for example."""
+        """Call a function with any instance as first argument, for example NULL; return its status."""
         status = self._make(name, [instance, *arguments], shown=1 if instance else 0)
         if status is None:
             return OK
@@ -131,7 +131,7 @@ class Session:
         return int(status)
 
     def need(self, name: str, *arguments: Any) -> None:
-        """Call a function that must succeed for a check to go on."""
+        """Call a function that must succeed for a check to go on; raise ProbeError if it does not."""
         status = self.call(name, *arguments)
         if status > WARNING:
             said = f": {self.messages[-1]}" if self.messages else ""
@@ -145,7 +145,7 @@ class Session:
             self.instance = None
 
     def _make(self, name: str, arguments: list[Any], shown: int = 0) -> Any:
-        if self.model.version == 2:  # which spells some names otherwise
+        if self.model.version == 2:  # FMI 2 spells some names differently
             name = name.replace("FMUState", "FMUstate").replace("Deserialize", "DeSerialize")
         text = ", ".join(show(argument) for argument in arguments[shown:])
         self.journal.call(f"{self.prefix}{name}({text})")

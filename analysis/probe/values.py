@@ -1,4 +1,4 @@
-"""Checks of single values: derivatives against differences, declared bounds, starts."""
+"""Check single values: derivatives against finite differences, declared bounds, start values."""
 
 from __future__ import annotations
 
@@ -12,14 +12,14 @@ from .model import Model, Variable
 from .session import ProbeError
 from .walk import derivative_arguments
 
-#: Steps of the differences, relative to the size of the known; the best of them is compared.
+#: Steps of the finite differences, relative to the size of the known; the best difference is compared.
 _DIFFERENCES = (1e-3, 1e-4, 1e-5, 1e-6, 1e-7)
-#: Difference of a derivative from the best difference, relative to the largest of the row, that is called wrong.
+#: Error of a derivative, compared with the best difference and relative to the largest of the row, above which it is wrong.
 DERIVATIVE_TOLERANCE = 1e-4
 
 
 def derivatives(context: Context, case: int) -> None:
-    """Compare directional derivatives with differences, and adjoint with directional ones, at random states."""
+    """Compare directional derivatives with finite differences, and adjoint with directional derivatives, at random states."""
     model, rng = context.model, context.random(case)
     run = _at_a_point(context, case)
     worst, name = 0.0, ""
@@ -43,7 +43,7 @@ def derivatives(context: Context, case: int) -> None:
 
 
 def _floor(unknown: Variable) -> float:
-    """Return the size below which a derivative may be rounding alone."""
+    """Return the size below which a derivative may be only a rounding error."""
     return 1e-8 * abs(unknown.nominal)
 
 
@@ -80,7 +80,7 @@ def _difference(run: Run, unknown: Variable, known: Variable, step: float, decla
 
 
 def _state(run: Run, known: Variable) -> float:
-    """Return an input, or one of the continuous states, which may differ from the variable of its name between events."""
+    """Return an input or continuous state; a state may differ from the variable of the same name between events."""
     names = run.model.state_names
     if known.is_state and run.model.interface == "me" and known.name in names:
         return float(run.states("GetContinuousStates")[names.index(known.name)])
@@ -180,7 +180,7 @@ def past_the_end(context: Context, case: int) -> None:
 
 
 def bounded_parameters(model: Model) -> list[tuple[Variable, float]]:
-    """Return each parameter with a value beyond each of its declared bounds."""
+    """Return pairs of a parameter and a value beyond one of its declared bounds, one pair for each bound."""
     parameters = [
         v
         for v in model.variables
@@ -196,7 +196,7 @@ def bounded_parameters(model: Model) -> list[tuple[Variable, float]]:
 
 
 def out_of_bounds(context: Context, case: int) -> None:
-    """Check that a parameter beyond its bounds is refused when set or at the end of the initialization."""
+    """Check that a parameter beyond its bounds is refused when it is set, or at the end of the initialization."""
     variable, beyond = bounded_parameters(context.model)[case]
     session = context.session()
     if not session.instantiate():

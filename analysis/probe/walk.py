@@ -1,4 +1,4 @@
-"""Random legal calls on one instance, with the state that the standard's machine is in after each."""
+"""Make random legal calls on one instance, and follow the state of the standard's state machine."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from .machines import MACHINES
 from .model import TYPES, Model, Variable
 from .session import DISCARD, ERROR, STATUS, WARNING, Session
 
-#: How often a function is chosen, where it is not 1.
+#: Weight with which a function is chosen, if it is not 1.
 _WEIGHTS = {
     "Terminate": 0.1,
     "Reset": 0.2,
@@ -24,14 +24,14 @@ _WEIGHTS = {
     "SetTime": 4,
     "CompletedIntegratorStep": 3,
 }
-#: Functions that may have a reason to refuse: those that compute, with the values that the probe chose, for example.
+#: Functions that may refuse a legal call, for example because they compute with values that the probe has chosen.
 _MAY_REFUSE = (
     *("DoStep", "CompletedIntegratorStep"),
     *("NewDiscreteStates", "UpdateDiscreteStates", "EvaluateDiscreteStates"),
     *("GetDerivatives", "GetContinuousStateDerivatives", "GetEventIndicators"),
     *("GetStatus", "GetRealStatus", "GetBooleanStatus", "GetStringStatus"),  # of use after Discard and Pending only
 )
-#: States before a run, in which all is computed from start values that the probe chose.
+#: States before a run, in which all variables are computed from start values that the probe has chosen.
 _BEFORE = ("instantiated", "ready", "initialization")
 _STATES = 3
 
@@ -42,7 +42,7 @@ def references(variables: Sequence[Variable]) -> Any:
 
 
 def value(rng: random.Random, variable: Variable) -> Any:
-    """Return a value that a variable should take: its start, or one near it within its bounds."""
+    """Return a value that a variable should accept: its start value, or one near it within its bounds."""
     if variable.group == "String":
         return (
             variable.start
@@ -69,7 +69,7 @@ class Walk:
     session : Session
     rng : random.Random
     note : Note
-        Takes findings.
+        Function to which findings are passed.
     """
 
     def __init__(self, session: Session, rng: random.Random, note: Note) -> None:
@@ -85,7 +85,7 @@ class Walk:
         self.functions = [name for name in self.machine.allowed if self._offered(name)]
 
     def _offered(self, name: str) -> bool:
-        """Whether the FMU says that it has a function, or has variables for it."""
+        """Return whether the FMU declares a function, or has variables for it."""
         key, model = name.lower(), self.model
         if "serializ" in key:
             return model.can_serialize and model.can_save
@@ -113,7 +113,7 @@ class Walk:
         return self.machine.cell(name, self.state, self.session.event_mode)
 
     def step(self) -> None:
-        """Make one random legal call, or the one that the FMU asked for."""
+        """Make one random legal call, or the call that the FMU has asked for."""
         if self.forced is not None:
             name, self.forced = self.forced, None
             if self.cell(name) not in ".?" and self.call(name):
@@ -147,7 +147,7 @@ class Walk:
         return self.machine.follow(name, "", True) == "" and name.lower() != "setfmustate"
 
     def call(self, name: str) -> bool:
-        """Make a call with legal arguments, if there are some; whether it was made and accepted."""
+        """Make a call with legal arguments, if there are any; return whether it was made and accepted."""
         arguments = self.arguments(name)
         if arguments is None:
             return False
@@ -175,7 +175,7 @@ class Walk:
             )
 
     def after(self, name: str, arguments: Sequence[Any], status: int) -> None:
-        """Follow the machine and keep what the call returned."""
+        """Update the state of the machine after a call, and keep what the call returned."""
         if status == ERROR:
             self.state = "error"
             return
@@ -212,21 +212,21 @@ class Walk:
         return access(self.model, chosen, self.values(chosen) if verb == "Set" else ())
 
     def values(self, variables: Sequence[Variable]) -> list[Any]:
-        """Return random legal values of variables, as many for each as it has elements."""
+        """Return random legal values of variables, one for each element of each variable."""
         return [value(self.rng, v) for v in variables for _ in range(v.size)]
 
     def pick(self, pairs: Sequence[tuple[Variable, tuple[Variable, ...]]]) -> tuple[Variable, Variable] | None:
-        """Return a random unknown and a known on which it depends."""
+        """Return a random unknown and a known on which it depends; None if there is none."""
         if not pairs:
             return None
         unknown, knowns = self.rng.choice(pairs)
-        if self.model.interface == "cs":  # its states are no knowns of its steps
+        if self.model.interface == "cs":  # in co-simulation states are no knowns
             knowns = tuple(known for known in knowns if known.causality == "input")
         return (unknown, self.rng.choice(knowns)) if knowns else None
 
 
 def access(model: Model, variables: Sequence[Variable], values: Sequence[Any] = ()) -> list[Any]:
-    """Return the arguments that get these variables of one group, or set them to values."""
+    """Return the arguments of a call that gets variables of one group, or sets them to values."""
     size = sum(v.size for v in variables)
     array = (model.c_types[variables[0].group] * size)(*values)
     return [references(variables), len(variables), array, *([size] if model.version == 3 else [])]
@@ -262,7 +262,7 @@ def serialized(session: Session, state: Any) -> bytes:
 
 
 def byte_array(session: Session, data: bytes) -> Any:
-    """Return bytes as the array that the functions of a version take."""
+    """Return bytes as an array of the C type that the functions of this FMI version take."""
     kind = ctypes.c_char if session.model.version == 2 else ctypes.c_ubyte
     return (kind * len(data)).from_buffer_copy(data)
 
@@ -321,7 +321,10 @@ def derivative_arguments(
     seed: Sequence[float],
     transposed: bool = False,
 ) -> list[Any]:
-    """Return the arguments of a derivative along a seed; the result goes to the last array (FMI 2) or the one before."""
+    """Return the arguments of a call for the derivative along a seed, adjoint if ``transposed``.
+
+    The call writes the result into the last argument (FMI 2) or the one before it.
+    """
     given = (ctypes.c_double * len(seed))(*seed)
     result = (ctypes.c_double * len(knowns if transposed else unknowns))()
     about = [references(unknowns), len(unknowns), references(knowns), len(knowns)]
@@ -357,7 +360,7 @@ def _completed(walk: Walk) -> list[Any]:
     return [0, kind(), kind()]
 
 
-#: Legal arguments, by the name of a function in lower case; a function that is not here has none.
+#: Functions that make legal arguments, by the name of an FMI function in lower case; other functions have no arguments.
 _ARGUMENTS: dict[str, Callable[[Walk], list[Any] | None]] = {
     "setdebuglogging": lambda walk: [walk.rng.random() < 0.9, 0, None],
     "setupexperiment": _setup,

@@ -1,4 +1,4 @@
-"""Analysis of the generalised slider-crank: force problems, mobility, tolerances, and the thesis's dual-number method.
+"""Analyse the generalised slider-crank: force problems, mobility, tolerances, and the thesis's dual-number method.
 
 The names are those of ``__init__.pyi``; each is imported from its module when it is first used.
 """

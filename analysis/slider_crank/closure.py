@@ -1,6 +1,6 @@
-"""Loop closure of the generalised slider-crank by 3x3 dual matrices and Newton's method (Rahman, chapter II).
+"""Close the loop of the generalised slider-crank by 3x3 dual matrices and Newton's method (Rahman, chapter II).
 
-Round the loop the displacements from joint to joint multiply to the identity, M1 L2 L3 M4 = I (eq 5), with
+Around the loop the displacements from joint to joint multiply to the identity, M1 L2 L3 M4 = I (eq 5), with
 
     M1 = Z(theta1 + eps S1) X(eps a1)       ground -> crank, at the crank pin
     L2 = B2 X(eps a2)                       crank -> rod, at the slider pin
@@ -8,11 +8,11 @@ Round the loop the displacements from joint to joint multiply to the identity, M
     M4 = Z(eps S4) X(alpha4 + eps a4)       guide -> ground
 
 where X and Z are screw displacements about and along i and k. B2 and B3 are the rotations in the ball joints. The thesis
-gives each two angles, with which the loop cannot close for a given theta1 and S1 (see `settle` below, erratum 1).
-Here each is a general rotation, corrected in every step by a small rotation about three axes. With S4 these are seven
-unknowns for six equations: the spin of the rod about its own line is idle. The convention that it has none, omega . u = 0,
-is the seventh equation, in each step of Newton's method (the correction turns the rod about no axis with a component along
-it) and for the rates (`dual_dynamics`). It fixes no angle but a change of angle, so that the spin found depends on where
+gives each rotation two angles, with which the loop cannot close for given theta1 and S1 (see `settle` below, erratum 1).
+Here both are general rotations, corrected in every step by small rotations about three axes. With S4 these are seven
+unknowns for six equations, because the rod can spin about its own line without effect. The convention that it does not spin,
+omega . u = 0, is the seventh equation, in each step of Newton's method (the correction does not turn the rod about its line)
+and for the rates (`dual_dynamics`). It determines only changes of the spin angle, so that the angle found depends on where
 the iteration starts; positions and forces do not depend on it.
 """
 
@@ -32,9 +32,10 @@ from ..run import takes_published
 from ..units import INCH, Amount, in_si
 from .quantities import FloatArray
 
-#: Largest residual of a closed loop: rotation in radians, and length as a share of the links' lengths together.
+#: Largest residual of a closed loop: rotation in radians, and length relative to `scale`.
 TOLERANCE = 1e-12
-#: Newton's method doubles the digits in each step; only next to the limit of assembly does it gain one bit a step.
+#: Newton iterations at most: each doubles the number of correct digits, but next to the limit of assembly it gains only one
+#: bit.
 MAX_ITERATIONS = 60
 
 
@@ -43,7 +44,7 @@ class ClosureError(LinkworkError):
 
 
 def scale(p: SliderCrankParameters, shift: Array) -> float:
-    """Return the length by which lengths are divided to compare them with angles (m): links and largest shift together."""
+    """Return the length (m) by which lengths are divided to compare them with angles: sum of link lengths and largest shift."""
     return p.crank_length + p.rod_length + abs(p.guide_offset) + float(np.max(np.abs(shift)))
 
 
@@ -71,8 +72,8 @@ class Loops:
     def rod_frame(self) -> Dual:
         """A frame fixed to the rod, in frame 1, its origin in the crank pin and i along the rod: (n, 3, 3).
 
-        It differs from frame 3, in which components of forces are given (`JointLoads.components`): its j and k are turned
-        about the rod by the idle spin that the start of the iteration has left.
+        It differs from frame 3, in which components of forces are given (`JointLoads.components`): its axes j and k are turned
+        about the rod by the spin angle, which depends on the start of the iteration.
         """
         return cast(Dual, _pin_frame(self.parameters, self.crank_angle, self.shift) @ self.crank_ball)
 
@@ -123,7 +124,7 @@ class Closure(Loops):
     iterations: int
 
     def at(self, points: Any) -> Closure:
-        """Return the loops of some points, by their indices (array_like of int): a start for others near them."""
+        """Return the loops of the points with given indices (array_like of int), for example to start near them."""
         return replace(self, **{name: getattr(self, name)[points] for name in _POINTWISE})
 
 
@@ -134,8 +135,8 @@ _POINTWISE = tuple(x.name for x in fields(Closure) if x.name not in ("parameters
 def planar_loops(p: SliderCrankParameters, th: Array, s1: Array) -> Loops:
     """Return the start of the iteration: the planar slider-crank of section 2.6.2.
 
-    The planar mechanism lies in the plane through the crank pin that the common normal i and the guide span. With
-    alpha4 = 270 deg and S1 = 0 it is the thesis's and exact.
+    The planar mechanism lies in the plane through the crank pin that is parallel to the common normal i and the guide. With
+    alpha4 = 270 deg and S1 = 0 it is that of the thesis, and exact.
     """
     guide = about_i(-Dual(p.guide_twist, p.guide_offset))
     pin = (origin(_pin_frame(p, th, s1)) - origin(guide)) @ guide.real
@@ -155,7 +156,7 @@ def planar_loops(p: SliderCrankParameters, th: Array, s1: Array) -> Loops:
 
 
 def _moved(start: Closure, th: Array, s1: Array) -> Loops:
-    """Return a start from closed loops nearby, as many or one: the rod keeps its orientation in space."""
+    """Return a start from closed loops nearby, one or one for each point: the rod keeps its orientation in space."""
     if start.crank_angle.size not in (1, th.size):
         raise InputError(
             f"start has {start.crank_angle.size} loops for {th.size} points: it must have one, or one for each point"
@@ -185,15 +186,15 @@ def close(
     crank_angle, shift : array_like
         theta1 (rad) and S1 (m); numbers, or arrays of shape (n,).
     start : Closure, optional
-        Loops near the wanted ones, as many or one, to start from; the rod first keeps its orientation in space. By
-        default the planar slider-crank.
+        Loops near the wanted ones to start from, one or one for each point; the rod at first keeps its orientation in space.
+        By default the planar slider-crank.
 
     Raises
     ------
     InputError
         If an angle or a shift is not a finite number, or their shapes or the number of loops in ``start`` do not agree.
     AssemblyError
-        If the rod does not reach the guide; the message has the missing length at the worst of the given angles.
+        If the rod does not reach the guide; the message gives the greatest missing length and its crank angle.
     ClosureError
         If the iteration ends in an open loop or in the other assembly.
     """
@@ -211,7 +212,7 @@ def close(
     while not found and iterations < MAX_ITERATIONS:
         iterations += 1
         rotation, distance = residuals(loops.product)
-        # one more step from inside the tolerance, after which only rounding is left
+        # one more step from inside the tolerance, after which only rounding errors remain
         found = bool(np.all(rotation <= TOLERANCE) and np.all(distance <= TOLERANCE * length))
         try:
             loops = loops.corrected()
@@ -254,8 +255,8 @@ def follow(parameters: SliderCrankParameters, crank_angle: Amount, shift: Amount
 def residuals(product: Dual) -> tuple[FloatArray, FloatArray]:
     """Return the closure errors of loops (..., 3, 3): angle (rad) and length (unit of the loop), shape (...).
 
-    The whole matrix is judged: its antisymmetric part alone, which the iteration makes zero, is zero as well where the loop
-    closes but for half a turn.
+    The whole matrix is used, because its antisymmetric part, which the iteration makes zero, is also zero if the loop is
+    open by half a turn.
     """
     # |R - I| is 2 sqrt2 |sin of half the angle|
     chord = np.linalg.norm(product.real - np.eye(3), axis=(-2, -1)) / np.sqrt(8.0)
@@ -286,8 +287,8 @@ def _pin_frame(p: SliderCrankParameters, th: Array, s1: Array) -> Dual:
 def _correction(product: Dual, rod: Dual, guide: Dual, length: float) -> FloatArray:
     """Return Newton's step (n, 6): rotations about rod axes j, k and guide axes i, j, k; slide as a share of ``length``.
 
-    A joint's motion q along its screw s changes the loop E by [s]E q, and the vector of the antisymmetric part of that is
-    (tr(E) I - E) s q / 2: the exact derivative, from closed or open loops.
+    A joint's motion q along its screw s changes the loop E by [s]E q. The vector of the antisymmetric part of this change is
+    (tr(E) I - E) s q / 2, which is the exact derivative for closed and for open loops.
     """
     trace = Dual(np.trace(product.real, axis1=-2, axis2=-1), np.trace(product.dual, axis1=-2, axis2=-1))
     slide = Dual(np.zeros_like(guide.real[..., 2]), guide.real[..., 2] * length)
@@ -301,7 +302,7 @@ def _correction(product: Dual, rod: Dual, guide: Dual, length: float) -> FloatAr
 
 
 def _rotation(vector: Array) -> Array:
-    """Return rotation matrices (n, 3, 3) of vectors (n, 3): axis times twice the tangent of half the angle (Cayley)."""
+    """Return rotation matrices (n, 3, 3) of vectors (n, 3), which are the axis times twice tan(angle / 2) (Cayley)."""
     half = 0.5 * vector
     m = skew(half).real
     rotation: Array = np.eye(3) + 2.0 * (m + m @ m) / (1.0 + np.sum(half * half, -1))[:, None, None]
@@ -309,7 +310,7 @@ def _rotation(vector: Array) -> Array:
 
 
 def _check(found: Closure) -> None:
-    """Make sure that the loops are closed and in the chosen assembly; raises ClosureError if they are not."""
+    """Check that the loops are closed and in the chosen assembly; raises ClosureError if they are not."""
     p, rotation, distance = found.parameters, found.rotation_residual, found.length_residual
     error = np.maximum(rotation, distance / scale(p, found.shift))
 
@@ -322,7 +323,7 @@ def _check(found: Closure) -> None:
             f"loop closure residual {rotation[worst]:.1e} rad and {distance[worst]:.1e} m after {found.iterations} "
             f"iterations at {place(worst)}, though the rod reaches the guide: start nearer to the solution"
         )
-    # the slider pin is beyond the crank pin's foot on the guide, against k4
+    # the slider pin is beyond the crank pin's foot on the guide, in the direction -k4
     side = -p.assembly_branch * found.slider_ball[:, 0, 2]
     worst = int(np.argmin(side))
     if side[worst] < 0.0:
@@ -333,7 +334,7 @@ def _check(found: Closure) -> None:
 
 
 def shortage(p: SliderCrankParameters, crank_angle: Any, shift: Any) -> FloatArray:
-    """Return the distance of the crank pin from the guide less the rod length (m): above 0 the loop cannot be closed."""
+    """Return the distance of the crank pin from the guide minus the rod length (m): above 0 the loop cannot be closed."""
     guide = about_i(-Dual(p.guide_twist, p.guide_offset))
     pin = origin(_pin_frame(p, np.asarray(crank_angle), np.asarray(shift)))
     across = (pin - origin(guide)) @ guide.real[:, :2]
@@ -347,17 +348,17 @@ def shortage(p: SliderCrankParameters, crank_angle: Any, shift: Any) -> FloatArr
 #     L2 = Z(theta2) Y(eta2) X(eps a2)        crank -> rod
 #     L3 = Z(theta3) Y(eta3) X(90 deg)        rod -> guide
 #
-# in place of general rotations: Hooke's joints. In the planar mechanism (S1 = 0, alpha4 = 270 deg) the loop closes with
-# eta2 = eta3 = 0. Elsewhere seven joint rates stand against six equations: the chain has one freedom, theta1 and S1 cannot
+# instead of general rotations: they are Hooke's joints. In the planar mechanism (S1 = 0, alpha4 = 270 deg) the loop closes with
+# eta2 = eta3 = 0. Otherwise there are seven joint rates and six equations: the chain has one freedom, theta1 and S1 cannot
 # both be given, and the least-squares Newton iteration for (theta2, eta2, theta3, eta3, S4) settles on an open loop. The
-# thesis takes small steps for convergence, but they say nothing about closure; where the steps do not become small, its
-# published limits of "convergence" come from, although the mechanism can be assembled. The least sum of squares adds angles
-# and lengths, so that the result depends on the unit of length.
+# thesis regards small steps as convergence, but they say nothing about closure. Its published limits of "convergence" are the
+# angles at which the steps do not become small, although the mechanism can be assembled there. The sum of squares that is
+# minimised adds angles and lengths, so that the result depends on the unit of length.
 #
 # The thesis solves six of the eighteen equations, the entries 12, 13 and 23 (eqs 20 to 26), and adds to the three real ones
-# the deviation of the diagonal. Its steps become small where A'V = 0, which is no minimum of the loop's error.
+# the deviation of the diagonal. Its steps become small where A'V = 0, which need not be a minimum of the loop's error.
 
-#: Which equations a step solves: all eighteen; the six of eqs 20 and 21; these with what eq 22 adds, as the thesis does.
+#: The equations that a step solves: all eighteen; the six of eqs 20 and 21; or, as in the thesis, these six with eq 22.
 Rows = Literal["all", "upper", "printed"]
 #: Rows and columns of the entries 12, 13 and 23.
 _UPPER = np.array([[0, 0, 1], [1, 2, 2]])
@@ -365,12 +366,12 @@ _UPPER = np.array([[0, 0, 1], [1, 2, 2]])
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Settled:
-    """End of the thesis's iteration for each of n crank angles.
+    """Result of the thesis's iteration for each of n crank angles.
 
-    ``unknowns`` (n, 5) are theta2, eta2, theta3, eta3 (rad) and S4 (m); ``steps`` how many corrections were made and
-    ``settled`` whether the last was below the tolerance, which the thesis takes for convergence. ``rotation_residual`` (rad)
-    and ``length_residual`` (m) say by how much the loop is open then, ``position_error`` (m) by how much S4 differs from that
-    of the loop with true ball joints.
+    ``unknowns`` (n, 5) are theta2, eta2, theta3, eta3 (rad) and S4 (m). ``steps`` is the number of corrections, and
+    ``settled`` whether the last one was below the tolerance, which the thesis regards as convergence. ``rotation_residual``
+    (rad) and ``length_residual`` (m) are the closure errors of the result; ``position_error`` (m) is the difference of S4
+    from that of the loop with true ball joints.
     """
 
     crank_angle: FloatArray
@@ -419,7 +420,7 @@ def settle(
     step_tolerance: float = 1e-6,
     max_steps: int = 100,
 ) -> Settled:
-    """Run the thesis's iteration: least-squares Newton steps from an estimate until a step is small.
+    """Run the thesis's iteration: take least-squares Newton steps from an estimate until a step is small.
 
     Parameters
     ----------
@@ -428,21 +429,21 @@ def settle(
     crank_angle, shift : array_like
         theta1 (rad) and S1 (m), numbers or arrays of shape (n,).
     rows : str
-        Which equations are solved: ``all`` eighteen, or of the upper triangle the six of eqs 20 and 21 (``upper``) or those
-        with eq 22 in the place of eq 20 (``printed``).
+        Equations that are solved: ``all`` eighteen, or those of the upper triangle, either the six of eqs 20 and 21 (``upper``)
+        or the same with eq 22 instead of eq 20 (``printed``).
     start : array_like, optional
-        Estimates of the unknowns (n, 5), such as those at the angle before; by default those of the planar mechanism.
+        Estimates of the unknowns (n, 5), such as the solution at the previous angle; by default those of the planar mechanism.
     unit : float
-        Unit of length (m) in which lengths are weighed against angles; the thesis's is the inch.
+        Unit of length (m) in which lengths are compared with angles; the thesis's is the inch.
     step_tolerance : float
-        A step is small when no angle (rad) and not the slider (``unit``) changes by more.
+        Largest change of an angle (rad) or of the slider position (``unit``) in a small step.
     max_steps : int
-        How many steps are made at most.
+        Largest number of steps.
 
     Raises
     ------
     InputError, AssemblyError, ClosureError
-        As `closure.close`, by which the truth is found.
+        As `closure.close`, which computes the true slider position.
     """
     th, s1 = broadcast_points(crank_angle, shift)
     truth = close(parameters, th, s1)
@@ -470,9 +471,9 @@ def settle(
 
 
 def freedoms(parameters: SliderCrankParameters, crank_angle: float, shift: float, unknowns: Array) -> int:
-    """Return the number of freedoms of the chain at a configuration: seven joint rates less the rank of their screws.
+    """Return the number of freedoms of the chain at a configuration: seven joint rates minus the rank of their screws.
 
-    The screws are those of theta1, S1 and the five unknowns; lengths are counted in rod lengths.
+    The screws are those of theta1, S1 and the five unknowns; lengths are divided by the rod length.
     """
     _, screws = chain(parameters, np.array([crank_angle]), np.array([shift]), np.asarray(unknowns)[None])
     crank = np.zeros((6, 2))
@@ -483,10 +484,10 @@ def freedoms(parameters: SliderCrankParameters, crank_angle: float, shift: float
 
 
 def equations(product: Dual, screws: Dual, unit: float, rows: Rows) -> tuple[FloatArray, FloatArray]:
-    """Return matrix (n, m, 5) and right side (n, m) of the m equations of a step, slide and lengths in ``unit``.
+    """Return matrix (n, m, 5) and right side (n, m) of the m equations of a step, with slide and lengths in ``unit``.
 
-    A joint's motion q along its screw s changes the loop B by [s]B q. All entries of this are to be those of I - B; the thesis
-    writes [s] q = B' - I (eq 11), its matrix A and its right side V (eqs 23 to 25).
+    A joint's motion q along its screw s changes the loop B by [s]B q, which is set equal to I - B. The thesis writes this as
+    [s] q = B' - I (eq 11), with its matrix A and its right side V (eqs 23 to 25).
     """
     changes = [skew(screws[..., i]) for i in range(5)]
     if rows == "all":

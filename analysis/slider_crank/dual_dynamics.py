@@ -1,16 +1,16 @@
-"""Velocities, accelerations and joint forces of the generalised slider-crank by dual vectors (Rahman, eqs 29 to 69).
+"""Compute velocities, accelerations and joint forces of the generalised slider-crank by dual vectors (Rahman, eqs 29 to 69).
 
-The velocity of a body is a dual vector, omega + eps v, with v that of the point of the body at the origin of the frame in
-which it is given; forces are F + eps M and momenta p + eps H in the same way. All these go from frame to frame by the dual
-matrices of `closure`. Each body's momentum is its inertia binor applied to its velocity (eqs 46 to 48), the rate of it is
-that in the body's frame and the cross product by the velocity (eqs 49 to 58), and it equals the sum of the dual forces on
-the body (eqs 59 to 64). That makes 18 scalar equations. The rod's about its own line is met by itself: forces at the pins
-have no moment about it, and a rod of rotational symmetry without spin needs none. The 17 that are left hold 17 unknowns
-(eqs 69): force (2), moment (2) of the bearing and the axial force on the crank (erratum 7: it is an unknown, because S1 is
-prescribed), three components of the force in each ball joint, force (2) and moment (3) of the guide, and the crank's torque
-or the force on the slider.
+The velocity of a body is a dual vector, omega + eps v, where v is the velocity of the point of the body at the origin of
+the frame; forces are F + eps M and momenta p + eps H in the same way. The dual matrices of `closure` transform all of them
+from frame to frame. Each body's momentum is its inertia binor applied to its velocity (eqs 46 to 48). The rate of the
+momentum is the rate in the body's frame plus the cross product with the velocity (eqs 49 to 58); it equals the sum of the
+dual forces on the body (eqs 59 to 64). These are 18 scalar equations. The moment equation of the rod about its own line is
+always satisfied: forces at the pins have no moment about it, and a rod of rotational symmetry without spin needs none. The
+other 17 equations have 17 unknowns (eqs 69): force (2) and moment (2) of the bearing, the axial force on the crank (erratum
+7: it is an unknown, because S1 is prescribed), three components of the force in each ball joint, force (2) and moment (3)
+of the guide, and the crank's torque or the force on the slider.
 
-Nothing here takes the plant's equations (`linkwork.slider_crank.kinematics`, `dynamics`), only its parameters.
+The plant's equations (`linkwork.slider_crank.kinematics`, `dynamics`) are not used here, only its parameters.
 """
 
 from __future__ import annotations
@@ -35,9 +35,9 @@ LIMIT_COSINE = 1e-9
 
 
 class DeadCentreError(LinkworkError):
-    """The crank torque does not determine the slider force: the configuration is a dead centre, dS4/dtheta1 = 0.
+    """The crank torque does not determine the slider force, because the configuration is a dead centre, dS4/dtheta1 = 0.
 
-    ``points`` are the indices of the points concerned.
+    ``points`` are the indices of the dead centres among the points.
     """
 
     def __init__(self, message: str, points: tuple[int, ...]) -> None:
@@ -49,8 +49,8 @@ class DeadCentreError(LinkworkError):
 class Binor:
     """Inertia binor of a body in a body-fixed frame (eqs 46 to 48): maps its dual velocity to its dual momentum.
 
-    ``mass`` in kg, ``moment`` the mass times the coordinates of the centre of mass (3,) in kg.m, ``inertia`` the matrix
-    (3, 3) about the frame's origin in kg.m2.
+    ``mass`` is in kg; ``moment`` (3,) is the mass times the coordinates of the centre of mass, in kg.m; ``inertia`` (3, 3) is
+    the inertia matrix about the frame's origin, in kg.m2.
     """
 
     mass: float
@@ -74,7 +74,7 @@ class Binor:
 class Rates:
     """Dual velocities of the links in frame 1 with their rates, and velocity and acceleration of the slider.
 
-    Dual vectors of shape (n, 3): omega + eps v with v that of the body's point at O. ``slider_velocity`` and
+    Dual vectors have shape (n, 3): omega + eps v, where v is the velocity of the body's point at O. ``slider_velocity`` and
     ``slider_acceleration`` are S4' (m/s) and S4'' (m/s2), ``ratio`` is dS4/dtheta1 (m/rad), each of shape (n,).
     """
 
@@ -93,13 +93,13 @@ class Rates:
 class JointLoads:
     """Forces and moments in all joints, as components in frame 1; arrays of shape (n, 3) and (n,), N and N.m.
 
-    ``bearing`` is the force of the bearing on the crank, without axial component, ``axial`` the force along the axis that
-    the motion takes of whatever drives or holds the shift; ``bearing_moment`` is about O, the drive's ``torque`` included.
+    ``bearing`` is the force of the bearing on the crank, without axial component; ``axial`` is the force along the axis of all
+    that drives or holds the shift; ``bearing_moment`` is about O and includes the drive's ``torque``.
     ``crank_pin`` is the force of the crank on the rod, ``slider_pin`` that of the slider on the rod; ``guide`` that of the
     guide on the slider and ``guide_moment`` its moment about the slider pin. ``slider_force`` is all that acts on the
-    slider along the guide (load, spring, damper, friction), positive where the slider position increases.
+    slider along the guide (load, spring, damper, friction), positive in the direction in which the slider position increases.
 
-    ``residual`` is what is left of the equation that is not among the 17, the moment about the rod's line (N.m).
+    ``residual`` is the residual of the equation that is not among the 17, the moment about the rod's line (N.m).
     """
 
     closure: Closure
@@ -117,7 +117,7 @@ class JointLoads:
     def components(self, name: str, frame: int) -> FloatArray:
         """Return components (n, 3) of a force or moment in frame 1 (ground), 2 (crank), 3 (rod) or 4 (guide).
 
-        The moments keep the points about which they are taken.
+        The points about which moments are taken do not change with the frame.
 
         Parameters
         ----------
@@ -128,8 +128,8 @@ class JointLoads:
         Raises
         ------
         InputError
-            If there is no such force, moment or frame, or if frame 3 is not determined: it has j perpendicular to the rod
-            and to the crank axis, which must not be parallel.
+            If there is no such force, moment or frame, or if frame 3 is not determined: its axis j is perpendicular to the rod
+            and the crank axis, which must not be parallel.
         """
         check_joint(name, frame)
         return cast(FloatArray, np.einsum("nji,nj->ni", _FRAMES[frame](self.closure), getattr(self, name)))
@@ -145,9 +145,9 @@ def rates(
 ) -> Rates:
     """Compute dual velocities (eqs 29 to 45) and their rates from theta1', S1', theta1'', S1'' (rad/s, m/s, rad/s2, m/s2).
 
-    The screws of the joints times their rates add up to nothing round the loop: six equations, all of them used (the
-    thesis drops the last, erratum 3), and omega . u = 0 for the rod's spin. Their derivative, in which each screw moves
-    with the body that carries it, gives the accelerations.
+    The screws of the joints times their rates add up to zero around the loop: six equations, all of which are used (the
+    thesis drops the last, erratum 3), together with omega . u = 0 for the rod's spin. Their derivative, in which each screw
+    moves with the body that carries it, gives the accelerations.
 
     Raises
     ------
@@ -175,11 +175,11 @@ def rates(
     matrix = np.zeros((n, 7, 7))
     matrix[:, :3] = screws.real
     matrix[:, 3:6] = screws.dual / length
-    # no spin: the crank's rotation and the first ball joint's make none about the rod's line
+    # no spin: the rotations of the crank and of the first ball joint have no component along the rod's line in total
     matrix[:, 6, 0] = 1.0
 
     def solve(known: Dual, turning: Dual) -> FloatArray:
-        """Return the joints' rates for the known part of the loop and the known rotation of the rod."""
+        """Return the joint rates, shape (n, 7), for the known part of the loop and the known rotation of the rod."""
         spin = np.sum(turning.real * rod.real[..., 0], -1)
         right = np.concatenate([known.real, known.dual / length, spin[:, None]], -1)
         return cast(FloatArray, -np.linalg.solve(matrix, right[..., None])[..., 0])
@@ -188,7 +188,7 @@ def rates(
     q = solve(crank, crank)
     rod_relative, slider_relative = apply(rod, q[:, :3]), apply(guide, q[:, 3:6])
     rod_velocity = crank + rod_relative
-    # from the loop's other side, from the ground
+    # from the other side of the loop, starting at the ground
     slider = -(slide * q[:, 6:])
     # rates of the screws: those of the first ball joint move with the rod, of the second with the slider; the slide's is 0
     crank_rate = Dual(e[:, None] * k, a[:, None] * k)
@@ -211,8 +211,8 @@ def rates(
 def binors(p: SliderCrankParameters) -> tuple[Binor, Binor, Binor]:
     """Return the inertia binors of crank (frame 2), rod (its frame, at the crank pin) and slider (frame 4, at its pin).
 
-    Of the crank's inertia only what concerns its axis is of effect, of the rod's only that about transverse axes, of the
-    slider's, which does not turn, none.
+    Only the crank's inertia about its axis, and the rod's about transverse axes, have an effect; the slider does not turn, so
+    that its inertia has none.
     """
     crank = np.zeros((3, 3))
     crank[2] = crank[:, 2] = -p.crank_product_xz, -p.crank_product_yz, p.crank_inertia
@@ -262,7 +262,7 @@ def joint_loads(
     Raises
     ------
     InputError
-        If not one of ``torque`` and ``slider_force`` is given, or if a value is not finite or not one of so many points.
+        If not exactly one of ``torque`` and ``slider_force`` is given, or if a value is not finite or has the wrong shape.
     AssemblyError
         At the limit of assembly.
     DeadCentreError
@@ -284,7 +284,7 @@ def joint_loads(
     length = scale(p, closure.shift)
     pin, front = _ball_frames(closure)
     matrix, load = _equations(closure, motion, length)
-    # the rod's moment about its line is the equation that is met by itself
+    # the moment equation of the rod about its own line is always satisfied
     kept = np.delete(np.arange(18), 9)
     given, value = (5, torque) if torque is not None else (17, slider_force)
     known = per_angle("torque" if torque is not None else "slider_force", value, n) / (length if given == 5 else 1.0)
@@ -310,7 +310,7 @@ def joint_loads(
 
 
 def _ball_frames(closure: Closure) -> tuple[Dual, Dual]:
-    """Return the crank's frame moved to the crank pin, and the rod's moved to the slider pin."""
+    """Return the crank's frame moved to the crank pin, and the rod's frame moved to the slider pin."""
     p = closure.parameters
     pin = closure.crank_frame @ about_i(Dual(0.0, p.crank_length))
     return cast(Dual, pin), cast(Dual, closure.rod_frame @ about_i(Dual(0.0, p.rod_length)))
@@ -325,7 +325,7 @@ def _equations(closure: Closure, motion: Rates, length: float) -> tuple[FloatArr
     p, n = closure.parameters, closure.crank_angle.size
     axes = np.broadcast_to(np.eye(3), (n, 3, 3))
     forces, moments = Dual(axes), Dual(np.zeros_like(axes), axes * length)
-    # bodies' frames in frame 1, and momentum rates less gravity in them: D'Alembert (eqs 62 to 64), with the signs of f1
+    # bodies' frames in frame 1, and momentum rates minus gravity in them: D'Alembert (eqs 62 to 64), with the signs of f1
     # and f3 (erratum 5) and the centres of mass (erratum 6) as Newton's law has them
     frames = (closure.crank_frame, closure.rod_frame, closure.guide_frame)
     gravity = Dual(np.zeros(3), np.array([p.gravity_x, p.gravity_y, p.gravity_z]))
@@ -365,7 +365,7 @@ def _check_dead_centres(closure: Closure, motion: Rates) -> None:
 
 
 def _axes(frame: Dual) -> Dual:
-    """Return the same axes with the origin of frame 1."""
+    """Return a frame with the axes of ``frame`` and the origin of frame 1."""
     return Dual(frame.real)
 
 
@@ -391,15 +391,15 @@ _FRAMES: dict[int, Callable[[Closure], FloatArray]] = {
 }
 
 
-# Against vector mechanics
+# Comparison with vector mechanics
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Difference:
     """Largest difference of a quantity between the two methods, in SI.
 
-    ``largest`` is the greatest magnitude of the quantity, ``relative`` the difference over the greatest magnitude of any
-    quantity of the same unit.
+    ``largest`` is the greatest magnitude of the quantity; ``relative`` is the difference divided by the greatest magnitude of
+    any quantity of the same unit.
     """
 
     quantity: str
@@ -417,13 +417,13 @@ class Comparison:
     ----------
     differences : tuple of Difference
     angles : int
-        Crank angles that were compared: those at which everything is determined.
+        Number of crank angles that were compared: those at which all quantities are determined.
     rotation_residual, length_residual : float
-        By how much the loop fails to close at most (rad, m).
+        Largest closure errors of the loop (rad, m).
     iterations : int
-        That closing it took at most.
+        Largest number of iterations that closing the loop took.
     rod_moment : float
-        Greatest moment about the rod's line (N.m), which no equation asks to be none.
+        Greatest moment about the rod's line (N.m); it should be zero, although no equation was solved for that.
     """
 
     differences: tuple[Difference, ...]
@@ -445,7 +445,7 @@ def compare(turn: ForceTurn) -> Comparison:
     ------
     InputError
         If the slider's force is sought and a groove in the shaft makes the shift, which the dual method does not cover, or if
-        it is determined at none of the angles.
+        the force is determined at none of the angles.
     """
     sought = turn.sought == SLIDER_FORCE
     if sought and has_shaft_groove(turn.law):
@@ -465,7 +465,7 @@ def compare(turn: ForceTurn) -> Comparison:
         "shift_acceleration": turn.shift_acceleration[good],
     }
     motion = rates(closure, **moving)
-    # what the dual vectors call the slider's force is all along the guide, spring, damper and friction included
+    # the slider force of the dual method is the whole force along the guide, with spring, damper and friction
     pushed = plant_functions().slider_resistance(
         closure.slider_position, motion.slider_velocity, 0.0, turn.parameters.constants()
     )

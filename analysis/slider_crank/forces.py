@@ -1,14 +1,14 @@
-"""Both force problems of the generalised slider-crank: all joint forces and moments of a given motion over the turn.
+"""Solve the two force problems of the generalised slider-crank: all joint forces and moments of a motion over the turn.
 
 Crank and shift move as prescribed, so that the axial force on the crank is an unknown (Rahman prescribes it, erratum 7).
-Then either the slider's load L is given and the crank's torque T sought, or the torque is given and the force on the slider
-sought (the thesis's problem). The two are related by the crank's equation of motion
+Either the slider's load L is given and the crank's torque T is sought, or the torque is given and the load is sought (the
+thesis's problem). Load and torque are related by the crank's equation of motion
 
     T = T0 - kth L,    kth = dS4/dtheta1 at the shift held,
 
-with T0 the torque that no load takes. So the first problem is regular wherever the mechanism is assembled, and the second
-has a pole where kth = 0: at the dead centres, where the slider's force has no lever on the crank. The values there are masked
-with the reason.
+where T0 is the torque without load. The first problem is therefore regular wherever the mechanism can be assembled, and the
+second has a pole where kth = 0: at the dead centres, where the slider's force has no lever on the crank. The values there are
+masked; `ForceTurn.masked` gives the reason.
 
 The equations are the plant's own (`linkwork.slider_crank.dynamics`), evaluated on arrays.
 """
@@ -49,15 +49,15 @@ from .quantities import (
 )
 from .shifts import ConstantShift, Course, ShiftLaw, ShiftMotion, has_shaft_groove, plant_functions, with_groove
 
-#: Angles over the turn by default: every degree, both ends.
+#: Default number of angles over the turn: one for every degree, both ends included.
 SAMPLES = 361
 #: Sine of the angle between rod and crank axis below which frame 3 has no direction.
 _PARALLEL = 1e-12
-#: Angle (deg) from a singularity or a limit of assembly beyond which a value is reported as an extreme, and shown.
+#: Least angle (deg) from a singularity or a limit of assembly at which a value is reported as an extreme, and drawn.
 CLEAR_DEG = 10.0
-#: Reason for which no slider force is found at any angle.
+#: Reason why the slider force cannot be found at any angle.
 NO_LEVER = "the slider has no lever on the crank at any angle, so that the torque determines no force on it"
-#: Reason for which none is found at a dead centre.
+#: Reason why the slider force cannot be found at a dead centre.
 _NO_LEVER_HERE = "the slider's force has no lever on the crank, so that the torque does not determine it"
 #: The shift by default.
 _STILL = ConstantShift(0.0)
@@ -66,7 +66,7 @@ TORQUE, SLIDER_FORCE = "torque", "slider force"
 
 
 class Solution(NamedTuple):
-    """Result of `solve`: `Position`, `Coefficients`, `Motion` and `Reactions`, of the given kind of numbers."""
+    """Result of `solve`: `Position`, `Coefficients`, `Motion`, `Reactions`, load (N), ratio (m); arrays or dual numbers."""
 
     position: Any
     coefficients: Any
@@ -97,14 +97,14 @@ def solve(
     given
         The load (N), or with ``torque`` the torque (N.m).
     torque : bool
-        Whether the torque is given and the load sought. It is not finite where the ratio is zero.
+        Whether the torque is given and the load sought. The load is not finite where the ratio is zero.
     groove : bool
         Whether the parameters' groove makes the shift.
 
     Returns
     -------
     Solution
-        ``ratio`` is minus the derivative of the torque by the load (m): kth, or with a groove in the shaft dS4/dtheta1.
+        ``ratio`` is minus the derivative of the torque by the load (m): kth, or dS4/dtheta1 with a groove in the shaft.
     """
     f = plant_functions()
     q = f.position(angle, shift.shift, p)
@@ -127,28 +127,28 @@ class ForceTurn:
     ----------
     parameters : SliderCrankParameters
     law : ShiftLaw
-        Of the axial shift.
+        Law of the axial shift.
     sought : str
         "torque" or "slider force".
     angle, speed, acceleration : ndarray, shape (n,)
         theta1 (rad), theta1' (rad/s), theta1'' (rad/s2).
     shift, shift_velocity, shift_acceleration : ndarray, shape (n,)
-        m, m/s, m/s2.
+        Axial shift of the crank and its rates (m, m/s, m/s2).
     slider_position, slider_velocity, slider_acceleration : ndarray, shape (n,)
-        m, m/s, m/s2.
+        Motion of the slider (m, m/s, m/s2).
     torque : masked array, shape (n,)
         Torque of the drive on the crank (N.m).
     slider_force : masked array, shape (n,)
-        Load on the slider (N), positive in the direction in which its position increases, -k of frame 4; spring, damper and
-        friction come on top of it. Masked at a dead centre where it is sought.
+        Load on the slider (N), positive in the direction in which the slider position increases, -k of frame 4; the forces of
+        spring, damper and friction are not part of it. If it is sought, it is masked at dead centres.
     axial_force : masked array, shape (n,)
-        Force on the crank along its axis (N), of all that drives, holds and springs it.
+        Whole force on the crank along its axis (N): of the drive of the shift, spring and damper.
     applied_axial_force : masked array, shape (n,)
-        Of it that of what drives or holds the shift: without the spring and the damper there (N).
+        Part of the axial force that drives or holds the shift (N): without the spring and the damper.
     ratio : ndarray, shape (n,)
         Lever of the slider's force on the crank, minus dT/dL (m): kth, or dS4/dtheta1 with a groove in the shaft.
     unreachable : ndarray, shape (m,)
-        Angles that were asked for and left out because the rod does not reach the guide there (rad).
+        Given angles (rad) that were left out because the rod does not reach the guide there.
     """
 
     parameters: SliderCrankParameters
@@ -185,29 +185,29 @@ class ForceTurn:
 
     @cached_property
     def dead_centres(self) -> tuple[DeadCentre, ...]:
-        """Dead centres of the slider between the first and the last angle, located to the last digit."""
+        """Dead centres of the slider between the first and the last angle, located to rounding errors."""
         return self._course.dead_centres(*self._span)
 
     @cached_property
     def singularities(self) -> tuple[DeadCentre, ...]:
         """Configurations between the first and last angle at which the torque does not determine the slider force.
 
-        Zeros of ``ratio``. They differ from the dead centres only if the shift moves without a groove in the shaft.
+        They are the zeros of ``ratio``, and differ from the dead centres only if the shift moves without a groove in the shaft.
         """
         return self.dead_centres if has_shaft_groove(self.law) else self._course.singularities(*self._span)
 
     @cached_property
     def limits(self) -> tuple[float, ...]:
-        """Crank angles (rad) between the first and last given one at which a range of assembly ends.
+        """Crank angles (rad) between the first and the last given angle at which a range of assembly ends.
 
-        There rod and guide are perpendicular, and velocity, acceleration and all forces grow without bound.
+        At these angles rod and guide are perpendicular; velocity, acceleration and all forces grow without bound near them.
         """
         asked = np.concatenate([self.angle, self.unreachable])
         return self._course.limits(float(asked.min()), float(asked.max()))
 
     @cached_property
     def breaks(self) -> tuple[int, ...]:
-        """Indices of angles between which and the next one the mechanism cannot be assembled."""
+        """Indices of angles such that the mechanism cannot be assembled somewhere between this angle and the next."""
         outside = np.sort(np.concatenate([self.unreachable, self.limits]))
         low, high = np.minimum(self.angle[:-1], self.angle[1:]), np.maximum(self.angle[:-1], self.angle[1:])
         between = np.searchsorted(outside, high) - np.searchsorted(outside, low, side="right")
@@ -220,14 +220,14 @@ class ForceTurn:
 
     @property
     def _parallel(self) -> NDArray[np.bool_]:
-        """Where the rod is parallel to the crank axis."""
+        """Mask of the angles at which the rod is parallel to the crank axis, shape (n,)."""
         p = self.parameters.constants()
         r = plant_functions().rod(self._position, p)
         return np.asarray(np.hypot(r.x, r.y) <= _PARALLEL * p.a2)
 
     @cached_property
     def masked(self) -> tuple[str, ...]:
-        """Sentences about masked values and the reasons, one for each run of angles."""
+        """Sentences about masked values with the reasons, one for each set of consecutive angles."""
         sentences = [NO_LEVER] if self.without_lever else []
         dead = np.ma.getmaskarray(self.slider_force) & (not sentences)
         for flags, what, why in (
@@ -243,10 +243,10 @@ class ForceTurn:
         return tuple(sentences)
 
     def clear(self, degrees: float = CLEAR_DEG, *, poles: bool = True) -> NDArray[np.bool_]:
-        """Return which angles (n,) are further than ``degrees`` from poles of the forces.
+        """Return a mask (n,) of the angles that are further than ``degrees`` from the poles of the forces.
 
-        Poles are at the limits of assembly and, if the slider force is unknown, at the singularities; without ``poles`` at the
-        limits alone. Poles beyond the first and the last angle count.
+        Poles are at the limits of assembly and, if the slider force is unknown, at the singularities; if ``poles`` is
+        False, only the limits are taken. Poles before the first and after the last angle are taken into account.
         """
         away = radians(degrees)
         low, high = self._span
@@ -264,12 +264,13 @@ class ForceTurn:
         Parameters
         ----------
         name : str
-            ``bearing``: force of the bearing on the crank, without axial component; ``bearing_moment``: about the ground's
-            origin O, the torque of the drive included; ``crank_pin``: force of the crank on the rod; ``slider_pin``: of the
-            slider on the rod; ``guide``: of the guide on the slider; ``guide_moment``: about the slider pin.
+            ``bearing``: force of the bearing on the crank, without axial component; ``bearing_moment``: its moment about the
+            ground's origin O, the torque of the drive included; ``crank_pin``: force of the crank on the rod; ``slider_pin``:
+            force of the slider on the rod; ``guide``: force of the guide on the slider; ``guide_moment``: its moment about the
+            slider pin.
         frame : int
-            1 ground; 2 crank, i towards the crank pin; 3 rod, i along it from crank pin to slider pin, j perpendicular to it
-            and to the crank axis; 4 guide, the slider position increasing along -k. Moments keep their points.
+            1 ground; 2 crank, i towards the crank pin; 3 rod, i along the rod from crank pin to slider pin, j perpendicular to
+            rod and crank axis; 4 guide, the slider position increasing along -k. The points of moments do not change.
 
         Returns
         -------
@@ -299,7 +300,7 @@ class ForceTurn:
         return np.ma.MaskedArray(_stacked(turned, len(self)), mask=mask, fill_value=np.nan)
 
     def columns(self, units: str = "SI", frames: tuple[int, ...] = (1, 2, 3, 4)) -> dict[str, FloatArray]:
-        """Return all values by name with unit, as for a file: NaN for masked values, the last two columns say why.
+        """Return all values by name with unit, for a file; masked values are NaN, and the last two columns give the reasons.
 
         Parameters
         ----------
@@ -361,18 +362,18 @@ def force_turn(
     Parameters
     ----------
     parameters : SliderCrankParameters
-        Parameters, or a published set or its name, which has a crank speed and a shift.
+        Parameters, or a published set or its name; a set brings its crank speed and shift.
     crank_speed, crank_acceleration : array_like, scalar or shape (n,)
-        theta1' (rad/s), theta1'' (rad/s2); a number may be a text with its unit, such as "50 rpm", here and below.
+        theta1' (rad/s), theta1'' (rad/s2). Here and below, a number may be given as text with its unit, such as "50 rpm".
     shift : ShiftLaw
         `ConstantShift`, `GrooveShift`, `AngleShift`, `TimeShift` or another. The parameters' own groove is not used.
     angles : array_like, shape (n,), optional
         Crank angles (rad); 361 over the turn by default.
     load : array_like, scalar or shape (n,), optional
-        Force on the slider (N), positive in the direction in which its position increases; the torque is sought. 0 by
-        default.
+        Force on the slider (N), positive in the direction in which its position increases, 0 by default; the torque is then
+        sought.
     torque : array_like, scalar or shape (n,), optional
-        Torque of the drive on the crank (N.m); the load on the slider is sought. Excludes ``load``.
+        Torque of the drive on the crank (N.m); the load on the slider is then sought. Not together with ``load``.
     partial : bool
         Whether to leave out the angles at which the rod does not reach the guide; ``unreachable`` lists them.
 
@@ -381,8 +382,8 @@ def force_turn(
     InputError
         If both ``load`` and ``torque`` are given, a value is no finite number or of the wrong shape, or ``shift`` is no law.
     AssemblyError
-        If the rod does not reach the guide at some angle, with the ranges in which it does; with ``partial`` only if it does
-        not at any angle.
+        If the rod does not reach the guide at some angle; the message gives the ranges in which it does. With ``partial`` only
+        if it reaches the guide at no angle.
 
     Examples
     --------
@@ -443,7 +444,7 @@ def force_turn(
         applied_axial_force=scalar(m.force),
         ratio=found.ratio,
         unreachable=unreachable,
-        # the slider's mass times its acceleration has no part in the load
+        # the moment on the guide does not depend on the load
         _joints=MappingProxyType(
             {
                 name: masked_array(_stacked(getattr(r, name), n), (never if name == "guide_moment" else dead)[:, None])
@@ -455,7 +456,7 @@ def force_turn(
 
 
 def _crank_angles(angles: ArrayLike | None) -> FloatArray:
-    """Return the given crank angles (n,), or those of a turn by default."""
+    """Return the given crank angles as an array (n,), or `SAMPLES` angles over a turn."""
     if angles is None:
         return np.linspace(0.0, tau, SAMPLES)
     message = "the angles must be a list of finite numbers (rad), at least one"
@@ -466,7 +467,7 @@ def _crank_angles(angles: ArrayLike | None) -> FloatArray:
 
 
 def _stacked(vector: Vector, n: int) -> FloatArray:
-    """Return the components as an array (n, 3)."""
+    """Return the components of a vector as an array (n, 3)."""
     return np.stack([np.broadcast_to(x, (n,)) for x in vector], axis=-1).astype(float)
 
 
@@ -499,6 +500,6 @@ def _not_assembled(
 
 
 def _runs(flags: NDArray[np.bool_]) -> list[tuple[int, int]]:
-    """Return first and last index of each run of true values."""
+    """Return the first and the last index of each group of consecutive true values."""
     edges = np.flatnonzero(np.diff(np.concatenate([[False], flags, [False]]).astype(int)))
     return [(int(first), int(end) - 1) for first, end in zip(edges[::2], edges[1::2])]

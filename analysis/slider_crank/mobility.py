@@ -1,4 +1,4 @@
-"""Mobility of the slider-crank: margin of assembly, ranges of the crank, dead centres, stroke.
+"""Find the mobility of the slider-crank: margin of assembly, ranges of the crank, dead centres, stroke.
 
 With f and g the crank pin's coordinates across the guide, as in `kinematics`, and S1 a function of theta1 (prime: by it)
 
@@ -7,9 +7,10 @@ With f and g the crank pin's coordinates across the guide, as in `kinematics`, a
     S4' = A/h - B,  B = a1 cos(theta1) sin(alpha4) + S1' cos(alpha4)
 
 and the slider's dead centres are the zeros of h S4' = A - B h, which stays finite at the limit of assembly. The zeros are
-found by halving the turn: lengths and the bounds of the law's derivatives bound the change of each function over a piece, and a
-piece is dropped only if this bound excludes a zero. The remaining pieces are bisected to the last digit. No zero is missed
-except pairs closer together than `FINEST`, between which the slider moves by some 1e-10 of the crank's length.
+found by halving the turn repeatedly: the lengths and the bounds of the law's derivatives bound the change of each function
+over a piece, and a piece is dropped only if this bound excludes a zero. In the remaining pieces zeros are bisected to the
+last digit. No zero is missed except pairs closer together than `FINEST`, between which the slider moves by some 1e-10 of
+the crank's length.
 """
 
 from __future__ import annotations
@@ -29,15 +30,16 @@ from linkwork.slider_crank.parameters import Constants, SliderCrankParameters
 
 from ..run import takes_published
 
-#: Width (rad) of a piece of the turn that is not divided further. Two zeros of one piece go unseen.
+#: Width (rad) of a piece of the turn that is not divided further. Two zeros in one such piece are not found.
 FINEST = 1e-3
-#: Share of its scale below which a function is taken as zero, of no sign: a slider that rests does not turn back by rounding.
+#: Value relative to its scale below which a function counts as zero, so that rounding errors do not make a slider at rest turn
+#: back.
 _ROUNDING = 1e-13
 #: Pieces into which the turn is divided first.
 _PIECES = 32
-#: Angle (rad) at which the search of a turn begins: none at which a mechanism is likely to have something to find.
+#: Angle (rad) at which the search of a turn begins: an arbitrary one, at which a zero is unlikely.
 _SEAM = -0.7390851332151607
-#: Largest number of turns after which a groove's law is looked for to repeat.
+#: Largest number of turns after which the law of a groove may repeat.
 _MOST_TURNS = 64
 
 
@@ -49,9 +51,10 @@ class PeriodicShift:
     ----------
     at : callable
         Function of the crank angle (rad) that returns the shift (m) and its first derivative by the angle (m/rad); further
-        items are ignored, so that `kinematics.groove` fits.
+        items that it returns are ignored, so that `kinematics.groove` can be used.
     rate, curvature : float
-        Bounds of the absolute first and second derivatives by the angle (m/rad, m/rad2). They need not be sharp.
+        Upper bounds of the absolute values of the first and second derivatives by the angle (m/rad, m/rad2), not
+        necessarily sharp.
     turns : int
         Whole turns of the crank after which the law repeats.
 
@@ -105,7 +108,7 @@ def groove_shift(parameters: SliderCrankParameters) -> PeriodicShift:
     Raises
     ------
     ParameterError
-        If alpha is not a ratio of whole numbers with a denominator of at most 64, after which many turns the law repeats.
+        If alpha is not a ratio of whole numbers with a denominator of at most 64; the law repeats after that many turns.
     """
     p = parameters.constants()
     ratio = Fraction(p.ratio).limit_denominator(_MOST_TURNS)
@@ -120,10 +123,10 @@ def groove_shift(parameters: SliderCrankParameters) -> PeriodicShift:
 
 
 class Margin(NamedTuple):
-    """An extreme over the turn of the margin of assembly: rod length less distance of crank pin and guide (m); angle (rad)."""
+    """A least or greatest value over the turn of the margin of assembly."""
 
-    length: float
-    crank_angle: float
+    length: float  # rod length minus distance of the crank pin from the guide (m)
+    crank_angle: float  # rad
 
 
 class Place(NamedTuple):
@@ -135,10 +138,10 @@ class Place(NamedTuple):
 
 
 class DeadCentre(NamedTuple):
-    """A configuration in which the slider turns back: angle (rad), shift and slider position (m).
+    """A configuration in which the slider reverses: crank angle (rad), shift and slider position (m).
 
-    ``outer`` is true at a maximum of S4 on branch +1 and at a minimum on branch -1: the slider is furthest out on the side of
-    its assembly.
+    ``outer`` is true at a maximum of S4 on branch +1 and at a minimum on branch -1: the slider is then furthest out on the side
+    of its assembly.
     """
 
     crank_angle: float
@@ -150,9 +153,9 @@ class DeadCentre(NamedTuple):
 class Range(NamedTuple):
     """A range of crank angles in which the rod reaches the guide, and the slider positions in it.
 
-    ``low`` is in [0, span) and ``high`` at most the span above it (rad); the other angles are in [0, span). The span is one
-    turn, or as many as the law of the shift takes to repeat. ``greatest`` and ``least`` are the extreme slider positions;
-    where the crank cannot turn fully they may be at an end of the range.
+    ``low`` (rad) is in [0, span), and ``high`` exceeds it by at most the span; the other angles are in [0, span). The span
+    is one turn, or the number of turns after which the law of the shift repeats. ``greatest`` and ``least`` are the extreme
+    slider positions; if the crank cannot turn fully, they may be at an end of the range.
     """
 
     low: float
@@ -162,12 +165,12 @@ class Range(NamedTuple):
     least: Place
 
     def full(self, span: float) -> bool:
-        """Return whether the range has no ends: the crank makes all turns of the law, its ``span``."""
+        """Return whether the range has no ends: whether it covers the whole ``span`` of the law."""
         return self.high - self.low >= span * (1.0 - 1e-12)
 
     @property
     def stroke(self) -> float:
-        """Greatest less least slider position (m)."""
+        """Greatest minus least slider position (m)."""
         return self.greatest.slider_position - self.least.slider_position
 
 
@@ -177,7 +180,7 @@ class _Zero(NamedTuple):
 
 
 class _Change(NamedTuple):
-    """D, A and B at the middle of a piece, and bounds of their change within it."""
+    """D, A and B (``square``, ``pull``, ``along``) at the middle of a piece, and bounds of their changes within it."""
 
     square: float
     pull: float
@@ -188,7 +191,7 @@ class _Change(NamedTuple):
 
 
 def _change(middle: float, half: float, law: PeriodicShift, p: Constants, pitch: float) -> _Change:
-    """Return D, A, B and their spreads over ``middle`` +- ``half``; with ``pitch`` 0 A and B leave out S1', else it is 1."""
+    """Return D, A, B and bounds of their changes over ``middle`` +- ``half``; with ``pitch`` 0, not 1, S1' is left out."""
     s1, ds1 = law.at(middle)[:2]
     if not (isfinite(s1) and abs(ds1) <= law.rate * (1.0 + 1e-9)):
         raise InputError(
@@ -220,7 +223,7 @@ def _change(middle: float, half: float, law: PeriodicShift, p: Constants, pitch:
     )
 
 
-#: A function of the middle and the half width of a piece: its value in the middle, and its spread over the piece.
+#: A function of the middle and the half width of a piece: returns its value in the middle, and a bound of its change.
 _Bounded = Callable[[float, float], tuple[float, float]]
 
 
@@ -235,12 +238,12 @@ def _margin_slope(law: PeriodicShift, p: Constants) -> _Bounded:
 
 
 def _slider_slope(changes: Callable[[float, float], _Change], branch: float) -> _Bounded:
-    """Return the function A - B h, of the sign of S4' on branch +1 and opposite to it on branch -1."""
+    """Return the function A - B h (A + B h on branch -1), which has the sign of S4' on branch +1 and the opposite on -1."""
 
     def slope(middle: float, half: float) -> tuple[float, float]:
         change = changes(middle, half)
         h = sqrt(max(0.0, change.square))
-        # |sqrt x - sqrt y| is at most the root of |x - y|, and |x - y| over either root
+        # |sqrt x - sqrt y| is at most sqrt |x - y|, and at most |x - y| / sqrt x
         spread = sqrt(change.square_spread)
         if change.square_spread < spread * h:
             spread = change.square_spread / h
@@ -254,7 +257,7 @@ def _slider_slope(changes: Callable[[float, float], _Change], branch: float) -> 
 
 
 def _bisect(positive: Callable[[float], bool], low: float, high: float) -> float:
-    """Find to the last digit where ``positive`` changes between ``low`` and ``high``."""
+    """Find by bisection, to the last digit, where ``positive`` changes between ``low`` and ``high``."""
     at_low = positive(low)
     while True:
         middle = 0.5 * (low + high)
@@ -269,8 +272,8 @@ def _bisect(positive: Callable[[float], bool], low: float, high: float) -> float
 def _zeros(function: _Bounded, low: float, high: float, scale: float) -> list[_Zero]:
     """Find all sign changes of ``function`` between ``low`` and ``high``, in order.
 
-    Where it is zero to the rounding of ``scale`` over a stretch, the stretch is one zero if the signs before and after it
-    differ, and none otherwise.
+    If the function is zero over a stretch, up to rounding errors of ``scale``, the stretch is one zero if the signs before and
+    after it differ, and none otherwise.
     """
 
     def positive(x: float) -> bool:
@@ -292,7 +295,7 @@ def _zeros(function: _Bounded, low: float, high: float, scale: float) -> list[_Z
 
     for a, b in pairwise([low + (high - low) * n / _PIECES for n in range(_PIECES)] + [high]):
         search(a, b)
-    # the sign changes in pieces that were kept alone
+    # look for sign changes only in the pieces that were kept
     found: list[_Zero] = []
     last: float | None = None
     for x in kept:
@@ -305,7 +308,7 @@ def _zeros(function: _Bounded, low: float, high: float, scale: float) -> list[_Z
 
 
 def _wrapped(angle: float, law: PeriodicShift) -> float:
-    """Return the angle in [0, span): the remainder of a tiny negative number rounds to the span itself."""
+    """Return the angle reduced to [0, span); the remainder of a tiny negative number, which rounds to the span, becomes 0."""
     wrapped = angle % law.span
     return wrapped if wrapped < law.span else 0.0
 
@@ -315,14 +318,14 @@ def _square(angle: float, law: PeriodicShift, p: Constants) -> float:
 
 
 def _extremes(law: PeriodicShift, p: Constants) -> list[float]:
-    """Find the angles of least or greatest margin of assembly, in order; any one if it is the same everywhere."""
+    """Find the angles of local extremes of the margin of assembly, in order; one angle if the margin is the same everywhere."""
     zeros = _zeros(_margin_slope(law, p), _SEAM, _SEAM + law.span, (p.a1 + law.rate) * p.a2)
     return [zero.angle for zero in zeros] or [0.0]
 
 
 @takes_published()
 def assembly_margin(parameters: SliderCrankParameters, law: PeriodicShift) -> Margin:
-    """Find the least margin of assembly over the turn, negative where the crank cannot turn fully.
+    """Find the least margin of assembly over the turn; it is negative if the crank cannot turn fully.
 
     The crank turns fully where the margin is zero or greater. The plant's steps also keep clear of the limit of assembly
     by `linkwork.limits.LIMIT_SINE`, 5e-7 of the rod's length.
@@ -332,12 +335,12 @@ def assembly_margin(parameters: SliderCrankParameters, law: PeriodicShift) -> Ma
 
 @takes_published()
 def greatest_margin(parameters: SliderCrankParameters, law: PeriodicShift) -> Margin:
-    """Find the greatest margin of assembly over the turn, negative if it can be assembled nowhere."""
+    """Find the greatest margin of assembly over the turn; it is negative if the mechanism can be assembled nowhere."""
     return _margin(max, law, parameters.constants())
 
 
 def _margin(choose: Callable[..., float], law: PeriodicShift, p: Constants) -> Margin:
-    """Return the margin at the extreme chosen by ``choose``, min or max."""
+    """Return the least or greatest margin over the turn, chosen by ``choose``, which is min or max."""
     place = choose(_extremes(law, p), key=lambda angle: _square(angle, law, p))
     return Margin(p.a2 - sqrt(p.a2 * p.a2 - _square(place, law, p)), _wrapped(place, law))
 
@@ -346,14 +349,14 @@ def _margin(choose: Callable[..., float], law: PeriodicShift, p: Constants) -> M
 def greatest_shift(parameters: SliderCrankParameters) -> float | None:
     """Find the greatest constant shift ``|S1|`` (m) at which the crank turns fully; None if there is none.
 
-    It turns fully at a shift of either sign up to this one. With the guide parallel to the crank axis any shift will do, and
-    the value is infinite.
+    The crank turns fully at shifts of either sign up to this value. With the guide parallel to the crank axis it does so at any
+    shift, and the value is infinite.
     """
     p = parameters.constants()
     if p.a2 < p.a1 + abs(p.a4):
         return None
     # |S1 sin(alpha4) - a1 s cos(alpha4)| <= r = sqrt(a2^2 - f^2) at every angle: |S1 sin(alpha4)| is at most the least
-    # value of a1 s |cos(alpha4)| + r, which is that of a slider in the plane but for the cosine
+    # value of a1 s |cos(alpha4)| + r, the position of a planar slider apart from the cosine
 
     def changes(middle: float, half: float) -> _Change:
         c, s = cos(middle), sin(middle)
@@ -372,7 +375,7 @@ def greatest_shift(parameters: SliderCrankParameters) -> float | None:
     least = min(bound(zero.angle) for zero in _zeros(_slider_slope(changes, 1.0), _SEAM, _SEAM + 2.0 * pi, p.a1 * p.a2))
     if least < 0.0:
         return None
-    # a twist of pi has a sine of its rounding
+    # the sine of a twist of pi is a rounding error
     parallel = abs(p.sa) <= 4.0 * float_info.epsilon * max(1.0, abs(parameters.guide_twist))
     return inf if parallel else least / abs(p.sa)
 
@@ -380,7 +383,7 @@ def greatest_shift(parameters: SliderCrankParameters) -> float | None:
 def _place(angle: float, law: PeriodicShift, p: Constants, *, limit: bool = False) -> Place:
     """Return the configuration at an angle; at the ``limit`` of assembly the rod is perpendicular to the guide."""
     shift = law.at(angle)[0]
-    # at the limit the rounding of the angle would be a root of it in h
+    # at the limit h is set to zero: the square root would magnify the rounding error of the angle
     h = 0.0 if limit else p.branch * sqrt(max(0.0, kinematics.assembly_square(angle, shift, p)))
     return Place(_wrapped(angle, law), shift, h - p.a1 * sin(angle) * p.sa - shift * p.ca)
 
@@ -393,7 +396,7 @@ def _dead_centres(low: float, high: float, law: PeriodicShift, p: Constants, pit
 
 def _range(low: float, high: float, law: PeriodicShift, p: Constants) -> Range:
     dead = _dead_centres(low, high, law, p, 1.0)
-    # a full turn is searched from the seam, and reported from zero
+    # a full turn is searched from `_SEAM` on, and reported from zero on
     full = low == _SEAM
     places = [_place(low, law, p, limit=not full), _place(high, law, p, limit=not full)]
     places += [Place(*centre[:3]) for centre in dead]
@@ -403,12 +406,12 @@ def _range(low: float, high: float, law: PeriodicShift, p: Constants) -> Range:
 
 
 def _assembled(law: PeriodicShift, p: Constants) -> list[tuple[float, float]]:
-    """Find the ends of the ranges in which the rod reaches the guide."""
+    """Find the ranges (low, high) of crank angles in which the rod reaches the guide."""
     extremes = _extremes(law, p)
     reached = [_square(angle, law, p) >= 0.0 for angle in extremes]
     if all(reached):
         return [(_SEAM, _SEAM + law.span)]
-    # between two extremes D is monotonic; the turn closes with the first extreme, a span on
+    # between two extremes D is monotonic; the last interval ends at the first extreme plus a span
     closed = [*extremes, extremes[0] + law.span]
     starts: list[float] = []
     ends: list[float] = []
@@ -416,7 +419,7 @@ def _assembled(law: PeriodicShift, p: Constants) -> list[tuple[float, float]]:
         if at_a != at_b:
             crossing = _bisect(lambda x: _square(x, law, p) >= 0.0, a, b)
             (ends if at_a else starts).append(crossing)
-    # a range that begins before the seam is ended by the first crossing after it, a span on
+    # a range that contains the seam ends at the first crossing after it, plus a span
     if ends and ends[0] < starts[0]:
         ends.append(ends.pop(0) + law.span)
     return sorted(zip(starts, ends), key=lambda pair: _wrapped(pair[0], law))
@@ -426,9 +429,9 @@ def _assembled(law: PeriodicShift, p: Constants) -> list[tuple[float, float]]:
 def ranges(parameters: SliderCrankParameters, law: PeriodicShift) -> tuple[Range, ...]:
     """Find the ranges of crank angles in which the rod reaches the guide, with dead centres and stroke.
 
-    One from 0 to the span where the crank turns fully; none where it cannot be assembled at all; at most two at a constant
-    shift. Their ends, at which rod and guide are perpendicular, are those of geometry: the plant's steps stop as soon as the
-    rod is within `linkwork.limits.LIMIT_SINE` of that.
+    There is one range, from 0 to the span, if the crank turns fully; none if the mechanism cannot be assembled at all; at most
+    two at a constant shift. At the ends of a range rod and guide are exactly perpendicular; the plant's steps stop earlier,
+    within `linkwork.limits.LIMIT_SINE` of such an end.
     """
     p = parameters.constants()
     return tuple(_range(low, high, law, p) for low, high in _assembled(law, p))
@@ -441,7 +444,7 @@ def assembled_ranges(parameters: SliderCrankParameters, law: PeriodicShift) -> t
     Raises
     ------
     AssemblyError
-        If there is none; the message has the least missing length of the rod.
+        If there is no such range; the message gives the least missing length of the rod.
     """
     found = ranges(parameters, law)
     if not found:
@@ -457,13 +460,13 @@ def assembled_ranges(parameters: SliderCrankParameters, law: PeriodicShift) -> t
 
 @takes_published()
 def dead_centres(parameters: SliderCrankParameters, law: PeriodicShift) -> tuple[DeadCentre, ...]:
-    """Find all configurations in which the slider turns back, in the order of their angles: dS4/dtheta1 = 0 along the law.
+    """Find all configurations in which the slider reverses, in the order of their angles: dS4/dtheta1 = 0 along the law.
 
-    None where the slider stands still at every angle. At a constant shift there are two where the crank turns fully, of at
-    most four on both branches together.
+    There are none if the slider stands still at every angle. At a constant shift there are two if the crank turns fully, and at
+    most four on the two branches together.
 
-    With the crank torque given and the slider force sought, these are the singular configurations of a crank whose shift a
-    groove in its shaft makes, or at a constant shift. Where the shift is driven from outside it is `singularities`.
+    If the crank torque is given and the slider force sought, these configurations are singular at a constant shift, or if a
+    groove in the shaft makes the shift. If the shift has a drive of its own, the singular ones are those of `singularities`.
     """
     return tuple(sorted(centre for part in ranges(parameters, law) for centre in part.dead_centres))
 
@@ -474,8 +477,8 @@ def singularities(parameters: SliderCrankParameters, law: PeriodicShift) -> tupl
 
     kth is the derivative of the slider position by the crank angle at constant shift. If the shift has a drive of its own, kth
     multiplies the slider force in the crank's equation of motion (the thesis's force problem), whatever the rate of the shift.
-    The slider itself stops here only if the shift is constant; ``outer`` is true where its position would have a maximum (on
-    branch +1) at constant shift.
+    The slider itself stops in these configurations only if the shift is constant; ``outer`` is true if its position would have
+    a maximum (on branch +1) at constant shift.
     """
     p = parameters.constants()
     found = (_dead_centres(low, high, law, p, 0.0) for low, high in _assembled(law, p))

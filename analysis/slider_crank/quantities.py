@@ -1,4 +1,4 @@
-"""Names, frames and units of the slider-crank's forces, and checked arrays of values."""
+"""Define names, frames and units of the slider-crank's forces, and check arrays of values."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from ..units import INCH
 FloatArray: TypeAlias = NDArray[np.float64]
 MaskedArray: TypeAlias = "np.ma.MaskedArray[Any, np.dtype[np.float64]]"
 
-#: Share of the crank's length below which dS4/dtheta1 is taken as zero: there no torque balances a force on the slider.
+#: Value relative to the crank's length below which dS4/dtheta1 counts as zero: no torque then balances a force on the slider.
 DEAD_CENTRE = 1e-9
 
 
@@ -74,7 +74,7 @@ def unit_table(units: str) -> Mapping[str, tuple[str, float]]:
 
 
 def shown_units(units: str) -> Mapping[str, tuple[str, float]]:
-    """Return an entry of `UNITS` for tables and pictures, which have millimetres where it has metres.
+    """Return an entry of `UNITS` for tables and figures: with "SI", lengths are in millimetres instead of metres.
 
     Raises
     ------
@@ -86,7 +86,7 @@ def shown_units(units: str) -> Mapping[str, tuple[str, float]]:
 
 
 def check_joint(name: str, frame: int) -> None:
-    """Make sure that a force or moment and a frame exist; raises InputError if not."""
+    """Check that a force or moment of this name and a frame of this number exist; raises InputError if not."""
     if name not in JOINTS:
         raise unknown_name(name, JOINTS, f"joint force or moment {name!r}")
     if frame not in FRAMES:
@@ -95,7 +95,7 @@ def check_joint(name: str, frame: int) -> None:
 
 
 def masked_array(values: ArrayLike, where: NDArray[np.bool_]) -> MaskedArray:
-    """Return values as a masked array, NaN under the mask; the mask is broadcast."""
+    """Return values as a masked array with the mask ``where``, which is broadcast; masked values are NaN."""
     whole = np.asarray(values, dtype=float)
     mask = np.broadcast_to(where, whole.shape).copy()
     return np.ma.MaskedArray(np.where(mask, np.nan, whole), mask=mask, fill_value=np.nan)
@@ -110,12 +110,12 @@ def float_array(value: ArrayLike, message: str) -> FloatArray:
 
 
 def per_angle(name: str, value: ArrayLike, n: int) -> FloatArray:
-    """Return a finite value for each of n crank angles.
+    """Return an array with a finite value for each of n crank angles, from one value or n values.
 
     Raises
     ------
     InputError
-        If the value is neither a finite number nor n of them.
+        If the value is neither a finite number nor n finite numbers.
     """
     values = float_array(value, f"{name} is {value!r}: it must be a number in SI or an array of them")
     if values.shape not in ((), (1,), (n,)):

@@ -1,4 +1,4 @@
-"""Monte Carlo of a slider-crank with tolerances, compared with the estimates without samples (`tolerances`)."""
+"""Run a Monte Carlo analysis of a slider-crank with tolerances, and compare it with the estimates without samples."""
 
 from __future__ import annotations
 
@@ -34,13 +34,13 @@ from .tolerances import (
     vary,
 )
 
-#: Percentiles that a Monte Carlo gives: the normal distribution's at -3, -2, 0, 2, 3 standard deviations.
+#: Percentiles of a Monte Carlo: those of the normal distribution at -3, -2, 0, 2, 3 standard deviations.
 PERCENTILES = (0.13498980316300957, 2.275013194817921, 50.0, 97.72498680518208, 99.86501019683699)
-#: Share of the standard deviation by which the linear estimate may be off before it is reported.
+#: Error of the linear estimate, relative to the standard deviation, above which it is reported.
 OFF = 0.05
-#: Samples that are worked on at once, few enough for the processor's cache.
+#: Number of samples that are evaluated at once, small enough for the processor's cache.
 _CHUNK = 16384
-#: Parts of a turn for each worker.
+#: Number of parts of the turn for each worker.
 _PARTS = 4
 #: Bins of the histograms.
 _BINS = 80
@@ -53,14 +53,16 @@ class Spread:
     Attributes
     ----------
     mean, deviation : masked array, shape (n,)
-        Mean and standard deviation; masked where samples fall on both sides of a dead centre and the quantity has its pole
-        between them: there they do not exist, although a sum of the samples does.
+        Mean and standard deviation; masked if samples fall on both sides of a dead centre at which the quantity has a pole.
+        Mean and deviation of the distribution then do not exist, although those of the samples can be computed.
     percentiles : masked array, shape (p, n)
-        At `PERCENTILES`; masked only where there is no sample.
+        Values at `PERCENTILES`; masked only if there is no sample.
     least, greatest : masked array, shape (n,)
+        Least and greatest value among the samples.
     edges : ndarray, shape (n, b + 1)
+        Edges of the bins of the histograms.
     counts : ndarray, shape (n, b)
-        Histograms of the middle 99.9 % of the samples.
+        Histograms of the middle 99.9 % of the samples: number of samples in each bin.
     """
 
     mean: MaskedArray
@@ -83,13 +85,13 @@ class MonteCarlo:
     tolerances : tuple of Tolerance
     samples, seed : int
     spreads : mapping
-        Quantity to `Spread`.
+        `Spread` of each quantity, by name.
     estimates : mapping
-        Quantity to `Estimate`.
+        `Estimate` of each quantity, by name.
     not_assembled : ndarray of int, shape (n,)
-        Samples whose rod does not reach the guide; they are in no mean or percentile.
+        Number of samples whose rod does not reach the guide; they are left out of the statistics.
     undetermined : ndarray of int, shape (n,)
-        Samples at a dead centre itself where the slider's force is sought; likewise.
+        Number of samples exactly at a dead centre, if the slider's force is sought; they are left out, too.
     """
 
     turn: ForceTurn
@@ -145,15 +147,15 @@ class MonteCarlo:
         return tuple(found)
 
     def _without_estimate(self, quantity: str) -> NDArray[np.bool_]:
-        """Return where a determined quantity has no estimate because a dead centre is near (n,)."""
+        """Return a mask (n,) of the angles at which a determined quantity has no estimate because a dead centre is near."""
         linear = self.estimates[quantity]
         return np.asarray(np.ma.getmaskarray(linear.deviation) & ~np.ma.getmaskarray(linear.nominal))
 
     def linear_is_off(self, quantity: str) -> NDArray[np.bool_]:
-        """Return where the linear estimate misses mean or standard deviation by more than 5 % of the latter (n,).
+        """Return a mask (n,) of the angles at which the linear estimate is off.
 
-        Five standard errors of the samples are allowed on top. Near a dead centre, without an estimate or without mean and
-        deviation, it is off.
+        It is off if its mean or standard deviation is wrong by more than 5 % of the standard deviation plus five standard
+        errors of the samples, or if a dead centre is so near that there is no estimate.
         """
         check_names((quantity,), self.spreads, "quantity")
         spread, linear = self.spreads[quantity], self.estimates[quantity]
@@ -175,7 +177,7 @@ class MonteCarlo:
         ParameterError
             If the quantity was not sampled.
         InputError
-            If it is not determined there.
+            If the quantity is not determined there.
         """
         check_names((quantity,), self.spreads, "quantity")
         i = int(np.argmin(np.abs(self.turn.angle - angle)))
@@ -192,7 +194,10 @@ class MonteCarlo:
         return () if free else tuple(centre.crank_angle for centre in self.turn.singularities)
 
     def _failure_sentence(self, name: str, unit: str, one: float) -> list[str]:
-        """Return the sentence on the worst failure of the linear estimate, if any, in a unit of the value ``one`` in SI."""
+        """Return a list with the sentence on the worst failure of the linear estimate, or an empty one.
+
+        ``one`` is the value in SI of the unit ``unit``.
+        """
         off = np.flatnonzero(self.linear_is_off(name) & ~self._without_estimate(name))
         if not off.size:
             return []
@@ -224,8 +229,8 @@ def monte_carlo(
 ) -> MonteCarlo:
     """Sample a mechanism with random errors of its dimensions, at every angle of a turn.
 
-    The same samples are taken at all angles. An angle takes about 0.2 s with a million samples of the slider's motion, and
-    about 2 to 3 s with all joint forces.
+    The same samples are used at all angles. With a million samples, each angle takes about 0.2 s for the slider's motion, and
+    about 2 to 3 s for all joint forces.
 
     Parameters
     ----------
@@ -233,8 +238,9 @@ def monte_carlo(
         The nominal mechanism; see `sensitivities` for the quantities held constant.
     tolerances : sequence of Tolerance
     quantities : sequence of str
-        Of `QUANTITIES`.
+        Names of `QUANTITIES`.
     samples : int
+        Number of samples.
     seed : int
         Seed of the random numbers: the same seed gives the same samples.
     n_jobs : int, optional
@@ -284,7 +290,7 @@ def monte_carlo(
 
 
 def _mask_poles(linear: Estimate, poles: NDArray[np.bool_]) -> Estimate:
-    """Return the estimate masked at angles at which the samples have a pole."""
+    """Return an estimate masked at the angles at which samples fall on both sides of a pole."""
     values = {name: getattr(linear, name) for name in Estimate.__dataclass_fields__ if name != "nominal"}
     return replace(
         linear, **{name: np.ma.masked_where(np.broadcast_to(poles, x.shape), x) for name, x in values.items()}
@@ -292,12 +298,12 @@ def _mask_poles(linear: Estimate, poles: NDArray[np.bool_]) -> Estimate:
 
 
 class _Draws(NamedTuple):
-    """The samples at one angle: statistics by quantity, whether they straddle a dead centre, numbers left out."""
+    """The evaluated samples at one angle."""
 
-    statistics: Mapping[str, tuple[Any, ...]]
-    across: bool
-    not_assembled: int
-    undetermined: int
+    statistics: Mapping[str, tuple[Any, ...]]  # fields of `Spread`, by quantity
+    across: bool  # whether samples fall on both sides of a dead centre
+    not_assembled: int  # see `MonteCarlo`
+    undetermined: int  # see `MonteCarlo`
 
 
 def _sample_angles(
@@ -308,7 +314,7 @@ def _sample_angles(
     seed: int,
     places: Sequence[int],
 ) -> list[_Draws]:
-    """Return the samples at some of the angles; drawing them anew takes less time than sending them."""
+    """Draw the samples and evaluate them at some of the angles; drawing them in each worker is faster than sending them."""
     generator = np.random.default_rng(seed)
     errors = {t.name: t.draw(generator, samples) for t in tolerances}
     _check_samples(turn.parameters, errors)
@@ -351,7 +357,7 @@ def _statistics(values: FloatArray) -> tuple[Any, ...]:
     percentiles = values[below] + (places - below) * (values[below + 1] - values[below])
     low, high = values[0], values[-1]
     first, last = values[int(0.0005 * values.size)], values[int(0.9995 * (values.size - 1))]
-    # all samples alike have a bin of no width: it is given a width that floats can represent
+    # if all samples are equal, the bins would have no width: they are given one that floats can represent
     edges = first + np.linspace(0.0, max(last - first, 1e-12 * max(abs(low), abs(high)), 1e-300), _BINS + 1)
     inside = np.searchsorted(values, edges[:-1])
     counts = np.diff(inside, append=np.searchsorted(values, edges[-1], "right"))
@@ -359,7 +365,7 @@ def _statistics(values: FloatArray) -> tuple[Any, ...]:
 
 
 def _spread(rows: Sequence[tuple[Any, ...]], poles: NDArray[np.bool_]) -> Spread:
-    """Collect the statistics of all angles, without mean and deviation at the poles."""
+    """Collect the statistics of all angles; mean and deviation are masked at the poles."""
     mean, deviation, percentiles, least, greatest, edges, counts = (np.array(part) for part in zip(*rows))
     return Spread(
         mean=masked_array(mean, poles | np.isnan(mean)),
@@ -373,7 +379,7 @@ def _spread(rows: Sequence[tuple[Any, ...]], poles: NDArray[np.bool_]) -> Spread
 
 
 def _check_samples(parameters: SliderCrankParameters, drawn: Mapping[str, FloatArray]) -> None:
-    """Make sure that every sample is a valid mechanism, by the rules of `SliderCrankParameters`.
+    """Check that every sample is a valid mechanism, by the rules of `SliderCrankParameters`.
 
     Raises InputError if some are invalid, with the tolerances that make them so and their number.
     """

@@ -1,6 +1,6 @@
-"""Laws of the axial shift over the crank's turn, on arrays, and the special configurations along them.
+"""Define laws of the axial shift over the crank's turn, on arrays, and find the special configurations along them.
 
-The plant's functions on arrays are here too, because the law of a groove is one of them.
+The plant's functions on arrays are also here, because the law of a groove is one of them.
 """
 
 from __future__ import annotations
@@ -48,21 +48,21 @@ class ShiftLaw(Protocol):
     """A law of the crank's axial shift over its turn."""
 
     def at(self, angle: Any, speed: Any, acceleration: Any) -> ShiftMotion:
-        """Return shift and rates at crank angles (rad), speeds (rad/s) and accelerations (rad/s2) of one shape."""
+        """Return shift and rates at crank angles (rad), speeds (rad/s) and accelerations (rad/s2) of equal shape."""
 
     def repeating(self, parameters: SliderCrankParameters) -> mobility.PeriodicShift | None:
-        """Return the law for `analysis.slider_crank.mobility`; None if it may not repeat after whole turns."""
+        """Return the law in the form for `mobility`; None if it is not known to repeat after whole turns."""
 
 
 @in_si(value="m")
 @dataclass(frozen=True, slots=True)
 class ConstantShift:
-    """The crank held at a shift S1 (m).
+    """A law for a crank that is held at a constant shift S1 (m).
 
     Raises
     ------
     InputError
-        If it is not finite.
+        If the shift is not finite.
     """
 
     value: Amount = 0.0
@@ -84,7 +84,7 @@ class ConstantShift:
 @in_si(amplitude="m")
 @dataclass(frozen=True, slots=True)
 class GrooveShift:
-    """S1 = SS1 sin(alpha theta1), eq 28 (eq 28a prints S1 for SS1).
+    """The law of a groove, S1 = SS1 sin(alpha theta1), eq 28 (eq 28a prints S1 for SS1).
 
     Parameters
     ----------
@@ -93,8 +93,8 @@ class GrooveShift:
     ratio : float
         alpha, periods of the shift in a turn of the crank.
     in_shaft : bool
-        Whether the groove is cut in the crank's shaft, so that the torque of the drive works against its flank: the groove of
-        the plant and the FMU. By default, as in the thesis, something apart from the crank's drive moves the crank along.
+        Whether the groove is cut in the crank's shaft, so that the torque of the drive works against its flank, as in the plant
+        and the FMU. By default, as in the thesis, a drive of its own shifts the crank.
 
     Raises
     ------
@@ -113,7 +113,7 @@ class GrooveShift:
 
     def at(self, angle: Any, speed: Any, acceleration: Any) -> ShiftMotion:
         """See `ShiftLaw`."""
-        # all that the plant's function asks the constants for is amplitude and ratio
+        # the plant's function uses only amplitude and ratio of the constants
         shift, pitch, bend = plant_functions().groove(angle, self)
         return ShiftMotion(shift, pitch * speed, pitch * acceleration + bend * speed * speed)
 
@@ -160,8 +160,8 @@ class AngleShift:
 class TimeShift:
     """A shift given as a function of time with its first two derivatives, for a crank of constant speed.
 
-    ``value``, ``velocity`` and ``acceleration`` take an array of times (s) and give m, m/s and m/s2. The time is 0 where the
-    crank angle is.
+    ``value``, ``velocity`` and ``acceleration`` take an array of times (s) and give m, m/s and m/s2. The time is 0 when the
+    crank angle is 0.
 
     Raises
     ------
@@ -195,13 +195,13 @@ def has_shaft_groove(law: ShiftLaw) -> bool:
 
 
 def with_groove(p: Constants, law: ShiftLaw) -> Constants:
-    """Return the constants with the groove of the law, if it is one."""
+    """Return the constants with amplitude and ratio of a `GrooveShift`; for any other law return them unchanged."""
     return p._replace(amplitude=law.amplitude, ratio=law.ratio) if isinstance(law, GrooveShift) else p
 
 
 # Special configurations along a law
 
-#: Pieces of a turn in which signs are compared under a law that need not repeat; two zeros in one piece go unseen.
+#: Pieces of a turn at whose ends signs are compared if the law need not repeat; two zeros in one piece are not found.
 _PIECES = 1440
 
 
@@ -217,11 +217,11 @@ class Course:
     speed: float
 
     def dead_centres(self, low: float, high: float) -> tuple[DeadCentre, ...]:
-        """Find the configurations from ``low`` to ``high`` (rad) in which the slider turns back."""
+        """Find the configurations from ``low`` to ``high`` (rad) in which the slider reverses."""
         return self._zeros(low, high, held=False)
 
     def singularities(self, low: float, high: float) -> tuple[DeadCentre, ...]:
-        """Find the configurations from ``low`` to ``high`` (rad) in which the slider would turn back at constant shift."""
+        """Find the configurations from ``low`` to ``high`` (rad) in which the slider would reverse at constant shift."""
         return self._zeros(low, high, held=True)
 
     def limits(self, low: float, high: float) -> tuple[float, ...]:
@@ -241,7 +241,7 @@ class Course:
         return tuple(sorted(end for end in moved if low <= end <= high))
 
     def _zeros(self, low: float, high: float, *, held: bool) -> tuple[DeadCentre, ...]:
-        """Find the zeros of the slider's velocity along the law, or with the shift held."""
+        """Find the zeros of the slider's velocity along the law, or with the shift held constant if ``held``."""
         repeating = self.law.repeating(self.parameters)
         if repeating is None:
             return self._sign_changes(low, high, 0.0 if held else 1.0)
@@ -255,7 +255,7 @@ class Course:
         return tuple(centre for centre in moved if low <= centre.crank_angle <= high)
 
     def _sign_changes(self, low: float, high: float, pitch: float) -> tuple[DeadCentre, ...]:
-        """Find zeros of kth + ``pitch`` S1' ks by its signs at `_PIECES` places of the turn."""
+        """Find the zeros of kth + ``pitch`` S1' ks from its signs at `_PIECES` angles of a turn."""
         f, p = plant_functions(), self.parameters.constants()
 
         def slope(angle: FloatArray) -> FloatArray:
@@ -281,7 +281,7 @@ class Course:
         return self.law.at(angle, np.full(angle.shape, self.speed or 1.0), np.zeros(angle.shape))
 
     def _square(self, angle: FloatArray) -> FloatArray:
-        """Return rod length squared less distance squared of crank pin and guide (m2): positive if it can be assembled."""
+        """Return rod length squared minus squared distance of crank pin and guide (m2); it can be assembled if positive."""
         return np.asarray(
             plant_functions().assembly_square(angle, self._shift(angle).shift, self.parameters.constants())
         )
@@ -293,5 +293,5 @@ def _whole_spans(low: float, high: float, span: float) -> list[float]:
 
 
 def _search_angles(low: float, high: float) -> FloatArray:
-    """Return the angles between which signs are compared."""
+    """Return evenly spaced angles from ``low`` to ``high`` at which signs are compared."""
     return np.linspace(low, high, ceil((high - low) / tau * _PIECES) + 1)

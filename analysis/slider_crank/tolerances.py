@@ -1,13 +1,13 @@
-"""Effect of manufacturing tolerances on the slider-crank without samples: exact sensitivities and estimates of the spread.
+"""Compute the effect of manufacturing tolerances on the slider-crank without samples: exact sensitivities, estimated spread.
 
-The nominal mechanism and its motion are a `ForceTurn`; an error adds to one of its dimensions, masses or settings while all the
-others, and the motion of the crank, stay. The derivatives are exact: the plant's own equations on dual numbers
-(`analysis.numerics.dual`).
+The nominal mechanism and its motion are a `ForceTurn`. An error is added to one of its dimensions, masses or settings while all
+others, and the motion of the crank, stay the same. The derivatives are exact: the plant's own equations are evaluated on dual
+numbers (`analysis.numerics.dual`).
 
 The linear estimate adds the variances of independent errors, each times the square of its derivative. It fails where the
 derivatives vanish: at the ideal mechanism (S1 = a4 = 0, alpha4 = 270 deg) the slider's position is of the second order in S1
-and alpha4 at every angle, and in a4 at 90 and 270 deg. So the estimate to second order stands beside it, and a Monte Carlo
-(`sampling`), the same equations on arrays of random samples, says where the linear one is off.
+and alpha4 at every angle, and in a4 at 90 and 270 deg. Therefore there is also an estimate to second order, and a Monte Carlo
+analysis (`sampling`), which evaluates the same equations on random samples, shows where the linear estimate is off.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ from .forces import SLIDER_FORCE, ForceTurn, solve
 from .quantities import JOINTS, FloatArray, MaskedArray, masked_array
 from .shifts import ShiftMotion, has_shaft_groove, plant_functions, with_groove
 
-#: What is in error besides the mechanism's parameters: the crank angle and the axial shift, by the names of their outputs.
+#: Settings that may be in error besides the mechanism's parameters: the crank angle and the axial shift, by output name.
 ANGLE, SHIFT = "crank.angle", "shift.position"
 #: The errors for which sensitivities are computed by default: theta1, S1, a1, a2, a4, alpha4.
 DIMENSIONS = (ANGLE, SHIFT, "crank.length", "rod.length", "guide.offset", "guide.twist")
@@ -49,11 +49,11 @@ _ERRORS = {
         and not v.name.startswith("groove.")
     )
 }
-#: Everything that may be in error, with its unit, and the symbols of the thesis.
+#: Names of all that may be in error, with the units; the symbols of the thesis, where there are any.
 ERRORS: Mapping[str, str] = MappingProxyType({name: v.unit for name, v in _ERRORS.items()})
 SYMBOLS: Mapping[str, str] = MappingProxyType({name: v.symbol for name, v in _ERRORS.items() if v.symbol})
 
-#: Quantities that no force takes part in.
+#: Quantities that do not depend on forces.
 KINEMATIC = ("slider.position", "slider.velocity", "slider.acceleration")
 #: Field of `Reactions` and its component by the name of the FMI interface.
 _COMPONENTS = {
@@ -61,7 +61,7 @@ _COMPONENTS = {
     for vector in JOINTS
     for axis in "xyz"
 }
-#: Everything that sensitivities are given of, by the names of the FMI interface, with its unit. Vectors are in the ground
+#: All quantities that have sensitivities, by the names of the FMI interface, with their units. Vectors are in the ground
 #: frame, the moment of the bearing about O; bearing.fz is the axial force. In the thesis's problem, where the torque is given,
 #: drive.applied_torque has no sensitivity and slider.load is the force that is sought.
 QUANTITIES: Mapping[str, str] = MappingProxyType(
@@ -71,10 +71,10 @@ QUANTITIES: Mapping[str, str] = MappingProxyType(
         if v.name in (*KINEMATIC, *_COMPONENTS, "drive.applied_torque", "slider.load")
     }
 )
-#: What does not depend on the load where that is sought, and so is determined at a dead centre too.
+#: Quantities that do not depend on the load if it is sought, and are therefore determined at a dead centre, too.
 FREE_OF_LOAD = (*KINEMATIC, "drive.applied_torque", "guide.mx", "guide.my", "guide.mz")
 
-#: The constants of the equations for arrays or dual numbers in the place of the parameters.
+#: `SliderCrankParameters.constants` for parameters that are arrays or dual numbers.
 _CONSTANTS: Callable[[Any], Constants] = rebound((parameters,), {"cos": np.cos, "sin": np.sin}).of(
     SliderCrankParameters.constants
 )
@@ -89,12 +89,12 @@ class Sensitivities:
     turn : ForceTurn
         The nominal mechanism and its motion.
     names : tuple of str
-        The m errors of the derivatives.
+        Names of the m errors.
     values : mapping
-        Quantity to its nominal values, masked array (n,).
+        Nominal values of each quantity, by name: masked array (n,).
     derivatives : mapping
-        Quantity to masked array (m, n): the quantity's unit over the error's. If the load is unknown, quantities that depend on
-        it are masked at the dead centres.
+        Derivatives of each quantity by the errors, by name: masked array (m, n), in the unit of the quantity divided by that of
+        the error. If the load is unknown, quantities that depend on it are masked at the dead centres.
     """
 
     turn: ForceTurn
@@ -108,7 +108,7 @@ class Sensitivities:
         Raises
         ------
         ParameterError
-            If it is not among them.
+            If there is no such quantity or error here.
         """
         check_names((quantity,), self.derivatives, "quantity")
         check_names((error,), self.names, "error")
@@ -127,9 +127,9 @@ def sensitivities(
         An error of the crank angle does not change the shift, unless a groove in the shaft makes it; an error of a length does
         not change masses, centres of mass or moments of inertia.
     errors : sequence of str
-        Of `ERRORS`; by default `DIMENSIONS`.
+        Names of `ERRORS`; by default `DIMENSIONS`.
     quantities : sequence of str
-        Of `QUANTITIES`; by default all.
+        Names of `QUANTITIES`; by default all.
 
     Raises
     ------
@@ -165,13 +165,13 @@ class Varied:
 
     @property
     def square(self) -> Any:
-        """Rod length squared less distance squared of crank pin and guide (m2): positive if it can be assembled."""
+        """Rod length squared minus squared distance of crank pin and guide (m2); it can be assembled if this is positive."""
         return plant_functions().assembly_square(self.angle, self.moving.shift, self.p)
 
     def evaluate(self, quantities: Collection[str]) -> tuple[dict[str, Any], Any]:
-        """Compute the quantities, and the lever of the slider's force.
+        """Compute quantities by name, and the lever of the slider's force (m).
 
-        Only the needed parts are computed; the lever is zero if no force is asked for.
+        Only what is needed is computed; the lever is 0 if no quantity depends on forces.
         """
         turn, p, moving = self.turn, self.p, self.moving
         w, e = turn.speed[self.at], turn.acceleration[self.at]
@@ -220,20 +220,20 @@ def vary(turn: ForceTurn, at: Any, errors: Mapping[str, Any]) -> Varied:
 
 
 def error_variables(names: Sequence[str], n: int, moved: int = 0, step: float = 0.0) -> dict[str, Dual]:
-    """Return errors at n points as independent variables, all zero but one, which is moved by a step."""
+    """Return errors at n points as independent dual variables by name, all zero except number ``moved``, which is ``step``."""
     values = np.zeros((len(names), n))
     values[moved] = step
     return dict(zip(names, independent(*values)))
 
 
 def undetermined(turn: ForceTurn, quantity: str) -> NDArray[np.bool_]:
-    """Return where a quantity of the nominal mechanism is undetermined at a dead centre."""
+    """Return a mask (n,) of the angles at which a quantity of the nominal mechanism is undetermined: dead centres."""
     dead = np.ma.getmaskarray(turn.slider_force)
     return np.zeros(len(turn), dtype=bool) if quantity in FREE_OF_LOAD else dead
 
 
 def check_names(names: Sequence[str], known: Collection[str], kind: str) -> None:
-    """Make sure that quantities or errors of these names exist.
+    """Check that quantities or errors of these names exist.
 
     Raises UnknownNameError if one does not.
     """
@@ -246,7 +246,7 @@ def check_names(names: Sequence[str], known: Collection[str], kind: str) -> None
 
 #: Standard deviations in the half width of a normal tolerance.
 NORMAL_EXTENT = 3.0
-#: By distribution: half width over standard deviation, and the fourth moment over the square of the variance.
+#: By distribution: half width divided by standard deviation, and fourth moment divided by the square of the variance.
 _DISTRIBUTIONS = {"normal": (NORMAL_EXTENT, 3.0), "uniform": (sqrt(3.0), 1.8), "triangular": (sqrt(6.0), 2.4)}
 
 
@@ -259,10 +259,10 @@ class Tolerance:
     name : str
         One of `ERRORS`: a parameter of the mechanism by its FMI name, "shift.position" or "crank.angle".
     half_width : float or str, optional
-        Half the width of the tolerance, in the SI unit of the erroneous quantity or with a unit, such as "0.1 mm". A normal
-        distribution has three standard deviations in it and is not cut off there.
+        Half the width of the tolerance, in the SI unit of the quantity that is in error, or with a unit, such as "0.1 mm".
+        For a normal distribution it is three standard deviations; the distribution is not cut off there.
     standard_deviation : float, optional
-        In place of the half width.
+        Standard deviation, instead of the half width.
     distribution : str
         "normal", "uniform" or "triangular".
 
@@ -271,7 +271,7 @@ class Tolerance:
     ParameterError
         If there is no such error.
     InputError
-        If not one of half width and standard deviation is given, if it is not a finite number above zero, or if the
+        If not exactly one of half width and standard deviation is given, if it is not a finite number above zero, or if the
         distribution is none of the three.
     """
 
@@ -304,13 +304,13 @@ class Tolerance:
 
     @property
     def extent(self) -> float:
-        """Half width, of a normal distribution three standard deviations."""
+        """Half width; for a normal distribution three standard deviations."""
         if self.half_width is not None:
             return float(self.half_width)
         return self.deviation * _DISTRIBUTIONS[self.distribution][0]
 
     def draw(self, generator: np.random.Generator, samples: int) -> FloatArray:
-        """Draw random errors (samples,)."""
+        """Draw random errors, shape (samples,)."""
         if self.distribution == "normal":
             return generator.normal(0.0, self.deviation, samples)
         if self.distribution == "uniform":
@@ -325,20 +325,22 @@ class Estimate:
     Attributes
     ----------
     nominal : masked array, shape (n,)
+        Nominal value.
     deviation : masked array, shape (n,)
         Standard deviation to first order: the root of the sum of squares of derivative times standard deviation.
     worst : masked array, shape (n,)
-        Greatest departure to first order: every error at its extent, with the sign that makes it worse.
+        Greatest deviation from the nominal value to first order: every error is at its extent, with the sign that makes it
+        worse.
     shares : masked array, shape (m, n)
-        Share of each tolerance in the variance to first order; masked where the variance is zero but for rounding.
+        Share of each tolerance in the variance to first order; masked if the variance is only a rounding error.
     second_mean, second_deviation : masked array, shape (n,)
-        Mean and standard deviation to second order, from exact derivatives and their differences over one standard
-        deviation; masked where the mechanism cannot be assembled there.
+        Mean and standard deviation to second order, from exact first derivatives and their differences over one standard
+        deviation; masked if the mechanism cannot be assembled with these errors.
     second_shares : masked array, shape (m, n)
-        As ``shares``, to second order; the joint effect of two errors counts half for each.
+        As ``shares``, to second order; half of the joint effect of two errors is counted for each.
 
-    Where the slider's force is sought and the errors, all at their extents, reach a dead centre, everything but ``nominal``
-    is masked: the quantity has a pole there, and neither mean nor variance.
+    If the slider's force is sought and the errors, all at their extents, reach a dead centre, everything but ``nominal``
+    is masked: the quantity has a pole there, and has neither mean nor variance.
     """
 
     nominal: MaskedArray
@@ -386,12 +388,12 @@ def tolerance_effects(
         variance = (steps**2).sum(axis=0)
         h = 0.5 * (curvatures[name] + curvatures[name].swapaxes(0, 1))
         own = np.einsum("iin->in", h)
-        # the variance of the square of each error, and of the products of two
+        # variance from the squares of the errors, and from the products of two errors
         pairs = (h**2).sum(axis=1) - own**2
         second = steps.filled(np.nan) ** 2 + 0.25 * (kurtoses - 1.0)[:, None] * own**2 + 0.5 * pairs
         whole = second.sum(axis=0)
         lost = np.ma.getmaskarray(nominal) | ~reached | pole
-        # derivatives that are rounding errors share nothing out
+        # shares are masked if all derivatives are rounding errors
         rounding = (1e-15 * nominal.filled(0.0)) ** 2
         vanishing = variance.filled(0.0) <= np.fmax(1e-12 * whole, rounding)
         still = lost | ~(whole > rounding)
@@ -421,9 +423,10 @@ def check_tolerances(tolerances: Sequence[Tolerance]) -> tuple[str, ...]:
 def _curvatures(
     turn: ForceTurn, tolerances: Sequence[Tolerance], quantities: Sequence[str]
 ) -> tuple[dict[str, FloatArray], NDArray[np.bool_]]:
-    """Return second derivatives (m, m, n) times both standard deviations, and where all their configurations assemble.
+    """Return second derivatives times the two standard deviations, and a mask (n,): whether all mechanisms can be assembled.
 
-    They are half the differences of the first derivatives over one standard deviation to either side.
+    The second derivatives of each quantity, by name and of shape (m, m, n), are half the differences between the first
+    derivatives one standard deviation above and below.
     """
     n, m = len(turn), len(tolerances)
     names, deviations = [t.name for t in tolerances], np.array([t.deviation for t in tolerances])
@@ -442,7 +445,7 @@ def _curvatures(
 
 
 def _near_pole(turn: ForceTurn, names: tuple[str, ...], extents: FloatArray) -> NDArray[np.bool_]:
-    """Return where errors at their extents reach a zero of the slider force's lever, if that force is unknown (n,)."""
+    """Return a mask (n,): whether errors at their extents reach a zero of the slider force's lever, if the force is unknown."""
     n = len(turn)
     if turn.sought != SLIDER_FORCE:
         return np.zeros(n, dtype=bool)
