@@ -1,4 +1,4 @@
-"""Compare times at equal accuracy: each solver at its loosest setting that reaches the accuracy."""
+"""Compare times at equal accuracy: each solver runs at its loosest setting that reaches the accuracy."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ class Choice(NamedTuple):
 
 
 def loosest(error: Callable[[float], float], settings: Iterable[float]) -> Choice:
-    """Find the first of the settings, from loose to tight, that reaches the accuracy; if none does, the most accurate one.
+    """Find the first of the settings, from loose to tight, that reaches the accuracy; if none does, return the most accurate.
 
     A setting counts only if the next tighter one reaches the accuracy as well, to exclude lucky cancellation.
     """
@@ -46,7 +46,7 @@ def loosest(error: Callable[[float], float], settings: Iterable[float]) -> Choic
 
 
 def best_time(run: Callable[[], object], repeats: int = 7) -> float:
-    """Return the shortest of several runs in time of the processor (s), which other work disturbs little."""
+    """Return the shortest processor time of several runs (s), which other work on the machine disturbs little."""
     times = []
     for _ in range(repeats):
         begun = process_time()
@@ -57,7 +57,7 @@ def best_time(run: Callable[[], object], repeats: int = 7) -> float:
 
 @njit(error_model="numpy")
 def _in_turn(equation, modes, constants, states, forces):
-    """Evaluate one of the equations along states, each of which waits for the result before it, as the stages of a step do."""
+    """Evaluate an equation along states; each evaluation waits for the previous result, as do the stages of a step."""
     x, out = np.empty(states.shape[1]), np.zeros(states.shape[1])
     for i in range(states.shape[0]):
         for j in range(x.shape[0]):
@@ -67,7 +67,7 @@ def _in_turn(equation, modes, constants, states, forces):
 
 
 def right_hand_side(parameters: Parameters, inputs: Inputs, states: NDArray[np.float64]) -> float:
-    """Return the time of one compiled right-hand side (s), along states without forces, one after the other."""
+    """Return the time of one compiled right-hand side (s), evaluated at states without forces one after the other."""
     mechanism = mechanism_of(parameters)
     p = parameters.constants()
     equation = machine(mechanism, mechanism.switched(p)).addresses[DERIVATIVE]

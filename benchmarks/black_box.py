@@ -1,6 +1,6 @@
-"""Synthesis with the quality function as a black box: differential evolution, and the thesis's downhill simplex.
+"""Synthesise with the quality function as a black box: by differential evolution, and by the thesis's downhill simplex.
 
-Neither knows a derivative. `synthesize` is compared with them; chapter VI of the thesis has only the simplex.
+Neither method uses derivatives. `synthesize` is compared with both; chapter VI of the thesis has only the simplex.
 
 The quality is that of the task in normal form. A path without crank rotations is compared with the coupler curve at equal
 shares of both lengths, in both directions of travel, so that a curve that collapses onto a piece of the target, or makes
@@ -32,21 +32,21 @@ from linkwork.five_bar import kinematics
 
 FloatArray = NDArray[np.float64]
 ComplexArray = NDArray[np.complex128]
-#: Violation up to which a constraint counts as kept.
+#: Violation up to which a constraint counts as satisfied.
 KEPT = 1e-4
-#: Points of a coupler curve that a path is compared with.
+#: Points of a coupler curve with which a path is compared.
 CURVE = 128
 #: Least crank rotation over which an open path is traced (rad).
 SPAN = 0.1
 #: Generations of differential evolution, and members of a generation for each unknown.
 GENERATIONS, MEMBERS = 400, 10
-#: Random linkages of which the best is a simplex's first vertex; edge of that simplex (units, rad).
+#: Number of random linkages, the best of which is the first vertex of a simplex; edge of this simplex (units, rad).
 DRAWS, EDGE = 64, 0.2
 #: Factor of violated constraints in the simplex's quality function, in mean squared sizes of the target.
 PENALTY = 10.0
-#: Evaluations that a simplex may take for each unknown.
+#: Greatest number of evaluations of a simplex for each unknown.
 EVALUATIONS = 600
-#: The plant's loop closure over arrays, its square root zero where the links cannot be joined.
+#: The plant's loop closure over arrays; its square root is zero where the links cannot be joined.
 _joined = rebound((kinematics,), {"sqrt": lambda square: np.sqrt(np.maximum(square, 0.0))}).joined
 
 
@@ -82,11 +82,11 @@ def evolve(
     measure = quality or box.quality
 
     def violations(x: FloatArray) -> FloatArray:
-        # of one vector first, of a generation then
+        # SciPy passes one vector at first, then a generation
         return box.violations(np.atleast_2d(x.T)).T.reshape(-1, *x.shape[1:])
 
     return differential_evolution(
-        # SciPy asks for none where no member of a generation keeps the constraints
+        # if no member of a generation satisfies the constraints, SciPy passes no vectors
         lambda x: measure(x.T) if x.size else np.empty(0),
         Bounds(box.low, box.high),
         maxiter=maxiter,
@@ -111,7 +111,7 @@ def descend(
 
 
 def descend_from(box: BlackBox, first: FloatArray, score: Callable[[FloatArray], float]) -> OptimizeResult:
-    """Minimise a score by Nelder and Mead's simplex from a linkage, regular and away from the nearer bounds."""
+    """Minimise a score by Nelder and Mead's method, from a regular simplex at a linkage that extends away from near bounds."""
     away = np.where(first > 0.5 * (box.low + box.high), -1.0, 1.0)
     simplex = first + away * initial_simplex(np.zeros(len(first)), EDGE)
     return minimize(
@@ -124,7 +124,7 @@ def descend_from(box: BlackBox, first: FloatArray, score: Callable[[FloatArray],
 
 
 class BlackBox:
-    """The quality function of one assembly, and how far each constraint is violated, over rows of unknowns.
+    """The quality function of one assembly, and the violation of each constraint, for rows of unknowns.
 
     The unknowns are those of `constraints.UNKNOWNS` that are free, and of an open path the rotation over which it is traced.
 
@@ -178,7 +178,7 @@ class BlackBox:
         return np.column_stack([value for _, value in self._inequalities(q, rotation)])
 
     def answer(self, result: OptimizeResult) -> Answer:
-        """Return the answer of a search from its result."""
+        """Convert the result of a search to an `Answer`."""
         x = np.asarray(result.x)[None, :]
         q = self._linkages(x)
         rotation = self._rotations(x, q)
@@ -186,7 +186,7 @@ class BlackBox:
         worst, violation = max(((name, float(value[0])) for name, value in inequalities), key=lambda pair: pair[1])
         start = Start(q=q[0], branch=self.branch, rotation=None if self.normal.timed else rotation[0])
         quality = sum_of_squares(self.normal, start)
-        # the simplex comes to lie on a constraint, not within it
+        # the simplex ends on a constraint, not inside it
         kept = violation <= KEPT and bool(np.isfinite(quality))
         return Answer(
             start=replace(start, quality=quality),
@@ -212,12 +212,12 @@ class BlackBox:
         return q[:, 2, None] - q[:, 3, None] * np.cos(th2), -q[:, 3, None] * np.sin(th2)
 
     def _directions(self, q: FloatArray, rotation: FloatArray) -> tuple[ComplexArray, ComplexArray]:
-        """Return the directions of coupler and rocker, shape (m, n); no unit vectors if the links are stretched."""
+        """Return the directions of coupler and rocker, shape (m, n); they are not unit vectors if the links are stretched."""
         dx, dy = self._pins(q, rotation)
         with np.errstate(divide="ignore", invalid="ignore"):
             g = _joined(0.0, 0.0, dx, dy, q[:, 4, None], q[:, 5, None], float(self.branch))
         coupler, rocker = g.c3 + 1j * g.s3, g.c4 + 1j * g.s4
-        # B on D: any direction
+        # if B is on D, take any direction
         return np.nan_to_num(coupler, nan=1.0), np.nan_to_num(rocker, nan=1.0)
 
     def _traced(self, q: FloatArray, rotation: FloatArray, coupler: ComplexArray) -> ComplexArray:
@@ -242,7 +242,7 @@ class BlackBox:
     def _turned(
         self, q: FloatArray, rotation: FloatArray, coupler: ComplexArray, rocker: ComplexArray, angle: FloatArray
     ) -> FloatArray:
-        """Return the errors of angle as lengths; for a stretched link, of its direction."""
+        """Return the errors of an angle, converted to lengths; for a stretched link those of its direction."""
         own = rocker if self.normal.of_rocker else coupler * np.exp(1j * q[:, 7])[:, None]
         left: FloatArray = self.normal.leverage * np.angle(own * np.exp(1j * (q[:, 10, None] - angle)))
         return left
@@ -257,7 +257,7 @@ class BlackBox:
         return np.where(forward[:, None], *found)
 
     def _paired(self, q: FloatArray, span: FloatArray) -> FloatArray:
-        """Return the rotations at the stations' shares of the length of the curve."""
+        """Return the crank rotations at which the curve has the stations' shares of its length, shape (m, n)."""
         normal = self.normal
         assert normal.points is not None
         steps = np.abs(np.diff(np.append(normal.points, normal.points[0]) if normal.closed else normal.points))

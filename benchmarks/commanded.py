@@ -1,4 +1,4 @@
-"""How well each master follows a commanded speed that moves: error of the coordinate after 0.2 s, and its order in the step.
+"""Measure how well each master follows a varying commanded speed: error of the coordinate after 0.2 s, and its order.
 
     python -m benchmarks.commanded                   # all masters, two minutes; writes docs/commanded.csv
     python -m benchmarks.commanded --master FMPy     # one of them (repeatable); prints what it finds
@@ -23,7 +23,7 @@ from linkwork.mechanism import Mechanism
 from tests.fmu.runner import run_in_process
 
 RESULTS = Path(__file__).parents[1] / "docs" / "commanded.csv"
-#: Communication steps (s), and the number of the greater ones.
+#: Communication steps (s), and the number of steps of the greater length.
 STEPS, COUNT = (2e-3, 1e-3), 100
 #: Errors below this are those of the solvers and of rounding.
 LEAST = 1e-9
@@ -32,7 +32,7 @@ Table = list[dict[str, str]]
 
 
 class Command(NamedTuple):
-    """A command of a mechanism: its input, that of its rate, the coordinate, and the numbers a and b of its law."""
+    """A command of a mechanism: FMI names of speed, rate and coordinate, and the numbers a and b of its law."""
 
     mechanism: str
     speed: str
@@ -48,13 +48,13 @@ COMMANDS = (
 )
 
 
-# The masters: each function runs in a process of its own, and imports what it needs inside itself. It takes cases, each of an
-# FMU, what a `Command` has, whether the rate is set too, the communication step, how many there are, and arguments of a `Row`;
-# it returns the coordinate at the end of each.
+# The masters: each function runs in a process of its own, and imports what it needs itself. It takes cases, each with an
+# FMU, the fields of a `Command`, whether the rate is also set, the communication step, the number of steps, and arguments
+# of a `Row`; it returns the coordinate at the end of each case.
 
 
 def by_fmpy(cases: list[Any]) -> list[float]:
-    """FMPy's `simulate_fmu`; for its CVode, which sets inputs at the ends of its own steps, the command is given densely."""
+    """Run by FMPy's `simulate_fmu`; its CVode sets inputs only at the ends of its own steps: the command is given densely."""
     import numpy as np
     from fmpy import simulate_fmu
 
@@ -84,7 +84,7 @@ def by_fmpy(cases: list[Any]) -> list[float]:
 
 
 def by_libcosimpy(cases: list[Any]) -> list[float]:
-    """libcosim's fixed-step algorithm."""
+    """Run by libcosim's fixed-step algorithm."""
     from math import cos, sin
 
     from fmpy import read_model_description
@@ -137,7 +137,7 @@ def by_ecospy(cases: list[Any]) -> list[float]:
 
 
 def by_cofmupy(cases: list[Any]) -> list[float]:
-    """CoFMUPy, which sets all inputs, those that it is not given to zero."""
+    """Run by CoFMUPy, which sets all inputs; an input without a value is set to zero."""
     import sys
     from math import cos, sin
 
@@ -161,7 +161,7 @@ def by_cofmupy(cases: list[Any]) -> list[float]:
 
 
 def by_pathsim(cases: list[Any]) -> list[float]:
-    """PathSim's block for co-simulation, or with a solver that for model exchange."""
+    """Run by PathSim's block for co-simulation, or, if a solver is given, by its block for model exchange."""
     from math import cos, sin
 
     import pathsim.solvers
@@ -182,7 +182,7 @@ def by_pathsim(cases: list[Any]) -> list[float]:
         connections = [Connection(source, block[place]) for place, source in enumerate(sources)]
         options = {"Solver": getattr(pathsim.solvers, solver), "tolerance_lte_rel": 1e-9} if solver else {}
         simulation = Simulation([*sources, block], connections, dt=step, log=False, **options)
-        # for co-simulation it steps at the beginning of each period
+        # the block for co-simulation steps at the beginning of each period
         simulation.run(count * step if solver else (count - 1.5) * step)
         return float(dict(zip(block.fmu_wrapper.output_refs, block.fmu_wrapper.get_outputs_as_array()))[coordinate])
 
@@ -190,7 +190,7 @@ def by_pathsim(cases: list[Any]) -> list[float]:
 
 
 def by_cosimulate(cases: list[Any]) -> list[float]:
-    """`analysis.cosimulate`, which sets the rate itself: the change of the coordinate."""
+    """Run by `analysis.cosimulate`, which sets the rate itself; return the change of the coordinate."""
     from math import cos, sin
 
     from analysis import Function, Inputs, cosimulate
@@ -215,7 +215,7 @@ def by_cosimulate(cases: list[Any]) -> list[float]:
 
 
 class Row(NamedTuple):
-    """A master on FMUs of some kinds, with one interface; ``sets_rate`` where it sets the rate of a command itself."""
+    """A master on FMUs of some kinds, with one interface; ``sets_rate``: it sets the rate of a command itself."""
 
     master: str
     interface: str
@@ -251,7 +251,7 @@ COLUMNS = [_column(command, rated) for command in COMMANDS for rated in (False, 
 
 
 def fmu_of(mechanism: Mechanism, kind: str, folder: Path) -> Path:
-    """Return an FMU, built if it is not in the folder."""
+    """Return the path of an FMU in a folder; build it if it is not there."""
     target = folder / KINDS[kind].file_name(mechanism)
     if not target.is_file():
         target = build(mechanism, folder) if kind == "python" else build_native(mechanism, KINDS[kind], folder)
@@ -259,7 +259,7 @@ def fmu_of(mechanism: Mechanism, kind: str, folder: Path) -> Path:
 
 
 def right(command: Command, row: Row) -> float:
-    """Return what the coordinate must be in the end; of `cosimulate` its change, as it starts where the published set does."""
+    """Return the exact coordinate at the end; for `cosimulate`, which starts like the published set, its exact change."""
     end = COUNT * STEPS[0]
     start = {v.name: v.start for v in MECHANISMS[command.mechanism].variables}[
         f"initial.{command.coordinate.replace('.', '_')}"
@@ -268,7 +268,7 @@ def right(command: Command, row: Row) -> float:
 
 
 def text(errors: list[float]) -> str:
-    """Return order and error at the smaller step, in words."""
+    """Format the error at the smaller step and the order."""
     coarse, fine = errors
     if fine < LEAST:
         return f"below {LEAST:.0e}"
@@ -277,7 +277,7 @@ def text(errors: list[float]) -> str:
 
 
 def find(master: str, folder: Path) -> Table:
-    """Return the rows of a master; where FMUs of several kinds differ, both are said."""
+    """Measure a master and return its rows; if FMUs of several kinds differ, a cell has all results."""
     looked = [
         (row, command, rated, kind)
         for row in ROWS
@@ -312,13 +312,13 @@ def find(master: str, folder: Path) -> Table:
 
 
 def read(path: Path) -> Table:
-    """Read what was found."""
+    """Read a table of results."""
     with path.open(newline="", encoding="utf-8") as file:
         return list(csv.DictReader(file))
 
 
 def write(path: Path, table: Table) -> None:
-    """Write what was found."""
+    """Write a table of results."""
     with path.open("w", newline="", encoding="utf-8") as file:
         rows = csv.DictWriter(file, list(table[0]), lineterminator="\n")
         rows.writeheader()

@@ -1,4 +1,4 @@
-"""A synthesis problem in the form that all searches share, and the searches other than `synthesize`.
+"""Define synthesis problems in the form that all searches share, and the searches other than `synthesize`.
 
 All searches have the same unknowns, bounds and constraints and the same measure: when a search improves, its clock is stopped
 and the linkage is evaluated by the task's own measure, unless it violates a constraint.
@@ -40,7 +40,7 @@ Score = Callable[[FloatArray], float]
 
 #: Number of phases for which pylinkage's function generation is tried.
 PHASES = 360
-#: Relative improvement of a score from which on a linkage is measured, as measuring takes long.
+#: Least relative improvement of a score for which a linkage is measured, because measuring takes long.
 SLIGHT = 1e-4
 #: How often the population of the evolution strategy is doubled before a new start.
 DOUBLED = 8
@@ -63,7 +63,7 @@ class Problem(Protocol):
 
 
 class TimeUp(Exception):
-    """A search has used its time, or reached its goal."""
+    """A search has used up its time, or reached its goal."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -102,7 +102,7 @@ class Contest:
         return float(symmetric_difference(place, target, np.empty_like(place)))
 
     def unknowns(self, x: FloatArray) -> FloatArray:
-        """Complete the free unknowns to all of `constraints.UNKNOWNS`."""
+        """Return all of `constraints.UNKNOWNS`, from the free ones."""
         q = self.limits.low.copy()
         q[self.limits.high > self.limits.low] = x
         return q
@@ -138,7 +138,7 @@ def packs(linkage: Linkage) -> bool:
 
 
 class Trace:
-    """Best error of a search over its time; the clock is stopped while a linkage is measured.
+    """The best error of a search over its time; the clock is stopped while a linkage is measured.
 
     Parameters
     ----------
@@ -146,9 +146,9 @@ class Trace:
     budget : float
         Time after which the search ends (s).
     enough : float
-        Error at which it ends, in the reported unit.
+        Error at which the search ends, in the reported unit.
     clock : callable
-        Returns the time (s), of the wall or of the processor.
+        Function that returns the time (s), by the wall clock or of the processor.
     """
 
     def __init__(
@@ -169,7 +169,7 @@ class Trace:
         Raises
         ------
         TimeUp
-            If its time is over.
+            If the time of the search is over.
         """
         seconds = self.clock() - self._begun - self._measuring
         if seconds > self.budget:
@@ -182,7 +182,7 @@ class Trace:
         Raises
         ------
         TimeUp
-            If it is good enough, or the time is over.
+            If the linkage is good enough, or the time is over.
         """
         seconds, begun = self.tick(), self.clock()
         value = self.contest.error(box, x)
@@ -209,11 +209,11 @@ class Trace:
         return value
 
     def at(self, seconds: float) -> float:
-        """Return the least error after some time (s), in the reported unit; infinite if there was none."""
+        """Return the least error within a time (s), in the reported unit; infinite if nothing was found by then."""
         return min((value for passed, value in self.points if passed <= seconds), default=inf)
 
     def time_to(self, error: float) -> float:
-        """Return the time at which an error was reached (s); infinite if it was not."""
+        """Return the time (s) at which an error was reached; infinite if it was never reached."""
         return next((seconds for seconds, value in self.points if value <= error), inf)
 
 
@@ -228,7 +228,7 @@ def by_scipy(trace: Trace, box: BlackBox, random: np.random.Generator) -> None:
 
 
 def by_cma(trace: Trace, box: BlackBox, random: np.random.Generator) -> None:
-    """Run Hansen's evolution strategy by its own package, for each assembly, then with twice as many members."""
+    """Run Hansen's evolution strategy by its own package, for each assembly, repeatedly with twice as many members."""
     import cma
 
     contest = trace.contest
@@ -320,7 +320,7 @@ class PlacedFourBar:
         a = complex(x, y)
         d = a + l1 * np.exp(1j * a1)
         b = a + l2 * np.exp(1j * (a1 + th20 - tau / self.n))
-        # C on its side of BD; pylinkage finds out whether the links can be joined
+        # put C on the side of BD of its assembly; pylinkage finds out whether the links can be joined
         bd = abs(d - b)
         along = 0.5 * (bd * bd + l3 * l3 - l4 * l4) / bd
         c = b + (along + 1j * self.branch * max(l3 * l3 - along * along, 0.0) ** 0.5) * (d - b) / bd
@@ -338,7 +338,7 @@ class PylinkageScore:
     def __init__(self, contest: Contest, box: BlackBox) -> None:
         self.contest, self.normal, self.box = contest, contest.normal, box
         low, high = contest.limits.low, contest.limits.high
-        # with longer steps pylinkage changes to the other assembly, as it takes the nearer place of C
+        # with longer steps pylinkage may change to the other assembly, because it takes the nearer place of C
         steps = AREA_N
         if self.normal.rotation is not None:
             own = round(tau / float(np.abs(np.diff(self.normal.rotation)).min()))
@@ -383,7 +383,7 @@ class PylinkageScore:
         return min(self._paired(track[:, 4], way) for way in (1, -1))
 
     def _paired(self, curve: ComplexArray, way: int) -> tuple[float, float]:
-        """Return the same at equal shares of the lengths of curve and target, as `BlackBox` compares closed paths."""
+        """Return errors and violation as `measured` does, at equal shares of the lengths of curve and target."""
         normal = self.normal
         points = normal.points
         assert points is not None
@@ -404,7 +404,7 @@ class PylinkageScore:
 
 
 def _by_pylinkage(trace: Trace, box: BlackBox, *stages: tuple[Callable[..., Any], dict[str, Any]]) -> None:
-    """Optimisers of pylinkage one after another; where the measure is an area, its Nelder-Mead on that at last."""
+    """Run optimisers of pylinkage one after another; if the measure is an area, its Nelder-Mead minimises the area at last."""
     from pylinkage.optimization import chain_optimizers, minimize_linkage
 
     score = PylinkageScore(trace.contest, box)
@@ -419,7 +419,7 @@ def _by_pylinkage(trace: Trace, box: BlackBox, *stages: tuple[Callable[..., Any]
 
 
 def by_swarm(trace: Trace, box: BlackBox, random: np.random.Generator) -> None:
-    """pylinkage's particle swarm and, from its best, Nelder-Mead; settings as they come."""
+    """Run pylinkage's particle swarm and, from its best linkage, its Nelder-Mead, with default settings."""
     from pylinkage.optimization import minimize_linkage, particle_swarm_optimization
 
     bounds = (box.low, box.high)
@@ -427,7 +427,7 @@ def by_swarm(trace: Trace, box: BlackBox, random: np.random.Generator) -> None:
 
 
 def by_pylinkage_evolution(trace: Trace, box: BlackBox, random: np.random.Generator) -> None:
-    """pylinkage's differential evolution and, from its best, Nelder-Mead; settings as they come."""
+    """Run pylinkage's differential evolution and, from its best linkage, its Nelder-Mead, with default settings."""
     from pylinkage.optimization import differential_evolution_optimization, minimize_linkage
 
     settings = {"bounds": (box.low, box.high), "seed": int(random.integers(1 << 31))}
@@ -435,7 +435,7 @@ def by_pylinkage_evolution(trace: Trace, box: BlackBox, random: np.random.Genera
 
 
 def by_pylinkage_simplex(trace: Trace, box: BlackBox, random: np.random.Generator) -> None:
-    """pylinkage's Nelder-Mead, from the best of as many random linkages as our simplex; settings as they come."""
+    """Run pylinkage's Nelder-Mead from the best of as many random linkages as our simplex takes, with default settings."""
     from pylinkage.optimization import minimize_linkage
 
     score = PylinkageScore(trace.contest, box)
@@ -445,7 +445,7 @@ def by_pylinkage_simplex(trace: Trace, box: BlackBox, random: np.random.Generato
 
 
 def by_freudenstein(trace: Trace, box: BlackBox, random: np.random.Generator) -> None:
-    """pylinkage's function generation, which solves Freudenstein's equation by least squares, at every phase; once."""
+    """Run pylinkage's function generation once at every phase; it solves Freudenstein's equation by least squares."""
     from pylinkage.synthesis import function_generation
 
     task = trace.contest.problem.task

@@ -1,4 +1,4 @@
-"""What couplings of systems cost in accuracy: errors over four decades of the communication step, in our master and in others.
+"""Measure the errors that coupling of systems causes, over four decades of the communication step, in our and other masters.
 
     python -m benchmarks.coupling                          # every system of the library, and the other masters: an hour
     python -m benchmarks.coupling --system press           # one system (repeatable), without the other masters
@@ -41,7 +41,7 @@ CONSOLE = Console(width=128)
 
 
 def show(found: Convergence, powers: bool = True) -> None:
-    """Print errors, orders, and the error as a multiple of the share of work that the coupling brought in."""
+    """Print errors, orders, and the ratio of the error to the share of work that the coupling has added."""
     table = Table(title=f"{found.title}: greatest relative error")
     for name in ("step [ms]", *found.errors):
         table.add_column(name, justify="right")

@@ -1,4 +1,4 @@
-"""Targets that cross themselves: `synthesize` with its defaults, beside a long differential evolution on the area.
+"""Synthesise targets that cross themselves: compare `synthesize` with a long differential evolution on the area.
 
     python -m benchmarks.crossing                           # runs all, writes the results, prints the table
     python -m benchmarks.crossing --budget 60 --target eight
@@ -77,7 +77,7 @@ def targets() -> dict[str, TargetPath]:
 
 
 class Row(NamedTuple):
-    """Errors (m2) of a target, and the time of the processor that `synthesize` took (s)."""
+    """Errors of the two searches on a target (m2), and the processor time of `synthesize` (s)."""
 
     target: str
     asked: str
@@ -223,7 +223,7 @@ def markdown(rows: Iterable[Row]) -> str:
 
 
 def main(path: Path, names: Sequence[str], budget: float) -> None:
-    """Run, write and print."""
+    """Run both searches on the targets, write the results and print the table."""
     console, rows = Console(width=120), []
     for name, target in targets().items():
         for asked in ASKED if name in names else ():

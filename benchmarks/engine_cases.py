@@ -1,4 +1,4 @@
-"""The runs of the five-bar slider that solvers and engines are timed at, and how accurate they are.
+"""Define the runs of the five-bar slider for which solvers and engines are timed, and measure their accuracy.
 
 Accuracy is the largest error of the slider position on a sample grid, relative to its largest magnitude, against the reduced
 equations of `linkwork` integrated to 1e-13.
@@ -22,7 +22,7 @@ from linkwork.five_bar.published import DYN_CM_PER_NEWTON_METRE, SETS
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Case:
-    """One run from th2 = u = u' = 0: parameters, drive, duration (s) and number of sample intervals.
+    """A run from th2 = u = u' = 0: parameters, drive, duration (s) and number of sample intervals.
 
     With ``crank_speed`` (rad/s) the crank turns at that constant speed. Without it the crank starts from rest under the
     torsion bar of fig. 3.6: T = torque (1 - th2/switch_angle) until th2 reaches ``switch_angle``, then none.
@@ -52,7 +52,7 @@ class Case:
 
 
 def steps_in(interval: float, time_step: float) -> int:
-    """Least number of equal steps in ``interval`` that are no longer than ``time_step`` (both s)."""
+    """Return the least number of equal steps in ``interval`` that are no longer than ``time_step`` (both in s)."""
     return max(1, ceil(interval / time_step * (1.0 - 1e-9)))
 
 
@@ -139,7 +139,7 @@ def by_scipy(case: Case, method: str, rtol: float, atol: float | np.ndarray) -> 
 
 
 def relative_error(case: Case, u: np.ndarray) -> float:
-    """Return the largest |u - u_ref| on the sample grid over the largest |u_ref|; infinite if u is not finite."""
+    """Return the largest |u - u_ref| on the sample grid divided by the largest |u_ref|; infinite if u is not finite."""
     expected = reference(case)
     error = float(np.max(np.abs(u - expected)) / np.max(np.abs(expected)))
     return error if isfinite(error) else inf

@@ -1,4 +1,4 @@
-"""The five-bar slider in two general multibody engines, MuJoCo and Exudyn, timed at a stated accuracy.
+"""Time the five-bar slider in two general multibody engines, MuJoCo and Exudyn, at a stated accuracy.
 
 Each engine gets the formulation, the integrator and the solver settings that reach the accuracy soonest: the closed loop as
 relative joints with one closing pin in MuJoCo, as planar bodies with three pins in Exudyn, no Python code inside the
@@ -123,7 +123,7 @@ def _mujoco_model(case: Case, iterations: int, *, stiffened: bool = True) -> tup
 
 
 def _mujoco_until_switch(model: Any, data: Any, case: Case, n: int) -> tuple[int, float | None]:
-    """Take ``n`` steps, or those to the switch angle, the last cut by Newton's method to end on it.
+    """Take ``n`` steps, or fewer up to the switch angle; Newton's method shortens the last one to end at that angle.
 
     Returns the number of steps and what remains of the ``n`` steps' time (s) after the switch, None if it was not reached.
     """
@@ -205,7 +205,7 @@ class _Bar(NamedTuple):
     y: float
 
 
-#: Where the coordinates of crank and slider, the first two nodes, stand in the vector of all.
+#: Indices of the coordinates of crank and slider, the first two nodes, in the vector of all coordinates.
 _EXUDYN_CRANK, _EXUDYN_SLIDER = 0, 1
 
 
@@ -280,7 +280,7 @@ class _Assembly:
         return node, body
 
     def drive(self, case: Case, node: Any) -> Any:
-        """Drive the crank at its speed, or by a spring, which is returned."""
+        """Drive the crank at its speed, or by a spring; return the spring, or None."""
         if case.crank_speed is not None:
             markers = [self.ground, self.coordinate(node)]
             self.mbs.AddObject(
@@ -327,7 +327,7 @@ def _exudyn_model(case: Case) -> tuple[Any, Any, Any]:
 
 
 class _ExudynSolver:
-    """Legs of a run, each a call of the engine's own loop; ``seconds`` is the wall time of those loops."""
+    """A solver that runs in legs, each a call of the engine's own loop; ``seconds`` is the total wall time of these loops."""
 
     def __init__(self, mbs: Any, newton_tolerance: float) -> None:
         self.exu, _ = _import_exudyn()
@@ -441,7 +441,7 @@ def time_steps(case: Case, first: float, last: float, ratio: float = 2.0**-0.25)
 
 
 def fastest(run: Run, case: Case, time_step: float, repeats: int = 7) -> EngineRun:
-    """Return the shortest of several equal runs, which the machine disturbed least."""
+    """Return the fastest of several equal runs, the one that the machine has disturbed least."""
     return min((run(case, time_step) for _ in range(repeats)), key=lambda result: result.seconds)
 
 

@@ -1,4 +1,4 @@
-"""Throughput of `simulate_many`, as ratios within this one process.
+"""Measure the throughput of `simulate_many`, as ratios within this one process.
 
     python -m benchmarks.ensembles
     python -m benchmarks.ensembles --runs 1000000 --disk
@@ -35,7 +35,7 @@ LENGTHS = {"three turns": 6.0 * pi / SPEED, "0.1 s": 0.1}
 
 @contextmanager
 def without_lanes() -> Iterator[None]:
-    """Solve all runs one after the other."""
+    """Solve all runs one after the other, without lanes, while the context lasts."""
     fits = batches._fits
     batches._fits = lambda batch, settings: np.zeros(len(batch.steady), dtype=bool)
     try:
@@ -46,7 +46,7 @@ def without_lanes() -> Iterator[None]:
 
 @contextmanager
 def kernels_timed(spent: list[float]) -> Iterator[None]:
-    """Note the CPU time (s) of each call of the compiled solvers."""
+    """Append the CPU time (s) of each call of the compiled solvers to ``spent`` while the context lasts."""
     kernels = compiled.run, lanes.run_in_lanes
 
     def timed(kernel: Callable[..., None]) -> Callable[..., None]:
@@ -74,7 +74,7 @@ def integration_time(run: Callable[[], object], repeats: int) -> float:
 
 
 def measured(runs: list[Callable[[], object]]) -> list[tuple[float, float, float]]:
-    """Return for each the shortest CPU time, that within the compiled solver, and time by the clock (s), taken in turn."""
+    """Return for each run the shortest CPU time, CPU time within the compiled solver, and clock time (s); runs alternate."""
     times = []
     for _ in range(REPEATS + 1):
         row = []

@@ -1,4 +1,4 @@
-"""Waiting times: imports, first results on an empty cache of compiled code, and the same again.
+"""Measure waiting times: imports, first results with an empty cache of compiled code, and the same again.
 
     python -m benchmarks.first
     python -m benchmarks.first linkages
@@ -50,7 +50,7 @@ MEASURED = ("klann", "jansen", "geared-five-bar", "elastic-bearing")
 
 
 def waited(arguments: tuple[str, ...], folder: str) -> tuple[str, str, str]:
-    """Measure seconds by the clock and of the processor, and count the announced compilations."""
+    """Run Python with these arguments; return clock time and processor time (s), and the number of compilations announced."""
     before, begin = resource.getrusage(resource.RUSAGE_CHILDREN), perf_counter()
     environment = os.environ | {"LINKWORK_CACHE_DIR": folder}
     done = subprocess.run(
@@ -62,7 +62,7 @@ def waited(arguments: tuple[str, ...], folder: str) -> tuple[str, str, str]:
 
 
 def first(arguments: tuple[str, ...], *, carried: bool) -> tuple[str, str, str]:
-    """Measure on an empty cache, with the kernels that the installation carries or without."""
+    """Measure as `waited` with an empty cache, with or without the kernels that the installation carries."""
     code, *others = arguments
     with tempfile.TemporaryDirectory() as folder:
         return waited((code if carried else WITHOUT + code, *others), folder)
@@ -91,7 +91,7 @@ def linkages(names: list[str]) -> Table:
 
 
 def main() -> None:
-    """Measure and print."""
+    """Measure and print the tables."""
     if sys.argv[1:2] == ["linkages"]:
         Console(width=180).print(linkages(sys.argv[2:] or list(MEASURED)))
         return

@@ -1,4 +1,4 @@
-"""Cost of a communication step of every kind of FMU, from a host in C and through FMPy, beside the bare equations.
+"""Measure the cost of a communication step of every kind of FMU, from a host in C and through FMPy, and of the bare equations.
 
     python -m benchmarks.fmu
 
@@ -45,7 +45,7 @@ from tests.mechanisms.pendulum import MECHANISM as PENDULUM
 STEP = 1e-3
 STEPS = 430
 REPEATS = 7
-GOALS = (2.0, 100.0)  # times the bare right-hand sides, at most; times less than the Python FMU, at least
+GOALS = (2.0, 100.0)  # at most, in times of the bare right-hand sides; at least, in speed relative to the Python FMU
 
 TRIVIAL = """
 from pythonfmu import Fmi2Causality, Fmi2Slave, Real
@@ -72,7 +72,7 @@ def best(measure: Callable[[], float]) -> float:
 
 
 def by_fmpy(fmu: Path) -> float:
-    """Measure a step through FMPy, with inputs set and outputs read (s)."""
+    """Measure the time (s) of a step through FMPy, with inputs set and outputs read."""
     description = read_model_description(str(fmu))
     fmi3 = description.fmiVersion == "3.0"
     reals = [v for v in description.modelVariables if v.type in ("Real", "Float64")]
@@ -106,11 +106,11 @@ def by_fmpy(fmu: Path) -> float:
 
 
 def by_host(host: Path, fmu: Path, folder: Path) -> float:
-    """Measure a step from the host in C, with inputs set and outputs read (s)."""
+    """Measure the time (s) of a step from the host in C, with inputs set and outputs read."""
     unpacked = unpack(fmu, folder / fmu.stem)
     inputs = {s.name: float(s.attributes["start"]) for s in unpacked.reals("input")}
     native = (unpacked.folder / "sources").is_dir()
-    # PythonFMU's library expects that of Python in the process
+    # PythonFMU's library expects Python's library in the process
     preload = {} if native else {"LD_PRELOAD": str(sysconfig.get_config_var("INSTSONAME"))}
 
     def measure() -> float:
@@ -122,7 +122,7 @@ def by_host(host: Path, fmu: Path, folder: Path) -> float:
 
 
 def right_hand_sides(folder: Path) -> tuple[float, float]:
-    """Count the right-hand sides of a step, and measure a bare one (s)."""
+    """Return the number of right-hand sides in a step, and the time of a bare one (s)."""
     files = source_files(MECHANISM, NATIVE)
     driver = Path(__file__).with_name("right_hand_sides.c")
     for name, text in files.items():
@@ -139,7 +139,7 @@ def right_hand_sides(folder: Path) -> tuple[float, float]:
 
 
 def plain_step() -> float:
-    """Measure a step of the plant in plain Python, with its outputs (s)."""
+    """Measure the time (s) of a step of the plant in plain Python, with its outputs."""
     entry = MECHANISM.published["table-3.1"]
     plant = Plant(MECHANISM, entry.parameters, entry.initial, inputs={"drive.speed": entry.crank_speed}, drive_mode=1)
     begun = time.perf_counter()
@@ -150,7 +150,7 @@ def plain_step() -> float:
 
 
 def compiled_step() -> float:
-    """Measure a step in process, with inputs held as in the FMU (s)."""
+    """Measure the time (s) of a step in this process, with inputs held as in the FMU."""
     entry = MECHANISM.published["table-3.1"]
     begun = time.perf_counter()
     run = simulate(entry.parameters, Inputs(speed=entry.crank_speed), stop_time=STEPS * STEP, step=STEP, hold=STEP)
@@ -159,7 +159,7 @@ def compiled_step() -> float:
 
 
 def as_component(native: Path, component: Path) -> list[tuple[float, float]]:
-    """Compare a communication step of a WebAssembly component with the native library's: its length, and their ratio."""
+    """Compare a WebAssembly component with the native library; return pairs of a step length (s) and the ratio of the times."""
     entry = MECHANISM.published["table-3.1"]
     inputs, initial = given(MECHANISM, Inputs(speed=entry.crank_speed), entry.initial)
     values = dict.fromkeys(MECHANISM.input_names, 0.0) | {"drive.speed": entry.crank_speed}

@@ -1,4 +1,4 @@
-"""Accuracy of long runs: a million turns, a start at 1e9 s, an angle of 1e9 turns. The tables of docs/solvers.md.
+"""Measure the accuracy of long runs: a million turns, a start at 1e9 s, an angle of 1e9 turns. The tables of docs/solvers.md.
 
     python -m benchmarks.long_runs turns --turns 1e5
     python -m benchmarks.long_runs turns --turns 1e6 --tolerances 1e-9
@@ -66,7 +66,7 @@ def free_run(mechanism: str, turns: float, *, begun: float = 0.0, **options: Any
     Returns
     -------
     residual, angle : float
-        Largest residual of the energy, turned angle (rad).
+        Largest relative residual of the energy, and angle by which the crank has turned (rad).
     """
     parameters, start, speed = FREE[mechanism]
     start = replace(start, crank_angle=2.0 * pi * begun)
@@ -86,7 +86,7 @@ def shifted(what: str, late: float = LATE, **options: Any) -> tuple[float, float
     difference, steps : float
         Largest difference of the slider's position relative to its largest, ratio of the numbers of steps.
     """
-    # samples that are exact at both times
+    # sample times that are exact floats in either run
     samples = np.arange(513) * 2.0**-10
     runs = [simulate(TABLE_3_1, ACTING[what](t0), samples=t0 + samples, **options) for t0 in (0.0, late)]
     u = [run["slider.position"] for run in runs]

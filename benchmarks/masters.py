@@ -1,10 +1,10 @@
-"""What masters use of the FMUs in this project, found by running them with FMUs that write down what is called.
+"""Find out which features of this project's FMUs each master uses, by runs with FMUs that log all calls.
 
     python -m benchmarks.masters                     # all masters, five minutes; writes docs/masters.csv
     python -m benchmarks.masters --master FMPy       # one of them (repeatable); prints what it finds
 
-Each run is a process of its own, on Linux; `tests/fmu/spy.c` stands before the library of an FMU. `docs/generate.py` puts the
-table into docs/masters.md.
+Each run is a process of its own, on Linux; `tests/fmu/spy.c` takes the place of an FMU's library, and passes each call on.
+`docs/generate.py` puts the table into docs/masters.md.
 """
 
 from __future__ import annotations
@@ -114,11 +114,11 @@ READERS = (together.by_fmpy, together.by_libcosimpy, together.by_ecospy, togethe
 
 
 class Capability(NamedTuple):
-    """What a master does: on which materials it is looked for, and the line that tells."""
+    """A capability of a master, and how it is found."""
 
     name: str
-    on: tuple[str, ...]
-    line: str
+    on: tuple[str, ...]  # materials whose runs are examined
+    line: str  # line of a run that shows the capability
 
 
 _FMI2 = ("archive", "started", "FMI 2.0")
@@ -153,7 +153,7 @@ def _watch(folder: Path) -> None:
 
 
 def material(folder: Path, on: str) -> Path:
-    """Return what a run is on, made if it is not in the folder; all that is called is written down."""
+    """Return the FMU or archive for a run, which logs all calls; make it if it is not in the folder."""
     name = {"jump": "FMI 2.0", "limit": "FMI 2.0"}.get(on, on)
     target = folder / f"{name}.{'fmu' if name.startswith('FMI') else 'ssp'}"
     if target.exists():
@@ -174,7 +174,7 @@ def material(folder: Path, on: str) -> Path:
 
 
 def lines(run: Run, material: Path) -> set[str]:
-    """Return what is told of a run: what it called, that the master read the archive itself, or refused it for its units."""
+    """Run a master; return its calls, and whether it read the archive itself or refused it for its units, as lines."""
     with tempfile.TemporaryDirectory() as folder:
         calls = Path(folder, "calls")
         calls.touch()
@@ -207,13 +207,13 @@ Table = dict[str, dict[str, str]]
 
 
 def read(path: Path) -> Table:
-    """Read what was found, by master and capability."""
+    """Read the table of results, by master and capability."""
     with path.open(newline="", encoding="utf-8") as file:
         return {row.pop("master"): row for row in csv.DictReader(file)}
 
 
 def write(path: Path, table: Table) -> None:
-    """Write what was found."""
+    """Write the table of results."""
     with path.open("w", newline="", encoding="utf-8") as file:
         rows = csv.DictWriter(file, ["master", *(c.name for c in CAPABILITIES)], lineterminator="\n")
         rows.writeheader()

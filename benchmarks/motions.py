@@ -51,7 +51,7 @@ def drawn(random: np.random.Generator):
 
 
 def ends_of(parameters, drive):
-    """Yield the turns after which a settled run repeats itself, and y there."""
+    """Yield, for each run that settles, the number of turns after which it repeats itself, and y at its end."""
     point, guess = operating_point(parameters, drive), np.zeros(2)
     scale, turn = point.scale(guess), np.array([0.0, point.flow.period])
     section = point.section(guess, PLAIN, tolerance=1e-8)

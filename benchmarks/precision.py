@@ -1,4 +1,4 @@
-"""Work and precision of all solvers and engines on the same runs, and the cost of a run in ensembles of 1 to a million.
+"""Compare work and precision of all solvers and engines on the same runs, and the cost of a run in ensembles up to a million.
 
     python -m benchmarks.precision docs
     python -m benchmarks.precision docs --runs 10000
@@ -146,7 +146,7 @@ def picture(found: dict[str, dict[str, list[Point]]]) -> Any:
 
 
 def costs(most: int) -> list[tuple[int, float, float]]:
-    """Measure ensembles: number of runs, time of each over that of one alone, in lanes and one after the other."""
+    """Measure ensembles: number of runs, and time per run divided by that of one run alone, with and without lanes."""
     speed = SETS["table-3.1"].crank_speed
     settings = {"stop_time": 0.1, "step": 1e-2}
     alone = best_time(lambda: simulate(TABLE_3_1, Inputs(speed=speed), **settings), 40)

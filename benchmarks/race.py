@@ -1,4 +1,4 @@
-"""`synthesize` beside pylinkage's optimisers, SciPy's differential evolution and CMA-ES on fifty targets, at equal time.
+"""Compare `synthesize` with pylinkage's optimisers, SciPy's differential evolution and CMA-ES on fifty targets, at equal time.
 
     python -m benchmarks.race                              # runs what is not in the results yet, then prints the tables
     python -m benchmarks.race --again Linkwork             # runs a search afresh on all targets
@@ -71,7 +71,7 @@ class Row(NamedTuple):
     errors: tuple[float, ...]
 
     def at(self, seconds: float) -> float:
-        """Return the least error after some time (s), at least the one that counts as exact."""
+        """Return the least error after one of `TIMES` (s), but not less than the error that counts as exact."""
         return max(self.exact, self.errors[TIMES.index(seconds)])
 
 
@@ -134,7 +134,7 @@ def read(path: Path) -> list[Row]:
 
 
 def write(path: Path, rows: Iterable[Row]) -> None:
-    """Replace a file as a whole."""
+    """Write rows to a file, which replaces the old file at once."""
     path.parent.mkdir(parents=True, exist_ok=True)
     beside = path.with_name(f"{path.name}.new")
     with beside.open("w", newline="", encoding="utf-8") as file:

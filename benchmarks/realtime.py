@@ -1,10 +1,10 @@
-"""Step times and missed deadlines of a system in one C program: motor, five-bar slider and controllers, `motor-tracking`.
+"""Measure step times and missed deadlines of a system in one C program: motor, five-bar slider, controllers, `motor-tracking`.
 
     python -m benchmarks.realtime [--steps 1000000] [--seconds 10]
 
 The program takes so many steps as fast as they go, and then for so many seconds 1000 and 4000 of them a second, each begun at
 its time and due when the next begins: as any other process, and with the priority of a real-time one where `chrt` may give it.
-Beside it stands the same system in the Python master.
+The same system is also timed in the Python master.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ PERCENTILES = ("median", "99%", "99.9%", "99.99%", "worst")
 
 
 def run_host(host: Path, steps: int, rate: float | None = None, *, by: Sequence[str] = ()) -> dict[str, float]:
-    """Run the program, perhaps by another command, and return the numbers that it prints."""
+    """Run the program, by the command ``by`` if it is given, and return the numbers that it prints, by name."""
     words = [*by, str(host), str(steps), *([] if rate is None else [f"{rate:g}"])]
     done = subprocess.run(words, capture_output=True, text=True, check=False)
     if done.returncode:

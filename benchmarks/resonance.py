@@ -1,4 +1,4 @@
-"""Processor time of `linkwork resonance`, as a whole and by its parts, with everything compiled.
+"""Measure the processor time of `linkwork resonance`, as a whole and by its parts, with everything compiled.
 
     python -m benchmarks.resonance
     python -m benchmarks.resonance rig-1-spring-b

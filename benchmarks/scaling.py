@@ -1,4 +1,4 @@
-"""Parallel speed: each kind of work on one worker and on two, as processes and as a Dask cluster on this machine.
+"""Measure parallel speed: each kind of work on one worker and on two, as processes and as a Dask cluster on this machine.
 
     python -m benchmarks.scaling
 
@@ -81,7 +81,7 @@ def timed(work: Callable[[], Any], backend: str | None) -> tuple[float, float, A
 
 
 def nothing(_: int) -> None:
-    """Make a worker import the packages that it needs."""
+    """Do no work but import the packages that a worker needs."""
     import analysis.periodic.chart.grid
     import analysis.run.compiled
     import analysis.slider_crank

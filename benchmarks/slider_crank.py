@@ -1,4 +1,4 @@
-"""Speed of the slider-crank: runs in time, joint forces over a turn by both formulations, Monte Carlo.
+"""Measure the speed of the slider-crank: runs in time, joint forces over a turn by two formulations, Monte Carlo.
 
     python -m benchmarks.slider_crank
 

@@ -1,4 +1,4 @@
-"""Speed of the in-process solver at a stated accuracy, beside SciPy, the multiplier form, MuJoCo and Exudyn.
+"""Compare the speed of the in-process solver at a stated accuracy with SciPy, the multiplier form, MuJoCo and Exudyn.
 
     python -m benchmarks.solvers
 
@@ -100,7 +100,7 @@ def with_scipy(case: Case) -> Timing:
 
 
 def with_multipliers(case: Case) -> Timing:
-    """Time the redundant form under SciPy's DOP853, which gets the torsion bar's time of release for free."""
+    """Time the multiplier form under SciPy's DOP853; the torsion bar's time of release is given to it, and not timed."""
     rtol, error, reached = loosest(lambda rtol: relative_error(case, by_multipliers(case, rtol)), TOLERANCES[::5])
     assert reached, "the multiplier form does not reach the accuracy"
     seconds = best_time(lambda: by_multipliers(case, rtol), 2)

@@ -1,4 +1,4 @@
-"""Time of a chart of the true orbit's largest Floquet multiplier, beside the same with SciPy on the plain right-hand side.
+"""Time a chart of the true orbit's largest Floquet multiplier, and the same chart with SciPy on the plain right-hand side.
 
     python -m benchmarks.stability
 
@@ -30,7 +30,7 @@ from linkwork.five_bar.parameters import FiveBarParameters
 from linkwork.five_bar.published import SETS
 
 POINTS = 200
-#: Rows of the sample, and how many points of each.
+#: Rows of the sample, and number of points in each.
 ROWS, RUN = 4, 10
 SPEEDS = np.linspace(200.0, 1200.0, POINTS) * RAD_S_PER_RPM
 DAMPINGS = np.linspace(3.0, 40.0, POINTS)

@@ -1,4 +1,4 @@
-"""How smooth the studio is: `python -m benchmarks.studio [seconds]`, in headless Chromium by Playwright.
+"""Measure how smooth the studio is: `python -m benchmarks.studio [seconds]`, in headless Chromium by Playwright.
 
 First sight is the time from the beginning of the page's loading to the first motion shown; the verdict is the time from a
 change of a dimension to its Floquet multipliers on the page; frames are the times between frames while a joint is dragged with

@@ -1,4 +1,4 @@
-"""Synthesis beside pylinkage's optimisers, SciPy's differential evolution and the thesis's simplex.
+"""Compare the synthesis with pylinkage's optimisers, SciPy's differential evolution and the thesis's simplex.
 
     python -m benchmarks.synthesis
 
@@ -169,7 +169,7 @@ def _kernel_times_of_pylinkage(linkage: Linkage, n: int) -> dict[str, float]:
 
 
 def ours(contest: Contest, search: Search) -> Trace:
-    """Run `synthesize`, whose answer counts from the end of the call."""
+    """Run `synthesize` on a problem; its answer counts from the end of the call."""
     problem = contest.problem
     trace = Trace(contest, inf)
     begun = perf_counter()

@@ -1,4 +1,4 @@
-"""The fifty targets of `benchmarks.race`, ten of each of five kinds.
+"""Define the fifty targets of `benchmarks.race`, ten of each of five kinds.
 
 The published ones are Youssef's (chapter VI), the 18 points of Acharyya and Mandal, Mech. Mach. Theory 44 (2009), and the six
 points of a vertical line of the same literature. Youssef's and the vertical line keep the bounds and constraints under which
@@ -82,7 +82,7 @@ def curves(n: int) -> dict[str, FloatArray]:
 
 
 def outlined(corners: ArrayLike, n: int = CURVE) -> FloatArray:
-    """Return n points at even steps along a closed line."""
+    """Return n points at equal distances along a closed polygon, shape (n, 2)."""
     line = ring(np.asarray(corners, dtype=float), True)
     length = float(np.hypot(*np.diff(line, axis=0).T).sum())
     return along(line, np.linspace(0.0, length, n, endpoint=False))
