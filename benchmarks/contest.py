@@ -478,7 +478,7 @@ SEARCHES: dict[str, BlackBoxSearch] = {
 def searched(
     search: BlackBoxSearch, contest: Contest, budget: float, enough: float, clock: Callable[[], float] = perf_counter
 ) -> Trace:
-    """Repeat a search, alternating the assemblies, until its time is over or its goal is reached."""
+    """Repeat a search, alternating the assemblies, until its time is over or its goal is reached; return its trace."""
     trace = Trace(contest, budget, enough, clock)
     with suppress(TimeUp):
         for number in count():

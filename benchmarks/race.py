@@ -115,7 +115,7 @@ def run(target: Target, search: str, budget: float) -> Row:
 
 
 def prepared() -> None:
-    """Compile and load everything that the searches need."""
+    """Compile and load everything that the searches need, before they are timed."""
     for target in {target.kind: target for target in TARGETS}.values():
         for search in RACERS:
             run(target, search, 0.2)
@@ -183,7 +183,7 @@ def by_target(rows: Iterable[Row]) -> dict[tuple[str, str], dict[str, Row]]:
 
 
 def rival(of: Mapping[str, Row], seconds: float) -> float:
-    """Return the least error of the other searches."""
+    """Return the least error of the searches other than ours after a time (s); ``of`` has the rows of a target by search."""
     return min(row.at(seconds) for search, row in of.items() if search != OURS)
 
 
@@ -194,12 +194,12 @@ def ahead(of: Mapping[str, Row], seconds: float) -> bool:
 
 
 def level(of: Mapping[str, Row], seconds: float) -> bool:
-    """Return whether we are ahead, and another search is as good within `LEVEL`."""
+    """Return whether our search is ahead, but another one is as good within `LEVEL`."""
     return ahead(of, seconds) and rival(of, seconds) <= (1.0 + LEVEL) * of[OURS].at(seconds)
 
 
 def found(of: Mapping[str, Row], search: str, seconds: float, end: float) -> bool:
-    """Return whether a search is within `FOUND` of the least error of all at the end."""
+    """Return whether a search has come within `FOUND` of the least error that any search has at the end."""
     return of[search].at(seconds) <= (1.0 + FOUND) * min(row.at(end) for row in of.values())
 
 

@@ -76,11 +76,11 @@ class Turn:
     angle : ndarray, shape (n,)
         Crank angle (rad), from 0.
     time : ndarray, shape (n,)
-        s, from 0.
+        Time (s), from 0.
     period : float
-        s.
+        Period (s).
     states, inputs : ndarray, shapes (n, states) and (n, channels)
-        States of a run, with zero work, and the channels that are in effect.
+        States of a run, with zero work, and values of the channels.
     values : ndarray, shape (n, outputs)
         Outputs by `names`: those of the FMI interface except the energies that count from the start of a run.
     turns : int

@@ -62,9 +62,9 @@ class Jump:
     speed : float
         First speed on the new motion (rad/s).
     amplitude_before, amplitude_after : float
-        m.
+        Amplitudes of the two motions (m).
     turns_before, turns_after : int
-        Turns in a period: a period doubling hardly changes the amplitude.
+        Turns in a period of the two motions: a period doubling hardly changes the amplitude.
     """
 
     speed: float
@@ -81,11 +81,11 @@ class Sweep:
     Attributes
     ----------
     speed : ndarray, shape (m,)
-        rad/s, in the order of the sweep.
+        Speeds in the order of the sweep (rad/s).
     orbits : tuple of (PeriodicOrbit or None)
         None if no steady motion with a period of 1 to 4 turns, or common periods, was met.
     flags : tuple of str
-        Reason if there is none; otherwise empty.
+        For each speed the reason why there is no orbit; empty if there is one.
     jumps : tuple of Jump
     """
 

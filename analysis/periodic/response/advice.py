@@ -219,7 +219,10 @@ def _overlap(a: Arc, b: Arc) -> Interval:
 
 
 def _resonances(arc: Arc) -> list[Interval]:
-    """Return the half-power bands of the peaks of an arc, and of an end at which its amplitude is greatest and it goes on."""
+    """Return the half-power bands of the peaks of an arc.
+
+    An end counts as a peak, too, if the amplitude is greatest there and the branch continues on another arc.
+    """
     a = arc.amplitude
     tops = [top for top, prominence in peaks(a) if prominence > _PROMINENCE * a[top]]
     bands = [tuple(_band_end(arc, top, way) for way in (-1, 1)) for top in tops]
