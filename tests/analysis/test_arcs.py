@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from analysis.cli.vibration import _avoid
+from analysis.cli.vibration import _print_ranges_to_avoid
 from analysis.periodic import Branch, Crossing, FoldJump, Response, Risk, arcs, fold_jumps, ranges_to_avoid
 
 from .periodic_branches import branch, hysteresis, response
@@ -129,9 +129,9 @@ def test_a_maximum_that_is_no_resonance_is_not_denied(monkeypatch: pytest.Monkey
     monkeypatch.setattr("analysis.cli.vibration.say", said.append)
     flat = response(branch(X, 1.0 - 4e-4 * ((X - 103.0) / 10.0) ** 2, 0.9))
     assert not flat.maxima()
-    _avoid(replace(flat, sought=3), 1.0, "kg")
+    _print_ranges_to_avoid(replace(flat, sought=3), 1.0, "kg")
     assert said[0] == "all motions were sought at 3 values of p only: more --places may find more"
     assert said[-1].endswith("the amplitude has no peak; it is greatest, 1000 mm, at 103 kg")
     monkeypatch.setattr(Response, "maxima", lambda self: ("one, above which the amplitude rises",))
-    _avoid(flat, 1.0, "kg")
+    _print_ranges_to_avoid(flat, 1.0, "kg")
     assert said[-1].endswith("at no maximum does the amplitude fall to 0.71 of it on both sides")
