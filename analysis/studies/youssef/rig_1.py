@@ -222,8 +222,8 @@ def compute_friction() -> StudyResult:
     pins = lowered("A", **{f"pin_{pin}_friction_radius": PIN_RADIUS for pin in "BCD"}).max()
     damper = lowered("A", slider_damping=1.1 * rig("A").slider_damping).max()
     taken = {(s, c): lowered(s, slider_friction_coefficient=c) for s in "AB" for c in (SLIGHT, STRONG)}
-    # in cm
-    lost = [x * amplitude(turn("A", w)) for w, x in zip(COMPARED["A"], taken["A", SLIGHT])]
+    in_cm = {(s, c): x * [amplitude(turn(s, w)) for w in COMPARED[s]] for (s, c), x in taken.items()}
+    lost = in_cm["A", SLIGHT]
     at = COMPARED["A"].index(SHOWN["A"])
     still_slight = brentq(
         lambda c: lowered("A", slider_friction_coefficient=c)[at] - SLIGHTLY, SLIGHT, STRONG, xtol=1e-4
@@ -236,11 +236,8 @@ def compute_friction() -> StudyResult:
     shift = max(abs(lag("A", w, SLIGHT)) for w in COMPARED["A"])
     strong = f"with a coefficient of {STRONG:g} it takes {taken['A', STRONG].max():.0%} off the amplitude, which is not slight"
     heavy = f"the slider's weight, {rig('A').slider_mass * rig('A').gravity:.2f} N, comes on top of the joint's force"
-    b_over_a = " and ".join(f"{taken['B', c].mean() / taken['A', c].mean():.2f} ({c:g})" for c in (SLIGHT, STRONG))
-    in_cm = {
-        key: np.mean([x * amplitude(turn(key[0], w)) for w, x in zip(COMPARED[key[0]], taken[key])]) for key in taken
-    }
-    b_over_a_cm = " and ".join(f"{in_cm['B', c] / in_cm['A', c]:.2f}" for c in (SLIGHT, STRONG))
+    b_over_a = " and ".join(f"{taken['B', c].mean() / taken['A', c].mean():.2f}" for c in (SLIGHT, STRONG))
+    b_over_a_cm = " and ".join(f"{in_cm['B', c].mean() / in_cm['A', c].mean():.2f}" for c in (SLIGHT, STRONG))
     return StudyResult(
         number="rig-1-friction",
         claim="Friction by the normal force in the guide, and in the pins, explains the differences of amplitude.",
@@ -313,9 +310,9 @@ def compute_friction() -> StudyResult:
                 "The differences may be attributed to the same factors as previously described with spring A.",
                 text("8.4.1.1, L6528"),
                 why="of the three factors two, the scatter of the damping and the pins, have no size; the first, friction in "
-                f"the guide, with one coefficient for both springs takes off {b_over_a} times as great a share of the "
-                f"amplitude with B as with A, means of the three speeds; in cm the ratios are {b_over_a_cm}: alone it does not "
-                "explain why the agreement with B is poorer",
+                f"the guide, with one coefficient for both springs, {SLIGHT:g} and {STRONG:g}, takes off {b_over_a} times as "
+                "great a share of the amplitude with B as with A, means of the three speeds; in cm the ratios are "
+                f"{b_over_a_cm}: alone it does not explain why the agreement with B is poorer",
             ),
         ),
     )

@@ -313,7 +313,8 @@ def compute_harmonics() -> StudyResult:
                 f"{100 * ABOUT:g} %, the rule for *about*, as no digit after 50 is given",
                 tuple(ratios),
                 f"at resonance itself, where the second is not greatest, the full equations have {' and '.join(together)}; "
-                "(4.21) as printed is for a coupler without mass, and cannot be taken for the rig",
+                "(4.21) as printed has the coupler's mass (I3, mr3), in terms that the scan garbles; our transcription of it "
+                "is for a coupler without mass, and cannot be taken for the rig",
             ),
         ),
     )
