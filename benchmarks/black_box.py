@@ -257,7 +257,11 @@ class BlackBox:
         return np.where(forward[:, None], *found)
 
     def _paired(self, q: FloatArray, span: FloatArray) -> FloatArray:
-        """Return the crank rotations at which the curve has the stations' shares of its length, shape (m, n)."""
+        """Return the crank rotations that pair points of each coupler curve with the stations by arc length, shape (m, n).
+
+        At each rotation the coupler curve has covered the same fraction of its length as the target has at the station. ``q``
+        has m linkages; ``span``, shape (m,), is the signed crank rotation over each whole curve.
+        """
         normal = self.normal
         assert normal.points is not None
         steps = np.abs(np.diff(np.append(normal.points, normal.points[0]) if normal.closed else normal.points))

@@ -115,7 +115,7 @@ class Contest:
         return self.area(curve) + self.charge(box, x) if np.isfinite(curve).all() else inf
 
     def charge(self, box: BlackBox, x: FloatArray) -> float:
-        """Return the proportional penalties for violated constraints that are added to an area."""
+        """Return the penalty to add to an area: PENALTY times the sum of the constraint violations."""
         return PENALTY * float(np.maximum(self.plain[box.branch].violations(x[None, :]), 0.0).sum())
 
     def error(self, box: BlackBox, x: FloatArray) -> float:

@@ -142,7 +142,7 @@ class Controller(Fmi2Slave):  # type: ignore[misc]
         return values
 
     def set_real(self, vrs: list[int], values: list[float]) -> None:
-        """Set all values or none; after the first sample parameters must be valid, and the sample time cannot be set."""
+        """Set all values or none. Once the first sample is taken, invalid parameters and any new sample time are refused."""
         self._expect("fmi2SetReal", INSTANTIATED, INITIALISING, RUNNING)
         for reference, value in zip(vrs, values):
             if reference not in self.vars:

@@ -454,7 +454,11 @@ def _rule(mechanism: Mechanism, entry: Entry) -> tuple[str, float, float, str]:
 
 
 def _commands(mechanism: Mechanism) -> list[str]:
-    """Return the rows of the commanded channels: number, index in the state, mode and its value, number of the rate."""
+    """Return a C row of `Command` for each channel that commands a rate.
+
+    A row has the number of the channel, the index of its rate in the state, the number of the mode (-1 without one), the value
+    of the mode at which the command is in force, and the number of the channel that gives the command's time derivative.
+    """
     rows = []
     for number, channel in enumerate(mechanism.channels):
         if channel.kind != "command":

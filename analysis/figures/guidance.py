@@ -139,7 +139,7 @@ def _poses(found: Guidance | GuidanceMap) -> tuple[NDArray[np.complex128], NDArr
 
 
 def _view(found: GuidanceMap) -> tuple[complex, complex]:
-    """Return two opposite corners (complex, mm) of a square that contains the poses with a margin, and the best linkage."""
+    """Return the lower left and upper right corners (complex, mm) of a square around the poses and the best linkage's pins."""
     places, _, size = _poses(found)
     middle = complex(np.mean(places))
     held = [middle - 0.5 * VIEW * size * (1 + 1j), middle + 0.5 * VIEW * size * (1 + 1j)]

@@ -1,4 +1,4 @@
-"""Place names of vertical lines, texts of points, and letters of pins where they cover as little as possible."""
+"""Move the names of vertical lines, the labels of points and the letters of pins to where they cover as little as possible."""
 
 from __future__ import annotations
 

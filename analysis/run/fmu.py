@@ -191,7 +191,7 @@ class _Instance:
         self._get_reals = getattr(self._fmu, f"get{self._real}")
 
     def _instance_class(self, identifier: str) -> type:
-        """Return the class that runs the FMU: of FMPy, or for a WebAssembly component if no library is for this platform."""
+        """Return the class that runs the FMU: FMPy's, or the WebAssembly one if no library is there for this platform."""
         assert self._folder is not None
         native = Path(self._folder) / "binaries" / (platform_tuple if self._fmi3 else platform)
         if native.is_dir() or not component_of(self._folder, identifier).is_file():

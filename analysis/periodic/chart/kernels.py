@@ -378,7 +378,7 @@ def _record(lane, point, seekers, v, room, carry):
 
 @inner
 def _go_on(lane, point, seekers, v, room, carry):
-    """Continue the search of a lane whose integration has ended; if the search is over, its place becomes -1."""
+    """Continue the search of a lane after its integration; if it is over, mark the lane free: ``seekers.place[lane]`` = -1."""
     hunt, most, status = _hunt(lane, seekers.hunts), point.search.most, v.status[lane]
     take(lane, LANES, v.x, v.z)
     if seekers.polishing[lane]:

@@ -496,14 +496,16 @@ def _count_rounds(point: OperatingPoint, start: FloatArray, turns: int) -> dict[
 def approach(
     point: OperatingPoint, turns: int, place: FloatArray, known: FloatArray | None = None
 ) -> FloatArray | None:
-    """Search for a periodic motion far from the guess; return its start, accurate to SEARCH_TOLERANCE, or None.
+    """Search for a periodic motion from a guess that may be far from it; return its start, None if the search fails.
+
+    The start has the accuracy of a search, `SEARCH_TOLERANCE`.
 
     Parameters
     ----------
     place : ndarray, shape (n,)
         Guess of the start.
     known : ndarray, shape (m, n), optional
-        Starts of known motions, which are divided out.
+        Starts of known motions; deflation keeps the search from finding them again: see `kernels.search`.
     """
     n, start = point.flow.size, place.copy()
     status = kernels.search(
@@ -550,11 +552,13 @@ def approach_even(point: OperatingPoint, turns: int, place: FloatArray) -> Float
 
 
 def first_guess(flow: Flow, drive: Drive, start: ArrayLike | None, speed: float | None = None) -> FloatArray:
-    """Return the guess for Newton's method: ``start``, or else rest at the coordinates with which the mechanism starts.
+    """Return the first guess of y for Newton's method: ``start``, or else the mechanism's default coordinates with zero rates.
 
-    At rest the crank has the prescribed speed; under a torque it has ``speed`` (rad/s), or a speed within the motor's range.
+    In the default guess only cranks turn. The first has the prescribed speed; under a torque it has ``speed`` (rad/s), or else
+    a speed within the motor's range. Another crank whose angle is part of y has its ratio times that speed.
 
-    Raises InputError if ``start`` does not have the components of the state, or is missing and needed.
+    Raises InputError if ``start`` does not have the components of the state, if under a torque neither ``start``, ``speed``
+    nor a motor is given, or if the crank's speed is then not above zero.
     """
     if start is None:
         guess = flow.rest.copy()

@@ -678,7 +678,7 @@ def damped_statements(charts: Mapping[float, Chart]) -> tuple[Statement, ...]:
 
 
 def compute_damped() -> StudyResult:
-    """Compute the boundaries at each damper, and the damper that removes the region."""
+    """Compute the boundaries of the first region of instability at each damper, and the damper that removes it for each I4."""
     charts = {omega_c: damped_region(omega_c) for omega_c in DAMPERS}
     columns = {"I4 [1]": RATIOS}
     for motion in MOTIONS:

@@ -166,7 +166,7 @@ def half_units(linkage: Linkage) -> FloatArray:
 
 
 def rounded(name: str) -> dict[str, tuple[float, float]]:
-    """Return the range of the error of a printed linkage if each of its numbers is rounded up or down, by reading."""
+    """Return, for each reading of the text, the range of a printed linkage's error within its rounding."""
     p = PROBLEMS[name]
     off = half_units(p.linkage)
     if isinstance(p.task, UntimedPath):

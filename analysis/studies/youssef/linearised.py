@@ -145,7 +145,10 @@ def _first_order_quotient(part: FourierSeries, by: FourierSeries) -> tuple[float
 
 
 def expansion(sigma2: float) -> NDArray[np.float64]:
-    """Return what (4.23) and (4.24) leave out of S/I: sizes of mean, first and second harmonic, about the printed datum."""
+    """Return the truncation error of the expansion (4.23), (4.24) of S/I, with the coefficients of (4.21) at the printed datum.
+
+    It is given by the magnitudes of its complex Fourier coefficients: mean, first and second harmonic; shape (3,).
+    """
     parts = printed(ratios(with_crank(sigma2)))
     kept, angle = convert(parts, Form.SERIES).spring, np.linspace(0.0, 2.0 * pi, 64, endpoint=False)
     left = FourierSeries.from_samples(parts.spring(angle) / parts.inertia(angle) - kept(angle), 2)

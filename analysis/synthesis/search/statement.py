@@ -436,7 +436,7 @@ class Statement:
         return casadi.vertcat(phi, *between), casadi.vertcat(steps, steps[-1], *[steps] * len(between))
 
     def _constrain_slider(self, pivot: SliderUnknown, ground: Any, v: Any) -> Any:
-        """Constrain the slider's motion; return the term of its smoothness in the quality."""
+        """Add the constraints on the slider's motion; return the smoothness term of the quality function, or 0."""
         casadi, unit = self._casadi, self.normal.unit
 
         def position(x: Any) -> Any:
