@@ -381,7 +381,7 @@ class Linkage:
 
     @staticmethod
     def transmission_excess(l3: Any, l4: Any, nearest: Any, farthest: Any, cosine: Any) -> tuple[Any, ...]:
-        """Return the values g of constraints g <= 0 that bound |cos mu| by ``cosine``, with the transmission angle mu at C.
+        """Return the values g of constraints g <= 0 that bound ``|cos mu|`` by ``cosine``, with the transmission angle mu at C.
 
         The arguments are numbers, arrays or symbols; ``nearest`` and ``farthest`` are the squares of the least and greatest
         `reach`.
