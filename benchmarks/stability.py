@@ -1,12 +1,14 @@
-"""Time a chart of the true orbit's largest Floquet multiplier, and the same chart with SciPy on the plain right-hand side.
+"""Measure the time of a chart of the true orbit's largest Floquet multiplier, and compare it with SciPy.
 
     python -m benchmarks.stability
 
-200 x 200 points of rig 1 with spring A, damping over crank speed, each on its own periodic orbit, on two cores from an empty
-cache of results. With SciPy: the same Newton iterations from the same guesses, the orbit and its two neighbours integrated
-together by solve_ivp's DOP853 at the same tolerance, their differences in the place of the variational equations, on the
-same two cores for a sample of the rows. The sample's cost per point stands for the rest; both are measured in one run. With
---cores 1 what is measured is the time of the processor, which others on the machine hardly change.
+The chart has 200 x 200 points of rig 1 with spring A, damping over crank speed. Each point has its own periodic orbit. The
+chart is computed on two cores from an empty cache of results.
+
+SciPy computes a sample of the rows, and its time per point is scaled to the whole chart. It takes the same Newton iterations;
+solve_ivp's DOP853 integrates the orbit and two neighbours together at the same tolerance, and their differences replace the
+variational equations. Chart and sample are timed in the same run on the same cores. With --cores 1 processor time is measured
+instead of elapsed time; it hardly depends on other programs.
 """
 
 from __future__ import annotations

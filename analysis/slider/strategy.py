@@ -81,7 +81,7 @@ class Strategy:
 
     @property
     def chosen(self) -> Step:
-        """The step that meets the tolerance; if none does, the one with the least value, preferably without a defect."""
+        """The step that meets the tolerance; if none does, the sound step with the least `Step.value`, or the least of all."""
         if self.met:
             return self.steps[-1]
         return min(self.steps, key=lambda s: (s.solution is None or not s.solution.verdicts.sound, s.value))

@@ -143,7 +143,7 @@ class OperatingPoint:
         along: float = 1.0,
         switched: bool = False,
     ) -> Section:
-        """Return the flow and its numbers in the form that the kernels take.
+        """Return the `Section` for the kernels: addresses of the flow's functions, constants, drive, scale of y, tolerance.
 
         Parameters
         ----------
@@ -156,7 +156,7 @@ class OperatingPoint:
         along : float
             Magnitude of lambda.
         switched : bool
-            Whether to compute the equation that some mechanisms switch on even if this one does not.
+            Whether to use the equations with their optional terms, such as friction, though this mechanism has switched them off.
         """
         d_drive, d_p = direction or (np.zeros_like(self.vector), np.zeros_like(self.constants))
         # a change of lambda may set the switch
@@ -345,7 +345,9 @@ def choose_pieces(point: OperatingPoint, places: FloatArray, turns: int) -> tupl
 
 
 class Discretisation:
-    """The pieces of a period along a family of motions, solved by collocation from the last motion, or else by shooting.
+    """Compute the pieces of a period for one motion after another of a family.
+
+    Collocation takes the previous motion as its first approximation; shooting replaces it where it fails or is not used.
 
     Parameters
     ----------

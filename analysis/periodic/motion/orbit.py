@@ -196,8 +196,8 @@ class PeriodicOrbit(Shown):
     turns : int
         Number of common periods, `Flow.period`, in one period of the motion; `crank_turns` is the number of turns of the crank.
     start : ndarray, shape (n,)
-        y at crank angle 0: coordinates and rates of the free freedoms other than the crank, of a five-bar u (m) and u'
-        (m/s), and under a torque the crank speed (rad/s).
+        y at crank angle 0: first the coordinates, then the rates of the freedoms other than the crank that are not
+        prescribed; last, if a torque drives the crank, its speed (rad/s). For a five-bar: u (m), u' (m/s).
     monodromy : ndarray, shape (n, n)
         Derivative of the map over one period on the section at crank angle 0.
     residual : float
