@@ -156,7 +156,7 @@ class OperatingPoint:
         along : float
             Magnitude of lambda.
         switched : bool
-            Whether to use the equations with their optional terms, such as friction, though this mechanism has switched them off.
+            Whether to use the equations with their optional terms, such as friction, even if this mechanism has none.
         """
         d_drive, d_p = direction or (np.zeros_like(self.vector), np.zeros_like(self.constants))
         # a change of lambda may set the switch
