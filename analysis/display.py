@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from base64 import b64encode
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from html import escape
 from io import BytesIO
 from math import isfinite
@@ -46,6 +46,11 @@ def format_range(values: Iterable[float], unit: str) -> str:
 def format_turns(turns: int) -> str:
     """Format a number of turns: "one turn", "2 turns"."""
     return "one turn" if turns == 1 else f"{turns} turns"
+
+
+def format_rounds(rounds: Mapping[str, int], before: str) -> str:
+    """Format how often links go round, with ``before`` in front of each: ", swing.angle goes round +1"."""
+    return "".join(f"{before}{name} goes round {times:+d}" for name, times in rounds.items())
 
 
 def format_count(count: int, what: str) -> str:

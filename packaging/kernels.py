@@ -1,6 +1,6 @@
 """Compile all kernels for any processor of this kind into the package, from where an installation takes them: see `linking`.
 
-python packaging/kernels.py
+Run it as ``python packaging/kernels.py``.
 """
 
 from __future__ import annotations
@@ -25,18 +25,21 @@ MODULES = (
 )
 
 
-def carry(number: int) -> Path:
-    """Compile one of the kernels; return its path."""
+def kernels() -> list[Kernel]:
+    """Return all kernels, in the same order in each process."""
     for name in MODULES:
         import_module(name)
-    return Kernel.known[number].carry()
+    return Kernel.known
+
+
+def carry(number: int) -> Path:
+    """Compile one of the kernels; return its path."""
+    return kernels()[number].carry()
 
 
 def main() -> None:
     """Compile those that are missing, on all cores, and remove the others."""
-    for name in MODULES:
-        import_module(name)
-    wanted = [kernel.carried for kernel in Kernel.known]
+    wanted = [kernel.carried for kernel in kernels()]
     for path in CARRIED.glob("*"):
         if path not in wanted:
             path.unlink()

@@ -264,6 +264,10 @@ def plotted(wanted: bool, result: Any, path: str | Path, **options: Any) -> list
 
 
 plot_option = click.option("--plot/--no-plot", default=True, show_default=True, help="Whether to write a plot.")
+#: Option of commands that write several plots.
+plots_option = click.option(
+    "--plots/--no-plots", "--plot/--no-plot", default=True, show_default=True, help="Whether to write plots."
+)
 
 
 def case_options(published: Iterable[str]) -> Callable[..., Any]:

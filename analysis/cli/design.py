@@ -22,6 +22,7 @@ from .common import (
     folder_of,
     handled,
     out_option,
+    plots_option,
     plotted,
     print_error,
     print_written,
@@ -59,9 +60,7 @@ def leave_if_stopped(stopped: Interrupted | None, kept: str) -> None:
 def search_options(command: Callable[..., Any]) -> Callable[..., Any]:
     """Add the options that all commands with a search have."""
     for option in (
-        click.option(
-            "--plots/--no-plots", "--plot/--no-plot", default=True, show_default=True, help="Whether to write plots."
-        ),
+        plots_option,
         out_option(help="Folder for the results."),
         workers_options(),
         click.option(

@@ -15,6 +15,7 @@ from .common import (
     folder_of,
     handled,
     out_option,
+    plots_option,
     plotted,
     print_error,
     print_written,
@@ -32,7 +33,7 @@ from .design import overrides_of, print_best, print_solutions, write_described, 
 @click.option(
     "--count", type=click.IntRange(1), default=6, show_default=True, help="Number of linkages to report for four poses."
 )
-@click.option("--plots/--no-plots", "--plot/--no-plot", default=True, show_default=True, help="Whether to write plots.")
+@plots_option
 @out_option(help="Folder for the results.")
 @handled
 def exact(case: str, settings: Sequence[str], crank_phase: str | None, count: int, plots: bool, out: str) -> None:

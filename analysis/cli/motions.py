@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from ..display import format_count
+from ..display import format_count, format_rounds
 from ..mechanisms import mechanism_of
 from .common import console, folder_of, html_option, quantity, save_picture, say, show_table, workers_options
 from .driven import Chosen, about_a_case, swing_of
@@ -104,8 +104,7 @@ def _motions(title: str, found: Sequence[Orbits], common: int) -> None:
         word = orbit.verdict().stability
         stays = word is not Stability.UNSTABLE
         number += stays
-        round_it = "".join(f", {name} goes round {times:+d}" for name, times in orbit.rounds.items())
-        size_of_it = f"{size * orbit.amplitude:.5g} {unit} of {what}{round_it}"
+        size_of_it = f"{size * orbit.amplitude:.5g} {unit} of {what}{format_rounds(orbit.rounds, ', ')}"
         shown = str(number) if stays else ""
         rows.append((shown, str(orbit.crank_turns), size_of_it, word.value, f"{orbit.largest:.6g}"))
     show_table(title, headings, rows, words=("stability",))

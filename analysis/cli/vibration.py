@@ -10,6 +10,7 @@ import numpy as np
 from linkwork.errors import InputError, LinkworkError, ParameterError
 from linkwork.parameters import field_name
 
+from ..display import format_rounds
 from ..mechanisms import FIVE_BAR, mechanism_of
 from ..units import RAD_S_PER_RPM, display_of
 from .common import (
@@ -202,7 +203,7 @@ def _print_branches(title: str, response: Any, factor: float, unit: str) -> None
     for number, branch in enumerate(response.branches, start=1):
         words = [s.value for s in branch.stability()]
         shares = ", ".join(f"{words.count(word) / len(words):.0%} {word}" for word in dict.fromkeys(words))
-        shares += "".join(f", {name} goes round {times:+d}" for name, times in branch.orbits[0].rounds.items())
+        shares += format_rounds(branch.orbits[0].rounds, ", ")
         events = [
             f"{s.kind.value} at {factor * s.parameter:.6g} ({_normal_form_in_words(branch.family, s)})"
             for s in branch.special

@@ -107,7 +107,7 @@ def for_any_processor(dispatcher: Any) -> bytes:
 
 def _for_this_processor(content: bytes) -> tuple[Any, ...]:
     """Return what Numba keeps of a kernel, from its code for any processor."""
-    name, noted, *rest = pickle.loads(zlib.decompress(content[:-_DIGEST]))
+    name, noted, *rest = pickle.loads(zlib.decompress(content))
     library = cpu_target.target_context.codegen().create_library(name)
     library.enable_object_caching()
     library._final_module = binding.parse_bitcode(noted)
@@ -126,10 +126,7 @@ class _Files(IndexDataCacheFile):
         found = super().load(key)
         if found is None and os.path.exists(self.source):
             try:
-                content = self.source.read_bytes()
-                if not _is_whole(content):
-                    raise ValueError("its bytes do not have their hash")
-                found = _for_this_processor(content)
+                found = _for_this_processor(_read_checked(self.source))
             except Exception as error:  # of the file, of pickle, zlib or LLVM
                 warnings.warn(
                     f"{self.source} is not used ({error!r}): the kernel is compiled", RuntimeWarning, stacklevel=2
@@ -146,26 +143,25 @@ class _Files(IndexDataCacheFile):
 
     def _load_index(self) -> Any:
         if Path(self._index_path).exists():
-            _check(Path(self._index_path))
+            _read_checked(Path(self._index_path))
         return super()._load_index()
 
     def _load_data(self, name: str) -> Any:
-        _check(Path(self._data_path(name)))
+        _read_checked(Path(self._data_path(name)))
         return super()._load_data(name)
-
-
-def _check(path: Path) -> None:
-    """Raise ValueError if the hash at the end of a file is not that of its bytes; Numba ignores the hash."""
-    if not _is_whole(path.read_bytes()):
-        raise ValueError(f"the bytes of {path.name} do not have their hash")
 
 
 def _with_hash(content: bytes) -> bytes:
     return content + sha256(content).digest()
 
 
-def _is_whole(content: bytes) -> bool:
-    return sha256(content[:-_DIGEST]).digest() == content[-_DIGEST:]
+def _read_checked(path: Path) -> bytes:
+    """Return the bytes of a file before the hash at its end, which Numba ignores; raise ValueError if it is not their hash."""
+    whole = path.read_bytes()
+    content = whole[:-_DIGEST]
+    if sha256(content).digest() != whole[-_DIGEST:]:
+        raise ValueError(f"the bytes of {path.name} do not have their hash")
+    return content
 
 
 def keep(dispatcher: Any, source: Path) -> None:

@@ -473,8 +473,8 @@ def other_motions(found: Survey) -> tuple[tuple[PeriodicOrbit, ...], tuple[float
     several: list[float] = []
     for level in np.linspace(*wish.span, SOUGHT).tolist():
         parameters, drive = wish.operation(found.x, level)
-        near, stable = _nearest(wish, found.response, level), 0
-        start = None if wish.over in speed_names(wish.mechanism) else near.start
+        start = None if wish.over in speed_names(wish.mechanism) else _nearest(wish, found.response, level).start
+        stable = 0
         for turns in range(1, wish.turns + 1):
             there: Orbits = orbits_of(parameters, drive, turns=turns, start=start)
             # a machine does not come near a motion from which deviations grow faster

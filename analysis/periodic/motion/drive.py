@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from linkwork.errors import AssemblyError, InputError
-from linkwork.mechanism import Channel, Mechanism, Mode, PublishedSet
+from linkwork.mechanism import Channel, Freedom, Mechanism, Mode, PublishedSet
 from linkwork.parameters import field_name
 
 from ...files import unknown_name
@@ -188,10 +188,14 @@ class Drive:
             raise InputError(f"a {mechanism.name} has no input for the {what} its crank: drive it otherwise")
         chosen = self.arguments(mechanism)
         modes = tuple(mode.arguments.index(chosen[mode.name]) for mode in mechanism.modes)
-        freedoms, way = mechanism.freedoms, {n: round(f.period / (2.0 * pi)) for n, f in enumerate(mechanism.freedoms)}
+        freedoms = mechanism.freedoms
         common = lcm(*(ratio.denominator for n, ratio in ratios.items() if not freedoms[n].swings))
         # of a link that goes round, in its own whole turns
-        rounds = (ratio * way[crank.freedom] / way[n] for n, ratio in ratios.items() if freedoms[n].swings)
+        rounds = (
+            ratio * _whole_turns(freedoms[crank.freedom]) / _whole_turns(freedoms[n])
+            for n, ratio in ratios.items()
+            if freedoms[n].swings
+        )
         base = lcm(common, *(of.denominator for of in rounds))
         made = flow(mechanism, modes, crank.freedom, base, base // common)
         for number in made.others:
@@ -224,8 +228,8 @@ class Drive:
         turns : int
             Common periods of the new drive in the same time: fewer than before if the new ones are longer.
         """
-        made, way = self.flow(mechanism), {f.coordinate: round(f.period / (2.0 * pi)) for f in mechanism.freedoms}
-        ratios = {name: Fraction(times * way[name], turns * made.turns) for name, times in rounds.items()}
+        made, freedoms = self.flow(mechanism), {f.coordinate: f for f in mechanism.freedoms}
+        ratios = {n: Fraction(times * _whole_turns(freedoms[n]), turns * made.turns) for n, times in rounds.items()}
         drive = replace(self, ratios={**self.ratios, **ratios})
         return drive, round(turns * made.period / drive.flow(mechanism).period)
 
@@ -290,6 +294,11 @@ class Drive:
         for argument in self.arguments(mechanism).values():
             acting.setdefault(argument, 0.0 if argument in names else True)
         return Inputs(**acting)
+
+
+def _whole_turns(freedom: Freedom) -> int:
+    """Return the number of turns of a link after which a mechanism is in the same configuration."""
+    return round(freedom.period / (2.0 * pi))
 
 
 def require_drive(drive: object) -> Drive:

@@ -127,6 +127,8 @@ class Flow:
         y with the coordinates at which the mechanism starts by default, and rates of zero.
     ways : ndarray, shape (n,)
         Increase of each component after which the motion is the same: a whole turn of an angle; 0 where there is none.
+    swinging : dict of str to int
+        Indices in y of the coordinates of links that nothing drives and that may go round, by FMI name.
     """
 
     def __init__(self, mechanism: Mechanism, modes: tuple[int, ...], crank: int, base: int, commons: int) -> None:
@@ -167,6 +169,7 @@ class Flow:
         self.rest, self.ways = np.zeros(self.size), np.zeros(self.size)
         self.rest[:free] = [initial[n] for n in self.free]
         self.ways[:free] = [freedom.period for freedom in freedoms]
+        self.swinging = {freedom.coordinate: place for place, freedom in enumerate(freedoms) if freedom.swings}
         self.inputs = self.motors = len(mechanism.channels)
         self.held = self.motors + len(MOTOR) * len(mechanism.torques)
         self.drive_size = self.held + rates + len(self.others)

@@ -19,7 +19,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from linkwork.errors import AssemblyError, InputError, LinkworkError
 
-from ...display import Shown, format_count
+from ...display import Shown, format_count, format_rounds
 from ...files import unknown_name
 from ...mechanisms import Parameters, mechanism_of
 from ...numerics.continuation import Evaluation
@@ -29,6 +29,7 @@ from . import kernels
 from .discretisation import (
     INTEGRATOR_TOLERANCE,
     Discretisation,
+    Ends,
     OperatingPoint,
     OrbitAssemblyError,
     OrbitError,
@@ -38,7 +39,7 @@ from .discretisation import (
     operating_point,
     orbit_error,
 )
-from .drive import Drive, starts_of
+from .drive import Drive, even_rates, starts_of
 from .floquet import TOLERANCE, StabilityVerdict, liouville, multipliers, verdict
 from .flow import PLAIN, STATE, VARIATIONAL, Flow
 from .kernels import Status
@@ -238,7 +239,7 @@ class PeriodicOrbit(Shown):
         except LinkworkError as error:
             said, swing = f" that cannot be followed ({error})", ""
         turns = format_count(self.crank_turns, "turn")
-        swing += "".join(f"; {name} goes round {times:+d}" for name, times in self.rounds.items())
+        swing += format_rounds(self.rounds, "; ")
         others = f"; {format_count(self.others, 'other motion')} there: find_orbits" if self.others else ""
         return f"<PeriodicOrbit: {turns}{said}, largest Floquet multiplier {self.largest:.4g}{swing}{others}>"
 
@@ -276,9 +277,9 @@ class PeriodicOrbit(Shown):
     @property
     def rounds(self) -> dict[str, int]:
         """Whole turns in a period of the motion of links that nothing drives and that go round, by their coordinates."""
-        paces, way = self.flow.paces(self.point.vector), self.flow.period * self.turns
-        swinging = {f.coordinate: f.period for f in self.flow.mechanism.freedoms if f.swings}
-        return {name: round(paces[name] * way / swinging[name]) for name in paces if name in swinging}
+        flow, paces = self.flow, self.flow.paces(self.point.vector)
+        way = flow.period * self.turns
+        return {name: round(paces[name] * way / flow.ways[i]) for name, i in flow.swinging.items() if name in paces}
 
     @property
     def swing(self) -> tuple[str, str]:
@@ -483,14 +484,12 @@ def _count_rounds(point: OperatingPoint, start: FloatArray, turns: int) -> dict[
     dict of str to int
         Whole turns by coordinate, without the links that only swing.
     """
-    flow, freedoms = point.flow, point.mechanism.freedoms
-    swinging = [
-        i for i, n in enumerate(flow.free) if freedoms[n].swings and freedoms[n].coordinate not in point.drive.ratios
-    ]
+    flow = point.flow
+    swinging = {name: i for name, i in flow.swinging.items() if name not in point.drive.ratios}
     if not swinging:
         return {}
     shift = point.period(start, turns).shift
-    return {freedoms[flow.free[i]].coordinate: times for i in swinging if (times := round(shift[i] / flow.ways[i]))}
+    return {name: times for name, i in swinging.items() if (times := round(shift[i] / flow.ways[i]))}
 
 
 def approach(
@@ -534,14 +533,10 @@ def approach_even(point: OperatingPoint, turns: int, place: FloatArray) -> Float
         np.tile(place, (k, 1)),
         point.scale(place),
     )
-    jacobian, pieces = np.zeros((k, n, k, n)), np.arange(k)
-    jacobian[pieces, :, (pieces + 1) % k] = -np.eye(n)
     for _ in range(SEARCH_ITERATIONS):
         try:
-            ends = point.shoot(angles, starts)
-            jacobian[pieces, :, pieces] = ends.matrices
-            gaps = ends.y - starts[(pieces + 1) % k]
-            change = np.linalg.solve(jacobian.reshape(k * n, k * n), gaps.ravel()).reshape(k, n)
+            gaps, jacobian = _close(point.shoot(angles, starts), starts)
+            change = np.linalg.solve(jacobian, gaps.ravel()).reshape(k, n)
         except (OrbitError, np.linalg.LinAlgError):
             return None
         size = float(np.abs(change / scale).max())
@@ -570,10 +565,8 @@ def first_guess(flow: Flow, drive: Drive, start: ArrayLike | None, speed: float 
                     )
                 speed = drive.motor.synchronous_speed * (1.0 - 0.5 * drive.motor.breakdown_slip)
             guess[-1] = speed
-        turning, rates = drive.speed or guess[-1], len(flow.mechanism.freedoms)
-        for number, ratio in drive.turning(flow.mechanism).items():
-            if number in flow.free:
-                guess[flow.places.index(rates + number)] = ratio * turning
+        free = len(flow.free)
+        guess[free : 2 * free] = even_rates(drive, flow, guess)
     else:
         guess = np.array(start, dtype=float)
         if guess.shape != (flow.size,) or not np.isfinite(guess).all():
@@ -690,6 +683,16 @@ def trial_orbit(
     return made, shift
 
 
+def _close(ends: Ends, starts: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return the gaps between the ends of k pieces and the next beginnings, shape (k, n), and their Jacobian, (k n, k n)."""
+    (k, n), pieces = starts.shape, np.arange(len(starts))
+    following = (pieces + 1) % k
+    jacobian: FloatArray = np.zeros((k, n, k, n))
+    jacobian[pieces, :, following] = -np.eye(n)
+    jacobian[pieces, :, pieces] += ends.matrices
+    return ends.y - starts[following], jacobian.reshape(k * n, k * n)
+
+
 class OrbitEquations:
     """Equations of a family's periodic motions over a range, in the form for `numerics.continuation`.
 
@@ -713,10 +716,7 @@ class OrbitEquations:
         (mechanism, drive), (other, last) = self._bounds
         flow = drive.flow(mechanism_of(mechanism))
         self.angles = np.array([0.0, flow.period * turns]) if angles is None else angles
-        # derivatives by the beginnings of the next pieces, shape (k, n, k, n): the constant part of the Jacobian
-        k, n = len(self.angles) - 1, flow.size
-        self._joined: FloatArray = np.zeros((k, n, k, n))
-        self._joined[np.arange(k), :, (np.arange(k) + 1) % k] = -np.eye(n)
+        self._shape = len(self.angles) - 1, flow.size
         self._discretised = Discretisation(self.angles, collocation_serves((drive, last), (mechanism, other)))
         # if only the drive varies, its numbers are linear in the parameter: one derivative serves all values
         self._direction = family.direction(high, low, high) if mechanism is other else None
@@ -731,17 +731,13 @@ class OrbitEquations:
     def __call__(self, unknowns: FloatArray, value: float) -> Evaluation:
         """Evaluate the residual with its exact derivatives; raises OrbitError if a piece cannot be followed."""
         point = operating_point(*self.family.at(value))
-        k, n = self._joined.shape[:2]
-        starts = unknowns.reshape(k, n).copy()
+        starts = unknowns.reshape(self._shape).copy()
         direction = self._direction or self.family.direction(value, self.low, self.high)
         ends = self._discretised.ends(point, starts, value, direction, self.high - self.low)
-        pieces = np.arange(k)
-        gaps = ends.y - starts[(pieces + 1) % k]
-        jacobian = self._joined.copy()
-        jacobian[pieces, :, pieces] += ends.matrices
+        gaps, jacobian = _close(ends, starts)
         scale = point.scale(starts[0])
         stations = None
-        if k > 1:
+        if len(starts) > 1:
             stations = Stations(self.angles, starts, float(growths(ends.matrices, scale).max()))
         orbit = make_orbit(
             point,
@@ -753,4 +749,4 @@ class OrbitEquations:
             stations=stations,
             nearest=ends.clearance,
         )
-        return Evaluation(gaps.ravel(), jacobian.reshape(k * n, k * n), ends.slopes.ravel(), orbit)
+        return Evaluation(gaps.ravel(), jacobian, ends.slopes.ravel(), orbit)

@@ -28,7 +28,6 @@ from ...units import Amount, in_si
 from .discretisation import OperatingPoint, OrbitError, operating_point, orbit_error
 from .drive import SAME, Drive, Torque, drive_of, even_rates, starts_of
 from .floquet import Stability
-from .flow import Flow
 from .kernels import Status
 from .orbit import (
     SEARCH_TOLERANCE,
@@ -302,18 +301,11 @@ class Orbits(Shown):
 @takes_published()
 def unsought(parameters: Parameters, drive: Drive) -> str:
     """Return what an error message adds about motions that are not sought, in which swinging links go round; may be empty."""
-    flow = drive.flow(mechanism_of(parameters))
-    names = _swinging(flow)
+    names = list(drive.flow(mechanism_of(parameters)).swinging)
     if not names:
         return ""
     also = " or in which several of them go round" if len(names) > 1 else ""
     return f"; motions in which {' or '.join(names)} goes round more than once in a turn{also} were not sought"
-
-
-def _swinging(flow: Flow) -> list[str]:
-    """Return the coordinates of the links that nothing drives and that may go round."""
-    freedoms = (flow.mechanism.freedoms[n] for n in flow.free)
-    return [freedom.coordinate for freedom in freedoms if freedom.swings]
 
 
 @takes_published(inputs=driven, initial=started)
@@ -465,7 +457,7 @@ def orbits_of(
     drives = [(drive, turns), *((orbit.drive, orbit.turns) for orbit in known)]
     drives += [
         drive.with_rounds(mechanism, {name: sign * times}, turns)
-        for name in _swinging(flow)
+        for name in flow.swinging
         if name not in drive.ratios
         for times in range(1, turns * flow.turns + 1)
         for sign in (1, -1)

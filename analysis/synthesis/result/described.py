@@ -82,22 +82,18 @@ def description(linkage: Linkage, make: Make, *, rotation: float = 0.0, directio
                 "phase": with_unit(remainder(phase, tau), "rad"),
             }
         }
-    if any(make.load):
-        tables["loads"] = [_load_point(linkage)]
+    if acting := loads(linkage, make):
+        tables["loads"] = list(acting)
     return tables
 
 
 def loads(linkage: Linkage, make: Make) -> dict[str, Any]:
     """Return the table with the load of ``make``, by the name of the point on which it acts; empty without a load."""
-    values = {f"load_{axis}": with_unit(force, "N") for axis, force in zip("xy", make.load)}
-    return {_load_point(linkage): values} if any(make.load) else {}
-
-
-def _load_point(linkage: Linkage) -> str:
-    """Return the name of the point on which the load acts: P, or the pin B or C if the coupler point is that pin."""
-    if linkage.point_is_pin:
-        return "C"
-    return "P" if linkage.point_distance else "B"
+    if not any(make.load):
+        return {}
+    # the coupler point may be one of the coupler's pins
+    point = "C" if linkage.point_is_pin else "P" if linkage.point_distance else "B"
+    return {point: {f"load_{axis}": with_unit(force, "N") for axis, force in zip("xy", make.load)}}
 
 
 def drives(linkage: Linkage, make: Make, *, rotation: float = 0.0, direction: float = 1.0) -> dict[str, Any]:
