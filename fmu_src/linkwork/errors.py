@@ -17,6 +17,10 @@ def _shown(value: object) -> str:
         text = repr(value)
     except (ValueError, RecursionError):  # an integer with thousands of digits; endlessly nested lists
         return f"a {type(value).__name__} that is too long to be shown"
+    return _cut(text)
+
+
+def _cut(text: str) -> str:
     return text if len(text) <= 500 else f"{text[:500]}..."
 
 
@@ -60,7 +64,7 @@ class UnknownNameError(ParameterError, InputError):
         super().__init__(words or name, None, f"be one of {listed}")
         hint = f"; did you mean {self.near}?" if self.near else ""
         which = "the names" if few else f"the nearest of {len(known)} names"
-        self.args = (f"there is no {words or name}{hint} ({which} are {listed})",)
+        self.args = (f"there is no {_cut(words or name)}{hint} ({which} are {listed})",)
 
 
 class MissingParameterError(ParameterError):

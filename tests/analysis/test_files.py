@@ -39,6 +39,7 @@ from analysis.files import (
     save_array,
     tables,
     text,
+    unknown_name,
     write_csv,
 )
 from analysis.units import quantity, with_unit
@@ -389,3 +390,7 @@ def test_csv_and_arrays_are_read_back(tmp_path):
     for unreadable in (read_csv, read_rows):
         with pytest.raises(InputError, match="cannot be read"):
             unreadable(tmp_path / "none.csv")
+
+
+def test_an_unknown_name_of_any_length_is_cut_in_the_message() -> None:
+    assert len(str(unknown_name("9" * 20_000, ["size"], f"trade_off.over {'9' * 20_000!r}"))) < 1_000
