@@ -68,7 +68,7 @@ def with_unit(value: float, unit: str) -> str:
 
 @lru_cache(maxsize=1)
 def _registry() -> Any:
-    import pint  # takes a third of a second
+    import pint
 
     return pint.UnitRegistry()
 
@@ -250,12 +250,19 @@ def _convert(text: str, unit: str, spelled: str, name: str, wanted: str) -> floa
         raise ParameterError(
             name, text, f"come with its unit, such as '{text} {spelled}', or be a number, which is in SI"
         )
+    of = re.sub(
+        r"(?<=[^\W\d_])(-?[0-9])", r"**\1", of.replace("·", "*").replace("^", "**")
+    )  # m2 for m**2, as FMI has it
+    # what most files have need not wait for pint, half a second; the numbers are pint's to the last bit
     if of in (unit, spelled):
         return number
+    if unit == "m" and of in LENGTHS:
+        return number * LENGTHS[of]
+    if of == display_of(unit)[0]:
+        return number * (1.0 / display_of(unit)[1])
     import pint
 
     try:
-        of = re.sub(r"(?<=[^\W\d_])(-?[0-9])", r"**\1", of.replace("·", "*"))  # m2 for m**2, as FMI has it
         return float(_registry().Quantity(number, of).to(spelled).magnitude)
     except pint.UndefinedUnitError as error:
         raise ParameterError(name, text, f"{wanted} ({error.args[0]!r} is no known unit)") from error

@@ -6,7 +6,7 @@ from math import inf, pi
 from typing import NamedTuple
 
 import numpy as np
-from scipy.optimize import brentq, minimize_scalar
+import scipy
 
 from linkwork.limits import LIMIT_SINE
 from linkwork.mechanism import Mechanism
@@ -83,12 +83,14 @@ def reach(mechanism: Mechanism, freedom: int = 0, *, most: float | None = None, 
             if values[n - 2] > values[n - 1] <= values[n]:
                 # the limit may lie between two places, where a sine goes through zero
                 bounds = sorted((places[n - 2], q))
-                dip = minimize_scalar(margin, bounds=bounds, method="bounded", options={"xatol": 1e-9 * most})
+                dip = scipy.optimize.minimize_scalar(
+                    margin, bounds=bounds, method="bounded", options={"xatol": 1e-9 * most}
+                )
                 if dip.fun < min(values[n - 1], lowest) and 0.0 <= sign * (dip.x - middle) <= most:
                     lowest, at = float(dip.fun), float(dip.x)
             if lowest < 0.0:
                 before = places[max(n - 2, 1)]
-                ends.append(float(brentq(lambda c: max(margin(c), -1.0), before, at, xtol=1e-9 * most)))
+                ends.append(float(scipy.optimize.brentq(lambda c: max(margin(c), -1.0), before, at, xtol=1e-9 * most)))
                 free.append(False)
                 break
             least = min(least, lowest)
@@ -151,6 +153,6 @@ def dead_centres(package: Package, freedom: int = 0, samples: int = 720) -> list
         if np.abs(values).max() < 1e-9:
             continue
         for n in np.flatnonzero(values[:-1] * values[1:] < 0.0):
-            place = brentq(lambda q, name=name: coefficient(q, name), at[n], at[n + 1], xtol=1e-12)
+            place = scipy.optimize.brentq(lambda q, name=name: coefficient(q, name), at[n], at[n + 1], xtol=1e-12)
             centres.append(DeadCentre(name, float(place)))
     return centres

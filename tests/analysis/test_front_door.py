@@ -45,6 +45,7 @@ from analysis import (
 from analysis.display import format_count
 from analysis.periodic import basins
 from analysis.run import published_case, save_parameters
+from analysis.units import _registry, quantity
 from linkwork.errors import InputError, MissingParameterError, ParameterError, UnknownNameError
 
 FUNCTIONS = [name for name in dir(analysis) if inspect.isfunction(getattr(analysis, name))]
@@ -136,6 +137,20 @@ def test_many_runs_of_sets_and_parameters() -> None:
 )
 def test_a_quantity_may_be_a_text_with_its_unit(text: Callable[[], float], number: float) -> None:
     assert text() == pytest.approx(number, rel=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("text", "unit"),
+    [("mm", "m"), ("cm", "m"), ("in", "m"), ("deg", "rad"), ("rpm", "rad/s"), ("m/s^2", "m/s2"), ("N·m", "N.m")],
+)  # fmt: skip
+def test_usual_units_are_those_of_pint_to_the_last_bit(monkeypatch: pytest.MonkeyPatch, text: str, unit: str) -> None:
+    """And do not wait for it."""
+    spelled = text.replace("·", "*")
+    base = {"m/s2": "m/s**2", "N.m": "N*m"}.get(unit, unit)
+    numbers = [float(f"{n:.5g}") for n in np.random.default_rng(1).uniform(0.01, 999.0, 200)]
+    expected = [float(_registry().Quantity(number, spelled).to(base).magnitude) for number in numbers]
+    monkeypatch.setattr("analysis.units._registry", None)
+    assert [quantity(f"{number!r} {text}", unit, "amount") for number in numbers] == expected
 
 
 def test_a_range_is_in_the_unit_of_what_varies() -> None:
