@@ -197,6 +197,15 @@ class TestFreeMotion:
         assert half == pytest.approx(published.HALF_NATURAL_FREQUENCY_RAD_S, abs=0.005)
 
     @pytest.mark.parametrize("k", [free_crank.SOFT, free_crank.STIFF])
+    def test_linear_motion_is_that_of_a_slider_that_stays_near_its_start(self, k: float) -> None:
+        """It follows the free motion the better, the less the slider moves: at the end better than at the start."""
+        angle, u = free_crank.linear_motion(k)
+        of = free_crank.coast(k)["slider.position"][: len(angle)]
+        apart = np.abs(free_crank.over_turns(angle, u - of)).max(axis=1) / np.ptp(of)
+        assert apart[-1] < 0.2 * apart[:5].max()
+        assert apart.max() < 0.2
+
+    @pytest.mark.parametrize("k", [free_crank.SOFT, free_crank.STIFF])
     def test_the_damper_takes_the_energy(self, k: float) -> None:
         run = free_crank.coast(k)
         energy = run["energy.kinetic"] + run["energy.potential"]
@@ -216,6 +225,15 @@ class TestFormulation:
         assert run.errors[1] > 1e-3
         assert run.unseen < 1e-12
         assert run.gap.max() > run.errors[0]
+
+    def test_estimate_of_hamming_tells_the_truncation_and_no_error_of_the_start(self) -> None:
+        estimates, errors, _ = formulation.estimated()
+        assert np.corrcoef(estimates, errors)[0, 1] > 0.95
+        assert formulation.estimated(1e-5)[0] == pytest.approx(estimates, abs=1e-11)
+
+    @pytest.mark.parametrize(("highest", "order"), [(2, 3), (3, 4)])
+    def test_series_of_order_four_needs_the_third_derivative(self, highest: int, order: int) -> None:
+        assert formulation.order_of_series(highest) == pytest.approx(order, abs=0.1)
 
     def test_milne_grows_where_hamming_decays(self) -> None:
         """Milne's corrector by steps on y' = -y from a start that is off by 1e-8."""

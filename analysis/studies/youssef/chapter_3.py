@@ -57,8 +57,8 @@ the first harmonics alone the spring's is the greatest; a spring stiffer still d
 torque varies with the spring at its least value, but not because the slider's accelerations differ: they make 3 % of
 the difference. T0 is not hyperbolic in the time of a launch; T0 t^2 is nearly constant. After the weakest launch the
 slider swings to both sides of its start. The second harmonic near 27 rad/s goes on growing down to 22 rad/s, and is no
-non-linear effect: the equation linear in u has it too. And Milne's method, which the thesis takes for as stable as
-Hamming's, is weakly unstable."""
+non-linear effect: the equation linear in u has it too. And not every predictor-corrector method is stable: Milne's
+classical one is weakly unstable."""
 
 #: Dampings of Fig 3.2 and 3.3 (dyn.s/cm).
 DAMPINGS = (1e4, 5e4, 1e5, 5e5, 1e6)
@@ -110,22 +110,35 @@ class Drift:
         """Slider position (cm), NaN from the moment the links are collinear."""
         return np.where(self.turns > self.collinear_turn, np.nan, self.slider_cm)
 
-    @property
-    def _ends(self) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+    def _last(self, turns: int = DRAWN_TURNS) -> int:
+        """Return the last whole turn before the links are collinear, at most ``turns``."""
+        return int(np.fmin(turns, self.collinear_turn))
+
+    def _ends(self, last: int) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
         """Numbers of the turns after the transient, or of all if there are none, and the slider position at their ends (cm)."""
-        last = int(min(DRAWN_TURNS, np.nan_to_num(self.collinear_turn, nan=DRAWN_TURNS)))
+        last = self._last(last)
         turns = np.arange(TRANSIENT_TURNS if last > TRANSIENT_TURNS else 0, last + 1)
         return turns, self.slider_cm[turns * SAMPLES_PER_DRIFT_TURN]
 
     @property
+    def line(self) -> tuple[float, float]:
+        """Least-squares line of the drift after the transient: drift per turn, and position at crank angle 0 (cm)."""
+        rate, start = np.polyfit(*self._ends(DRAWN_TURNS), 1)
+        return float(rate), float(start)
+
+    @property
     def rate(self) -> float:
-        """Drift per turn after the transient (cm): slope of the least-squares line."""
-        return float(np.polyfit(*self._ends, 1)[0])
+        """Drift per turn after the transient (cm); see `line`."""
+        return self.line[0]
 
     @property
     def bend(self) -> float:
         """Greatest distance of the slider at the ends of turns from the least-squares line, relative to the drift over them."""
-        turns, ends = self._ends
+        return self.bend_over(DRAWN_TURNS)
+
+    def bend_over(self, last: int) -> float:
+        """Return `bend` over the turns up to the ``last``."""
+        turns, ends = self._ends(last)
         return float(np.abs(ends - np.polyval(np.polyfit(turns, ends, 1), turns)).max() / np.ptp(ends))
 
     def unsteadiness(self, number: int) -> float:
@@ -133,6 +146,11 @@ class Drift:
         share = np.linspace(0.0, 1.0, SAMPLES_PER_DRIFT_TURN + 1)
         one, other = (u - share * (u[-1] - u[0]) for u in map(self.turn, (number, number + 1)))
         return float(np.ptp(other - one) / np.ptp(other))
+
+    @property
+    def unsteadiest(self) -> float:
+        """Greatest `unsteadiness` of the turns after the transient, up to `DRAWN_TURNS`."""
+        return max(self.unsteadiness(n) for n in range(TRANSIENT_TURNS + 1, self._last()))
 
     @property
     def transient(self) -> float:
@@ -163,15 +181,18 @@ def drift_result() -> StudyResult:
     """Compute the drift with the five dampers, its departure from a line, and when the links become collinear."""
     runs = {mu: drift(mu) for mu in DAMPINGS}
     accelerates = "the drift accelerates, and the swing about it grows"
-    shapes = [
-        at_most(_mu(mu), ALIKE, run.unsteadiness(3), why=accelerates) for mu, run in runs.items() if mu > DAMPINGS[0]
-    ]
+    shapes = [at_most(_mu(mu), ALIKE, run.unsteadiest, why=accelerates) for mu, run in runs.items() if mu > DAMPINGS[0]]
     bends = [at_most(_mu(mu), ALIKE, run.bend, why=accelerates) for mu, run in runs.items() if mu > DAMPINGS[0]]
     folds = {mu: run.collinear_turn for mu, run in runs.items()}
     sooner = [
         at_most(f"{_mu(weak)} over {plain(strong)}", 1.0, folds[weak] / folds[strong])
         for weak, strong in zip(folds, list(folds)[1:])
     ]
+    (rate, start), (other_rate, other_start) = runs[5e5].line, runs[1e6].line
+    collinear = (
+        f"coupler and rocker are within {degrees(asin(COLLINEAR_SINE)):.0f} deg of a line, abs(sin(th4 - th3)) = "
+        f"{COLLINEAR_SINE:g}, ours"
+    )
     columns = {TURNS: max((run.turns for run in runs.values()), key=len)}
     columns |= {f"slider position u; {_mu(mu)} [cm]": run.until_collinear for mu, run in runs.items()}
     return StudyResult(
@@ -184,16 +205,18 @@ def drift_result() -> StudyResult:
                 "The first of these is a transient region of duration approximately two cycles.",
                 text("3.2.1, L1905-1907"),
                 "cycles after which the motion less the line from end to end of a cycle changes to the next by at most "
-                f"{ALIKE:g} of its range, the rule for *steady*; where it never does, all until the links are collinear",
+                f"{ALIKE:g} of its range, the rule for *steady*; where it never does, all until {collinear}",
                 "half a cycle, the rule where whole cycles are counted",
                 tuple(near(_mu(mu), "2", run.transient, unit="cycles") for mu, run in runs.items()),
-                "with the two strongest dampers it is over in the first cycle, with the others the motion never becomes steady",
+                "with the two strongest dampers already the second cycle is like the first, with the others the motion never "
+                "becomes steady",
             ),
             Statement(
                 "The second consists of a steady periodic motion superimposed upon a drift.",
                 text("3.2.1, L1907-1911"),
-                "change from the third cycle to the fourth of the motion less the line from end to end of the cycle, "
-                "relative to its range; with the weakest damper the links are collinear before",
+                "greatest change from a cycle to the next, relative to its range, of the motion less the line from end to end "
+                f"of the cycle; from the third cycle on, over {DRAWN_TURNS} cycles, ours, or until the links are collinear, "
+                "which with the weakest damper they are before; the drift is judged in the next row",
                 ALIKE_WORDS,
                 tuple(shapes),
             ),
@@ -203,21 +226,24 @@ def drift_result() -> StudyResult:
                 text("3.2.1, L1911-1917"),
                 f"greatest distance of u at the ends of cycles {TRANSIENT_TURNS} to {DRAWN_TURNS}, or of those before the "
                 f"links are collinear, from their best line, relative to the drift over them; {DRAWN_TURNS} cycles are ours, "
-                "the text does not say how many are drawn; with the weakest damper none is left; difference of M, relative",
+                "the text does not say how many are drawn; with the weakest damper none is left; fall in size of M and of u0 "
+                f"from {_mu(5e5)} to 1e6, relative",
                 f"{ALIKE_WORDS}; *depending* by more than that",
                 (
                     *bends,
-                    at_least(f"M depending on mu: {_mu(5e5)} to 1e6", ALIKE, 1.0 - runs[1e6].rate / runs[5e5].rate),
+                    at_least("M depending on mu", ALIKE, 1.0 - other_rate / rate),
+                    at_least("u0 depending on mu", ALIKE, 1.0 - other_start / start),
                 ),
+                f"over 5 cycles {_mu(1e5)} is straight too ({runs[1e5].bend_over(5):.3f}), over 20 {_mu(5e5)} no longer is "
+                f"({runs[5e5].bend_over(20):.3f})",
             ),
             Statement(
                 "This indicates that for a small viscous force the linkage tends to collapse quickly into a collinear "
                 "configuration. However, as the viscous force is increased this tendency is counteracted.",
                 text("3.2.1, L1917-1925"),
-                f"cycles until coupler and rocker are within {degrees(asin(COLLINEAR_SINE)):.0f} deg of a line, abs(sin(th4 "
-                f"- th3)) = {COLLINEAR_SINE:g}, ours: {', '.join(f'{n:.1f}' for n in folds.values())}; relative "
-                "to those with the next stronger damper",
-                SIGN,
+                f"cycles until {collinear}: {', '.join(f'{n:.1f}' for n in folds.values())}; relative to those with the next "
+                "stronger damper",
+                f"{SIGN}; *quickly* is read as sooner than with the next stronger damper",
                 tuple(sooner),
             ),
         ),
@@ -337,10 +363,12 @@ def _steady_statements() -> list[Statement]:
             "The figure shows that due to the initial condition assumptions that u and [u' = 0] a transient effect "
             "is shown over the first cycle.",
             text("3.2.1, L1944-1948"),
-            "greatest distance of u from the steady motion in the first cycle and in the second, relative to its range",
+            "greatest distance of u from the steady motion in the first cycle and in the second, relative to its range; for "
+            "*due to* the change of u from the first cycle to the second with u and u' of the steady motion at the start",
             ALIKE_WORDS,
             (
                 at_least("first cycle, least of the springs", ALIKE, min(first.values())),
+                at_most("from the steady motion, greatest of the springs", ALIKE, change),
                 *(at_most(f"second cycle; {_k(k)}", ALIKE, x, why=later) for k, x in second.items()),
             ),
         ),
@@ -362,7 +390,7 @@ def _steady_statements() -> list[Statement]:
         Statement(
             "This mean position shifts towards the slider initial position as the spring stiffness is increased.",
             text("3.2.1, L1954-1958"),
-            "mean of u relative to that with the next softer spring",
+            "mean of u, which is negative, relative to that with the next softer spring, the greater of the two",
             SIGN,
             (at_most("greatest", 1.0, greatest_ratio(np.array(list(means.values())))),),
         ),
@@ -395,12 +423,15 @@ def _shape_statements() -> list[Statement]:
     ends = np.array([[find(t.angle_deg, t.slider_cm)[0] for find in (least, greatest)] for t in turns])
     widths, ranges = np.diff(ends, axis=1)[:, 0] % 360.0, np.array([np.ptp(t.slider_cm) for t in turns])
     rise, fall = (each.max() / each.min() for each in (ranges / widths, ranges / (360.0 - widths)))
+    slopes = np.array([np.gradient(t.slider_cm, t.angle_deg) for t in turns])
+    steep = [each.max() / each.min() for each in (slopes.max(axis=1), -slopes.min(axis=1))]
     shares = np.array([spring_share(k) for k in STIFFNESSES])
-    spring, damper, inertia = (np.abs(np.fft.rfft(force)[1]) for force in slider_forces(STIFFNESSES[-1]))
+    forces = slider_forces(STIFFNESSES[-1])
+    spring, damper, inertia = (np.abs(np.fft.rfft(force)[1]) for force in forces)
     assert spring > max(damper, inertia), (spring, damper, inertia)
-    of_first = spring / inertia
+    of_first, of_squares = spring / inertia, np.std(forces[0]) / np.std(forces[2])
     varies, least_at = {}, []
-    for k in (1e7, 1e8):
+    for k in (1e7, 1e8, 1e9):
         u = _steady(k).slider_cm
         high, low = int(u.argmax()), int(u.argmin())
         part = np.tile(u[:-1], 2)[high : high + (low - high) % (len(u) - 1) + 1]
@@ -411,12 +442,13 @@ def _shape_statements() -> list[Statement]:
             "The rate of change of the slider position is approximately the same for all the response curves between "
             "the minimum and maximum values.",
             text("3.2.1, L1966-1972"),
-            "mean slope of u between the two, greatest over least of the three springs",
+            "mean slope of u between the two, our choice, greatest over least of the three springs",
             f"{ABOUT:g}, the rule for *approximately*",
             (
                 at_most("from the least to the greatest u", 1.0 + ABOUT, rise, why="steeper with a stiffer spring"),
                 at_most("from the greatest to the least u", 1.0 + ABOUT, fall),
             ),
+            f"by the steepest slopes instead of the mean ones the two ratios are {steep[0]:.2f} and {steep[1]:.2f}",
         ),
         Statement(
             "However, as the spring stiffness is increased the spring force becomes dominant and the width of the "
@@ -437,7 +469,8 @@ def _shape_statements() -> list[Statement]:
                     why="the inertia force is greater, by its higher harmonics",
                 ),
             ),
-            f"of the first harmonics alone the spring's force is the greatest, {of_first:.2f} times that of the inertia",
+            f"as root mean square the spring's force is {of_squares:.2f} of the inertia's, of the first harmonics alone "
+            f"{of_first:.2f} times it, and then the greatest",
         ),
         Statement(
             "Eventually, although not shown on this figure, as k increases further the slope of the response curve "
@@ -445,7 +478,7 @@ def _shape_statements() -> list[Statement]:
             "curve below the zero degree crank angle positions.",
             text("3.2.1, L1976-1986"),
             "distance of u from a line, from the greatest to the least u, relative to its range; with these springs, ours, "
-            f"this part lies below 0 (or 360) deg: the least comes at {' and '.join(least_at)} deg",
+            f"this part lies below 0 (or 360) deg: the least comes at {', '.join(least_at[:-1])} and {least_at[-1]} deg",
             ALIKE_WORDS,
             tuple(at_most(_k(k), ALIKE, x) for k, x in varies.items()),
             "the slider swings on a stiffer spring, up to ten extremes a turn near 5e7 dyn/cm, and with a stiffer one yet the "
@@ -669,7 +702,8 @@ def torque_result() -> StudyResult:
                     *(near(f"position; {name} torque", 1.0, x, ALIKE) for name, (*_, x, _) in shares.items()),
                     Case(label="change in the geometry", computed=moved, lower=ALIKE, upper=SLIGHTLY),
                 ),
-                "the position alone makes more than the whole difference: the rates of the slider take part of it back",
+                "the position alone makes more than the whole difference: the rates of the slider take part of it back; that "
+                "the spring is *no external load* is not judged: it acts on the slider, but takes no work over a turn",
             ),
             Statement(
                 "The energy dissipation in the slider guide due to viscous friction also accounts for variations in "

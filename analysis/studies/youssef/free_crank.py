@@ -9,6 +9,8 @@ from math import pi
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.integrate import solve_ivp
+from scipy.interpolate import CubicSpline
 
 from linkwork.five_bar import dynamics, kinematics
 from linkwork.five_bar.parameters import InitialState
@@ -18,7 +20,7 @@ from ...figures import COLOURS, Curve, Figure, Panel, plot_curves
 from ...periodic import natural_frequency
 from ...run import Event, Inputs, TorsionBar, Trajectory, simulate
 from ...units import CM_PER_METRE, RAD_S_PER_RPM
-from ...youssef import harmonic_balance, nonlinear_harmonic_balance, slider_equation
+from ...youssef import harmonic_balance, slider_equation
 from ..rules import ABOUT, ALIKE, SMALL
 from ..statements import Case, Statement, at_least, at_most, near, text
 from ..study import Study, StudyResult, padded
@@ -173,9 +175,14 @@ def transient(stiffness: float) -> NDArray[np.float64]:
 
 def turn_by_turn(run: Trajectory, output: str, start: float) -> NDArray[np.float64]:
     """Return an output over each whole turn from the crank angle ``start`` (rad), shape (turns, SAMPLES)."""
-    marks = np.arange(start, run["crank.angle"][-1], 2.0 * pi)
+    return over_turns(run["crank.angle"], run[output], start)
+
+
+def over_turns(angle: NDArray[np.float64], values: NDArray[np.float64], start: float = 0.0) -> NDArray[np.float64]:
+    """Return values at crank angles (rad) over each whole turn from the angle ``start``, shape (turns, SAMPLES)."""
+    marks = np.arange(start, angle[-1], 2.0 * pi)
     grid = marks[:-1, None] + np.linspace(0.0, 2.0 * pi, SAMPLES, endpoint=False)
-    return np.interp(grid, run["crank.angle"], run[output])
+    return np.interp(grid, angle, values)
 
 
 def half_natural_frequencies(stiffness: float) -> NDArray[np.float64]:
@@ -230,8 +237,9 @@ def draw_launches(values: Sequence[float], legend: str, result: StudyResult) -> 
 
 #: How the rise of the crank speed is judged.
 RISE = (
-    "greatest distance of the crank speed, up to its peak, from the line whose greatest distance from the curve is least, "
-    "relative to the peak; crank angle of the peak, while the torque acts up to 1 rad"
+    "greatest distance of the crank speed, up to its peak while the torque acts, from the line whose greatest distance from "
+    "the curve is least, relative to the peak; crank angle of this peak, after which the speed falls up to 1 rad, where the "
+    "torque ends"
 )
 
 
@@ -250,10 +258,14 @@ def _rise_to_peak(run: Trajectory) -> tuple[NDArray[np.float64], NDArray[np.floa
     return run.time[: peak + 1] / run.time[peak], run["crank.speed"][: peak + 1] / run["crank.speed"][peak]
 
 
-def _least_squares_words(runs: Mapping[str, Trajectory]) -> str:
-    """Return a sentence on the greatest distance of the crank speed from its least-squares line, of all runs."""
+def _rise_words(runs: Mapping[str, Trajectory]) -> str:
+    """Return words on the greatest distance of the crank speed from its least-squares line, and on its fall after the peak."""
     off = [np.abs(w - np.polynomial.Polynomial.fit(t, w, 1)(t)).max() for t, w in map(_rise_to_peak, runs.values())]
-    return f"from the line of least squares the greatest distance is {max(off):.3f}, at the peak, above {ALIKE:g}"
+    fall = min(1.0 - run["crank.speed"][-1] / run["crank.speed"].max() for run in runs.values())
+    return (
+        f"from the peak to 1 rad the speed falls by {100 * fall:.1f} % at least; there is a line within {ALIKE:g}, though from "
+        f"that of least squares the greatest distance is {max(off):.3f}, at the peak"
+    )
 
 
 def _swing_cases(runs: Mapping[str, Trajectory], start: float) -> tuple[Case, ...]:
@@ -320,13 +332,13 @@ def launch_speeds() -> StudyResult:
             f"{RISE}; for p1 and p2 we take the peaks",
             ALIKE_WORDS,
             _rise_cases(rises),
-            _least_squares_words(rises),
+            _rise_words(rises),
         ),
         Statement(
             "The behaviour of the crank speed beyond [theta2] = 1 rad. in Fig. (3.6) is governed by the free motion "
             "equations of motion. However, it is oscillatory and decaying.",
             text("3.2.2, L2142-2147"),
-            f"{SWINGS} after all three torques",
+            f"{SWINGS} after all three torques, up to 1 s; no torque acts there by the thesis's own definition",
             f"{ALIKE:g}, the rule for *steady*; {SIGN}",
             _swing_cases(runs, 1.0),
         ),
@@ -334,8 +346,8 @@ def launch_speeds() -> StudyResult:
             "The decaying aspect is due to the energy dissipation in the slider guide and will be studied in the "
             "next section.",
             text("3.2.2, L2147-2151"),
-            f"{UNDAMPED}; with 2e8 dyn.cm and without the damper the links are collinear after four turns, so that "
-            "only turns 3 and 4 are compared there",
+            f"{UNDAMPED}; runs of 3 s, ours; with 2e8 dyn.cm and without the damper the links are collinear after four turns, "
+            "so that only turns 3 and 4 are compared there",
             f"{ALIKE_WORDS}; a loss is more than that",
             _damper_cases({label: _launches(torque, 1e6) for label, torque in zip(runs, TORQUES)}, 1.0),
         ),
@@ -355,10 +367,10 @@ def torque_over_time() -> StudyResult:
         statements=(
             Statement(
                 "A plot of the initial torque T0 against the time taken to reach [theta2] = 1 rad. is shown in Fig. (3.7). It "
-                "shows a hyperbolic relationship[ ]between T0 and T asymptotic to [T0 = 0 and T = 0].",
+                "shows a hyperbolic relationship[ ]between T0 and T [the time] asymptotic to [T0 = 0 and T = 0].",
                 text("3.2.2, L2134-2142"),
                 "exponent of T0 in the time, mean of the two between the three torques; least T0 that turns the "
-                f"crank by 1 rad, below which it falls back, relative to {scale:.0e} dyn.cm; time at 1e12 dyn.cm "
+                f"crank by 1 rad, below which it falls back, relative to {plain(scale)} dyn.cm; time at 1e12 dyn.cm, ours, "
                 f"relative to that at {plain(TORQUES[0])}",
                 f"{ALIKE_WORDS}; asymptotes to {SMALL:g}, the rule for *small*",
                 (
@@ -393,6 +405,10 @@ def launch_positions() -> StudyResult:
     turns = _turns(runs)
     largest = max(float(np.abs(run["slider.position"]).max()) for run in runs.values())
     later = turns[2].transient - max(t.transient for t in turns[:2])
+    *sooner, last = (
+        np.interp(t.transient, np.arange(len(t.ends) + 1), [run.events[0].time, *t.ends]) - run.events[0].time
+        for t, run in zip(turns, runs.values())
+    )
     *lesser, shift = (abs(t.slider.mean()) for t in turns)
     shaft = -CM_PER_METRE * table_3_1(0.0).ground_length
     return _launch_result(
@@ -404,10 +420,14 @@ def launch_positions() -> StudyResult:
             "As would be expected the response for [T0 = 2 x 10^8] takes longer before it settles and then starts a "
             "steady state decay.",
             text("3.2.2, L2155-2159"),
-            "turns until the mean of u is farthest from the start, with T0 = 2e8 dyn.cm less the greater of the "
-            "others; mean of u relative to the turn before, from then on",
+            "turns, and time from the end of the torque, until the mean of u is farthest from the start, with T0 = 2e8 dyn.cm "
+            "less the greater of the others; mean of u relative to the turn before, from then on",
             SIGN,
-            (at_least("turns longer", 1.0, later), _decay_case(turns[-1:])),
+            (
+                at_least("turns longer", 1.0, later),
+                at_least("time longer", 0.0, last - max(sooner), "s"),
+                _decay_case(turns[-1:]),
+            ),
         ),
         Statement(
             "The three responses show the slider oscillates between its initial position and the crank shaft and as "
@@ -453,14 +473,14 @@ def launch_speeds_by_spring() -> StudyResult:
             RISE,
             ALIKE_WORDS,
             _rise_cases(rises),
-            _least_squares_words(rises),
+            _rise_words(rises),
         ),
         Statement(
             "The speed fluctuates when the torque is removed and then decays due to the viscous dissipation of "
             "energy in the slider guide.",
             text("3.2.2, L2181-2185"),
-            f"{SWINGS} with all three springs; {UNDAMPED}; with 5e5 dyn/cm and without the damper the links are collinear "
-            "after five turns, so that only turns 3 to 5 are compared there",
+            f"{SWINGS} with all three springs, up to 1 s; {UNDAMPED}; runs of 3 s, ours; with 5e5 dyn/cm and without the "
+            "damper the links are collinear after five turns, so that only turns 3 to 5 are compared there",
             f"{ALIKE_WORDS}, and a loss of more than that; of the turn before {SIGN}",
             (
                 *_swing_cases(_spring_runs(), 1.0),
@@ -471,8 +491,9 @@ def launch_speeds_by_spring() -> StudyResult:
             "Because the speed response is the same throughout the time region in which the torque acts, it suggests "
             "similar loads and movement of slider.",
             text("3.2.2, L2187-2191"),
-            "spread between the springs while the torque acts of the crank speed, relative to its peak, and of the force at "
-            "pin C, for the loads, relative to its own; the slider's movement is judged at Fig 3.10",
+            "spread between the springs while the torque acts, at equal shares of the time to 1 rad, of the crank speed, "
+            "relative to its peak, and of the force at pin C, for the loads, relative to its own; the slider's movement is "
+            "judged at Fig 3.10",
             f"{ALIKE_WORDS}; {ABOUT:g}, the rule for *similar*",
             (
                 at_most("crank speed", ALIKE, np.ptp(speeds, axis=0).max() / speeds.max()),
@@ -500,8 +521,8 @@ def launch_positions_by_spring() -> StudyResult:
             "... similar loads and movement of slider. The latter is verified in Fig. (3.10) in which the slider response is "
             "shown.",
             text("3.2.2, L2191-2195"),
-            "spread of u, the movement of the slider, between the springs while the torque acts, relative to its range in "
-            "that time",
+            "spread of u, the movement of the slider, between the springs while the torque acts, at equal shares of the time "
+            "to 1 rad, relative to its range in that time",
             f"{ABOUT:g}, the rule for *similar*",
             (at_most("greatest", ABOUT, apart),),
         ),
@@ -510,8 +531,9 @@ def launch_positions_by_spring() -> StudyResult:
             "which occurs a free motion steady state decay which is studied in the next section.",
             text("3.2.2, L2195-2201"),
             "greatest distance of u over a turn from that of a free crank of the same mean speed, left from its steady motion "
-            f"at {FASTER:g} rpm, relative to its range; with k = 5e5 dyn/cm, where there is no such motion, turns until the "
-            "mean of u is farthest from the start; mean of u relative to the turn before, from then on",
+            f"at {FASTER:g} rpm, relative to its range; with k = 5e5 dyn/cm, with which the links come collinear at this "
+            "speed, turns until the mean of u is farthest from the start; mean of u relative to the turn before, once it is "
+            "farthest",
             f"{ALIKE_WORDS}; {SIGN}",
             (
                 at_least("k = 5e5 dyn/cm, turns", 1.0, _turns(runs)[0].transient),
@@ -584,7 +606,8 @@ def _free_swings() -> Statement:
         "Both figures show that (1) The crank speed behaviour is oscillatory (2) The amplitude of oscillations "
         "decreases with crank angle and (3) The mean position of oscillation reduces with crank angle.",
         text("3.3, L2241-2251"),
-        "range of the crank speed in a turn over its mean, least; range and mean relative to the turn before, greatest",
+        "range of the crank speed in a turn over its mean, least; range and mean relative to the turn before, greatest; of all "
+        "turns in 10 s, ours",
         f"{ALIKE:g}, the rule for *steady*; {SIGN}",
         tuple(
             case
@@ -610,7 +633,7 @@ def _free_causes() -> Statement:
         text("3.3, L2253-2259"),
         "relative range of the kinetic energy in a turn over that of the crank speed squared, greatest down to "
         f"{HARMONIC_SPEED:g} rad/s: where this energy does not change, the inertia's change with the position alone swings "
-        f"the speed; {UNDAMPED}",
+        f"the speed; {UNDAMPED}; runs of 4 s, ours",
         f"less than half, as *due to* says; {ALIKE_WORDS}",
         (*swings, *_damper_cases({label: (coast(k, 0.0), coast(k)) for label, k in BOTH.items()}, 0.0)),
     )
@@ -669,7 +692,8 @@ def soft_phase_plane() -> StudyResult:
         SOFT,
         Statement(
             "Due to sampling of output data straight-line segments appear on the curves. These segments should in "
-            "fact be smooth curves following the line pattern of the curves ...",
+            "fact be smooth curves following the line pattern of the curves and appear as straight lines only because no "
+            "points were sampled between the end points of each segment.",
             text("3.3, L2266-2276"),
             "power of the time between samples with which the distance of the curve, halfway in time, from the middle of the "
             "straight segment falls, in shares of the ranges of u and u'; from samples 2 ms apart to 1 ms",
@@ -701,27 +725,82 @@ def soft_phase_plane() -> StudyResult:
         Statement(
             "Non-linear effects leading to higher harmonics in the slider motion are clearly shown in both figures.",
             text("3.3, L2293-2297"),
-            "second harmonic of u relative to the first, least of all turns; the same at a constant 27 rad/s, over that by the "
-            "equation linear in u",
+            "higher harmonics of u, root of the sum of their squares, relative to the first, least of the turns that are "
+            "drawn; this ratio over that by the equation linear in u with the same motion of the crank, greatest of the turns",
             f"more than {SMALL:g}, the rule for *small*; more than {1.0 + ALIKE:g}, the rule for *the same*, for a non-linear "
             "effect",
             (
-                *(at_least(label, SMALL, (t.second / t.first).min()) for label, t in turns.items()),
+                *(at_least(label, SMALL, drawn_harmonics(k).min()) for label, k in BOTH.items()),
                 *(at_least(f"non-linear; {label}", 1.0 + ALIKE, beyond_linear(k)) for label, k in BOTH.items()),
             ),
-            "the equation linear in u has these harmonics too: the geometry of the linkage forces them",
+            "the equation linear in u has these harmonics too: the geometry of the linkage forces them, also at a constant "
+            f"crank speed: at {HARMONIC_SPEED:g} rad/s its second harmonic is "
+            f"{' and '.join(f'{linear_ratio(k):.2f}' for k in BOTH.values())} of the first",
         ),
     )
 
 
+def linear_ratio(stiffness: float) -> float:
+    """Return the ratio of the second to the first harmonic of u at a constant 27 rad/s by the linear equation."""
+    linear = harmonic_balance(slider_equation(table_3_1(stiffness), HARMONIC_SPEED), 8)
+    return linear.harmonic(2) / linear.harmonic(1)
+
+
 @cache
+def linear_motion(stiffness: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Integrate the slider's equation, linear about u = u' = 0, with the free crank's motion; return th2 (rad) and u (m)."""
+    run, p, turns = coast(stiffness), table_3_1(stiffness).constants(), Turns.of(coast(stiffness))
+    # half a turn beyond those that are drawn
+    n = int(np.searchsorted(run["crank.angle"], 2.0 * pi * (turns.shown + 0.5)))
+    time, crank = run.time[:n], [run[f"crank.{name}"][:n] for name in ("angle", "speed", "acceleration")]
+
+    def acceleration(at: Sequence[float], u: float, v: float) -> float:
+        angle, speed, rate = at
+        g = kinematics.position(angle, u, p)
+        inputs = dynamics.NO_INPUTS._replace(speed_drive=1.0, acceleration=rate)
+        return dynamics.motion(
+            g, kinematics.coefficients(g, p), (angle, u, speed, v, 0.0, 0.0), inputs, p
+        ).slider_acceleration
+
+    du, dv = 1e-6, 1e-5
+    terms = CubicSpline(
+        time,
+        [
+            (
+                acceleration(at, 0.0, 0.0),
+                (acceleration(at, du, 0.0) - acceleration(at, -du, 0.0)) / (2.0 * du),
+                (acceleration(at, 0.0, dv) - acceleration(at, 0.0, -dv)) / (2.0 * dv),
+            )
+            for at in np.transpose(crank).tolist()
+        ],
+    )
+
+    def derivative(t: float, y: NDArray[np.float64]) -> NDArray[np.float64]:
+        force, by_position, by_velocity = terms(t)
+        return np.array([y[1], force + by_position * y[0] + by_velocity * y[1]])
+
+    start = [run["slider.position"][0], run["slider.velocity"][0]]
+    found = solve_ivp(derivative, (0.0, time[-1]), start, t_eval=time, rtol=1e-8, atol=1e-10, max_step=2e-3)
+    return crank[0], found.y[0]
+
+
+def higher_harmonics(turns: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the root of the sum of squares of the harmonics from the second on, over the first, in each row of samples."""
+    sizes = np.abs(np.fft.rfft(turns, axis=1))
+    ratios: NDArray[np.float64] = np.linalg.norm(sizes[:, 2:], axis=1) / sizes[:, 1]
+    return ratios
+
+
+def drawn_harmonics(stiffness: float) -> NDArray[np.float64]:
+    """Return `higher_harmonics` of u in each turn that is drawn."""
+    run = coast(stiffness)
+    return higher_harmonics(turn_by_turn(run, "slider.position", 0.0))[: Turns.of(run).shown]
+
+
 def beyond_linear(stiffness: float) -> float:
-    """Return the ratio of the second to the first harmonic of u at 27 rad/s, relative to the ratio by the linear equation."""
-    parameters = table_3_1(stiffness)
-    full = nonlinear_harmonic_balance(parameters, HARMONIC_SPEED)
-    linear = harmonic_balance(slider_equation(parameters, HARMONIC_SPEED), full.order)
-    _, first, second, *_ = full.series.amplitudes
-    return float(second / first * linear.harmonic(1) / linear.harmonic(2))
+    """Return the greatest ratio of `drawn_harmonics` to those of the linear motion."""
+    found = drawn_harmonics(stiffness)
+    return float((found / higher_harmonics(over_turns(*linear_motion(stiffness)))[: len(found)]).max())
 
 
 def stiff_phase_plane() -> StudyResult:
@@ -743,7 +822,8 @@ def stiff_phase_plane() -> StudyResult:
             "rad/sec.",
             text("3.3, L2297-2301"),
             "second harmonic over the first at a mean crank speed of 27 rad/s, relative to that with k = 5e5 dyn/cm; "
-            "speed at which it is greatest, the motion followed beyond the plot, down to 20.7 rad/s",
+            "speed at which it is greatest, the motion followed beyond the plot, down to "
+            f"{stiff.speed[-1]:.1f} rad/s",
             f"{SIGN}; {100 * ABOUT:g} %, the rule for *around*",
             (
                 at_least("at 27 rad/s", 1.0, seen[0] / seen[1]),
@@ -760,7 +840,8 @@ def stiff_phase_plane() -> StudyResult:
         Statement(
             "This speed is in fact an approximation to half the natural frequency of the system.",
             text("3.3, L2301-2305"),
-            "half the natural frequency with the mean, the least and the greatest effective mass of a turn, at u = 0",
+            "half the natural frequency, k = 2e6 dyn/cm, with the mean, the least and the greatest effective mass of a turn, "
+            "at u = 0",
             f"{ABOUT:g}, the rule for *approximately*; 27 rad/s lies between the others, the range in which the thesis itself "
             "places the natural frequency (L2309)",
             (
@@ -773,8 +854,8 @@ def stiff_phase_plane() -> StudyResult:
             "This suggests that the non-linearity is a second subharmonic resonance.",
             text("3.3, L2305-2307"),
             "mean crank speed at which the second harmonic over the speed squared, to which its force is "
-            "proportional, is greatest, relative to half the natural frequency with the mean mass; second harmonic over the "
-            "first at a constant 27 rad/s, over that by the equation linear in u",
+            "proportional, is greatest, relative to half the natural frequency with the mean mass; higher harmonics over "
+            "the first, relative to those by the equation linear in u, as at Fig 3.13",
             f"{lowered:.3f} below 1, by which the damper of the thesis lowers the peak of an oscillator; more than "
             f"{1.0 + ALIKE:g}, the rule for *the same*, for a non-linearity",
             (
@@ -788,7 +869,8 @@ def stiff_phase_plane() -> StudyResult:
             "value but extends over a range. This is due to the variable mass and inertia of the mechanism "
             "experienced by the slider.",
             text("3.3, L2307-2317"),
-            "natural frequency with the least over that with the greatest effective mass of a turn",
+            "natural frequency with the least over that with the greatest effective mass of a turn, which alone differ; k = "
+            "2e6 dyn/cm",
             f"more than {ALIKE:g}, the rule for *the same*",
             (at_least("", 1.0 + ALIKE, over_turn.max() / over_turn.min()),),
         ),
