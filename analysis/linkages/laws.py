@@ -18,10 +18,10 @@ from ..units import quantity
 #: A formula, or the rows (x, force) of a table as they were given.
 Law: TypeAlias = str | tuple[tuple[Any, Any], ...]
 
-#: Functions of `math` that formulas may use.
-FUNCTIONS = ("sin", "cos", "tan", "atan", "tanh", "exp", "log", "sqrt", "fabs")
-#: Functions that the source of a law may call.
-WRITTEN = (*FUNCTIONS, "pow")
+#: Functions of `math` that the source of a law may call.
+WRITTEN = ("sin", "cos", "tan", "atan", "tanh", "exp", "log", "sqrt", "fabs", "pow")
+#: Functions that formulas may use, with the number of their arguments.
+FUNCTIONS = {**dict.fromkeys((*WRITTEN[:-1], "abs"), 1), "max": 2, "min": 2}
 _NODES = (ast.Expression, ast.BinOp, ast.UnaryOp, ast.Add, ast.Sub, ast.Mult, ast.Div, ast.Pow, ast.USub, ast.UAdd)
 _ROWS = Many(Many(unchanged, length=2), least=2)
 _WANTED = f"be a formula in x, v and the constants with + - * / ** and {', '.join(FUNCTIONS)}, or a table of [x, force]"
@@ -54,7 +54,7 @@ def law(value: Any, name: str) -> Law:
             (
                 isinstance(node, ast.Call)
                 and isinstance(node.func, ast.Name)
-                and len(node.args) == 1
+                and len(node.args) == FUNCTIONS.get(node.func.id)
                 and not node.keywords
             )
             or (isinstance(node, ast.Name) and (node.id in FUNCTIONS) == (node in called))
@@ -75,14 +75,17 @@ def expression(law: Law, about: bool, name: str) -> str:
         If a row of a table is of other kinds of quantities, or the rows are not in order.
     """
     if isinstance(law, str):
-        return ast.unparse(_Powers().visit(ast.parse(law, mode="eval")))
+        return ast.unparse(_Written().visit(ast.parse(law, mode="eval")))
     units = ("rad", "N.m") if about else ("m", "N")
     rows = [[quantity(value, unit, name) for value, unit in zip(row, units)] for row in law]
     return _table(rows, name)
 
 
-class _Powers(ast.NodeTransformer):
-    """Writes powers as `math.pow`, which raises where ``**`` gives a complex number; whole constant powers stay."""
+class _Written(ast.NodeTransformer):
+    """Writes powers as `math.pow`, which raises where ``**`` gives a complex number, and max, min and abs by `math.fabs`.
+
+    Whole constant powers stay.
+    """
 
     def visit_BinOp(self, node: ast.BinOp) -> ast.expr:
         self.generic_visit(node)
@@ -90,6 +93,15 @@ class _Powers(ast.NodeTransformer):
         if not isinstance(node.op, ast.Pow) or whole:
             return node
         return ast.Call(ast.Name("pow"), [node.left, node.right], [])
+
+    def visit_Call(self, node: ast.Call) -> ast.expr:
+        self.generic_visit(node)
+        name, (a, b, *_) = ast.unparse(node.func), (*(f"({ast.unparse(own)})" for own in node.args), "")
+        if name not in ("abs", "max", "min"):
+            return node
+        sign = "+" if name == "max" else "-"
+        written = f"fabs{a}" if name == "abs" else f"0.5 * ({a} + {b} {sign} fabs({a} - {b}))"
+        return ast.parse(written, mode="eval").body
 
 
 def constants(value: Any, name: str) -> dict[str, tuple[float, str]]:
@@ -117,7 +129,7 @@ def check_law(law: Law, known: Mapping[str, Any], name: str) -> None:
         wanted = f"have x, v and its constants only: {own} is none of them; give its value, as in constants = {{ {own} = 2.5 }}"
         raise ParameterError(name, formula, wanted)
     for own in known:
-        if own in ("x", "v", *WRITTEN) or not re.fullmatch("[a-z][a-z0-9_]*", own):
+        if own in ("x", "v", "pow", *FUNCTIONS) or not re.fullmatch("[a-z][a-z0-9_]*", own):
             where = f"{name.rpartition('.')[0]}.constants.{own}"
             raise ParameterError(where, known[own], "have a name of small letters that is no function, x or v")
 
@@ -126,7 +138,7 @@ def periodic(law: Law, known: Mapping[str, tuple[float, str]]) -> bool:
     """Return whether a force law about a pin has the period of a turn."""
     if not isinstance(law, str):
         return False
-    names = {name: getattr(math, name) for name in FUNCTIONS} | {name: value for name, (value, _) in known.items()}
+    names = vars(math) | {"abs": abs, "max": max, "min": min} | {name: value for name, (value, _) in known.items()}
     code = compile(law, "law", "eval")
     try:
         turns = [

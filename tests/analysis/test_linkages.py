@@ -6,6 +6,7 @@ import importlib
 import inspect
 import itertools
 import math
+import re
 import sys
 from dataclasses import replace
 from pathlib import Path
@@ -23,7 +24,7 @@ from analysis.linkages.structure import Pin, Slider
 from analysis.mechanisms import check
 from analysis.periodic import find_orbit
 from analysis.run import Inputs, Trajectory, load_case, simulate
-from linkwork.errors import InputError, LinkworkError
+from linkwork.errors import InputError, LinkworkError, ParameterError
 from linkwork.plant import Plant
 from tests.oracles.planar import Multipliers
 from tests.random_linkages import KINDS, random_linkage
@@ -642,6 +643,18 @@ def test_powers_that_are_not_whole_have_no_complex_value() -> None:
     assert written.replace("(-1)", "-1") == "a * x ** 2 - 3 * x ** -1 + pow(x - 1, 2 * pow(x, 1.5))"
     with pytest.raises(ValueError, match="math domain error"):
         eval(laws.expression("x**1.5", False, "law"), vars(math) | {"x": -0.1})
+
+
+@pytest.mark.parametrize("x", [-1.7, 0.0, 0.4, 2.5])
+def test_laws_have_max_min_and_abs(x: float) -> None:
+    """A one-sided stop is max(-x, 0), in the source without branches."""
+    formula = "max(-x, 0)**1.5 - 3*min(x, 0.3 - x) + abs(x - 2*max(x, min(1, v)))"
+    written = laws.expression(laws.law(formula, "law"), False, "law")
+    assert set(re.findall(r"[a-z]+(?=\()", written)) == {"fabs", "pow"}
+    known = {"x": x, "v": 0.9}
+    assert eval(written, vars(math) | known) == pytest.approx(eval(formula, known), rel=1e-14, abs=1e-15)
+    with pytest.raises(ParameterError, match="be a formula in x, v"):
+        laws.law("max(x)", "law")
 
 
 def test_springs_without_a_length_are_named() -> None:
