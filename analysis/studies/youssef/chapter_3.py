@@ -56,9 +56,9 @@ steeply as with the softest, and the inertia force, by its higher harmonics, is 
 the first harmonics alone the spring's is the greatest; a spring stiffer still does not make the slope constant. The
 torque varies with the spring at its least value, but not because the slider's accelerations differ: they make 3 % of
 the difference. T0 is not hyperbolic in the time of a launch; T0 t^2 is nearly constant. After the weakest launch the
-slider swings to both sides of its start. The second harmonic near 27 rad/s goes on growing down to 22 rad/s, and is no
-non-linear effect: the equation linear in u has it too. And not every predictor-corrector method is stable: Milne's
-classical one is weakly unstable."""
+slider swings to both sides of its start. The second harmonic, relative to the first, goes on growing from 27 down to
+22 rad/s, and is no non-linear effect: the equation linear in u has it too. And not every predictor-corrector method is
+stable: Milne's classical one is weakly unstable."""
 
 #: Dampings of Fig 3.2 and 3.3 (dyn.s/cm).
 DAMPINGS = (1e4, 5e4, 1e5, 5e5, 1e6)
