@@ -215,8 +215,8 @@ def drift_result() -> StudyResult:
                 "The second consists of a steady periodic motion superimposed upon a drift.",
                 text("3.2.1, L1907-1911"),
                 "greatest change from a cycle to the next, relative to its range, of the motion less the line from end to end "
-                f"of the cycle; from the third cycle on, over {DRAWN_TURNS} cycles, ours, or until the links are collinear, "
-                "which with the weakest damper they are before; the drift is judged in the next row",
+                f"of the cycle; from the third cycle on, over {DRAWN_TURNS} cycles, ours, or until the links are collinear, as "
+                "with the weakest damper they are in the third; the drift is judged in the next row",
                 ALIKE_WORDS,
                 tuple(shapes),
             ),

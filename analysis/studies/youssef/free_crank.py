@@ -583,7 +583,7 @@ def launch_positions_by_spring() -> StudyResult:
             SIGN,
             tuple(at_least(f"of the three {name}", 1.0, x) for name, x in spread.items()),
             f"from the steady decay, as in the row before, u is within {ALIKE:g} after "
-            f"{' and '.join(str((left > ALIKE).sum()) for left in distances)} turns with the three springs",
+            f"{', '.join(str((left > ALIKE).sum()) for left in distances)} turns with k = 5e5, 1e6 and 2e6 dyn/cm",
         ),
     )
 
