@@ -199,7 +199,7 @@ class TestFriction:
         of = rigs.turn("A", 420.0, slider_friction_coefficient=0.1)
         damper = rigs.rig("A").slider_damping * np.mean(of["slider.velocity"] ** 2)
         supplied = of["drive.applied_torque"].mean() * 420.0 * published.RPM
-        assert rig_1.lost_to_friction(420.0, 0.1) == pytest.approx(supplied / damper - 1.0, rel=2e-3)
+        assert rig_1.lost_to_friction("A", 420.0, 0.1) == pytest.approx(supplied / damper - 1.0, rel=2e-3)
 
     def test_amplitudes_without_friction_are_those_of_the_branch(self) -> None:
         branch = rigs.motions("A").branches[0]
@@ -300,6 +300,13 @@ class TestRig2:
         for speed in (200.0, 400.0, 700.0, 1000.0):
             full = rigs.harmonic(rigs.turn(spring, speed), 2) / rig_2.length(spring)
             assert rig_2.linear_motion(spring, speed).harmonic(2) == pytest.approx(full, rel=0.1)
+
+    @pytest.mark.slow
+    @pytest.mark.parametrize("spring", "CD")
+    def test_friction_by_the_weight_widens_the_resonance_and_lowers_the_amplitude_beyond_it(self, spring: str) -> None:
+        rubbed = {"slider_coulomb_friction": rigs.SLIGHT * rigs.rig(spring).slider_mass * 9.81}
+        assert max(rig_2.amplitudes_beyond(spring, **rubbed)) < 1.0
+        assert rig_2.width(spring, **rubbed) > rig_2.width(spring)
 
     def test_a_damper_widens_the_resonance_in_proportion(self) -> None:
         """That of a lightly damped mass on a spring is mu / m."""

@@ -18,7 +18,7 @@ from ...figures import COLOURS, Curve, Figure, Panel, plot_curves
 from ...numerics.decay import LEAST_SWING, fit_decay
 from ...periodic import Turn
 from ...units import CM_PER_METRE, RAD_S_PER_RPM
-from ..rules import ABOUT, ALIKE, READ, SMALL
+from ..rules import ABOUT, ABOUT_DEG, ALIKE, READ, SMALL
 from ..statements import Statement, at_least, at_most, near, text
 from ..study import Study, StudyResult, curves_of, padded
 from . import rig_1
@@ -27,17 +27,20 @@ from .rigs import (
     LOST,
     NOTICED,
     RIG,
+    SAMPLES,
     SEEN_IN_RECORDS,
     SLIGHT,
     SLOWEST,
     amplitude,
     between,
+    complex_stiffness,
     dynamic_stiffness,
     harmonic,
     largest_multiplier,
     motions,
     natural_speed,
     near_fraction,
+    orbit,
     overtones,
     peaks,
     rig,
@@ -53,7 +56,9 @@ FINDINGS = """\
 The chapter claims that two rigs bear out the theory: rig 1 (vertical, springs A and B) the equations of chapters II and
 III, rig 2 (horizontal, a crank of a twentieth of the links, springs C and D) the linearised equation of chapter IV. The
 measured curves are lost with the figures, so that no sentence which compares a measured curve with theory can be judged.
-What can be judged is what the theory gives for the printed masses, springs and dampers at the stated speeds.
+What can be judged is what the theory gives for the printed masses, springs and dampers at the stated speeds; a sentence that
+describes a measured motion alone is judged by it. The amplitude is half the range of the slider's position u over a turn.
+Sentences that describe the rigs, or tell what was done, claim nothing and have no verdict.
 
 *What stands.* The motion repeats itself after one turn of the crank at every speed that was run, and is stable. With spring
 A four peaks a turn become two at 452 rpm (450 in the thesis). The natural frequencies lie in the regions stated. Rig 2 is
@@ -69,13 +74,13 @@ At 500 rpm a shoulder is left of the peaks that have met. The third harmonic of 
 first two. The theory has effects at a third and, with spring B, a quarter of the natural frequency of rig 1, and at half of
 that of rig 2, which the thesis did not see: there rig 2 moves in no sine, the second harmonic being 0.9 to 1.6 times the
 first. At their greatest it is 32 times smaller than the first, not 50. The natural frequencies of rig 2 are calculated as
-582 and 829 rpm, but are 585.5 and 828.0. Up to the 800 rpm at which the rig with spring B is said to have been stopped
-because of it, the largest displacement is at half the natural frequency, twice that at 800 rpm.
+582 and 829 rpm, but are 585.5 and 828.0. With spring B the guide is said to have been too short at 800 rpm, but the slider
+moves twice as far near half the natural frequency, where the rig did run.
 
 *Why.* No coefficient of friction explains all differences at once: what hides the higher harmonics takes a third off the
 amplitudes with spring A. Resonance of rig 2 was wider, and the amplitude beyond it larger, than in theory. What the linear
-equation ignores makes both smaller. Friction and a stronger damper widen the resonance and lower the amplitude beyond it, a
-weaker damper the reverse: no one of them does both.
+equation ignores makes both smaller, by at most one per cent. Friction and a stronger damper widen the resonance and lower
+the amplitude beyond it, a weaker damper the reverse: no one of them does both.
 """
 
 # --- 8.4: crank speed from the widths of the photocell's pulses
@@ -119,7 +124,8 @@ def compute_pulses() -> StudyResult:
     return StudyResult(
         number="8.4",
         claim="The widths of the pulses of a photocell behind sixty holes show whether the speed varies within a turn.",
-        assignment="No moment of inertia of crank and flywheels is printed: two are tried out, driven by a constant torque.",
+        assignment="No moment of inertia of crank and flywheels is printed: two are tried out, driven by a constant torque, "
+        f"with spring A about {PULSED:g} rpm.",
         columns=padded(columns),
         statements=(
             Statement(
@@ -127,8 +133,8 @@ def compute_pulses() -> StudyResult:
                 "within the crank cycle.",
                 text("8.2.1.2, L6255"),
                 "range of the crank speed over a turn by the times from hole to hole, for which the widths of the pulses are "
-                f"taken, relative to the range itself; spring A, {PULSED:g} rpm",
-                f"{READ:g}, what a graph can be read to",
+                "taken, relative to the range itself",
+                f"{READ:g}, the rule for what is read from a graph",
                 tuple(
                     near(
                         f"{i:g} kg.m2, speed varies by {varies[i]:.1%}",
@@ -142,8 +148,8 @@ def compute_pulses() -> StudyResult:
             Statement(
                 "A further [flywheel] (4) is mounted on the shaft to ensure constant speed input.",
                 text("8.2.1.1, L6140-6142"),
-                why=f"no moment of inertia is printed; {enough:.3f} kg.m2 keep the range of the speed over a turn at "
-                f"{ALIKE:.0%} at {PULSED:g} rpm with spring A",
+                why=f"no moment of inertia is printed; with {enough:.3f} kg.m2 the range of the speed over a turn is "
+                f"{ALIKE:.0%}, the rule for *constant*, at {PULSED:g} rpm with spring A and a constant torque",
             ),
         ),
     )
@@ -201,15 +207,13 @@ def impulse_response(spring: str, time: NDArray[np.float64], friction: float = 0
 def compute_decay() -> StudyResult:
     """Compute records like those of the thesis, and the damping that their logarithmic decrement gives."""
     time = np.linspace(0.0, LENGTH, 4001)
-    columns, added, by_cycle = {"time [s]": time}, [], []
+    columns, added = {"time [s]": time}, []
     for number, (stated, spring) in FOUND.items():
         name, rubbed = f"rig {number}; spring {spring}", impulse_response(spring, time, DRY)
         columns[f"slider position u; {name} [cm]"] = CM_PER_METRE * impulse_response(spring, time)
         columns[f"slider position u with {DRY:g} N of dry friction; {name} [cm]"] = CM_PER_METRE * rubbed
         decay, mass = fit_decay(time, rubbed), rig(spring).slider_mass
         added.append(f"{decay.damping(mass)[0] - stated:.1f}")
-        first, *_, last = mass / pi * decay.frequency * decay.cycle_decrements - stated
-        by_cycle.append(f"{first:.1f} to {last:.1f}")
     return StudyResult(
         number="8.6",
         claim="The slider, disconnected and struck, swings out; its logarithmic decrement gives the damping coefficient.",
@@ -221,17 +225,15 @@ def compute_decay() -> StudyResult:
                 "Average values of the coefficient were found to be [9 x 10^3 dyne.Sec/cm.] for Experimental Rig 1 and [5.5 "
                 "x 10^3 dyne.Sec/cm.] for Experimental Rig 2 (linearised rig).",
                 text("8.3.3, L6401"),
-                why=f"{LOST}; {DRY:g} N of dry friction, our choice, if it counts as damping, adds {' and '.join(added)} N.s/m "
-                f"to the 9 and 5.5 N.s/m of the two rigs after a blow that gives the slider {KICK:g} m/s, fitted over the "
-                f"swings down to {LEAST_SWING:g} of the record's range; from the first to the last of these cycles it adds "
-                f"{' and '.join(by_cycle)} N.s/m, and more after a weaker blow",
+                why=f"{LOST}; the decrement counts dry friction as damping: {DRY:g} N, our choice, adds "
+                f"{' and '.join(added)} N.s/m to the 9 and 5.5 N.s/m of the two rigs, over the swings down to "
+                f"{LEAST_SWING:g} of the record's range",
             ),
             Statement(
                 "Theoretical calculations of the stiffness, based on the number of coils, the wire and mean coil diameters "
                 "and the modulus of rigidity of the material gave good agreement with the experimentally determined values.",
                 text("8.3.2, L6383"),
-                why="no coil, diameter or modulus is printed; by the theory, k = G d^4 / (8 n D^3), 1 % of the wire's "
-                "diameter is 4 % of the stiffness, and 1 % of the coil's 3 %",
+                why="no number of coils, diameter or modulus is printed",
             ),
         ),
     )
@@ -317,6 +319,8 @@ class Turns:
 
 #: Speeds of the figures (rpm).
 SPEEDS = {"A": (240.0, 260.0, 280.0, 300.0, 360.0, 500.0), "B": (500.0, 540.0, 580.0, 620.0, 680.0, 780.0)}
+#: All speeds of Fig 8.7 to 8.17 (rpm).
+OF_FIGURES = {s: sorted({*SPEEDS[s], *rig_1.COMPARED[s]}) for s in "AB"}
 #: Tolerance of a speed that is printed in tens of rpm.
 TENS = "5 rpm, half a unit of the last digit of a speed in tens"
 
@@ -328,16 +332,18 @@ def _periodic() -> tuple[Statement, ...]:
         at_most(f"spring {s}, to {rig_1.STOPPED[s]} rpm", 1.0, largest_multiplier(s, SLOWEST, float(rig_1.STOPPED[s])))
         for s in "AB"
     ]
-    here = largest_multiplier("A", 355.0, 365.0)
+    shown = [(s, w) for s in "AB" for w in OF_FIGURES[s]]
+    here = max(orbit(rig(s), w).largest for s, w in shown)
+    fewest = min(peaks(turn(s, w)) for s, w in shown)
     return (
         Statement(
             "The theory predicts the steady state slider motion to be oscillatory and periodic with one crank cycle.",
             text("8.4.1.1, L6437"),
-            "largest Floquet multiplier of the motion with the period of a crank cycle, spring A, the greatest from 355 to 365 "
-            "rpm: half a unit of the last digit of the figure's speed, in tens; all others at L6449",
-            stable,
-            (at_most("", 1.0, here),),
-            "that it is oscillatory is seen in the figure",
+            "at the 18 speeds of Fig 8.7 to 8.17: maxima and minima of u together in a turn, the fewest; largest Floquet "
+            "multiplier of the motion with the period of a crank cycle, the factor by which a small departure from it grows "
+            "in a turn, the most",
+            f"at least 2, for *oscillatory*; {stable}",
+            (at_least("maxima and minima", 2.0, fewest), at_most("multiplier", 1.0, here)),
         ),
         Statement(
             "This is verified experimentally as shown in Fig. (8.7) in which a typical experimentally observed steady state "
@@ -349,8 +355,8 @@ def _periodic() -> tuple[Statement, ...]:
             "However, for all other speeds, using this spring and also spring B, the motion was always periodic with one "
             "crank cycle.",
             text("8.4.1.1, L6449"),
-            f"largest Floquet multiplier of that motion from {SLOWEST:g} rpm, our choice, below all speeds that are named, up "
-            "to the speed at which the rig was stopped with each spring",
+            f"largest Floquet multiplier of that motion from {SLOWEST:g} rpm, our choice, below all speeds that are named, to "
+            "the greatest that was run with each spring (L6555)",
             stable,
             tuple(largest),
         ),
@@ -402,9 +408,8 @@ def _compared_b() -> tuple[Statement, ...]:
 def _fig_8_14() -> tuple[Statement, ...]:
     natural = {"A": "580", "B": "1160"}
     ratio = natural_speed("B") / natural_speed("A")
-    # at 450 rpm two of the peaks meet (L6726), and at 500 they have met
-    shown = {speed for speed in (*SPEEDS["A"], *rig_1.COMPARED["A"]) if speed < 450.0}
-    counted = {speed: peaks(turn("A", speed)) for speed in sorted(shown)}
+    shown = OF_FIGURES["A"]
+    of_four = sum(peaks(turn("A", speed)) == 4 for speed in shown)
     second = min(harmonic(turn("A", w), 2) / harmonic(turn("A", w), 1) for w in shown)
     (lowest, _), rising = between(motions("A").minima(), 320.0, 420.0), _least_rise("A", (*SPEEDS["A"][:3], 290.0))
     top = near_fraction("A", 2)[0]
@@ -413,7 +418,8 @@ def _fig_8_14() -> tuple[Statement, ...]:
             "Theoretical calculations give the natural frequency with spring A to be in the region of 580 RPM and with "
             "spring B in the region of 1160 RPM.",
             text("8.4.1.2, L6551"),
-            "crank speed at the natural frequency, by the stiffness and the mean effective mass",
+            "crank speed at the natural frequency, by the stiffness and the effective mass of the slider with the links, its "
+            "mean over a turn with u = 0",
             f"{100 * ABOUT:g} %, the rule for *in the region of*",
             tuple(
                 near(f"spring {s}", stated, natural_speed(s), ABOUT * float(stated), "rpm")
@@ -426,21 +432,21 @@ def _fig_8_14() -> tuple[Statement, ...]:
             "They also show that a typical oscillation has four peaks indicating that, since the oscillations are periodic "
             "in the crank cycle, more than one harmonic is present in the solution.",
             text("8.4.1.2, L6579"),
-            "maxima and minima together in a turn at the speeds of Fig 8.8 to 8.10, 8.14 and 8.15 up to 420 rpm; at 450 two of "
-            "them meet (L6726); second harmonic over the first, the least of these speeds",
-            f"none of a count; more than {NOTICED:g}, the rule for *small*",
+            f"number of the {len(shown)} speeds of Fig 8.8 to 8.10, 8.14 and 8.15 at which u has four maxima and minima "
+            "together in a turn; second harmonic over the first, the least of all of them",
+            f"more than half, as *typical* says; more than {SMALL:g}, the rule for *small*: it is seen",
             (
-                *(near(f"peaks at {speed:g} rpm", "4", n, 0.0) for speed, n in counted.items()),
-                at_least("second harmonic over first", NOTICED, second),
+                at_least("speeds with four peaks", 0.5 * len(shown), of_four),
+                at_least("second harmonic over first", SMALL, second),
             ),
-            "that they are periodic is judged at L6449",
+            "at 500 rpm there are two peaks, as the thesis says (L6730); that the oscillations are periodic is judged at L6449",
         ),
         Statement(
             "The amplitude of oscillations increases as the speed increases up to 290 RPM, i.e. half the natural frequency, "
             "where it reaches a maximum after which the amplitude decreases with increase of speed up to 345 RPM beyond "
             "which it increases with increase of speed.",
             text("8.4.1.2, L6734"),
-            "amplitude over the speed with spring A, from 240 rpm on",
+            "amplitude over the speed with spring A, from 240 rpm on, the lowest of the figures",
             f"{TENS}; 0.5 rpm of 345 rpm, by the same rule; {ALIKE:g}, the rule for *the same*; of rises the sign alone",
             (
                 at_least("least rise to the next of 240, 260, 280, 290 rpm", 0.0, rising, "cm"),
@@ -459,7 +465,7 @@ def _fig_8_14() -> tuple[Statement, ...]:
                     "345",
                     lowest,
                     unit="rpm",
-                    why=f"it is at {lowest / natural_speed('A'):.2f} of the natural frequency",
+                    why=f"from 345 to {lowest:.0f} rpm the amplitude still decreases",
                 ),
                 at_least("least rise by 10 rpm, 370 to 500 rpm", 0.0, _least_rise("A", range(370, 501, 10)), "cm"),
             ),
@@ -473,7 +479,8 @@ def _least_rise(spring: str, speeds: Sequence[float]) -> float:
 
 
 def _fig_8_15() -> tuple[Statement, ...]:
-    u = slider(turn("A", 500.0))
+    at_500 = turn("A", 500.0)
+    u = slider(at_500)
     return (
         Statement(
             "At 240 RPM the slider oscillation has four peaks; however when the speed is 450 RPM the first and last peaks "
@@ -481,8 +488,8 @@ def _fig_8_15() -> tuple[Statement, ...]:
             "with the third peak, thus resulting in a sinusoidal type oscillation as shown in the case of 500 RPM.",
             text("8.4.1.2, L6724"),
             "peaks of a turn, maxima and minima together; speed above which there are two instead of four; points of "
-            "inflection of a turn at 500 rpm, of which a sine has two",
-            f"none of a count; {TENS}",
+            "inflection of a turn at 500 rpm, of which a sine has two; second harmonic over the first there",
+            f"none of a count; {TENS}; {ABOUT:g}, the rule for *nearly* a sine",
             (
                 near("peaks at 240 rpm", "4", peaks(turn("A", 240.0)), 0.0),
                 near(
@@ -498,21 +505,33 @@ def _fig_8_15() -> tuple[Statement, ...]:
                     2.0,
                     turns_of_sign(np.diff(u, 2, prepend=u[-2])),
                     0.0,
-                    why="the point of inflection has not reached the other peak: a shoulder is left",
+                    why="the point of inflection has not reached the third peak: a shoulder is left",
+                ),
+                at_most(
+                    "second harmonic over first at 500 rpm",
+                    ABOUT,
+                    harmonic(at_500, 2) / harmonic(at_500, 1),
+                    why="a sine has no second harmonic",
                 ),
             ),
-            "the two are the first and the last of a turn from 300 to 420 rpm; where they meet both lie before 360 deg",
+            "from 300 to 420 rpm the two that meet are the first and the last of a turn; then the first moves back past 0 deg",
         ),
     )
 
 
 def _fig_8_16() -> tuple[Statement, ...]:
     counted = {speed: peaks(turn("B", speed)) for speed in SPEEDS["B"]}
-    top, (lowest, _) = near_fraction("B", 2)[0], between(motions("B").minima(), 600.0, 800.0)
+    top = near_fraction("B", 2)[0]
     shown = max(SPEEDS["B"], key=lambda speed: amplitude(turn("B", speed)))
     fractions = [(s, order, part) for s in "AB" for order, part in ((3, "a third"), (4, "a quarter"))]
     meets = {order: f"harmonic {order} meets the natural frequency there" for order in (3, 4)}
     hidden = max(rise(s, rig_1.STRONG, n) for s in "AB" for n in (3, 4))
+    greatest = {s: max(amplitude(turn(s, w)) for w in OF_FIGURES[s]) for s in "AB"}
+    of_greatest = ", ".join(
+        f"{near_fraction(s, n)[1] * risen / (1.0 + risen) / greatest[s]:.2f} ({s}, {part})"
+        for s, n, part in fractions
+        if (risen := rise_at(s, n)) > NOTICED
+    )
     return (
         Statement(
             "As in the case of spring A the oscillations are periodic and each oscillation has four peaks.",
@@ -526,10 +545,10 @@ def _fig_8_16() -> tuple[Statement, ...]:
             "The amplitude of oscillations increases with speed up to 580 RPM, i.e. half the natural frequency, where it "
             "reaches a maximum after which the amplitude decreases and then increases with increase of speed.",
             text("8.4.1.2, L6752"),
-            "amplitude over the speed with spring B, from 500 rpm on",
+            "amplitude over the speed with spring B, from 500 rpm on, the lowest of the figures",
             f"{TENS}; {ALIKE:g}, the rule for *the same*; of rises and falls the sign alone",
             (
-                at_least("rise from 500 to 540 rpm", 0.0, _least_rise("B", (500.0, 540.0)), "cm"),
+                at_least("least rise to the next of 500, 540, 580 rpm", 0.0, _least_rise("B", SPEEDS["B"][:3]), "cm"),
                 near(
                     "speed of the maximum",
                     "580",
@@ -540,12 +559,8 @@ def _fig_8_16() -> tuple[Statement, ...]:
                     f"{natural_speed('B') / 2.0:.0f} rpm",
                 ),
                 near("maximum over half the natural frequency", 1.0, 2.0 * top / natural_speed("B"), ALIKE),
-                at_most(
-                    "greatest rise from 580 to 620 and 680 rpm", 0.0, -_least_rise("B", (680.0, 620.0, 580.0)), "cm"
-                ),
-                at_least(
-                    f"rise from the minimum at {lowest:.0f} to 800 rpm", 0.0, _least_rise("B", (lowest, 800.0)), "cm"
-                ),
+                at_most("greatest rise by 10 rpm, 580 to 710 rpm", 0.0, -_least_rise("B", range(710, 579, -10)), "cm"),
+                at_least("least rise by 10 rpm, 720 to 800 rpm", 0.0, _least_rise("B", range(720, 801, 10)), "cm"),
             ),
         ),
         Statement(
@@ -559,21 +574,23 @@ def _fig_8_16() -> tuple[Statement, ...]:
                 at_most(f"spring {s}, {part}, {natural_speed(s) / n:.0f} rpm", NOTICED, rise_at(s, n), why=meets[n])
                 for s, n, part in fractions
             ),
-            f"with a coefficient of friction of {rig_1.STRONG:g} in the guide the greatest of these rises is {hidden:.3f}, "
-            f"but so much friction changes the amplitudes more than slightly: see {FRICTION}; no figure is for a speed so low",
+            f"relative to the greatest amplitude of the figures with the spring, these rises are {of_greatest}; "
+            f"with a coefficient of friction of {rig_1.STRONG:g} in the guide none of them exceeds "
+            f"{np.ceil(100.0 * hidden) / 100.0:g}, but so much friction changes the amplitudes more than slightly: see "
+            f"{FRICTION}; no figure is for a speed so low",
         ),
         Statement(
             "This suggested a slider solution based on the first and second harmonics, and that the third and higher "
             "harmonics are small in comparison.",
             text("8.4.1.2, L6774-6779"),
-            "greatest of the harmonics 3 to 6 over the greater of the first and second",
+            "greatest of the harmonics 3 to 6 over the greater of the first and second, at the 18 speeds of Fig 8.7 to 8.17",
             f"{SMALL:g}, the rule for *small*",
             tuple(
                 at_most(f"spring {s}, {speed:g} rpm", SMALL, overtones(turn(s, speed)))
                 for s in "AB"
-                for speed in SPEEDS[s]
+                for speed in OF_FIGURES[s]
             ),
-            "the greatest is the third; at 500 rpm with spring A alone it is small",
+            "the greatest is the third; it is small with spring A at 500 rpm alone",
         ),
     )
 
@@ -581,12 +598,15 @@ def _fig_8_16() -> tuple[Statement, ...]:
 def _fig_8_17() -> tuple[Statement, ...]:
     meeting = {s: speed_of_fewer_peaks(s, *ends) for s, ends in {"A": (400.0, 500.0), "B": (800.0, 900.0)}.items()}
     of_natural = [speed / natural_speed(s) for s, speed in meeting.items()]
+    late = [speed for speed in OF_FIGURES["B"] if speed >= 580.0]
+    angles = [_fall_angle(turn("B", speed)) for speed in late]
     return (
         Statement(
             "The four peaks in the oscillations show the same tendency as for spring A, i.e. the first and last peaks "
             "coinciding and becoming an inflection point.",
             text("8.4.1.2, L6760"),
-            "speed at which first and last peak meet over the natural frequency, spring B's over spring A's",
+            "speed at which first and last peak meet, so that two of the four are left, over the natural frequency: spring B's "
+            "over spring A's",
             f"{ALIKE:g}, the rule for *the same*",
             (near("spring B over A", 1.0, of_natural[1] / of_natural[0], ALIKE),),
         ),
@@ -594,14 +614,15 @@ def _fig_8_17() -> tuple[Statement, ...]:
             "Although it is not possible to show these peaks coinciding in this case the tendency may be predicted from "
             "Figs. (8.11) to (8.13) and (8.16) to (8.17).",
             text("8.4.1.2, L6764"),
-            "speed at which first and last peak meet with spring B; crank angle between them at 780 less that at 500 rpm",
+            "speed at which first and last peak meet with spring B; crank angle from the last peak of a turn to the first of "
+            f"the next: greatest change from one to the next of the speeds of the figures from {late[0]:g} to "
+            f"{late[-1]:g} rpm, below which the two are not the first and the last",
             "above 800 rpm, the greatest speed that was run with it; the sign alone",
             (
-                at_least("speed", float(rig_1.STOPPED["B"]), meeting["B"], "rpm"),
-                at_most(
-                    "change of the angle", 0.0, _fall_angle(turn("B", 780.0)) - _fall_angle(turn("B", 500.0)), "deg"
-                ),
+                at_least("speed at which they meet", float(rig_1.STOPPED["B"]), meeting["B"], "rpm"),
+                at_most("greatest change of the angle", 0.0, np.diff(angles).max(), "deg"),
             ),
+            f"the angle falls from {angles[0]:.0f} to {angles[-1]:.0f} deg",
         ),
     )
 
@@ -633,19 +654,23 @@ def _fig_8_18() -> tuple[Statement, ...]:
     higher = {s: max(overtones(turn(s, w)) for w in speeds) for s in "CD"}
     largest = max(largest_multiplier(s, *RUN) for s in "CD")
     # the inertia of each link acts on the slider as a force that grows with the square of the speed
-    shift, spread, growth, beyond = [], [], [], []
+    shift: list[float] = []
+    phi: list[float] = []
+    spread, growth, beyond = [], [], []
     for s in "CD":
-        phases = [np.angle(np.fft.rfft(slider(turn(s, w))[:-1])[1]) for w in speeds]
-        shift.append(np.degrees(np.ptp(np.unwrap(phases))))
         rates = RAD_S_PER_RPM * np.array(speeds)
-        force = sizes[s][:, 0] * dynamic_stiffness(rig(s), rates)
+        first = np.array([np.fft.rfft(slider(turn(s, w))[:-1])[1] / (0.5 * SAMPLES) for w in speeds])
+        forces = first * complex_stiffness(rig(s), rates)
+        for turned, of in ((shift, first), (phi, forces)):
+            turned.append(float(np.degrees(np.ptp(np.unwrap(np.angle(of))))))
+        force = np.abs(forces)
         spread.append(np.ptp(force / rates**2) / np.mean(force / rates**2))
         growth.append(force.max() / force.min())
         beyond.append(_unbalance_ratio(s, np.array(sorted({*speeds, *about[s]})), float(np.mean(force / rates**2))))
     there = max(10.0 * harmonic(turn(s, w), 2) for s, of in about.items() for w in of)
     why = (
         f"near half the natural frequency the second harmonic is {most['C']:.1f} (C) and {most['D']:.1f} (D) times the first, "
-        f"though neither exceeds {there:.1f} mm there"
+        f"though at most {there:.1f} mm"
     )
     almost = f"{ABOUT:g}, the rule for *almost*"
     unbalance = [(f"spring {s}, F0 over the square", value) for s, value in zip("CD", spread)]
@@ -656,7 +681,7 @@ def _fig_8_18() -> tuple[Statement, ...]:
             text(f"{section}, L6804"),
             f"share of the speeds from {RUN[0]:g} to {RUN[1]:g} rpm, in tens, at which the second harmonic is at most "
             f"{ABOUT:g} of the first; largest Floquet multiplier of the motion of one cycle over all of them",
-            f"{almost}; more than half of the speeds for *typical*; below 1",
+            f"{almost}; more than half of the speeds, as *typical* says; below 1, as at L6437",
             (
                 *(at_least(f"spring {s}", 0.5, np.mean(ratio <= ABOUT)) for s, ratio in ratios.items()),
                 at_most("largest multiplier", 1.0, largest),
@@ -667,9 +692,9 @@ def _fig_8_18() -> tuple[Statement, ...]:
             "Other results show that the sinusoidal behaviour is maintained throughout the range of speeds performed in "
             "this experiment, i.e. a range of 300 to 1000 RPM, and the phase shift varies with speed.",
             text(f"{section}, L6808"),
-            "second harmonic over the first, the most over the range, in steps of 10 rpm and of 1 rpm about it; change of the "
-            "phase of the first over the range",
-            f"{almost}; 90 deg, half of what a resonance turns it by",
+            "second harmonic over the first, the most over the range, in steps of 10 rpm, then of 1 rpm about the greatest; "
+            "change of the phase of the first over the range",
+            f"{almost}; 90 deg, ours: half of what a resonance turns it by",
             (
                 *(at_most(f"spring {s}, second over first", ABOUT, most[s], why=why) for s in "CD"),
                 *(at_least(f"spring {s}, change of the phase", 90.0, angle, "deg") for s, angle in zip("CD", shift)),
@@ -679,9 +704,9 @@ def _fig_8_18() -> tuple[Statement, ...]:
             "This indicates that the basic and dominant harmonic in the slider motion is the first; the second is very "
             "small in comparison and no evidence of the third and higher harmonics exists.",
             text(f"{section}, L6814; again 8.4.2.2, L6968"),
-            "second harmonic over the first, and greatest of the harmonics 3 to 6 over the greater of the two, the most from "
-            "300 to 1000 rpm",
-            f"at most 1, as *dominant* says of the first; {SMALL:g}, the rule for *small*",
+            "second harmonic over the first, and greatest of the harmonics 3 to 6 over the greater of the two, each the most "
+            f"from {RUN[0]:g} to {RUN[1]:g} rpm, as in the sentence before",
+            f"at most 1, as *dominant* says of the first; {SMALL:g}, the rule for *small*, for *no evidence* too",
             tuple(
                 at_most(f"spring {s}, {words}", bound, ratio[s], why=why)
                 for s in "CD"
@@ -691,26 +716,28 @@ def _fig_8_18() -> tuple[Statement, ...]:
                     ("the higher ones small", SMALL, higher),
                 )
             ),
+            "each at its greatest, the second is small: see L6877",
         ),
         Statement(
             "It also indicates that the steady state behaviour is similar to a second order [damped] mass-spring system "
             "described by [m x'' + mu x' + k x = F0 Sin (wt + phi)].",
             text(f"{section}, L6820"),
             "F0, the force on a damped mass-spring system of the mean effective mass that gives the first harmonic, from 300 "
-            "to 1000 rpm: the most over the least, as the equation has it; and, as under an unbalance, the spread of F0 "
-            "over the square of the speed, relative to its mean",
-            f"{ABOUT:g}, the rule for *similar*",
+            "to 1000 rpm in tens: the most over the least, and the range of its phase phi, as the equation has both constant; "
+            "and, as under an unbalance, the spread of F0 over the square of the speed, relative to its mean",
+            f"{ABOUT:g} and {ABOUT_DEG:g} deg, the rule for *similar*",
             (
                 *(at_most(f"spring {s}, the equation: F0", 1.0 + ABOUT, times) for s, times in zip("CD", growth)),
+                *(at_most(f"spring {s}, the equation: phi", ABOUT_DEG, turned, "deg") for s, turned in zip("CD", phi)),
                 *(at_most(f"such a system: {label}", ABOUT, value) for label, value in unbalance),
             ),
-            "F0 grows with the speed, as of an unbalance",
+            "F0 grows with the square of the speed, as under an unbalance",
         ),
         Statement(
             "The resonance and steady state behaviour is similar to a linear second order damped mass-spring system ...",
             text("8.4.2.2, L6970"),
             "the spread of F0 over the square of the speed, as above; amplitude of the slider over that of such a system under "
-            "an unbalance, which the first harmonic gives, the greatest from 300 to 1000 rpm",
+            "an unbalance, the mean of F0 over the square of the speed; the greatest from 300 to 1000 rpm, as at L6808",
             f"{ABOUT:g}, the rule for *similar*",
             (
                 *(at_most(label, ABOUT, value) for label, value in unbalance),

@@ -9,7 +9,7 @@ from scipy.optimize import brentq
 from ...figures import COLOURS, Curve, Figure, Panel, plot_curves
 from ...periodic import PeriodicOrbit, SpecialPoint, Sweep, Turn, sweep
 from ...units import CM_PER_METRE, RAD_S_PER_RPM
-from ..rules import ABOUT_DEG, ALIKE, SLIGHTLY
+from ..rules import ABOUT, ABOUT_DEG, ALIKE, SLIGHTLY
 from ..statements import Statement, at_least, at_most, text
 from ..study import Study, StudyResult, curves_of, padded
 from ..variation import cache
@@ -77,6 +77,7 @@ def compute_rig_1() -> StudyResult:
     columns[f"speed; {SPECIAL} [rpm]"] = np.array([s.parameter for s in special]) / RAD_S_PER_RPM
     columns[f"amplitude; {SPECIAL} [cm]"] = CM_PER_METRE * np.array([s.orbit.amplitude for s in special])
     greatest = {"A": float(motions("A").branches[0].amplitude.max()), "B": upper_orbit(1000.0).amplitude}
+    resonant = float(rpm(motions("A").branches[0])[motions("A").branches[0].amplitude.argmax()])
     # at the last speed the guide was too short
     accommodated = {s: max([amplitude(of) for of in _turns_to_stop(s).values()][:-1]) for s in "AB"}
     reached = {s: _displacements(s) for s in "AB"}
@@ -86,17 +87,18 @@ def compute_rig_1() -> StudyResult:
     )
     return StudyResult(
         number="rig-1-resonance",
-        claim="With spring A there is one motion at each speed; with spring B resonance leans over, and two exist at a time.",
+        claim="With spring A there is one motion at each speed; with spring B resonance leans over, and below its peak two "
+        "stable motions exist at a time.",
         columns=padded(columns),
         statements=(
             Statement(
                 "Due to practical difficulties, namely the large amplitudes of oscillations near the natural frequencies, "
                 "resonance curves could not be obtained using this apparatus.",
                 text("8.4.1.2, L6543"),
-                "amplitude near the natural frequency over the greatest at speeds below those of L6555, which the guide did "
-                "accommodate: with spring A the greatest of all, with spring B on the upper branch at 1000 rpm, within 15 % of "
-                "1160: the rule for *near*",
-                "at least 1, the rule for *greater*; how long the guide was is not printed",
+                "amplitude near the natural frequency over the greatest at the speeds of the next sentence, which the guide "
+                f"did accommodate: with spring A the greatest of all, at {resonant:.0f} rpm; with spring B that of the upper "
+                f"branch at 1000 rpm, our choice, within {ABOUT:.0%} of 1160, the rule for *near*",
+                "at least 1: *large* is more than the guide did accommodate, as its length is not printed",
                 tuple(at_least(f"spring {s}", 1.0, CM_PER_METRE * greatest[s] / accommodated[s]) for s in "AB"),
                 "with spring B on the lower branch, which rising speed follows, it is "
                 f"{amplitude(turn('B', 1000.0)) / accommodated['B']:.1f}",
@@ -105,8 +107,9 @@ def compute_rig_1() -> StudyResult:
                 "However when the speed was increased to 500 RPM with spring A and 800 RPM with spring B the amplitude of "
                 "slider oscillations was so large that the slider guide could not accommodate it.",
                 text("8.4.1.2, L6555"),
-                "greatest displacement at this speed over that at lower speeds, which the guide did accommodate: every 5 rpm "
-                "from 240 (spring A) and 500 rpm (spring B) on, the lowest of the figures",
+                "greatest displacement at this speed, from the free position of the spring, over that at lower speeds, which "
+                "the guide did accommodate: every 5 rpm from 240 (spring A) and 500 rpm (spring B) on, the lowest of the "
+                "figures",
                 "at least 1: what the guide accommodated is no more than it can",
                 tuple(
                     at_least(f"spring {s}, {STOPPED[s]} rpm", 1.0, a / b, why=why) for s, (a, b, _) in reached.items()
@@ -186,21 +189,25 @@ def lag(spring: str, speed: float, coefficient: float) -> float:
     return (shift + 180.0) % 360.0 - 180.0
 
 
-def lost_to_friction(speed: float, coefficient: float) -> float:
-    """Return the work of friction in the guide divided by the work of the damper, over a crank cycle with spring A."""
-    of = turn("A", speed, slider_friction_coefficient=coefficient)
+def lost_to_friction(spring: str, speed: float, coefficient: float) -> float:
+    """Return the work of friction in the guide divided by the work of the damper, over a crank cycle."""
+    of = turn(spring, speed, slider_friction_coefficient=coefficient)
     v = of["slider.velocity"]
-    viscous = rig("A").slider_damping * np.mean(v**2)
+    viscous = rig(spring).slider_damping * np.mean(v**2)
     return float(coefficient * np.mean(np.abs(of["slider.guide_force"] * v)) / viscous)
 
 
-def _constant_friction(force: float, varying: Turn) -> tuple[float, float, float]:
-    """Compare constant friction (N) with friction by the coefficient `SLIGHT`, spring A.
+def _constant_friction(force: float, speed: float) -> tuple[float, float, float]:
+    """Compare constant friction (N) with friction by the coefficient `SLIGHT`, spring A, at a speed (rpm).
 
     Returns the greatest difference of u between them, relative to the amplitude without friction; the relative decrease of
-    this amplitude by constant friction; and the relative excess of its work in a turn over that of the ``varying`` friction.
+    this amplitude by constant friction; and the relative excess of its work in a turn over that of the other friction.
     """
-    even, free = turn("A", SHOWN["A"], slider_coulomb_friction=force), amplitude(turn("A", SHOWN["A"]))
+    even, varying = (
+        turn("A", speed, **{name: value})
+        for name, value in (("slider_coulomb_friction", force), ("slider_friction_coefficient", SLIGHT))
+    )
+    free = amplitude(turn("A", speed))
     work = SLIGHT * np.mean(np.abs(varying["slider.guide_force"] * varying["slider.velocity"]))
     apart = np.abs(slider(varying) - slider(even)).max()
     more = force * np.mean(np.abs(even["slider.velocity"])) / work - 1.0
@@ -217,24 +224,28 @@ def compute_friction() -> StudyResult:
             columns[f"u; coefficient {c:g}; spring {s} [cm]"] = slider(turn(s, SHOWN[s], slider_friction_coefficient=c))
     columns["crank angle [deg]"] = np.linspace(0.0, 360.0, len(slider(turn("A", SHOWN["A"]))))
     force = {speed: np.abs(turn("A", speed)["slider.guide_force"]) for speed in COMPARED["A"]}
-    joint = turn("A", SHOWN["A"])
-    apart = np.abs(joint["slider.guide_force"] - joint["pin.D.fy"]).max()
+    apart = min(
+        np.abs(of["slider.guide_force"] - of["pin.D.fy"]).max() / force[w].max()
+        for w, of in ((w, turn("A", w)) for w in COMPARED["A"])
+    )
     pins = lowered("A", **{f"pin_{pin}_friction_radius": PIN_RADIUS for pin in "BCD"}).max()
     damper = lowered("A", slider_damping=1.1 * rig("A").slider_damping).max()
     taken = {(s, c): lowered(s, slider_friction_coefficient=c) for s in "AB" for c in (SLIGHT, STRONG)}
     in_cm = {(s, c): x * [amplitude(turn(s, w)) for w in COMPARED[s]] for (s, c), x in taken.items()}
     lost = in_cm["A", SLIGHT]
-    at = COMPARED["A"].index(SHOWN["A"])
     still_slight = brentq(
-        lambda c: lowered("A", slider_friction_coefficient=c)[at] - SLIGHTLY, SLIGHT, STRONG, xtol=1e-4
+        lambda c: lowered("A", slider_friction_coefficient=c).max() - SLIGHTLY, SLIGHT, STRONG, xtol=1e-4
     )
-    varying = turn("A", SHOWN["A"], slider_friction_coefficient=SLIGHT)
-    constant = SLIGHT * float(force[SHOWN["A"]].mean())
-    within, takes, _ = _constant_friction(constant, varying)
+    constant = {w: SLIGHT * float(force[w].mean()) for w in COMPARED["A"]}
+    even = [_constant_friction(constant[w], w)[:2] for w in COMPARED["A"]]
+    within, takes = (f(values) for f, values in zip((min, max), zip(*even)))
     # constant friction that does the same work in a turn
-    working = brentq(lambda c: _constant_friction(c, varying)[2], 0.5 * constant, 2.0 * constant, xtol=1e-4)
-    shift = max(abs(lag("A", w, SLIGHT)) for w in COMPARED["A"])
-    strong = f"with a coefficient of {STRONG:g} it takes {taken['A', STRONG].max():.0%} off the amplitude, which is not slight"
+    mean = constant[SHOWN["A"]]
+    working = brentq(lambda c: _constant_friction(c, SHOWN["A"])[2], 0.5 * mean, 2.0 * mean, xtol=1e-4)
+    shift, shift_slight = (max(abs(lag("A", w, c)) for w in COMPARED["A"]) for c in (SLIGHT, still_slight))
+    works = {
+        c: max(lost_to_friction(s, w, c) for s in "AB" for w in COMPARED[s]) for c in (SLIGHT, still_slight, STRONG)
+    }
     heavy = f"the slider's weight, {rig('A').slider_mass * rig('A').gravity:.2f} N, comes on top of the joint's force"
     b_over_a = " and ".join(f"{taken['B', c].mean() / taken['A', c].mean():.2f}" for c in (SLIGHT, STRONG))
     b_over_a_cm = " and ".join(f"{in_cm['B', c].mean() / in_cm['A', c].mean():.2f}" for c in (SLIGHT, STRONG))
@@ -256,19 +267,20 @@ def compute_friction() -> StudyResult:
                 f"({taken['A', SLIGHT].max():.1%})",
                 f"{ABOUT_DEG:g} deg, the rule for *almost*",
                 (at_most("shift", ABOUT_DEG, shift, "deg"),),
-                strong,
+                f"with {still_slight:.3f}, the greatest coefficient whose effect is still slight, as it takes {SLIGHTLY:.0%} "
+                f"off the amplitude, it is {shift_slight:.2g} deg",
             ),
             Statement(
                 "However in practice these frictional forces are a combination of viscous and Coloumb friction forces, "
                 "although in this experiment the viscous forces are dominant.",
                 text("8.4.1.1, L6490"),
-                f"work of Coulomb's friction over the damper's in a turn, spring A, {SHOWN['A']:g} rpm, by the greatest "
-                f"coefficient whose effect is still slight as L6486 has it, {still_slight:.3f}, which takes {SLIGHTLY:.0%} off "
-                "the amplitude",
+                "work of Coulomb's friction in the guide over the damper's in a turn, the most of the six speeds of Fig 8.8 "
+                "to 8.13, springs A and B, by the greatest coefficient whose effect with spring A is still slight as at L6486, "
+                f"{still_slight:.3f}",
                 "at most 1: *dominant* is the greater",
-                (at_most("work", 1.0, lost_to_friction(SHOWN["A"], still_slight)),),
-                f"with {SLIGHT:g} it is {lost_to_friction(SHOWN['A'], SLIGHT):.2g}, with {STRONG:g} it would be "
-                f"{lost_to_friction(SHOWN['A'], STRONG):.2g}",
+                (at_most("work", 1.0, works[still_slight]),),
+                f"with {SLIGHT:g} it is {works[SLIGHT]:.2g}; with {STRONG:g} it would be {works[STRONG]:.2g}, but so much "
+                f"takes {taken['A', STRONG].max():.0%} off the amplitude with spring A",
             ),
             Statement(
                 "Because a Coloumb friction force varies with the normal force and since in this experiment this normal "
@@ -276,25 +288,26 @@ def compute_friction() -> StudyResult:
                 "crank cycle, this explains the difference in amplitude between the theoretical and experimental motions "
                 "with variation of crank speed and also within one crank cycle.",
                 text("8.4.1.1, L6496"),
-                f"force of the guide at {SHOWN['A']:g} rpm, spring A: its greatest value over its mean; the same at 450 "
-                "over 390 rpm; its greatest difference from the vertical force in the joint, relative to its greatest value; "
-                f"what friction by a coefficient of {SLIGHT:g} takes off the amplitude, in cm, greatest over least of 390, 420 "
-                "and 450 rpm; greatest difference of u in the turn from that with constant friction of the same mean, over "
-                f"the amplitude, {SHOWN['A']:g} rpm",
+                "spring A at 390, 420 and 450 rpm: greatest force of the guide in a turn over its mean, the least of the "
+                "three; greatest force at 450 over that at 390 rpm; greatest difference of the force from the vertical one in "
+                "the joint, relative to the greatest force, the least of the three; what friction by a coefficient of "
+                f"{SLIGHT:g} takes off the amplitude, in cm, greatest over least of the three; greatest difference of u in the "
+                "turn with this friction from u with constant friction of the same mean, over the amplitude, the least of the "
+                "three",
                 f"more than {1.0 + ALIKE:g} for a ratio and {ALIKE:g} for a difference that is seen; at most {ALIKE:g} for the "
                 "force of the joint: the rule for *the same*",
                 (
-                    at_least("within a cycle", 1.0 + ALIKE, force[420.0].max() / force[420.0].mean()),
+                    at_least("within a cycle", 1.0 + ALIKE, min(f.max() / f.mean() for f in force.values())),
                     at_least("with the speed", 1.0 + ALIKE, force[450.0].max() / force[390.0].max()),
-                    at_most("from the joint's", ALIKE, apart / force[420.0].max(), why=heavy),
+                    at_most("from the joint's", ALIKE, apart, why=heavy),
                     at_least("taken off, with the speed", 1.0 + ALIKE, max(lost) / min(lost)),
                     at_least("within a cycle, from constant friction", ALIKE, within),
                 ),
                 f"friction takes off {min(lost):.3f} to {max(lost):.3f} cm; relative to the amplitude this is alike at the "
                 f"three speeds, {100.0 * taken['A', SLIGHT].min():.1f} to {100.0 * taken['A', SLIGHT].max():.1f} %; constant "
-                f"friction of the same mean takes off {takes:.1%}; from one that does the same work in a turn, "
-                f"{working / constant:.2f} times as strong, u differs by {_constant_friction(working, varying)[0]:.2f} of the "
-                "amplitude too",
+                f"friction of the same mean takes off {takes:.1%} at most; from one that does the same work in a turn, "
+                f"{working / mean:.2f} times as strong at {SHOWN['A']:g} rpm, u differs by "
+                f"{_constant_friction(working, SHOWN['A'])[0]:.2f} of the amplitude too",
             ),
             Statement(
                 "Other factors contributing to the difference are (a) only an average estimation of the damping coefficient "
@@ -303,8 +316,8 @@ def compute_friction() -> StudyResult:
                 text("8.4.1.1, L6508"),
                 why="neither the scatter of the coefficient nor a size of the bearings is given, nor which way the amplitude "
                 "differs, which is said for rig 2 (L6841); 10 % more damping takes "
-                f"{damper:.1%} off the amplitude with spring A, a friction radius of {1e3 * PIN_RADIUS:g} mm in the pins "
-                f"{pins:.1%}",
+                f"{damper:.1%} off the amplitude with spring A, friction in the pins {pins:.1%}, with a friction radius "
+                f"(coefficient times radius of the pin) of {1e3 * PIN_RADIUS:g} mm, our choice: the most of the three speeds",
             ),
             Statement(
                 "The differences may be attributed to the same factors as previously described with spring A.",

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import replace
 from functools import partial
 from math import sqrt
@@ -10,6 +9,7 @@ from math import sqrt
 import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
+from scipy.optimize import minimize_scalar
 
 from ...figures import COLOURS, Curve, Figure, Panel, plot_curves
 from ...units import CM_PER_METRE, RAD_S_PER_RPM
@@ -29,6 +29,7 @@ from .rigs import (
     SLOWEST,
     amplitude,
     follow,
+    harmonic,
     marks,
     motions,
     natural_speed,
@@ -47,16 +48,16 @@ NATURAL = {"C": ("585", "582"), "D": ("825", "829")}
 #: Speeds (rpm) of the linear equation, and those that were run.
 CURVE = np.arange(SLOWEST, FASTEST["C"] + 1.0, 10.0)
 RANGE = np.arange(300.0, 1001.0, 10.0).tolist()
-#: Speed (rpm) beyond resonance at which the amplitude is compared, and dampers relative to the rig's.
-BEYOND, DAMPERS = 1000.0, (1.25, 0.8)
+#: Speeds (rpm) beyond resonance, by spring, at which the amplitude is compared, and dampers relative to the rig's.
+BEYOND, DAMPERS = {"C": (650.0, 700.0, 800.0, 900.0, 1000.0), "D": (890.0, 950.0, 1000.0)}, (1.25, 0.8)
 #: How the width of a resonance is measured, in words.
 WIDTH = "width of the resonance: of the speeds at which the amplitude over the speed squared is at least 0.71 of its greatest"
 
 
 @cache
-def linear_motion(spring: str, speed: float) -> HarmonicMotion:
+def linear_motion(spring: str, speed: float, variant: Variant = Variant.SECOND_ORDER) -> HarmonicMotion:
     """Return u/l4 at a speed (rpm) by two harmonics of the corrected linear equation of chapter IV."""
-    return two_harmonics(slider_equation(rig(spring), speed * RAD_S_PER_RPM, variant=Variant.SECOND_ORDER))
+    return two_harmonics(slider_equation(rig(spring), speed * RAD_S_PER_RPM, variant=variant))
 
 
 def length(spring: str) -> float:
@@ -85,11 +86,11 @@ def compute_resonance(number: str, spring: str) -> StudyResult:
 
 
 @cache
-def width(spring: str, linear: bool = False, /, **changes: float) -> float:
-    """Return the width of the resonance (rpm), see `WIDTH`: by the full equations, or by the linear one."""
+def width(spring: str, linear: Variant | None = None, /, **changes: float) -> float:
+    """Return the width of the resonance (rpm), see `WIDTH`: by the full equations, or by a variant of the linear one."""
     speeds = natural_speed(spring) + np.arange(-40.0, 40.1, 5.0)
     if linear:
-        sizes = np.array([linear_motion(spring, speed).amplitude for speed in speeds.tolist()])
+        sizes = np.array([linear_motion(spring, speed, linear).amplitude for speed in speeds.tolist()])
     else:
         sizes = follow(spring, speeds.tolist(), **changes)
     fine = np.linspace(speeds[0], speeds[-1], 80001)
@@ -100,11 +101,14 @@ def width(spring: str, linear: bool = False, /, **changes: float) -> float:
 
 def _resonance() -> tuple[Statement, ...]:
     """Judge the statements on Fig 8.19 and 8.20."""
-    section, larger = (
-        "8.4.2.2",
-        f"above 1, the sign alone, as *smaller* says; {BEYOND:g} rpm is the greatest speed that was run",
-    )
-    base = {s: amplitude(turn(s, BEYOND)) for s in "CD"}
+    section, larger = "8.4.2.2", "above 1, the sign alone, as *smaller* says"
+    over = {}
+    for s in "CD":
+        orders = (Variant.SECOND_ORDER, Variant.FIRST_ORDER)
+        linear = {(w, v): length(s) * linear_motion(s, w, v).amplitude for w in BEYOND[s] for v in orders}
+        over[f"spring {s}, amplitude"] = [amplitude(turn(s, w)) / size for (w, _), size in linear.items()]
+        over[f"spring {s}, width"] = [width(s) / width(s, v) for v in orders]
+    beyond = " and ".join(f"{', '.join(f'{w:g}' for w in speeds)} rpm with {s}" for s, speeds in BEYOND.items())
     natural = {s: natural_speed(s) for s in "CD"}
     error = {
         s: max(abs(length(s) * linear_motion(s, w).amplitude / amplitude(turn(s, w)) - 1.0) for w in RANGE)
@@ -127,31 +131,28 @@ def _resonance() -> tuple[Statement, ...]:
             "These differences may however be attributed to the fact that quantities involving the second and higher orders "
             "of [xi3, xi4] and [sigma2], and their derivatives are ignored in the theory.",
             text(f"{section}, L6847"),
-            f"both differences: amplitude at {BEYOND:g} rpm, and {WIDTH}; each by the full equations over that by the linear "
-            "equation, corrected, which keeps the second order of sigma2, as (4.23) to (4.28) do",
+            f"both differences: amplitude beyond resonance, at {beyond}, our choice up to the greatest speed that was run; and "
+            f"{WIDTH}; each by the full equations over that by the linear equation, corrected, to second order of sigma2, as "
+            "(4.23) to (4.28) have it, and to first: the greatest of these ratios",
             larger,
-            tuple(
-                at_least(f"spring {s}, {what}", 1.0, ratio)
-                for s in "CD"
-                for what, ratio in (
-                    ("amplitude", base[s] / length(s) / linear_motion(s, BEYOND).amplitude),
-                    ("width", width(s) / width(s, True)),
-                )
-            ),
-            "what is ignored lowers the amplitude and narrows the resonance",
+            tuple(at_least(label, 1.0, max(ratios)) for label, ratios in over.items()),
+            "what is ignored lowers the amplitude and narrows the resonance, by at most "
+            f"{1.0 - min(map(min, over.values())):.1%}",
         ),
         Statement(
             "Other factors contributing to the differences may, as before, be attributed to the presence of Coloumb "
             "friction in the guide and pin joints and to the fact that only an average value of the damping is considered "
             "in the theory.",
             text(f"{section}, L6853"),
-            f"amplitude at {BEYOND:g} rpm and width as before, by the full equations: with friction by {SLIGHT:g} of the "
-            f"guide's force or a friction radius of {1e3 * PIN_RADIUS:g} mm in the pins, as in {FRICTION}, and with a damper "
-            f"{' or '.join(f'{d:g}' for d in DAMPERS)} times as strong (ours: no scatter is printed), over those without",
+            f"amplitude, the least of the same speeds, and width as before, by the full equations: with friction by {SLIGHT:g} "
+            f"of the guide's force or a friction radius of {1e3 * PIN_RADIUS:g} mm in the pins, as in {FRICTION}, and with a "
+            f"damper {' or '.join(f'{d:g}' for d in DAMPERS)} times as strong (ours: no scatter is printed), over those "
+            "without",
             larger,
-            _factors(base),
+            _factors(),
             "friction and a stronger damper widen the resonance and lower the amplitude beyond it, a weaker damper the "
-            "reverse: no one of them does both",
+            "reverse: no one of them does both; friction by the slider's weight, across the plane of the rig, has the same "
+            "signs",
         ),
         Statement(
             "Figs. (8.19) and (8.20) also show a natural frequency in the region of 585 RPM with spring C and in the region "
@@ -194,7 +195,7 @@ def _resonance() -> tuple[Statement, ...]:
             "a reasonable assumption.",
             text(f"{section}, L6974"),
             "error of the amplitude by the linear equation of chapter IV, corrected, the most from "
-            f"{RANGE[0]:g} to {RANGE[-1]:g} rpm, relative",
+            f"{RANGE[0]:g} to {RANGE[-1]:g} rpm in tens, relative",
             f"{SMALL:g}, the rule for *negligible*",
             (
                 *(at_most(f"spring {s}", SMALL, error[s]) for s in "CD"),
@@ -204,8 +205,13 @@ def _resonance() -> tuple[Statement, ...]:
     )
 
 
-def _factors(base: Mapping[str, float]) -> tuple[Case, ...]:
-    """Judge how friction and other dampers change the amplitude beyond resonance, relative to ``base``, and the width."""
+def amplitudes_beyond(spring: str, **changes: float) -> list[float]:
+    """Return the amplitudes at the speeds `BEYOND` with changes of the rig, relative to those without them."""
+    return [amplitude(turn(spring, w, **changes)) / amplitude(turn(spring, w)) for w in BEYOND[spring]]
+
+
+def _factors() -> tuple[Case, ...]:
+    """Judge how friction and other dampers change the amplitude beyond resonance and its width."""
     cases = []
     for s in "CD":
         factors: dict[str, dict[str, float]] = {
@@ -215,7 +221,7 @@ def _factors(base: Mapping[str, float]) -> tuple[Case, ...]:
         factors |= {f"damper {d:g} times as strong": {"slider_damping": d * rig(s).slider_damping} for d in DAMPERS}
         for name, changes in factors.items():
             cases += [
-                at_least(f"{name}, spring {s}, amplitude", 1.0, amplitude(turn(s, BEYOND, **changes)) / base[s]),
+                at_least(f"{name}, spring {s}, amplitude", 1.0, min(amplitudes_beyond(s, **changes))),
                 at_least(f"{name}, spring {s}, width", 1.0, width(s, **changes) / width(s)),
             ]
     return tuple(cases)
@@ -249,6 +255,20 @@ def draw_resonance(spring: str, result: StudyResult) -> Figure:
 ORDERS = (1, 2, 3)
 
 
+def _greatest(way: str, spring: str, n: int) -> float:
+    """Return the greatest harmonic of an order over l4 near its resonance, by the "linear" or the "full" equations."""
+
+    def less(speed: float) -> float:
+        speed = float(speed)
+        if way == "linear":
+            return -linear_motion(spring, speed).harmonic(n)
+        return -harmonic(turn(spring, speed), n) / length(spring)
+
+    place = natural_speed(spring) / n
+    found = minimize_scalar(less, bounds=(place - 10.0, place + 10.0), method="bounded", options={"xatol": 0.01})
+    return -float(found.fun)
+
+
 def compute_harmonics() -> StudyResult:
     """Compute three harmonics relative to l4 over the speed, and the second by the linear equation too."""
     columns: dict[str, NDArray[np.float64]] = {}
@@ -264,17 +284,11 @@ def compute_harmonics() -> StudyResult:
         columns[f"harmonic 2 over l4; linear equation; {name} [1]"] = np.array(
             [linear_motion(spring, speed).harmonic(2) for speed in points.tolist()]
         )
-        at = int(np.argmax(sizes[1]))
-        together.append(f"{sizes[1][at] / sizes[2][at]:.0f}")
-        first, second = (
-            max(
-                linear_motion(spring, natural_speed(spring) / n + x).harmonic(n)
-                for x in np.arange(-10.0, 10.1, 0.5).tolist()
-            )
-            for n in (1, 2)
-        )
-        for way, ratio in (("linear", first / second), ("full", sizes[1].max() / sizes[2].max())):
-            ratios.append(near(f"{name}, {way}", "50", ratio, ABOUT * 50.0))
+        resonant = turn(spring, near_fraction(spring, 1)[0])
+        together.append(f"{harmonic(resonant, 1) / harmonic(resonant, 2):.0f}")
+        for way in ("linear", "full"):
+            first, second = (_greatest(way, spring, n) for n in (1, 2))
+            ratios.append(near(f"{name}, {way}", "50", first / second, ABOUT * 50.0))
         for n, part in ((4, "quarter"), (3, "third"), (2, "half")):
             above = rise_at(spring, n)
             size = f"{10.0 * near_fraction(spring, n)[1]:.1f}" if above > NOTICED else ""
@@ -298,9 +312,9 @@ def compute_harmonics() -> StudyResult:
                 tuple(cases),
                 f"of these places only half with D, at {natural_speed('D') / 2.0:.0f} rpm, lies within the "
                 f"{RANGE[0]:g} to {RANGE[-1]:g} rpm that were run (L6808); with friction by {SLIGHT:g} of the guide's "
-                f"force, more than linear bearings have, {' and '.join(left)} are left at half; relative to the "
-                f"greatest amplitude of the curve the rises there are {' and '.join(part_of_all)}, which its scale "
-                "does not show",
+                f"force {' and '.join(left)} are left at half; relative to the greatest amplitude of the curve the rises "
+                f"there are {' and '.join(part_of_all)}, which a graph of it does not show; that the motion is based on the "
+                "first harmonic is judged at L6814",
             ),
             Statement(
                 "The theoretical resonance curves corresponding to the second harmonic for both springs C and D are shown in "

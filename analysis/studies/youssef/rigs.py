@@ -39,7 +39,7 @@ FRICTION = "*What friction explains of the amplitudes; rig 1, springs A and B*"
 #: Relative rise of the amplitude that no one notices on a graph.
 NOTICED = ALIKE
 SEEN_IN_RECORDS = (
-    f"{NOTICED:g} of the amplitude there, ours: what one sees who compares the records of neighbouring speeds"
+    f"{NOTICED:g} of the amplitude there, the rule for *the same*, as the records of neighbouring speeds are compared"
 )
 #: Coefficient of friction in the guide that reduces the amplitude slightly.
 SLIGHT = 0.05
@@ -51,8 +51,13 @@ SLOWEST, SPLIT = 100.0, 900.0
 FASTEST = {"A": 1200.0, "B": 1300.0, "C": 1300.0, "D": 1300.0}
 #: Speeds (rpm) of the studies of friction in the guide, for rig 2 about half the natural frequency.
 GRID = {
-    spring: np.arange(first, last + 1.0, 5.0)
-    for spring, first, last in (("A", 150, 520), ("B", 250, 820), ("C", 250, 350), ("D", 360, 500))
+    spring: np.arange(first, last + 1.0, step)
+    for spring, first, last, step in (
+        ("A", 150, 520, 5.0),
+        ("B", 250, 820, 5.0),
+        ("C", 250, 350, 2.0),
+        ("D", 360, 500, 2.0),
+    )
 }
 #: Samples of a turn.
 SAMPLES = 1440
@@ -112,9 +117,14 @@ def slider(of: Turn) -> NDArray[np.float64]:
     return np.append(u, u[0])
 
 
+def complex_stiffness(p: FiveBarParameters, rates: NDArray[np.float64]) -> NDArray[np.complex128]:
+    """Return force divided by displacement (N/m) of the mean effective mass on spring and damper at angular speeds (rad/s)."""
+    return np.asarray(p.slider_stiffness - mean_effective_mass(p) * rates**2 + 1j * p.slider_damping * rates)
+
+
 def dynamic_stiffness(p: FiveBarParameters, rates: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return force divided by amplitude (N/m) of the mean effective mass on spring and damper at angular speeds (rad/s)."""
-    return np.abs(p.slider_stiffness - mean_effective_mass(p) * rates**2 + 1j * p.slider_damping * rates)
+    """Return the size of the complex stiffness (N/m): force divided by amplitude."""
+    return np.abs(complex_stiffness(p, rates))
 
 
 def amplitude(of: Turn) -> float:
