@@ -49,7 +49,7 @@ _PINT = {
 }
 
 
-def display_of(unit: str) -> tuple[str, float]:
+def display_scale(unit: str) -> tuple[str, float]:
     """Return the unit in which tables and pictures show a quantity, such as mm for m, and the factor from SI to it."""
     displays = UNITS[unit].displays if unit in UNITS else ()
     return displays[0] if displays else (unit, 1.0)
@@ -57,7 +57,7 @@ def display_of(unit: str) -> tuple[str, float]:
 
 def displayed(value: float, unit: str, digits: int = 6) -> str:
     """Return a value given in SI as text in the unit in which tables show it, such as "700 rpm" or "3 mm"."""
-    shown, factor = display_of(unit)
+    shown, factor = display_scale(unit)
     return f"{factor * value:.{digits}g}" + ("" if shown == "1" else f" {shown}")
 
 
@@ -258,8 +258,8 @@ def _convert(text: str, unit: str, spelled: str, name: str, wanted: str) -> floa
         return number
     if unit == "m" and of in LENGTHS:
         return number * LENGTHS[of]
-    if of == display_of(unit)[0]:
-        return number * (1.0 / display_of(unit)[1])
+    if of == display_scale(unit)[0]:
+        return number * (1.0 / display_scale(unit)[1])
     import pint
 
     try:

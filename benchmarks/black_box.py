@@ -107,10 +107,10 @@ def descend(
 ) -> OptimizeResult:
     """Minimise a score, by default `BlackBox.charge`, by Nelder and Mead's simplex from the best of `DRAWS` random linkages."""
     draws = random.uniform(box.low, box.high, (DRAWS, len(box.low)))
-    return descend_from(box, draws[np.argmin(box.charged(draws))], score or box.charge)
+    return minimise_score(box, draws[np.argmin(box.charged(draws))], score or box.charge)
 
 
-def descend_from(box: BlackBox, first: FloatArray, score: Callable[[FloatArray], float]) -> OptimizeResult:
+def minimise_score(box: BlackBox, first: FloatArray, score: Callable[[FloatArray], float]) -> OptimizeResult:
     """Minimise a score by Nelder and Mead's method, from a regular simplex at a linkage that extends away from near bounds."""
     away = np.where(first > 0.5 * (box.low + box.high), -1.0, 1.0)
     simplex = first + away * initial_simplex(np.zeros(len(first)), EDGE)

@@ -250,7 +250,7 @@ def _column(command: Command, rated: bool) -> str:
 COLUMNS = [_column(command, rated) for command in COMMANDS for rated in (False, True)]
 
 
-def fmu_of(mechanism: Mechanism, kind: str, folder: Path) -> Path:
+def built_fmu(mechanism: Mechanism, kind: str, folder: Path) -> Path:
     """Return the path of an FMU in a folder; build it if it is not there."""
     target = folder / KINDS[kind].file_name(mechanism)
     if not target.is_file():
@@ -288,7 +288,7 @@ def find(master: str, folder: Path) -> Table:
     ]
     cases = [
         [
-            str(fmu_of(MECHANISMS[c.mechanism], kind, folder)),
+            str(built_fmu(MECHANISMS[c.mechanism], kind, folder)),
             [*c],
             rated,
             h,

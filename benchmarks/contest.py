@@ -32,7 +32,7 @@ from analysis.synthesis.task.constraint import Constraint
 from analysis.synthesis.task.limits import Limits, make_limits
 from analysis.synthesis.task.task import Normal, Task
 
-from .black_box import DRAWS, PENALTY, BlackBox, descend, descend_from, evolve
+from .black_box import DRAWS, PENALTY, BlackBox, descend, evolve, minimise_score
 
 FloatArray = NDArray[np.float64]
 ComplexArray = NDArray[np.complex128]
@@ -212,7 +212,7 @@ class Trace:
         """Return the least error within a time (s), in the reported unit; infinite if nothing was found by then."""
         return min((value for passed, value in self.points if passed <= seconds), default=inf)
 
-    def time_to(self, error: float) -> float:
+    def reaching_time(self, error: float) -> float:
         """Return the time (s) at which an error was reached; infinite if it was never reached."""
         return next((seconds for seconds, value in self.points if value <= error), inf)
 
@@ -224,7 +224,7 @@ def by_scipy(trace: Trace, box: BlackBox, random: np.random.Generator) -> None:
     """Run SciPy's differential evolution over whole generations."""
     found = evolve(box, random, lambda intermediate_result: trace.offer(box, intermediate_result.x))
     if trace.contest.on_area:
-        descend_from(box, found.x, trace.watched(box, partial(trace.contest.charged_area, box)))
+        minimise_score(box, found.x, trace.watched(box, partial(trace.contest.charged_area, box)))
 
 
 def by_cma(trace: Trace, box: BlackBox, random: np.random.Generator) -> None:

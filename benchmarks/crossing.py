@@ -36,7 +36,7 @@ from analysis.synthesis.task.constraint import USUAL, Constraint
 from analysis.synthesis.task.limits import make_limits
 from analysis.synthesis.task.task import Normal
 
-from .black_box import PENALTY, BlackBox, descend_from, evolve
+from .black_box import PENALTY, BlackBox, evolve, minimise_score
 
 FloatArray = NDArray[np.float64]
 
@@ -159,7 +159,7 @@ class Evolution:
             maxiter=GENERATIONS,
             tol=1e-4,
         )
-        return min(self.error(found.x), self.error(descend_from(self.box, found.x, self.charge).x))
+        return min(self.error(found.x), self.error(minimise_score(self.box, found.x, self.charge).x))
 
 
 def by_evolution(task: UntimedPath, constraints: Sequence[Constraint], budget: float) -> float:

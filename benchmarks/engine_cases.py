@@ -51,7 +51,7 @@ class Case:
         return self.crank_speed or 0.0
 
 
-def steps_in(interval: float, time_step: float) -> int:
+def step_count(interval: float, time_step: float) -> int:
     """Return the least number of equal steps in ``interval`` that are no longer than ``time_step`` (both in s)."""
     return max(1, ceil(interval / time_step * (1.0 - 1e-9)))
 

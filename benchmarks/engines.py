@@ -24,7 +24,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from benchmarks.accuracy import loosest
-from benchmarks.engine_cases import CASES, Case, EngineRun, centre, relative_error, start, steps_in
+from benchmarks.engine_cases import CASES, Case, EngineRun, centre, relative_error, start, step_count
 from linkwork.five_bar.parameters import Constants
 
 Run = Callable[[Case, float], EngineRun]
@@ -159,7 +159,7 @@ def run_mujoco(case: Case, time_step: float, *, iterations: int = 1, stiffened: 
 
     model, data = _mujoco_model(case, iterations, stiffened=stiffened)
     interval = case.duration / case.samples
-    n_full = steps_in(interval, time_step)
+    n_full = step_count(interval, time_step)
     u = np.zeros(case.samples + 1)
     steps = 0
     driven = case.torque != 0.0
@@ -173,7 +173,7 @@ def run_mujoco(case: Case, time_step: float, *, iterations: int = 1, stiffened: 
             n = 0
             if rest is not None:
                 driven = False
-                n = steps_in(rest, time_step)
+                n = step_count(rest, time_step)
                 model.opt.timestep = rest / n
         if n:
             mujoco.mj_step(model, data, n)
@@ -365,7 +365,7 @@ class _ExudynSolver:
         data, configuration = self.mbs.systemData, getattr(self.exu.ConfigurationType, which)
         return data.GetODE2Coordinates(configuration), data.GetODE2Coordinates_t(configuration)
 
-    def start_from(self, state: tuple[np.ndarray, np.ndarray]) -> None:
+    def set_start(self, state: tuple[np.ndarray, np.ndarray]) -> None:
         """Make ``state`` the initial configuration of the next leg."""
         data, initial = self.mbs.systemData, self.exu.ConfigurationType.Initial
         data.SetODE2Coordinates(state[0], initial)
@@ -375,7 +375,7 @@ class _ExudynSolver:
 def _exudyn_until_switch(case: Case, solver: _ExudynSolver, spring: Any, time_step: float) -> list[float]:
     """Return the slider positions up to the first sample after the torque's switch, which Newton's method locates."""
     interval = case.duration / case.samples
-    n = steps_in(interval, time_step)
+    n = step_count(interval, time_step)
     u: list[float] = [0.0]
     while True:
         start = (len(u) - 1) * interval
@@ -385,7 +385,7 @@ def _exudyn_until_switch(case: Case, solver: _ExudynSolver, spring: Any, time_st
         if q[_EXUDYN_CRANK] >= case.switch_angle:
             break
         u.append(q[_EXUDYN_SLIDER])
-        solver.start_from((q, qd))
+        solver.set_start((q, qd))
     kept = solver.steps - n
     switch = start + interval
     for _ in range(10):
@@ -393,17 +393,17 @@ def _exudyn_until_switch(case: Case, solver: _ExudynSolver, spring: Any, time_st
         if abs(miss) < 1e-10:
             break
         switch -= miss / qd[_EXUDYN_CRANK]
-        solver.start_from(begin)
-        n = steps_in(switch - start, time_step)
+        solver.set_start(begin)
+        n = step_count(switch - start, time_step)
         solver.run(start, switch, n, interval)
         q, qd = solver.state()
     solver.mbs.SetObjectParameter(spring, "activeConnector", False)
-    solver.start_from((q, qd))
+    solver.set_start((q, qd))
     rest = start + interval - switch
     solver.steps = kept + n
-    solver.run(switch, start + interval, steps_in(rest, time_step), interval)
+    solver.run(switch, start + interval, step_count(rest, time_step), interval)
     u.append(solver.state()[0][_EXUDYN_SLIDER])
-    solver.start_from(solver.state())
+    solver.set_start(solver.state())
     return u
 
 
@@ -422,7 +422,7 @@ def run_exudyn(case: Case, time_step: float, *, newton_tolerance: float = 1e-6) 
     with contextlib.suppress(ArithmeticError):
         u = [0.0] if spring is None else _exudyn_until_switch(case, solver, spring, time_step)
         done = len(u) - 1
-        steps = (case.samples - done) * steps_in(interval, time_step)
+        steps = (case.samples - done) * step_count(interval, time_step)
         solver.run(done * interval, case.duration, steps, interval)
         u.extend(mbs.GetSensorStoredData(sensor)[done - case.samples :, 1])
         error = relative_error(case, np.array(u))
@@ -436,7 +436,7 @@ def time_steps(case: Case, first: float, last: float, ratio: float = 2.0**-0.25)
     """Yield a geometric series of time steps (s) from ``first`` to ``last``, each shortened to divide a sample interval."""
     interval = case.duration / case.samples
     count = ceil(log(last / first) / log(ratio) * (1.0 - 1e-9))
-    fitted = (steps_in(interval, first * ratio**i) for i in range(count + 1))
+    fitted = (step_count(interval, first * ratio**i) for i in range(count + 1))
     return (interval / n for n in dict.fromkeys(fitted))
 
 

@@ -16,9 +16,9 @@ from dataclasses import fields, replace
 
 import numpy as np
 
-from analysis.periodic import Drive, OrbitError, natural_frequency, orbit_of, orbits_of, scale_of
+from analysis.periodic import Drive, OrbitError, motion_scales, natural_frequency, newton_orbit, search_orbits
 from analysis.periodic.motion.discretisation import operating_point
-from analysis.periodic.motion.drive import starts_of
+from analysis.periodic.motion.drive import spread_starts
 from analysis.periodic.motion.flow import PLAIN
 from analysis.periodic.motion.kernels import segments
 from analysis.units import RAD_S_PER_RPM
@@ -50,12 +50,12 @@ def drawn(random: np.random.Generator):
             continue
 
 
-def ends_of(parameters, drive):
+def settled_ends(parameters, drive):
     """Yield, for each run that settles, the number of turns after which it repeats itself, and y at its end."""
     point, guess = operating_point(parameters, drive), np.zeros(2)
     scale, turn = point.scale(guess), np.array([0.0, point.flow.period])
     section = point.section(guess, PLAIN, tolerance=1e-8)
-    for start in (guess, *starts_of(parameters, drive, guess, STARTS, 5)):
+    for start in (guess, *spread_starts(parameters, drive, guess, STARTS, 5)):
         z, last = start[None].copy(), np.full((MOST + 1, 2), np.inf)
         for _ in range(TURNS):
             if segments(section, turn, z.copy(), z) != 0:
@@ -69,12 +69,12 @@ def ends_of(parameters, drive):
 
 def compare(parameters, drive) -> tuple[Counter, int]:
     """Count runs by the turns of their final motion, and the final motions that `find_orbits` has missed."""
-    scale, seen, missed = scale_of(parameters, drive, np.zeros(2)), Counter(), 0
-    known = {turns: orbits_of(parameters, drive, turns=turns).orbits for turns in range(1, MOST + 1)}
+    scale, seen, missed = motion_scales(parameters, drive, np.zeros(2)), Counter(), 0
+    known = {turns: search_orbits(parameters, drive, turns=turns).orbits for turns in range(1, MOST + 1)}
     starts = {turns: np.array([p for o in found for p in o.passages()]) for turns, found in known.items()}
-    for turns, end in ends_of(parameters, drive):
+    for turns, end in settled_ends(parameters, drive):
         try:
-            orbit = orbit_of(parameters, drive, turns=turns, start=end, settle=False)
+            orbit = newton_orbit(parameters, drive, turns=turns, start=end, settle=False)
         except OrbitError:
             continue
         passed = np.abs((orbit.passages() - orbit.start) / scale).max(axis=1)

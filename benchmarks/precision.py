@@ -55,11 +55,11 @@ def in_process(case: Case, of: str) -> list[Point]:
     def run(tolerance: float) -> Any:
         return simulate(case.parameters, inputs, initial=start, samples=case.times, tolerance=tolerance)
 
-    time_of = best_time if of == "whole" else integration_time
+    measure_time = best_time if of == "whole" else integration_time
     points = []
     for tolerance in TOLERANCES.tolist():
         error = relative_error(case, run(tolerance)["slider.position"])
-        points.append(Point(error, time_of(partial(run, tolerance), 40)))
+        points.append(Point(error, measure_time(partial(run, tolerance), 40)))
     return points
 
 
@@ -72,7 +72,7 @@ def at_tolerances(case: Case, run: Callable[[float], np.ndarray], repeats: int =
     return points
 
 
-def by_scipy_at(case: Case, method: str) -> list[Point]:
+def scipy_points(case: Case, method: str) -> list[Point]:
     """Measure one of SciPy's methods on the plain right-hand side."""
     length, speed = case.parameters.crank_length, max(1.0, case.start_speed)
     scale = np.array([1.0, length, speed, length * 40.0])
@@ -89,7 +89,7 @@ def by_engine(case: Case, engine: engines.Engine, run: engines.Run) -> list[Poin
 def measured(case: Case, say: Callable[[str], None]) -> dict[str, list[Point]]:
     """Return the points of all solvers that are installed, ours first."""
     found = {OURS: in_process(case, "integration"), "Linkwork, all outputs": in_process(case, "whole")}
-    found |= {f"SciPy {method}": by_scipy_at(case, method) for method in SCIPY_METHODS}
+    found |= {f"SciPy {method}": scipy_points(case, method) for method in SCIPY_METHODS}
     found["multiplier form, SciPy DOP853"] = at_tolerances(case, partial(by_multipliers, case), 1)
     mujoco, exudyn = engines.ENGINES
     for name, engine, run in (

@@ -55,7 +55,7 @@ from analysis.synthesis.task.limits import make_limits
 from analysis.synthesis.task.task import Normal
 from linkwork.five_bar import kinematics
 
-from .black_box import DRAWS, BlackBox, descend_from
+from .black_box import DRAWS, BlackBox, minimise_score
 from .contest import PHASES, SEARCHES, Contest, PlacedFourBar, Trace, by_freudenstein, searched
 
 FloatArray = NDArray[np.float64]
@@ -229,7 +229,7 @@ def convergence(weighted: bool, scanned: bool, number: int = STARTS) -> list[Sta
         first = np.clip(start.q[free], box.low, box.high)
         # angles within the turn that the box has
         first[-3:] = (start.q[free][-3:] + pi) % tau - pi
-        return float(box.quality(descend_from(box, first, box.charge).x[None, :])[0])
+        return float(box.quality(minimise_score(box, first, box.charge).x[None, :])[0])
 
     runs: dict[str, Callable[[Start], float]] = {
         "least squares, exact Jacobian": lambda start: fit_least_squares(normal, limits, start).start.quality,
@@ -281,15 +281,15 @@ def contest_table(names: Sequence[str], budget: float, console: Console) -> Tabl
         problem = PROBLEMS[name]
         traces = contested(Contest.of(problem), budget)
         best = min(trace.best for trace in traces.values())
-        first = next(iter(traces.values())).time_to((1.0 + NEAR) * best)
+        first = next(iter(traces.values())).reaching_time((1.0 + NEAR) * best)
         title = f"{name}: goal {problem.goal:g} {problem.unit}"
         for search, trace in traces.items():
-            near = trace.time_to((1.0 + NEAR) * best)
+            near = trace.reaching_time((1.0 + NEAR) * best)
             table.add_row(
                 title,
                 search,
                 f"{trace.best:.4g}" if isfinite(trace.best) else "none feasible",
-                _seconds(trace.time_to(problem.goal)),
+                _seconds(trace.reaching_time(problem.goal)),
                 _seconds(near),
                 f"{near / first:.2f}" if isfinite(near / first) else "",
             )

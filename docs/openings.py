@@ -16,8 +16,8 @@ from html import escape
 from pathlib import Path
 from typing import Any
 
-from analysis.run import case_from, load_case
-from analysis.studio import address_of, state_of
+from analysis.run import load_case, read_case
+from analysis.studio import page_address, page_state
 from linkwork import five_bar, slider_crank
 
 HERE = Path(__file__).resolve().parent
@@ -53,11 +53,11 @@ ALL = "studio"
 @cache
 def states() -> dict[str, dict[str, Any]]:
     """Return all states that open, by the name of a published set or of an example."""
-    found = {name: state_of(case_from({"published": name}, folder=EXAMPLES, title=name)) for name in PUBLISHED}
+    found = {name: page_state(read_case({"published": name}, folder=EXAMPLES, title=name)) for name in PUBLISHED}
     found |= json.loads(ANSWERS.read_text(encoding="utf-8"))
     for path in filter(is_run, sorted(EXAMPLES.glob("*.toml"))):
         constant = CONSTANT.get(path.stem, {})
-        state = state_of(load_case(path, constant))
+        state = page_state(load_case(path, constant))
         words = f", with constant {' and '.join(constant)}" if constant else ""
         found[path.stem] = state | {"title": state["title"] + words}
     return found
@@ -80,7 +80,7 @@ def links(page: str, text: str) -> str:
     """Return a line of HTML with links to all states of a page, or an empty text."""
     known = states()
     parts = [
-        f'<a href="{escape(address_of(known[name], "page.html"))}" title="{escape(known[name]["title"])}">{name}</a>'
+        f'<a href="{escape(page_address(known[name], "page.html"))}" title="{escape(known[name]["title"])}">{name}</a>'
         for name in named(page, text)
     ]
     return f'<p class="openings">Opens in the studio: {", ".join(parts)}.</p>' if parts else ""
@@ -96,7 +96,7 @@ def _answer(path: Path, folder: Path) -> dict[str, Any]:
     if not (cases := _cases(folder)):
         subprocess.run([*words, *OF_THE_FMUS], check=True, stdout=subprocess.DEVNULL)
         cases, added = _cases(folder), ", the best that the FMUs have"
-    state = state_of(load_case(cases[0], {"force": 0.0} if command == "slider-motion" else {}))
+    state = page_state(load_case(cases[0], {"force": 0.0} if command == "slider-motion" else {}))
     return state | {"title": state["title"] + added}
 
 

@@ -14,8 +14,8 @@ from PIL import Image
 from playwright.sync_api import sync_playwright
 
 from analysis.files import write_text
-from analysis.run import case_from
-from analysis.studio import page_of, state_of
+from analysis.run import read_case
+from analysis.studio import make_page, page_state
 
 TARGET = Path(__file__).resolve().parent / "studio.webp"
 #: Pixels of the page, and the share of them that the picture has.
@@ -28,10 +28,10 @@ def main() -> None:
     """Write the picture."""
     browser_path = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))))
     point = {"point_distance": "12 cm", "point_angle": "30 deg"}
-    machine = case_from({"published": "table-3.1", "coupler": point}, folder=Path())
+    machine = read_case({"published": "table-3.1", "coupler": point}, folder=Path())
     pictures = []
     with TemporaryDirectory() as folder, sync_playwright() as playwright:
-        path = write_text(Path(folder) / "studio.html", page_of(state_of(machine)))
+        path = write_text(Path(folder) / "studio.html", make_page(page_state(machine)))
         browser = playwright.chromium.launch(executable_path=browser_path, args=["--no-sandbox"])
         tab = browser.new_page(viewport={"width": WIDTH, "height": HEIGHT})
         tab.goto(path.resolve().as_uri())

@@ -23,7 +23,7 @@ from analysis.studies import RAHMAN, STUDIES, YOUSSEF
 from analysis.studies.contents import sentences
 from analysis.studies.page import MOST_BYTES, quotes
 from analysis.studies.statements import FAILS, HOLDS, IN_PART
-from analysis.studio import PAGE, case_of
+from analysis.studio import PAGE, page_case
 from linkwork import __version__
 
 from .scripts import script_of_docs
@@ -294,7 +294,7 @@ def test_every_published_set_and_example_opens_in_the_studio(openings):
     examples = {path.stem for path in (ROOT / "examples").glob("*.toml")}
     assert {*openings.states()} == {*PUBLISHED, *examples}
     for name, state in openings.states().items():
-        assert case_of(state).title == state["title"], name
+        assert page_case(state).title == state["title"], name
     pages = {page.stem: page.read_text(encoding="utf-8") for page in (ROOT / "docs").glob("*.md")}
     assert {*openings.SETS} <= {*pages}
     shown = {name for page, text in pages.items() if page != "studio" for name in openings.named(page, text)}
@@ -302,7 +302,7 @@ def test_every_published_set_and_example_opens_in_the_studio(openings):
     for page, text in pages.items():
         for address in re.findall('href="([^"]+)"', openings.links(page, text)):
             kept = base64.urlsafe_b64decode(address.partition("#state=")[2] + "==")
-            assert case_of(json.loads(kept)).parameters
+            assert page_case(json.loads(kept)).parameters
 
 
 @pytest.fixture(scope="module")

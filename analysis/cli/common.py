@@ -20,7 +20,7 @@ from rich.text import Text
 from linkwork.errors import AssemblyError, InputError, Interrupted, LinkworkError
 
 from ..libraries import MissingLibraryError, require
-from ..units import display_of
+from ..units import display_scale
 from .codes import CHECK_FAILED as CHECK_FAILED
 from .codes import ENDED_EARLY as ENDED_EARLY
 from .codes import INTERRUPTED as INTERRUPTED
@@ -74,12 +74,12 @@ def handled(command: Callable[..., Any]) -> Callable[..., Any]:
 
     @wraps(command)
     def run(*arguments: Any, **options: Any) -> Any:
-        from ..files import written_by
+        from ..files import attribute_files
 
         context = click.get_current_context()
         # without the name of the program, which may be python
         names = context.command_path.removeprefix(context.find_root().command_path)
-        with written_by(names.strip(), bool(context.meta.get(_FORCE))) as writing:
+        with attribute_files(names.strip(), bool(context.meta.get(_FORCE))) as writing:
             try:
                 return report(*arguments, **options)
             finally:
@@ -92,7 +92,7 @@ def handled(command: Callable[..., Any]) -> Callable[..., Any]:
         except Interrupted as error:
             text, style, code = str(error), "yellow", INTERRUPTED
         except AssemblyError as error:
-            text, style, code = f"error: {in_units(str(error), display_of)}", "red", WRONG
+            text, style, code = f"error: {in_units(str(error), display_scale)}", "red", WRONG
         except LinkworkError as error:
             text, style, code = f"error: {error}", "red", WRONG
         except OSError as error:
@@ -208,7 +208,7 @@ def workers_options(default: int | None = None) -> Callable[..., Any]:
     return lambda command: jobs(scheduler(command))
 
 
-def folder_of(out: str | Path) -> Path:
+def output_folder(out: str | Path) -> Path:
     """Return the folder of the option --out; make it if it does not exist."""
     folder = Path(out)
     folder.mkdir(parents=True, exist_ok=True)
@@ -316,16 +316,16 @@ _OTHERS = {
 }
 
 
-def kind_of(tables: Mapping[str, Any]) -> tuple[str, str] | None:
+def case_kind(tables: Mapping[str, Any]) -> tuple[str, str] | None:
     """Return the kind of a case file, such as `RUN`, by the names of its tables; None if they do not tell."""
-    from ..linkages import described_in
+    from ..linkages import has_linkage
     from ..mechanisms import MECHANISMS
-    from ..run import COMMON, acting_on
+    from ..run import COMMON, case_inputs
 
     names = set(tables)
     if "parts" in names:
         return SYSTEM
-    if described_in(tables) and not names & {"tune", "task"}:
+    if has_linkage(tables) and not names & {"tune", "task"}:
         return RUN
     if "tune" in names:
         return TUNING
@@ -333,7 +333,7 @@ def kind_of(tables: Mapping[str, Any]) -> tuple[str, str] | None:
         return SLIDER_MOTION if names & {"slider", "strategy"} else SYNTHESIS
     if names & {"bounds", "constraints", "search", "make", "trade_off", "linkage", "strategy", "tracking"}:
         return None
-    acting = {name.partition(".")[0] for m in MECHANISMS.values() for name in acting_on(m)}
+    acting = {name.partition(".")[0] for m in MECHANISMS.values() for name in case_inputs(m)}
     if names & (acting | set(COMMON) - {"mechanism", "title"}):
         return RUN
     parameters = {name.partition(".")[0] for m in MECHANISMS.values() for name in m.mechanism_variables}
@@ -361,7 +361,7 @@ def check_kind(path: str, *wanted: tuple[str, str], settings: Iterable[str] = ()
     ending = Path(path).suffix.lower()
     if ending in _OTHERS:
         raise InputError(f"{path} is {_OTHERS[ending].format(path)}")
-    kind = kind_of(read_tables(path) | {name.partition(".")[0]: None for name in settings})
+    kind = case_kind(read_tables(path) | {name.partition(".")[0]: None for name in settings})
     if kind is not None and kind not in wanted:
         what, command = kind
         raise InputError(f"{path} is {what}: {command} {path} (this command takes {wanted[0][0]})")
@@ -387,7 +387,7 @@ def changes(settings: Sequence[str], read: Callable[[str], Any], example: str) -
 
 def chosen_case(file: str | None, published: str | None, settings: Sequence[str]) -> Any:
     """Return the case of a file or of a published set with the changes of ``--set``, and print its warnings."""
-    from ..run import case_from, in_sentences, load_case, published_case
+    from ..run import in_sentences, load_case, published_case, read_case
 
     if (file is None) == (published is None):
         raise click.UsageError("give either a case file or --published NAME")
@@ -396,7 +396,7 @@ def chosen_case(file: str | None, published: str | None, settings: Sequence[str]
         check_kind(file, RUN, PARAMETERS)
         case = load_case(file, overrides)
     elif overrides:
-        case = case_from({"published": published}, folder=Path.cwd(), title=str(published), overrides=overrides)
+        case = read_case({"published": published}, folder=Path.cwd(), title=str(published), overrides=overrides)
     else:
         case = published_case(str(published))
     for warning in in_sentences(case.masses)[1]:

@@ -19,9 +19,9 @@ from .common import (
     changes,
     check_kind,
     console,
-    folder_of,
     handled,
     out_option,
+    output_folder,
     plots_option,
     plotted,
     print_error,
@@ -38,7 +38,7 @@ if TYPE_CHECKING:
 POSES = 6
 
 
-def settings_of(settings: Sequence[str]) -> dict[str, Any]:
+def read_settings(settings: Sequence[str]) -> dict[str, Any]:
     """Return the overrides of a case file given as NAME=VALUE; a value that is not TOML is a text with a unit."""
 
     def value(text: str) -> Any:
@@ -76,10 +76,10 @@ def search_options(command: Callable[..., Any]) -> Callable[..., Any]:
     return command
 
 
-def overrides_of(settings: Sequence[str], **options: Any) -> dict[str, Any]:
+def read_overrides(settings: Sequence[str], **options: Any) -> dict[str, Any]:
     """Return the overrides of a case file from ``--set`` and from other options, given as ``table__name=value``."""
     given = {name.replace("__", "."): value for name, value in options.items() if value is not None}
-    return settings_of(settings) | given
+    return read_settings(settings) | given
 
 
 def print_solutions(
@@ -227,7 +227,7 @@ def synthesize(
         solution_columns,
     )
 
-    overrides = overrides_of(settings, task__objective=objective, search__seed=seed, search__jobs=jobs)
+    overrides = read_overrides(settings, task__objective=objective, search__seed=seed, search__jobs=jobs)
     check_kind(case, SYNTHESIS)
     chosen = load_synthesis_case(case, overrides)
     stopped: Interrupted | None = None
@@ -242,7 +242,7 @@ def synthesize(
     print_solutions(title, result.solutions, forces)
     best = assess(result.best, chosen.violated)
     print_best(best)
-    folder = folder_of(out)
+    folder = output_folder(out)
     carried = {"greatest pin force [N]": [force.greatest for force in forces]} if forces else {}
     written = [write_csv(folder / "solutions.csv", result.columns() | carried)]
     if has_cognates(result.best):

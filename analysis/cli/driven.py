@@ -14,7 +14,7 @@ import click
 from linkwork.errors import InputError
 
 from ..mechanisms import PUBLISHED, mechanism_of
-from ..units import display_of
+from ..units import display_scale
 from .common import (
     ENDED_EARLY,
     INTERRUPTED,
@@ -44,14 +44,14 @@ class Chosen:
 
     def drive(self, speed: str | None = None) -> Any:
         """Return the drive of the case with its constant forces; a given speed, as text, replaces the drive of the crank."""
-        from ..periodic import NothingFreeError, VaryingInputError, drive_of
+        from ..periodic import NothingFreeError, VaryingInputError, steady_drive
 
         speed = speed or self.speed
         value = None if speed is None else quantity(speed, "rad/s", "--speed")
         if value is not None and self.case.inputs.torque is not None:
             print_error("note: the speed is prescribed; the case's torque is left out")
         try:
-            drive = drive_of(self.case.parameters, self.case.inputs, self.case.initial, speed=value)
+            drive = steady_drive(self.case.parameters, self.case.inputs, self.case.initial, speed=value)
             # raises an error if nothing is free
             drive.flow(mechanism_of(self.case.parameters))
             return drive
@@ -113,8 +113,8 @@ def about_a_case(command: Callable[..., None]) -> Callable[..., None]:
     return with_case
 
 
-def swing_of(orbit: Any) -> tuple[str, float, str]:
+def swing_unit(orbit: Any) -> tuple[str, float, str]:
     """Return the name of the coordinate whose amplitude is printed, the factor from SI to the printed unit, and this unit."""
     what, si = orbit.swing
-    unit, factor = display_of(si)
+    unit, factor = display_scale(si)
     return what, factor, unit

@@ -12,16 +12,16 @@ from .common import (
     SYNTHESIS,
     check_kind,
     console,
-    folder_of,
     handled,
     out_option,
+    output_folder,
     plots_option,
     plotted,
     print_error,
     print_written,
     set_option,
 )
-from .design import overrides_of, print_best, print_solutions, write_described, write_linkages
+from .design import print_best, print_solutions, read_overrides, write_described, write_linkages
 
 
 @click.command()
@@ -62,14 +62,14 @@ def exact(case: str, settings: Sequence[str], crank_phase: str | None, count: in
     )
 
     check_kind(case, SYNTHESIS)
-    chosen = load_synthesis_case(case, overrides_of(settings))
+    chosen = load_synthesis_case(case, read_overrides(settings))
     found: Generators | Guidance | GuidanceMap
     if isinstance(chosen.task, RockerFunction):
         found = function_generators(chosen.task, crank_phase=crank_phase)
     else:
         found = guidance(chosen.task, count)
     console.print(f"{chosen.title}: {found.describe()}", highlight=False, soft_wrap=True)
-    folder = folder_of(out)
+    folder = output_folder(out)
     written = []
     if found.solutions:
         print_solutions(f"{chosen.title}: in closed form", found.solutions)

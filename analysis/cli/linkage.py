@@ -101,11 +101,11 @@ def _print_reach(made: Mechanism) -> None:
 def _print_dead_centres(package: Package) -> None:
     """Print the values of each freedom at which a body jointed to the ground is at rest."""
     from ..linkages import dead_centres
-    from ..units import display_of
+    from ..units import display_scale
 
     rows = []
     for number, freedom in enumerate(package.interface.drives):
-        unit, factor = display_of(freedom.unit)
+        unit, factor = display_scale(freedom.unit)
         rows += [
             (freedom.coordinate, centre.name, f"{factor * centre.at:.4f} {unit}")
             for centre in dead_centres(package, number)

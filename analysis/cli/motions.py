@@ -9,8 +9,8 @@ import click
 
 from ..display import format_count, format_rounds
 from ..mechanisms import mechanism_of
-from .common import console, folder_of, html_option, quantity, save_picture, say, show_table, workers_options
-from .driven import Chosen, about_a_case, swing_of
+from .common import console, html_option, output_folder, quantity, save_picture, say, show_table, workers_options
+from .driven import Chosen, about_a_case, swing_unit
 
 if TYPE_CHECKING:
     from ..periodic import Orbits
@@ -55,7 +55,7 @@ def basins(
     """
     from .. import figures
     from ..periodic import basins as find_basins
-    from ..periodic import joined, orbits_of, turns_sought
+    from ..periodic import joined, search_orbits, turns_sought
 
     parameters, drive = chosen.case.parameters, chosen.drive()
     start = chosen.start(drive)
@@ -65,7 +65,7 @@ def basins(
         None if texts is None else tuple(quantity(text, unit, option) for text in texts)
         for texts, unit, option in zip((position, rate), units, ("--position", "--rate"))
     ]
-    found = [orbits_of(parameters, drive, turns=number, start=start) for number in range(1, turns + 1)]
+    found = [search_orbits(parameters, drive, turns=number, start=start) for number in range(1, turns + 1)]
     _motions(f"{chosen.case.title}: periodic motions of {turns_sought(flow, turns)}", found, flow.turns)
     picture = find_basins(
         parameters,
@@ -85,7 +85,7 @@ def basins(
         highlight=False,
         soft_wrap=True,
     )
-    stem = folder_of(chosen.folder) / f"{chosen.stem}-basins"
+    stem = output_folder(chosen.folder) / f"{chosen.stem}-basins"
     drawn = figures.picture(picture, title=chosen.case.title)
     chosen.finish([picture.to_csv(f"{stem}.csv"), *save_picture(drawn, stem, html=html)], ())
 
@@ -100,7 +100,7 @@ def _motions(title: str, found: Sequence[Orbits], common: int) -> None:
     headings = ("motion", "turns", "amplitude", "stability", "largest multiplier")
     rows, number = [], 0
     for orbit in sorted((orbit for part in found for orbit in part.orbits), key=lambda orbit: orbit.amplitude):
-        what, size, unit = swing_of(orbit)
+        what, size, unit = swing_unit(orbit)
         word = orbit.verdict().stability
         stays = word is not Stability.UNSTABLE
         number += stays

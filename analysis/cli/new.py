@@ -117,7 +117,7 @@ def _value(variable: Any, value: Any) -> Any:
 def _parameter_rows(mechanism: Mechanism, *, sections: bool) -> dict[str, str]:
     """Return the lines of the first published set's parameters by name; with ``sections`` masses follow from sections."""
     from ..files import line
-    from ..run import parameters_from
+    from ..run import read_parameters
 
     made = mechanism.first_set.parameters
     rows = {}
@@ -125,7 +125,7 @@ def _parameter_rows(mechanism: Mechanism, *, sections: bool) -> dict[str, str]:
     for link in mechanism.links if sections else ():
         computed |= {link.mass, link.inertia, *link.centre}
         rows[f"{link.name}.section"] = line("section", _SECTION, "", active=True)
-        made = parameters_from({f"{link.name}.section": _SECTION}, made)
+        made = read_parameters({f"{link.name}.section": _SECTION}, made)
     return rows | {
         name: line(
             name.rpartition(".")[2],
@@ -163,7 +163,7 @@ def _parameters(mechanism: Mechanism) -> Iterator[str]:
 def _run(mechanism: Mechanism, file: str) -> Iterator[str]:
     """Yield the lines of a run of the first published set at its speed, or of one second if it has no drive."""
     from ..files import entries, in_words, line
-    from ..run import RunTable, acting_on, signal_kinds
+    from ..run import RunTable, case_inputs, signal_kinds
 
     published = mechanism.first_set
     meaning = {v.name: v.description for v in mechanism.variables}
@@ -182,7 +182,7 @@ def _run(mechanism: Mechanism, file: str) -> Iterator[str]:
         value = getattr(published.initial, name)
         active = value != getattr(start, name)
         rows[f"initial.{name}"] = line(name, _value(v, value), v.description, active=active)
-    for name, (argument, unit) in acting_on(mechanism).items():
+    for name, (argument, unit) in case_inputs(mechanism).items():
         leaf = name.rpartition(".")[2]
         if not unit:
             rows[name] = line(leaf, True, "true or false, in the place of the others of its table", active=False)

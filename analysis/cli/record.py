@@ -9,7 +9,7 @@ import click
 import numpy as np
 
 from ..units import RAD_S_PER_RPM
-from .common import console, folder_of, handled, out_option, plot_option, print_written, quantity, show_table
+from .common import console, handled, out_option, output_folder, plot_option, print_written, quantity, show_table
 
 
 @click.command()
@@ -73,7 +73,7 @@ def decrement(
         words=("", "unit"),
     )
     console.print(f"the fit is within {decay.residual:.2g} of the first amplitude (root mean square)", highlight=False)
-    stem = folder_of(out) / f"{Path(record).stem}-decrement"
+    stem = output_folder(out) / f"{Path(record).stem}-decrement"
     columns = {
         "time [s]": decay.time,
         f"position [{options['unit']}]": decay.position,

@@ -14,24 +14,24 @@ from linkwork import __version__
 from linkwork.errors import InputError
 
 from ..mechanisms import PUBLISHED
-from ..units import RAD_S_PER_RPM, display_of
+from ..units import RAD_S_PER_RPM, display_scale
 from .common import (
     CHECK_FAILED,
     ENDED_EARLY,
     INTERRUPTED,
     PARAMETERS,
     RUN,
+    case_kind,
     case_options,
     changes,
     check_kind,
     chosen_case,
     console,
-    folder_of,
     handled,
     in_units,
-    kind_of,
     number_or_text,
     out_option,
+    output_folder,
     plot_option,
     print_error,
     print_written,
@@ -132,7 +132,7 @@ def run(
             result = simulate(chosen.parameters, chosen.inputs, method=method, **common)
     except RunInterrupted as stopped:
         result, interrupted = stopped.trajectory, True
-    stem = folder_of(out) / ((Path(case).stem if case else str(published)) + ("-fmu" if fmu else ""))
+    stem = output_folder(out) / ((Path(case).stem if case else str(published)) + ("-fmu" if fmu else ""))
     written = [result.to_csv(f"{stem}.csv")]
     if plot and len(result) > 1:
         written.append(save_figure(figures.plot(result, title=chosen.title), f"{stem}.png"))
@@ -148,7 +148,7 @@ def run(
         print_error(f"interrupted at t = {result.time[-1]:.6g} s; what was computed is kept")
         sys.exit(INTERRUPTED)
     if result.status:
-        print_error(f"the run ended early: {in_units(result.message, display_of)}", "red")
+        print_error(f"the run ended early: {in_units(result.message, display_scale)}", "red")
         for sentence in _bare_speeds(case, settings, chosen):
             print_error(sentence)
         sys.exit(ENDED_EARLY)
@@ -160,13 +160,13 @@ def _bare_speeds(file: str | None, settings: Sequence[str], case: Any) -> list[s
     """Return a note for each speed given as a number without unit, which asks whether rpm was meant instead of rad/s."""
     from ..files import flattened, read_tables
     from ..mechanisms import mechanism_of
-    from ..run import acting_on
+    from ..run import case_inputs
 
     given = {
         **flattened(read_tables(file) if file else {}),
         **changes(settings, number_or_text, "drive.speed='420 rpm'"),
     }
-    speeds = [name for name, acting in acting_on(mechanism_of(case.parameters)).items() if acting.unit == "rad/s"]
+    speeds = [name for name, acting in case_inputs(mechanism_of(case.parameters)).items() if acting.unit == "rad/s"]
     return [
         f"{name} = {given[name]:g} has no unit and is taken in rad/s, as {given[name] / RAD_S_PER_RPM:.6g} rpm: "
         f"was '{given[name]:g} rpm' meant?"
@@ -184,7 +184,7 @@ def _print_extremes(title: str, result: Any) -> None:
         largest[si] = max(largest.get(si, 0.0), *map(abs, values))
     rows = []
     for name, si, values in columns:
-        unit, factor = display_of(si)
+        unit, factor = display_scale(si)
         numbers = (factor * v if abs(v) > _ROUNDING * largest[si] else 0.0 for v in values)
         rows.append((name, unit, *(f"{number:.6g}" for number in numbers)))
     show_table(
@@ -282,7 +282,7 @@ def check(
                     f"{case.title}: {path.name}, {words}, less in process ({in_process.source})", comparison
                 )
             if not good or path == runs[0][0]:
-                _write_comparison(folder_of(out) / label, case, in_process, through_fmu)
+                _write_comparison(output_folder(out) / label, case, in_process, through_fmu)
             worst = comparison.worst
             verdicts.append(good)
             lines.append(
@@ -427,7 +427,7 @@ def info(what: str | None) -> None:
         _print_fmu(Path(what))
     elif Path(what).suffix in (".toml", ".json"):
         check_kind(what, RUN, PARAMETERS)
-        if kind_of(read_tables(what)) == PARAMETERS:
+        if case_kind(read_tables(what)) == PARAMETERS:
             _print_parameters(Path(what).stem, load_parameters(what))
         else:
             case = load_case(what)
@@ -439,9 +439,9 @@ def info(what: str | None) -> None:
 
 def _print_mechanism(mechanism: Any) -> None:
     """Print the entries of a case file for a mechanism: parameters, initial state and inputs."""
-    from ..run import acting_on
+    from ..run import case_inputs
 
-    what = acting_on(mechanism)
+    what = case_inputs(mechanism)
     meaning = {v.name: v.description for v in mechanism.variables}
     inputs = {c.argument: meaning[c.name] for c in mechanism.channels}
     parameters = (*mechanism.mechanism_variables.values(), *mechanism.initial_variables.values())

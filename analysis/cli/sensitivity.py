@@ -11,7 +11,7 @@ import numpy as np
 from linkwork.errors import LinkworkError
 
 from .common import console, print_error, show_table
-from .driven import swing_of
+from .driven import swing_unit
 
 #: Number of parameters that are printed for each point.
 _NAMED = 4
@@ -29,13 +29,15 @@ def report_sensitivity(response: Any, factor: float, unit: str, path: str) -> li
         Path of the table, with a row for each point in the order printed.
     """
     from ..files import write_csv
-    from ..periodic import gradient_names, special_gradient, value_of
+    from ..periodic import gradient_names, parameter_value, special_gradient
 
     family = response.family
     operation = family.parameters, family.drive
     # elasticities of a parameter that is zero are zero
-    names = [name for name in gradient_names(*operation) if name != family.vary and value_of(*operation, name) != 0.0]
-    what, size, length = swing_of(response.branches[0].orbits[0])
+    names = [
+        name for name in gradient_names(*operation) if name != family.vary and parameter_value(*operation, name) != 0.0
+    ]
+    what, size, length = swing_unit(response.branches[0].orbits[0])
     rows, shown = [], []
     for word, point in _points(response):
         try:

@@ -18,15 +18,15 @@ from .common import (
     SLIDER_MOTION,
     check_kind,
     console,
-    folder_of,
     handled,
+    output_folder,
     plotted,
     print_error,
     print_written,
     set_option,
     show_table,
 )
-from .design import leave_if_stopped, overrides_of, search_options, write_described, write_linkages
+from .design import leave_if_stopped, read_overrides, search_options, write_described, write_linkages
 
 if TYPE_CHECKING:
     from ..numerics.fourier import FourierSeries
@@ -68,13 +68,13 @@ def slider_motion(
     from ..slider import load_slider_case
     from ..synthesis import SecondCrank, SliderMotion
 
-    overrides = overrides_of(
+    overrides = read_overrides(
         settings, slider__harmonics=harmonics, task__objective=objective, search__seed=seed, search__jobs=jobs
     )
     check_kind(case, SLIDER_MOTION, settings=overrides)
     chosen = load_slider_case(case, overrides)
     solution, stopped = _moved(chosen) if chosen.strategy is None else _strategy(chosen)
-    folder = folder_of(out)
+    folder = output_folder(out)
     written = _write_solution(solution, folder, chosen, plots)
     pivot = solution.linkage.pivot
     if stopped is None and chosen.drive is not None:

@@ -62,9 +62,9 @@ def studio(what: str | None, out: str | None, browser: bool, port: int, settings
       linkwork studio examples/run-up.toml --set force='0 N' --out page.html
     """
     from ..files import write_text
-    from ..studio import page_of
+    from ..studio import make_page
 
-    page = page_of(_state(what, changes(settings, number_or_text, "slider.stiffness='2e6 dyn/cm'")))
+    page = make_page(_state(what, changes(settings, number_or_text, "slider.stiffness='2e6 dyn/cm'")))
     if out is not None:
         say(f"wrote {write_text(out, page)}")
         return
@@ -91,15 +91,15 @@ def _open(address: str) -> None:
 
 def _state(what: str | None, overrides: dict[str, Any]) -> dict[str, Any]:
     from ..files import read_tables, unknown_name
-    from ..run import case_from, load_case
-    from ..studio import opening_state, state_of
+    from ..run import load_case, read_case
+    from ..studio import opening_state, page_state
 
     if what is None:
         if overrides:
             raise click.UsageError("--set changes a case or a published set: name one")
         return opening_state()
     if what in PUBLISHED:
-        return state_of(case_from({"published": what}, folder=Path.cwd(), title=what, overrides=overrides))
+        return page_state(read_case({"published": what}, folder=Path.cwd(), title=what, overrides=overrides))
     if not Path(what).is_file():
         raise unknown_name(what, PUBLISHED, f"file or published set {what!r}")
     check_kind(what, RUN, PARAMETERS)
@@ -107,4 +107,4 @@ def _state(what: str | None, overrides: dict[str, Any]) -> dict[str, Any]:
     if "run" not in tables and not any(name.startswith("run.") for name in overrides):
         # a file of parameters does not say how long a run is
         overrides = {"run.stop_time": 1.0} | overrides
-    return state_of(load_case(what, overrides))
+    return page_state(load_case(what, overrides))

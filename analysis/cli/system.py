@@ -10,9 +10,9 @@ import click
 from . import Commands
 from .common import (
     ENDED_EARLY,
-    folder_of,
     handled,
     out_option,
+    output_folder,
     plot_option,
     plotted,
     print_error,
@@ -93,7 +93,7 @@ def build(file: str, fmi: str, out: str) -> None:
     """Build the FMUs of a system and write it as an SSP 1.0 archive; with --fmi 3 as SSP 2.0."""
     from ..systems import write_ssp
 
-    say(f"wrote {write_ssp(_wiring(file, fmi), folder_of(out) / f'{Path(file).stem}.ssp')}")
+    say(f"wrote {write_ssp(_wiring(file, fmi), output_folder(out) / f'{Path(file).stem}.ssp')}")
 
 
 @system.command()
@@ -128,7 +128,7 @@ def run(
     """Run a system: print a table of its connected outputs, write all outputs as CSV, and a plot."""
     from ..files import write_csv
     from ..systems import run_system
-    from ..units import display_of
+    from ..units import display_scale
 
     found = run_system(
         _wiring(file, fmi),
@@ -140,7 +140,7 @@ def run(
     )
     rows = []
     for name in found.connected:
-        unit, factor = display_of(found.units[name])
+        unit, factor = display_scale(found.units[name])
         values = factor * found[name]
         rows.append((name, unit, f"{values.min():.6g}", f"{values.max():.6g}", f"{values[-1]:.6g}"))
     title = f"{found.title}  ({len(found)} communication points to t = {found.time[-1]:g} s, coupling: {coupling})"
@@ -148,13 +148,13 @@ def run(
     for note in found.notes:
         print_error(f"note: {note}")
     if found.powers:
-        advice = found.step_for(1e-3)
+        advice = found.suggested_step(1e-3)
         then = f"; 0.1 % takes steps of about {1e3 * advice:.2g} ms" if advice is not None and share is None else ""
         say(
-            f"work that the coupling brought in: {100.0 * found.brought_in():.2g} % of what went through the power "
+            f"work that the coupling brought in: {100.0 * found.added_work():.2g} % of what went through the power "
             f"bonds{then}"
         )
-    folder, stem = folder_of(out), Path(file).stem
+    folder, stem = output_folder(out), Path(file).stem
     residuals = {f"power residual of {name}": power for name, power in found.powers.items()}
     say(f"wrote {write_csv(folder / f'{stem}.csv', {'time': found.time, **found.values, **residuals})}")
     for path in plotted(plot, found, folder / f"{stem}.png"):
@@ -213,7 +213,7 @@ def check(file: str, stop: str | None, decades: int, out: str, plot: bool) -> No
                    ("step [ms]", *found.powers), rows)  # fmt: skip
     for when, message in found.messages.items():
         print_error(f"note: {when}: {message}")
-    for path in plotted(plot, found, folder_of(out) / f"{Path(file).stem}-check.png"):
+    for path in plotted(plot, found, output_folder(out) / f"{Path(file).stem}-check.png"):
         say(f"wrote {path}")
 
 
@@ -223,7 +223,7 @@ def check(file: str, stop: str | None, decades: int, out: str, plot: bool) -> No
 @handled
 def draw(file: str, out: str) -> None:
     """Draw the parts of a system and their connections."""
-    for path in plotted(True, _wiring(file), folder_of(out) / f"{Path(file).stem}-diagram.png"):
+    for path in plotted(True, _wiring(file), output_folder(out) / f"{Path(file).stem}-diagram.png"):
         say(f"wrote {path}")
 
 
@@ -235,5 +235,5 @@ def host(file: str, out: str) -> None:
     """Build a system as one C program for real-time targets, without heap or Python, with step times and missed deadlines."""
     from ..systems import build_host
 
-    made = build_host(_wiring(file), folder_of(out) / f"{Path(file).stem}-host")
+    made = build_host(_wiring(file), output_folder(out) / f"{Path(file).stem}-host")
     say(f"wrote {made} with its sources: {made} STEPS [RATE]")

@@ -14,9 +14,9 @@ from .common import (
     TUNING,
     check_kind,
     console,
-    folder_of,
     handled,
     out_option,
+    output_folder,
     plot_option,
     plotted,
     print_error,
@@ -25,7 +25,7 @@ from .common import (
     set_option,
     show_table,
 )
-from .design import settings_of
+from .design import read_settings
 
 
 @click.command()
@@ -54,7 +54,7 @@ def tune(case: str, settings: Sequence[str], as_json: bool, plot: bool, out: str
     from ..tuning import load_tuning_case
     from ..tuning import tune as find
 
-    overrides = settings_of(settings)
+    overrides = read_settings(settings)
     check_kind(case, TUNING, settings=overrides)
     chosen = load_tuning_case(case, overrides)
     tuned = find(chosen.wish, progress=console.is_terminal)
@@ -63,7 +63,7 @@ def tune(case: str, settings: Sequence[str], as_json: bool, plot: bool, out: str
         click.echo(json.dumps(tables, indent=2))
     else:
         _print(chosen.title, tuned)
-    folder = folder_of(out)
+    folder = output_folder(out)
     stem = folder / f"{Path(case).stem}-tuned"
     written = [
         write_tables(f"{stem}.toml", chosen.tuned_tables(tuned, folder)),
@@ -80,14 +80,14 @@ def tune(case: str, settings: Sequence[str], as_json: bool, plot: bool, out: str
 
 def _print(title: str, tuned: Any) -> None:
     from ..mechanisms import mechanism_of
-    from ..periodic import unit_of
-    from ..units import display_of
+    from ..periodic import parameter_unit
+    from ..units import display_scale
 
     wish = tuned.wish
     rows = []
     for name, before, after in zip(wish.names, wish.present.tolist(), tuned.values.tolist()):
         # a change from zero has no percentage
-        unit, factor = display_of(unit_of(mechanism_of(wish.parameters), name))
+        unit, factor = display_scale(parameter_unit(mechanism_of(wish.parameters), name))
         change = f"{100.0 * (after / before - 1.0):+.4g} %" if before else f"{factor * after:+.4g} {unit}"
         changed = change if after != before else "none"
         rows.append((name, unit, f"{factor * before:.7g}", f"{factor * after:.7g}", changed))

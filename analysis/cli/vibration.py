@@ -12,11 +12,11 @@ from linkwork.parameters import field_name
 
 from ..display import format_rounds
 from ..mechanisms import FIVE_BAR, mechanism_of
-from ..units import RAD_S_PER_RPM, display_of
+from ..units import RAD_S_PER_RPM, display_scale
 from .common import (
     console,
-    folder_of,
     html_option,
+    output_folder,
     plot_option,
     print_error,
     print_written,
@@ -26,7 +26,7 @@ from .common import (
     show_table,
     workers_options,
 )
-from .driven import Chosen, about_a_case, swing_of
+from .driven import Chosen, about_a_case, swing_unit
 from .sensitivity import report_sensitivity
 
 #: Default range of speeds relative to the natural frequency; it contains 2, near which parametric resonance begins.
@@ -35,9 +35,9 @@ _RANGE = (0.15, 2.3)
 
 def _require_range(parameters: Any, low: float, high: float, name: str, first: str, last: str) -> None:
     """Raise a usage error if a range does not increase, or if speeds in it are not above zero; it names the options."""
-    from ..periodic import format_value, speed_names, unit_of
+    from ..periodic import format_value, parameter_unit, speed_names
 
-    unit = unit_of(mechanism_of(parameters), name)
+    unit = parameter_unit(mechanism_of(parameters), name)
     options = first if first == last else f"{first} and {last}"
     if not low < high:
         span = f"from {format_value(name, low, unit)} to {format_value(name, high, unit)}"
@@ -114,8 +114,8 @@ def resonance(
         ResponseInterrupted,
         default_variable,
         frequency_response,
+        parameter_unit,
         speed_names,
-        unit_of,
         with_isolas,
     )
     from ..youssef import approximations
@@ -142,7 +142,7 @@ def resonance(
             response = with_isolas(response, places=places, turns=turns, progress=console.is_terminal)
     except ResponseInterrupted as stopped:
         response, interrupted = stopped.response, True
-    unit, factor = display_of(unit_of(mechanism, vary))
+    unit, factor = display_scale(parameter_unit(mechanism, vary))
     if natural is not None:
         console.print(
             f"natural frequency of the spring alone on the mean effective mass: {natural / RAD_S_PER_RPM:.2f} rpm, "
@@ -150,7 +150,7 @@ def resonance(
             highlight=False,
         )
     _print_branches(title, response, factor, unit)
-    stem = folder_of(chosen.folder) / f"{chosen.stem}-resonance"
+    stem = output_folder(chosen.folder) / f"{chosen.stem}-resonance"
     written = [response.to_csv(f"{stem}.csv")]
     table = approximations(response) if over_speed and mechanism is FIVE_BAR else None
     _print_extrema(response, factor, unit, table)
@@ -179,9 +179,9 @@ def _range_ends(
     parameters: Any, vary: str, low: str | None, high: str | None, natural: float | None
 ) -> tuple[float, float]:
     """Return the ends of the range to follow in SI, by default about the natural frequency (rad/s)."""
-    from ..periodic import speed_names, unit_of
+    from ..periodic import parameter_unit, speed_names
 
-    unit = unit_of(mechanism_of(parameters), vary)
+    unit = parameter_unit(mechanism_of(parameters), vary)
     if natural is None and (low is None or high is None):
         speed = vary in speed_names(mechanism_of(parameters))
         why = "without a spring there is no natural frequency to begin with" if speed else "it has no range of its own"
@@ -241,7 +241,7 @@ def _print_extrema(response: Any, factor: float, unit: str, table: Any) -> None:
             "no maximum or minimum of the amplitude inside the range stands out by a thousandth", highlight=False
         )
         return
-    what, size, length = swing_of(response.branches[0].orbits[0])
+    what, size, length = swing_unit(response.branches[0].orbits[0])
     names = () if table is None else tuple(table.amplitudes)
     headings = ("", f"at [{unit}]", f"amplitude [{length}]", "motion", *(f"{name} [{length}]" for name in names))
     if table is not None and _has_dry_friction(response.family.parameters):
@@ -268,8 +268,8 @@ def _print_ranges_to_avoid(response: Any, factor: float, unit: str) -> None:
     if response.caution:
         say(f"{response.caution}: --places seeks them")
     else:
-        say(f"all motions were sought at {response.sought_at} only: more --places may find more")
-    what, size, length = swing_of(response.branches[0].orbits[0])
+        say(f"all motions were sought at {response.sought_values} only: more --places may find more")
+    what, size, length = swing_unit(response.branches[0].orbits[0])
     if not ranges:
         largest = max(response.branches, key=lambda branch: float(branch.amplitude.max()))
         place = int(largest.amplitude.argmax())
@@ -367,7 +367,7 @@ def stability(
         raise missing
     if not charted:
         return
-    stem = folder_of(chosen.folder) / f"{chosen.stem}-stability"
+    stem = output_folder(chosen.folder) / f"{chosen.stem}-stability"
 
     def picture_first(found: Any) -> None:
         """Write the picture of the grid without its boundaries, which take longer."""
@@ -403,22 +403,22 @@ def stability(
 def _axis_range(
     parameters: Any, drive: Any, name: str, texts: tuple[str, str] | None, option: str
 ) -> tuple[float, float]:
-    from ..periodic import default_range, unit_of
+    from ..periodic import default_range, parameter_unit
 
     if texts is None:
         return default_range(parameters, drive, name)
-    low, high = (quantity(text, unit_of(mechanism_of(parameters), name), option) for text in texts)
+    low, high = (quantity(text, parameter_unit(mechanism_of(parameters), name), option) for text in texts)
     _require_range(parameters, low, high, name, option, option)
     return low, high
 
 
 def _report_verdict(title: str, parameters: Any, drive: Any, start: Any) -> None:
     """Print the verdict on the motion at one speed, and for a five-bar that of the linear equation."""
-    from ..periodic import orbit_of
+    from ..periodic import newton_orbit
     from ..youssef import linear_verdict
 
-    orbit = orbit_of(parameters, drive, start=start)
-    turn, (_, size, unit) = orbit.turn(), swing_of(orbit)
+    orbit = newton_orbit(parameters, drive, start=start)
+    turn, (_, size, unit) = orbit.turn(), swing_unit(orbit)
     values = ", ".join(f"{m.real:.6g}{m.imag:+.6g}i" if m.imag else f"{m.real:.6g}" for m in orbit.multipliers)
     # other cranks in a ratio have a common period; a free crank has only a mean speed
     rpm = drive.speed / RAD_S_PER_RPM if drive.speed_drive else 60.0 * turn.turns / turn.period

@@ -1,6 +1,6 @@
 """Build FMUs of the mechanisms."""
 
-from .archive import SOURCES, BuildError, try_out
+from .archive import SOURCES, BuildError, run_trial
 from .builds import Built, build_all, kinds_here
 from .compatibility import publish
 from .description import KINDS, NATIVE, NATIVE_FMI3, PYTHON, Kind
@@ -34,8 +34,8 @@ __all__ = [
     "kinds_here",
     "publish",
     "rebuild",
+    "run_trial",
     "source_files",
     "this_platform",
-    "try_out",
     "with_starts",
 ]

@@ -134,7 +134,7 @@ assert len(result) == 21, len(result)
 """
 
 
-def try_out(fmu: Path, script: str = _TRIAL, *arguments: str) -> None:
+def run_trial(fmu: Path, script: str = _TRIAL, *arguments: str) -> None:
     """Run the FMU through FMPy in a process of its own, by default for twenty steps.
 
     Parameters

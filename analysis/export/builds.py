@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 from ..files import unknown_name
 from ..mechanisms import MECHANISMS
-from .archive import try_out
+from .archive import run_trial
 from .compatibility import publish
 from .description import KINDS, PYTHON
 from .native_fmu import EVERYWHERE, PLATFORMS, WASM, build_native, this_platform
@@ -89,7 +89,7 @@ def build_all(
             native = native or asked
             made = build(known[name], dest) if python else build_native(known[name], kind, dest, native)
             if python or here in native:
-                try_out(made)
+                run_trial(made)
                 if publish_to is not None:
                     publish(known[name], kind, made, publish_to)
             yield Built(made, () if python else native)

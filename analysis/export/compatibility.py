@@ -16,7 +16,7 @@ from pathlib import Path
 import linkwork
 from linkwork.mechanism import Mechanism
 
-from .archive import try_out
+from .archive import run_trial
 from .description import NATIVE_FMI3, PYTHON, Kind, started
 
 #: Importers in which the tests of Linkwork run the FMUs, by package: the kinds of FMU and the interfaces.
@@ -58,7 +58,7 @@ def publish(mechanism: Mechanism, kind: Kind, fmu: Path, folder: Path | str) -> 
     for suffix, text in written.items():
         (place / f"{fmu.stem}{suffix}").write_text(text, encoding="utf-8")
     (place / "Readme.txt").write_text(readme(mechanism, kind), encoding="utf-8")
-    try_out(place / fmu.name, _COMPARISON, *map(str, (start, stop, step, RELATIVE, ABSOLUTE)))
+    run_trial(place / fmu.name, _COMPARISON, *map(str, (start, stop, step, RELATIVE, ABSOLUTE)))
     return place
 
 

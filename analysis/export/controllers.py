@@ -204,7 +204,7 @@ class Controller(Fmi2Slave):  # type: ignore[misc]
         for name in self.parameters:
             self._check(name, getattr(self, name))
         self.count, self.phase = 0, RUNNING
-        self._up_to(self.start_time + 0.5 * self.sample_time)
+        self._sample_before_end(self.start_time + 0.5 * self.sample_time)
 
     def do_step(self, current_time: float, step_size: float) -> bool:
         """Take the samples in a step, without one at its end; return False if the step is not valid."""
@@ -214,7 +214,7 @@ class Controller(Fmi2Slave):  # type: ignore[misc]
         elif not (isfinite(end) and step_size > 0.0 and end <= self.stop_time + 1e-6 * step_size):
             wrong = f"it must be finite and above 0, and end by the stop time, {self.stop_time} s"
         else:
-            self._up_to(end)
+            self._sample_before_end(end)
             return True
         self.log(f"a step of {step_size} s at {current_time} s: {wrong}", Fmi2Status.discard)
         return False
@@ -229,7 +229,7 @@ class Controller(Fmi2Slave):  # type: ignore[misc]
         state: dict[str, Any] = super()._get_fmu_state()
         return state | {"phase": self.phase}
 
-    def _up_to(self, end: float) -> None:
+    def _sample_before_end(self, end: float) -> None:
         while (t := self.start_time + self.count * self.sample_time) < end - 1e-6 * self.sample_time:
             self.sample(t)
             self.count += 1

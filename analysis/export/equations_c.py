@@ -45,7 +45,7 @@ _START = "constants, RULES and error_scale must be arithmetic without branches, 
 
 def _equations(mechanism: Mechanism) -> str:
     made = {function.name(): function for function in functions(mechanism)}
-    text = c_of(made.values(), "equations")
+    text = write_c_functions(made.values(), "equations")
     if mechanism.switch:
         text += _switched_calls(mechanism, made["equations_solution"].numel_out(0))
     return '#include "sizes.h"\n\n#ifndef LOCAL\n#define LOCAL\n#endif\n\n' + re.sub(
@@ -62,7 +62,7 @@ _UNUSED = re.compile(
 )
 
 
-def c_of(functions: Iterable[Any], file: str) -> str:
+def write_c_functions(functions: Iterable[Any], file: str) -> str:
     """Return functions of CasADi as C for the shell; names that the functions share begin with ``file``."""
     options = {"with_header": False, "main": False, "casadi_int": "int", "with_export": False, "with_mem": False}
     generator = symbolic.library().CodeGenerator(f"{file}.c", options)

@@ -17,7 +17,7 @@ from ..numerics import symbolic
 from ..run import MOTOR, at_rest, expressions, kloss
 from .archive import SOURCES
 from .description import NATIVE
-from .equations_c import beginning, c_of, generated
+from .equations_c import beginning, generated, write_c_functions
 from .native_fmu import EVERYWHERE, WASM, WASM_OPTIONS, compile_library
 
 #: C files that a browser's module shares with a native FMU, and the folder of its own files.
@@ -121,7 +121,7 @@ def _drawing(mechanism: Mechanism) -> str:
             *_driven(mechanism),
         )
     )
-    return c_of(made, "drawing")
+    return write_c_functions(made, "drawing")
 
 
 def _driven(mechanism: Mechanism) -> list[tuple[Any, ...]]:

@@ -17,7 +17,7 @@ from matplotlib.ticker import MaxNLocator
 from numpy.typing import ArrayLike, NDArray
 
 from ..periodic import OTHER_ORBIT, TOLERANCE, TRUE_ORBIT, Basins, Coexistence, Crossing, Outcome, StabilityChart
-from ..units import RAD_S_PER_RPM, display_of
+from ..units import RAD_S_PER_RPM, display_scale
 from .curves import Curve, Panel, Picture, draw, draw_panel, draw_part, pictured
 from .style import COLOURS, LIGHT, legend_above, spoken, spoken_label
 
@@ -94,7 +94,7 @@ def plot_charts(
     return draw(Picture(parts=charts, title=title, columns=columns, size=size))
 
 
-def colours_of(chart: HeatMap) -> tuple[Normalize, Colormap]:
+def colour_scale(chart: HeatMap) -> tuple[Normalize, Colormap]:
     """Return the scale from a map's values to [0, 1], and its colour map."""
     values = np.ma.masked_invalid(chart.values)
     if chart.classes:
@@ -110,7 +110,7 @@ def colours_of(chart: HeatMap) -> tuple[Normalize, Colormap]:
     return norm, colormaps["RdBu_r"]
 
 
-def keys_of(chart: HeatMap) -> list[tuple[str, str, str]]:
+def legend_entries(chart: HeatMap) -> list[tuple[str, str, str]]:
     """Return colour, hatching and name of each legend entry of a map; the entries of its curves are not among them."""
     keys = [(colour, hatch, name) for (name, colour), hatch in zip(chart.classes.items(), cycle(_HATCHES))]
     if chart.sides is not None:
@@ -123,7 +123,7 @@ def keys_of(chart: HeatMap) -> list[tuple[str, str, str]]:
 @draw_part.register
 def _(chart: HeatMap, figure: Figure, axis: Axes) -> None:
     values = np.ma.masked_invalid(chart.values)
-    norm, colours = colours_of(chart)
+    norm, colours = colour_scale(chart)
     axis.set_facecolor(EMPTY)
     mesh = axis.pcolormesh(chart.x, chart.y, values, shading="nearest", rasterized=True, norm=norm, cmap=colours)
     for of, hatch in _hatched_points(chart, values):
@@ -140,7 +140,7 @@ def _(chart: HeatMap, figure: Figure, axis: Axes) -> None:
         figure.colorbar(mesh, cax=scale, label=chart.label, ticks=_ticks(norm), format="%g")
         scale.grid(False)
     handles, labels = axis.get_legend_handles_labels()
-    for colour, hatch, name in keys_of(chart):
+    for colour, hatch, name in legend_entries(chart):
         handles.append(Patch(facecolor=colour, hatch=hatch, edgecolor="0.45", linewidth=0.0))
         labels.append(name)
     if not handles:
@@ -248,7 +248,7 @@ def _coexistence_picture(chart: StabilityChart, beside: Coexistence, panel: Pane
     """Describe maps of the number of stable motions, and of the least and greatest amplitude, with the boundaries."""
     x, y = (axis.factor * values for axis, values in zip(chart.axes, (beside.x, beside.y)))
     what, unit = beside.swing
-    shown, factor = display_of(unit)
+    shown, factor = display_scale(unit)
     sizes = {
         f"amplitude of {spoken(what)}, {word} stable motion [{shown}]": factor * amplitude
         for word, amplitude in (("smallest", beside.least), ("largest", beside.greatest))
@@ -281,9 +281,9 @@ def _coexistence_picture(chart: StabilityChart, beside: Coexistence, panel: Pane
 def plot_basins(found: Basins, *, title: str = "") -> Picture:
     """Plot each initial condition in the colour of the motion it settles to, and mark the motions at crank angle 0."""
     name, _, position_unit = found.labels[0].removesuffix("]").partition(" [")
-    drawn, scale = display_of(position_unit)
+    drawn, scale = display_scale(position_unit)
     half = len(found.motions[0].start) // 2
-    shown, factor = display_of(found.motions[0].swing[1])
+    shown, factor = display_scale(found.motions[0].swing[1])
     curves = []
     for stable, marker in ((True, "o"), (False, "x")):
         those = [orbit for orbit in found.found.orbits if (orbit in found.motions) == stable]

@@ -17,7 +17,7 @@ from matplotlib.colors import to_hex
 from numpy.typing import ArrayLike
 
 from ..libraries import require
-from .charts import HeatMap, colours_of, keys_of
+from .charts import HeatMap, colour_scale, legend_entries
 from .curves import Curve, Panel, Picture, shades_by_label
 from .dispatch import picture
 from .style import COLOURS, LINE, MARKED, SHADE, SHADES
@@ -299,7 +299,7 @@ def _(part: HeatMap, axes: _Axes) -> None:
         colorbar=place | {"thickness": 12, "title": {"text": escape(part.label), "side": "right"}},
         **_colour_scale(part),
     )
-    for colour, _, name in keys_of(part):
+    for colour, _, name in legend_entries(part):
         key = {"symbol": "square", "size": 12, "color": _hex(colour), "line": {"width": 1, "color": _hex(MARKED)}}
         legend = axes.legend_group(part.panel.title or part.label)
         axes.add_trace(type="scatter", x=[None], y=[None], mode="markers", marker=key, name=escape(name), **legend)
@@ -309,7 +309,7 @@ def _(part: HeatMap, axes: _Axes) -> None:
 
 def _colour_scale(part: HeatMap) -> dict[str, Any]:
     """Return Plotly's colour scale and range of values for a map, with Matplotlib's colours."""
-    norm, colours = colours_of(part)
+    norm, colours = colour_scale(part)
     low, high = float(norm.vmin or 0.0), float(norm.vmax or 0.0)
     if part.classes:
         n = len(part.classes)

@@ -29,7 +29,7 @@ from ..periodic import (
     Stability,
     fold_jumps,
 )
-from ..units import display_of
+from ..units import display_scale
 from ..youssef import Approximations
 from .curves import Arrow, Curve, Label, Panel, Picture, Shade, draw, pictured
 from .style import COLOURS, LINE, THIN, spoken
@@ -133,8 +133,8 @@ def describe_branches(
 ) -> Picture:
     """Return the picture that `plot_branches` draws; ``caution`` is a line above the legend on limits of the shaded ranges."""
     family, (what, si) = branches[0].family, branches[0].orbits[0].swing
-    unit, factor = display_of(family.unit) if rpm or family.unit != "rad/s" else (family.unit, 1.0)
-    shown, scale = display_of(si)
+    unit, factor = display_scale(family.unit) if rpm or family.unit != "rad/s" else (family.unit, 1.0)
+    shown, scale = display_scale(si)
     outputs = (v for v in mechanism_of(family.parameters).variables if v.causality == "output")
     name = next((spoken(v.name) for v in outputs if v.symbol == what), spoken(what))
     look = _Scale(family=family, factor=factor, unit=unit, scale=scale, shown=shown, what=what, name=name)

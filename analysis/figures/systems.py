@@ -10,7 +10,7 @@ import numpy as np
 from matplotlib.patches import FancyBboxPatch
 
 from ..systems import Convergence, SystemRun, Wiring, boxes
-from ..units import display_of
+from ..units import display_scale
 from .dispatch import plot
 from .runs import BANDS, draw_over_time, is_fast
 from .style import (
@@ -58,11 +58,11 @@ def plot_wiring(wiring: Wiring, *, title: str = "") -> Figure:
             axes.text(box.left + 0.5 * size[0], box.top - 5.5, name, ha="center", va="center", weight="bold", zorder=4)
             for ports, x, align in ((box.inputs, box.left + 2.0, "left"), (box.outputs, box.right - 2.0, "right")):
                 for port in ports:
-                    axes.text(x, box.height_of(port), port, ha=align, va="center", fontsize=TINY, zorder=4)
+                    axes.text(x, box.port_height(port), port, ha=align, va="center", fontsize=TINY, zorder=4)
         for number, (target, source) in enumerate(wiring.connections.items()):
             start, end = placed[source.part], placed[target.part]
             path = _path(
-                (start.right, start.height_of(source.port)), (end.left, end.height_of(target.port)), number, lowest
+                (start.right, start.port_height(source.port)), (end.left, end.port_height(target.port)), number, lowest
             )
             colour = COLOURS[number % len(COLOURS)]
             axes.plot(*zip(*path[:-1]), color=colour, lw=LINE)
@@ -105,7 +105,7 @@ def plot_system_run(run: SystemRun, names: Sequence[str] = (), *, title: str = "
         figure = Figure(figsize=(7.0, 1.4 + 1.5 * rows))
         axes = np.atleast_1d(figure.subplots(rows, sharex=True))
         for place, name in zip(axes, names):
-            unit, factor = display_of(run.units[name])
+            unit, factor = display_scale(run.units[name])
             draw_over_time(place, run.time, factor * run[name])
             of, _, output = name.rpartition(".")
             place.set_ylabel(f"{spoken(of)}\n{spoken(output)}\n[{unit}]", fontsize=SMALL)

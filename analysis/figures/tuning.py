@@ -7,9 +7,9 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 from matplotlib.figure import Figure
 
-from ..periodic import unit_of
+from ..periodic import parameter_unit
 from ..tuning import Survey, Tuned
-from ..units import RAD_S_PER_RPM, display_of
+from ..units import RAD_S_PER_RPM, display_scale
 from .curves import Curve, Panel, Shade, plot_curves
 from .dispatch import plot
 from .style import COLOURS, LINE, spoken
@@ -23,7 +23,7 @@ def plot_tuned(tuned: Tuned, *, title: str = "") -> Figure:
     """Plot amplitude and largest Floquet multiplier over the speed before and after the change, unstable motions dashed."""
     orbit = tuned.after.response.branches[0].orbits[0]
     what, si = orbit.flow.components[0]
-    unit, factor = display_of(si)
+    unit, factor = display_scale(si)
     family = tuned.after.response.family
     scale, of_x = (RAD_S_PER_RPM, "rpm") if family.unit == "rad/s" else (1.0, family.unit)
     low, high = (level / scale for level in tuned.wish.span)
@@ -62,7 +62,7 @@ def plot_tuned(tuned: Tuned, *, title: str = "") -> Figure:
     changed = [
         f"{spoken(name)} {scaled * before:.5g} to {scaled * after:.5g} {quantity}"
         for name, before, after in zip(tuned.wish.names, tuned.wish.present, tuned.values)
-        for quantity, scaled in [display_of(unit_of(tuned.wish.mechanism, name))]
+        for quantity, scaled in [display_scale(parameter_unit(tuned.wish.mechanism, name))]
     ]
     return plot_curves(panels, title=title, notes=[f"Changed: {', '.join(changed)}. Dashed: unstable.", *tuned.missed])
 

@@ -10,11 +10,11 @@ from .drawings import save_drawing as save_drawing
 from .drawings import save_figure as save_figure
 from .drawings import to_dxf as to_dxf
 from .drawings import to_svg as to_svg
+from .outputs import attribute_files as attribute_files
 from .outputs import free_path as free_path
 from .outputs import output as output
 from .outputs import record_output as record_output
 from .outputs import write_text as write_text
-from .outputs import written_by as written_by
 from .paths import WritingError as WritingError
 from .paths import check_fmu as check_fmu
 from .paths import first_line as first_line

@@ -44,7 +44,7 @@ _CURRENT: ContextVar[Writing | None] = ContextVar("writing", default=None)
 
 
 @contextmanager
-def written_by(command: str, force: bool = False) -> Iterator[Writing]:
+def attribute_files(command: str, force: bool = False) -> Iterator[Writing]:
     """Attribute the files written inside this context to a command."""
     token = _CURRENT.set(writing := Writing(command, force))
     try:

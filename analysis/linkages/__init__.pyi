@@ -1,6 +1,6 @@
 from .builder import Builder as Builder
 from .builder import described as described
-from .builder import described_in as described_in
+from .builder import has_linkage as has_linkage
 from .builder import linkage as linkage
 from .builder import load_linkage as load_linkage
 from .builder import load_package as load_package

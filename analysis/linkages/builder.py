@@ -31,7 +31,7 @@ def described(tables: Mapping[str, Any]) -> Description:
     return files.read(Description, tables, LINKAGE)
 
 
-def described_in(tables: Mapping[str, Any]) -> bool:
+def has_linkage(tables: Mapping[str, Any]) -> bool:
     """Return whether the tables of a file describe a linkage, or name the file that does."""
     own = tables.get(LINKAGE)
     return isinstance(own, str) or (isinstance(own, Mapping) and "bodies" in own)
@@ -51,7 +51,7 @@ def with_linkage(tables: Mapping[str, Any], folder: Path) -> Mapping[str, Any]:
     """
     if LINKAGE in tables and not isinstance(tables[LINKAGE], str | Mapping):
         raise ParameterError(LINKAGE, tables[LINKAGE], "be the name of a file, or a table that describes a linkage")
-    if not described_in(tables):
+    if not has_linkage(tables):
         return tables
     own = tables[LINKAGE]
     named = _named_files(folder / own) if isinstance(own, str) else []
@@ -78,7 +78,7 @@ def _named_files(path: Path) -> list[tuple[Path, Mapping[str, Any]]]:
                 f"{path} names itself as the file of its linkage: one of these files must have a table [linkage]"
             )
         tables = files.read_tables(path)
-        if not described_in(tables):
+        if not has_linkage(tables):
             raise _no_linkage(path)
         found.append((path, tables))
         if not isinstance(tables[LINKAGE], str):

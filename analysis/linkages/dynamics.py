@@ -22,7 +22,7 @@ class Reaction(NamedTuple):
     on: str
 
 
-def springs_at(description: Description, interface: Interface) -> dict[str, int]:
+def springs_by_freedom(description: Description, interface: Interface) -> dict[str, int]:
     """Return the springs that act along a freedom, by name, with the number of the freedom."""
     numbers = {drive.joint: n for n, drive in enumerate(interface.drives)}
     return {name: numbers[s.at] for name, s in description.springs.items() if s.at in numbers}
@@ -34,7 +34,7 @@ class Motion:
     def __init__(self, interface: Interface) -> None:
         self.description, self.structure, self.interface = interface.description, interface.structure, interface
         self.n = len(interface.drives)
-        self.along = springs_at(self.description, interface)
+        self.along = springs_by_freedom(self.description, interface)
         self.bodies = self.structure.bodies
         self.reactions: list[Reaction] = []
         #: steps with racks, in the order in which their forces are computed
@@ -66,7 +66,7 @@ class Motion:
                     first, second = turned
                     angle = f"p.{name}_COS, p.{name}_SIN" if free else "1.0, 0.0"
                     one, other = self.interface.turn(first, "b."), self.interface.turn(second, "b.")
-                    rows.append(f"{stretch} = angle_between({one}, {other}, {angle})")
+                    rows.append(f"{stretch} = turn_difference({one}, {other}, {angle})")
                     rows.append(f"{rate} = {other}.w - {one}.w")
                 else:
                     slide = sliders(self.structure)[spring.at]

@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 from .description import given
 from .dynamics import Motion
-from .parameters import turn_of
+from .parameters import spring_angle_name
 from .structure import Pin, Slider, sliders
 from .symbols import symbol
 from .variables import display
@@ -70,7 +70,7 @@ class Outputs:
         for body in self.description.bodies:
             if f"{body}.angle" not in taken:
                 rest = f"*POSITION, minimum=-pi, maximum=pi, {_DEGREES}"
-                value = f"angle_of(b.{body}_frame.turn)"
+                value = f"turn_angle(b.{body}_frame.turn)"
                 yield Output(f"{body}.angle", "rad", f"Direction of the {body}", rest, value)
         moving = {own for body in self.description.bodies for own in self.interface.points[body]}
         for own in sorted(moving - set(self.description.ground)):
@@ -88,7 +88,7 @@ class Outputs:
                 yield Output(f"{name}.length", "m", f"Length of {name}", "*POSITION", f"s.{name}_stretch{free}")
             elif spring.at and name not in self.motion.along and self.motion.turned(spring):
                 text = f"Angle of {spring.at} from that at which {name} is free"
-                yield Output(turn_of(self.description, name), "rad", text, "*POSITION", f"s.{name}_stretch")
+                yield Output(spring_angle_name(self.description, name), "rad", text, "*POSITION", f"s.{name}_stretch")
             elif spring.bodies:
                 text = f"Angle by which {name} is twisted"
                 yield Output(f"{name}.turn", "rad", text, "*POSITION", f"s.{name}_stretch")
@@ -128,7 +128,7 @@ class Outputs:
             yield Output(f"{r.name}.force", "N", text, 'role="guide force"', normal)
             block = r.joint.bodies[1]
             text = f"Moment {of} in {joint}, about the origin of the {block}"
-            yield Output(f"{r.name}.moment", "N.m", text, "", f"moment_about(f.in_{r.name}, b.{block}_frame.origin)")
+            yield Output(f"{r.name}.moment", "N.m", text, "", f"wrench_moment(f.in_{r.name}, b.{block}_frame.origin)")
         for rack in self.motion.racked:
             line = f"b.{rack.slide.name}_line"
             sign, gear, bar = ("-", rack.body, rack.mate) if rack.turns else ("", rack.mate, rack.body)

@@ -279,7 +279,7 @@ class Package:
             bodies = () if name in self.motion.along else self.motion.turned(spring)
             if not bodies or not given(spring.free):
                 continue
-            one, other = (0.0 if b == GROUND else planar.angle_of(getattr(places, f"{b}_frame").turn) for b in bodies)
+            one, other = (0.0 if b == GROUND else planar.turn_angle(getattr(places, f"{b}_frame").turn) for b in bodies)
             free, angle = getattr(start.parameters, f"{name}_free_angle"), remainder(other - one, tau)
             shorter = remainder(angle - free, tau)
             # an angle may be meant in (-pi, pi] or in [0, 2 pi)

@@ -128,7 +128,7 @@ class Interface:
     def travel(self, slide: Slider) -> str:
         """Return the expression of position and velocity of a block along its line, from the record of poses b."""
         (holder, block), (x, y) = slide.bodies, self.own(slide.bodies[0], slide.through)
-        return f"position_along({self.frame(holder, 'b.')}, {x}, {y}, b.{slide.name}_line, b.{block}_frame)"
+        return f"block_position({self.frame(holder, 'b.')}, {x}, {y}, b.{slide.name}_line, b.{block}_frame)"
 
 
 def freedoms(description: Description, structure: Structure) -> tuple[Drive, ...]:
@@ -381,7 +381,7 @@ def _mass(name: str, body: Body) -> _Mass | None:
     return _Mass(body.mass, (centre[0], centre[1]), body.inertia)
 
 
-def turn_of(description: Description, name: str) -> str:
+def spring_angle_name(description: Description, name: str) -> str:
     """Return the name of a torsion spring's angle: its pin's, or its own if the pin has other springs or it has no pin."""
     pin = description.springs[name].at
     alone = sum(spring.at == pin for spring in description.springs.values()) == 1
@@ -407,7 +407,7 @@ def _spring(name: str, description: Description, structure: Structure, drive: Dr
         if spring.between
         else drive.coordinate
         if drive
-        else turn_of(description, name)
+        else spring_angle_name(description, name)
         if about
         else f"{spring.at}.position"
     )

@@ -431,7 +431,7 @@ def chart(
             gaps += [Gap(point=point(place), message=message) for place, message in line.gaps]
     found: list[Boundary] = []
     for axis, seed in candidates:
-        if any(_passes_through(boundary, axis, seed, box) for boundary in found):
+        if any(_contains_root(boundary, axis, seed, box) for boundary in found):
             continue
         try:
             found.append(trace(test, seed, box, step=step))
@@ -441,7 +441,7 @@ def chart(
     return Chart(box=box, test=test, boundaries=tuple(found), gaps=tuple(gaps))
 
 
-def _passes_through(boundary: Boundary, axis: int, seed: tuple[float, float], box: Box) -> bool:
+def _contains_root(boundary: Boundary, axis: int, seed: tuple[float, float], box: Box) -> bool:
     """Return whether a boundary passes through a root found on a line, to within the error of interpolation."""
     others = boundary.crossings(axis, seed[axis], box)
     return len(others) > 0 and float(np.abs(others - seed[1 - axis]).min()) < 1e-5 * box.size[1 - axis]

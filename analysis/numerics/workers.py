@@ -295,7 +295,7 @@ class _WorkError(Exception):
 def _do_task(task: _Task) -> _Found | Path:
     """Do the work of a task; return its result, or the file that holds the result."""
     work, number, item, caller, folder = task
-    end_with(caller)
+    end_when_orphaned(caller)
     found: _Found
     try:
         found = number, work(item), None
@@ -326,7 +326,7 @@ def _read_result(sent: _Found | Path) -> _Found:
     return found
 
 
-def end_with(caller: int) -> None:
+def end_when_orphaned(caller: int) -> None:
     """Start a thread that ends this worker process when its parent, the process ``caller``, is gone.
 
     Without the thread a worker would go on for minutes. If the parent is another process, as in a cluster or in the caller

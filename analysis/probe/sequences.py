@@ -98,7 +98,7 @@ class Forbidden:
         session.journal.write(f"\n# forbidden: {fault.what}")
         instance = None if fault.what == "NULL instance" else session.instance
         state, before = walk.state, len(session.messages)
-        status = session.call_on(instance, fault.function, *changed)
+        status = session.call_instance(instance, fault.function, *changed)
         full = f"{session.prefix}{fault.function}"
         if fault.accepted == ACCEPT:
             if refused(status):

@@ -119,9 +119,9 @@ class Session:
 
     def call(self, name: str, *arguments: Any) -> int:
         """Call a function with the instance as first argument; return its status."""
-        return self.call_on(self.instance, name, *arguments)
+        return self.call_instance(self.instance, name, *arguments)
 
-    def call_on(self, instance: Any, name: str, *arguments: Any) -> int:
+    def call_instance(self, instance: Any, name: str, *arguments: Any) -> int:
         """Call a function with any instance as first argument, for example NULL; return its status."""
         status = self._make(name, [instance, *arguments], shown=1 if instance else 0)
         if status is None:

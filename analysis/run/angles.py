@@ -78,10 +78,10 @@ class WholeTurns:
     @property
     def _columns(self) -> list[int]:
         """Return the indices of the outputs that are coordinates."""
-        return coordinates_of(self._mechanism)
+        return coordinate_outputs(self._mechanism)
 
 
-def coordinates_of(mechanism: Mechanism) -> list[int]:
+def coordinate_outputs(mechanism: Mechanism) -> list[int]:
     """Return the indices of the outputs that are coordinates."""
     return [mechanism.output_names.index(freedom.coordinate) for freedom in mechanism.freedoms]
 
@@ -97,7 +97,7 @@ def repeats(
     """Return whether outputs and derivatives of a mechanism are the same at the states x and x + way, coordinates aside."""
     equations = mechanism.equations
     acting = equations.applied(modes, tuple(u.tolist()), p)
-    coordinates = coordinates_of(mechanism)
+    coordinates = coordinate_outputs(mechanism)
 
     def seen(y: NDArray[np.float64]) -> NDArray[np.float64]:
         state = tuple(y.tolist())

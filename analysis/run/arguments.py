@@ -14,7 +14,7 @@ from linkwork.mechanism import Mechanism, PublishedSet
 from .. import files
 from ..mechanisms import MECHANISMS, PUBLISHED, Parameters, mechanism_of
 from ..units import Amount
-from .inputs import Inputs, parameter_readers, start_from
+from .inputs import Inputs, parameter_readers, read_start
 
 _Function = TypeVar("_Function", bound=Callable[..., Any])
 #: Takes a published set and an argument, None if it was not given; returns the value to use for the argument.
@@ -121,7 +121,7 @@ def _without_drives(known: PublishedSet, names: Iterable[str]) -> PublishedSet:
 def started(known: PublishedSet, initial: Any) -> Any:
     """Return the initial state: as given, a mapping completed from the published set, or that of the set if it is None."""
     if isinstance(initial, Mapping):
-        return start_from(mechanism_of(known.parameters), initial, known.initial)
+        return read_start(mechanism_of(known.parameters), initial, known.initial)
     return known.initial if initial is None else initial
 
 

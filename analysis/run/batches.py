@@ -23,9 +23,9 @@ from ..files import load_array, save_array
 from ..mechanisms import MECHANISMS, InitialState, Parameters
 from .cautions import MANY_STEPS, too_slow
 from .inputs import Encoded, Inputs, align, compiled_source, encode
-from .prepared import STEPS_PER_CALL, Run, Settings, outputs_of, problem_of, verdict
+from .prepared import STEPS_PER_CALL, Run, Settings, compute_outputs, make_problem, verdict
 from .sampling import of_functions
-from .varied import Varied, constants_of, distinct, over_arrays
+from .varied import Varied, distinct, over_arrays, varied_constants
 
 #: solver.status of a run that was not begun, or was interrupted.
 NOT_RUN = -1
@@ -219,7 +219,7 @@ def _integrate(
     # kept alive while their addresses are in use
     source, _kept = compiled_source(encoded)
     switched = _switched(mechanism, batch.p)
-    problem = problem_of(encoded, settings, switched)
+    problem = make_problem(encoded, settings, switched)
     state = k.State(np.zeros(m, dtype=k.CARRY), prepared.x.copy(), np.zeros((m, len(mechanism.channels))))
     carries = state.carries
     carries["begin"] = settings.times[0]
@@ -246,7 +246,7 @@ def _integrate(
     if task.outputs is not None:
         for i, count in enumerate(counts.tolist()):
             rows = (states[i, :count], forces[i, :count])
-            samples[0][i, :count] = outputs_of(mechanism, problem.modes, batch.p[i], *rows, task.outputs)
+            samples[0][i, :count] = compute_outputs(mechanism, problem.modes, batch.p[i], *rows, task.outputs)
     for i in np.flatnonzero(counts < n).tolist():
         for part in samples:
             part[i, counts[i] :] = np.nan
@@ -299,7 +299,7 @@ def prepare(task: Task) -> Prepared:
     functions, equations = over_arrays(mechanism)[0], mechanism.equations
     try:
         with np.errstate(all="ignore"):
-            parameters, columns = constants_of(mechanism, task.parameters)
+            parameters, columns = varied_constants(mechanism, task.parameters)
             for n, column in enumerate(columns):
                 p[:, n] = column
             if mechanism.switch:
@@ -359,7 +359,7 @@ def _encode_inputs(task: Task) -> tuple[Encoded, Any]:
     kinds: list[Encoded] = []
     constant = -1
 
-    def kind_of(inputs: Inputs) -> tuple[int, list[float] | None]:
+    def encode_kind(inputs: Inputs) -> tuple[int, list[float] | None]:
         """Encode inputs if they are of a new kind; return the number of their kind, and their values if all are constant."""
         nonlocal constant
         values = inputs.constants(signals)
@@ -371,7 +371,7 @@ def _encode_inputs(task: Task) -> tuple[Encoded, Any]:
         return constant, values
 
     varied = task.inputs.columns if isinstance(task.inputs, Varied) else {}
-    found = _map_distinct(kind_of, distinct(task.inputs) * len(task.inputs) if varied else task.inputs)
+    found = _map_distinct(encode_kind, distinct(task.inputs) * len(task.inputs) if varied else task.inputs)
     which = np.array([kind for kind, _ in found])
     sources = [e.source for e in kinds]
     sizes = np.array([(len(e.coefficients), len(e.harmonics)) for e in sources])

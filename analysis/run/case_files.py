@@ -24,14 +24,14 @@ from ..mechanisms import MECHANISMS, PUBLISHED, Parameters, mechanism_of, name_i
 from ..units import with_unit
 from .arguments import driven, turn_durations
 from .case import Case
-from .inputs import Inputs, parameter_readers, start_from
+from .inputs import Inputs, parameter_readers, read_start
 from .masses import mass_origins, resolve_sections
 from .signals import SHAPES, Harmonics, InductionMotor, Piecewise, TorsionBar, ramp, table
 
 # Parameters
 
 
-def parameters_from(
+def read_parameters(
     data: Mapping[str, Any], base: Parameters | None = None, mechanism: Mechanism | None = None
 ) -> Parameters:
     """Read parameters from nested tables or dotted names; missing ones are taken from ``base``.
@@ -70,7 +70,7 @@ def parameters_from(
     return made
 
 
-def parameters_to(parameters: Parameters) -> dict[str, Any]:
+def parameter_tables(parameters: Parameters) -> dict[str, Any]:
     """Return parameters as nested tables of texts with SI units and all digits, with the name of the ``mechanism``."""
     mechanism = mechanism_of(parameters)
     data: dict[str, Any] = {"mechanism": mechanism.name}
@@ -84,7 +84,7 @@ def parameters_to(parameters: Parameters) -> dict[str, Any]:
 
 def save_parameters(path: str | Path, parameters: Parameters, *, head: str = "") -> Path:
     """Write parameters to a TOML or JSON file, by the path's ending; ``head`` is a comment at the top of a TOML file."""
-    return files.write_tables(path, parameters_to(parameters), head=head)
+    return files.write_tables(path, parameter_tables(parameters), head=head)
 
 
 def load_parameters(path: str | Path) -> Parameters:
@@ -95,9 +95,9 @@ def load_parameters(path: str | Path) -> Parameters:
     InputError
         If the file cannot be read.
     ParameterError
-        As for `parameters_from`.
+        As for `read_parameters`.
     """
-    return parameters_from(files.read_tables(path))
+    return read_parameters(files.read_tables(path))
 
 
 def _find_mechanism(data: Mapping[str, Any]) -> Mechanism:
@@ -119,7 +119,7 @@ def _find_mechanism(data: Mapping[str, Any]) -> Mechanism:
 # Cases
 
 
-def mechanism_in(data: Mapping[str, Any]) -> Mechanism:
+def case_mechanism(data: Mapping[str, Any]) -> Mechanism:
     """Return the mechanism of a case: that of its published set, else the one that the file names or has parameters of."""
     if "published" in data:
         return mechanism_of(PUBLISHED[Choice(PUBLISHED)(data["published"], "published")].parameters)
@@ -137,7 +137,7 @@ class Acting(NamedTuple):
     unit: str
 
 
-def acting_on(mechanism: Mechanism) -> dict[str, Acting]:
+def case_inputs(mechanism: Mechanism) -> dict[str, Acting]:
     """Return the inputs of a mechanism by their names in case files.
 
     The name of a channel follows from `name_in_files`: ``slider.force`` is ``force``. A flag that drives a freedom is an entry
@@ -199,34 +199,34 @@ def load_case(path: str | Path, overrides: Mapping[str, Any] | None = None) -> C
     ParameterError
         If a name is unknown or a value is wrong.
     """
-    return case_from(files.read_tables(path), folder=Path(path).parent, title=Path(path).stem, overrides=overrides)
+    return read_case(files.read_tables(path), folder=Path(path).parent, title=Path(path).stem, overrides=overrides)
 
 
-def case_from(
+def read_case(
     data: Mapping[str, Any], *, folder: Path, title: str = "", overrides: Mapping[str, Any] | None = None
 ) -> Case:
     """Build a case from the tables of a case file; ``folder`` is where the files that it names, CSV or a linkage, are read."""
     data = with_linkage(data, folder)
     named = {**data, **(overrides or {})}
-    mechanism = mechanism_in(named)
+    mechanism = case_mechanism(named)
     data = with_names_of_files(data, mechanism)
     overrides = {_case_file_name(name, mechanism): value for name, value in (overrides or {}).items()}
     published = PUBLISHED[named["published"]] if "published" in named else None
     if named.get("mechanism", mechanism.name) != mechanism.name:
         raise ParameterError("mechanism", named["mechanism"], f"be that of the published set {named['published']}")
-    acting = acting_on(mechanism)
+    acting = case_inputs(mechanism)
     data = files.overridden(_without_rivals(data, overrides, mechanism, acting), overrides)
     own, found = _split_tables(data, mechanism, acting, folder)
     printed = None if published is None else published.parameters
     try:
-        parameters = parameters_from(own, printed, mechanism)
+        parameters = read_parameters(own, printed, mechanism)
     except UnknownNameError as error:
         if not set(mechanism.mechanism_variables) <= set(error.known):  # an entry of a part, such as of a section
             raise
         others = (*acting, *(f"run.{name}" for name in files.entry_names(RunTable)), *COMMON[:-2])
         raise files.unknown_name(error.name, (*error.known, *others)) from None
     base = None if published is None or published.at_rest else published.initial
-    initial = start_from(mechanism, data.get("initial", {}), base)
+    initial = read_start(mechanism, data.get("initial", {}), base)
     inputs = Inputs(**found)
     if published is not None:
         inputs = driven(published, inputs)
@@ -325,7 +325,7 @@ def _check_drives(
             "groove.amplitude", 0.0, "be given with axial.groove: a groove without it holds the shift at zero"
         )
     modes = inputs.modes(mechanism)
-    names = {argument: name for name, (argument, _) in acting_on(mechanism).items()}
+    names = {argument: name for name, (argument, _) in case_inputs(mechanism).items()}
     for freedom in mechanism.freedoms:
         rate = getattr(initial, freedom.initial[1])
         if freedom.mode is None or rate == 0.0:

@@ -12,7 +12,7 @@ from linkwork.mechanism import Mechanism
 
 from ..mechanisms import MECHANISMS
 from .case import Case, published_case
-from .case_files import case_from
+from .case_files import read_case
 from .cosimulation import Comparison, compare, cosimulate
 from .simulation import simulate
 from .trajectory import Trajectory
@@ -27,7 +27,7 @@ def standard_cases(mechanism: Mechanism) -> Mapping[str, Case]:
     if not mechanism.cases:
         name = next(iter(mechanism.published))
         return {name: published_case(name)}
-    return {name: case_from(tables, folder=Path()) for name, tables in mechanism.cases.items()}
+    return {name: read_case(tables, folder=Path()) for name, tables in mechanism.cases.items()}
 
 
 class _Cases(Mapping[str, Case]):

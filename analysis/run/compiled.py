@@ -22,7 +22,7 @@ from linkwork.limits import LIMIT_SINE, NEAR_LIMIT
 from ..numerics.codegen import CUBE, MATRIX, VECTOR, copy, evaluate, inline, inner, kernel, part
 from ..numerics.references import refer
 from .equations import DERIVATIVE, JUMP, OUTPUTS
-from .locating import EVENTS_PER_STEP, NOTHING, end_at, locate_events, notice_jumps
+from .locating import EVENTS_PER_STEP, NOTHING, end_step, locate_events, notice_jumps
 from .records import (
     BAD_INPUT,
     FINISHED,
@@ -36,12 +36,12 @@ from .records import (
     Motion,
     Room,
     Samples,
-    clearance_at,
     equation,
     released,
     renew,
+    state_clearance,
 )
-from .sources import SOURCE, Source, channels_at, find, hold, unwound, wound
+from .sources import SOURCE, Source, find, hold, unwound, wound, write_channels
 from .stepping import EXPONENT, STAGES, Flow, attempt, following, interpolate, shorter
 
 #: Largest residual of the energy balance, as a fraction of the kinetic energy, that is corrected: near rest it may be larger.
@@ -61,7 +61,7 @@ def begin_interval(motion):
     for n in range(source.laws.shape[0]):
         if unwound(n, x, source):
             source.laws[n, 2] = 0.0
-    channels_at(t, 0.0, piece, x, source, u)
+    write_channels(t, 0.0, piece, x, source, u)
     carry.piece = -1 if problem.hold > 0.0 or (motion.steady and not wound(source.laws)) else piece
     lost = _not_finite(u)
     if problem.hold > 0.0 and lost < 0:
@@ -156,7 +156,7 @@ def _accept(h, last, t_new, motion):
     renew(carry.elapsed + h, y, u, motion)
     if watch.balance.shape[0] > 0:
         _keep_balance(motion)
-    clearance = clearance_at(y, u, motion)
+    clearance = state_clearance(y, u, motion)
     inside = (
         clearance < LIMIT_SINE
         or released(y, motion)
@@ -189,7 +189,7 @@ def _keep_balance(motion):
 def refused(h, motion):
     """Return the status of a run whose step size h has become too short: LIMIT, BAD_INPUT or NO_STEP."""
     carry, room, x, u = motion.carry, motion.room, motion.x, motion.u
-    status = LIMIT if abs(clearance_at(x, u, motion)) < NEAR_LIMIT else NO_STEP
+    status = LIMIT if abs(state_clearance(x, u, motion)) < NEAR_LIMIT else NO_STEP
     if carry.piece >= 0:
         # an input that is not finite may be the cause
         for i in range(x.shape[0]):
@@ -268,7 +268,7 @@ def _cross_interval(motion, most):
             what, cut = locate_events(clearance, h, motion)
             if what != NOTHING:
                 sample_step(carry.begin + (carry.elapsed + cut * h), h, motion)
-                return end_at(what, cut, h, motion)
+                return end_step(what, cut, h, motion)
             sample_step(t_new, h, motion)
         copy(room.y, x)
         copy(room.k[12], room.k[0])
@@ -356,7 +356,7 @@ def _own(i, source, batch):
 
 
 @inline
-def motion_of(i, problem, source, batch, watch, samples, room, state):
+def lane_motion(i, problem, source, batch, watch, samples, room, state):
     """Return a reference to run i of a batch as a `Motion`."""
     return refer(Motion(
         problem, batch.p[i], batch.scales[i], batch.steady[i], _own(i, source, batch), watch,
@@ -369,7 +369,7 @@ def channels_of_many(t, source, batch, x, u):
     """Write the channels of each run of a batch, at time t and its state in x, into its row of u."""
     for i in range(x.shape[0]):
         own = _own(i, source, batch)
-        channels_at(t, 0.0, find(t, own.breaks), x[i], own, u[i])
+        write_channels(t, 0.0, find(t, own.breaks), x[i], own, u[i])
 
 
 @kernel(
@@ -411,7 +411,7 @@ def run(problem, source, batch, watch, state, samples, status, most, budget):
             continue
         if budget <= 0:
             return
-        motion = motion_of(i, problem, source, batch, watch, samples, room, state)
+        motion = lane_motion(i, problem, source, batch, watch, samples, room, state)
         status[i] = _advance(motion, min(most, before + budget))
         budget -= carry.steps - before
 

@@ -16,7 +16,7 @@ FOLDER = "wasm32-wasip2"
 _INTERFACE = "fmi:fmi3/{}@3.0.0"
 
 
-def component_of(folder: str | Path, identifier: str) -> Path:
+def component_path(folder: str | Path, identifier: str) -> Path:
     """Return the path of the component in the folder of an unpacked FMU, by its model identifier."""
     return Path(folder) / "binaries" / FOLDER / f"{identifier}.wasm"
 
@@ -40,7 +40,7 @@ class _Component:
         #: the instance, under the name that FMPy uses; None before `instantiate` and after `freeInstance`
         self.component: Any = None
         self._log: Callable[..., None] = lambda *_: None
-        made = Component.from_file(engine, str(component_of(unzipDirectory, modelIdentifier)))
+        made = Component.from_file(engine, str(component_path(unzipDirectory, modelIdentifier)))
         linker = Linker(engine)
         with linker.root() as root, root.add_instance(_INTERFACE.format("callbacks")) as callbacks:
             callbacks.add_func("log-message", self._receive_log)

@@ -31,12 +31,12 @@ from .batches import NOT_RUN, Result, Task, solve
 from .equations import machine
 from .events import shown
 from .inputs import Inputs, compiled_source, encode, given
-from .prepared import outputs_of
+from .prepared import compute_outputs
 from .signals import Function
-from .simulation import MOST_STEPS, RunOptions, sample_times, settings_of
+from .simulation import MOST_STEPS, RunOptions, check_settings, sample_times
 from .trajectory import Trajectory
-from .varied import Varied, constants_of, distinct
-from .varied import vary as sets_of
+from .varied import Varied, distinct, varied_constants
+from .varied import vary as varied_sets
 
 #: Largest number of samples in a batch, if the caller does not choose the size of batches.
 _SAMPLES_OF_BATCH = 1 << 16
@@ -102,7 +102,7 @@ class Ensemble:
         else:
             mechanism = mechanism_of(self.parameters[index])
             p = np.array([*self.parameters[index].constants(), self.energies[index]])
-            values = outputs_of(mechanism, self.modes, p, self.states[index, :n], self.forces[index, :n])
+            values = compute_outputs(mechanism, self.modes, p, self.states[index, :n], self.forces[index, :n])
         return Trajectory(
             time=self.time[:n],
             values=values,
@@ -123,7 +123,7 @@ class Ensemble:
         shape = (len(self), len(self.time))
         if self.values is not None:
             ended = np.arange(len(self.time)) >= self.counts[:, None]
-            return np.ma.MaskedArray(self.values[:, :, column_of(name, self.names)], mask=ended)
+            return np.ma.MaskedArray(self.values[:, :, output_column(name, self.names)], mask=ended)
         result = np.ma.MaskedArray(np.full(shape, np.nan), mask=np.ones(shape, dtype=bool))
         for i in range(len(self)):
             run = self[i]
@@ -232,7 +232,7 @@ def simulate_many(
     if vary is not None:
         if isinstance(parameters, Sequence):
             raise InputError("with vary there is one set of parameters, which all runs have in common")
-        parameters, inputs = sets_of(parameters, inputs, vary)
+        parameters, inputs = varied_sets(parameters, inputs, vary)
     elif not isinstance(parameters, Sequence):
         raise InputError(f"parameters is {parameters!r:.200}: it must be a list, or vary must say what differs")
     if len(parameters) == 0:
@@ -247,10 +247,10 @@ def simulate_many(
     if isinstance(outputs, str):
         raise InputError(f"outputs is {outputs!r}: it must be a list of names, such as [{outputs!r}]")
     names = mechanism.output_names if outputs is None else tuple(outputs)
-    columns = tuple(column_of(name, mechanism.output_names) for name in names)
+    columns = tuple(output_column(name, mechanism.output_names) for name in names)
     all_inputs, starts = _check_runs(mechanism, inputs, initial, len(parameters))
     times = sample_times(stop_time, step, options.get("start_time", 0.0))
-    settings = settings_of(times, hold, tolerance, options.get("max_steps", MOST_STEPS))
+    settings = check_settings(times, hold, tolerance, options.get("max_steps", MOST_STEPS))
     where = None if folder is None else Path(folder)
     # what cannot be compiled is reported here, and not by a worker
     encoded = encode(all_inputs[0], mechanism)
@@ -377,7 +377,7 @@ def _hash_code(mechanism: Mechanism, parameters: Sequence[Parameters], functions
     from . import batches, compiled, lanes
 
     kernels = (compiled.run, lanes.run_in_lanes, compiled.channels_of_many, compiled.rows)
-    switch = mechanism.switch and getattr(constants_of(mechanism, parameters)[1], mechanism.switch)
+    switch = mechanism.switch and getattr(varied_constants(mechanism, parameters)[1], mechanism.switch)
     switched = bool(np.any(switch)) if mechanism.switch else False
     ours = [
         *(machine(mechanism, switched, n).fingerprint for n in sorted({1, LANES})),
@@ -419,7 +419,7 @@ def _check_runs(
     return all_inputs, starts
 
 
-def column_of(name: str, names: tuple[str, ...]) -> int:
+def output_column(name: str, names: tuple[str, ...]) -> int:
     """Return the index of an output among ``names``.
 
     Raises

@@ -79,7 +79,9 @@ class OfParameters(NamedTuple):
 def of_parameters(mechanism: Mechanism) -> OfParameters:
     """Return symbols for the parameters, so that their ``constants`` and ``error_scale`` can be traced."""
     casadi = symbolic.library()
-    functions = symbolic.traced(modules_of(mechanism), max=casadi.fmax, min=casadi.fmin, float=lambda value: value)
+    functions = symbolic.traced(
+        equation_modules(mechanism), max=casadi.fmax, min=casadi.fmin, float=lambda value: value
+    )
     names = [field.name for field in fields(mechanism.parameters)]
     own = casadi.SX.sym("own", len(names))
     parameters = like_parameters(mechanism, functions)(**dict(zip(names, casadi.vertsplit(own))))
@@ -93,7 +95,7 @@ def like_parameters(mechanism: Mechanism, functions: Rebound) -> type[SimpleName
     return type("LikeParameters", (SimpleNamespace,), methods)
 
 
-def modules_of(mechanism: Mechanism) -> tuple[ModuleType, ...]:
+def equation_modules(mechanism: Mechanism) -> tuple[ModuleType, ...]:
     """Return the modules of the equations and the modules that compute constants and error scales."""
     of: Iterable[Callable[..., Any]] = (mechanism.parameters, mechanism.error_scale)
     further = {sys.modules[f.__module__]: None for f in of} | {sys.modules[Mechanism.__module__]: None}

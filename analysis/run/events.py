@@ -91,7 +91,7 @@ _LISTENER: ContextVar[Callable[[str, float], None] | None] = ContextVar("listene
 
 
 @contextmanager
-def heard_by(listener: Callable[[str, float], None]) -> Iterator[None]:
+def progress_listener(listener: Callable[[str, float], None]) -> Iterator[None]:
     """Report progress inside the context to ``listener(what, share)``, share from 0 to 1, instead of showing a bar."""
     token = _LISTENER.set(listener)
     try:

@@ -27,7 +27,7 @@ from linkwork.parameters import fmi_name
 
 from ..files import check_fmu
 from ..mechanisms import InitialState, Parameters, mechanism_of
-from .component import ComponentModel, ComponentSlave, component_of
+from .component import ComponentModel, ComponentSlave, component_path
 
 
 class CosimulationError(LinkworkError):
@@ -194,7 +194,7 @@ class _Instance:
         """Return the class that runs the FMU: FMPy's, or the WebAssembly one if no library is there for this platform."""
         assert self._folder is not None
         native = Path(self._folder) / "binaries" / (platform_tuple if self._fmi3 else platform)
-        if native.is_dir() or not component_of(self._folder, identifier).is_file():
+        if native.is_dir() or not component_path(self._folder, identifier).is_file():
             return self._classes[self.description.fmiVersion[0]]
         return self._component
 

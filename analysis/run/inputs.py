@@ -228,7 +228,7 @@ def parameter_readers(mechanism: Mechanism) -> dict[str, files.Reader]:
     }
 
 
-def start_from(mechanism: Mechanism, data: Any, base: InitialState | None = None) -> InitialState:
+def read_start(mechanism: Mechanism, data: Any, base: InitialState | None = None) -> InitialState:
     """Read the initial state from a mapping of its fields, in SI or with units, such as {"crank_speed": "420 rpm"}.
 
     Missing fields are taken from ``base``, or are the defaults.
@@ -246,7 +246,7 @@ def start_from(mechanism: Mechanism, data: Any, base: InitialState | None = None
 @lru_cache(maxsize=64)
 def _at_rest(mechanism: Mechanism) -> InitialState:
     """Return the default initial state."""
-    return start_from(mechanism, {})
+    return read_start(mechanism, {})
 
 
 @lru_cache(maxsize=64)
@@ -270,7 +270,7 @@ def speed_ratio(name: str, value: float, reference: str, speed: float) -> Fracti
 def given(mechanism: Mechanism, inputs: Inputs | None, initial: InitialState | None) -> tuple[Inputs, Any]:
     """Check the inputs and the initial state of a run and return them; the defaults are no inputs and the state of rest.
 
-    The state may be a mapping, as for `start_from`.
+    The state may be a mapping, as for `read_start`.
 
     Raises
     ------
@@ -291,7 +291,7 @@ def given(mechanism: Mechanism, inputs: Inputs | None, initial: InitialState | N
     if initial is None:
         initial = _at_rest(mechanism)
     elif isinstance(initial, Mapping):
-        initial = start_from(mechanism, initial)
+        initial = read_start(mechanism, initial)
     if not isinstance(initial, mechanism.initial):
         kind, wanted = type(initial), mechanism.initial
         raise InputError(

@@ -28,8 +28,8 @@ from .compiled import (
     Batch,
     begin_interval,
     choose_first,
+    lane_motion,
     make_room,
-    motion_of,
     next_size,
     put,
     refused,
@@ -37,7 +37,7 @@ from .compiled import (
     take,
 )
 from .equations import CLEARANCE, DERIVATIVE
-from .locating import end_at, locate_events
+from .locating import end_step, locate_events
 from .records import PROBLEM, RUNNING, SAMPLES, STATE, WATCH, Problem, Room, Samples, State, Watch
 from .sources import ADDRESSES, SOURCE, Source
 from .stepping import STAGES, following, shorter
@@ -186,7 +186,7 @@ class Work(NamedTuple):
 @inline
 def _motion(i, w):
     """Return a reference to run i as a `Motion`."""
-    return motion_of(i, w.problem, w.source, w.batch, w.watch, w.samples, w.room, w.state)
+    return lane_motion(i, w.problem, w.source, w.batch, w.watch, w.samples, w.room, w.state)
 
 
 @inner
@@ -275,7 +275,7 @@ def _end_at_limit(lane, v, w):
     motion = _motion(i, w)
     what, cut = locate_events(v.clearance[lane], h, motion)
     sample_step(motion.carry.begin + (motion.carry.elapsed + cut * h), h, motion)
-    w.status[i] = end_at(what, cut, h, motion)
+    w.status[i] = end_step(what, cut, h, motion)
     v.run[lane] = -1
     v.outcome[lane] = _IDLE
 
@@ -301,7 +301,7 @@ def _decide(lane, least, v, w):
 
 
 @inner
-def _move_on(lane, v, w):
+def _accept_step(lane, v, w):
     """Move a lane to the end of its accepted step."""
     i = v.run[lane]
     carry = w.state.carries[i]
@@ -344,7 +344,7 @@ def _run(lanes, work, most, budget):
             _sample(w.samples, w.state, v)
         for lane in range(LANES):
             if v.outcome[lane] == _ACCEPTED:
-                _move_on(lane, v, w)
+                _accept_step(lane, v, w)
     for lane in range(LANES):
         if v.run[lane] >= 0:
             take(lane, LANES, v.x, w.state.x[v.run[lane]])

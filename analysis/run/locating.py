@@ -16,12 +16,12 @@ from .records import (
     OUTPUT,
     RUNNING,
     STOPS,
-    clearance_at,
     equation,
     look_inside,
     released,
     renew,
-    time_at,
+    state_clearance,
+    step_time,
 )
 from .sources import unwound
 from .stepping import NODES, interpolant, interpolate, stage
@@ -41,7 +41,7 @@ def _gap(e, t, x, u, motion):
     """Return the value, at time t, state x and inputs u, of the function that is zero when event number e happens."""
     watch, source = motion.watch, motion.source
     if e == ASSEMBLY:
-        return clearance_at(x, u, motion) - LIMIT_SINE
+        return state_clearance(x, u, motion) - LIMIT_SINE
     if e <= RELEASE:
         return source.laws[RELEASE - e, 1] - x[source.law_places[RELEASE - e, 1]]
     if watch.addresses[e] != 0:
@@ -93,7 +93,7 @@ def _locate(e, low, high, h, motion):
         s = low if n == 0 else 0.5 * (low + high)
         look_inside(s, h, motion)
         # NaN, beyond the limit of assembly, counts as not positive
-        sign = _gap(e, time_at(s, h, motion), room.z, room.inside, motion) > 0.0
+        sign = _gap(e, step_time(s, h, motion), room.z, room.inside, motion) > 0.0
         if n == 0:
             positive = sign
         elif sign == positive:
@@ -116,10 +116,10 @@ def _events_of_step(what, cut, h, motion):
             s0 = quarter / EVENTS_PER_STEP
             s1 = (quarter + 1) / EVENTS_PER_STEP
             if s1 == 1.0:
-                gap = _gap(e, time_at(s1, h, motion), room.y, motion.u, motion)
+                gap = _gap(e, step_time(s1, h, motion), room.y, motion.u, motion)
             else:
                 look_inside(s1, h, motion)
-                gap = _gap(e, time_at(s1, h, motion), room.z, room.inside, motion)
+                gap = _gap(e, step_time(s1, h, motion), room.z, room.inside, motion)
             if _crosses(watch.gaps[e], gap, watch.table[e, DIRECTION]):
                 s = _locate(e, s0, s1, h, motion)
                 interpolate(s, motion.x, room.f, room.z)
@@ -138,7 +138,7 @@ def _make_interpolant(h, motion):
     for s in range(13, 16):
         stage(s, x, room.k, h, room.z)
         renew(carry.elapsed + NODES[s] * h, room.z, room.inside, motion)
-        equation(DERIVATIVE, time_at(NODES[s], h, motion), room.z, room.inside, room.k[s], motion)
+        equation(DERIVATIVE, step_time(NODES[s], h, motion), room.z, room.inside, room.k[s], motion)
     carry.evaluations += 3
     interpolant(x, room.y, room.k, h, room.f)
 
@@ -165,18 +165,18 @@ def locate_events(clearance, h, motion):
         s = watch.found[n, 1]
         if s <= cut + SAME:
             copy(watch.found[n], watch.found[kept])
-            watch.found[kept, 1] = time_at(s, h, motion)
+            watch.found[kept, 1] = step_time(s, h, motion)
             kept += 1
     carry.found = kept
     return what, cut
 
 
 @inner
-def end_at(what, cut, h, motion):
+def end_step(what, cut, h, motion):
     """End a step at the fraction ``cut`` at which event ``what`` happens; return the status of the run."""
     carry, watch, source = motion.carry, motion.watch, motion.source
     x, u = motion.x, motion.u
-    t = time_at(cut, h, motion)
+    t = step_time(cut, h, motion)
     interpolate(cut, x, motion.room.f, motion.room.z)
     copy(motion.room.z, x)
     if what <= RELEASE:
@@ -188,7 +188,7 @@ def end_at(what, cut, h, motion):
     for n in range(carry.known, carry.found):
         # this event happened at the end of the step, to within rounding errors
         e = int(watch.found[n, 0])
-        if watch.found[n, 1] >= time_at(cut - SAME, h, motion):
+        if watch.found[n, 1] >= step_time(cut - SAME, h, motion):
             watch.gaps[e] = 0.0
             if watch.table[e, STOPS] != 0.0 and what <= RELEASE:
                 status = EVENT

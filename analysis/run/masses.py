@@ -87,7 +87,7 @@ def with_sections(parameters: Parameters, **sections: Section) -> Parameters:
     return parameters
 
 
-def _section_of(link: Link, flat: Mapping[str, Any]) -> dict[str, Any]:
+def _section_entries(link: Link, flat: Mapping[str, Any]) -> dict[str, Any]:
     """Return the entries of a link's section from the values of a file by dotted name; empty if it has none."""
     head = f"{link.name}.section"
     if head in flat:
@@ -108,7 +108,7 @@ def resolve_sections(mechanism: Mechanism, flat: Mapping[str, Any], base: Parame
     result = dict(flat)
     units = {v.name: v.unit for v in mechanism.mechanism_variables.values()}
     for link in mechanism.links:
-        table = _section_of(link, flat)
+        table = _section_entries(link, flat)
         if not table:
             continue
         head = f"{link.name}.section"
@@ -152,7 +152,7 @@ def mass_origins(
         if variable.unit != "kg":
             continue
         link, stale = links.get(name), ""
-        table = {} if link is None else _section_of(link, flat)
+        table = {} if link is None else _section_entries(link, flat)
         if table:
             origin = Kinds(SECTIONS)(table, name).origin(name in flat)
         elif name in flat:
@@ -172,7 +172,7 @@ def mass_origins(
     return tuple(found)
 
 
-def masses_of(parameters: Parameters) -> tuple[Mass, ...]:
+def trace_masses(parameters: Parameters) -> tuple[Mass, ...]:
     """Tell where the masses of parameters come from: those equal to the most similar published set's count as from this set.
 
     Raises

@@ -167,7 +167,7 @@ class Run:
             turns.take(start.x, sample(self.encoded, float(self.settings.times[0]), start.x, laws), laws, 0)
             # the energy at the start must be that of the reduced angles
             start = replace(start, energy=self.mechanism.equations.energy(tuple(start.x.tolist()), self.p))
-        problem = problem_of(self.encoded, self.settings, self.mechanism.switched(self.p))
+        problem = make_problem(self.encoded, self.settings, self.mechanism.switched(self.p))
         source, kept = compiled_source(self.encoded)
         batch = compiled.of_one(source, np.array([*self.p, start.energy]), start.scale, self.encoded.steady)
         watch, watching = self._watch(self._balance() if balanced else ())
@@ -207,7 +207,7 @@ class Run:
         code, message = verdict(self.mechanism, self.settings, int(status[0]), t, x + turns.taken, self.limit, needed)
         if status[0] == k.NO_STEP:
             message += self.undefined(x)
-        values = turns.put_back(outputs_of(self.mechanism, problem.modes, batch.p[0], states, forces))
+        values = turns.put_back(compute_outputs(self.mechanism, problem.modes, batch.p[0], states, forces))
         balance = "" if code else energy_balance(self.mechanism.output_names, values, self.settings.tolerance)
         message = "; ".join(filter(None, (message, stiff, balance)))
         trajectory = Trajectory(
@@ -242,7 +242,7 @@ class Run:
         n, states = len(self.mechanism.freedoms), np.tile(x, (2, 1))
         states[:, :n] += np.array([[1e-6], [1e-3]]) * x[n : 2 * n]
         names, idle = self.mechanism.output_names, np.zeros((2, len(self.mechanism.channels)))
-        values = outputs_of(self.mechanism, np.array(self.modes), np.array([*self.p, 0.0]), states, idle)
+        values = compute_outputs(self.mechanism, np.array(self.modes), np.array([*self.p, 0.0]), states, idle)
         if "assembly.clearance" in names:
             # beyond the limit of assembly no output has a value
             values = values[np.isfinite(values[:, names.index("assembly.clearance")])]
@@ -284,7 +284,7 @@ class Run:
         return Watch(table, addresses, np.zeros(n), found, np.array(balance, dtype=np.int64)), kept
 
 
-def problem_of(encoded: Encoded, settings: Settings, switched: bool) -> Any:
+def make_problem(encoded: Encoded, settings: Settings, switched: bool) -> Any:
     """Return the `Problem` of the compiled code: data that runs with the same kind of inputs have in common."""
     from .records import Problem
 
@@ -328,7 +328,7 @@ def verdict(
     return 0, ""
 
 
-def outputs_of(
+def compute_outputs(
     mechanism: Mechanism,
     modes: NDArray[np.float64],
     p: NDArray[np.float64],

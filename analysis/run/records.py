@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from ..numerics.codegen import CUBE, MATRIX, VECTOR, copy, evaluate, inner
 from .equations import CLEARANCE
-from .sources import ADDRESSES, PLACES, Source, channels_at, unwound
+from .sources import ADDRESSES, PLACES, Source, unwound, write_channels
 from .stepping import interpolate
 
 # Status of a run, as the kernels return it; from BAD_INPUT to NO_STEP the same as solver.status of the FMI contract
@@ -154,14 +154,14 @@ def equation(which, t, x, u, out, motion):
 
 
 @inner
-def clearance_at(x, u, motion):
+def state_clearance(x, u, motion):
     """Return the clearance to the limit of assembly at state x with inputs u; NaN beyond the limit."""
     equation(CLEARANCE, 0.0, x, u, motion.room.outputs, motion)
     return motion.room.outputs[0]
 
 
 @inner
-def time_at(s, h, motion):
+def step_time(s, h, motion):
     """Return the time at the fraction s of a step of size h."""
     return motion.carry.begin + (motion.carry.elapsed + s * h)
 
@@ -170,7 +170,7 @@ def time_at(s, h, motion):
 def renew(elapsed, x, u, motion):
     """Update the channels u for the time since the interval's begin and the state x, unless they are constant."""
     if motion.carry.piece >= 0:
-        channels_at(motion.carry.begin, elapsed, motion.carry.piece, x, motion.source, u)
+        write_channels(motion.carry.begin, elapsed, motion.carry.piece, x, motion.source, u)
 
 
 @inner

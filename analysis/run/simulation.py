@@ -177,7 +177,7 @@ def simulate(
         times = sample_times(*usual_times(parameters, inputs, stop_time, step), start_time)
     else:
         times = _check_samples(np.asarray(samples, float))
-    settings = settings_of(times, hold, tolerance, options.pop("max_steps", MOST_STEPS))
+    settings = check_settings(times, hold, tolerance, options.pop("max_steps", MOST_STEPS))
     run = Run(parameters, inputs, initial, settings, tuple(events))
     if method in ("compiled", "balanced"):
         if options:
@@ -188,7 +188,7 @@ def simulate(
     return solve(run, _solver(method), dict(options), progress)
 
 
-def settings_of(times: NDArray[np.float64], hold: float | None, tolerance: float, max_steps: int) -> Settings:
+def check_settings(times: NDArray[np.float64], hold: float | None, tolerance: float, max_steps: int) -> Settings:
     """Check the settings of a run and return them as `Settings`.
 
     Raises

@@ -31,14 +31,14 @@ def find(t, breaks):
 
 
 @inner
-def _find_before(t, breaks):
+def _find_piece(t, breaks):
     """Return the number of the polynomial piece that holds up to t."""
     piece = find(t, breaks)
     return piece - 1 if piece > 0 and t == breaks[piece] else piece
 
 
 @inner
-def channels_at(begin, elapsed, piece, x, source, u):
+def write_channels(begin, elapsed, piece, x, source, u):
     """Write the channels at state x and time ``begin + elapsed`` into u, with the given piece of the polynomials.
 
     The sum is not computed: far from zero it would be rounded so much that the inputs change in steps, which an integrator
@@ -108,7 +108,7 @@ def channels(t, ahead, left, x, source, commands, u, there):
     If ``ahead`` is later than t, the channels are those held from t to ``ahead``, see `hold`. ``there`` is a work array for
     channels.
     """
-    channels_at(t, 0.0, _find_before(t, source.breaks) if left else find(t, source.breaks), x, source, u)
+    write_channels(t, 0.0, _find_piece(t, source.breaks) if left else find(t, source.breaks), x, source, u)
     if ahead > t:
         hold(t, ahead, x, source, commands, u, there)
 
@@ -125,7 +125,7 @@ def hold(t, ahead, x, source, commands, u, there):
             channel, coordinate, speed = source.law_places[n]
             u[channel] += _held_bar(source.laws[n], x[coordinate], x[speed], ahead - t)
     if commands.shape[0] > 0:
-        channels_at(ahead, 0.0, _find_before(ahead, source.breaks), x, source, there)
+        write_channels(ahead, 0.0, _find_piece(ahead, source.breaks), x, source, there)
         for n in range(commands.shape[0]):
             value, rate = commands[n, 0], commands[n, 2]
             u[rate] = (there[value] - u[value]) / (ahead - t)

@@ -12,7 +12,7 @@ from linkwork import tableau
 from linkwork.integrate import GREATEST_FACTOR, LEAST_FACTOR, SAFETY
 
 from ..numerics.codegen import evaluate, inner
-from .sources import channels_at
+from .sources import write_channels
 
 # DOP853: the weights in stage s are WEIGHT[ROW[s]:ROW[s + 1]], of the rates at the stages FROM[ROW[s]:ROW[s + 1]]
 ROW = np.cumsum([0, *(len(row) for row in tableau.A)])
@@ -78,7 +78,7 @@ def attempt(flow, begin, elapsed, h, x, room, u, piece, source):
         # two conditions, since the first decides what Numba compiles
         if source is not None:  # noqa: SIM102
             if piece >= 0:
-                channels_at(begin, elapsed + NODES[s] * h, piece, y, source, u)
+                write_channels(begin, elapsed + NODES[s] * h, piece, y, source, u)
         evaluate(flow.equation, begin + (elapsed + NODES[s] * h), y, flow.modes, u, flow.p, k[s])
     stage(STAGES, x, k, h, y)
     return _local_error(x, y, k, h, flow.scale)

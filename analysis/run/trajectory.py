@@ -17,7 +17,7 @@ from ..display import Shown, format_count, format_range
 from ..files import unknown_name
 from ..libraries import require
 from ..mechanisms import MECHANISMS, Parameters, output_units
-from .masses import in_sentences, masses_of
+from .masses import in_sentences, trace_masses
 
 if TYPE_CHECKING:
     import pandas
@@ -113,7 +113,7 @@ class Trajectory(Shown):
         """
         if self.parameters is None:
             return ""
-        masses = masses_of(self.parameters)
+        masses = trace_masses(self.parameters)
         return "; ".join((in_sentences(masses)[0], *(mass.stale for mass in masses if mass.stale)))
 
     def column(self, name: str) -> int:

@@ -22,7 +22,7 @@ from ..mechanisms import Parameters, mechanism_of
 from ..numerics.symbolic import ELEMENTARY
 from ..numerics.tracing import Rebound, rebound
 from .arguments import variant
-from .equations import like_parameters, modules_of
+from .equations import equation_modules, like_parameters
 from .inputs import Inputs
 
 
@@ -143,7 +143,7 @@ def check_sets(mechanism: Mechanism, sets: Varied) -> None:
     if not wrong.any():
         try:
             with np.errstate(all="ignore"):
-                of, constants = constants_of(mechanism, sets)
+                of, constants = varied_constants(mechanism, sets)
                 for least in rules.least:
                     wrong |= getattr(of, least.field) < least.of(of)
                 wrong |= ~np.isfinite(np.sum(np.broadcast_arrays(*constants, wrong)[:-1], axis=0))
@@ -158,7 +158,7 @@ def check_sets(mechanism: Mechanism, sets: Varied) -> None:
             raise
 
 
-def constants_of(mechanism: Mechanism, sets: Sequence[Parameters]) -> tuple[SimpleNamespace, Any]:
+def varied_constants(mechanism: Mechanism, sets: Sequence[Parameters]) -> tuple[SimpleNamespace, Any]:
     """Return the parameters of all sets as one object with arrays, and the constants of the equations computed from it.
 
     With `Varied` sets, parameters that do not vary are numbers.
@@ -181,7 +181,7 @@ def over_arrays(mechanism: Mechanism) -> tuple[Rebound, type[SimpleNamespace]]:
     """
     elementwise = {name: _elementwise(getattr(math, name)) for name in ELEMENTARY}
     ours = {"sqrt": np.sqrt, "fabs": np.abs, "max": np.maximum, "min": np.minimum, "float": lambda value: value}
-    functions = rebound(modules_of(mechanism), elementwise | ours)
+    functions = rebound(equation_modules(mechanism), elementwise | ours)
     return functions, like_parameters(mechanism, functions)
 
 

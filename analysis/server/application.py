@@ -180,7 +180,7 @@ def _hashes(page: str) -> str:
     return " ".join(f"'sha256-{one}'" for one in found)
 
 
-def hosts_of(port: int) -> tuple[str, ...]:
+def allowed_hosts(port: int) -> tuple[str, ...]:
     """Return the hosts that a browser may send for this server at a port; port 80 is not named."""
     return tuple(name if port == 80 else f"{name}:{port}" for name in (ADDRESS, "localhost"))
 
@@ -226,7 +226,7 @@ class Server:
         )
         self._server.maintenance = self._close_silent
         self.port = int(listening.getsockname()[1])
-        self.application.hosts = hosts_of(self.port)
+        self.application.hosts = allowed_hosts(self.port)
 
     @property
     def address(self) -> str:

@@ -16,9 +16,9 @@ from linkwork.errors import InputError
 from ..export import KINDS, NATIVE, PLATFORMS, PYTHON, build, build_native, kinds_here, this_platform, with_starts
 from ..files import Choice, Many, Quantity, Whole, entry, flag, read, text
 from ..mechanisms import mechanism_of
-from ..periodic import drive_of, of_the_motor
+from ..periodic import of_the_motor, steady_drive
 from ..run import Case, cosimulate
-from ..studio import case_of, given_values, shown_in, state_of
+from ..studio import given_values, page_case, page_state, shown_unit
 from ..tuning import Wish, tune
 from .answers import Answer, file, folder
 from .paths import Linkages, Moved, linkages, moved
@@ -66,7 +66,7 @@ def do(kind: str, request: Mapping[str, Any]) -> Answer:
     state = request.get("state")
     if not isinstance(state, Mapping):
         raise InputError("a request has no state: it must have that of the page")
-    return work(case_of(state), read(wanted, request.get("wanted", {}), ""))
+    return work(page_case(state), read(wanted, request.get("wanted", {}), ""))
 
 
 def _tuned(case: Case, wanted: _Tuning) -> Answer:
@@ -74,7 +74,7 @@ def _tuned(case: Case, wanted: _Tuning) -> Answer:
     low, high = wanted.speeds
     wish = Wish(
         parameters=case.parameters,
-        drive=drive_of(case.parameters, case.inputs, case.initial, speed=low),
+        drive=steady_drive(case.parameters, case.inputs, case.initial, speed=low),
         speeds=(low, high),
         change=dict.fromkeys(wanted.change, f"{100.0 * wanted.share!r} %"),
         no_resonance=wanted.no_resonance,
@@ -86,7 +86,7 @@ def _tuned(case: Case, wanted: _Tuning) -> Answer:
     rows = []
     variables = {variable.name: variable for variable in mechanism.variables}
     for name, before, after in zip(wish.names, wish.present.tolist(), tuned.values.tolist()):
-        unit, factor = shown_in(variables[name])
+        unit, factor = shown_unit(variables[name])
         called = name.replace(".", " ").replace("_", " ")
         change = f"{100.0 * (after / before - 1.0):+.3g} %"
         rows.append(
@@ -94,7 +94,7 @@ def _tuned(case: Case, wanted: _Tuning) -> Answer:
         )
     rows += [[r.name, r.before.text, r.after.text, "met" if r.met else "not met"] for r in tuned.requirements]
     title = f"{case.title}, tuned"
-    changed = state_of(replace(case, title=title, parameters=tuned.parameters))
+    changed = page_state(replace(case, title=title, parameters=tuned.parameters))
     words = f"Verified: {tuned.verification}." if tuned.met else " ".join(f"{sentence}." for sentence in tuned.missed)
     table = {"headings": ["what", "before", "after", "change"], "rows": rows}
     return {"words": words, "table": table, "states": [changed], "met": tuned.met}
@@ -124,7 +124,7 @@ def _run(case: Case, wanted: _Run) -> Answer:
     )
     return {
         "words": f"{words}.",
-        "states": [state_of(case)],
+        "states": [page_state(case)],
         "time": run.time.tolist(),
         "outputs": {name: run[name].tolist() for name in run.names},
     }
@@ -133,7 +133,7 @@ def _run(case: Case, wanted: _Run) -> Answer:
 def _exported(case: Case, wanted: _Export) -> Answer:
     """Build a native FMU with the values of the page as start values."""
     mechanism = mechanism_of(case.parameters)
-    values = given_values(mechanism, state_of(case)["values"])
+    values = given_values(mechanism, page_state(case)["values"])
     motor = of_the_motor(mechanism)
     if any(values[name] != 0.0 for name, (field, _) in motor.items() if field == "breakdown_torque"):
         raise InputError(

@@ -15,9 +15,9 @@ from ..display import format_count
 from ..files import Choice, Many, Quantity, Whole, entry, flag, save_drawing, write_csv, write_tables
 from ..mechanisms import mechanism_of
 from ..periodic import default_variable
-from ..run import Case, case_from
+from ..run import Case, read_case
 from ..slider import inverse_dynamics, motion_of_plant, slider_motion
-from ..studio import state_of
+from ..studio import page_state
 from ..synthesis import (
     Constraint,
     FiveBar,
@@ -150,8 +150,8 @@ def linkages(case: Case, wanted: Linkages) -> Answer:
 
 
 def _state(solution: Solution, title: str) -> Answer:
-    case = case_from(solution.run_case(Make(), title), folder=Path(), title=title)
-    state, speed = state_of(case), default_variable(mechanism_of(case.parameters))
+    case = read_case(solution.run_case(Make(), title), folder=Path(), title=title)
+    state, speed = page_state(case), default_variable(mechanism_of(case.parameters))
     # the path does not say in which direction the crank turns; the page seeks periodic motions with positive speed
     state["values"][speed] = abs(state["values"][speed])
     return state

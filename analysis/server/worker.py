@@ -20,8 +20,8 @@ from typing import Any
 
 from linkwork.errors import InputError, LinkworkError
 
-from ..numerics.workers import end_with
-from ..run import heard_by
+from ..numerics.workers import end_when_orphaned
+from ..run import progress_listener
 
 #: Seconds between two reports of progress; seconds to wait for a killed process.
 _INTERVAL, _PATIENCE = 0.1, 5.0
@@ -144,7 +144,7 @@ class Worker:
 
 def _work(pipe: Any, caller: int, folder: str) -> None:
     """Run one job after another in the worker's process until it is killed."""
-    end_with(caller)
+    end_when_orphaned(caller)
     if os.name == "posix":
         os.setsid()
     signal.signal(signal.SIGINT, signal.SIG_IGN)
@@ -187,7 +187,7 @@ class _Terminal(io.TextIOBase):
 def _answer(do: Any, kind: str, request: Mapping[str, Any], teller: _Teller) -> dict[str, Any]:
     """Run a job; return its end state with the answer as JSON, or with a sentence on the error."""
     try:
-        with heard_by(teller), redirect_stderr(_Terminal(teller)):
+        with progress_listener(teller), redirect_stderr(_Terminal(teller)):
             return {"state": "done", "answer": json.dumps(do(kind, request), allow_nan=False)}
     except LinkworkError as error:
         return {"state": "failed", "sentence": str(error)}

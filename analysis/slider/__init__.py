@@ -7,7 +7,7 @@ motion; `track` runs the full plant under control.
 
 from __future__ import annotations
 
-from .cases import TABLES, SliderCase, linkage_from_csv, load_slider_case, run_case, slider_case_from
+from .cases import TABLES, SliderCase, linkage_from_csv, load_slider_case, read_slider_case, run_case
 from .inverse import BestSpring, Load, SliderDrive, TurnBalance, best_spring, inverse_dynamics
 from .motion import greatest_derivative, motion_of_plant, slider_motion
 from .strategy import Step, Strategy, StrategyInterrupted, simplest_mechanism
@@ -34,9 +34,9 @@ __all__ = [
     "linkage_from_csv",
     "load_slider_case",
     "motion_of_plant",
+    "read_slider_case",
     "run_case",
     "simplest_mechanism",
-    "slider_case_from",
     "slider_motion",
     "track",
     "variational_motion",

@@ -34,7 +34,7 @@ from ..files import (
 )
 from ..linear import Design, design_pid, linearise_along
 from ..numerics.fourier import FourierSeries
-from ..run import parameters_to
+from ..run import parameter_tables
 from ..synthesis import (
     ANGLES,
     LENGTHS,
@@ -51,7 +51,7 @@ from ..synthesis import (
     Task,
     TimedPath,
     UntimedPath,
-    synthesis_case_from,
+    read_synthesis_case,
     synthesize,
 )
 from ..units import with_unit
@@ -384,7 +384,7 @@ def run_case(drive: SliderDrive, title: str, force_file: str) -> dict[str, Any]:
     position, velocity = drive.states[0, [1, 3]].tolist()
     return {
         "title": title,
-        **parameters_to(drive.parameters),
+        **parameter_tables(drive.parameters),
         "initial": {"slider_position": with_unit(position, "m"), "slider_velocity": with_unit(velocity, "m/s")},
         "drive": {"speed": with_unit(drive.crank_speed, "rad/s")},
         "force": {"kind": "table", "file": force_file, "interpolation": "cubic"},
@@ -428,10 +428,10 @@ def load_slider_case(path: str | Path, overrides: Mapping[str, Any] | None = Non
         If bounds and constraints contradict one another.
     """
     path = Path(path)
-    return slider_case_from(read_tables(path), folder=path.parent, title=path.stem, overrides=overrides)
+    return read_slider_case(read_tables(path), folder=path.parent, title=path.stem, overrides=overrides)
 
 
-def slider_case_from(
+def read_slider_case(
     data: Mapping[str, Any], *, folder: Path, title: str = "", overrides: Mapping[str, Any] | None = None
 ) -> SliderCase:
     """Build a case from the tables of a case file; file names in it are relative to ``folder``."""
@@ -440,7 +440,7 @@ def slider_case_from(
     check_names(data, "", [name for name in (*entry_names(SynthesisCase), *own) if name != "trade_off"])
     if "slider" not in data and "strategy" not in data:
         raise MissingParameterError("slider")
-    synthesis = synthesis_case_from({name: value for name, value in data.items() if name not in own}, folder=folder)
+    synthesis = read_synthesis_case({name: value for name, value in data.items() if name not in own}, folder=folder)
     angular = isinstance(synthesis.task, RockerFunction)
     return read(
         SliderCase,

@@ -27,7 +27,7 @@ from linkwork.five_bar.variables import OUTPUT_NAMES
 from ..files import unknown_name
 from ..mechanisms import FIVE_BAR, output_units
 from ..numerics.fourier import FourierSeries
-from ..run import at_its_speed, outputs_of, takes_published
+from ..run import at_its_speed, compute_outputs, takes_published
 from ..units import Amount, in_si
 from ..youssef import require_no_contact_friction
 
@@ -266,7 +266,7 @@ def inverse_dynamics(
         _check_joined(parameters, x[0], x[1])
         at_p = load_at_angle(load, x[0])
         i[3], i[4], i[5] = slider_force(x[0], x[1], x[2], x[3], a, at_p, p), *at_p
-    values = outputs_of(FIVE_BAR, np.array([1.0]), np.array([*p, 0.0]), states, inputs)
+    values = compute_outputs(FIVE_BAR, np.array([1.0]), np.array([*p, 0.0]), states, inputs)
     return SliderDrive(
         parameters=parameters,
         slider=slider,

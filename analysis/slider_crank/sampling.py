@@ -151,7 +151,7 @@ class MonteCarlo:
         linear = self.estimates[quantity]
         return np.asarray(np.ma.getmaskarray(linear.deviation) & ~np.ma.getmaskarray(linear.nominal))
 
-    def linear_is_off(self, quantity: str) -> NDArray[np.bool_]:
+    def linear_misses(self, quantity: str) -> NDArray[np.bool_]:
         """Return a mask (n,) of the angles at which the linear estimate is off.
 
         It is off if its mean or standard deviation is wrong by more than 5 % of the standard deviation plus five standard
@@ -198,7 +198,7 @@ class MonteCarlo:
 
         ``one`` is the value in SI of the unit ``unit``.
         """
-        off = np.flatnonzero(self.linear_is_off(name) & ~self._without_estimate(name))
+        off = np.flatnonzero(self.linear_misses(name) & ~self._without_estimate(name))
         if not off.size:
             return []
         spread, linear = self.spreads[name], self.estimates[name]

@@ -19,7 +19,7 @@ from ..files import write_text
 from ..mechanisms import MECHANISMS
 from ..periodic import TOLERANCE
 from .state import opening_state
-from .tables import tables_of
+from .tables import mechanism_tables
 
 #: The built page.
 PAGE = Path(__file__).with_name("page.html")
@@ -78,11 +78,11 @@ def build_page(template: str | None = None, mechanisms: Iterable[Mechanism] | No
             "<title>", f"{_HASH.format(hash_of_sources())}\n<title>", 1
         )
     made = MECHANISMS.values() if mechanisms is None else mechanisms
-    tables = {"version": __version__, "tolerance": TOLERANCE, "mechanisms": [tables_of(m) for m in made]}
+    tables = {"version": __version__, "tolerance": TOLERANCE, "mechanisms": [mechanism_tables(m) for m in made]}
     return _replace_script(_replace_script(template, "tables", tables), "state", opening_state())
 
 
-def page_of(state: Mapping[str, Any]) -> str:
+def make_page(state: Mapping[str, Any]) -> str:
     """Return the built page with an opening state; if the page lacks the state's mechanism, it has only that one.
 
     Raises
@@ -96,7 +96,7 @@ def page_of(state: Mapping[str, Any]) -> str:
     return _replace_script(page, "state", state)
 
 
-def address_of(state: Mapping[str, Any], page: str) -> str:
+def page_address(state: Mapping[str, Any], page: str) -> str:
     """Return the address of the page with a state, in the form that the page itself writes; start values are left out.
 
     Parameters

@@ -16,7 +16,7 @@ from ..files import unknown_name
 from ..mechanisms import FIVE_BAR, MECHANISMS, mechanism_of
 from ..periodic import of_the_motor
 from ..run import Case, InductionMotor, Inputs
-from .tables import NO_MOTOR, given_entries, published_values, values_of
+from .tables import NO_MOTOR, fmi_starts, given_entries, published_values
 
 #: Values that the opening state changes in the first published set of the five-bar: it has a coupler point.
 OPENING = {"coupler.point_distance": 0.105, "coupler.point_angle": 0.55}
@@ -32,7 +32,7 @@ def opening_state() -> dict[str, Any]:
     }
 
 
-def state_of(case: Case) -> dict[str, Any]:
+def page_state(case: Case) -> dict[str, Any]:
     """Return the state of the page for a case.
 
     Raises
@@ -41,7 +41,7 @@ def state_of(case: Case) -> dict[str, Any]:
         If an input varies with time: the page has only constant inputs and a motor.
     """
     mechanism = mechanism_of(case.parameters)
-    values = values_of(mechanism, case.parameters, case.initial)
+    values = fmi_starts(mechanism, case.parameters, case.initial)
     values |= {name: float(value) for name, value in case.inputs.modes(mechanism).items()}
     for channel in (channel for channel in mechanism.channels if channel.kind != "rate"):
         parts = case.inputs.parts(channel.argument)
@@ -59,7 +59,7 @@ def state_of(case: Case) -> dict[str, Any]:
     return {"mechanism": mechanism.name, "title": case.title, "values": values, "duration": case.stop_time}
 
 
-def case_of(state: Mapping[str, Any]) -> Case:
+def page_case(state: Mapping[str, Any]) -> Case:
     """Return the case for a state of the page, which has only numbers and names, so that it cannot refer to a file.
 
     Raises

@@ -13,7 +13,7 @@ from linkwork.variables import UNITS, Variable
 
 from ..export import Entry, build_web, crank_number, interface
 from ..mechanisms import name_in_files
-from ..periodic import crank_of, damping_name, of_the_motor, stiffness_name
+from ..periodic import damping_name, find_crank, of_the_motor, stiffness_name
 
 #: Sections of parameters by role, and by unit; all others are dimensions.
 _SECTIONS = {
@@ -28,7 +28,7 @@ NO_MOTOR = {"breakdown_torque": 0.0, "breakdown_slip": 0.2, "synchronous_speed":
 TOLERANCE = 1e-12
 
 
-def tables_of(mechanism: Mechanism) -> dict[str, Any]:
+def mechanism_tables(mechanism: Mechanism) -> dict[str, Any]:
     """Return the tables of a mechanism for the page, and its WebAssembly module."""
     entries = interface(mechanism)
     reference = {entry.variable.name: entry.reference for entry in entries}
@@ -72,19 +72,19 @@ def tables_of(mechanism: Mechanism) -> dict[str, Any]:
 
 def published_values(mechanism: Mechanism, known: PublishedSet) -> dict[str, float]:
     """Return the values of a published set, driven at its speed, by FMI name."""
-    return values_of(mechanism, known.parameters, known.initial) | {
+    return fmi_starts(mechanism, known.parameters, known.initial) | {
         channel.name: known.drive[channel.argument] for channel in mechanism.channels if channel.argument in known.drive
     }
 
 
-def values_of(mechanism: Mechanism, parameters: Any, initial: Any) -> dict[str, float]:
+def fmi_starts(mechanism: Mechanism, parameters: Any, initial: Any) -> dict[str, float]:
     """Return the values of parameters and initial state by FMI name."""
     own = {name: getattr(parameters, field_name(name)) for name in mechanism.mechanism_variables}
     start = {variable.name: getattr(initial, name) for name, variable in mechanism.initial_variables.items()}
     return {name: float(value) for name, value in (own | start).items()}
 
 
-def shown_in(variable: Variable) -> tuple[str, float]:
+def shown_unit(variable: Variable) -> tuple[str, float]:
     """Return the unit in which the page shows a variable, and the factor from SI to this unit."""
     displays = dict(UNITS[variable.unit].displays) if variable.kind == "Real" else {}
     shown = variable.display or ("" if variable.unit == "rad/s" else next(iter(displays), ""))
@@ -93,7 +93,7 @@ def shown_in(variable: Variable) -> tuple[str, float]:
 
 
 def _unit(variable: Variable) -> dict[str, Any]:
-    return dict(zip(("unit", "factor"), shown_in(variable)))
+    return dict(zip(("unit", "factor"), shown_unit(variable)))
 
 
 def given_entries(mechanism: Mechanism) -> list[Entry]:
@@ -136,7 +136,7 @@ def _given(mechanism: Mechanism, variable: Variable, reference: int) -> dict[str
 
 def _motor(mechanism: Mechanism, crank: int) -> list[dict[str, Any]]:
     """Return the rows of a motor on the crank, whose references in the page's module are negative."""
-    torque = crank_of(mechanism, mechanism.freedoms[crank].coordinate).torque if crank >= 0 else None
+    torque = find_crank(mechanism, mechanism.freedoms[crank].coordinate).torque if crank >= 0 else None
     if torque is None:
         return []
     own = mechanism.channels[torque].name

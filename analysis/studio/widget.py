@@ -9,9 +9,9 @@ from typing import Any
 from ..files import unknown_name
 from ..libraries import MissingLibraryError
 from ..mechanisms import PUBLISHED
-from ..run import Case, case_from
-from .page import page_of
-from .state import case_of, opening_state, state_of
+from ..run import Case, read_case
+from .page import make_page
+from .state import opening_state, page_case, page_state
 
 try:
     import anywidget
@@ -50,19 +50,19 @@ class Widget(anywidget.AnyWidget):
         if isinstance(what, str):
             if what not in PUBLISHED:
                 raise unknown_name(what, PUBLISHED, f"published set {what!r}")
-            what = case_from({"published": what}, folder=Path(), title=what)
-        state = opening_state() if what is None else state_of(what)
-        super().__init__(state=state, page=page_of(state), height=height)
+            what = read_case({"published": what}, folder=Path(), title=what)
+        state = opening_state() if what is None else page_state(what)
+        super().__init__(state=state, page=make_page(state), height=height)
 
     @traitlets.validate("state")
     def _check(self, proposal: Mapping[str, Any]) -> Any:
-        case_of(proposal["value"])
+        page_case(proposal["value"])
         return proposal["value"]
 
     @property
     def case(self) -> Case:
         """The case that the page shows: parameters, initial state and inputs."""
-        return case_of(self.state)
+        return page_case(self.state)
 
     def change(self, values: Mapping[str, float]) -> None:
         """Change values, given in SI by the names of the FMU's variables.

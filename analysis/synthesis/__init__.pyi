@@ -2,7 +2,7 @@ from .case.case import BOUNDS as BOUNDS
 from .case.case import TABLES as TABLES
 from .case.case import SynthesisCase as SynthesisCase
 from .case.case import load_synthesis_case as load_synthesis_case
-from .case.case import synthesis_case_from as synthesis_case_from
+from .case.case import read_synthesis_case as read_synthesis_case
 from .case.tables import KINDS as KINDS
 from .exact.burmester import Dyad as Dyad
 from .exact.burmester import Guidance as Guidance

@@ -143,7 +143,7 @@ def convergence(
                 if run.status:
                     messages[f"{way}, {step:g} s"] = run.message
                     continue
-                errors[way][number], powers[way][number] = _error(run, right, names), run.brought_in()
+                errors[way][number], powers[way][number] = _error(run, right, names), run.added_work()
     return Convergence(
         title=system.title,
         steps=np.array(steps),

@@ -23,7 +23,7 @@ from ..files import Quantity, Table, entry, unknown_name
 from ..linkages import load_linkage
 from ..mechanisms import mechanism_of
 from ..numerics.cache import code_folder
-from ..run import case_from, published_case
+from ..run import published_case, read_case
 from ..units import quantity
 from .wiring import End, Part, Wiring, WiringError
 
@@ -140,7 +140,7 @@ class System:
         elif Path(table.case).suffix in (".toml", ".json"):
             # the stop time of the case itself is not used, and may be missing
             tables = files.read_tables(self.folder / table.case) | {"run": {"stop_time": self.run.stop_time}}
-            case = case_from(tables, folder=(self.folder / table.case).parent)
+            case = read_case(tables, folder=(self.folder / table.case).parent)
         else:
             case = published_case(table.case)
         mechanism = mechanism_of(case.parameters)

@@ -143,7 +143,7 @@ static int64_t now(void) {
     return (int64_t)t.tv_sec * 1000000000 + t.tv_nsec;
 }
 
-static void sleep_until(int64_t due) {
+static void await_time(int64_t due) {
     struct timespec t = {.tv_sec = due / 1000000000, .tv_nsec = due % 1000000000};
     while (clock_nanosleep(CLOCK_MONOTONIC, TIMER_ABSTIME, &t, NULL) == EINTR) {
     }
@@ -175,7 +175,7 @@ int main(int words, char **word) {
     int64_t start = now() + 1000000;
     for (long k = 0; k < steps; k++) {
         int64_t due = start + (int64_t)((double)k * step * 1e9), end = start + (int64_t)((double)(k + 1) * step * 1e9);
-        if (rate > 0.0) sleep_until(due);
+        if (rate > 0.0) await_time(due);
         int64_t begun = now();
         set_inputs();
         advance((double)k * step, step);

@@ -197,6 +197,6 @@ class Instance3(Instance):
         self._fmu.freeFMUState(state)
 
 
-def instance_of(part: Part) -> Instance:
+def make_instance(part: Part) -> Instance:
     """Return an instance of a part, according to its FMI version."""
     return (Instance3 if part.description.fmiVersion.startswith("3") else Instance)(part)

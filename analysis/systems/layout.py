@@ -20,7 +20,7 @@ class Box(NamedTuple):
     inputs: tuple[str, ...]
     outputs: tuple[str, ...]
 
-    def height_of(self, port: str) -> float:
+    def port_height(self, port: str) -> float:
         """Return the y coordinate of a port (mm)."""
         ports = self.inputs if port in self.inputs else self.outputs
         return self.top - HEAD - PORT * (ports.index(port) + 0.5)

@@ -21,7 +21,7 @@ from linkwork.errors import InputError
 from ..files import unknown_name
 from ..numerics.workers import interruptible
 from ..run import CosimulationError, RunInterrupted, shown
-from .instances import Floats, instance_of
+from .instances import Floats, make_instance
 from .wiring import Bond, End, Wiring
 
 #: The inputs over a communication step, by coupling.
@@ -87,7 +87,7 @@ class SystemRun:
     def __len__(self) -> int:
         return len(self.time)
 
-    def brought_in(self) -> float:
+    def added_work(self) -> float:
         """Return the work that the coupling added, as a fraction of the work that all bonds transmitted; 0 without bonds.
 
         Over a step a residual grows from 0, so that its mean is half of its value at the end.
@@ -97,13 +97,13 @@ class SystemRun:
         brought = 0.5 * sum(float(steps @ np.abs(power[1:])) for power in self.powers.values())
         return brought / through if through > 0.0 else 0.0
 
-    def step_for(self, share: float) -> float | None:
+    def suggested_step(self, share: float) -> float | None:
         """Return the communication step with which the coupling would add a given share of the work (s).
 
         It is valid for equal steps so small that a residual is proportional to the step, or to its square if inputs are linear.
         None without power bonds, and for couplings whose error the residuals do not measure.
         """
-        brought = self.brought_in()
+        brought = self.added_work()
         orders = {"hold": 1.0, "derivatives": 2.0}
         if self.coupling not in orders or brought == 0.0:
             return None
@@ -118,7 +118,7 @@ class _Together:
         self.instances: dict[str, Any] = {}
         try:
             for name, part in wiring.parts.items():
-                self.instances[name] = instance_of(part)
+                self.instances[name] = make_instance(part)
             self.ends = [End(name, output) for name, each in self.instances.items() for output in each.outputs]
             index = {end: number for number, end in enumerate(self.ends)}
             self.targets = t = {target: number for number, target in enumerate(wiring.connections)}

@@ -130,7 +130,7 @@ def _complete_structure(path: Path, wiring: Wiring) -> None:
         box = placed[element.get("name")]
         for connector in element.iter(f"{_NAMESPACE}Connector"):
             name, across = connector.get("name"), 0.0 if connector.get("kind") == "input" else 1.0
-            up = (box.height_of(name) - box.bottom) / (box.top - box.bottom)
+            up = (box.port_height(name) - box.bottom) / (box.top - box.bottom)
             etree.SubElement(connector, f"{_NAMESPACE}ConnectorGeometry", x=repr(across), y=f"{up:.4f}")
         edges = {"x1": box.left, "y1": box.bottom, "x2": box.right, "y2": box.top}
         geometry = etree.Element(f"{_NAMESPACE}ElementGeometry", {key: repr(value) for key, value in edges.items()})

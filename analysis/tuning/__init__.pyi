@@ -1,7 +1,7 @@
 from .cases import TuneTable as TuneTable
 from .cases import TuningCase as TuningCase
 from .cases import load_tuning_case as load_tuning_case
-from .cases import tuning_case_from as tuning_case_from
+from .cases import read_tuning_case as read_tuning_case
 from .optimisation import tune as tune
 from .result import Reading as Reading
 from .result import Requirement as Requirement

@@ -13,8 +13,8 @@ from linkwork.errors import InputError, MissingParameterError, ParameterError
 from ..files import Many, Quantity, Table, Whole, as_table, entry, flag, overridden, read, read_tables, text, unchanged
 from ..linkages import with_linkage
 from ..mechanisms import mechanism_of, name_in_files
-from ..periodic import default_variable, drive_of, resting, unit_of
-from ..run import case_from, mechanism_in, with_names_of_files
+from ..periodic import default_variable, parameter_unit, resting, steady_drive
+from ..run import case_mechanism, read_case, with_names_of_files
 from ..units import with_unit
 from .result import Tuned
 from .wishes import Limit, Wish
@@ -85,7 +85,7 @@ class TuningCase:
         mechanism = mechanism_of(self.wish.parameters)
         inputs = {channel.name: name_in_files(mechanism, channel) for channel in mechanism.channels}
         values = zip(self.wish.names, tuned.values.tolist())
-        changes = {inputs.get(name, name): with_unit(value, unit_of(mechanism, name)) for name, value in values}
+        changes = {inputs.get(name, name): with_unit(value, parameter_unit(mechanism, name)) for name, value in values}
         if isinstance(own := self.tables.get("linkage"), str):
             changes["linkage"] = Path(os.path.relpath(self.folder / own, folder)).as_posix()
         return overridden(with_names_of_files(self.tables, mechanism), changes)
@@ -100,10 +100,10 @@ def load_tuning_case(path: str | Path, overrides: Mapping[str, Any] | None = Non
         If the file cannot be read, or an entry is not usable.
     """
     path = Path(path)
-    return tuning_case_from(read_tables(path), folder=path.parent, title=path.stem, overrides=overrides)
+    return read_tuning_case(read_tables(path), folder=path.parent, title=path.stem, overrides=overrides)
 
 
-def tuning_case_from(
+def read_tuning_case(
     data: Mapping[str, Any], *, folder: Path, title: str = "", overrides: Mapping[str, Any] | None = None
 ) -> TuningCase:
     """Build a case from the tables of a case file; names of files in it are relative to ``folder``."""
@@ -118,9 +118,9 @@ def tuning_case_from(
                 "drive.torque drives the crank, so that its speed follows: leave out tune.speeds and give what "
                 "is set, such as over = 'drive.torque' and between = ['0.1 N*m', '0.2 N*m']; or leave out drive.torque"
             )
-        overrides[default_variable(mechanism_in(linked))] = with_unit(wanted.speeds[0], "rad/s")
-    case = case_from(linked, folder=folder, title=title, overrides=overrides)
-    drive = drive_of(case.parameters, case.inputs, case.initial)
+        overrides[default_variable(case_mechanism(linked))] = with_unit(wanted.speeds[0], "rad/s")
+    case = read_case(linked, folder=folder, title=title, overrides=overrides)
+    drive = steady_drive(case.parameters, case.inputs, case.initial)
     wish = Wish(
         parameters=case.parameters,
         drive=drive,

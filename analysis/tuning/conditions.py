@@ -28,7 +28,7 @@ from ..periodic import (
     Variations,
     extremum_gradient,
     motion_gradient,
-    scale_of,
+    motion_scales,
 )
 from .wishes import AMPLITUDE, Limit, Wish
 
@@ -270,7 +270,7 @@ class Place:
     def __init__(self, wish: Wish, row: Row, spot: Spot) -> None:
         self.wish, self.row = wish, row
         self._last = spot
-        self._scale = np.append(scale_of(*wish.operation(spot.x, spot.level), spot.y), wish.size)
+        self._scale = np.append(motion_scales(*wish.operation(spot.x, spot.level), spot.y), wish.size)
 
     def at(self, x: FloatArray) -> Found:
         """Find the motion for changes x in units of the tolerances; raises LostError if it is not found again."""

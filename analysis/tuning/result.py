@@ -8,7 +8,7 @@ from typing import Any
 
 from ..display import Shown, format_count
 from ..mechanisms import Parameters
-from ..run import parameters_to
+from ..run import parameter_tables
 from ..units import displayed
 from .conditions import FloatArray
 from .survey import MARGINAL, Survey
@@ -249,5 +249,5 @@ class Tuned(Shown):
                 "sought": v.sought,
                 "several": v.several,
             },
-            "parameters": parameters_to(self.parameters),
+            "parameters": parameter_tables(self.parameters),
         }

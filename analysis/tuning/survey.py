@@ -25,9 +25,9 @@ from ..periodic import (
     follow_both,
     frequency_response,
     largest_multipliers,
-    orbits_of,
+    motion_scales,
     passes,
-    scale_of,
+    search_orbits,
     speed_names,
 )
 from .conditions import (
@@ -324,7 +324,7 @@ def _doubling(wish: Wish, orbit: PeriodicOrbit, response: Response) -> SpecialPo
     for branch in response.branches:
         for point in branch.special if 2 * branch.turns == orbit.turns else ():
             there = point.orbit
-            scale = scale_of(there.parameters, there.drive, there.start)
+            scale = motion_scales(there.parameters, there.drive, there.start)
             away = np.abs(there.flow.within(there.start - orbit.start) / scale).max()
             near = abs(wish.level(there) - wish.level(orbit)) < NEXT * (response.high - response.low)
             if point.kind is Crossing.PERIOD_DOUBLING and near and away < NEXT:
@@ -364,7 +364,7 @@ def _lowest(
     """
     orbit, before, after = branch.orbits[i], max(i - 1, 0), min(i + 1, len(branch) - 1)
     spot = known_spot(wish, x, orbit)
-    scale = np.append(scale_of(orbit.parameters, orbit.drive, orbit.start), wish.size)
+    scale = np.append(motion_scales(orbit.parameters, orbit.drive, orbit.start), wish.size)
     ends = [np.append(branch.orbits[j].start, branch.parameter[j]) / scale for j in (before, after)]
     normal = np.append(np.zeros(len(orbit.start)), 1.0)
     if not at_level:
@@ -476,7 +476,7 @@ def other_motions(found: Survey) -> tuple[tuple[PeriodicOrbit, ...], tuple[float
         start = None if wish.over in speed_names(wish.mechanism) else _nearest(wish, found.response, level).start
         stable = 0
         for turns in range(1, wish.turns + 1):
-            there: Orbits = orbits_of(parameters, drive, turns=turns, start=start)
+            there: Orbits = search_orbits(parameters, drive, turns=turns, start=start)
             # a machine does not come near a motion from which deviations grow faster
             new += [o for o in there.orbits if o.largest < GREATEST and not _meets(wish, found.response, o)]
             stable += len(there.stable)

@@ -20,13 +20,13 @@ from ..periodic import (
     Drive,
     Operation,
     PeriodicOrbit,
-    drive_of,
     driving_names,
+    parameter_unit,
+    parameter_value,
     require_variable,
     speed_name,
     speed_names,
-    unit_of,
-    value_of,
+    steady_drive,
     variable_names,
     with_values,
 )
@@ -166,14 +166,14 @@ class Wish:
         if isinstance(given, (str, PublishedSet)):
             put("parameters", published_set(given).parameters)
         mechanism = self.mechanism
-        put("over", self._required_over())
+        put("over", self._check_range())
         put("between", _span(mechanism, self.over, self.between if self.speeds is None else self.speeds))
-        drive = self.drive or drive_of(given, speed=self.span[0])
+        drive = self.drive or steady_drive(given, speed=self.span[0])
         require_variable(self.parameters, drive, self.over)
         alone = (
             not drive.speed_drive
             and drive.motor is None
-            and value_of(self.parameters, drive, self.over) == drive.torque
+            and parameter_value(self.parameters, drive, self.over) == drive.torque
         )
         if alone and self.span[0] <= 0.0 <= self.span[1]:
             raise ParameterError(self.over, list(self.span), "not contain zero: nothing would drive the crank there")
@@ -205,7 +205,7 @@ class Wish:
                 except ParameterError as error:
                     if not change.given:
                         raise
-                    unit = unit_of(self.mechanism, change.name)
+                    unit = parameter_unit(self.mechanism, change.name)
                     raise ParameterError(
                         f"change.{change.name}",
                         change.given,
@@ -215,7 +215,7 @@ class Wish:
         for x in (self.scaled(self.low), self.scaled(self.high)):
             self.operation(x, self.span[0])
 
-    def _required_over(self) -> str:
+    def _check_range(self) -> str:
         """Check the arguments about the range, and return the FMI name of the quantity that it is of."""
         speed = speed_name(self.mechanism, self.drive)
         if (self.speeds is None) == (self.between is None) or (self.between is None) == bool(self.over):
@@ -248,11 +248,11 @@ class Wish:
 
     def level(self, orbit: PeriodicOrbit) -> float:
         """Return the level of a motion: its value of the quantity ``over``."""
-        return value_of(orbit.parameters, orbit.drive, self.over)
+        return parameter_value(orbit.parameters, orbit.drive, self.over)
 
     def say(self, *levels: float, joint: str = ", ") -> str:
         """Format levels as text with the unit; speeds in rpm."""
-        unit = unit_of(self.mechanism, self.over)
+        unit = parameter_unit(self.mechanism, self.over)
         factor, unit = (RAD_S_PER_RPM, "rpm") if unit == "rad/s" else (1.0, unit)
         return f"{joint.join(f'{level / factor:.6g}' for level in levels)} {unit}"
 
@@ -292,7 +292,7 @@ class Wish:
     def present(self) -> FloatArray:
         """Present values, shape (k,)."""
         assert self.drive is not None
-        return np.array([value_of(self.parameters, self.drive, name) for name in self.names])
+        return np.array([parameter_value(self.parameters, self.drive, name) for name in self.names])
 
     @property
     def low(self) -> FloatArray:
@@ -321,7 +321,7 @@ class Wish:
 
 
 def _span(mechanism: Mechanism, over: str, given: Any) -> tuple[float, float]:
-    name, unit = "speeds" if over in speed_names(mechanism) else over, unit_of(mechanism, over)
+    name, unit = "speeds" if over in speed_names(mechanism) else over, parameter_unit(mechanism, over)
     low, high = pair(given, unit, name)
     shown = [displayed(end, unit) for end in (low, high)]
     if not low < high:
@@ -369,8 +369,8 @@ def _named(given: Mapping[str, Any], mechanism: Mechanism, prefix: str = "") -> 
 
 def _change(operation: Operation, name: str, value: Any) -> Change:
     require_variable(*operation, name)
-    unit = unit_of(mechanism_of(operation[0]), name)
-    now, what = value_of(*operation, name), f"change.{name}"
+    unit = parameter_unit(mechanism_of(operation[0]), name)
+    now, what = parameter_value(*operation, name), f"change.{name}"
     given: Mapping[str, Any]
     if isinstance(value, Mapping):
         check_names(value, what, ("tolerance", "between"))

@@ -136,7 +136,7 @@ def harmonic_balance(equation: SliderEquation, order: int) -> HarmonicMotion:
     return HarmonicMotion(series=zeta, residual=float(np.abs(left - equation.force(angle)).max()))
 
 
-def amplitudes_over(
+def harmonic_amplitudes(
     parameters: FiveBarParameters,
     speeds: ArrayLike,
     order: int,
@@ -326,7 +326,7 @@ _APPROXIMATIONS = {
 
 def _approximate(parameters: FiveBarParameters, speed: ArrayLike, load: Load) -> dict[str, NDArray[np.float64]]:
     return {
-        name: amplitudes_over(parameters, speed, order, variant=variant, load=load)
+        name: harmonic_amplitudes(parameters, speed, order, variant=variant, load=load)
         for name, (variant, order) in _APPROXIMATIONS.items()
     }
 

@@ -487,7 +487,7 @@ def needed(m: Mass, accelerations: Rates, applied: Wrench) -> Wrench:
     return less(Wrench(x, y, moment + m.centre.x * y - m.centre.y * x), applied)
 
 
-def moment_about(f: Wrench, at: Vector) -> float:
+def wrench_moment(f: Wrench, at: Vector) -> float:
     """Return the moment of a wrench about the point ``at``."""
     return f.moment - at.x * f.y + at.y * f.x
 
@@ -499,7 +499,7 @@ def pin_between_pins(p: Vector, c: Vector, q: Vector, on1: Wrench, on2: Wrench) 
     """
     ux, uy, wx, wy = c.x - p.x, c.y - p.y, c.x - q.x, c.y - q.y
     # u x F = m1, w x F = -m2
-    m1, m2, cross = moment_about(on1, p), moment_about(on2, q), ux * wy - uy * wx
+    m1, m2, cross = wrench_moment(on1, p), wrench_moment(on2, q), ux * wy - uy * wx
     return force((m2 * ux + m1 * wx) / cross, (m2 * uy + m1 * wy) / cross, c)
 
 
@@ -507,7 +507,7 @@ def pin_to_block(p: Vector, c: Vector, t: Turn, on1: Wrench, on2: Wrench) -> Wre
     """Return the force of the block on body 1 of a dyad RRP in the pin at c, where the block slides along t."""
     ux, uy = c.x - p.x, c.y - p.y
     # u x F = m1; -F . t = along
-    m1, along = moment_about(on1, p), on2.x * t.c + on2.y * t.s
+    m1, along = wrench_moment(on1, p), on2.x * t.c + on2.y * t.s
     across = (m1 + along * (ux * t.s - uy * t.c)) / (ux * t.c + uy * t.s)
     return force(-along * t.c - across * t.s, -along * t.s + across * t.c, c)
 
@@ -521,7 +521,7 @@ def pin_of_blocks(c: Vector, t: Turn, r: Turn, on1: Wrench, on2: Wrench) -> Wren
 
 def slide_between_pins(p: Vector, q: Vector, t: Turn, on1: Wrench, on2: Wrench) -> Wrench:
     """Return the force of body 2 on body 1 of a dyad RPR in the slide along t between them."""
-    m1, m2 = moment_about(on1, p), moment_about(on2, q)
+    m1, m2 = wrench_moment(on1, p), wrench_moment(on2, q)
     # across the slide: its moments about p and q differ by (q - p) . t times it
     across = (m1 + m2) / ((q.x - p.x) * t.c + (q.y - p.y) * t.s)
     x, y = -across * t.s, across * t.c
@@ -530,7 +530,7 @@ def slide_between_pins(p: Vector, q: Vector, t: Turn, on1: Wrench, on2: Wrench) 
 
 def slide_to_block(p: Vector, t: Turn, r: Turn, on1: Wrench, on2: Wrench) -> Wrench:
     """Return the force of body 2, which slides along t, on body 1 of a dyad RPP in the slide along r between them."""
-    m1, f2 = moment_about(on1, p), on2.x * t.c + on2.y * t.s
+    m1, f2 = wrench_moment(on1, p), on2.x * t.c + on2.y * t.s
     across = -f2 / (t.s * r.c - t.c * r.s)
     x, y = -across * r.s, across * r.c
     return Wrench(x, y, m1 + p.x * y - p.y * x)
@@ -542,7 +542,7 @@ def mesh(pin: Vector, other: Vector, ratio: float, on: Wrench) -> Wrench:
     ``other`` is the centre of the mate; ``ratio`` is the speed of the gear divided by that of the mate, both relative to the
     line of centres; ``on`` is the wrench that its joints must exert on the gear.
     """
-    moment = moment_about(on, pin)
+    moment = wrench_moment(on, pin)
     dx, dy = pin.x - other.x, pin.y - other.y
     share = (ratio - 1.0) * moment / (dx * dx + dy * dy)
     x, y = -share * dy, share * dx
@@ -559,7 +559,7 @@ def gear_on_rack(pin: Vector, t: Turn, radius: float, on: Wrench) -> Wrench:
 
 def rack_on_gear(pin: Vector, t: Turn, radius: float, on: Wrench) -> Wrench:
     """Return the force of a rack on its gear at their pitch point; the arguments are those of `gear_on_rack`."""
-    return _in_teeth(pin, t, radius, moment_about(on, pin) / radius)
+    return _in_teeth(pin, t, radius, wrench_moment(on, pin) / radius)
 
 
 def _in_teeth(pin: Vector, t: Turn, radius: float, pull: float) -> Wrench:
@@ -570,12 +570,12 @@ def _in_teeth(pin: Vector, t: Turn, radius: float, pull: float) -> Wrench:
 # Measures
 
 
-def angle_of(t: Turn) -> float:
+def turn_angle(t: Turn) -> float:
     """Return the angle of a direction, in (-pi, pi]."""
     return atan2(t.s, t.c)
 
 
-def angle_between(t: Turn, r: Turn, c: float, s: float) -> float:
+def turn_difference(t: Turn, r: Turn, c: float, s: float) -> float:
     """Return the angle from t to r minus the angle of cosine c and sine s, in (-pi, pi]."""
     x, y = t.c * r.c + t.s * r.s, t.c * r.s - t.s * r.c
     return atan2(y * c - x * s, x * c + y * s)
@@ -587,7 +587,7 @@ def transmission(p: Vector, c: Vector, q: Vector) -> float:
     return atan2(fabs(ux * wy - uy * wx), ux * wx + uy * wy)
 
 
-def position_along(f: Frame, x: float, y: float, t: Turn, block: Frame) -> tuple[float, float]:
+def block_position(f: Frame, x: float, y: float, t: Turn, block: Frame) -> tuple[float, float]:
     """Return position and velocity of a block's origin along the line of body f through its point (x, y), of direction t."""
     start = point(f, x, y)
     dx, dy = block.origin.x - start.x, block.origin.y - start.y

@@ -102,7 +102,7 @@ class Plant:
         self._scale = mechanism.error_scale(parameters, self.state)
         self.start_energy = mechanism.equations.energy(self.state, self._p)
         if not isfinite(self.start_energy):
-            raise InputError(f"the energy at the start is not finite: {self._started_from(self.state)}")
+            raise InputError(f"the energy at the start is not finite: {self._describe_start(self.state)}")
 
     @classmethod
     def of_values(
@@ -155,10 +155,10 @@ class Plant:
     def _start(self, initial: Any) -> Vector:
         x = list(self.mechanism.state(initial))
         for number in self._commands:
-            x[self._rate_of(number)] = float(self.inputs[self.mechanism.channels[number].name])
+            x[self._commanded_rate(number)] = float(self.inputs[self.mechanism.channels[number].name])
         return self._settled(tuple(x))
 
-    def _rate_of(self, number: int) -> int:
+    def _commanded_rate(self, number: int) -> int:
         """Return the index in the state of the rate that a channel commands."""
         return len(self.mechanism.freedoms) + self.mechanism.channels[number].freedom
 
@@ -182,7 +182,7 @@ class Plant:
         for number in self._commands:
             # a commanded freedom without a new command keeps its rate
             if names[number] not in commanded:
-                u[number] = x[self._rate_of(number)]
+                u[number] = x[self._commanded_rate(number)]
         jumped: Vector = self.mechanism.equations.jump(x, applied, tuple(u), self._p)
         return jumped
 
@@ -193,10 +193,10 @@ class Plant:
         except UNDEFINED:
             return True
 
-    def _started_from(self, x: Vector) -> str:
+    def _describe_start(self, x: Vector) -> str:
         """Describe the initial state in words, each value by the name of the parameter or input that sets it."""
         units = {v.name: v.unit for v in self.mechanism.variables}
-        source = {self._rate_of(number): self.mechanism.channels[number].name for number in self._commands}
+        source = {self._commanded_rate(number): self.mechanism.channels[number].name for number in self._commands}
         fields = [freedom.initial[part] for part in (0, 1) for freedom in self.mechanism.freedoms]
         names = [source.get(place, f"initial.{field}") for place, field in enumerate(fields)]
         return ", ".join(f"{name} is {value:g} {units[name]}" for name, value in zip(names, x))

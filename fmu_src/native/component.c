@@ -44,7 +44,7 @@ __attribute__((import_module("callbacks"), import_name("log-message"))) void hos
                                                                                       size_t category_size, const char *message,
                                                                                       size_t message_size);
 
-static void log_out(fmi3InstanceEnvironment name, fmi3Status status, fmi3String category, fmi3String message) {
+static void write_log(fmi3InstanceEnvironment name, fmi3Status status, fmi3String category, fmi3String message) {
     host_log(name, strlen(name), status, category, strlen(category), message, strlen(message));
 }
 
@@ -128,14 +128,14 @@ Created *make_co_simulation(const char *name, size_t name_size, const char *toke
                             size_t path_size, bool visible, bool logging, bool event_mode, bool early_return,
                             const uint32_t *intermediate, size_t count) {
     NAME return created(own, fmi3InstantiateCoSimulation(own, text(token, token_size), text(path, path_size), visible, logging,
-                                                         event_mode, early_return, intermediate, count, own, log_out, NULL));
+                                                         event_mode, early_return, intermediate, count, own, write_log, NULL));
 }
 
 EXPORT("instantiate-model-exchange")
 Created *make_model_exchange(const char *name, size_t name_size, const char *token, size_t token_size, const char *path,
                              size_t path_size, bool visible, bool logging) {
-    NAME return created(
-        own, fmi3InstantiateModelExchange(own, text(token, token_size), text(path, path_size), visible, logging, own, log_out));
+    NAME return created(own, fmi3InstantiateModelExchange(own, text(token, token_size), text(path, path_size), visible, logging,
+                                                          own, write_log));
 }
 
 EXPORT("drop") void drop(Instance *c) {

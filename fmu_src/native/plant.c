@@ -33,7 +33,7 @@ static void inputs(const Plant *a, double u[ROOM(INPUTS)]) {
 }
 
 /* The inputs at a time after the beginning of a step; the slope of a command is the acceleration that it demands. */
-static void inputs_after(const Plant *a, double t, double u[ROOM(INPUTS)]) {
+static void shifted_inputs(const Plant *a, double t, double u[ROOM(INPUTS)]) {
     for (int i = 0; i < INPUTS; i++) u[i] = a->given[input_at[i]] + a->slopes[i] * (t - a->slopes_from);
     for (int c = 0; c < COMMANDS; c++) u[commands[c].acceleration] += a->slopes[commands[c].input];
 }
@@ -58,11 +58,11 @@ static Reason check_inputs(const Plant *a, char sentence[SENTENCE]) {
 
 /* The equations at a state */
 
-static void derivative_of(const Plant *a, const double x[STATES], const double u[], double result[STATES]) {
+static void state_derivative(const Plant *a, const double x[STATES], const double u[], double result[STATES]) {
     call(equations_derivative, (const double *[]){x, a->modes, u, a->p}, (double *[]){result});
 }
 
-static double clearance_of(const Plant *a, const double x[STATES]) {
+static double state_clearance(const Plant *a, const double x[STATES]) {
     double u[ROOM(INPUTS)], result;
     inputs(a, u);
     call(equations_clearance, (const double *[]){x, a->modes, u, a->p}, (double *[]){&result});
@@ -206,12 +206,12 @@ bool plant_jams(const Plant *a, const double x[STATES]) {
     Plant smooth = *a;
     if (SWITCH < 0 || a->p[SWITCH] == 0.0) return false;
     smooth.p[SWITCH] = 0.0;
-    return fabs(clearance_of(&smooth, x)) >= NEAR_CLEARANCE;
+    return fabs(state_clearance(&smooth, x)) >= NEAR_CLEARANCE;
 }
 
 Reason plant_check_assembly(const Plant *a, const double x[STATES], char sentence[SENTENCE]) {
     char where[SENTENCE], more[SENTENCE];
-    double clearance = clearance_of(a, x), apart[STATES];
+    double clearance = state_clearance(a, x), apart[STATES];
     if (clearance >= LIMIT_CLEARANCE) return GOOD;
     bool jams = plant_jams(a, x), near = clearance >= 0.0;
     configuration(x, where);
@@ -271,7 +271,7 @@ Reason plant_begin(Plant *a, char sentence[SENTENCE]) {
 }
 
 /* Constants of the parameters given, with the energy at the state. */
-static double energy_of(const Plant *a, double p[CONSTANTS]) {
+static double start_energy(const Plant *a, double p[CONSTANTS]) {
     double own[ROOM(PARAMETERS)], state[2 * FREEDOMS], u[ROOM(INPUTS)], x[STATES], scale[STATES];
     what_begins(a, own, state, u);
     memcpy(state, a->x, sizeof state);
@@ -284,7 +284,7 @@ Reason plant_tune(Plant *a, const double before[VARIABLES], char sentence[SENTEN
     double p[CONSTANTS], unused[CONSTANTS];
     memcpy(old.given, before, sizeof old.given);
     Reason reason = check_parameters(a, sentence);
-    double change = energy_of(a, p) - energy_of(&old, unused);
+    double change = start_energy(a, p) - start_energy(&old, unused);
     if (reason == GOOD && !all_finite(p, CONSTANTS)) reason = blame_extreme(a, sentence);
     if (reason != GOOD) {
         *a = old;
@@ -298,17 +298,17 @@ Reason plant_tune(Plant *a, const double before[VARIABLES], char sentence[SENTEN
 /* The integrator: see step.h */
 
 /* What the slope of the state needs beside it: the plant, whose inputs change over the step. */
-static bool slope_of(const void *context, double t, const double x[], double result[], int length) {
+static bool state_slope(const void *context, double t, const double x[], double result[], int length) {
     (void)length;
     const Plant *a = context;
     double u[ROOM(INPUTS)];
-    inputs_after(a, t, u);
-    derivative_of(a, x, u, result);
+    shifted_inputs(a, t, u);
+    state_derivative(a, x, u, result);
     return true; /* a slope that is not finite makes the result so */
 }
 
 static double attempt(const Plant *a, double t, const double x[STATES], double h, double k[], double result[STATES]) {
-    return attempt_step(slope_of, a, t, x, h, k, a->scale, STATES, result);
+    return attempt_step(state_slope, a, t, x, h, k, a->scale, STATES, result);
 }
 
 /* A cautious first step: one hundredth of the time in which the state would change by its own size. */
@@ -325,7 +325,7 @@ static double up_to_limit(const Plant *a, double t, double x[STATES], double h, 
     while (high - low > 1e-15 * h) {
         double middle = 0.5 * (low + high);
         attempt(a, t, x, middle, k, tried);
-        if (clearance_of(a, tried) >= LIMIT_CLEARANCE) {
+        if (state_clearance(a, tried) >= LIMIT_CLEARANCE) {
             low = middle;
             memcpy(best, tried, sizeof best);
         } else {
@@ -341,7 +341,7 @@ static Reason not_met(const Plant *a, const double x[STATES], double time, const
     Digits number;
     configuration(x, where);
     digits(number, time);
-    if (!(fabs(clearance_of(a, x)) >= NEAR_CLEARANCE)) {
+    if (!(fabs(state_clearance(a, x)) >= NEAR_CLEARANCE)) {
         snprintf(sentence, SENTENCE, "in the step from t = %s s: %s near %s", number, plant_jams(a, x) ? JAMMING : ASSEMBLY,
                  where);
         return LIMIT_OF_ASSEMBLY;
@@ -386,7 +386,7 @@ static Reason integrate(Plant *a, double x[STATES], double time, double *duratio
     char cause[SENTENCE];
     Digits first, second, third;
     Reason reason;
-    slope_of(a, 0.0, x, k, STATES);
+    state_slope(a, 0.0, x, k, STATES);
     if (!all_finite(k, STATES)) return not_met(a, x, time, "the accelerations are not finite", sentence);
     double proposal = a->step_size > 0.0 ? a->step_size : first_step(a, x, k, *duration);
     for (int steps = 1;; steps++) {
@@ -401,7 +401,7 @@ static Reason integrate(Plant *a, double x[STATES], double time, double *duratio
         }
         double error = attempt(a, done, x, h, k, result) / a->tolerance;
         if (error <= 1.0 && !last) {
-            slope_of(a, done + h, result, slope, STATES);
+            state_slope(a, done + h, result, slope, STATES);
             if (!all_finite(slope, STATES)) error = NAN;
         }
         if (error <= 1.0) {
@@ -423,7 +423,7 @@ static Reason integrate(Plant *a, double x[STATES], double time, double *duratio
                 if (*duration <= done) return GOOD;
                 reason = check_inputs(a, sentence);
                 if (reason != GOOD) return reason;
-                slope_of(a, done, x, k, STATES);
+                state_slope(a, done, x, k, STATES);
             }
         } else {
             proposal = h * step_factor(error);
@@ -521,7 +521,7 @@ bool plant_derivative(const Plant *a, double derivative[STATES]) {
     double x[STATES], u[ROOM(INPUTS)];
     plant_present(a, x);
     inputs(a, u);
-    derivative_of(a, x, u, derivative);
+    state_derivative(a, x, u, derivative);
     return all_finite(derivative, STATES);
 }
 
@@ -538,7 +538,7 @@ bool plant_state_derivative(const Plant *a, double derivative[STATES]) {
 double plant_margin(const Plant *a) {
     double x[STATES];
     plant_present(a, x);
-    return clearance_of(a, x) - LIMIT_CLEARANCE;
+    return state_clearance(a, x) - LIMIT_CLEARANCE;
 }
 
 /* Derivatives of what is computed */

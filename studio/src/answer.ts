@@ -1,6 +1,6 @@
 /** What came of a job, as the page shows it: tables with small pictures, charts, files. */
 
-import { look, plotIn } from "./charts";
+import { look, makePlot } from "./charts";
 import { button, line, make } from "./elements";
 import { save } from "./exports";
 import type { Answer, File, Small } from "./server";
@@ -45,7 +45,7 @@ export function smallPicture({ links, curves }: Small, wanted: Point[], closed: 
 }
 
 /** The table of an answer; `last` is what stands at the end of a row. */
-export function tableOf(answer: Answer, wanted: Point[], last?: (row: number) => Node[]): HTMLElement {
+export function answerTable(answer: Answer, wanted: Point[], last?: (row: number) => Node[]): HTMLElement {
   const { headings, rows, files } = answer.table!;
   const made = make("table");
   const head = made.createTHead().insertRow();
@@ -68,7 +68,7 @@ export function tableOf(answer: Answer, wanted: Point[], last?: (row: number) =>
 }
 
 /** Curves over an axis that has a name and a unit. */
-export function curvesIn(
+export function drawCurves(
   place: HTMLElement,
   title: string,
   axis: string,
@@ -79,14 +79,14 @@ export function curvesIn(
   place.append(box);
   // the first is wide, so that it is seen under the second
   const looks = curves.map(({ label }, n) => look(label, n, n === 0 && curves.length > 1 ? 4 : 1.5));
-  const plot = plotIn(box, axis, looks, { width: Math.max(220, place.clientWidth - 24) });
+  const plot = makePlot(box, axis, looks, { width: Math.max(220, place.clientWidth - 24) });
   plot.setData([x, ...curves.map(({ y }) => y)]);
 }
 
 /** All of an answer but for what the page does with it: words, charts, files. */
-export function shownIn(place: HTMLElement, answer: Answer, table: HTMLElement | undefined): void {
+export function showAnswer(place: HTMLElement, answer: Answer, table: HTMLElement | undefined): void {
   place.replaceChildren(make("p", { textContent: plainly(answer.words) }), ...(table ? [table] : []));
   for (const { title, unit, axis, x, y } of answer.charts ?? [])
-    curvesIn(place, `${title} [${unit}]`, axis, x, [{ label: title, y }]);
+    drawCurves(place, `${title} [${unit}]`, axis, x, [{ label: title, y }]);
   if (answer.files) place.append(line(...answer.files.map(fileButton)));
 }

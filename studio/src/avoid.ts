@@ -41,7 +41,7 @@ const overlap = (a: Arc, b: Arc): Interval => [
   Math.min(span(a)[1], span(b)[1]),
 ];
 
-export function arcsOf(branch: Point[], tolerance: number): Arc[] {
+export function splitArcs(branch: Point[], tolerance: number): Arc[] {
   // at a special point a multiplier is on the unit circle: its neighbours judge
   const holds = branch.map((point) => point.kind !== "" || largest(point) <= 1 + tolerance);
   const way = (i: number): string => {
@@ -65,7 +65,7 @@ export function arcsOf(branch: Point[], tolerance: number): Arc[] {
 }
 
 /** The amplitude of an arc at a value, between its points. */
-export function amplitudeAt({ points }: Arc, value: number): number {
+export function interpolateAmplitude({ points }: Arc, value: number): number {
   const i = Math.max(
     1,
     points.findIndex((point) => point.value >= value),
@@ -79,7 +79,7 @@ function same(a: Arc, b: Arc): boolean {
   const [low, high] = overlap(a, b);
   if (low >= high) return false;
   return [0.2, 0.4, 0.6, 0.8].every((share) => {
-    const [x, y] = [a, b].map((arc) => amplitudeAt(arc, low + share * (high - low)));
+    const [x, y] = [a, b].map((arc) => interpolateAmplitude(arc, low + share * (high - low)));
     return Math.abs(x - y) < SAME * Math.max(x, y);
   });
 }
@@ -172,7 +172,7 @@ export function rangesToAvoid(arcs: Arc[], low: number, high: number): Avoided[]
 }
 
 /** What happens at the folds at which a stable motion ends. */
-export function jumpsOf(arcs: Arc[]): Jump[] {
+export function findJumps(arcs: Arc[]): Jump[] {
   const stable = arcs.filter((arc) => arc.stable);
   const found: Jump[] = [];
   for (const arc of stable)
@@ -187,7 +187,7 @@ export function jumpsOf(arcs: Arc[]): Jump[] {
         value: end.value,
         rising,
         before: end.amplitude,
-        after: after.map((one) => amplitudeAt(one, end.value)).sort((a, b) => a - b),
+        after: after.map((one) => interpolateAmplitude(one, end.value)).sort((a, b) => a - b),
       });
     }
   return found.sort((a, b) => a.value - b.value);

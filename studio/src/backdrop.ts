@@ -1,6 +1,6 @@
 /** A photo or a drawing behind the mechanism: it never leaves the machine, only where it lies is kept. */
 
-import { linesIn } from "./dxf";
+import { readLines } from "./dxf";
 import { element } from "./picture";
 import type { Placement } from "./tables";
 import type { Point, View } from "./view";
@@ -141,7 +141,7 @@ export class Backdrop {
   }
 
   private lines(text: string): void {
-    const { paths, left } = linesIn(text);
+    const { paths, left } = readLines(text);
     const [low, high]: Point[] = [
       [Infinity, Infinity],
       [-Infinity, -Infinity],

@@ -3,8 +3,15 @@
 import uPlot from "uplot";
 import uplotStyle from "uplot/dist/uPlot.min.css";
 import type { Rows } from "./motions";
-import { type Chart as Table, type Curve, type Mechanism, outputAt, rowLength, type Source } from "./tables";
-import { called, roundingOf } from "./words";
+import {
+  type Chart as Table,
+  type Curve,
+  type Mechanism,
+  outputPlace,
+  rowLength,
+  type Source,
+} from "./tables";
+import { called, roundingSizes } from "./words";
 
 /** Colours alone do not tell the curves apart; of each there is a colour `--curve` with its number. */
 const DASHES: number[][] = [[], [7, 3], [2, 3], [9, 3, 2, 3], [4, 2], [12, 4]];
@@ -36,7 +43,7 @@ function sample({ stroke, dash, width }: Look): string {
 }
 
 /** The name of a curve in the legend: a click shows and hides the curve, which uPlot hears of. */
-function switchOf({ label }: Look): HTMLElement {
+function legendSwitch({ label }: Look): HTMLElement {
   const made = document.createElement("button");
   made.textContent = label;
   made.title = "Show or hide this curve";
@@ -45,13 +52,13 @@ function switchOf({ label }: Look): HTMLElement {
 }
 
 /** Curves over an axis with a name and a unit, in the colours of the page; without data yet. */
-export function plotIn(
+export function makePlot(
   place: HTMLElement,
   axis: string,
   looks: Look[],
   options: Partial<uPlot.Options>,
 ): uPlot {
-  const switches = looks.map(switchOf);
+  const switches = looks.map(legendSwitch);
   const pressed = (plot: uPlot, n: number | null): void =>
     void (n && switches[n - 1].setAttribute("aria-pressed", String(plot.series[n].show)));
   const stroke = colour("text");
@@ -137,7 +144,7 @@ export class Charts {
       const looks = curves.map((curve, n) => look(called(curve), n));
       // its scale is known when it is drawn
       const hooks = { draw: [() => this.mark(this.row)] };
-      const plot = plotIn(box, axis, looks, { width: this.width(), hooks });
+      const plot = makePlot(box, axis, looks, { width: this.width(), hooks });
       const line = document.createElement("div");
       line.className = "now";
       plot.over.append(line);
@@ -150,16 +157,16 @@ export class Charts {
     if (source !== this.kind) this.show(this.mechanism, source);
     const m = this.mechanism;
     const length = rowLength(m);
-    const crank = source === "steady" && m.crank >= 0 ? outputAt(m, m.freedoms[m.crank].coordinate) : -1;
+    const crank = source === "steady" && m.crank >= 0 ? outputPlace(m, m.freedoms[m.crank].coordinate) : -1;
     const value = (row: number, of: number[]): number => {
-      const parts = of.map((output) => rows.values[row * length + outputAt(m, output)]);
+      const parts = of.map((output) => rows.values[row * length + outputPlace(m, output)]);
       return parts.length === 1 ? parts[0] : Math.hypot(...parts);
     };
     const numbers = Array.from({ length: rows.count }, (_, row) => row);
     this.axis = numbers.map((row) =>
       crank < 0 ? rows.values[row * length] : (rows.values[row * length + crank] * 180) / Math.PI,
     );
-    const roundings = roundingOf(m, rows);
+    const roundings = roundingSizes(m, rows);
     for (const { plot, unit, factor, curves } of this.charts) {
       const rounding = roundings.get(unit) ?? 0;
       const seen = (found: number): number => (Math.abs(found) > rounding ? found * factor : 0);

@@ -1,10 +1,10 @@
 /** A run of the FMU over the page's own. */
 
-import { curvesIn } from "./answer";
-import { bytesOf, Core } from "./core";
+import { drawCurves } from "./answer";
+import { moduleBytes, Core } from "./core";
 import { make } from "./elements";
 import type { Answer } from "./server";
-import { givenOf, type Mechanism, type Output, outputAt, rowLength } from "./tables";
+import { allGiven, type Mechanism, type Output, outputPlace, rowLength } from "./tables";
 import { called, digits, shown } from "./words";
 
 /** Steps of a run of the FMU. */
@@ -20,8 +20,8 @@ interface Pair {
 }
 
 /** Where the runs differ most is said; what is drawn is chosen, first how the mechanism moves. */
-export async function compareIn(place: HTMLElement, m: Mechanism, answer: Answer): Promise<void> {
-  const pairs = await pairsOf(m, answer);
+export async function showComparison(place: HTMLElement, m: Mechanism, answer: Answer): Promise<void> {
+  const pairs = await loadPairs(m, answer);
   const worst = pairs.reduce((one, other) => (other.relative > one.relative ? other : one));
   const said = make("p", {
     textContent:
@@ -45,22 +45,22 @@ export async function compareIn(place: HTMLElement, m: Mechanism, answer: Answer
     const title = `${called(output)}${output.unit && ` [${output.unit}]`}`;
     const time = answer.time!.slice(0, page.length);
     chart.replaceChildren();
-    curvesIn(chart, title, "time [s]", time, [curve("page", page), curve("FMU", fmu)]);
+    drawCurves(chart, title, "time [s]", time, [curve("page", page), curve("FMU", fmu)]);
   };
   choice.addEventListener("change", drawn);
   place.append(said, make("label", {}, "Output ", choice), chart);
   drawn();
 }
 
-async function pairsOf(m: Mechanism, answer: Answer): Promise<Pair[]> {
+async function loadPairs(m: Mechanism, answer: Answer): Promise<Pair[]> {
   const { values, duration } = answer.states![0]!;
-  const core = await Core.make(m, await bytesOf(m));
-  core.give(givenOf(m, values));
+  const core = await Core.make(m, await moduleBytes(m));
+  core.give(allGiven(m, values));
   const own = core.run((duration ?? 1) / STEPS, STEPS);
   const count = Math.min(own.count, answer.time!.length);
   const length = rowLength(m);
   const curves = m.outputs.map((output, n) => {
-    const page = Array.from({ length: count }, (_, row) => own.values[row * length + outputAt(m, n)]);
+    const page = Array.from({ length: count }, (_, row) => own.values[row * length + outputPlace(m, n)]);
     const fmu = answer.outputs![output.name].slice(0, count);
     return { output, page, fmu, largest: Math.max(...page.map(Math.abs)) };
   });

@@ -1,7 +1,7 @@
 /** Buttons, lists and keys about the mechanism: what they do is told by who makes them. */
 
 import type { Playback } from "./playback";
-import { type Source, type State, type Tables, valueOf } from "./tables";
+import { type Source, type State, type Tables, givenValue } from "./tables";
 import { digits, multiplierInWords, verdictInWords } from "./words";
 import type { Answer } from "./worker";
 
@@ -87,7 +87,9 @@ export class Controls {
   name({ mechanism, title, values }: State): void {
     by("title").textContent = title;
     const { given, sets } = this.tables.mechanisms.find((m) => m.name === mechanism)!;
-    const set = sets.find((known) => given.every((g) => valueOf(g, known.values) === valueOf(g, values)));
+    const set = sets.find((known) =>
+      given.every((g) => givenValue(g, known.values) === givenValue(g, values)),
+    );
     this.sets.value = set ? `${mechanism}/${set.name}` : "";
   }
 

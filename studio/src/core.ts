@@ -25,7 +25,7 @@ interface Face {
   studio_drag(joint: number, first: number, second: number): number;
 }
 
-export async function bytesOf(m: Mechanism): Promise<ArrayBuffer> {
+export async function moduleBytes(m: Mechanism): Promise<ArrayBuffer> {
   const packed = Uint8Array.from(atob(m.module), (c) => c.charCodeAt(0));
   const stream = new Blob([packed]).stream().pipeThrough(new DecompressionStream("gzip"));
   return new Response(stream).arrayBuffer();

@@ -108,20 +108,20 @@ function corners({ pairs }: Entity): [Point, number][] {
   return found;
 }
 
-const centreOf = (one: Entity): Point => [number(one, 10), number(one, 20)];
+const entityCentre = (one: Entity): Point => [number(one, 10), number(one, 20)];
 
 /** The path of an entity; of a POLYLINE with the vertices that follow it. */
-function pathOf(one: Entity, all: Entity[], next: number): Point[] | undefined {
+function entityPath(one: Entity, all: Entity[], next: number): Point[] | undefined {
   const rad = Math.PI / 180;
   const closed = (number(one, 70) & 1) === 1;
   switch (one.kind) {
     case "LINE":
-      return [centreOf(one), [number(one, 11), number(one, 21)]];
+      return [entityCentre(one), [number(one, 11), number(one, 21)]];
     case "CIRCLE":
     case "ARC": {
       const [from, to] = one.kind === "ARC" ? [number(one, 50), number(one, 51)] : [0, 360];
       const over = (((to - from) % 360) + 360) % 360 || 360;
-      const [centre, radius] = [centreOf(one), number(one, 40)];
+      const [centre, radius] = [entityCentre(one), number(one, 40)];
       const start: Point = [
         centre[0] + radius * Math.cos(from * rad),
         centre[1] + radius * Math.sin(from * rad),
@@ -133,7 +133,7 @@ function pathOf(one: Entity, all: Entity[], next: number): Point[] | undefined {
     case "POLYLINE": {
       const vertices: [Point, number][] = [];
       for (let n = next; all[n]?.kind === "VERTEX"; n++)
-        vertices.push([centreOf(all[n]), number(all[n], 42)]);
+        vertices.push([entityCentre(all[n]), number(all[n], 42)]);
       return polyline(vertices, closed);
     }
     default:
@@ -142,7 +142,7 @@ function pathOf(one: Entity, all: Entity[], next: number): Point[] | undefined {
 }
 
 /** The lines of a DXF: LINE, LWPOLYLINE, POLYLINE, CIRCLE and ARC; an Error says where there are none. */
-export function linesIn(text: string): Lines {
+export function readLines(text: string): Lines {
   if (text.startsWith("AutoCAD Binary DXF")) throw new Error("a binary DXF is not read: save it as text");
   const rows = text.split(/\r\n|\r|\n/);
   const entities: Entity[] = [];
@@ -164,7 +164,7 @@ export function linesIn(text: string): Lines {
   const found: Lines = { paths: [], left: {} };
   entities.forEach((one, n) => {
     if (["VERTEX", "SEQEND"].includes(one.kind)) return;
-    const path = pathOf(one, entities, n + 1);
+    const path = entityPath(one, entities, n + 1);
     if (!path) found.left[one.kind] = (found.left[one.kind] ?? 0) + 1;
     else if (path.length > 1 && path.flat().every(Number.isFinite))
       found.paths.push(path.map(([x, y]) => [x * unit, y * unit]));

@@ -52,7 +52,7 @@ export interface Rule {
 }
 
 /** The number of a text, or what is wrong with it. */
-export function numberOf(text: string, name: string, unit: string, rule: Rule): number {
+export function readNumber(text: string, name: string, unit: string, rule: Rule): number {
   const written = text.trim();
   if (written === "" && rule.missing !== undefined) return rule.missing;
   const value = written === "" ? Number.NaN : Number(written);
@@ -86,7 +86,7 @@ export function number(
   const field = make("input", { type: "number", step: "any", value: String(value) });
   const read = (): number => {
     try {
-      return numberOf(field.value, label, unit, rule);
+      return readNumber(field.value, label, unit, rule);
     } catch (error) {
       throw new Wrong((error as Error).message, field);
     }

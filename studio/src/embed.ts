@@ -1,6 +1,6 @@
 /** The page in a frame of a notebook: its state goes to the page around it, and comes from there. */
 
-import { type State, stateFrom, type Tables } from "./tables";
+import { type State, checkState, type Tables } from "./tables";
 
 /** Whether the page was put into a frame as a text, which anywidget's part of it does (analysis/studio/widget.js). */
 export const embedded = (): boolean => location.href === "about:srcdoc" && parent !== window;
@@ -17,7 +17,7 @@ export class Embed {
     addEventListener("message", ({ source, data }: MessageEvent<{ linkwork?: unknown }>) => {
       if (source !== parent || !data?.linkwork) return;
       try {
-        this.take(stateFrom(data.linkwork, tables));
+        this.take(checkState(data.linkwork, tables));
       } catch (error) {
         fault((error as Error).message);
       }

@@ -3,7 +3,15 @@
 import type { Orbit, Rows } from "./motions";
 import { dxfText } from "./dxf";
 import type { Drawn } from "./picture";
-import { type Given, type Mechanism, rowLength, type State, stateFrom, type Tables, valueOf } from "./tables";
+import {
+  type Given,
+  type Mechanism,
+  rowLength,
+  type State,
+  checkState,
+  type Tables,
+  givenValue,
+} from "./tables";
 
 /** A number as TOML and Python read it, with every digit. */
 function written(number: number): string {
@@ -15,7 +23,7 @@ function written(number: number): string {
 export function caseText(m: Mechanism, state: State, duration: number): string {
   const lines = [`mechanism = ${JSON.stringify(m.name)}`, `title = ${JSON.stringify(state.title)}`];
   const modes = m.given.filter((g) => g.arguments);
-  const chosen = modes.map((mode) => mode.arguments![valueOf(mode, state.values)]);
+  const chosen = modes.map((mode) => mode.arguments![givenValue(mode, state.values)]);
   const inputs = m.given.filter((g) => g.argument !== undefined);
   const forced = new Set(inputs.filter((g) => g.kind === "force").map((g) => g.argument!));
   // a rate at the start is that of a freedom that a force drives
@@ -25,15 +33,15 @@ export function caseText(m: Mechanism, state: State, duration: number): string {
   });
   const idle = new Set(m.freedoms.flatMap(({ initial }, n) => (free[n] ? [] : [initial[1]])));
   const motor = m.given.filter((g) => g.kind === "motor");
-  const law = motor.map((g) => `${g.file!} = ${written(valueOf(g, state.values))}`).join(", ");
+  const law = motor.map((g) => `${g.file!} = ${written(givenValue(g, state.values))}`).join(", ");
   // what acts: a motor beside the torque that is given
   const acting = (g: Given, now: number): string =>
-    g.argument === motor[0]?.argument && valueOf(motor[0], state.values) !== 0
+    g.argument === motor[0]?.argument && givenValue(motor[0], state.values) !== 0
       ? `[${written(now)}, { kind = "induction-motor", ${law} }]`
       : written(now);
   for (const given of m.given) {
     if (given.kind === "motor") continue;
-    const now = valueOf(given, state.values);
+    const now = givenValue(given, state.values);
     if (given.arguments) {
       const flag = chosen[modes.indexOf(given)];
       if (!inputs.some((g) => g.argument === flag)) lines.push(`${given.name.split(".")[0]}.${flag} = true`);
@@ -54,16 +62,16 @@ export function pythonText(m: Mechanism, state: State, duration: number, orbit?:
   return `import tomllib
 from pathlib import Path
 
-${start ? "from analysis.periodic import drive_of, orbit_of\n" : ""}from analysis.run import case_from, simulate
+${start ? "from analysis.periodic import steady_drive, newton_orbit\n" : ""}from analysis.run import read_case, simulate
 
-case = case_from(tomllib.loads(r"""
+case = read_case(tomllib.loads(r"""
 ${caseText(m, state, duration)}"""), folder=Path())
 run = simulate(case.parameters, case.inputs, initial=case.initial, stop_time=case.stop_time, step=case.step)
 print(run)
 ${
   start
     ? `# of several motions that which the page shows, from its start
-orbit = orbit_of(case.parameters, drive_of(case.parameters, case.inputs, case.initial), start=${start})
+orbit = newton_orbit(case.parameters, steady_drive(case.parameters, case.inputs, case.initial), start=${start})
 print(orbit, orbit.multipliers)
 `
     : ""
@@ -78,7 +86,7 @@ export function parameterText(m: Mechanism, state: State): string {
   // a motor of the page has no value reference: it is none of the FMU's
   const known = m.given.filter((given) => given.reference >= 0);
   const lines = known.map((given) => {
-    const now = valueOf(given, state.values);
+    const now = givenValue(given, state.values);
     const written = given.choices ? `<ssv:Integer value="${now}"/>` : `<ssv:Real value="${now}"/>`;
     return `    <ssv:Parameter name="${escaped(given.name)}">${written}</ssv:Parameter>`;
   });
@@ -104,7 +112,7 @@ export function tableText(m: Mechanism, rows: Rows): string {
 }
 
 /** The state in the address of the page. */
-export function linkOf(state: State): string {
+export function pageAddress(state: State): string {
   const bytes = new TextEncoder().encode(JSON.stringify(state));
   const text = btoa(String.fromCharCode(...bytes))
     .replaceAll("+", "-")
@@ -114,7 +122,7 @@ export function linkOf(state: State): string {
 }
 
 /** The state that an address holds, if it holds one; an Error says what is wrong with it. */
-export function stateIn(address: string, tables: Tables): State | undefined {
+export function readState(address: string, tables: Tables): State | undefined {
   const text = /#state=([^&]+)$/.exec(address)?.[1];
   if (!text) return undefined;
   let data: unknown;
@@ -126,7 +134,7 @@ export function stateIn(address: string, tables: Tables): State | undefined {
   } catch {
     throw new Error("the state in the address is damaged: a part of the link may be missing");
   }
-  return stateFrom(data, tables);
+  return checkState(data, tables);
 }
 
 /** What is saved: the motion, and the drawing in its forms. */

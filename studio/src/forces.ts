@@ -3,7 +3,7 @@
 import type { Rows } from "./motions";
 import { hull } from "./hull";
 import { type Interval, Plane } from "./plane";
-import { type Chart, type Mechanism, outputAt, rowLength } from "./tables";
+import { type Chart, type Mechanism, outputPlace, rowLength } from "./tables";
 import { called, digits } from "./words";
 
 const HEIGHT = 300;
@@ -64,7 +64,7 @@ export class Forces {
     const length = rowLength(this.mechanism);
     const places = sides.map((side) => {
       const number = curve.of["xyz".indexOf(side)] as number | undefined;
-      return number === undefined ? -1 : outputAt(this.mechanism, number);
+      return number === undefined ? -1 : outputPlace(this.mechanism, number);
     });
     const points = Array.from({ length: rows.count }, (_, row): Interval => {
       const [x, y] = places.map((place) => (place < 0 ? 0 : rows.values[row * length + place]));

@@ -2,10 +2,10 @@
 
 import { Backdrop } from "./backdrop";
 import { by, Controls } from "./controls";
-import { bytesOf, Core } from "./core";
+import { moduleBytes, Core } from "./core";
 import type { Rows } from "./motions";
 import { Embed } from "./embed";
-import { linkOf, saveAs, stateIn } from "./exports";
+import { pageAddress, saveAs, readState } from "./exports";
 import { History } from "./history";
 import { Numbers } from "./numbers";
 import { Panel } from "./panel";
@@ -15,17 +15,17 @@ import { WithPython } from "./python";
 import { Solver } from "./solver";
 import {
   type Given,
-  givenOf,
-  jointAt,
+  allGiven,
+  jointPlace,
   type Mechanism,
-  outputAt,
+  outputPlace,
   rowLength,
   type Source,
   type State,
   type Tables,
-  valueOf,
+  givenValue,
 } from "./tables";
-import { called, capital, motionInWords, roundingOf } from "./words";
+import { called, capital, motionInWords, roundingSizes } from "./words";
 import { Views } from "./views";
 import type { Answer } from "./worker";
 
@@ -103,7 +103,7 @@ class Studio {
     const starts: State[] = [this.state, { mechanism, title: "", values: {} }];
     let said = "";
     try {
-      const given = stateIn(location.href, this.tables);
+      const given = readState(location.href, this.tables);
       if (given) starts.unshift(given);
     } catch (error) {
       said = (error as Error).message;
@@ -136,7 +136,7 @@ class Studio {
   private async open(state: State): Promise<string> {
     const mechanism = this.tables.mechanisms.find((m) => m.name === state.mechanism);
     if (!mechanism) throw new Error(`there is no mechanism ${state.mechanism}`);
-    const bytes = mechanism === this.mechanism ? undefined : await bytesOf(mechanism);
+    const bytes = mechanism === this.mechanism ? undefined : await moduleBytes(mechanism);
     const core = bytes ? await Core.make(mechanism, bytes) : this.core;
     const { values, sentence } = this.begin(core, mechanism, state);
     this.fault(capital(sentence));
@@ -173,7 +173,7 @@ class Studio {
 
   /** The links at the start, with the sentence where they cannot be joined. */
   private begin(core: Core, mechanism: Mechanism, { values }: State): Rows {
-    core.give(givenOf(mechanism, values));
+    core.give(allGiven(mechanism, values));
     return core.run(1, 0);
   }
 
@@ -182,7 +182,7 @@ class Studio {
     const duration = this.duration();
     this.solver.ask({
       start,
-      given: givenOf(m, this.state.values),
+      given: allGiven(m, this.state.values),
       source: this.state.source ?? "steady",
       step: duration / RUN_STEPS,
       count: RUN_STEPS,
@@ -206,7 +206,7 @@ class Studio {
   }
 
   private value(given: Given): number {
-    return valueOf(given, this.state.values);
+    return givenValue(given, this.state.values);
   }
 
   private answered(answer: Answer, newest: boolean): void {
@@ -243,7 +243,7 @@ class Studio {
     const m = this.mechanism;
     let natural = Number.NaN;
     if (m.natural !== null) {
-      this.core.give(givenOf(m, this.state.values));
+      this.core.give(allGiven(m, this.state.values));
       natural = this.core.natural(m.natural);
     }
     this.charts.see({ mechanism: m, values: this.state.values, orbit, natural });
@@ -270,10 +270,10 @@ class Studio {
 
   private tell(row: Float64Array): void {
     const m = this.mechanism;
-    const angle = m.crank < 0 ? 0 : row[outputAt(m, m.freedoms[m.crank].coordinate)];
+    const angle = m.crank < 0 ? 0 : row[outputPlace(m, m.freedoms[m.crank].coordinate)];
     const crank = m.crank < 0 ? "" : `, crank at ${((angle * 180) / Math.PI).toFixed(1)} deg`;
     by("instant").textContent = `t = ${row[0].toFixed(4)} s${crank}`;
-    this.numbers.write(row, roundingOf(m, this.playback.answer!.rows));
+    this.numbers.write(row, roundingSizes(m, this.playback.answer!.rows));
   }
 
   // Changes
@@ -325,7 +325,7 @@ class Studio {
   /** The state in which a joint comes to a place, as far as the links let it; none where nothing moves. */
   private pull(joint: number, target: [number, number], held: Float64Array): State | undefined {
     const m = this.mechanism;
-    const at = jointAt(m, joint);
+    const at = jointPlace(m, joint);
     const [x, y] = this.view.seen(held[at], held[at + 1], held[at + 2]);
     this.fault("");
     if (Math.hypot(x - target[0], y - target[1]) * this.view.scale < NEAR) return undefined;
@@ -340,10 +340,10 @@ class Studio {
     }
     // the configuration that is drawn is the start of what is dragged
     const start = m.freedoms.flatMap((f): [number, number][] => [
-      [f.initial[0], held[outputAt(m, f.coordinate)]],
-      [f.initial[1], held[outputAt(m, f.rate)]],
+      [f.initial[0], held[outputPlace(m, f.coordinate)]],
+      [f.initial[1], held[outputPlace(m, f.rate)]],
     ]);
-    this.core.give([...givenOf(m, this.state.values), ...start]);
+    this.core.give([...allGiven(m, this.state.values), ...start]);
     const before = free.map((reference) => this.core.given(reference));
     const { values: row, sentence } = this.core.drag(joint, free, this.view.matrix.slice(0, 6), target);
     this.fault(capital(sentence));
@@ -418,7 +418,7 @@ class Studio {
     new ResizeObserver(() => this.refit()).observe(by("picture"));
     addEventListener("hashchange", () => {
       try {
-        const state = stateIn(location.href, this.tables);
+        const state = readState(location.href, this.tables);
         if (state) void this.take(state);
       } catch (error) {
         this.fault((error as Error).message);
@@ -448,7 +448,7 @@ class Studio {
     const { rows, orbit } = this.playback.answer ?? {};
     await saveAs(form, { mechanism, state, duration: this.duration(), rows, orbit, drawing });
     if (form !== "link") return;
-    history.replaceState(null, "", linkOf({ ...state, view: this.view.kept }));
+    history.replaceState(null, "", pageAddress({ ...state, view: this.view.kept }));
     this.fault("");
     by("words").textContent = "The address of this page now holds its state: copy it.";
   }

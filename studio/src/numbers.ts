@@ -1,6 +1,6 @@
 /** All outputs at the instant that is drawn, as a table. */
 
-import { type Mechanism, outputAt } from "./tables";
+import { type Mechanism, outputPlace } from "./tables";
 import { shown } from "./words";
 
 export class Numbers {
@@ -33,7 +33,7 @@ export class Numbers {
     if (!this.box.open) return;
     const m = this.mechanism;
     m.outputs.forEach((output, n) => {
-      const value = row[outputAt(m, n)];
+      const value = row[outputPlace(m, n)];
       const rounding = Math.abs(value) <= (roundings.get(output.unit) ?? 0);
       this.cells[n].textContent = shown(rounding ? 0 : value, output, 6);
       this.cells[n].dataset.value = String(value);

@@ -1,6 +1,6 @@
 /** Sliders and fields of all that is given, by section. */
 
-import { type Given, type Mechanism, type Values, valueOf } from "./tables";
+import { type Given, type Mechanism, type Values, givenValue } from "./tables";
 import { called, digits } from "./words";
 
 /** Sections that are open at first. */
@@ -59,7 +59,7 @@ export class Panel {
       box.append(head);
       if (name === LOCKABLE) box.append(this.heading());
       for (const given of mechanism.given.filter((g) => g.section === name))
-        box.append(this.row(given, valueOf(given, values), locks.includes(given.name)));
+        box.append(this.row(given, givenValue(given, values), locks.includes(given.name)));
       this.place.append(box);
     }
     this.hide(values);
@@ -67,7 +67,7 @@ export class Panel {
 
   /** Show values; `all`: in the field too in which someone is. */
   update(values: Values, all = false): void {
-    for (const { given, update } of this.rows) update(valueOf(given, values), all);
+    for (const { given, update } of this.rows) update(givenValue(given, values), all);
     this.hide(values);
   }
 
@@ -80,7 +80,7 @@ export class Panel {
   private hide(values: Values): void {
     for (const { given: mode } of this.rows)
       if (mode.arguments) {
-        const acting = mode.arguments[valueOf(mode, values)];
+        const acting = mode.arguments[givenValue(mode, values)];
         for (const { given, line } of this.rows)
           if (given.argument && mode.arguments.includes(given.argument))
             line.classList.toggle("idle", given.argument !== acting);

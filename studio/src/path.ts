@@ -2,9 +2,9 @@
 
 import type { Rows } from "./motions";
 import { button, type Child, line, make, number, part, tick, Wrong } from "./elements";
-import { pointsOf, soundPath, textOf } from "./points";
+import { readPoints, soundPath, writePoints } from "./points";
 import { resampled, type Sketch } from "./sketch";
-import { jointAt, type Mechanism, outputAt, rowLength } from "./tables";
+import { jointPlace, type Mechanism, outputPlace, rowLength } from "./tables";
 import type { Point } from "./view";
 
 /** Points of a path that is taken from the mechanism. */
@@ -40,14 +40,14 @@ function drawing(form: PathForm): { rows: Child[]; target: () => object } {
   let wrong: Wrong | undefined;
   sketch.onChange = () => {
     isClosed.checked = sketch.closed;
-    points.value = textOf(sketch.points);
+    points.value = writePoints(sketch.points);
     if (wrong) form.wrong((wrong = undefined));
   };
   isClosed.addEventListener("change", () => sketch.put(sketch.points, isClosed.checked));
   points.addEventListener("change", () => {
     wrong = undefined;
     try {
-      sketch.put(pointsOf(points.value), isClosed.checked);
+      sketch.put(readPoints(points.value), isClosed.checked);
     } catch (error) {
       wrong = new Wrong((error as Error).message, points);
     }
@@ -110,12 +110,12 @@ function ownPath(m: Mechanism, rows: Rows | undefined): Point[] | undefined {
   const length = rowLength(m);
   const { crank, freedoms } = m;
   const turned = (n: number): number =>
-    crank < 0 ? 0 : rows.values[n * length + outputAt(m, freedoms[crank].coordinate)];
+    crank < 0 ? 0 : rows.values[n * length + outputPlace(m, freedoms[crank].coordinate)];
   const all: Point[] = [];
   // a turn of the crank, without its end
   for (let n = 0; n < rows.count; n++) {
     if (crank >= 0 && Math.abs(turned(n) - turned(0)) >= freedoms[crank].period * (1 - 1e-6)) break;
-    const at = n * length + jointAt(m, joint);
+    const at = n * length + jointPlace(m, joint);
     all.push([rows.values[at], rows.values[at + 1]]);
   }
   return resampled(all, true, POINTS);

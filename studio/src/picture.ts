@@ -1,6 +1,6 @@
 /** The drawing of a mechanism, by its table of parts; joints are places in a row. */
 
-import { jointAt, type Mechanism, type Part, rowLength } from "./tables";
+import { jointPlace, type Mechanism, type Part, rowLength } from "./tables";
 import { type Point, View } from "./view";
 
 type Attributes = Record<string, string | number>;
@@ -270,7 +270,7 @@ export class Picture {
   }
 
   private seen(rows: Float64Array, start: number, joint: number): Point {
-    const at = start + jointAt(this.mechanism, joint);
+    const at = start + jointPlace(this.mechanism, joint);
     return this.view.seen(rows[at], rows[at + 1], rows[at + 2]);
   }
 
@@ -282,7 +282,7 @@ export class Picture {
   private stack(row: Float64Array): void {
     const near = ({ part }: Shape): number => {
       const all = part.joints.map((joint) => {
-        const at = jointAt(this.mechanism, joint);
+        const at = jointPlace(this.mechanism, joint);
         return this.view.nearness(row[at], row[at + 1], row[at + 2]);
       });
       return all.reduce((sum, one) => sum + one, 0) / all.length;

@@ -1,6 +1,6 @@
 /** The motion that is shown, and the instant of it that is drawn. */
 
-import { type Mechanism, outputAt, rowLength } from "./tables";
+import { type Mechanism, outputPlace, rowLength } from "./tables";
 import type { Answer } from "./worker";
 
 export class Playback {
@@ -65,7 +65,7 @@ export class Playback {
     const m = this.mechanism;
     if (m.crank < 0 || this.answer?.source !== "steady") return this.time;
     const freedom = m.freedoms[m.crank];
-    const turns = values[outputAt(m, freedom.coordinate)] / freedom.period;
+    const turns = values[outputPlace(m, freedom.coordinate)] / freedom.period;
     return this.timeOf(Math.round((turns - Math.floor(turns)) * (this.count - 1)));
   }
 }

@@ -5,7 +5,7 @@ import type { Point } from "./view";
 import { digits } from "./words";
 
 /** The points of a text (m); empty lines count for nothing. */
-export function pointsOf(text: string): Point[] {
+export function readPoints(text: string): Point[] {
   return text.split("\n").flatMap((row, n): Point[] => {
     const words = row.trim().split(/[\s,;]+/);
     if (words.length === 1 && words[0] === "") return [];
@@ -17,7 +17,7 @@ export function pointsOf(text: string): Point[] {
   });
 }
 
-export const textOf = (points: Point[]): string =>
+export const writePoints = (points: Point[]): string =>
   points.map((point) => point.map((value) => digits(1e3 * value, 7)).join(" ")).join("\n");
 
 /** Of a path, at least. */

@@ -1,7 +1,7 @@
 /** What the page does with Python behind it: each part asks for a job, and shows what came of it. */
 
-import { shownIn, tableOf } from "./answer";
-import { compareIn, STEPS } from "./comparison";
+import { showAnswer, answerTable } from "./answer";
+import { showComparison, STEPS } from "./comparison";
 import type { Rows } from "./motions";
 import { button, line, make, part, tick, Wrong } from "./elements";
 import { pathPart } from "./path";
@@ -189,11 +189,11 @@ export class WithPython {
       pick.setAttribute("aria-label", `${pick.textContent}: ${table!.rows[n][0]}`);
       return [pick];
     };
-    shownIn(this.answer, answer, table && tableOf(answer, wanted, curves && last));
+    showAnswer(this.answer, answer, table && answerTable(answer, wanted, curves && last));
     if (table && states?.[0] && !curves)
       this.answer.append(line(button("Take it over", () => void this.desk.take(states[0]!))));
     if (kind === "slider" && curves) this.sketch.put(wanted, closed, curves[curves.length - 1]);
     const of = answer.outputs && states?.[0]?.mechanism;
-    if (of === this.mechanism.name) await compareIn(this.answer, this.mechanism, answer);
+    if (of === this.mechanism.name) await showComparison(this.answer, this.mechanism, answer);
   }
 }

@@ -1,11 +1,19 @@
 /** How far the slider swings over the speed, or over what else varies: stable and unstable motions, folds, doublings, what to avoid. */
 
-import { amplitudeAt, type Arc, arcsOf, type Avoided, type Interval, jumpsOf, rangesToAvoid } from "./avoid";
+import {
+  interpolateAmplitude,
+  type Arc,
+  splitArcs,
+  type Avoided,
+  type Interval,
+  findJumps,
+  rangesToAvoid,
+} from "./avoid";
 import type { Found } from "./explore";
 import type { Point } from "./motions";
 import { type Go, Search } from "./search";
 import { type Context, driving, swinging } from "./varied";
-import { type Given, valueOf } from "./tables";
+import { type Given, givenValue } from "./tables";
 import { called, digits, shown } from "./words";
 
 const HEIGHT = 260;
@@ -54,7 +62,7 @@ export class Response extends Search {
   }
 
   private get arcs(): Arc[] {
-    return this.branches.flatMap((branch) => arcsOf(branch, this.tolerance));
+    return this.branches.flatMap((branch) => splitArcs(branch, this.tolerance));
   }
 
   protected paint(): void {
@@ -89,7 +97,7 @@ export class Response extends Search {
       c.fillRect(-4, -4, 8, 8);
       c.restore();
     }
-    const now = valueOf(given!, this.context!.values) * given!.factor;
+    const now = givenValue(given!, this.context!.values) * given!.factor;
     c.lineWidth = 1.5;
     c.strokeStyle = plane.colour("text");
     plane.line([
@@ -125,7 +133,7 @@ export class Response extends Search {
         arcs.length > 0 ? `${speed} to avoid: none in this range.` : "No periodic motion was found.",
       );
     lines.push("Motions that no branch leads to were not sought; the command linkwork resonance seeks them.");
-    for (const { value, rising, before, after } of jumpsOf(arcs)) {
+    for (const { value, rising, before, after } of findJumps(arcs)) {
       const then = after.map((amplitude) => shown(amplitude, output)).join(" or ");
       lines.push(
         `Fold at ${at(value)}: where ${called(given!)} ${rising ? "rises" : "falls"} past it, the motion of ` +
@@ -176,7 +184,7 @@ export class Response extends Search {
     const [{ low, high }] = this.ranges;
     const sense = { ArrowLeft: -1, ArrowDown: -1, ArrowRight: 1, ArrowUp: 1 }[key];
     if (sense === undefined) return false;
-    const now = valueOf(this.axes[0].given!, this.context!.values);
+    const now = givenValue(this.axes[0].given!, this.context!.values);
     this.set(now + (sense * (shiftKey ? 10 : 1) * (high - low)) / 200);
     return true;
   }
@@ -186,6 +194,6 @@ export class Response extends Search {
     const inside = this.arcs.filter(
       ({ points }) => points[0].value <= value && value <= points[points.length - 1].value,
     );
-    return inside.map((arc) => amplitudeAt(arc, value));
+    return inside.map((arc) => interpolateAmplitude(arc, value));
   }
 }

@@ -3,7 +3,7 @@
 import type { Exploration, Found } from "./explore";
 import { Explorer } from "./explorer";
 import { Plane } from "./plane";
-import { type Given, type Mechanism, type Range, type Values, givenOf, valueOf } from "./tables";
+import { type Given, type Mechanism, type Range, type Values, allGiven, givenValue } from "./tables";
 import { type Context, variables } from "./varied";
 import { called, digits } from "./words";
 
@@ -150,10 +150,10 @@ export abstract class Search {
     this.ranges = this.axes.map(({ given }) => this.range(given!));
     const [{ given }] = this.axes;
     const task: Exploration = {
-      given: givenOf(mechanism, values),
+      given: allGiven(mechanism, values),
       axes: this.ranges,
       start: orbit.start,
-      at: valueOf(given!, values),
+      at: givenValue(given!, values),
     };
     if (this.grid) task.grid = this.grid;
     this.explorer.ask(task);
@@ -165,7 +165,7 @@ export abstract class Search {
   private range(given: Given): Range {
     const { natural, values } = this.context!;
     const { reference } = given;
-    const value = valueOf(given, values);
+    const value = givenValue(given, values);
     const typed = this.typed.get(given.name);
     if (typed) return { reference, low: typed[0], high: typed[1] };
     const sign = value < 0 ? -1 : 1;

@@ -3,7 +3,7 @@
 import { type Cell, type Found, middle } from "./explore";
 import { type Go, Search } from "./search";
 import { type Context, driving } from "./varied";
-import { type Given, valueOf } from "./tables";
+import { type Given, givenValue } from "./tables";
 import { called, multiplierInWords, shown, verdictInWords } from "./words";
 
 const HEIGHT = 300;
@@ -97,7 +97,7 @@ export class Stability extends Search {
         c.stroke();
       }
     }
-    const now = [x, y].map((given) => valueOf(given, this.context!.values) * given.factor);
+    const now = [x, y].map((given) => givenValue(given, this.context!.values) * given.factor);
     c.lineWidth = 1.5;
     c.strokeStyle = plane.colour("text");
     plane.line([

@@ -145,21 +145,22 @@ export const rowLength = (m: Mechanism): number =>
   1 + m.states + m.outputs.length + 3 * m.picture.joints.length + 2;
 
 /** Places in a row: of an output, and of a joint. */
-export const outputAt = (m: Mechanism, output: number): number => 1 + m.states + output;
-export const jointAt = (m: Mechanism, joint: number): number => 1 + m.states + m.outputs.length + 3 * joint;
+export const outputPlace = (m: Mechanism, output: number): number => 1 + m.states + output;
+export const jointPlace = (m: Mechanism, joint: number): number =>
+  1 + m.states + m.outputs.length + 3 * joint;
 
 /** A value, or what it starts from where a state leaves it out. */
-export const valueOf = (given: Given, values: Values): number => values[given.name] ?? given.start;
+export const givenValue = (given: Given, values: Values): number => values[given.name] ?? given.start;
 
 /** All that is given, by value reference, with the start values of what a state leaves out. */
-export function givenOf(m: Mechanism, values: Values): [number, number][] {
-  return [m.tolerance, ...m.given.map((g): [number, number] => [g.reference, valueOf(g, values)])];
+export function allGiven(m: Mechanism, values: Values): [number, number][] {
+  return [m.tolerance, ...m.given.map((g): [number, number] => [g.reference, givenValue(g, values)])];
 }
 
 const isNumber = (value: unknown): value is number => typeof value === "number" && Number.isFinite(value);
 
 /** A state as it came from elsewhere, held against the tables; an Error says what is wrong with it. */
-export function stateFrom(data: unknown, tables: Tables): State {
+export function checkState(data: unknown, tables: Tables): State {
   const state = data as Partial<State> | null;
   if (typeof state !== "object" || state === null) throw new Error("the state is no object");
   const mechanism = tables.mechanisms.find((m) => m.name === state.mechanism);

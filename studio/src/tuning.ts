@@ -1,7 +1,7 @@
 /** The form of a range of speeds in which something must not lie. */
 
 import { line, make, number, part, tick, Wrong } from "./elements";
-import { type Given, type Mechanism, type State, valueOf } from "./tables";
+import { type Given, type Mechanism, type State, givenValue } from "./tables";
 import { called } from "./words";
 
 const RPM = 30 / Math.PI;
@@ -16,7 +16,7 @@ export interface TuningForm {
 }
 
 export function tuningPart({ mechanism, state, begin }: TuningForm, first: State): HTMLElement {
-  const value = (given: Given, of = state()): number => valueOf(given, of.values);
+  const value = (given: Given, of = state()): number => givenValue(given, of.values);
   const speed = mechanism.given.find((given) => given.unit === "rpm" && given.argument !== undefined);
   const now = speed ? Math.abs(value(speed, first)) * RPM : 0;
   const [from, low, lowest] = number("speeds from", "rpm", Number((0.95 * now).toFixed(1)) || "");

@@ -1,7 +1,7 @@
 /** What can vary of a mechanism under the values that it has, and what swings then. */
 
 import type { Orbit } from "./motions";
-import { type Given, type Mechanism, type Output, type Values, valueOf } from "./tables";
+import { type Given, type Mechanism, type Output, type Values, givenValue } from "./tables";
 
 export interface Context {
   mechanism: Mechanism;
@@ -14,14 +14,14 @@ export interface Context {
 export function variables({ mechanism, values }: Context): Given[] {
   const acts = (given: Given): boolean => {
     const mode = mechanism.given.find((one) => one.arguments?.includes(given.argument ?? ""));
-    const chosen = !mode || mode.arguments![valueOf(mode, values)] === given.argument;
+    const chosen = !mode || mode.arguments![givenValue(mode, values)] === given.argument;
     return chosen && (given.kind !== "motor" || hasMotor(mechanism, values));
   };
   return mechanism.given.filter((given) => !given.choices && given.section !== "Start" && acts(given));
 }
 
 const hasMotor = (mechanism: Mechanism, values: Values): boolean =>
-  mechanism.given.some((given) => given.reference === -1 && valueOf(given, values) !== 0);
+  mechanism.given.some((given) => given.reference === -1 && givenValue(given, values) !== 0);
 
 /** What drives the crank: its speed, its torque, or the field of its motor. */
 export function driving(context: Context): Given | undefined {

@@ -19,14 +19,14 @@ const LARGER = 1.25;
 const clamp = (value: number, most: number): number => Math.max(-most, Math.min(most, value));
 
 /** Rows of the matrix from places to what is seen, both in m, and in the third what is nearer. */
-export function matrixOf(planar: boolean, [up, round]: Point): number[] {
+export function viewMatrix(planar: boolean, [up, round]: Point): number[] {
   if (planar) return [1, 0, 0, 0, 1, 0, 0, 0, 1];
   const [s, c, t, d] = [Math.sin(up), Math.cos(up), Math.sin(round), Math.cos(round)];
   return [0, d, t, c, s * t, -s * d, -s, t * c, -d * c];
 }
 
 export class View {
-  matrix: number[] = matrixOf(true, [0, 0]);
+  matrix: number[] = viewMatrix(true, [0, 0]);
   /** After a change of what is seen. */
   onChange: () => void = () => {};
   /** Whether a pointer beside the joints is the view's: not while one of them is dragged. */
@@ -79,7 +79,7 @@ export class View {
     this.angles = [kept[0], kept[1]];
     this.zoom = kept[2];
     this.shift = [kept[3], kept[4]];
-    this.matrix = matrixOf(planar, this.angles);
+    this.matrix = viewMatrix(planar, this.angles);
   }
 
   /** All that lies between two corners (m) is seen, but for what the user has changed. */
@@ -129,7 +129,7 @@ export class View {
   look(name: string): void {
     if (name in VIEWS) this.angles = [...VIEWS[name]];
     if (name === "all") [this.zoom, this.shift] = [1, [0, 0]];
-    this.matrix = matrixOf(this.planar, this.angles);
+    this.matrix = viewMatrix(this.planar, this.angles);
   }
 
   /** Larger by a factor, so that one point stays where it is. */
@@ -160,7 +160,7 @@ export class View {
 
   private turn(right: number, down: number): void {
     this.angles = [clamp(this.angles[0] + down, Math.PI / 2), this.angles[1] + right];
-    this.matrix = matrixOf(this.planar, this.angles);
+    this.matrix = viewMatrix(this.planar, this.angles);
     this.onChange();
   }
 

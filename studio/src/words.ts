@@ -1,7 +1,15 @@
 /** Numbers and verdicts in words. */
 
 import type { Orbit, Rows } from "./motions";
-import { type Given, type Mechanism, type Output, outputAt, rowLength, type Values, valueOf } from "./tables";
+import {
+  type Given,
+  type Mechanism,
+  type Output,
+  outputPlace,
+  rowLength,
+  type Values,
+  givenValue,
+} from "./tables";
 
 /** A number as people read it, with so many digits. */
 export function digits(value: number, count = 4): string {
@@ -17,7 +25,7 @@ export function shown(value: number, of: Given | Output, count = 4): string {
 
 const column = (m: Mechanism, rows: Rows, output: number): number[] => {
   const length = rowLength(m);
-  return Array.from({ length: rows.count }, (_, i) => rows.values[i * length + outputAt(m, output)]);
+  return Array.from({ length: rows.count }, (_, i) => rows.values[i * length + outputPlace(m, output)]);
 };
 
 /** Share of the largest number of a unit below which another of that unit is rounding. */
@@ -25,7 +33,7 @@ const ROUNDING = 1e-12;
 const roundings = new WeakMap<Rows, Map<string, number>>();
 
 /** Below which size the numbers of a motion are rounding (SI), by their unit on the page. */
-export function roundingOf(m: Mechanism, rows: Rows): Map<string, number> {
+export function roundingSizes(m: Mechanism, rows: Rows): Map<string, number> {
   const known = roundings.get(rows);
   if (known) return known;
   const found = new Map<string, number>();
@@ -33,7 +41,7 @@ export function roundingOf(m: Mechanism, rows: Rows): Map<string, number> {
   const length = rowLength(m);
   m.outputs.forEach(({ unit }, output) => {
     let largest = found.get(unit) ?? 0;
-    for (let at = outputAt(m, output); at < rows.values.length; at += length)
+    for (let at = outputPlace(m, output); at < rows.values.length; at += length)
       largest = Math.max(largest, ROUNDING * Math.abs(rows.values[at]));
     found.set(unit, largest);
   });
@@ -77,13 +85,13 @@ export function plainly(sentence: string, m?: Mechanism): string {
 /** Where the crank is driven by a torque, whether there is one: of an input or of a motor. */
 export function isDriven(m: Mechanism, values: Values): boolean {
   const mode = m.given.find((given) => m.crank >= 0 && given.reference === m.freedoms[m.crank].mode);
-  const chosen = mode?.arguments?.[valueOf(mode, values)];
+  const chosen = mode?.arguments?.[givenValue(mode, values)];
   const torques = m.given.filter((given) => given.argument === chosen);
   const forced = torques.some((given) => given.kind === "force");
   return (
     !forced ||
     torques.some(
-      (given) => valueOf(given, values) !== 0 && (given.kind === "force" || given.reference === -1),
+      (given) => givenValue(given, values) !== 0 && (given.kind === "force" || given.reference === -1),
     )
   );
 }
@@ -110,7 +118,7 @@ export function motionInWords(m: Mechanism, rows: Rows, orbit: Orbit, values: Va
   }
   if (m.transmission >= 0)
     parts.push(`least transmission angle ${digits((leastTransmission(m, rows) * 180) / Math.PI)} deg`);
-  const rounding = roundingOf(m, rows);
+  const rounding = roundingSizes(m, rows);
   for (const output of m.moving) {
     const path = column(m, rows, output);
     const range = Math.max(...path) - Math.min(...path);

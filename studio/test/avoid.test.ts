@@ -1,6 +1,6 @@
 import assert from "node:assert/strict";
 import { test } from "node:test";
-import { arcsOf, jumpsOf, rangesToAvoid } from "../src/avoid";
+import { splitArcs, findJumps, rangesToAvoid } from "../src/avoid";
 import type { Point } from "../src/motions";
 import { hull } from "../src/hull";
 import { ticks } from "../src/plane";
@@ -19,7 +19,7 @@ test("a resonance is to be avoided between its half-power points", () => {
     const r = 0.5 + i / 2000;
     return at(r, 1 / Math.hypot(1 - r * r, 0.02 * r));
   });
-  const [range, ...others] = rangesToAvoid(arcsOf(branch, 1e-6), 0.5, 1.5);
+  const [range, ...others] = rangesToAvoid(splitArcs(branch, 1e-6), 0.5, 1.5);
   assert.equal(others.length, 0);
   assert.match(range.why, /resonance/);
   assert.ok(
@@ -32,12 +32,12 @@ test("between two folds there are several motions, and each ends with a jump", (
   const branch = [
     at(0, 1), at(1, 1.1), at(2, 1.2, 1, "fold"), at(1.5, 1.6, 3), at(1, 2, 1, "fold"), at(2, 2.1), at(3, 2.2),
   ]; // prettier-ignore
-  const arcs = arcsOf(branch, 1e-6);
+  const arcs = splitArcs(branch, 1e-6);
   assert.deepEqual(arcs.map(({ stable }) => stable), [true, false, true]); // prettier-ignore
   const [several] = rangesToAvoid(arcs, 0, 3);
   assert.deepEqual([several.low, several.high], [1, 2]);
   assert.match(several.why, /several/);
-  assert.deepEqual(jumpsOf(arcs), [
+  assert.deepEqual(findJumps(arcs), [
     { value: 1, rising: false, before: 2, after: [1.1] },
     { value: 2, rising: true, before: 1.2, after: [2.1] },
   ]);
@@ -45,7 +45,7 @@ test("between two folds there are several motions, and each ends with a jump", (
 
 test("where no motion is stable is to be avoided", () => {
   const branch = [at(0, 1), at(1, 1, -1, "doubling"), at(2, 1, -2), at(3, 1, -1, "doubling"), at(4, 1)];
-  const [range] = rangesToAvoid(arcsOf(branch, 1e-6), 0, 4);
+  const [range] = rangesToAvoid(splitArcs(branch, 1e-6), 0, 4);
   assert.deepEqual([range.low, range.high], [1, 3]);
   assert.match(range.why, /no stable/);
 });

@@ -1,6 +1,6 @@
 import assert from "node:assert/strict";
 import { test } from "node:test";
-import { dxfText, linesIn } from "../src/dxf";
+import { dxfText, readLines } from "../src/dxf";
 
 const drawing = (...rows: (string | number)[]): string =>
   ["0", "SECTION", "2", "ENTITIES", ...rows, "0", "ENDSEC", "0", "EOF"].join("\n");
@@ -34,7 +34,7 @@ test("what is written is read again", () => {
   assert.match(text, /ground-link/);
   assert.match(text, /\\U\+00C4/);
   assert.ok(/^[ -~\r\n]*$/.test(text));
-  const { paths, left } = linesIn(text);
+  const { paths, left } = readLines(text);
   near(paths[0], [
     [0, 0],
     [0.1, -0.05],
@@ -51,7 +51,7 @@ test("what is written is read again", () => {
 
 test("an arc goes round against the clock, from its first angle to its second", () => {
   const rows = ["0", "ARC", "10", 1, "20", 2, "40", 5, "50", 270, "51", 0];
-  const [path] = linesIn(drawing(...rows)).paths;
+  const [path] = readLines(drawing(...rows)).paths;
   near(
     [path[0], path.at(-1)!],
     [
@@ -64,7 +64,7 @@ test("an arc goes round against the clock, from its first angle to its second", 
 
 test("a bulge of one is half a circle to the right of the chord", () => {
   const corners = ["10", 0, "20", 0, "42", 1, "10", 2, "20", 0];
-  const [path] = linesIn(drawing("0", "LWPOLYLINE", "70", 0, ...corners)).paths;
+  const [path] = readLines(drawing("0", "LWPOLYLINE", "70", 0, ...corners)).paths;
   for (const [x, y] of path) assert.ok(Math.abs(Math.hypot(x - 1e-3, y) - 1e-3) < 1e-12);
   assert.ok(Math.min(...path.map((point) => point[1])) < -0.99e-3);
   near([path.at(-1)!], [[2e-3, 0]]);
@@ -73,7 +73,7 @@ test("a bulge of one is half a circle to the right of the chord", () => {
 test("a drawing is in its own unit", () => {
   const head = ["0", "SECTION", "2", "HEADER", "9", "$INSUNITS", "70", "1", "0", "ENDSEC", ""].join("\r\n");
   const line = drawing("0", "LINE", "10", 0, "20", 0, "11", 1, "21", 0).replaceAll("\n", "\r\n");
-  near(linesIn(head + line).paths[0], [
+  near(readLines(head + line).paths[0], [
     [0, 0],
     [0.0254, 0],
   ]);
@@ -87,5 +87,5 @@ for (const [text, said] of [
   ["", /no LINE/],
 ] as const)
   test(`${JSON.stringify(text.slice(0, 50))} is refused`, () => {
-    assert.throws(() => linesIn(text), said);
+    assert.throws(() => readLines(text), said);
   });

@@ -1,6 +1,6 @@
 import assert from "node:assert/strict";
 import { test } from "node:test";
-import { caseText, linkOf, parameterText, pythonText, stateIn, tableText } from "../src/exports";
+import { caseText, pageAddress, parameterText, pythonText, readState, tableText } from "../src/exports";
 import { STATE, TABLES, WHEEL } from "./wheel";
 
 Object.assign(globalThis, { location: { href: "https://example.org/page.html#old" } });
@@ -49,7 +49,7 @@ test("the lines of Python start from the motion that is shown, if there is one",
     place: 0,
     multipliers: [],
   };
-  assert.match(pythonText(WHEEL, STATE, 2, orbit), /orbit_of\(.*, start=\[0\.1,-2e-7\]\)/);
+  assert.match(pythonText(WHEEL, STATE, 2, orbit), /newton_orbit\(.*, start=\[0\.1,-2e-7\]\)/);
   for (const none of [undefined, { ...orbit, found: false }, { ...orbit, size: 0 }])
     assert.doesNotMatch(pythonText(WHEEL, STATE, 2, none), /orbit/);
 });
@@ -71,13 +71,13 @@ test("a table has a line of names and one for each row", () => {
 });
 
 test("a link holds the whole state", () => {
-  const link = linkOf(STATE);
+  const link = pageAddress(STATE);
   assert.match(link, /^https:\/\/example\.org\/page\.html#state=[\w-]+$/);
-  assert.deepEqual(stateIn(link, TABLES), STATE);
-  assert.equal(stateIn("page.html#elsewhere", TABLES), undefined);
+  assert.deepEqual(readState(link, TABLES), STATE);
+  assert.equal(readState("page.html#elsewhere", TABLES), undefined);
 });
 
 test("a damaged link is refused in a sentence", () => {
-  for (const text of ["%00", "AAAA", linkOf(STATE).split("=")[1].slice(0, -9)])
-    assert.throws(() => stateIn(`page.html#state=${text}`, TABLES), /damaged/);
+  for (const text of ["%00", "AAAA", pageAddress(STATE).split("=")[1].slice(0, -9)])
+    assert.throws(() => readState(`page.html#state=${text}`, TABLES), /damaged/);
 });

@@ -1,16 +1,16 @@
 import assert from "node:assert/strict";
 import { test } from "node:test";
-import { givenOf, jointAt, outputAt, rowLength, stateFrom } from "../src/tables";
+import { allGiven, jointPlace, outputPlace, rowLength, checkState } from "../src/tables";
 import { STATE, TABLES, WHEEL } from "./wheel";
 
 test("a row holds time, state, outputs and places", () => {
   assert.equal(rowLength(WHEEL), 1 + 1 + 2 + 3 + 2);
-  assert.equal(outputAt(WHEEL, 1), 3);
-  assert.equal(jointAt(WHEEL, 0), 4);
+  assert.equal(outputPlace(WHEEL, 1), 3);
+  assert.equal(jointPlace(WHEEL, 0), 4);
 });
 
 test("what a state leaves out has its start value", () => {
-  const given = new Map(givenOf(WHEEL, STATE.values));
+  const given = new Map(allGiven(WHEEL, STATE.values));
   assert.equal(given.get(0), 0.25);
   assert.equal(given.get(3), 2);
   assert.equal(given.get(9), 1e-12);
@@ -20,8 +20,8 @@ const behind = { x: 0, y: 0, width: 1, angle: 0, opacity: 0.5, locked: true };
 
 test("a good state comes through as it is", () => {
   const whole = { ...STATE, duration: 2, locks: ["wheel.radius"], behind, view: [0, 0, 1, 0, 0] };
-  assert.deepEqual(stateFrom(JSON.parse(JSON.stringify(whole)), TABLES), whole);
-  assert.deepEqual(stateFrom({ mechanism: "wheel", more: 1 }, TABLES), { ...STATE, title: "", values: {} });
+  assert.deepEqual(checkState(JSON.parse(JSON.stringify(whole)), TABLES), whole);
+  assert.deepEqual(checkState({ mechanism: "wheel", more: 1 }, TABLES), { ...STATE, title: "", values: {} });
 });
 
 for (const [change, said] of [
@@ -39,9 +39,9 @@ for (const [change, said] of [
   [{ view: [1] }, /view is \[1\]/],
 ] as const)
   test(`a state with ${JSON.stringify(change)} is refused`, () => {
-    assert.throws(() => stateFrom({ ...STATE, ...change }, TABLES), said);
+    assert.throws(() => checkState({ ...STATE, ...change }, TABLES), said);
   });
 
 test("a state that is no object is refused", () => {
-  for (const data of [null, 3, "x"]) assert.throws(() => stateFrom(data, TABLES), /no object|no mechanism/);
+  for (const data of [null, 3, "x"]) assert.throws(() => checkState(data, TABLES), /no object|no mechanism/);
 });

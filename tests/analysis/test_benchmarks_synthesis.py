@@ -161,8 +161,8 @@ def test_the_clock_stops_while_measuring(monkeypatch: pytest.MonkeyPatch) -> Non
         trace.offer(box, box.low)
     assert perf_counter() - begun >= 0.3
     assert [value for _, value in trace.points] == [5.0, 3.0]
-    assert trace.time_to(4.0) < 0.1
-    assert trace.time_to(1.0) == inf
+    assert trace.reaching_time(4.0) < 0.1
+    assert trace.reaching_time(1.0) == inf
     with pytest.raises(TimeUp):
         Trace(contest, 0.0).tick()
 

@@ -15,11 +15,11 @@ from analysis.run import (
     Harmonics,
     Piecewise,
     TorsionBar,
-    case_from,
     load_case,
     load_parameters,
-    parameters_from,
-    parameters_to,
+    parameter_tables,
+    read_case,
+    read_parameters,
     save_parameters,
 )
 from linkwork.errors import InputError, MissingParameterError, ParameterError, UnknownNameError
@@ -42,7 +42,7 @@ def test_a_saved_mechanism_comes_back_digit_for_digit(tmp_path, ending, paramete
 
 @pytest.mark.parametrize("parameters", AWKWARD)
 def test_every_parameter_has_its_place_in_a_file(parameters):
-    data = parameters_to(parameters)
+    data = parameter_tables(parameters)
     named = data.pop("mechanism", "five-bar")
     assert named == mechanism_of(parameters).name
     assert sum(len(v) if isinstance(v, dict) else 1 for v in data.values()) == len(fields(parameters))
@@ -62,25 +62,25 @@ def test_every_parameter_has_its_place_in_a_file(parameters):
 )
 def test_wrong_parameters_are_named(data, error, said):
     with pytest.raises(error, match=said):
-        parameters_from(data, TABLE_3_1)
+        read_parameters(data, TABLE_3_1)
 
 
 @pytest.mark.parametrize("name", PUBLISHED)
 def test_parameters_say_whose_they_are(name):
     parameters = PUBLISHED[name].parameters
-    data = parameters_to(parameters)
-    assert parameters_from(data) == parameters
+    data = parameter_tables(parameters)
+    assert read_parameters(data) == parameters
     other = "slider-crank" if data["mechanism"] == "five-bar" else "five-bar"
     with pytest.raises(ParameterError, match=f"mechanism is '{other}': it must be {data['mechanism']}"):
-        parameters_from({"mechanism": other}, parameters)
+        read_parameters({"mechanism": other}, parameters)
 
 
 def test_missing_names_are_listed():
     with pytest.raises(MissingParameterError, match=r"ground\.length is missing.*rocker\.cog_distance"):
-        parameters_from({"slider": {"stiffness": 1.0}}, mechanism=FIVE_BAR)
+        read_parameters({"slider": {"stiffness": 1.0}}, mechanism=FIVE_BAR)
     lengths = {"crank.length": 0.05, "crank.inertia": 1e-3, "coupler.length": 0.15, "rocker.length": 0.15}
     with pytest.raises(MissingParameterError, match=r"what they follow from: coupler\.section, rocker\.section$"):
-        parameters_from(lengths, mechanism=FIVE_BAR)
+        read_parameters(lengths, mechanism=FIVE_BAR)
 
 
 @pytest.mark.parametrize(
@@ -295,21 +295,21 @@ def test_the_examples_load():
 
 def test_an_end_that_is_given_for_itself_takes_the_place_of_the_files():
     data = {"published": "table-3.1", "run": {"revolutions": 2.0}}
-    case = case_from(data, folder=Path(), overrides={"run.stop_time": "0.1 s", "drive.torque": "1 N.m"})
+    case = read_case(data, folder=Path(), overrides={"run.stop_time": "0.1 s", "drive.torque": "1 N.m"})
     assert (case.stop_time, [*case.inputs], case.inputs.parts("torque")) == (0.1, ["torque"], (1.0,))
     data = {"published": "table-3.1", "run": {"stop_time": "1 s"}}
-    case = case_from(data, folder=Path(), overrides={"run.revolutions": 2.0})
+    case = read_case(data, folder=Path(), overrides={"run.revolutions": 2.0})
     assert case.stop_time == pytest.approx(4.0 * pi / PUBLISHED["table-3.1"].crank_speed)
 
 
 def test_an_input_that_is_given_for_itself_may_have_its_fmi_name():
     data = {"published": "table-3.1"}
     for name in ("force", "slider.force"):
-        case = case_from(data, folder=Path(), overrides={name: "3 N"})
+        case = read_case(data, folder=Path(), overrides={name: "3 N"})
         assert case.inputs.parts("force") == (3.0,)
     data = {"published": "table-3.1", "slider": {"force": "3 N", "damping": "5 N*s/m"}}
-    case = case_from(data, folder=Path())
+    case = read_case(data, folder=Path())
     assert (case.inputs.parts("force"), case.parameters.slider_damping) == ((3.0,), 5.0)
-    assert case_from(data, folder=Path(), overrides={"force": "4 N"}).inputs.parts("force") == (4.0,)
+    assert read_case(data, folder=Path(), overrides={"force": "4 N"}).inputs.parts("force") == (4.0,)
     with pytest.raises(InputError, match=r"slider\.force is force in case files, and that is given, too"):
-        case_from(data | {"force": "4 N"}, folder=Path())
+        read_case(data | {"force": "4 N"}, folder=Path())

@@ -20,7 +20,7 @@ from analysis.periodic import (
     find_orbit,
     follow,
     natural_frequency,
-    orbit_of,
+    newton_orbit,
     plane,
     points_to_confirm,
     stability_chart,
@@ -28,11 +28,11 @@ from analysis.periodic import (
 from analysis.periodic.chart import chart as charts
 from analysis.periodic.chart import grid as grids
 from analysis.periodic.chart.grid import Grid
-from analysis.periodic.chart.rows import rows_of
+from analysis.periodic.chart.rows import grid_rows
 from analysis.periodic.motion.discretisation import operating_point
 from analysis.periodic.motion.orbit import first_guess
-from analysis.periodic.motion.variables import value_of
-from analysis.run import heard_by
+from analysis.periodic.motion.variables import parameter_value
+from analysis.run import progress_listener
 from analysis.units import RAD_S_PER_RPM
 from analysis.youssef import linear_motion
 from linkwork.errors import InputError, LinkworkError, ParameterError, UnknownNameError
@@ -153,7 +153,7 @@ def test_crossings_of_other_motions_are_traced_under_their_own_name() -> None:
         assert traced.starts is not None
         speed, damping = traced.points[len(traced.points) // 2]
         there = replace(rig, slider_damping=damping)
-        orbit = orbit_of(there, Drive(speed=speed), start=traced.starts[len(traced.points) // 2])
+        orbit = newton_orbit(there, Drive(speed=speed), start=traced.starts[len(traced.points) // 2])
         assert np.abs(orbit.multipliers + 1.0).min() < 1e-6
         assert orbit.amplitude > 3.0 * find_orbit(there, speed=speed).amplitude
 
@@ -260,7 +260,7 @@ def test_the_grid_is_shown_before_its_boundaries() -> None:
 @pytest.mark.usefixtures("coarse")
 def test_progress_advances_within_a_line() -> None:
     heard: list[tuple[str, float]] = []
-    with heard_by(lambda what, share: heard.append((what, share))):
+    with progress_listener(lambda what, share: heard.append((what, share))):
         stability_chart("rig-2-spring-c", ranges=((550.0 * RPM, 560.0 * RPM), (50.0, 60.0)), points=3)
     shares = [share for what, share in heard if "branches" in what]
     assert shares == sorted(shares)
@@ -286,10 +286,10 @@ def test_a_row_of_named_parameters_has_the_numbers_of_its_points(
     drive: Drive, x: str, y: str, across: tuple[float, float]
 ) -> None:
     operation = plane(RIG_2, drive, x, y)
-    xs, ys = np.linspace(*across, 5), np.array([value_of(RIG_2, drive, y) or 1.0])
+    xs, ys = np.linspace(*across, 5), np.array([parameter_value(RIG_2, drive, y) or 1.0])
     start = first_guess(operating_point(RIG_2, drive).flow, drive, None)
-    (at_once,) = rows_of(operation, xs, ys, start)
-    (alone,) = rows_of(lambda a, b: operation(a, b), xs, ys, start)
+    (at_once,) = grid_rows(operation, xs, ys, start)
+    (alone,) = grid_rows(lambda a, b: operation(a, b), xs, ys, start)
     for name in ("constants", "vectors", "scales"):
         assert (getattr(at_once, name) == getattr(alone, name)).all(), name
     assert (at_once.smooth, at_once.switched) == (alone.smooth, alone.switched)
@@ -298,6 +298,6 @@ def test_a_row_of_named_parameters_has_the_numbers_of_its_points(
 def test_a_row_of_named_parameters_refuses_what_its_points_refuse() -> None:
     start = np.zeros(2)
     with pytest.raises(InputError, match="speed"):
-        rows_of(plane(RIG_2, DRIVE, "drive.speed", "slider.damping"), np.array([10.0, -1.0]), np.array([1.0]), start)
+        grid_rows(plane(RIG_2, DRIVE, "drive.speed", "slider.damping"), np.array([10.0, -1.0]), np.array([1.0]), start)
     with pytest.raises(ParameterError, match=r"mass.*-0\.1"):
-        rows_of(plane(RIG_2, DRIVE, "slider.mass", "drive.speed"), np.array([1.0, -0.1]), np.array([50.0]), start)
+        grid_rows(plane(RIG_2, DRIVE, "slider.mass", "drive.speed"), np.array([1.0, -0.1]), np.array([50.0]), start)

@@ -13,7 +13,7 @@ from analysis.files import Many, Quantity, Whole, entry_names
 from analysis.files.template import example, meanings
 from analysis.linkages.description import Body, Description, Gear, Rack, Slide, Slot, Spring
 from analysis.mechanisms import MECHANISMS
-from analysis.run import RunTable, acting_on, load_case, load_parameters
+from analysis.run import RunTable, case_inputs, load_case, load_parameters
 from analysis.slider import TABLES as MOTION
 from analysis.slider import SliderCase, load_slider_case
 from analysis.synthesis import BOUNDS, KINDS, TABLES, SynthesisCase, load_synthesis_case
@@ -61,7 +61,7 @@ def test_it_holds_every_entry_there_is(kind):
         assert names(found["run"]) == set(entry_names(RunTable))
         assert names(found["initial"]) == set(mechanism.initial_variables)
         there = {f"{table}.{name}" if table else name for table, lines in found.items() for name in names(lines)}
-        assert {*mechanism.mechanism_variables, *acting_on(mechanism)} <= there
+        assert {*mechanism.mechanism_variables, *case_inputs(mechanism)} <= there
         return
     if kind == TUNING:
         assert names(found["tune"]) == set(entry_names(TuneTable))

@@ -18,7 +18,7 @@ import analysis.synthesis as syn
 from analysis import cli, figures
 from analysis.files import entry_names
 from analysis.numerics.symbolic import library
-from analysis.run import case_from, load_case, load_parameters, simulate
+from analysis.run import load_case, load_parameters, read_case, simulate
 from analysis.synthesis.case import case as cases
 from analysis.synthesis.case.tables import KINDS
 from analysis.synthesis.task.constraint import UNKNOWNS
@@ -150,7 +150,7 @@ def test_a_crank_that_swings_backwards_is_run_over_its_task_alone(tmp_path) -> N
     task = syn.Motion(points=linkage.path(at) + 1e-3, angle=linkage.coupler_angle(at), rotation=at)
     solution = syn.Solution.of(task, linkage)
     assert not solution.verdicts.full_turn
-    ran = case_from(solution.run_case(syn.Make(speed=3.0), "swing"), folder=tmp_path)
+    ran = read_case(solution.run_case(syn.Make(speed=3.0), "swing"), folder=tmp_path)
     motion = simulate(
         ran.parameters, ran.inputs, initial=ran.initial, stop_time=ran.stop_time, step=ran.stop_time / 10.0
     )
@@ -171,7 +171,7 @@ def test_both_files_of_a_linkage_have_the_same_masses_and_load(own_linkages, tmp
     make = syn.Make(**{"speed": 15.0, "load": (3.0, -20.0)} | given)
     runs = []
     for tables in (solution.described_case(make, "one"), solution.run_case(make, "other")):
-        ran = case_from(tables, folder=tmp_path)
+        ran = read_case(tables, folder=tmp_path)
         runs.append(simulate(ran.parameters, ran.inputs, initial=ran.initial, stop_time=0.8, step=0.01))
     # of the other file a stiff spring holds the rocker's pivot, which settles first
     torques = [run["drive.applied_torque"][1:] for run in runs]
@@ -471,7 +471,7 @@ def test_the_examples_and_the_documentation_are_readable() -> None:
         syn.load_synthesis_case(path)
     page = (ROOT / "docs" / "synthesis-cases.md").read_text()
     (block,) = re.findall(r"```toml\n(.*?)```", page, flags=re.DOTALL)
-    syn.synthesis_case_from(tomllib.loads(block), folder=ROOT)
+    syn.read_synthesis_case(tomllib.loads(block), folder=ROOT)
     for kind in (
         cases.SynthesisCase,
         *KINDS.values(),

@@ -35,7 +35,7 @@ from analysis.numerics.codegen import (
 from analysis.numerics.symbolic import ELEMENTARY
 from analysis.run import compiled, machine, simulate, sources
 from analysis.run.equations import CLEARANCE, DERIVATIVE, JUMP, OUTPUTS
-from analysis.run.prepared import outputs_of
+from analysis.run.prepared import compute_outputs
 from linkwork.errors import LinkworkError
 from linkwork.mechanism import Mechanism
 from tests import slider_cranks, strategies
@@ -83,7 +83,7 @@ def test_machine_code_has_the_values_of_the_plain_functions(name: str, seed: int
             assert ours == pytest.approx(values, rel=1e-11, abs=1e-13 * size)
         # in lanes, a full vector and part of one
         states, forces = np.tile(x, (11, 1)), np.tile(u, (11, 1))
-        ours = outputs_of(mechanism, np.array(flags), np.array([*p, 0.3]), states, forces)
+        ours = compute_outputs(mechanism, np.array(flags), np.array([*p, 0.3]), states, forces)
         assert (ours == ours[0]).all()
         size = max(1.0, max(map(abs, plain[OUTPUTS])))
         assert ours[0] == pytest.approx(plain[OUTPUTS], rel=1e-11, abs=1e-13 * size)

@@ -27,7 +27,7 @@ from analysis.periodic import (
     coexistence,
     find_orbits,
     frequency_response,
-    orbit_of,
+    newton_orbit,
     plane,
     stability_chart,
     with_isolas,
@@ -299,7 +299,7 @@ def test_a_chart_finds_the_motions_that_newtons_method_misses() -> None:
     """At small damping near resonance: 37 of 900 such points had no motion, one of them stable with 13.8 cm."""
     chart = stability_chart("rig-1-spring-b", ranges=(("1060 rpm", "1090 rpm"), ("2 N.s/m", "3 N.s/m")), points=4)
     assert chart.grid.largest.count() == 16
-    orbit = orbit_of(replace(RIG_1_B, slider_damping=2.0), Drive(speed="1070 rpm"))
+    orbit = newton_orbit(replace(RIG_1_B, slider_damping=2.0), Drive(speed="1070 rpm"))
     assert chart.grid.largest[0, 1] == pytest.approx(orbit.largest, rel=1e-8)
 
 

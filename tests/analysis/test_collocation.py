@@ -12,7 +12,7 @@ import pytest
 from analysis import find_orbit
 from analysis.linkages import load_linkage
 from analysis.numerics.vectors import LANES
-from analysis.periodic import Drive, OrbitEquations, OrbitError, orbit_of
+from analysis.periodic import Drive, OrbitEquations, OrbitError, newton_orbit
 from analysis.periodic.chart.grid import largest_multipliers
 from analysis.periodic.motion import collocation
 from analysis.periodic.motion.discretisation import Discretisation, collocation_serves
@@ -33,7 +33,7 @@ def test_a_neighbour_followed_by_collocation_is_the_integrator_s(linkage: str | 
     used = 0
     for speed in np.linspace(30.0, 31.0, 6):
         parameters, drive = family.at(float(speed))
-        orbit = orbit_of(parameters, drive)
+        orbit = newton_orbit(parameters, drive)
         point = orbit.point
         starts = np.vstack([orbit.start, point.shoot(angles[:2], orbit.start[None, :]).y])
         direction = family.direction(float(speed), 30.0, 31.0)
@@ -92,14 +92,14 @@ def test_a_row_by_collocation_is_its_orbits_one_by_one() -> None:
     values, starts, status = largest_multipliers([SMOOTH] * len(drives), drives)
     assert (status == 0).all()
     for k in range(0, 41, 5):
-        alone = orbit_of(SMOOTH, drives[k], start=starts[k])
+        alone = newton_orbit(SMOOTH, drives[k], start=starts[k])
         assert values[k] == pytest.approx(alone.largest, abs=1e-8)
         assert starts[k] == pytest.approx(alone.start, abs=1e-9)
 
 
 def test_a_point_of_a_branch_computes_the_numbers_of_its_drive_once(monkeypatch: pytest.MonkeyPatch) -> None:
     family = Family(parameters=SMOOTH, drive=Drive(speed=30.0))
-    start = orbit_of(SMOOTH, family.drive).start
+    start = newton_orbit(SMOOTH, family.drive).start
     equations = OrbitEquations(family, 1, 29.0, 31.0)
     calls, vector = [], Drive.vector
     monkeypatch.setattr(Drive, "vector", lambda drive, mechanism: calls.append(drive) or vector(drive, mechanism))

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from analysis import Function, InductionMotor, Inputs, find_orbit, find_orbits, natural_frequency, simulate
-from analysis.periodic import Drive, OrbitError, Stability, confirm, orbit_of, sweep
-from analysis.periodic.motion.drive import coordinate_ranges, starts_of
+from analysis.periodic import Drive, OrbitError, Stability, confirm, newton_orbit, sweep
+from analysis.periodic.motion.drive import coordinate_ranges, spread_starts
 from analysis.units import RAD_S_PER_RPM
 from linkwork.errors import AssemblyError, InputError
 from linkwork.five_bar.assembly import check_assembly
@@ -27,14 +27,14 @@ def test_a_resonant_motion_that_newtons_method_misses() -> None:
     assert orbit.amplitude == pytest.approx(0.138, abs=5e-4)
     assert orbit.largest == pytest.approx(0.93546, abs=5e-6)
     with pytest.raises(OrbitError):
-        orbit_of(parameters, Drive(speed=speed), settle=False)
+        newton_orbit(parameters, Drive(speed=speed), settle=False)
 
 
 def test_one_motion_is_found_where_all_of_them_are() -> None:
     """None of the first 64 starts leads to the only motion there is."""
     parameters, drive = replace(RIG_1_B, slider_damping=2.0), Drive(speed=1031.5 * RAD_S_PER_RPM)
     (only,) = find_orbits(parameters, speed=drive.speed).orbits
-    assert orbit_of(parameters, drive).start == pytest.approx(only.start, rel=1e-8)
+    assert newton_orbit(parameters, drive).start == pytest.approx(only.start, rel=1e-8)
 
 
 def test_starts_fill_a_range_that_is_wider_on_one_side() -> None:
@@ -45,7 +45,7 @@ def test_starts_fill_a_range_that_is_wider_on_one_side() -> None:
         check_assembly(parameters, 0.0, end / 1.25)
         with pytest.raises(AssemblyError):
             check_assembly(parameters, 0.0, end)
-    starts = starts_of(parameters, Drive(speed=40.0), guess, 64)
+    starts = spread_starts(parameters, Drive(speed=40.0), guess, 64)
     assert starts[:, 0].min() < 0.7 * low[0]
     assert starts[:, 0].max() > 0.7 * high[0] > 2.0 * -low[0]
     assert np.ptp(starts[:, 1]) > 40.0 * (high[0] - low[0]) * 0.7
@@ -108,7 +108,7 @@ def test_motions_far_from_the_zero_of_the_slider() -> None:
     assert orbit.verdict().stability is Stability.STABLE
     assert confirm(parameters, Drive(speed=40.0), start=orbit.start).agrees
     with pytest.raises(OrbitError):
-        orbit_of(parameters, Drive(speed=40.0), settle=False)
+        newton_orbit(parameters, Drive(speed=40.0), settle=False)
 
 
 def test_no_motion_where_the_crank_is_longer_than_the_other_links() -> None:

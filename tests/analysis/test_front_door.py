@@ -315,7 +315,7 @@ def test_counts_in_words(count: int, what: str, words: str) -> None:
 
 PACKAGES = ("run", "periodic", "linear", "youssef", "slider_crank", "slider")
 #: Functions that write or check parameters, or tell where they come from.
-OF_PARAMETERS = {"parameters_to", "save_parameters", "require_five_bar", "mass_origins", "masses_of"}
+OF_PARAMETERS = {"parameter_tables", "save_parameters", "require_five_bar", "mass_origins", "trace_masses"}
 
 
 @pytest.mark.parametrize("package", PACKAGES)

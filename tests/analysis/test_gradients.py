@@ -36,12 +36,12 @@ from analysis.periodic import (
     frequency_response,
     gradient_names,
     motion_gradient,
-    orbit_of,
+    newton_orbit,
     special_gradient,
 )
-from analysis.periodic.motion.discretisation import operating_point, period_from
-from analysis.periodic.motion.drive import scale_of
-from analysis.periodic.motion.variables import unit_of, value_of, with_values
+from analysis.periodic.motion.discretisation import follow_period, operating_point
+from analysis.periodic.motion.drive import motion_scales
+from analysis.periodic.motion.variables import parameter_unit, parameter_value, with_values
 from analysis.periodic.stability import sensitivity as gradients
 from analysis.periodic.stability.variations import _GAUSS, Variations
 from analysis.units import RAD_S_PER_RPM
@@ -104,14 +104,14 @@ def amplitude(orbit: PeriodicOrbit) -> float:
 
 
 def step_of(orbit: PeriodicOrbit, name: str, relative: float) -> float:
-    unit = unit_of(orbit.flow.mechanism, name)
-    value = abs(value_of(orbit.parameters, orbit.drive, name))
+    unit = parameter_unit(orbit.flow.mechanism, name)
+    value = abs(parameter_value(orbit.parameters, orbit.drive, name))
     return relative * (value if value > 0.0 else SIZES[unit])
 
 
 def changed(orbit: PeriodicOrbit, name: str, value: float) -> PeriodicOrbit:
     parameters, drive = with_values(orbit.parameters, orbit.drive, {name: value})
-    return orbit_of(parameters, drive, turns=orbit.turns, start=orbit.start, settle=False)
+    return newton_orbit(parameters, drive, turns=orbit.turns, start=orbit.start, settle=False)
 
 
 def close(found: FloatArray, exact: FloatArray, size: FloatArray | float, step: float) -> bool:
@@ -125,21 +125,21 @@ def random_orbit(seed: int) -> PeriodicOrbit:
         parameters, slider_coulomb_friction=0.0, slider_damping=20.0, slider_stiffness=2000.0, gravity=9.81
     )
     short = replace(smooth, crank_length=0.4 * smooth.crank_length, slider_spring_free_position=0.0)
-    return orbit_of(short, Drive(speed=25.0))
+    return newton_orbit(short, Drive(speed=25.0))
 
 
 #: Motions, and outputs whose peaks are checked.
 MOTIONS: dict[str, tuple[Callable[[], PeriodicOrbit], tuple[str, ...]]] = {
-    "rig 2 C": (lambda: orbit_of(RIG_2_C, Drive(speed=500.0 * RPM)), ("drive.applied_torque", "pin.B")),
-    "rig 1 B": (lambda: orbit_of(RIG_1_B, Drive(speed=1000.0 * RPM)), ("drive.applied_torque", "pin.C")),
+    "rig 2 C": (lambda: newton_orbit(RIG_2_C, Drive(speed=500.0 * RPM)), ("drive.applied_torque", "pin.B")),
+    "rig 1 B": (lambda: newton_orbit(RIG_1_B, Drive(speed=1000.0 * RPM)), ("drive.applied_torque", "pin.C")),
     "motor, force": (lambda: find_orbit(RIG_2_C, Inputs(torque=MOTOR, force=1.0)), ("drive.applied_torque", "pin.A")),
-    "torque": (lambda: orbit_of(TABLE_3_1, Drive(torque=0.2), start=(0.0, 0.0, 45.0)), ("slider.guide_force",)),
-    "two turns": (lambda: orbit_of(RIG_2_C, Drive(speed=480.0 * RPM), turns=2), ("pin.D",)),
+    "torque": (lambda: newton_orbit(TABLE_3_1, Drive(torque=0.2), start=(0.0, 0.0, 45.0)), ("slider.guide_force",)),
+    "two turns": (lambda: newton_orbit(RIG_2_C, Drive(speed=480.0 * RPM), turns=2), ("pin.D",)),
     "doubled": (lambda: find_orbits(LIGHT, speed=1150.0 * RPM, turns=2).orbits[-1], ("pin.D",)),
     # the Fourier series of the check cannot hold what friction does
-    "friction": (lambda: orbit_of(replace(RIG_2_C, slider_coulomb_friction=0.3), Drive(speed=500.0 * RPM)), ()),
+    "friction": (lambda: newton_orbit(replace(RIG_2_C, slider_coulomb_friction=0.3), Drive(speed=500.0 * RPM)), ()),
     "slider-crank": (
-        lambda: orbit_of(SPRUNG, Drive(speed=rahman.CRANK_SPEED, forces={"axial.force": 0.0})),
+        lambda: newton_orbit(SPRUNG, Drive(speed=rahman.CRANK_SPEED, forces={"axial.force": 0.0})),
         ("drive.applied_torque",),
     ),
     "rotor, motor": (lambda: find_orbit(ROTOR, Inputs(torque=(MOTOR, -0.1))), ("cart.acceleration",)),
@@ -166,7 +166,7 @@ def test_a_motion_changes_with_every_parameter_as_its_differences_say(name: str)
     gradients = [motion.largest, motion.speed, *peaks]
     exact = np.vstack([motion.start, *(g.by for g in gradients)])
     size = np.abs(quantities(orbit))
-    size[: len(orbit.start)] = scale_of(orbit.parameters, orbit.drive, orbit.start)
+    size[: len(orbit.start)] = motion_scales(orbit.parameters, orbit.drive, orbit.start)
     assert [g.value for g in gradients] == pytest.approx(size[len(orbit.start) :].tolist(), rel=1e-9)
     for column, parameter in enumerate(motion.names):
         value = motion.values[column]
@@ -186,7 +186,7 @@ def _not_negative(orbit: PeriodicOrbit, name: str) -> bool:
 def test_the_cart_of_a_rotor_has_its_closed_form() -> None:
     """At a constant speed it is a linear oscillator: amplitude m r w^2 / |k - M w^2 + i c w|, multipliers by its roots."""
     speed = 35.0
-    motion = motion_gradient(orbit_of(ROTOR, Drive(speed=speed)))
+    motion = motion_gradient(newton_orbit(ROTOR, Drive(speed=speed)))
     m, r, k, c = ROTOR.rotor_mass, ROTOR.rotor_radius, ROTOR.cart_stiffness, ROTOR.cart_damping
     mass = ROTOR.cart_mass + m
     a, b = k - mass * speed**2, c * speed
@@ -218,7 +218,7 @@ def test_resonance_of_the_rotor_has_its_closed_form() -> None:
     m, r, k, c = ROTOR.rotor_mass, ROTOR.rotor_radius, ROTOR.cart_stiffness, ROTOR.cart_damping
     mass = ROTOR.cart_mass + m
     resonance = k / np.sqrt(k * mass - 0.5 * c * c)
-    found = extremum_gradient(orbit_of(ROTOR, Drive(speed=1.03 * resonance)), "drive.speed")
+    found = extremum_gradient(newton_orbit(ROTOR, Drive(speed=1.03 * resonance)), "drive.speed")
     assert found.place.value == pytest.approx(resonance, rel=1e-9)
     # along a branch too, where an amplitude alone would leave it open to the root of its error
     low, high = 0.9 * resonance, 1.1 * resonance
@@ -226,7 +226,7 @@ def test_resonance_of_the_rotor_has_its_closed_form() -> None:
     assert top.parameter == pytest.approx(resonance, rel=1e-9)
     # so does a branch over what a function says, to what that leaves
     family = Family(parameters=ROTOR, drive=Drive(speed=low), vary=lambda speed: (ROTOR, Drive(speed=speed)))
-    (top,) = extrema(follow(family, orbit_of(ROTOR, Drive(speed=low)), low, low=low, high=high))
+    (top,) = extrema(follow(family, newton_orbit(ROTOR, Drive(speed=low)), low, low=low, high=high))
     assert top.parameter == pytest.approx(resonance, rel=1e-4)
     assert found.amplitude.value == pytest.approx(m * r / (c * np.sqrt(mass / k - (0.5 * c / k) ** 2)), rel=1e-9)
     inner = k * mass - 0.5 * c * c
@@ -245,14 +245,14 @@ def test_resonance_of_the_rotor_has_its_closed_form() -> None:
 def relocated(orbit: PeriodicOrbit, kind: Crossing, along: str, name: str, value: float) -> FloatArray:
     """Place and amplitude of a crossing at another parameter: SciPy's solution of y(T) = y(0) and the test."""
     parameters, drive = with_values(orbit.parameters, orbit.drive, {name: value})
-    here = value_of(parameters, drive, along)
-    scale = np.append(scale_of(parameters, drive, orbit.start), abs(here))
+    here = parameter_value(parameters, drive, along)
+    scale = np.append(motion_scales(parameters, drive, orbit.start), abs(here))
 
     def operation(z: FloatArray) -> tuple[Any, Drive]:
         return with_values(parameters, drive, {along: float(z[-1] * scale[-1])})
 
     def residual(z: FloatArray) -> FloatArray:
-        period = period_from(*operation(z), z[:-1] * scale[:-1], orbit.turns)
+        period = follow_period(*operation(z), z[:-1] * scale[:-1], orbit.turns)
         return np.append(period.shift / scale[:-1], crossing_test(period.monodromy, kind))
 
     found = root(residual, np.append(orbit.start, here) / scale, tol=1e-13, options={"eps": 1e-7}).x
@@ -290,7 +290,7 @@ POINTS: dict[str, tuple[Any, Drive, str, tuple[float, float, float], int, tuple[
 def test_a_special_point_moves_as_its_differences_say(name: str) -> None:
     parameters, drive, along, (begin, low, high), direction, (turns, guess), kind = POINTS[name]
     family = Family(parameters=parameters, drive=drive, vary=along)
-    orbit = orbit_of(parameters, drive, turns=turns, start=guess)
+    orbit = newton_orbit(parameters, drive, turns=turns, start=guess)
     branch = follow(family, orbit, begin, low=low, high=high, direction=direction)
     point = next(s for s in branch.special if s.kind is kind)
     chosen = ("slider.damping", "slider.stiffness", "crank.length", "rocker.mass", "coupler.cog_angle", "slider.force")
@@ -325,7 +325,7 @@ def test_a_resonance_moves_as_its_differences_say() -> None:
         parameters, drive = with_values(orbit.parameters, orbit.drive, {name: value})
         speeds, slopes = [drive.speed or 0.0, 1.0001 * (drive.speed or 0.0)], []
         for _ in range(8):
-            there = orbit_of(parameters, replace(drive, speed=speeds[len(slopes)]), start=orbit.start, settle=False)
+            there = newton_orbit(parameters, replace(drive, speed=speeds[len(slopes)]), start=orbit.start, settle=False)
             slopes.append(motion_gradient(there, ("drive.speed",)).amplitude["drive.speed"])
             if len(slopes) > 1:
                 step = slopes[-1] * (speeds[-1] - speeds[-2]) / (slopes[-1] - slopes[-2])
@@ -355,7 +355,7 @@ def test_a_resonance_moves_as_its_differences_say() -> None:
 
 
 def test_tests_of_crossings_are_those_of_the_monodromy_matrix() -> None:
-    orbit = orbit_of(TABLE_3_1, Drive(torque=0.2), start=(0.0, 0.0, 45.0))
+    orbit = newton_orbit(TABLE_3_1, Drive(torque=0.2), start=(0.0, 0.0, 45.0))
     motion = motion_gradient(orbit, ("slider.damping", "drive.torque"))
     for kind in Crossing:
         test = motion.test(kind)
@@ -391,7 +391,7 @@ def in_pieces(orbit: PeriodicOrbit, name: str, value: float) -> PeriodicOrbit:
 @pytest.mark.slow
 def test_an_unstable_motion_that_is_followed_in_pieces() -> None:
     """A multiplier of thousands: the derivatives of the motion are as good as those of a stable one."""
-    orbit = orbit_of(RIG_1_B, Drive(speed=1200.0 * RPM))
+    orbit = newton_orbit(RIG_1_B, Drive(speed=1200.0 * RPM))
     family = Family(parameters=RIG_1_B, drive=orbit.drive)
     branch = follow(family, orbit, 1200.0 * RPM, low=500.0 * RPM, high=1300.0 * RPM, direction=-1)
     grown = [o for o in branch.orbits if o.stations is not None and o.largest > 1e3]
@@ -410,7 +410,7 @@ def test_an_unstable_motion_that_is_followed_in_pieces() -> None:
 @pytest.mark.slow
 def test_friction_by_contact_forces_can_be_added_to_a_motion_without() -> None:
     """The derivative at none, from the side on which there is some."""
-    orbit = orbit_of(RIG_2_C, Drive(speed=500.0 * RPM))
+    orbit = newton_orbit(RIG_2_C, Drive(speed=500.0 * RPM))
     assert "slider.friction_coefficient" not in gradient_names(orbit.parameters, orbit.drive)
     (slope,) = motion_gradient(orbit, ("slider.friction_coefficient",)).amplitude.by
 
@@ -427,7 +427,7 @@ def test_the_example_says_what_is_so() -> None:
 
 
 def test_what_has_no_gradient_says_so() -> None:
-    orbit = orbit_of(RIG_2_C, Drive(speed=500.0 * RPM))
+    orbit = newton_orbit(RIG_2_C, Drive(speed=500.0 * RPM))
     with pytest.raises(UnknownNameError, match=r"slider.dampin"):
         motion_gradient(orbit, ("slider.dampin",))
     with pytest.raises(InputError, match=r"drive.torque cannot vary"):
@@ -438,15 +438,15 @@ def test_what_has_no_gradient_says_so() -> None:
     with pytest.raises(UnknownNameError, match=r"pin.Z"):
         motion.peak("pin.Z")
     with pytest.raises(LinkworkError, match="no extremum"):
-        extremum_gradient(orbit_of(RIG_2_C, Drive(speed=200.0 * RPM)), "drive.speed")
+        extremum_gradient(newton_orbit(RIG_2_C, Drive(speed=200.0 * RPM)), "drive.speed")
     with pytest.raises(LinkworkError, match="no period doubling"):
         crossing_gradient(orbit, Crossing.PERIOD_DOUBLING, "drive.speed")
     # without gravity nothing moves the cart of a rotor without unbalance
-    still = orbit_of(replace(ROTOR, rotor_mass=1e-300, gravity=0.0), Drive(speed=20.0))
+    still = newton_orbit(replace(ROTOR, rotor_mass=1e-300, gravity=0.0), Drive(speed=20.0))
     with pytest.raises(LinkworkError, match="no extremum"):
         extremum_gradient(still, "drive.speed")
     # what two multipliers of an undamped motion are multiplied to is 1 at any speed
-    undamped = orbit_of(replace(RIG_2_C, slider_damping=0.0), Drive(speed=500.0 * RPM))
+    undamped = newton_orbit(replace(RIG_2_C, slider_damping=0.0), Drive(speed=500.0 * RPM))
     with pytest.raises(LinkworkError):
         crossing_gradient(undamped, Crossing.TORUS, "drive.speed")
     family = Family(parameters=RIG_2_C, drive=orbit.drive, vary=lambda value: (RIG_2_C, Drive(speed=value)))

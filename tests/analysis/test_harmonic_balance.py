@@ -122,7 +122,7 @@ class TestLinear:
     def test_amplitudes_at_many_speeds_are_those_of_each(self, variant: Variant) -> None:
         p = replace(RIG_1_B, ground_inclination=0.7, slider_damping=7.0)
         load, speeds = Load(x=3.0, slider=20.0), np.array([[20.0, 60.0], [90.0, 140.0]])
-        many = hb.amplitudes_over(p, speeds, 5, variant=variant, load=load)
+        many = hb.harmonic_amplitudes(p, speeds, 5, variant=variant, load=load)
         each = [
             p.rocker_length * harmonic_balance(slider_equation(p, w, variant=variant, load=load), 5).amplitude
             for w in speeds.ravel()

@@ -18,6 +18,7 @@ from analysis.cli.common import WRONG, print_error, say, show_table
 from analysis.figures.style import Figure
 from analysis.files import (
     WritingError,
+    attribute_files,
     check_fmu,
     outputs,
     paths,
@@ -29,9 +30,8 @@ from analysis.files import (
     save_figure,
     write_csv,
     write_text,
-    written_by,
 )
-from analysis.run import CASES, CosimulationError, case_from, load_case
+from analysis.run import CASES, CosimulationError, load_case, read_case
 from linkwork.errors import InputError, ParameterError
 from linkwork.five_bar.published import TABLE_3_1
 
@@ -195,7 +195,7 @@ def test_a_run_of_too_many_samples_is_refused(monkeypatch):
 )
 def test_signals_that_are_none(tmp_path, force, said):
     with pytest.raises(InputError if "phases" not in said else ParameterError, match=said):
-        case_from({"published": "table-3.1", "force": force}, folder=tmp_path)
+        read_case({"published": "table-3.1", "force": force}, folder=tmp_path)
 
 
 @pytest.mark.parametrize("value", ["-" * 50_000, "(" * 5000, int("9" * 4000), 16**5000, ["x" * 10_000]], ids=range(5))
@@ -331,7 +331,7 @@ def test_a_part_of_a_file_does_not_stay(tmp_path):
 
 def test_a_command_writes_over_its_own_files_and_no_others(tmp_path):
     def write(command, text, **options):
-        with written_by(command, **options) as writing:
+        with attribute_files(command, **options) as writing:
             return write_text(tmp_path / "x.txt", text).name, writing.notes
 
     assert write("run", "1") == ("x.txt", [])
@@ -358,7 +358,7 @@ def test_a_link_to_another_file_is_not_written_through(tmp_path):
     (tmp_path / "precious").write_text("kept")
     (tmp_path / "x.txt").symlink_to(tmp_path / "precious")
     (tmp_path / "y.txt").symlink_to(tmp_path / "not there")
-    with written_by("run"):
+    with attribute_files("run"):
         assert write_text(tmp_path / "x.txt", "1").name == "x-2.txt"
         assert write_text(tmp_path / "y.txt", "1").name == "y-2.txt"
     assert (tmp_path / "precious").read_text() == "kept"

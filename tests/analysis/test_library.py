@@ -20,12 +20,12 @@ from analysis.linkages import Package, dead_centres, described, linkage, load_li
 from analysis.linkages.structure import Pin
 from analysis.mechanisms import mechanism_of
 from analysis.numerics.fourier import FourierSeries
-from analysis.periodic import Drive, frequency_response, orbit_of
+from analysis.periodic import Drive, frequency_response, newton_orbit
 from analysis.periodic.motion.discretisation import operating_point
 from analysis.probe import probe
-from analysis.run import Inputs, Trajectory, case_from, compare, cosimulate, load_case, simulate, simulate_many
-from analysis.studio import page_of, state_of
-from analysis.studio.tables import tables_of
+from analysis.run import Inputs, Trajectory, compare, cosimulate, load_case, read_case, simulate, simulate_many
+from analysis.studio import make_page, page_state
+from analysis.studio.tables import mechanism_tables
 from analysis.synthesis.result.described import description, drives
 from linkwork.errors import InputError
 from linkwork.mechanism import Mechanism
@@ -425,7 +425,7 @@ class Vibration:
 def test_multipliers_are_those_of_the_multipliers_of_lagrange(name):
     """The monodromy matrix by finite differences of runs of the oracle, which knows nothing of freedoms in closed form."""
     of = Vibration(name)
-    orbit = orbit_of(of.parameters, Drive(speed=of.made.first_set.drive["speed"]))
+    orbit = newton_orbit(of.parameters, Drive(speed=of.made.first_set.drive["speed"]))
     y, angle, speed = of.of(orbit)
 
     def after(start: np.ndarray) -> np.ndarray:
@@ -524,14 +524,14 @@ def test_a_geared_five_bar_that_was_found_becomes_an_fmu_and_a_page(browser, tmp
         pivot=syn.SecondCrank(length=0.04, ratio=-2.0, phase=0.7),
     )  # fmt: skip
     tables = {"linkage": description(found, syn.Make(speed=20.0)), "run": {"revolutions": 1.0}}
-    case = case_from(tables, folder=FOLDER)
+    case = read_case(tables, folder=FOLDER)
     file = build_native(mechanism_of(case.parameters), NATIVE, tmp_path)
     fmu = cosimulate(
         file, case.parameters, case.inputs, initial=case.initial, stop_time=0.3, step=0.01, tolerance=1e-11
     )
     wanted = found.path(20.0 * fmu.time)
     np.testing.assert_allclose(np.column_stack([fmu["P.x"], fmu["P.y"]]), wanted, atol=1e-8)
-    (tmp_path / "page.html").write_text(page_of(state_of(case)), encoding="utf-8")
+    (tmp_path / "page.html").write_text(make_page(page_state(case)), encoding="utf-8")
     page = _opened(browser, tmp_path / "page.html")
     shown = _shown(page)["columns"]
     np.testing.assert_allclose(
@@ -620,7 +620,7 @@ def test_a_linkage_that_was_found_is_described_and_runs(found, direction):
     """Its coupler point goes where the synthesis says, over two turns."""
     make, way = syn.Make(speed=20.0), {"rotation": 0.2, "direction": direction}
     run = {"stop_time": 0.2 * np.pi, "step": 1e-3}
-    case = case_from(
+    case = read_case(
         {"linkage": description(found, make, **way), **drives(found, make, **way), "run": run}, folder=FOLDER
     )
     done = simulate(
@@ -633,12 +633,12 @@ def test_a_linkage_that_was_found_is_described_and_runs(found, direction):
 
 
 def test_two_cranks_alone_have_tables_without_a_natural_frequency():
-    tables = tables_of(load_linkage(FOLDER / "hybrid-press.toml"))
+    tables = mechanism_tables(load_linkage(FOLDER / "hybrid-press.toml"))
     assert (tables["natural"], tables["damping"]) == (None, "sheet.damping")
 
 
 def test_the_studio_sorts_parameters_by_their_roles():
-    given = {row["name"]: row for row in tables_of(load_linkage(FOLDER / "hybrid-press.toml"))["given"]}
+    given = {row["name"]: row for row in mechanism_tables(load_linkage(FOLDER / "hybrid-press.toml"))["given"]}
     sections = {
         name: given[name]["section"] for name in ("sheet.free_position", "gravity", "rod.cog_x", "initial.motor_angle")
     }
@@ -653,7 +653,7 @@ def test_a_linkage_moves_in_the_studio_and_is_dragged(browser, tmp_path, path):
     # the studio has inputs that are constant
     case = load_case(path, {"motor.torque": 0.5} if path.stem == "stephenson-2" else {})
     bars = {n: b.bar for n, b in described(tables_in(path)).bodies.items() if b.bar}
-    (tmp_path / "page.html").write_text(page_of(state_of(case)), encoding="utf-8")
+    (tmp_path / "page.html").write_text(make_page(page_state(case)), encoding="utf-8")
     page = _opened(browser, tmp_path / "page.html")
     root = "document.documentElement.dataset"
     settled = f"window.studio.solver.id === Number({root}.answer) && {root}.settled === 'true'"

@@ -11,7 +11,7 @@ import pytest
 
 from analysis import Inputs, linkages, simulate, variant
 from analysis.mechanisms import PUBLISHED
-from analysis.run import case_from, in_sentences, load_case, parameters_from, with_sections
+from analysis.run import in_sentences, load_case, read_case, read_parameters, with_sections
 from analysis.sections import Bar, Rod
 from linkwork.errors import LinkworkError, ParameterError
 
@@ -19,7 +19,7 @@ BAR = {"kind": "bar", "width": "20 mm", "thickness": "5 mm", "material": "steel"
 
 
 def _case(**tables):
-    return case_from({"published": "table-3.1", **tables}, folder=Path())
+    return read_case({"published": "table-3.1", **tables}, folder=Path())
 
 
 def test_section_gives_mass_centre_and_inertia_about_the_point_of_the_contract():
@@ -86,7 +86,7 @@ def test_wrong_sections_are_refused(own, said):
 def test_a_spatial_rod_has_its_mass_on_its_line():
     plate = {"kind": "plate", "thickness": 0.01, "material": "steel", "corners": [[0, 0], [1, 0], [0, 1]]}
     with pytest.raises(ParameterError, match="line of the pins"):
-        parameters_from({"rod": {"section": plate}}, PUBLISHED["rahman-ideal"].parameters)
+        read_parameters({"rod": {"section": plate}}, PUBLISHED["rahman-ideal"].parameters)
 
 
 def test_origins_of_masses_and_lengths_that_leave_them():

@@ -17,8 +17,8 @@ from analysis.periodic import (
     confirm_form,
     follow,
     frequency_response,
+    newton_orbit,
     normal_form,
-    orbit_of,
 )
 from analysis.periodic.stability.nonlinear import Forms, form_coefficient
 from analysis.units import RAD_S_PER_RPM
@@ -86,7 +86,7 @@ def test_torus_of_the_delayed_logistic_map() -> None:
 
 
 def branch_of(parameters: object, low: float, high: float) -> Branch:
-    orbit = orbit_of(parameters, Drive(speed=high * RPM))
+    orbit = newton_orbit(parameters, Drive(speed=high * RPM))
     family = Family(parameters=parameters, drive=orbit.drive)
     return follow(family, orbit, high * RPM, low=low * RPM, high=high * RPM, direction=-1, most_points=700)
 
@@ -117,7 +117,7 @@ def test_a_run_beside_each_period_doubling_does_what_its_normal_form_says(
 
 def test_on_which_side_of_a_fold_the_motions_are() -> None:
     parameters = SETS["rig-1-spring-b"].parameters
-    orbit = orbit_of(parameters, Drive(speed=900.0 * RPM))
+    orbit = newton_orbit(parameters, Drive(speed=900.0 * RPM))
     family = Family(parameters=parameters, drive=orbit.drive)
     branch = follow(family, orbit, 900.0 * RPM, low=850.0 * RPM, high=1100.0 * RPM, most_points=200)
     fold = next(s for s in branch.special if s.kind is Crossing.FOLD)

@@ -19,7 +19,7 @@ from analysis.periodic import (
     Stability,
     find_orbit,
     largest_multipliers,
-    orbit_of,
+    newton_orbit,
 )
 from analysis.periodic.motion.kernels import eliminate
 from analysis.periodic.motion.orbit import _time
@@ -105,7 +105,7 @@ ORBITS = {
 )
 def orbit(request: pytest.FixtureRequest) -> PeriodicOrbit:
     parameters, drive, start = ORBITS[request.param]
-    return orbit_of(parameters, drive, start=start)
+    return newton_orbit(parameters, drive, start=start)
 
 
 def test_motion_repeats_itself_on_the_plain_equations(orbit: PeriodicOrbit) -> None:
@@ -160,7 +160,7 @@ def test_turn_is_that_of_a_run() -> None:
 
 def test_small_deviations_grow_by_the_multiplier() -> None:
     parameters, drive, start = ORBITS["unstable"]
-    orbit = orbit_of(parameters, drive, start=start)
+    orbit = newton_orbit(parameters, drive, start=start)
     verdict = orbit.verdict()
     assert verdict.stability is Stability.UNSTABLE
     assert verdict.crossing is Crossing.FOLD

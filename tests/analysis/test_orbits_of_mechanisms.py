@@ -23,15 +23,15 @@ from analysis.periodic import (
     PeriodicOrbit,
     Stability,
     confirm,
-    drive_of,
     find_orbit,
     frequency_response,
     grid,
     mean_effective_mass,
     natural_frequency,
-    orbit_of,
+    newton_orbit,
     plane,
     stability_chart,
+    steady_drive,
 )
 from linkwork.errors import InputError, ParameterError, UnknownNameError
 from linkwork.slider_crank import published as rahman
@@ -128,7 +128,7 @@ def test_orbits_and_multipliers_under_a_torque_are_scipys(
 
 
 def test_what_is_free_names_the_components_and_the_amplitude() -> None:
-    slow = orbit_of(PENDULUM, Drive(torque=0.6), start=(30.0,))
+    slow = newton_orbit(PENDULUM, Drive(torque=0.6), start=(30.0,))
     assert slow.swing == ("pendulum speed", "rad/s")
     assert slow.amplitude == pytest.approx(0.5 * np.ptp(slow.turn(2048)["pendulum.speed"]), rel=1e-5)
     with pytest.raises(InputError, match=r"pendulum speed is needed: give start = \(pendulum speed\)"):
@@ -138,7 +138,7 @@ def test_what_is_free_names_the_components_and_the_amplitude() -> None:
     with pytest.raises(ParameterError, match="second freedom"):
         natural_frequency(PENDULUM)
     with pytest.raises(UnknownNameError, match=r"there is no load\.fx"):
-        orbit_of(ROTOR, Drive(speed=3.0, forces={"load.fx": 1.0}))
+        newton_orbit(ROTOR, Drive(speed=3.0, forces={"load.fx": 1.0}))
 
 
 def test_grid_over_cores_has_the_multipliers_of_the_linear_oscillator(tmp_path: Path) -> None:
@@ -226,13 +226,13 @@ def test_what_cannot_be_periodic_is_refused() -> None:
         ({"modes": {"drive.mode": 0}}, r"drive\.mode = 0 is no mode"),
     ):
         with pytest.raises(InputError, match=message):
-            orbit_of(SPRUNG, Drive(torque=1.0, **given), start=(5.0,))
+            newton_orbit(SPRUNG, Drive(torque=1.0, **given), start=(5.0,))
 
 
 def test_drive_and_inputs_are_each_others() -> None:
     for inputs in (Inputs(speed=3.0, axial_force=1.0, load=2.0), Inputs(torque=3.0, groove=True)):
-        drive = drive_of(SPRUNG, inputs)
-        assert drive_of(SPRUNG, drive.inputs(MECHANISMS["slider-crank"])) == drive
+        drive = steady_drive(SPRUNG, inputs)
+        assert steady_drive(SPRUNG, drive.inputs(MECHANISMS["slider-crank"])) == drive
 
 
 def test_frequency_response_of_the_shift() -> None:
@@ -258,7 +258,7 @@ def test_stability_chart_of_the_shift() -> None:
     assert [axis.name for axis in chart.axes] == ["drive.speed", "shift.damping"]
     for row, column in ((0, 0), (5, 3)):
         x, y = chart.grid.x[column], chart.grid.y[row]
-        orbit = orbit_of(
+        orbit = newton_orbit(
             replace(SPRUNG, shift_damping=y), replace(drive, speed=x), start=chart.grid.starts[row, column]
         )
         assert chart.grid.largest[row, column] == pytest.approx(orbit.largest, abs=1e-9)

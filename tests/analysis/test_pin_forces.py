@@ -14,7 +14,7 @@ import pytest
 import analysis.synthesis as syn
 from analysis.numerics import symbolic
 from analysis.numerics.fourier import FourierSeries
-from analysis.run import case_from, simulate
+from analysis.run import read_case, simulate
 from analysis.synthesis.linkage.machine import pin_functions
 from analysis.synthesis.task.constraint import InfeasibleError, Way
 from linkwork.errors import InputError, ParameterError
@@ -251,7 +251,7 @@ def test_a_case_file_asks_for_all_of_it(tmp_path: Path) -> None:
         },
         "make": {"speed": "300 rpm", "load": ["0 N", "-20 N"], "crank_mass": "200 g"},
     }
-    case = syn.synthesis_case_from(tables, folder=tmp_path)
+    case = syn.read_synthesis_case(tables, folder=tmp_path)
     _, advantage, stretched, folded, clear, most, least = case.constraints
     assert isinstance(advantage, syn.MechanicalAdvantage)
     assert (advantage.least, list(advantage.at)) == (1.5, [radians(30.0)])
@@ -265,9 +265,9 @@ def test_a_case_file_asks_for_all_of_it(tmp_path: Path) -> None:
     assert (most.force, most.pins, least.error, least.pins) == (40.0, "BC", "2 deg", "BC")
     assert most.make == least.make == case.make == syn.Make(speed=10.0 * pi, load=(0.0, -20.0), crank_mass=0.2)
     with pytest.raises(ParameterError, match="come with a least or greatest one"):
-        syn.synthesis_case_from(tables | {"constraints": {"mechanical_advantage_at": ["30 deg"]}}, folder=tmp_path)
+        syn.read_synthesis_case(tables | {"constraints": {"mechanical_advantage_at": ["30 deg"]}}, folder=tmp_path)
     swing = {"least_transmission_angle": False, "toggle_stretched": "200 deg", "toggle_folded": ["30 deg", "40 deg"]}
-    *_, toggle, other = syn.synthesis_case_from(tables | {"constraints": swing}, folder=tmp_path).constraints
+    *_, toggle, other = syn.read_synthesis_case(tables | {"constraints": swing}, folder=tmp_path).constraints
     assert isinstance(toggle, syn.Toggle)
     assert isinstance(other, syn.Toggle)
     assert (toggle.position, other.position) == ("stretched", "folded")
@@ -276,7 +276,7 @@ def test_a_case_file_asks_for_all_of_it(tmp_path: Path) -> None:
 def test_a_case_that_runs_has_the_load(free: syn.Solution, tmp_path: Path) -> None:
     """In the frame of the ground link, as the plant has it; its pins carry what they are said to, but for its spring."""
     made = replace(MAKE, gravity=0.0)
-    case = case_from(free.run_case(made, "loaded"), folder=tmp_path)
+    case = read_case(free.run_case(made, "loaded"), folder=tmp_path)
     run = simulate(case.parameters, case.inputs, initial=case.initial, stop_time=4.0 * pi / made.speed)
     last = run.time > 2.0 * pi / made.speed
     greatest = max(float(np.hypot(run[f"pin.{pin}.fx"], run[f"pin.{pin}.fy"])[last].max()) for pin in "ABC")

@@ -24,14 +24,14 @@ from analysis.periodic import (
     follow_both,
     follow_crossing,
     frequency_response,
+    newton_orbit,
     normal_form,
-    orbit_of,
     orbit_test,
     plane,
     switch,
     with_isolas,
 )
-from analysis.periodic.motion.drive import scale_of
+from analysis.periodic.motion.drive import motion_scales
 from analysis.periodic.response.advice import arcs, fold_jumps
 from linkwork.errors import InputError
 from tests.mechanisms import torsion
@@ -66,7 +66,7 @@ def test_multipliers_pass_the_unit_circle_at_the_characteristic_values_of_mathie
 
 def test_branches_and_boundaries_find_the_odd_characteristic_values_of_mathieu() -> None:
     family = Family(parameters=mathieu(0.0, 1.0), drive=MATHIEU, vary="rotor.stiffness")
-    branch = follow(family, orbit_of(mathieu(-1.0, 1.0), MATHIEU), -1.0, low=-1.0, high=10.0)
+    branch = follow(family, newton_orbit(mathieu(-1.0, 1.0), MATHIEU), -1.0, low=-1.0, high=10.0)
     assert {special.kind for special in branch.special} == {Crossing.PERIOD_DOUBLING}
     expected = [mathieu_b(1, 1.0), mathieu_a(1, 1.0), mathieu_b(3, 1.0), mathieu_a(3, 1.0)]
     assert [special.parameter for special in branch.special] == pytest.approx(expected, abs=1e-9)
@@ -177,7 +177,7 @@ def test_curvature_at_the_folds_of_duffing_is_that_of_the_series_of_the_map(hard
 def of_a_map(special: SpecialPoint) -> tuple[torsion.Constants, float, np.ndarray, int, np.ndarray]:
     orbit = special.orbit
     assert orbit.drive.speed is not None
-    scale = scale_of(orbit.parameters, orbit.drive, orbit.start)
+    scale = motion_scales(orbit.parameters, orbit.drive, orbit.start)
     return orbit.parameters.constants(), orbit.drive.speed, orbit.start, orbit.turns, scale
 
 

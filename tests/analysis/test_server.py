@@ -30,13 +30,13 @@ import pytest
 from analysis.cli.studio import _open as open_page
 from analysis.export import PLATFORMS, this_platform
 from analysis.mechanisms import MECHANISMS, PUBLISHED
-from analysis.run import case_from, heard_by, simulate
+from analysis.run import progress_listener, read_case, simulate
 from analysis.server import BODY, TOKEN, Server, Worker, application
-from analysis.server.application import hosts_of
+from analysis.server.application import allowed_hosts
 from analysis.server.jobs import JOBS, do
 from analysis.server.worker import _answer, _Teller
-from analysis.studio import PAGE, case_of, opening_state, page_of, state_of
-from analysis.synthesis import LeastTransmission, synthesis_case_from
+from analysis.studio import PAGE, make_page, opening_state, page_case, page_state
+from analysis.synthesis import LeastTransmission, read_synthesis_case
 from linkwork.errors import LinkworkError
 
 if TYPE_CHECKING:
@@ -245,8 +245,8 @@ def test_a_port_that_is_taken_is_said(server: Server) -> None:
 
 
 def test_a_browser_leaves_out_the_usual_port() -> None:
-    assert hosts_of(80) == ("127.0.0.1", "localhost")
-    assert hosts_of(8080) == ("127.0.0.1:8080", "localhost:8080")
+    assert allowed_hosts(80) == ("127.0.0.1", "localhost")
+    assert allowed_hosts(8080) == ("127.0.0.1:8080", "localhost:8080")
 
 
 def test_a_process_that_cannot_be_started_fails_the_job_alone(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -344,7 +344,7 @@ def test_a_job_that_cannot_be_done_is_a_sentence(
     given = opening_state()
     if state is not None and "mechanism" in state:
         known = next(iter(MECHANISMS[state["mechanism"]].published))
-        given = state_of(case_from({"published": known}, folder=Path())) | {"values": state.get("values")}
+        given = page_state(read_case({"published": known}, folder=Path())) | {"values": state.get("values")}
         if state["mechanism"] == "slider-crank":
             given["values"] = {}
     elif state is not None:
@@ -355,10 +355,10 @@ def test_a_job_that_cannot_be_done_is_a_sentence(
 
 @pytest.mark.parametrize("name", PUBLISHED)
 def test_a_state_is_the_case_that_it_was_made_of(name: str) -> None:
-    case = case_from({"published": name}, folder=Path())
-    again = case_of(state_of(case))
+    case = read_case({"published": name}, folder=Path())
+    again = page_case(page_state(case))
     assert (again.parameters, again.initial, again.stop_time) == (case.parameters, case.initial, case.stop_time)
-    assert state_of(again) == state_of(case)
+    assert page_state(again) == page_state(case)
 
 
 #: The command as a terminal runs it: a shell's background jobs, and all that they start, ignore Ctrl-C.
@@ -398,14 +398,14 @@ def test_the_command_serves_until_ctrl_c(tmp_path: Path) -> None:
 def test_linkages_of_every_kind_are_drawn_and_go_on_from_their_files() -> None:
     heard: set[str] = set()
     wanted = {"points": ELLIPSE, "starts": 6, "kinds": ["slider-crank", "geared-five-bar"]}
-    with heard_by(lambda what, share: heard.add(what)):
+    with progress_listener(lambda what, share: heard.add(what)):
         found = do("linkages", {"state": opening_state(), "wanted": wanted})
     assert {what.split()[0] for what in heard} == {"trying", "fitting", "comparing", "refining"}
 
     def tables(file: dict[str, str]) -> dict[str, Any]:
         return tomllib.loads(base64.b64decode(file["base64"]).decode())
 
-    task = synthesis_case_from(tables(found["files"][0]), folder=Path())
+    task = read_synthesis_case(tables(found["files"][0]), folder=Path())
     assert task.task.path.closed
     np.testing.assert_array_equal(task.task.path.points, ELLIPSE)
     assert task.constraints == (LeastTransmission(),)
@@ -418,7 +418,7 @@ def test_linkages_of_every_kind_are_drawn_and_go_on_from_their_files() -> None:
             assert files == []
             continue
         case, drawing = files
-        search = synthesis_case_from(tables(case), folder=Path()).search
+        search = read_synthesis_case(tables(case), folder=Path()).search
         assert search.kinds == ("geared-five-bar",)
         assert f"gears {Fraction(search.gears[0])}" in verdict
         assert base64.b64decode(drawing["base64"]).startswith(b"  0\nSECTION")
@@ -459,7 +459,7 @@ def test_an_fmu_starts_with_the_values_of_the_page(tmp_path: Path, kind: str, ev
     state = opening_state()
     state["values"] = state["values"] | {"crank.length": 0.047, "drive.speed": 31.0, "initial.crank_angle": 0.4}
     heard: set[str] = set()
-    with heard_by(lambda what, share: heard.add(what)):
+    with progress_listener(lambda what, share: heard.add(what)):
         file = do("export", {"state": state, "wanted": {"kind": kind, "everywhere": everywhere}})["files"][0]
     assert heard == {f"compiling for {name}" for name in (PLATFORMS if everywhere else [this_platform()])}
     path = tmp_path / file["name"]
@@ -476,7 +476,7 @@ def test_an_fmu_starts_with_the_values_of_the_page(tmp_path: Path, kind: str, ev
         assert float(starts[name] or "nan") == state["values"][name]
     # and without a value being set it runs as the case does
     found = simulate_fmu(str(path), stop_time=0.1, step_size=0.01, output_interval=0.01, output=["slider.position"])
-    case = case_of(state)
+    case = page_case(state)
     wanted = simulate(case.parameters, case.inputs, initial=case.initial, stop_time=0.1, step=0.01)
     np.testing.assert_allclose(found["slider.position"], wanted["slider.position"], atol=1e-9)
 
@@ -490,9 +490,9 @@ def test_the_fmu_runs_with_the_motor_of_the_page() -> None:
     state["values"] = state["values"] | {"drive.mode": 0.0, "initial.crank_speed": 35.0}
     state["values"] |= {f"drive.torque.{name}": value for name, value in motor.items()}
     found = do("run", {"state": state, "wanted": {"rows": 200}})
-    case = case_of(state)
+    case = page_case(state)
     # a page that is opened anew meanwhile holds it against its own run of the same state
-    assert case_of(found["states"][0]) == case
+    assert page_case(found["states"][0]) == case
     wanted = simulate(case.parameters, case.inputs, initial=case.initial, stop_time=0.2, step=1e-3)
     for name in ("crank.speed", "slider.position"):
         np.testing.assert_allclose(found["outputs"][name], wanted[name], atol=1e-6 * np.abs(wanted[name]).max())
@@ -504,7 +504,7 @@ def test_the_fmu_runs_with_the_motor_of_the_page() -> None:
 @pytest.fixture(scope="module")
 def studio() -> Iterator[Server]:
     """The built page, served."""
-    yield from _running(page_of(opening_state()))
+    yield from _running(make_page(opening_state()))
 
 
 @pytest.fixture
@@ -784,7 +784,7 @@ def test_the_fmu_runs_beside_the_page_and_is_saved_with_its_values(page: Page) -
 @pytest.mark.slow
 def test_a_range_of_speeds_is_tuned_and_the_change_taken_over(page: Page) -> None:
     # a resonance of rig 2 with spring C lies in the range; a stiffer spring leads it 2 % above the upper end
-    state = state_of(case_from({"published": "rig-2-spring-c"}, folder=Path()))
+    state = page_state(read_case({"published": "rig-2-spring-c"}, folder=Path()))
     page.evaluate("state => window.studio.restore(state)", state)
     _part(page, "A range of speeds")
     fields = page.locator("#python details[open] > .line").nth(0).locator('input[type="number"]')

@@ -13,7 +13,7 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 import analysis.synthesis as syn
-from analysis.run import Inputs, case_from, simulate
+from analysis.run import Inputs, read_case, simulate
 from analysis.synthesis.result.report import report
 from analysis.synthesis.task.constraint import advance, stroke
 from linkwork.errors import AssemblyError, InputError, ParameterError
@@ -178,7 +178,7 @@ def test_a_force_is_kept_and_the_case_runs_with_it(tmp_path: Path) -> None:
     calm = best(CLEAR, syn.LeastPinForce(error=1.001 * held.evaluation.worst, make=MAKE))
     assert calm.evaluation.worst <= 1.0011 * held.evaluation.worst
     assert syn.pin_forces(calm.linkage, MAKE).greatest <= 1.001 * bound
-    case = case_from(held.run_case(MAKE, "runs"), folder=tmp_path)
+    case = read_case(held.run_case(MAKE, "runs"), folder=tmp_path)
     run = simulate(case.parameters, case.inputs, initial=case.initial, stop_time=2.0 * pi / MAKE.speed, step=1e-4)
     # the load along the guide acts in the plant, that across it is carried by the guide alone
     assert np.hypot(run["crank_pin.fx"], run["crank_pin.fy"]).max() == pytest.approx(

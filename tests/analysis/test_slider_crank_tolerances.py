@@ -301,7 +301,7 @@ def test_where_the_first_derivatives_vanish_a_note_says_so() -> None:
     tolerances = [Tolerance("guide.offset", 5e-3), Tolerance(SHIFT, 5e-3), Tolerance("guide.twist", radians(0.5))]
     result = monte_carlo(turn, tolerances, samples=200_000)
     spread, found = result.spreads["slider.position"], result.estimates["slider.position"]
-    assert result.linear_is_off("slider.position").tolist() == [False, True]
+    assert result.linear_misses("slider.position").tolist() == [False, True]
     assert spread.deviation.data == pytest.approx(found.second_deviation.data, rel=0.02)
     assert spread.mean[1] == pytest.approx(found.second_mean[1], abs=0.02 * found.second_deviation[1])
     (message,) = result.notes()
@@ -359,7 +359,7 @@ def test_across_a_dead_centre_there_is_no_mean() -> None:
     assert load.percentiles[0, 1] < -1e3 < 1e3 < load.percentiles[-1, 1]
     assert load.counts[1].sum() == pytest.approx(0.999 * 20_000, abs=3)
     # neither is there an estimate, and it is reported as off
-    assert result.linear_is_off("slider.load").tolist() == [False, True]
+    assert result.linear_misses("slider.load").tolist() == [False, True]
     linear = result.estimates["slider.load"]
     for values in (linear.deviation, linear.worst, linear.second_mean, linear.second_deviation, *linear.shares):
         assert np.ma.getmaskarray(values).tolist() == [False, True]
@@ -384,7 +384,7 @@ def test_an_estimate_ends_where_the_tolerances_reach_the_dead_centre() -> None:
     # hardly a sample of a normal error is as far out as three standard deviations
     few = monte_carlo(turn, tolerances, quantities=("slider.load",), samples=10, seed=1)
     assert not np.ma.getmaskarray(few.spreads["slider.load"].mean).any()
-    assert few.linear_is_off("slider.load")[1:3].all()
+    assert few.linear_misses("slider.load")[1:3].all()
     assert "the tolerances reach a dead centre from crank angle 9" in few.notes()[0]
 
 

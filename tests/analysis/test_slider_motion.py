@@ -231,7 +231,7 @@ def test_the_program_has_the_gradient_of_the_kernels(
     linkage = make_linkage(start, normal, unknown)
     program = Program(normal, limits, unknown)
     at = np.concatenate([start.q, start.pivot]), program.at(start)[1]
-    value, gradient = program.stated(*at)[0], program.slopes_at(*at)[0]
+    value, gradient = program.stated(*at)[0], program.gradient_and_jacobian(*at)[0]
     size = normal.unit**2
     assert size * value == pytest.approx(evaluate(task, linkage).error, rel=1e-11)
     units = np.full(len(start.pivot), normal.unit)

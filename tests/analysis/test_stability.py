@@ -26,7 +26,7 @@ from analysis.periodic import (
     confirm,
     crossing_test,
     grid,
-    orbit_of,
+    newton_orbit,
     orbit_test,
     plane,
     removing_damping,
@@ -92,7 +92,7 @@ def test_torque_drive_has_charts_too() -> None:
     operation = plane(rig, Drive(torque=0.01), "drive.torque", "slider.damping")
     found = grid(operation, np.linspace(0.005, 0.03, 4), np.linspace(5.0, 8.0, 3), start=(0.0, 0.0, 56.0))
     assert found.starts.shape == (3, 4, 3)
-    orbit = orbit_of(*operation(0.03, 8.0), start=found.starts[2, 3])
+    orbit = newton_orbit(*operation(0.03, 8.0), start=found.starts[2, 3])
     assert found.largest[2, 3] == pytest.approx(orbit.largest, abs=1e-8)
     run = confirm(*operation(0.03, 8.0), start=found.starts[2, 3], turns=200)
     assert run.agrees
@@ -104,7 +104,7 @@ def test_torque_drive_has_charts_too() -> None:
 def test_a_small_margin_is_given_more_turns() -> None:
     rig = replace(SETS["rig-2-spring-c"].parameters, slider_damping=0.9794)
     drive = Drive(speed=1169.3 * pi / 30.0)
-    orbit = orbit_of(rig, drive)
+    orbit = newton_orbit(rig, drive)
     assert 0.0 < orbit.verdict().margin < 5e-4
     run = confirm(rig, drive)
     assert len(run.deviations) > 2000
@@ -390,7 +390,7 @@ def test_grid_is_each_point_alone(tmp_path: Path) -> None:
     assert found.largest.shape == found.status.shape == (len(YS), len(XS))
     for row, y in enumerate(YS.tolist()):
         for column, x in enumerate(XS.tolist()):
-            orbit = orbit_of(*first_region_plane(0.05)(x, y))
+            orbit = newton_orbit(*first_region_plane(0.05)(x, y))
             assert found.largest[row, column] == pytest.approx(orbit.largest, abs=1e-9)
             assert found.starts[row, column] == pytest.approx(orbit.start, abs=1e-9)
     states = found.stability()

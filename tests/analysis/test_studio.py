@@ -18,9 +18,9 @@ import pytest
 from click.testing import Result
 
 from analysis.mechanisms import MECHANISMS, PUBLISHED, MechanismError, check, mechanism_of, register
-from analysis.periodic import Drive, orbit_of
-from analysis.run import Case, Inputs, case_from, simulate
-from analysis.studio import PAGE, fresh, opening_state, page_of, state_of
+from analysis.periodic import Drive, newton_orbit
+from analysis.run import Case, Inputs, read_case, simulate
+from analysis.studio import PAGE, fresh, make_page, opening_state, page_state
 from linkwork.five_bar.parameters import InitialState
 from linkwork.five_bar.published import TABLE_3_1
 from tests import slider_cranks, strategies
@@ -202,7 +202,7 @@ def _random_slider_crank(seed: int) -> Case:
 def test_every_number_of_a_run_is_pythons(page: Page, random: Callable[[int], Case], seed: int) -> None:
     case = random(seed)
     mechanism = mechanism_of(case.parameters)
-    found = _load(page, state_of(case) | {"source": "run"})
+    found = _load(page, page_state(case) | {"source": "run"})
     columns, count = found["columns"], found["rows"]["count"]
     wanted = simulate(case.parameters, case.inputs, initial=case.initial, stop_time=0.02, **_HELD)
     assert len(wanted) == count > 1
@@ -240,8 +240,8 @@ def test_the_periodic_motion_and_its_multipliers_are_pythons(page: Page, seed: i
     parameters, drive = _varied(seed)
     mechanism = mechanism_of(parameters)
     case = Case(title="", parameters=parameters, inputs=drive.inputs(mechanism), stop_time=1.0)
-    found = _load(page, state_of(case))
-    orbit = orbit_of(parameters, drive)
+    found = _load(page, page_state(case))
+    orbit = newton_orbit(parameters, drive)
     turn, count = orbit.turn(720), found["rows"]["count"]
     assert (found["source"], count) == ("steady", 721)
     scale = [parameters.crank_length, parameters.crank_length * drive.speed]
@@ -367,12 +367,12 @@ def _saved(page: Page, form: str) -> Path:
     ids=["speed", "torque", "pushed", "shifted", "grooved"],
 )
 def test_a_case_that_is_saved_is_the_case(page: Page, case: Case) -> None:
-    _load(page, state_of(case) | {"source": "run"})
-    read = case_from(tomllib.loads(_saved(page, "case").read_text(encoding="utf-8")), folder=Path())
+    _load(page, page_state(case) | {"source": "run"})
+    read = read_case(tomllib.loads(_saved(page, "case").read_text(encoding="utf-8")), folder=Path())
     mechanism = mechanism_of(case.parameters)
     assert read.parameters == case.parameters
     assert read.inputs.modes(mechanism) == case.inputs.modes(mechanism)
-    wanted, found = state_of(case), state_of(read)
+    wanted, found = page_state(case), page_state(read)
     idle = {"initial." + freedom.initial[1] for freedom in mechanism.freedoms}
     for name, value in wanted["values"].items():
         assert found["values"][name] == value or name in idle, name
@@ -393,10 +393,10 @@ def test_motion_drawing_and_lines_are_saved(page: Page, tmp_path: Path) -> None:
     assert len([one for one in drawing.iter() if one.tag.endswith("circle")]) == 7
     assert _saved(page, "png").read_bytes()[:8] == b"\x89PNG\r\n\x1a\n"
     # of several motions the lines have that of the page, also where nothing but its start says at which speed it is
-    u, rate, speed = orbit_of(TABLE_3_1, Drive(torque=0.3), start=(0.0, 0.0, 40.0)).start
+    u, rate, speed = newton_orbit(TABLE_3_1, Drive(torque=0.3), start=(0.0, 0.0, 40.0)).start
     start = InitialState(slider_position=u, slider_velocity=rate, crank_speed=speed)
     torque = Case(title="", parameters=TABLE_3_1, inputs=Inputs(torque=0.3), initial=start, stop_time=1.0)
-    for state in (opening_state(), state_of(torque)):
+    for state in (opening_state(), page_state(torque)):
         found = _load(page, state)
         done = subprocess.run(
             [sys.executable, _saved(page, "python")],
@@ -433,7 +433,7 @@ def test_a_mechanism_of_ones_own_opens_in_the_page(browser: Browser, tmp_path: P
             title="own", parameters=known.parameters, initial=known.initial, inputs=Inputs(torque=0.3), stop_time=0.02
         )
         path = tmp_path / "own.html"
-        path.write_text(page_of(state_of(case) | {"source": "run"}), encoding="utf-8")
+        path.write_text(make_page(page_state(case) | {"source": "run"}), encoding="utf-8")
         page = _opened(browser, path)
         found = _shown(page)["columns"]
         wanted = simulate(case.parameters, case.inputs, initial=case.initial, stop_time=0.02, **_HELD)

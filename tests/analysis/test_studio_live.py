@@ -12,9 +12,9 @@ import numpy as np
 import pytest
 
 from analysis.mechanisms import PUBLISHED, mechanism_of
-from analysis.periodic import Drive, drive_of, frequency_response, natural_frequency, orbit_of
-from analysis.run import Case, InductionMotor, Inputs, case_from, simulate
-from analysis.studio import PAGE, case_of, state_of
+from analysis.periodic import Drive, frequency_response, natural_frequency, newton_orbit, steady_drive
+from analysis.run import Case, InductionMotor, Inputs, read_case, simulate
+from analysis.studio import PAGE, page_case, page_state
 from benchmarks.studio import measured, report
 from tests.analysis.test_studio import _HELD, _load, _near, _opened, _saved, _varied, in_browser
 
@@ -34,7 +34,7 @@ def page(browser: Any) -> Iterator[Any]:
 def _state(speed: float) -> dict[str, Any]:
     mechanism = mechanism_of(RIG.parameters)
     inputs = Drive(speed=speed * RPM).inputs(mechanism)
-    return state_of(Case(title="", parameters=RIG.parameters, inputs=inputs, stop_time=1.0))
+    return page_state(Case(title="", parameters=RIG.parameters, inputs=inputs, stop_time=1.0))
 
 
 def _explored(page: Any, which: str, ranges: Mapping[str, tuple[float, float]]) -> None:
@@ -57,7 +57,7 @@ def test_the_response_is_pythons_with_its_fold_and_what_to_avoid(page: Any) -> N
     assert len(branches) == 2
     largest = []
     for point in points[:: len(points) // 12]:
-        orbit = orbit_of(RIG.parameters, Drive(speed=point["value"]), start=point["start"])
+        orbit = newton_orbit(RIG.parameters, Drive(speed=point["value"]), start=point["start"])
         _near(np.array(point["start"]) / [0.05, 5.0], orbit.start / [0.05, 5.0])
         _near(point["amplitude"], orbit.amplitude)
         found = np.sort_complex([complex(*pair) for pair in point["multipliers"]])
@@ -106,7 +106,7 @@ def test_the_ranges_to_avoid_are_pythons(
     known = PUBLISHED[name]
     parameters = replace(known.parameters, **change)
     inputs = Drive(speed=0.5 * (low + high) * RPM).inputs(mechanism_of(parameters))
-    _load(page, state_of(Case(title="", parameters=parameters, inputs=inputs, stop_time=1.0)))
+    _load(page, page_state(Case(title="", parameters=parameters, inputs=inputs, stop_time=1.0)))
     _explored(page, "response", {"What varies": (low, high)})
     found = page.evaluate("window.studio.charts.response.avoided")
     wanted = frequency_response(parameters, low * RPM, high * RPM, doublings=0).speeds_to_avoid
@@ -128,10 +128,10 @@ def test_every_square_of_the_stability_chart_has_the_verdict_of_its_motion(page:
     for one in np.random.default_rng(1).choice(squares, 12, replace=False):
         speed = RPM * (1850.0 + 350.0 * (one["column"] + 0.5) / 48)
         damping = 5.0 + 10.0 * (one["row"] + 0.5) / 32
-        parameters = case_of(
+        parameters = page_case(
             _state(1900.0) | {"values": {**_state(1900.0)["values"], "slider.damping": damping}}
         ).parameters
-        orbit = orbit_of(parameters, Drive(speed=speed), start=one["start"])
+        orbit = newton_orbit(parameters, Drive(speed=speed), start=one["start"])
         assert orbit.verdict().stability.value == one["verdict"]
         found = np.sort_complex([complex(*pair) for pair in one["multipliers"]])
         _near(found, np.sort_complex(orbit.multipliers))
@@ -151,13 +151,13 @@ def test_a_motor_drives_the_crank_as_in_python(page: Any) -> None:
     mechanism = mechanism_of(parameters)
     inputs = Inputs(torque=(0.2, MOTOR), force=3.0)
     case = Case(title="motor", parameters=parameters, inputs=inputs, stop_time=0.02)
-    run = _load(page, state_of(case) | {"source": "run"})
+    run = _load(page, page_state(case) | {"source": "run"})
     # a motor's torque follows the speed: nothing is held over a step
     wanted = simulate(parameters, inputs, stop_time=0.02, step=_HELD["step"], tolerance=_HELD["tolerance"])
     for name in mechanism.output_names:
         _near(run["columns"][name], wanted[name])
-    found = _load(page, state_of(case))
-    orbit = orbit_of(parameters, drive_of(parameters, inputs))
+    found = _load(page, page_state(case))
+    orbit = newton_orbit(parameters, steady_drive(parameters, inputs))
     assert found["source"] == "steady"
     _near(found["answer"]["orbit"]["start"], orbit.start)
     multipliers = [complex(*pair) for pair in found["answer"]["orbit"]["multipliers"]]
@@ -172,13 +172,13 @@ def test_a_motor_drives_the_crank_as_in_python(page: Any) -> None:
             breakdown_slip=MOTOR.breakdown_slip,
             synchronous_speed=point["value"],
         )
-        varied = drive_of(parameters, Inputs(torque=(0.2, motor), force=3.0))
-        again = orbit_of(parameters, varied, start=point["start"])
+        varied = steady_drive(parameters, Inputs(torque=(0.2, motor), force=3.0))
+        again = newton_orbit(parameters, varied, start=point["start"])
         np.testing.assert_allclose(point["start"], again.start, rtol=1e-8, atol=1e-9)
         assert point["amplitude"] == pytest.approx(again.amplitude, rel=1e-8)
-    read = case_from(tomllib.loads(_saved(page, "case").read_text(encoding="utf-8")), folder=Path())
+    read = read_case(tomllib.loads(_saved(page, "case").read_text(encoding="utf-8")), folder=Path())
     assert read.inputs.parts("torque") == case.inputs.parts("torque")
-    again_of = case_of(state_of(case))
+    again_of = page_case(page_state(case))
     assert again_of.inputs.parts("torque") == case.inputs.parts("torque")
 
 
@@ -186,7 +186,9 @@ def test_a_motor_drives_the_crank_as_in_python(page: Any) -> None:
 def test_powers_are_those_of_the_equations_and_the_envelope_has_the_greatest_force(page: Any) -> None:
     parameters, drive = _varied(1)
     mechanism = mechanism_of(parameters)
-    found = _load(page, state_of(Case(title="", parameters=parameters, inputs=drive.inputs(mechanism), stop_time=1.0)))
+    found = _load(
+        page, page_state(Case(title="", parameters=parameters, inputs=drive.inputs(mechanism), stop_time=1.0))
+    )
     columns, equations = found["columns"], mechanism.equations
     p = parameters.constants()
     modes = tuple(map(float, drive.inputs(mechanism).modes(mechanism).values()))

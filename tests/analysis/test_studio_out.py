@@ -23,7 +23,7 @@ from PIL import Image
 from analysis.export import interface
 from analysis.mechanisms import MECHANISMS, PUBLISHED
 from analysis.run import Case, Inputs
-from analysis.studio import PAGE, address_of, opening_state, state_of
+from analysis.studio import PAGE, opening_state, page_address, page_state
 
 from ..scripts import script_of_docs
 from .test_studio import _drag, _given, _load, _opened, _pin, _saved, _settled, in_browser
@@ -44,7 +44,7 @@ def _spatial() -> dict[str, Any]:
     known = PUBLISHED["rahman-a4-20-alpha4-232"]
     inputs = Inputs(speed=known.crank_speed, shift_speed=0.0)
     case = Case(title="spatial", parameters=known.parameters, initial=known.initial, inputs=inputs, stop_time=1.0)
-    return state_of(case)
+    return page_state(case)
 
 
 # What is taken out
@@ -373,7 +373,7 @@ def test_what_the_documentation_links_to_opens(browser: Any) -> None:
     page = _opened(browser, PAGE)
     for name, state in openings.states().items():
         with _settled(page):
-            page.evaluate("address => { location.href = address }", address_of(state, PAGE.as_uri()))
+            page.evaluate("address => { location.href = address }", page_address(state, PAGE.as_uri()))
         assert page.inner_text("#title") == state["title"], name
         assert page.inner_text("#fault") == "", name
         assert page.evaluate("window.studio.shown().rows.count") > 1, name

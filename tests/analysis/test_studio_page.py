@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from analysis.studio import PAGE, address_of, opening_state
+from analysis.studio import PAGE, opening_state, page_address
 
 from .test_studio import _drag, _given, _load, _opened, _pin, in_browser
 
@@ -167,14 +167,14 @@ def test_a_state_that_cannot_be_shown_is_said_once_over_one_that_can(page: Any) 
     state = opening_state()
     state["values"] |= {"ground.length": 0.9}
     page.goto("about:blank")
-    page.goto(address_of(state, PAGE.as_uri()))
+    page.goto(page_address(state, PAGE.as_uri()))
     page.wait_for_function("document.documentElement.dataset.ready")
     assert page.inner_text("body").count("cannot be joined") == 1
     assert page.inner_text("#words").startswith("Turns fully")
     assert _given(page, "ground.length") == opening_state()["values"]["ground.length"]
     # nor does one that comes later
     page.evaluate("document.getElementById('fault').textContent = ''")
-    page.evaluate("address => { location.href = address }", address_of(state | {"title": "again"}, PAGE.as_uri()))
+    page.evaluate("address => { location.href = address }", page_address(state | {"title": "again"}, PAGE.as_uri()))
     page.wait_for_function("document.getElementById('fault').textContent")
     assert _given(page, "ground.length") == opening_state()["values"]["ground.length"]
     assert not page.evaluate(UNDO)

@@ -10,7 +10,7 @@ import pytest
 
 from analysis.mechanisms import PUBLISHED
 from analysis.run import Case, Inputs
-from analysis.studio import opening_state, state_of
+from analysis.studio import opening_state, page_state
 from linkwork.errors import InputError, LinkworkError
 
 from .test_studio import in_browser
@@ -31,7 +31,7 @@ CASE = Case(
 
 @pytest.mark.parametrize(
     ("what", "state"),
-    [(None, opening_state()), (CASE, state_of(CASE))],
+    [(None, opening_state()), (CASE, page_state(CASE))],
     ids=["nothing", "case"],
 )
 def test_a_widget_shows_what_it_is_made_of(what: Any, state: dict[str, Any]) -> None:

@@ -25,7 +25,7 @@ from analysis.periodic import (
     find_orbit,
     find_orbits,
     frequency_response,
-    orbit_of,
+    newton_orbit,
     sweep,
     turns_sought,
     unsought,
@@ -75,7 +75,7 @@ def mathieu(speed: float, *, stiffness: float = 0.0, damping: float = DAMPING, u
 def test_a_motion_is_sought_from_where_the_linkage_starts(hanging: float) -> None:
     parameters = yoke(f"yoke-{abs(hanging):.0f}", hanging=hanging).parameters
     for speed in (100.0 * RAD_S_PER_RPM, 134.0 * RAD_S_PER_RPM):
-        orbit = orbit_of(parameters, Drive(speed=speed))
+        orbit = newton_orbit(parameters, Drive(speed=speed))
         np.testing.assert_allclose(np.sort_complex(orbit.multipliers), mathieu(speed), rtol=1e-7)
         assert orbit.amplitude == 0.0
         np.testing.assert_allclose(find_orbit(parameters, speed=speed).start, [hanging, 0.0], atol=1e-9)
@@ -122,7 +122,7 @@ def test_a_slider_that_is_measured_from_elsewhere_has_the_same_motion() -> None:
         built.spring("support", at="S", stiffness=6e4, free=start, damping=80.0)
         built.freedom("crank", "A", speed="200 rpm").freedom("guide", "S", start=start)
         built.mechanism()
-        orbits.append(orbit_of(PUBLISHED[name].parameters, Drive(speed=200.0 * RAD_S_PER_RPM)))
+        orbits.append(newton_orbit(PUBLISHED[name].parameters, Drive(speed=200.0 * RAD_S_PER_RPM)))
     np.testing.assert_allclose(orbits[1].multipliers, orbits[0].multipliers, rtol=1e-8)
     np.testing.assert_allclose(orbits[1].start - orbits[0].start, [0.25, 0.0], atol=1e-10)
     assert orbits[0].amplitude > 1e-5
@@ -330,7 +330,7 @@ def test_a_machine_that_starts_to_go_round_goes_on() -> None:
     parameters, speed = yoke("yoke-started").parameters, 300.0 * RAD_S_PER_RPM
     round_it = max(find_orbits(parameters, speed=speed).stable, key=lambda orbit: orbit.start[1])
     near = round_it.start + np.array([0.05, 0.5])
-    assert orbit_of(parameters, Drive(speed=speed), start=near).rounds == {"swing.angle": 1}
+    assert newton_orbit(parameters, Drive(speed=speed), start=near).rounds == {"swing.angle": 1}
     swept = sweep(parameters, np.linspace(300.0, 400.0, 5) * RAD_S_PER_RPM, start=near)
     assert [orbit and orbit.rounds for orbit in swept.orbits] == [{"swing.angle": 1}] * 5
     assert find_orbit(parameters, speed=speed).rounds == {}  # run up from rest it hangs

@@ -18,18 +18,18 @@ from analysis import InductionMotor, Limit, Wish, cli, figures, tune
 from analysis.periodic import (
     Crossing,
     Drive,
-    drive_of,
     find_orbit,
     find_orbits,
     frequency_response,
-    orbit_of,
+    newton_orbit,
     orbit_test,
     plane,
     removing_damping,
+    steady_drive,
 )
-from analysis.run import case_from, load_case
+from analysis.run import load_case, read_case
 from analysis.tuning import load_tuning_case
-from analysis.tuning.cases import tuning_case_from
+from analysis.tuning.cases import read_tuning_case
 from analysis.tuning.optimisation import _conditions, _unwanted, _ways
 from analysis.tuning.result import STABLE, readings, wished
 from analysis.tuning.survey import other_motions, survey
@@ -248,7 +248,7 @@ def test_least_change_for_a_pin_force_is_that_of_slsqp():
     def room(x):
         start, force = None, []
         for speed in speeds.tolist():
-            orbit = orbit_of(*asked.operation(np.asarray(x), speed), start=start)
+            orbit = newton_orbit(*asked.operation(np.asarray(x), speed), start=start)
             start, turn = orbit.start, orbit.turn(512)
             force.append(float(np.hypot(turn["pin.C.fx"], turn["pin.C.fy"]).max()))
         # the top of a curve through the speeds
@@ -415,7 +415,7 @@ def test_numbers_of_the_drive_are_changed_in_the_case_too(force):
     tables["drive"]["torque"]["synchronous_speed"] = "600 rpm"
     change = {"drive": {"torque": {"breakdown_torque": "10 %"}}, "slider.force": {"tolerance": "2 N"}}
     asked = {"over": FIELD, "between": ["500 rpm", "600 rpm"], "no_jump": True, "change": change}
-    case = tuning_case_from(tables | {"tune": asked}, folder=Path())
+    case = read_tuning_case(tables | {"tune": asked}, folder=Path())
     assert [(c.name, c.low, c.high) for c in case.wish.change] == [
         ("drive.torque.breakdown_torque", pytest.approx(1.8), pytest.approx(2.2)),
         ("slider.force", -1.0, 3.0),
@@ -424,10 +424,10 @@ def test_numbers_of_the_drive_are_changed_in_the_case_too(force):
     _, drive = case.wish.operation(case.wish.scaled(values), 55.0)
     assert (drive.motor.breakdown_torque, drive.motor.synchronous_speed) == (pytest.approx(1.9), 55.0)
     assert drive.forces["slider.force"] == pytest.approx(2.5)
-    written = case_from(
+    written = read_case(
         case.tuned_tables(SimpleNamespace(values=values), Path()), folder=Path(), overrides={"run.stop_time": 1.0}
     )
-    again = drive_of(written.parameters, written.inputs, written.initial)
+    again = steady_drive(written.parameters, written.inputs, written.initial)
     assert again.motor.breakdown_torque == pytest.approx(1.9)
     assert again.forces["slider.force"] == pytest.approx(2.5)
 
@@ -437,7 +437,7 @@ def test_under_a_motor_the_crank_begins_as_it_does_in_the_case():
     asked = {"over": FIELD, "between": ["500 rpm", "600 rpm"], "no_jump": True, "change": {"slider.mass": "5 %"}}
     tables = {"published": "rig-2-spring-c", "drive": {"torque": motor}, "tune": asked}
     for initial, speed in (({}, 540.0), ({"crank_speed": "300 rpm"}, 300.0)):
-        case = tuning_case_from(tables | {"initial": initial}, folder=Path())
+        case = read_tuning_case(tables | {"initial": initial}, folder=Path())
         assert case.wish.start[-1] == pytest.approx(speed * RAD_S_PER_RPM)
 
 

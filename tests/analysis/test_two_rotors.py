@@ -43,14 +43,14 @@ from analysis.periodic import (
     find_orbits,
     motion_gradient,
     natural_frequency,
-    orbit_of,
+    newton_orbit,
     plane,
     stability_chart,
     sweep,
 )
 from analysis.periodic.motion.orbit import first_guess
 from analysis.run import load_case
-from analysis.studio.tables import tables_of
+from analysis.studio.tables import mechanism_tables
 from linkwork.errors import InputError
 
 from ..mechanisms.two_rotors import MECHANISM
@@ -84,7 +84,7 @@ def _cart(speeds: tuple[float, ...], phases: tuple[float, ...], t: Any) -> Any:
 @pytest.mark.parametrize("ratio", RATIOS, ids=str)
 def test_the_motion_at_commanded_speeds_is_the_closed_form(ratio: Fraction) -> None:
     speed, phase = 21.0, 0.4
-    orbit = orbit_of(P, _drive(speed, ratio, phase))
+    orbit = newton_orbit(P, _drive(speed, ratio, phase))
     turns = ratio.denominator
     assert orbit.flow.period == pytest.approx(2.0 * pi * turns)
     turn = orbit.turn(256)
@@ -138,8 +138,8 @@ def test_linear_models_along_a_motion_go_through_the_common_period_of_both_crank
     with pytest.raises(InputError, match="no common period"):
         settled_motion(P, Inputs(left_speed=speed, right_speed=30.0001))
     for orbit in (
-        orbit_of(P, _drive(speed, ratio)),
-        orbit_of(P, Drive(speed=30.0, crank="right.speed", ratios={"left.angle": 1 / ratio})),
+        newton_orbit(P, _drive(speed, ratio)),
+        newton_orbit(P, Drive(speed=30.0, crank="right.speed", ratios={"left.angle": 1 / ratio})),
     ):
         model = linearise_along(P, orbit, samples=64)
         assert model.period == pytest.approx(period)
@@ -171,7 +171,7 @@ def test_a_rotor_on_a_motor_locks_to_the_commanded_one_with_the_multipliers_of_a
     )
     last = [found[name][-1] for name in ("right.angle", "cart.position", "right.speed_out", "cart.velocity")]
     last[0] -= 400 * 2.0 * pi
-    orbit = orbit_of(P, drive, start=last)
+    orbit = newton_orbit(P, drive, start=last)
     assert orbit.flow.components[0][0] == "right.angle"
 
     def torque(w: float) -> float:
@@ -194,7 +194,7 @@ def test_a_rotor_on_a_motor_locks_to_the_commanded_one_with_the_multipliers_of_a
     response = frequency_response(P, 23.95, 24.05, drive=drive, vary="left.speed", start=orbit.start, doublings=0)
     assert not response.problems
     at = min(response.branches[0].orbits, key=lambda point: abs(point.drive.speed - 24.0))
-    again = orbit_of(P, at.drive, start=at.start, settle=False)
+    again = newton_orbit(P, at.drive, start=at.start, settle=False)
     np.testing.assert_allclose(again.start, at.start, rtol=1e-6, atol=1e-7)
 
 
@@ -202,9 +202,9 @@ def test_speeds_without_a_common_period_and_drives_that_say_too_little_are_refus
     with pytest.raises(InputError, match=r"left\.speed.*right\.speed"):
         Drive(speeds={"left.speed": 20.0, "right.speed": 20.0 * sqrt(2.0)})
     with pytest.raises(InputError, match=r"left\.angle, right\.angle"):
-        orbit_of(P, Drive(speed=20.0))
+        newton_orbit(P, Drive(speed=20.0))
     with pytest.raises(InputError, match=r"right\.angle"):
-        orbit_of(P, Drive(speed=20.0, crank="left.speed", forces={"right.torque": 0.01}))
+        newton_orbit(P, Drive(speed=20.0, crank="left.speed", forces={"right.torque": 0.01}))
 
 
 @pytest.mark.parametrize("ratio", [Fraction(1), Fraction(2), Fraction(3, 2)], ids=str)
@@ -265,7 +265,7 @@ def test_every_search_finds_the_one_motion_there_is() -> None:
 
 def test_the_motion_changes_with_the_parameters_of_the_cart_and_of_both_rotors_as_its_closed_form_does() -> None:
     speeds, unbalances = np.array([20.0, 30.0]), np.array([K.unbalance1, K.unbalance2])
-    motion = motion_gradient(orbit_of(P, _drive(20.0, Fraction(3, 2))))
+    motion = motion_gradient(newton_orbit(P, _drive(20.0, Fraction(3, 2))))
     stiff = K.k - K.mass * speeds**2 + 1j * K.c * speeds
     parts = unbalances * speeds**2 / stiff
     expected = {
@@ -344,10 +344,10 @@ def test_the_fmus_run_as_the_solver_does(tmp_path: Path) -> None:
 
 
 def test_the_studio_and_the_pictures_show_both_rotors() -> None:
-    tables = tables_of(MECHANISM)
+    tables = mechanism_tables(MECHANISM)
     starts = {row["name"]: row["start"] for row in tables["given"]}
     assert (starts["left.speed"], starts["right.speed"]) == (20.0, 30.0)
-    figures.plot(orbit_of(P, _drive(20.0, Fraction(2))))
+    figures.plot(newton_orbit(P, _drive(20.0, Fraction(2))))
     figures.plot(frequency_response(P, 18.0, 32.0, drive=_drive(20.0, Fraction(2)), vary="left.speed"))
 
 

@@ -12,7 +12,7 @@ from fmpy.fmi1 import FMICallException
 
 from analysis import Inputs, cosimulate
 from analysis.export import NATIVE, NATIVE_FMI3, WASM, BuildError, build_all, build_native, rebuild
-from analysis.run.component import ComponentSlave, component_of
+from analysis.run.component import ComponentSlave, component_path
 from analysis.run.experiments import ExperimentError, verify
 from analysis.run.fmu import CosimulationError, read_description
 from linkwork import five_bar, slider_crank
@@ -68,7 +68,7 @@ def test_the_archive_is_that_of_the_layered_standard(webs: dict[str, Path]) -> N
         (binary,) = (name for name in names if name.startswith("binaries/"))
         content = archive.read(binary)
         manifest = archive.read("extra/org.modelica.fmi-ls-wasm/manifest.xml").decode()
-    assert Path(binary) == component_of("", read_description(webs["FiveBarSlider"]).coSimulation.modelIdentifier)
+    assert Path(binary) == component_path("", read_description(webs["FiveBarSlider"]).coSimulation.modelIdentifier)
     assert 'fmi-ls-name="org.modelica.fmi-ls-wasm"' in manifest
     engine = wasmtime.Engine()
     kind = wasmtime.component.Component(engine, content).type

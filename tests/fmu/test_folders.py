@@ -12,7 +12,7 @@ from typing import Any
 import pytest
 
 from analysis import CosimulationError
-from analysis.export import try_out
+from analysis.export import run_trial
 from analysis.run import cosimulation, unpacking_folder
 
 from .runner import HERE, run_in_process
@@ -110,7 +110,7 @@ def test_trial_run_of_a_build_goes_around_such_folders(
     folder.mkdir()
     monkeypatch.setenv("TMPDIR", str(folder))
     monkeypatch.setattr(tempfile, "tempdir", str(folder))
-    try_out(five_bar)
+    run_trial(five_bar)
 
 
 def test_no_folder_that_would_do(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

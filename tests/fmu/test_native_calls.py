@@ -233,13 +233,13 @@ class Good:
         return self.kept[-1]
 
 
-def kind_of(library: Library) -> dict[str, tuple[set[str], set[str]]]:
+def allowed_calls(library: Library) -> dict[str, tuple[set[str], set[str]]]:
     return ALLOWED[library.fmi]
 
 
 def every(library: Library) -> Iterator[tuple[str, str, str, Callable[[], Instance]]]:
     """Each function in each state of each interface; the last makes an instance in that state."""
-    for name in kind_of(library):
+    for name in allowed_calls(library):
         for interface in ("cs", "me"):
             for phase, instance in phases(library, interface):
                 yield name, interface, phase, lambda instance=instance: instance  # type: ignore[misc]
@@ -247,7 +247,7 @@ def every(library: Library) -> Iterator[tuple[str, str, str, Callable[[], Instan
 
 def test_the_tables_have_every_function_of_the_standard(library: Library) -> None:
     prefix = f"fmi{library.fmi}"
-    known = {prefix + name for name in (*kind_of(library), *EMPTY[library.fmi], "FreeInstance", "GetVersion")}
+    known = {prefix + name for name in (*allowed_calls(library), *EMPTY[library.fmi], "FreeInstance", "GetVersion")}
     known |= {"fmi2Instantiate", "fmi2GetTypesPlatform", "fmi2SetString"} if library.fmi == 2 else {
         "fmi3InstantiateCoSimulation", "fmi3InstantiateModelExchange", "fmi3InstantiateScheduledExecution",
         "fmi3SetString",
@@ -259,7 +259,7 @@ def test_a_function_is_good_where_it_is_allowed_and_an_error_elsewhere(library: 
     wrong = []
     for name, interface, phase, make in every(library):
         c = make()
-        interfaces, states = kind_of(library)[name]
+        interfaces, states = allowed_calls(library)[name]
         arguments = Good(c).arguments(name)
         c.log.clear()
         status = c(name, *arguments)
@@ -278,7 +278,7 @@ def test_a_function_is_good_where_it_is_allowed_and_an_error_elsewhere(library: 
 
 def test_a_missing_pointer_is_an_error(library: Library) -> None:
     harmless = {"SetDebugLogging", "FreeFMUstate", "FreeFMUState", "GetVariableDependencies"}
-    for name, (interfaces, states) in kind_of(library).items():
+    for name, (interfaces, states) in allowed_calls(library).items():
         for interface in interfaces:
             for phase, c in phases(library, interface):
                 if phase in states and name not in harmless:
@@ -294,7 +294,7 @@ def test_a_missing_pointer_is_an_error(library: Library) -> None:
 def test_no_instance_is_an_error(library: Library) -> None:
     c = library.instance()
     good = Good(c)
-    calls = {name: good.arguments(name) for name in kind_of(library)}
+    calls = {name: good.arguments(name) for name in allowed_calls(library)}
     calls |= {name: (None, c_size_t(0), None, c_size_t(0)) for name in (*EMPTY[library.fmi], "SetString")}
     for name, arguments in calls.items():
         handle, c.handle = c.handle, None

@@ -159,11 +159,11 @@ def test_steps_chosen_by_the_power_bond_on_the_published_quarter_car(tmp_path: P
 def test_the_step_that_is_advised_brings_in_what_was_asked_for() -> None:
     for coupling in ("hold", "derivatives"):
         run = run_system(wiring_of("press"), coupling=coupling, step=5e-4, stop_time=0.1)
-        step = run.step_for(2e-3)
+        step = run.suggested_step(2e-3)
         assert step is not None
         again = run_system(wiring_of("press"), coupling=coupling, step=step, stop_time=0.1)
-        assert again.brought_in() == pytest.approx(2e-3, rel=0.3)
-    assert run_system(wiring_of("press"), coupling="rollback", step=1e-3, stop_time=0.01).step_for(1e-3) is None
+        assert again.added_work() == pytest.approx(2e-3, rel=0.3)
+    assert run_system(wiring_of("press"), coupling="rollback", step=1e-3, stop_time=0.01).suggested_step(1e-3) is None
 
 
 def test_parts_of_fmi_3_have_lines_by_their_middle_and_updates_within_long_steps() -> None:
@@ -190,7 +190,7 @@ def test_power_residuals_are_the_work_that_the_coupling_brings_in(tmp_path: Path
     assert energy[-1] > 1.001 * energy[0]
     assert energy[-1] - energy[0] == pytest.approx(0.5e-3 * power.sum(), rel=0.02)
     better = run_system(system.wiring(), coupling="derivatives", step=1e-3, stop_time=0.5)
-    assert better.brought_in() < 0.02 * run.brought_in()
+    assert better.added_work() < 0.02 * run.added_work()
 
 
 @pytest.mark.parametrize("coupling", COUPLINGS)

@@ -13,7 +13,7 @@ from click.core import ParameterSource
 from linkwork.slider_crank.assembly import check_assembly
 
 from ... import slider_crank as sc
-from ..common import CHECK_FAILED, console, folder_of, print_error, print_written, say, show_table, tolerance_option
+from ..common import CHECK_FAILED, console, output_folder, print_error, print_written, say, show_table, tolerance_option
 from .options import Chosen, Problem, about_mechanism, out_option, with_problem
 
 
@@ -79,7 +79,7 @@ def _show_two_rotations(chosen: Chosen, points: int, folder: Path) -> None:
     from ...files import write_csv
 
     angle = np.linspace(0.0, tau, points)
-    shift = chosen.shift_at(angle)
+    shift = chosen.link_shift(angle)
     short = sc.shortage(chosen.parameters, angle, shift)
     reached = short < 0.0
     if not reached.any():
@@ -110,4 +110,4 @@ def _show_two_rotations(chosen: Chosen, points: int, folder: Path) -> None:
         f"{chosen.units.length(float(end.position_error.max()))}; the steps become small at {int(end.settled.sum())} of "
         f"{len(end.settled)} crank angles"
     )
-    print_written([write_csv(folder_of(folder) / f"{chosen.name}-two-rotations.csv", columns)])
+    print_written([write_csv(output_folder(folder) / f"{chosen.name}-two-rotations.csv", columns)])

@@ -11,7 +11,7 @@ import numpy as np
 
 from ... import figures
 from ... import slider_crank as sc
-from ..common import folder_of, print_written, say, show_table
+from ..common import output_folder, print_written, say, show_table
 from .options import Chosen, Problem, Units, about_mechanism, angle_text, out_option, plot_option, with_problem
 
 if TYPE_CHECKING:
@@ -57,7 +57,7 @@ def forces(chosen: Chosen, problem: Problem, frames: Sequence[int], out: str, pl
     )
     for sentence in _special_places(turn, units):
         say(sentence)
-    stem = str(folder_of(out) / f"{chosen.name}-forces")
+    stem = str(output_folder(out) / f"{chosen.name}-forces")
     written = [write_csv(f"{stem}.csv", turn.columns(units.system))]
     if plot:
         for frame in frames:

@@ -108,7 +108,7 @@ def picture(
     seen = common
     if view is not None:
         seen = common | {"view": tuple(degrees(quantity(text, "rad", "--view")) for text in view)}
-    written = [save_figure(figures.plot(p, at, float(chosen.shift_at(at)), **seen), f"{stem}.png")]
+    written = [save_figure(figures.plot(p, at, float(chosen.link_shift(at)), **seen), f"{stem}.png")]
     if with_range:
         written.append(save_figure(figures.plot_range(p, **common), f"{stem}-range.png"))
     if animate:

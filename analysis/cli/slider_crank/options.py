@@ -92,7 +92,7 @@ class Chosen:
             return sc.ConstantShift(self.shift)
         return sc.GrooveShift(p.groove_amplitude, p.groove_ratio, in_shaft=self.groove == "shaft")
 
-    def shift_at(self, crank_angle: Any) -> Any:
+    def link_shift(self, crank_angle: Any) -> Any:
         """Return the shift (m) at crank angles (rad)."""
         return self.force_law.at(crank_angle, 0.0, 0.0).shift
 
@@ -117,7 +117,7 @@ class _MechanismOptions:
         Raises LinkworkError if a file, a name or a value is wrong.
         """
         from ...files import unknown_name
-        from ...run import load_parameters, parameters_from
+        from ...run import load_parameters, read_parameters
 
         units = Units(self.units)
         start, speed = 0.0, SETS[DEFAULT].crank_speed
@@ -150,7 +150,7 @@ class _MechanismOptions:
         if self.speed is not None:
             speed = quantity(self.speed, "rad/s", "--speed")
         if values:
-            changed = parameters_from(values, parameters)
+            changed = read_parameters(values, parameters)
             assert isinstance(changed, SliderCrankParameters)
             parameters = changed
         self._check_groove(parameters, values)

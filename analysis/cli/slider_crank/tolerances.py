@@ -13,7 +13,7 @@ from linkwork.errors import InputError
 
 from ... import figures
 from ... import slider_crank as sc
-from ..common import console, folder_of, print_written, quantity, show_table, workers_options
+from ..common import console, output_folder, print_written, quantity, show_table, workers_options
 from .options import Chosen, Problem, Units, about_mechanism, note, out_option, plot_option, with_problem
 
 if TYPE_CHECKING:
@@ -112,7 +112,7 @@ def tolerances(
     samples, seed, jobs = sampling["samples"], sampling["seed"], sampling["jobs"]
     with console.status(f"{samples} samples at {len(turn)} crank angles"):
         found = sc.monte_carlo(turn, allowed, quantities=quantities, samples=samples, seed=seed, n_jobs=jobs)
-    stem = str(folder_of(out) / chosen.name)
+    stem = str(output_folder(out) / chosen.name)
     files = [write_csv(f"{stem}-sensitivities.csv", slopes)]
     files.append(write_csv(f"{stem}-tolerances.csv", _spread_columns(found, units)))
     _show_spread(found, place, f"{chosen.title}: spread at {here}, {samples} samples", units)

@@ -71,7 +71,7 @@ void eigenvalues(const double matrix[], int n, double real[], double imaginary[]
     }
 }
 
-double swing_of(const double samples[SAMPLES]) {
+double swing_amplitude(const double samples[SAMPLES]) {
     enum { FINE_SAMPLES = 8 * SAMPLES };
     static double cosine[FINE_SAMPLES], fine[FINE_SAMPLES];
     double real[SAMPLES / 2 + 1], imaginary[SAMPLES / 2 + 1], ends[2];

@@ -149,7 +149,7 @@ static bool across(double from, double to, double z[], const double scale[], int
     return done >= whole;
 }
 
-static void scale_of(double scale[LENGTH]) {
+static void motion_scales(double scale[LENGTH]) {
     int n = section.size;
     double *along = scale + n + 1 + n * n;
     for (int i = 0; i < n; i++) scale[i] = plant.scale[section.place[i]];
@@ -164,7 +164,7 @@ static void scale_of(double scale[LENGTH]) {
 static bool once_round(double y[], int columns, double tolerance, double *proposal) {
     int n = section.size, length = n + 1 + columns * n, quarters = 16;
     double z[LENGTH] = {0}, scale[LENGTH], x[STATES];
-    scale_of(scale);
+    motion_scales(scale);
     memcpy(z, y, (size_t)n * sizeof *z);
     for (int i = 0; i < n && i < columns; i++) z[n + 1 + i * n + i] = 1.0;
     for (int part = 0; part < quarters; part++) {
@@ -234,7 +234,7 @@ static bool newton(double y[]) {
     int n = section.size;
     double scale[LENGTH], proposal = PERIOD / 64.0;
     bool close = false;
-    scale_of(scale);
+    motion_scales(scale);
     for (int trial = 1; trial <= TRIALS; trial++) {
         double end[MOST], matrix[MOST * MOST], residual = 0.0, size = 0.0;
         memcpy(end, y, sizeof end);
@@ -280,7 +280,7 @@ int FACE(studio_orbit)(int warm) {
     memcpy(first, sentence, sizeof first);
     if (!good) {
         double scale[LENGTH], change = INFINITY;
-        scale_of(scale);
+        motion_scales(scale);
         memcpy(y, start, sizeof y);
         for (int turn = 0; turn < SETTLING && change > 1e-4; turn++) {
             double end[MOST];
@@ -307,7 +307,7 @@ int FACE(studio_turn)(int steps) {
     double z[LENGTH] = {0}, scale[LENGTH], proposal = PERIOD / 64.0;
     Plant shown = plant;
     if (steps >= MOST_ROWS) steps = MOST_ROWS - 1;
-    scale_of(scale);
+    motion_scales(scale);
     memcpy(z, found.y, (size_t)n * sizeof *z);
     for (int number = 0;; number++) {
         locate(PERIOD * number / steps, z, shown.x);
@@ -325,7 +325,7 @@ int FACE(studio_turn)(int steps) {
 
 /* Branches, by the length of arc */
 
-static double *given_of(int reference) {
+static double *given_value(int reference) {
     return reference < 0 ? motor + (-1 - reference) : plant.given + reference;
 }
 
@@ -334,7 +334,7 @@ static bool vary(double value) {
     double own[ROOM(PARAMETERS)], state[2 * FREEDOMS], u[ROOM(INPUTS)];
     double down[ROOM(PARAMETERS)], dstate[2 * FREEDOMS], du[ROOM(INPUTS)];
     int reference = varied.reference;
-    *given_of(reference) = found.value = value;
+    *given_value(reference) = found.value = value;
     reason = begin(&plant);
     if (reason == GOOD) reason = cut();
     if (reason != GOOD) return false;
@@ -375,7 +375,7 @@ static void bordered(const double scale[], const double way[], double matrix[]) 
 }
 
 /* The way on from a point that was just found, in the sense of another; whether there is one. */
-static bool way_on(const double scale[], const double before[], double way[]) {
+static bool next_way(const double scale[], const double before[], double way[]) {
     int m = section.size + 1;
     double matrix[(MOST + 1) * (MOST + 1)], length = 0.0;
     memset(way, 0, (size_t)m * sizeof *way);
@@ -397,7 +397,7 @@ static int along(double step, double y[], double way[]) {
     for (int trial = 1; trial <= NEAR_TRIALS; trial++) {
         double size = 0.0;
         if (!vary(value)) return 0;
-        scale_of(scale);
+        motion_scales(scale);
         for (int i = 0; trial == 1 && i < m - 1; i++) y[i] = branch.y[i] + step * branch.way[i] * scale[i];
         memcpy(change, y, (size_t)(m - 1) * sizeof *y);
         if (!once_round(change, m, FINE, &proposal)) return 0;
@@ -409,14 +409,14 @@ static int along(double step, double y[], double way[]) {
         if (!(size < REACH)) return 0;
         for (int i = 0; i < m - 1; i++) y[i] += change[i] * scale[i];
         value += change[m - 1] * branch.size;
-        if (close) return vary(value) && way_on(scale, branch.way, way) ? trial : 0;
+        if (close) return vary(value) && next_way(scale, branch.way, way) ? trial : 0;
         close = size < FOUND;
     }
     return 0;
 }
 
 /* What changes its sign at a fold, and at a doubling of the period. */
-static void tests_of(const double way[], double tests[2]) {
+static void test_functions(const double way[], double tests[2]) {
     double complex product = 1.0;
     int n = section.size;
     eigenvalues(found.monodromy, section.size, found.real, found.imaginary);
@@ -431,17 +431,17 @@ int FACE(studio_branch)(int reference, double size, double sense) {
     int n = section.size;
     varied.reference = reference;
     branch.size = size;
-    if (n == 0 || !vary(*given_of(reference))) return 0;
+    if (n == 0 || !vary(*given_value(reference))) return 0;
     memcpy(y, found.y, sizeof y);
     if (!once_round(y, n + 1, FINE, &proposal)) return 0;
-    scale_of(scale);
+    motion_scales(scale);
     before[n] = sense;
-    if (!way_on(scale, before, branch.way)) return 0;
+    if (!next_way(scale, before, branch.way)) return 0;
     memcpy(branch.y, found.y, sizeof branch.y);
     branch.value = found.value;
     branch.step = GREATEST_VARIED;
     branch.kind = 0;
-    tests_of(branch.way, branch.tests);
+    test_functions(branch.way, branch.tests);
     return 1;
 }
 
@@ -451,7 +451,7 @@ static bool narrow(int kind, double step, double end, double y[], double way[]) 
     for (int trial = 0; trial < REFINEMENTS; trial++) {
         double middle = (low * at_high - high * at_low) / (at_high - at_low);
         if (!along(middle, y, way)) return false;
-        tests_of(way, tests);
+        test_functions(way, tests);
         double at = tests[kind - 1];
         if (fabs(at) < FOUND || high - low < FOUND * step) return true;
         if ((at < 0.0) == (at_high < 0.0)) { /* the end that stays counts half: Illinois */
@@ -476,11 +476,11 @@ int FACE(studio_follow)(void) {
         int kind = 0, trials = along(step, y, way);
         for (int i = 0; trials && i <= n; i++) cosine += way[i] * branch.way[i];
         if (!trials || cosine < STRAIGHT) continue;
-        tests_of(way, tests);
+        test_functions(way, tests);
         for (int k = 1; k <= 2 && !kind; k++)
             if (k != branch.kind && (tests[k - 1] < 0.0) != (branch.tests[k - 1] < 0.0)) kind = k;
         if (kind && !narrow(kind, step, tests[kind - 1], y, way)) continue;
-        if (kind) tests_of(way, tests);
+        if (kind) test_functions(way, tests);
         /* past a special point the sign is that of the other side */
         if (kind) tests[kind - 1] = -branch.tests[kind - 1];
         double grown = step * (trials <= 4 && cosine > 1.0 - 0.2 * (1.0 - STRAIGHT) ? 1.6 : 1.0);
@@ -507,14 +507,14 @@ int FACE(studio_follow)(void) {
 /* Half of how far the first of y swings in the motion that was found. */
 double FACE(studio_amplitude)(void) {
     double samples[SAMPLES], z[LENGTH] = {0}, scale[LENGTH], proposal = PERIOD / 64.0;
-    scale_of(scale);
+    motion_scales(scale);
     memcpy(z, found.y, (size_t)section.size * sizeof *z);
     for (int i = 0; i < SAMPLES; i++) {
         double from = PERIOD * i / SAMPLES, to = PERIOD * (i + 1) / SAMPLES;
         samples[i] = z[0];
         if (!across(from, to, z, scale, section.size + 1, FINE, &proposal)) return NAN;
     }
-    return swing_of(samples);
+    return swing_amplitude(samples);
 }
 
 /* Natural frequency of the freedom beside the crank, from the means of what moves with it over a turn, the links at rest and it at

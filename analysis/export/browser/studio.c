@@ -55,7 +55,7 @@ Reason begin(Plant *a) {
     return plant_begin(a, sentence);
 }
 
-static void joints_of(const Plant *a, double places[ROOM(PLACES)]) {
+static void joint_places(const Plant *a, double places[ROOM(PLACES)]) {
     double u[ROOM(INPUTS)];
     for (int i = 0; i < INPUTS; i++) u[i] = a->given[input_at[i]];
     equations_joints((const double *[]){a->x, a->modes, u, a->p}, (double *[]){places}, NULL, NULL, 0);
@@ -67,7 +67,7 @@ Reason write_row(Plant *a, int number) {
     row[0] = a->time;
     memcpy(row + 1, a->x, sizeof a->x);
     memcpy(row + 1 + STATES, a->outputs, sizeof a->outputs);
-    if (JOINTS > 0) joints_of(a, row + 1 + STATES + OUTPUTS);
+    if (JOINTS > 0) joint_places(a, row + 1 + STATES + OUTPUTS);
     plant_derivative(a, derivative);
     memcpy(row + ROW - 2, derivative + STATES - 2, 2 * sizeof *row);
     return result;
@@ -104,9 +104,9 @@ typedef struct {
 } Drag;
 
 /* How far a joint is from the target, in the view; the square of it. */
-static double miss_of(const Plant *a, const Drag *drag, double miss[2]) {
+static double drag_miss(const Plant *a, const Drag *drag, double miss[2]) {
     double places[ROOM(PLACES)];
-    joints_of(a, places);
+    joint_places(a, places);
     for (int i = 0; i < 2; i++) {
         miss[i] = desk.target[i];
         for (int d = 0; d < 3; d++) miss[i] -= desk.view[3 * i + d] * places[3 * drag->joint + d];
@@ -141,7 +141,7 @@ static bool correction(const Plant *a, const Drag *drag, const double miss[2], d
 
 /* Take a joint towards the target as far as the links let it; the square of what is left, and what was in the way. */
 static double approach(Plant *a, const Drag *drag, char blocked[SENTENCE]) {
-    double miss[2], step[2], left = miss_of(a, drag, miss);
+    double miss[2], step[2], left = drag_miss(a, drag, miss);
     blocked[0] = 0;
     for (int trial = 0; trial < CORRECTIONS; trial++) {
         bool better = false;
@@ -155,7 +155,7 @@ static double approach(Plant *a, const Drag *drag, char blocked[SENTENCE]) {
                 memcpy(blocked, sentence, sizeof sentence);
                 continue;
             }
-            double square = miss_of(&tried, drag, after);
+            double square = drag_miss(&tried, drag, after);
             better = square < left;
             if (better) {
                 *a = tried;

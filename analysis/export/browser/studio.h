@@ -35,6 +35,6 @@ void eigenvalues(const double matrix[], int n, double real[], double imaginary[]
 
 /* Half of how far a turn swings: from its Fourier series, on a grid eight times as fine, and the parabolas through the greatest
    and the least value. */
-double swing_of(const double samples[SAMPLES]);
+double swing_amplitude(const double samples[SAMPLES]);
 
 #endif

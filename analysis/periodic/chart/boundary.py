@@ -26,7 +26,7 @@ from ...numerics.boundaries import Test, lowest
 from ...numerics.continuation import ContinuationError, End, Evaluate, Evaluation, Follower, Settings
 from ..motion.discretisation import Discretisation, OrbitError, collocation_serves, operating_point
 from ..motion.floquet import Crossing, crossing_test
-from ..motion.orbit import PeriodicOrbit, orbit_of, trial_orbit
+from ..motion.orbit import PeriodicOrbit, newton_orbit, trial_orbit
 from ..motion.variables import Family, Plane
 from ..response.branch import GREATEST, Branch, follow_both, passes, reason_to_leave
 from .coexistence import Coexistence, coexistence
@@ -196,7 +196,7 @@ def line_branches(
             if any(passes(branch, value, motion, x[1] - x[0]) for branch in branches):
                 continue
             try:
-                orbit = orbit_of(parameters, drive, start=motion, settle=False)
+                orbit = newton_orbit(parameters, drive, start=motion, settle=False)
                 branch = follow_both(
                     family,
                     orbit,
@@ -223,7 +223,7 @@ def orbit_monodromy(operation: Plane, *, start: ArrayLike | None = None, near: G
     """Return a function that gives the monodromy matrix of the periodic orbit of one turn at a point of a plane.
 
     Each orbit is sought from the orbit found last, so that neighbouring points stay on one branch, then from the orbits at the
-    nearest points of a grid, then from all starts of `orbit_of`. Results are cached.
+    nearest points of a grid, then from all starts of `newton_orbit`. Results are cached.
 
     Parameters
     ----------
@@ -243,12 +243,12 @@ def orbit_monodromy(operation: Plane, *, start: ArrayLike | None = None, near: G
         parameters, drive = operation(x, y)
         for place in (last, *(() if near is None else near.around(x, y))):
             try:
-                orbit = orbit_of(parameters, drive, start=place, settle=False)
+                orbit = newton_orbit(parameters, drive, start=place, settle=False)
                 break
             except OrbitError:
                 continue
         else:
-            orbit = orbit_of(parameters, drive, start=first)
+            orbit = newton_orbit(parameters, drive, start=first)
         last = orbit.start
         return orbit.monodromy
 

@@ -32,13 +32,13 @@ from ..motion import (
     Plane,
     default_variable,
     format_value,
+    parameter_unit,
+    parameter_value,
     plane,
     published_drive,
     require_drive,
     require_variable,
     speed_names,
-    unit_of,
-    value_of,
 )
 from ..response import distance, natural_frequency, oscillating
 from ..stability import Confirmation, SpecialPoint, confirm
@@ -284,7 +284,9 @@ def stability_chart(
             raise ParameterError(what, given, "be two, along x and y")
     points = Whole(least=2)(points, "points")
     spans = tuple(
-        default_range(parameters, drive, name) if ranges is None else pair(ranges[n], unit_of(mechanism, name), name)
+        default_range(parameters, drive, name)
+        if ranges is None
+        else pair(ranges[n], parameter_unit(mechanism, name), name)
         for n, name in enumerate(names)
     )
     box = Box(x=spans[0], y=spans[1])
@@ -573,7 +575,7 @@ def default_range(parameters: Parameters, drive: Drive, name: str) -> tuple[floa
             pass
         else:
             return (_SPEEDS[0] * natural, _SPEEDS[1] * natural)
-    value = value_of(parameters, drive, name)
+    value = parameter_value(parameters, drive, name)
     if value <= 0.0:
         raise InputError(f"{name} is {value:g} here: give the range of the axis")
     return (_OTHERS[0] * value, _OTHERS[1] * value)
@@ -595,7 +597,7 @@ def damping_name(mechanism: Mechanism) -> str:
 
 
 def _axis(mechanism: Mechanism, name: str) -> Axis:
-    unit = unit_of(mechanism, name)
+    unit = parameter_unit(mechanism, name)
     if unit == "rad/s":
         return Axis(name=name, unit="rpm", factor=1.0 / RAD_S_PER_RPM, si=unit)
     return Axis(name=name, unit=unit, factor=1.0, si=unit)

@@ -23,12 +23,12 @@ from ..motion.drive import Drive, coordinate_ranges
 from ..motion.floquet import TOLERANCE, multipliers
 from ..motion.flow import GAP, IN_LANES, PLAIN, VARIATIONAL, Flow
 from ..motion.orbit import PeriodicOrbit, require_turns
-from ..motion.search import Orbits, orbits_of, unsought
+from ..motion.search import Orbits, search_orbits, unsought
 from ..motion.variables import Plane
 from . import kernels
 from .grid import Keeping, grid_points, row_code, row_name
 from .kernels import LOST, MOST_ORBITS, UNSETTLED, Motions
-from .rows import PointRow, row_of
+from .rows import PointRow, point_row
 
 FloatArray = NDArray[np.float64]
 #: Number of starts from which the motions of a point are sought, after the motions of its neighbour: a power of two.
@@ -313,7 +313,7 @@ def basins(
     if rate is not None:
         rate = pair(rate, flow.components[flow.size // 2][1], "rate")
     if found is None:
-        found = orbits_of(parameters, drive, turns=range(1, turns + 1), start=start)
+        found = search_orbits(parameters, drive, turns=range(1, turns + 1), start=start)
     motions = found.stable
     if not motions:
         of, also = turns_sought(drive.flow(mechanism_of(parameters)), turns), unsought(parameters, drive)
@@ -334,7 +334,7 @@ def basins(
     passed = [orbit.passages() for orbit in motions]
     known, owner = np.vstack(passed), np.repeat(np.arange(len(motions)), [len(starts) for starts in passed])
     point, code = operating_point(parameters, drive), row_code(kernels.settle_starts)
-    row = row_of([point], known[0])
+    row = point_row([point], known[0])
     ends, computed = Keeping(folder, n_jobs, progress, "starts", kernels.settle_starts).rows(
         partial(_ends, point, known, across),
         up.tolist(),

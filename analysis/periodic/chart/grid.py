@@ -23,15 +23,15 @@ from ...numerics.codegen import fingerprint
 from ...numerics.workers import check_jobs, interruptible, over_workers
 from ...run import shown
 from ...units import si
-from ..motion import TOLERANCE, Drive, Plane, Stability, multipliers, starts_of
+from ..motion import TOLERANCE, Drive, Plane, Stability, multipliers, spread_starts
 from ..motion.discretisation import INTEGRATOR_TOLERANCE, operating_point
 from ..motion.flow import GAP, IN_LANES, PLAIN, VARIATIONAL
 from ..motion.kernels import REASONS, Status
 from ..motion.orbit import first_guess
-from ..motion.variables import NamedPlane, unit_of
+from ..motion.variables import NamedPlane, parameter_unit
 from . import kernels
 from .kernels import Row
-from .rows import PointRow, row_of, rows_of
+from .rows import PointRow, grid_rows, point_row
 
 FloatArray = NDArray[np.float64]
 Item = TypeVar("Item")
@@ -75,7 +75,7 @@ def largest_multipliers(
     points = [operating_point(parameters, drive) for parameters, drive in zip(rows, drives)]
     given = (None,) if guesses is None else np.atleast_2d(np.asarray(guesses, dtype=float))
     starting = np.array([first_guess(points[0].flow, drives[0], guess) for guess in given])
-    return _solve_row(row_of(points, starting[0]), starting, tolerance, turns)
+    return _solve_row(point_row(points, starting[0]), starting, tolerance, turns)
 
 
 def _solve_row(
@@ -242,12 +242,12 @@ def grid_points(
     """
     if isinstance(operation, NamedPlane):
         mechanism = mechanism_of(operation.parameters)
-        x, y = (si(axis, unit_of(mechanism, name), name) for axis, name in ((x, operation.x), (y, operation.y)))
+        x, y = (si(axis, parameter_unit(mechanism, name), name) for axis, name in ((x, operation.x), (y, operation.y)))
     xs, ys = _axis("x", x), _axis("y", y)
     first = operating_point(*operation(float(xs[0]), float(ys[0])))
     guess = first_guess(first.flow, first.drive, start)
-    starts = np.vstack([guess, starts_of(first.parameters, first.drive, guess, count)])
-    return xs, ys, rows_of(operation, xs, ys, guess), starts
+    starts = np.vstack([guess, spread_starts(first.parameters, first.drive, guess, count)])
+    return xs, ys, grid_rows(operation, xs, ys, guess), starts
 
 
 def _axis(name: str, values: ArrayLike) -> FloatArray:

@@ -30,12 +30,12 @@ from ..motion.kernels import (
     begin_hunt,
     deflated,
     deflated_next,
-    difference_within,
     magnitude,
     make_room,
     newton,
     newton_next,
     numbered,
+    subtract_modulo_turns,
 )
 from ..motion.tracks import IDLE, RUNNING, advance_tracks, begin, make_tracks, set_scale
 
@@ -300,7 +300,7 @@ def _is_known(start, known, section, away):
     """Return whether a start is among the known ones, up to whole turns; ``away`` is work space."""
     found = False
     for k in range(known.shape[0]):
-        difference_within(start, known[k], section.ways, away)
+        subtract_modulo_turns(start, known[k], section.ways, away)
         found = found or magnitude(away, section.scale) < SAME
     return found
 
@@ -377,7 +377,7 @@ def _record(lane, point, seekers, v, room, carry):
 
 
 @inner
-def _go_on(lane, point, seekers, v, room, carry):
+def _continue_search(lane, point, seekers, v, room, carry):
     """Continue the search of a lane after its integration; if it is over, mark the lane free: ``seekers.place[lane]`` = -1."""
     hunt, most, status = _hunt(lane, seekers.hunts), point.search.most, v.status[lane]
     take(lane, LANES, v.x, v.z)
@@ -413,7 +413,7 @@ def _search_point(point, seekers, tables, room, carry):
             for lane in range(LANES):
                 while v.status[lane] != RUNNING:
                     if seekers.place[lane] >= 0:
-                        _go_on(lane, point, seekers, v, room, carry)
+                        _continue_search(lane, point, seekers, v, room, carry)
                     elif place < bound:
                         seekers.place[lane] = place
                         place += 1
@@ -467,7 +467,7 @@ def _arrived(z, known, near, section, away):
     """Return the number of the known motion that a state is near to, up to whole turns; UNSETTLED if there is none."""
     end = UNSETTLED
     for k in range(known.shape[0]):
-        difference_within(z, known[k], section.ways, away)
+        subtract_modulo_turns(z, known[k], section.ways, away)
         if magnitude(away, section.scale) < near:
             end = k
     return end

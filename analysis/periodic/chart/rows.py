@@ -12,11 +12,11 @@ from linkwork.errors import InputError
 from linkwork.parameters import field_name
 
 from ...mechanisms import Parameters
-from ...run.varied import Varied, check_sets, constants_of, over_arrays
+from ...run.varied import Varied, check_sets, over_arrays, varied_constants
 from ..motion.discretisation import OperatingPoint, collocation_serves, operating_point
 from ..motion.flow import Flow
 from ..motion.orbit import MOST_ITERATIONS, SEARCH_TOLERANCE
-from ..motion.variables import NamedPlane, Plane, places_of
+from ..motion.variables import NamedPlane, Plane, parameter_places
 from .kernels import Points, Search
 
 FloatArray = NDArray[np.float64]
@@ -65,7 +65,7 @@ class PointRow:
         return Search(self.flow.period * turns, turns, MOST_ITERATIONS, SEARCH_TOLERANCE, self.smooth)
 
 
-def row_of(points: Sequence[OperatingPoint], start: FloatArray) -> PointRow:
+def point_row(points: Sequence[OperatingPoint], start: FloatArray) -> PointRow:
     """Return operating points as a row; the magnitudes of y are those at ``start``.
 
     Raises InputError if the points are not driven in the same way.
@@ -83,14 +83,14 @@ def row_of(points: Sequence[OperatingPoint], start: FloatArray) -> PointRow:
     )
 
 
-def rows_of(operation: Plane, xs: FloatArray, ys: FloatArray, start: FloatArray) -> list[PointRow]:
+def grid_rows(operation: Plane, xs: FloatArray, ys: FloatArray, start: FloatArray) -> list[PointRow]:
     """Return the operating points of a grid by rows; in a plane of named parameters a whole row is computed at once."""
     if isinstance(operation, NamedPlane):
-        return [_row_at(operation, xs, y, start) for y in ys.tolist()]
-    return [row_of([operating_point(*operation(x, y)) for x in xs.tolist()], start) for y in ys.tolist()]
+        return [_named_row(operation, xs, y, start) for y in ys.tolist()]
+    return [point_row([operating_point(*operation(x, y)) for x in xs.tolist()], start) for y in ys.tolist()]
 
 
-def _row_at(operation: NamedPlane, xs: FloatArray, y: float, start: FloatArray) -> PointRow:
+def _named_row(operation: NamedPlane, xs: FloatArray, y: float, start: FloatArray) -> PointRow:
     """Return the row at ``y`` of a plane of named parameters."""
     first = operating_point(*operation(float(xs[0]), y))
     flow, mechanism = first.flow, first.mechanism
@@ -98,14 +98,14 @@ def _row_at(operation: NamedPlane, xs: FloatArray, y: float, start: FloatArray) 
     sets: Sequence[Parameters] = [first.parameters]
     # the two ends suffice: if the drive refuses a value, or a friction is not zero, this is so at one of them
     ends = [operating_point(*operation(x, y)) for x in (float(xs.min()), float(xs.max()))]
-    factors = places_of(flow, first.drive, operation.x)
+    factors = parameter_places(flow, first.drive, operation.x)
     if factors is None:
         sets = Varied(first.parameters, {field_name(operation.x): xs}, replace)
         check_sets(mechanism, sets)
     else:
         for place, factor in factors.items():
             vectors[:, place] = factor * xs
-    parameters, columns = constants_of(mechanism, sets)
+    parameters, columns = varied_constants(mechanism, sets)
     states = flow.state(start, vectors.T)
     scale = over_arrays(mechanism)[0].of(mechanism.error_scale)(parameters, states)
     constants, scales = np.empty((len(xs), len(columns))), np.empty((len(xs), flow.size))

@@ -32,7 +32,7 @@ from linkwork.parameters import field_name
 from ...mechanisms import MECHANISMS, Parameters, mechanism_of
 from ...run import repeats, takes_published
 from . import collocation, kernels
-from .drive import Direction, Drive, is_smooth, require_drive, scale_in
+from .drive import Direction, Drive, flow_scales, is_smooth, require_drive
 from .flow import DIRECTIONAL, GAP, IN_LANES, PLAIN, Flow
 from .kernels import Section, Status
 
@@ -131,8 +131,8 @@ class OperatingPoint:
         return _unpickle, (self.mechanism, self.parameters, self.drive)
 
     def scale(self, start: FloatArray) -> FloatArray:
-        """Return the magnitudes of y: see `scale_of`."""
-        return scale_in(self.flow, self.parameters, self.vector, start)
+        """Return the magnitudes of y: see `motion_scales`."""
+        return flow_scales(self.flow, self.parameters, self.vector, start)
 
     def section(
         self,
@@ -253,7 +253,7 @@ def _unpickle(mechanism: Mechanism, parameters: Parameters, drive: Drive) -> Ope
 
 
 @takes_published()
-def period_from(
+def follow_period(
     parameters: Parameters,
     drive: Drive,
     start: FloatArray,

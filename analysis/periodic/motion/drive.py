@@ -20,7 +20,7 @@ from ...files import unknown_name
 from ...mechanisms import InitialState, Parameters, mechanism_of, variable_units
 from ...run import InductionMotor, Inputs, driven, given, speed_ratio, started, takes_published
 from ...units import Amount, in_si
-from .flow import Crank, Flow, crank_of, flow, turning_of
+from .flow import Crank, Flow, find_crank, find_turning_freedom, flow
 
 #: Advice in messages about a negative speed.
 _MIRROR = (
@@ -151,11 +151,11 @@ class Drive:
         InputError
             If the mechanism has no crank, or several and ``crank`` names none.
         """
-        return crank_of(mechanism, self.crank)
+        return find_crank(mechanism, self.crank)
 
     def turning(self, mechanism: Mechanism) -> dict[int, Fraction]:
         """Return the ratios of the other cranks, and of links that go round, by the numbers of their freedoms."""
-        return {turning_of(mechanism, name): ratio for name, ratio in self.ratios.items()}
+        return {find_turning_freedom(mechanism, name): ratio for name, ratio in self.ratios.items()}
 
     def arguments(self, mechanism: Mechanism) -> Mapping[str, str]:
         """Return how each freedom with a mode is driven, as one of `Mode.arguments` by the name of the mode.
@@ -207,7 +207,7 @@ class Drive:
             if number in ratios and number not in (*made.free, *made.commanded):
                 raise InputError(f"{name} has a ratio, but is neither commanded nor free")
         if made.size == 0:
-            acting = forces_of(mechanism).values()
+            acting = force_inputs(mechanism).values()
             others = (c.name for c in acting if c.freedom >= 0 and c.freedom != crank.freedom)
             raise NothingFreeError(mechanism.name, next(others, ""))
         return made
@@ -252,7 +252,7 @@ class Drive:
                 u[channel] = ratios.get(number, Fraction(0)) * self.speed
         elif crank.torque is not None:
             u[crank.torque] = self.torque
-        forces = forces_of(mechanism)
+        forces = force_inputs(mechanism)
         for name, value in self.forces.items():
             if name not in forces:
                 raise unknown_name(name, forces)
@@ -347,7 +347,7 @@ def _arguments(
 
 
 @cache
-def forces_of(mechanism: Mechanism) -> dict[str, Channel]:
+def force_inputs(mechanism: Mechanism) -> dict[str, Channel]:
     """Return the force inputs of a mechanism, without the torque on its crank if it has only one crank, by FMI name."""
     crank = mechanism.cyclic[0] if len(mechanism.cyclic) == 1 else -1
     return {c.name: c for c in mechanism.channels if c.kind == "force" and (c.freedom != crank or crank < 0)}
@@ -367,12 +367,12 @@ def _value(mode: Mode, argument: str) -> str:
 
 def published_drive(known: PublishedSet, drive: Drive | None) -> Drive:
     """Return ``drive``; if it is None, the drive of a published set, with held freedoms at their initial values."""
-    return drive or drive_of(known.parameters, driven(known, None), known.initial)
+    return drive or steady_drive(known.parameters, driven(known, None), known.initial)
 
 
 @takes_published(inputs=driven, initial=started)
 @in_si(speed="rad/s", torque="N.m")
-def drive_of(
+def steady_drive(
     parameters: Parameters,
     inputs: Inputs | None = None,
     initial: InitialState | None = None,
@@ -437,7 +437,7 @@ def drive_of(
         speed=constant.get(named[0] or "") if speed is None else speed,
         torque=constant.get(named[1] or "", 0.0) + sum(float(p) for p in parts if not isinstance(p, InductionMotor)),
         motor=motors[0] if motors else None,
-        forces={name: constant[name] for name in forces_of(mechanism) if name in constant and name != named[1]},
+        forces={name: constant[name] for name in force_inputs(mechanism) if name in constant and name != named[1]},
         held={f.coordinate: float(getattr(initial, f.initial[0])) - ratios.get(n, 0) * angle for n, f in other.items()},
         modes={f.mode.name: modes[f.mode.name] for f in other.values() if f.mode is not None},
         crank=coordinate[crank.freedom] if several else "",
@@ -455,11 +455,11 @@ def _choose_crank(
     are those of commanded speeds; a free crank has the ratio of the speeds at the start, to the nearest whole number.
     """
     if len(mechanism.cyclic) < 2:
-        return crank_of(mechanism), {}
+        return find_crank(mechanism), {}
     commanded = {mechanism.channels[n].freedom: mechanism.channels[n] for n in mechanism.commands(modes)}
     speeds = {n: sum(inputs.constants([commanded[n].argument]) or [0.0]) for n in mechanism.cyclic if n in commanded}
     first = next((n for n, speed in speeds.items() if speed > 0.0), mechanism.cyclic[0])
-    crank = crank_of(mechanism, mechanism.freedoms[first].coordinate)
+    crank = find_crank(mechanism, mechanism.freedoms[first].coordinate)
     start = {n: float(getattr(initial, mechanism.freedoms[n].initial[1])) for n in mechanism.cyclic}
     speed = speeds.get(first) or start[first]
     ratios = {}
@@ -487,13 +487,13 @@ _SPEEDS = (0.25, 1.5)
 
 
 @takes_published()
-def scale_of(parameters: Parameters, drive: Drive, start: ArrayLike) -> NDArray[np.float64]:
+def motion_scales(parameters: Parameters, drive: Drive, start: ArrayLike) -> NDArray[np.float64]:
     """Return the scales of y: for a five-bar the crank length, the speed of the crank pin, and the crank speed."""
     mechanism = mechanism_of(parameters)
-    return scale_in(drive.flow(mechanism), parameters, drive.vector(mechanism), np.asarray(start, dtype=float))
+    return flow_scales(drive.flow(mechanism), parameters, drive.vector(mechanism), np.asarray(start, dtype=float))
 
 
-def scale_in(
+def flow_scales(
     flow: Flow, parameters: Parameters, vector: NDArray[np.float64], start: NDArray[np.float64]
 ) -> NDArray[np.float64]:
     """Return the scales of y from a flow and the numbers of the drive."""
@@ -518,7 +518,7 @@ def coordinate_ranges(
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Return the lower and upper bound of each free coordinate at the crank angle 0, two arrays of shape (free,)."""
     mechanism = mechanism_of(parameters)
-    flow, vector, scale = drive.flow(mechanism), drive.vector(mechanism), scale_of(parameters, drive, guess)
+    flow, vector, scale = drive.flow(mechanism), drive.vector(mechanism), motion_scales(parameters, drive, guess)
     sides = []
     for sign in (-1.0, 1.0):
         found = scale[: flow.size // 2].copy()
@@ -543,7 +543,7 @@ def even_rates(drive: Drive, flow: Flow, guess: NDArray[np.float64]) -> NDArray[
     return np.array([pace * turning.get(n, 0) for n in flow.free], dtype=float)
 
 
-def starts_of(
+def spread_starts(
     parameters: Parameters, drive: Drive, guess: NDArray[np.float64], count: int, number: int = 0
 ) -> NDArray[np.float64]:
     """Return initial states of many amplitudes and phases within the coordinate ranges, from a scrambled Sobol sequence.
@@ -563,7 +563,7 @@ def starts_of(
     """
     from scipy.stats import qmc  # takes half a second
 
-    flow, scale = drive.flow(mechanism_of(parameters)), scale_of(parameters, drive, guess)
+    flow, scale = drive.flow(mechanism_of(parameters)), motion_scales(parameters, drive, guess)
     half = flow.size // 2
     low, high = coordinate_ranges(parameters, drive, guess)
     sequence = qmc.Sobol(flow.size, rng=number).random(count)

@@ -33,20 +33,20 @@ class Crank(NamedTuple):
 
 
 @cache
-def cranks_of(mechanism: Mechanism) -> tuple[Crank, ...]:
+def find_cranks(mechanism: Mechanism) -> tuple[Crank, ...]:
     """Return all freedoms of a mechanism that turn."""
     return tuple(Crank(n, mechanism.channel(n, "command"), mechanism.channel(n, "force")) for n in mechanism.cyclic)
 
 
 @cache
-def turning_of(mechanism: Mechanism, name: str) -> int:
+def find_turning_freedom(mechanism: Mechanism, name: str) -> int:
     """Return the number of a freedom that turns, by one of its FMI names: a crank, or a link that swings and may go round."""
     swinging = {freedom.coordinate: n for n, freedom in enumerate(mechanism.freedoms) if freedom.swings}
-    return swinging[name] if name in swinging else crank_of(mechanism, name).freedom
+    return swinging[name] if name in swinging else find_crank(mechanism, name).freedom
 
 
 @cache
-def crank_of(mechanism: Mechanism, name: str = "") -> Crank:
+def find_crank(mechanism: Mechanism, name: str = "") -> Crank:
     """Return the crank of a mechanism, by name if there are several.
 
     Parameters
@@ -61,7 +61,7 @@ def crank_of(mechanism: Mechanism, name: str = "") -> Crank:
     InputError
         If the mechanism has no crank, if it has several and no name is given, or if none has that name.
     """
-    cranks = cranks_of(mechanism)
+    cranks = find_cranks(mechanism)
     if not cranks:
         raise InputError(
             f"a {mechanism.name} has no freedom that turns without end: it has no periodic motions over an angle"

@@ -184,7 +184,7 @@ def difference(a, b, out):
 
 
 @inner
-def difference_within(a, b, ways, out):
+def subtract_modulo_turns(a, b, ways, out):
     """Write a - b into ``out``, with whole turns removed from differences of angles."""
     for i in range(out.shape[0]):
         out[i] = a[i] - b[i]
@@ -488,7 +488,7 @@ def settle(section, turn, change, most, start):
         status = advance(section, 0.0, turn, z, room, carry)
         if status != DONE:
             return status
-        difference_within(z, start, section.ways, start)
+        subtract_modulo_turns(z, start, section.ways, start)
         size = magnitude(start, section.scale)
         copy(z, start)
         if size < change:

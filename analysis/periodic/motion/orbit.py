@@ -1,7 +1,7 @@
 """Find periodic motions of the full nonlinear mechanism with their Floquet multipliers.
 
 At prescribed speed a periodic motion repeats itself after one turn of the crank, or after several; under a torque the mean
-speed is part of the solution. `orbit_of` solves y(T) = y(0) by Newton's method with the exact monodromy matrix from the
+speed is part of the solution. `newton_orbit` solves y(T) = y(0) by Newton's method with the exact monodromy matrix from the
 variational equations. Its eigenvalues, the Floquet multipliers, come with every solution, and an unstable motion is found as
 easily as a stable one.
 """
@@ -23,7 +23,7 @@ from ...display import Shown, format_count, format_rounds
 from ...files import unknown_name
 from ...mechanisms import Parameters, mechanism_of
 from ...numerics.continuation import Evaluation
-from ...run import outputs_of, takes_published
+from ...run import compute_outputs, takes_published
 from ...units import RAD_S_PER_RPM
 from . import kernels
 from .discretisation import (
@@ -39,7 +39,7 @@ from .discretisation import (
     operating_point,
     orbit_error,
 )
-from .drive import Drive, even_rates, starts_of
+from .drive import Drive, even_rates, spread_starts
 from .floquet import TOLERANCE, StabilityVerdict, liouville, multipliers, verdict
 from .flow import PLAIN, STATE, VARIATIONAL, Flow
 from .kernels import Status
@@ -202,7 +202,7 @@ class PeriodicOrbit(Shown):
     monodromy : ndarray, shape (n, n)
         Derivative of the map over one period on the section at crank angle 0.
     residual : float
-        ``|y(T) - y(0)|`` relative to `scale_of`, before the last correction.
+        ``|y(T) - y(0)|`` relative to `motion_scales`, before the last correction.
     iterations : int
         Newton iterations taken.
     stations : Stations or None
@@ -258,7 +258,7 @@ class PeriodicOrbit(Shown):
 
     @property
     def scale(self) -> FloatArray:
-        """Magnitudes of y, shape (n,): see `scale_of`."""
+        """Magnitudes of y, shape (n,): see `motion_scales`."""
         if "scale" not in self._kept:
             self._kept["scale"] = self.point.scale(self.start)
         scale: FloatArray = self._kept["scale"]
@@ -325,7 +325,7 @@ class PeriodicOrbit(Shown):
         rows = self.sample(angles)
         states, channels = rows[:, : mechanism.size], rows[:, mechanism.size :]
         modes = np.array(flow.modes, dtype=float)
-        values = outputs_of(mechanism, modes, np.append(self.point.constants, 0.0), states, channels)
+        values = compute_outputs(mechanism, modes, np.append(self.point.constants, 0.0), states, channels)
         keep = [n for n, name in enumerate(mechanism.output_names) if name not in _OF_A_RUN]
         time, period = _time(states[:, len(mechanism.freedoms) + flow.crank], flow.period * self.turns)
         return Turn(
@@ -393,7 +393,7 @@ def make_orbit(point: OperatingPoint, **rest: Any) -> PeriodicOrbit:
 
 
 @takes_published()
-def orbit_of(
+def newton_orbit(
     parameters: Parameters,
     drive: Drive,
     *,
@@ -413,7 +413,7 @@ def orbit_of(
         drives goes round from there, a motion is sought first in which it does so in each period.
     settle : bool
         Whether other starts are tried if Newton's method fails from the guess: the state to which the motion settles, and the
-        states of `starts_of`.
+        states of `spread_starts`.
 
     Raises
     ------
@@ -439,7 +439,7 @@ def orbit_of(
         except OrbitError:
             pass
     for number in range(SETS):
-        for place in starts_of(parameters, drive, guess, STARTS, number):
+        for place in spread_starts(parameters, drive, guess, STARTS, number):
             found = approach(point, turns, place)
             if found is None:
                 continue

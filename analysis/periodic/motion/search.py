@@ -26,7 +26,7 @@ from ...mechanisms import InitialState, Parameters, mechanism_of
 from ...run import Inputs, driven, started, takes_published
 from ...units import Amount, in_si
 from .discretisation import OperatingPoint, OrbitError, operating_point, orbit_error
-from .drive import SAME, Drive, Torque, drive_of, even_rates, starts_of
+from .drive import SAME, Drive, Torque, even_rates, spread_starts, steady_drive
 from .floquet import Stability
 from .kernels import Status
 from .orbit import (
@@ -35,7 +35,7 @@ from .orbit import (
     approach,
     approach_even,
     first_guess,
-    orbit_of,
+    newton_orbit,
     require_turns,
     settle_motion,
     solve_orbit,
@@ -203,7 +203,9 @@ def _follow(
     before = _speed_of_drive(last.drive)
     assert before is not None
     try:
-        orbit = orbit_of(parameters, _with_speed(last.drive, speed), turns=last.turns, start=last.start, settle=False)
+        orbit = newton_orbit(
+            parameters, _with_speed(last.drive, speed), turns=last.turns, start=last.start, settle=False
+        )
     except OrbitError:
         orbit = None
     if orbit is not None:
@@ -229,7 +231,7 @@ def _settle(point: OperatingPoint, state: FloatArray) -> PeriodicOrbit:
         away = None
         for turns in PERIODS:
             try:
-                orbit = orbit_of(point.parameters, point.drive, turns=turns, start=start, settle=False)
+                orbit = newton_orbit(point.parameters, point.drive, turns=turns, start=start, settle=False)
             except OrbitError:
                 continue
             if np.abs(point.flow.within(orbit.start - start) / scale).max() >= 1e-3:
@@ -368,14 +370,14 @@ def find_orbit(
     >>> round(100.0 * float(orbit.start[0]), 8), orbit.verdict().stability.value, orbit.others
     (-0.89553115, 'stable', 0)
     """
-    drive = drive_of(parameters, inputs, initial, speed=speed, torque=torque)
+    drive = steady_drive(parameters, inputs, initial, speed=speed, torque=torque)
     if not settle or (start is not None and drive.speed_drive):
-        return orbit_of(parameters, drive, turns=turns, start=start, settle=settle)
+        return newton_orbit(parameters, drive, turns=turns, start=start, settle=settle)
     try:
-        first = orbit_of(parameters, drive, turns=turns, start=start)
+        first = newton_orbit(parameters, drive, turns=turns, start=start)
     except OrbitError as error:
         failure, first = error, None
-    found = orbits_of(parameters, drive, turns=turns, start=start, known=() if first is None else (first,))
+    found = search_orbits(parameters, drive, turns=turns, start=start, known=() if first is None else (first,))
     if not found.orbits:
         if first is None:
             raise failure
@@ -431,13 +433,13 @@ def find_orbits(
     >>> found.agreed, found.index
     (True, 1)
     """
-    return orbits_of(
-        parameters, drive_of(parameters, inputs, initial, speed=speed, torque=torque), turns=turns, start=start
+    return search_orbits(
+        parameters, steady_drive(parameters, inputs, initial, speed=speed, torque=torque), turns=turns, start=start
     )
 
 
 @takes_published()
-def orbits_of(
+def search_orbits(
     parameters: Parameters,
     drive: Drive,
     *,
@@ -451,7 +453,7 @@ def orbits_of(
     a turn, unless the drive says how often it goes round.
     """
     if not isinstance(turns, int):
-        return joined([orbits_of(parameters, drive, turns=number, start=start) for number in sorted(set(turns))])
+        return joined([search_orbits(parameters, drive, turns=number, start=start) for number in sorted(set(turns))])
     mechanism, known = mechanism_of(parameters), list(known)
     flow = drive.flow(mechanism)
     drives = [(drive, turns), *((orbit.drive, orbit.turns) for orbit in known)]
@@ -467,11 +469,11 @@ def orbits_of(
         kind = tuple(sorted(own.ratios.items()))
         if kind not in parts:
             alike = [orbit for orbit in known if orbit.drive.ratios == own.ratios]
-            parts[kind] = _orbits_of(operating_point(parameters, own), of, start, alike)
+            parts[kind] = _search_rounds(operating_point(parameters, own), of, start, alike)
     return joined(list(parts.values()))
 
 
-def _orbits_of(
+def _search_rounds(
     point: OperatingPoint, turns: int, start: ArrayLike | None, known: Iterable[PeriodicOrbit] = ()
 ) -> Orbits:
     """Find the periodic motions in which links go round as often as the drive says."""
@@ -532,8 +534,8 @@ class _Found:
         self.index = 0
 
     def places(self, count: int, number: int) -> list[FloatArray]:
-        """Return the starts of a set: see `starts_of`."""
-        return list(starts_of(self.point.parameters, self.point.drive, self.guess, count, number))
+        """Return the starts of a set: see `spread_starts`."""
+        return list(spread_starts(self.point.parameters, self.point.drive, self.guess, count, number))
 
     def knows(self, start: FloatArray, near: float = SAME) -> bool:
         """Return whether a start belongs to a known motion."""

@@ -19,8 +19,8 @@ from ...mechanisms import Parameters, mechanism_of
 from ...numerics import symbolic
 from ...run import InductionMotor, of_parameters, takes_published
 from ...units import RAD_S_PER_RPM
-from .drive import Direction, Drive, forces_of, require_acting, require_drive
-from .flow import Flow, crank_of, cranks_of
+from .drive import Direction, Drive, force_inputs, require_acting, require_drive
+from .flow import Flow, find_crank, find_cranks
 
 #: A mechanism and its drive.
 Operation = tuple[Parameters, Drive]
@@ -32,7 +32,7 @@ Plane = Callable[[float, float], Operation]
 def _crank_inputs(mechanism: Mechanism) -> dict[str, tuple[str, int]]:
     """Return the kind (speed or torque) and the freedom of each crank speed and crank torque, by FMI name."""
     found = {}
-    for crank in cranks_of(mechanism):
+    for crank in find_cranks(mechanism):
         for what, n in (("torque", crank.torque), ("speed", crank.command)):
             if n is not None:
                 found[mechanism.channels[n].name] = (what, crank.freedom)
@@ -49,7 +49,7 @@ def of_the_motor(mechanism: Mechanism) -> dict[str, tuple[str, str]]:
 
 def driving_names(mechanism: Mechanism) -> tuple[str, ...]:
     """Return the names of the parameters of a drive: speeds of cranks, torques on them, parameters of motors, and forces."""
-    return tuple(dict.fromkeys((*_crank_inputs(mechanism), *of_the_motor(mechanism), *forces_of(mechanism))))
+    return tuple(dict.fromkeys((*_crank_inputs(mechanism), *of_the_motor(mechanism), *force_inputs(mechanism))))
 
 
 def speed_names(mechanism: Mechanism) -> tuple[str, ...]:
@@ -65,7 +65,7 @@ def speed_name(mechanism: Mechanism, drive: Drive | None = None) -> str | None:
     InputError
         If the mechanism has several cranks, and there is no drive that says which.
     """
-    command = (crank_of(mechanism) if drive is None else drive.reference(mechanism)).command
+    command = (find_crank(mechanism) if drive is None else drive.reference(mechanism)).command
     return None if command is None else mechanism.channels[command].name
 
 
@@ -97,15 +97,15 @@ def require_variable(parameters: Parameters, drive: Drive, name: str) -> None:
     """
     require_drive(drive)
     mechanism = mechanism_of(parameters)
-    unit_of(mechanism, name)
+    parameter_unit(mechanism, name)
     what, freedom = _crank_inputs(mechanism).get(name, ("", -1))
     if what == "speed" or freedom == drive.reference(mechanism).freedom:
         if (what == "speed") != drive.speed_drive:
             raise InputError(f"{name} cannot vary: the drive is by {'speed' if drive.speed_drive else 'torque'}")
         if what == "speed" and not _crank_ratio(mechanism, drive, freedom):
             raise InputError(f"{name} cannot vary: this crank is not commanded to turn")
-    elif name in forces_of(mechanism):
-        require_acting(drive, mechanism, forces_of(mechanism)[name])
+    elif name in force_inputs(mechanism):
+        require_acting(drive, mechanism, force_inputs(mechanism)[name])
     if name in of_the_motor(mechanism) and _find_motor(mechanism, drive, name) is None:
         raise InputError(f"{name} cannot vary: no motor drives the crank")
 
@@ -131,7 +131,7 @@ def variable_names(mechanism: Mechanism) -> tuple[str, ...]:
     return (*driving_names(mechanism), *of_mechanism)
 
 
-def unit_of(mechanism: Mechanism, name: str) -> str:
+def parameter_unit(mechanism: Mechanism, name: str) -> str:
     """Return the unit of a parameter of a mechanism or its drive, by its FMI name.
 
     Raises
@@ -148,7 +148,7 @@ def unit_of(mechanism: Mechanism, name: str) -> str:
 
 
 @takes_published()
-def value_of(parameters: Parameters, drive: Drive, name: str) -> float:
+def parameter_value(parameters: Parameters, drive: Drive, name: str) -> float:
     """Return the value of a parameter; NaN for a speed under a torque drive, or for a missing motor."""
     mechanism = mechanism_of(parameters)
     what, freedom = _crank_inputs(mechanism).get(name, ("", -1))
@@ -158,7 +158,7 @@ def value_of(parameters: Parameters, drive: Drive, name: str) -> float:
         return float(drive.torque)
     if name in of_the_motor(mechanism):
         return float(getattr(_find_motor(mechanism, drive, name), of_the_motor(mechanism)[name][0], np.nan))
-    if name in forces_of(mechanism):
+    if name in force_inputs(mechanism):
         return float(drive.forces.get(name, 0.0))
     return float(getattr(parameters, field_name(name)))
 
@@ -179,7 +179,7 @@ def _replaced(parameters: Parameters, *values: tuple[str, float]) -> Parameters:
 def with_values(parameters: Parameters, drive: Drive, values: Mapping[str, float]) -> Operation:
     """Return the mechanism and drive with new values of parameters, by FMI name."""
     mechanism = mechanism_of(parameters)
-    of_cranks, of_motor, forces = _crank_inputs(mechanism), of_the_motor(mechanism), forces_of(mechanism)
+    of_cranks, of_motor, forces = _crank_inputs(mechanism), of_the_motor(mechanism), force_inputs(mechanism)
     own = drive.reference(mechanism).freedom
     of_drive: dict[str, Any] = {}
     acting: dict[str, float] = {}
@@ -299,7 +299,7 @@ class Family:
         object.__setattr__(self, "vary", vary)
         require_variable(self.parameters, self.drive, vary)
         object.__setattr__(self, "name", self.name or vary)
-        object.__setattr__(self, "unit", self.unit or unit_of(mechanism_of(self.parameters), vary))
+        object.__setattr__(self, "unit", self.unit or parameter_unit(mechanism_of(self.parameters), vary))
 
     def at(self, value: float) -> Operation:
         """Return the mechanism and drive at a value of the parameter."""
@@ -385,7 +385,7 @@ def along_parameters(parameters: Parameters, names: Sequence[str], along: str = 
     return Along(*chosen)
 
 
-def places_of(flow: Flow, drive: Drive, name: str) -> dict[int, float] | None:
+def parameter_places(flow: Flow, drive: Drive, name: str) -> dict[int, float] | None:
     """Return the numbers of the drive that are multiples of a parameter, as indices into `Drive.vector` with the factors.
 
     For a parameter of the mechanism the result is None.
@@ -407,7 +407,7 @@ def stacked(drive: Drive, flow: Flow, names: Sequence[str], p: FloatArray) -> Fl
     """
     found = np.zeros((flow.drive_size, p.shape[1]))
     for column, name in enumerate(names):
-        for place, factor in (places_of(flow, drive, name) or {}).items():
+        for place, factor in (parameter_places(flow, drive, name) or {}).items():
             found[place, column] = factor
     return np.vstack([found, p])
 

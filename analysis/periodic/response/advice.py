@@ -22,8 +22,8 @@ from linkwork.errors import InputError, LinkworkError
 from ...numerics.peaks import peaks
 from ..motion.discretisation import OrbitError
 from ..motion.floquet import TOLERANCE, Crossing, Stability
-from ..motion.orbit import PeriodicOrbit, orbit_of
-from ..motion.variables import Family, value_of
+from ..motion.orbit import PeriodicOrbit, newton_orbit
+from ..motion.variables import Family, parameter_value
 from ..stability.nonlinear import SpecialPoint
 from ..stability.sensitivity import PointGradient, crossing_gradient, extremum_gradient, extremum_orbit
 from .branch import Branch
@@ -330,13 +330,13 @@ def _locate_extremum(
         except LinkworkError:
             pass
         else:
-            place = value_of(rested.parameters, rested.drive, family.vary)
+            place = parameter_value(rested.parameters, rested.drive, family.vary)
             if a < place < c and sign * (rested.amplitude - orbit.amplitude) > -_SAMPLED * orbit.amplitude:
                 return place, rested
 
     def near(value: float) -> PeriodicOrbit:
         parameters, drive = family.at(value)
-        return orbit_of(parameters, drive, turns=orbit.turns, start=orbit.start, settle=False)
+        return newton_orbit(parameters, drive, turns=orbit.turns, start=orbit.start, settle=False)
 
     try:
         best = scipy.optimize.minimize_scalar(

@@ -36,14 +36,14 @@ from ..motion import (
     Family,
     OrbitError,
     PeriodicOrbit,
-    cranks_of,
     default_variable,
-    orbit_of,
-    orbits_of,
+    find_cranks,
+    newton_orbit,
+    parameter_unit,
     published_drive,
     require_turns,
+    search_orbits,
     speed_names,
-    unit_of,
 )
 from ..stability import SpecialPoint
 from .advice import Avoided, Extremum, FoldJump, extrema, fold_jumps, ranges_to_avoid
@@ -75,7 +75,7 @@ def stiffness_name(mechanism: Mechanism) -> str:
 def _means(parameters: Parameters) -> tuple[float, float]:
     """Return the effective mass (kg) and stiffness (N/m) of the first freedom at its zero position, averaged over a turn."""
     mechanism = mechanism_of(parameters)
-    cranks, freedom = cranks_of(mechanism), first_freedom(mechanism)
+    cranks, freedom = find_cranks(mechanism), first_freedom(mechanism)
     if not cranks:
         raise InputError(f"a {mechanism.name} has no freedom that turns: it has no mean over a turn")
     # for several cranks: the points of a lattice, which fill all combinations of angles evenly
@@ -174,7 +174,7 @@ class Response(Shown):
 
     def __repr__(self) -> str:
         parts = f"{format_count(len(self.branches), 'branch')}, {format_count(len(self.problems), 'problem')}"
-        sought = f"{self.caution}: with_isolas" if self.caution else f"all motions sought at {self.sought_at} only"
+        sought = f"{self.caution}: with_isolas" if self.caution else f"all motions sought at {self.sought_values} only"
         return f"<Response: {describe(self.branches)}; {parts}; {sought}>"
 
     @property
@@ -183,7 +183,7 @@ class Response(Shown):
         return "" if self.sought else UNSOUGHT
 
     @property
-    def sought_at(self) -> str:
+    def sought_values(self) -> str:
         """Number of values of the parameter at which all motions were sought, in words; more values may find more motions."""
         return f"{format_count(self.sought, 'value')} of {self.family.name}"
 
@@ -307,7 +307,7 @@ def frequency_response(
     """
     mechanism = mechanism_of(parameters)
     vary = vary or default_variable(mechanism, drive)
-    unit = unit_of(mechanism, vary)
+    unit = parameter_unit(mechanism, vary)
     low, high = float(si(low, unit, "low")), float(si(high, unit, "high"))
     if drive is None:
         if vary not in speed_names(mechanism):
@@ -359,7 +359,7 @@ class _Search:
                 # there is no guess of the speed at the other end
                 break
             try:
-                orbit = orbit_of(at, driven, start=guess)
+                orbit = newton_orbit(at, driven, start=guess)
             except OrbitError as error:
                 self.failures.append(error)
                 self.problems.append(f"at {self.family.format_value(value)}: {error}")
@@ -434,7 +434,7 @@ class _Search:
             points = [point for b in simple for point in zip(np.abs(b.parameter - value), b.orbits)]
             start = min(points, key=lambda point: float(point[0]))[1].start
         limit = GREATEST if turns == 1 else GREATEST_OF_SEVERAL
-        for orbit in orbits_of(parameters, drive, turns=turns, start=start).orbits:
+        for orbit in search_orbits(parameters, drive, turns=turns, start=start).orbits:
             if self.stop() or orbit.largest > limit or self._knows(orbit, value):
                 continue
             branch = follow_both(

@@ -26,7 +26,7 @@ from ...run import simulate, takes_published
 from ..motion.discretisation import OperatingPoint, OrbitError, operating_point
 from ..motion.drive import Drive
 from ..motion.floquet import TOLERANCE, Crossing, Stability, StabilityVerdict
-from ..motion.orbit import PeriodicOrbit, orbit_of
+from ..motion.orbit import PeriodicOrbit, newton_orbit
 from ..motion.variables import Family
 
 
@@ -307,7 +307,7 @@ def confirm_form(family: Family, special: SpecialPoint, form: NormalForm) -> For
         value = special.parameter + sign * step
         parameters, drive = family.at(value)
         sides.append(
-            (sign, orbit_of(parameters, drive, turns=special.orbit.turns, start=special.orbit.start, settle=False))
+            (sign, newton_orbit(parameters, drive, turns=special.orbit.turns, start=special.orbit.start, settle=False))
         )
     rates = [(orbit.largest - special.orbit.largest) / step for _, orbit in sides]
     sign, rate = max(zip((-1.0, 1.0), rates), key=lambda pair: pair[1])
@@ -316,7 +316,7 @@ def confirm_form(family: Family, special: SpecialPoint, form: NormalForm) -> For
     beyond = float(np.clip(_SMALL * abs(form.coefficient), *_BEYOND))
     value = special.parameter + sign * beyond / rate
     parameters, drive = family.at(value)
-    old = orbit_of(parameters, drive, turns=special.orbit.turns, start=special.orbit.start, settle=False)
+    old = newton_orbit(parameters, drive, turns=special.orbit.turns, start=special.orbit.start, settle=False)
     scale = old.scale
     expected = sqrt((old.largest - 1.0) / abs(form.coefficient))
     q = _eigenvectors(_forms(old).matrix, complex(old.multipliers[0]))[0].real
@@ -435,7 +435,7 @@ def confirm(
         raise InputError(
             f"{turns} turns from a disturbance of {disturbance}: 20 and more, and between {NOISE:g} and {LINEAR:g}"
         )
-    orbit = orbit_of(parameters, drive, start=start)
+    orbit = newton_orbit(parameters, drive, start=start)
     verdict = orbit.verdict(tolerance)
     if turns is None:
         # enough to change the deviation by more than NOTABLE, if possible

@@ -21,8 +21,8 @@ from ...files import unknown_name
 from ...mechanisms import mechanism_of
 from ..motion.discretisation import operating_point
 from ..motion.floquet import Crossing
-from ..motion.orbit import PeriodicOrbit, orbit_of, trial_orbit
-from ..motion.variables import along_parameters, gradient_names, require_variable, stacked, value_of, with_values
+from ..motion.orbit import PeriodicOrbit, newton_orbit, trial_orbit
+from ..motion.variables import along_parameters, gradient_names, parameter_value, require_variable, stacked, with_values
 from .variations import Place, Variations
 
 FloatArray = NDArray[np.float64]
@@ -122,7 +122,7 @@ class MotionGradient:
         self.names = gradient_names(parameters, drive) if names is None else tuple(names)
         for name in self.names:
             require_variable(parameters, drive, name)
-        self.values = np.array([value_of(parameters, drive, name) for name in self.names])
+        self.values = np.array([parameter_value(parameters, drive, name) for name in self.names])
         own = along_parameters(parameters, self.names)
         self.along = stacked(orbit.drive, orbit.flow, self.names, own.p)
         mechanism = mechanism_of(parameters)
@@ -181,9 +181,9 @@ class MotionGradient:
     @cached_property
     def amplitude(self) -> Gradient:
         """Gradient of `PeriodicOrbit.amplitude`, half the range of the first free coordinate."""
-        return self.amplitude_along(self._solution[0])
+        return self.gradient_for_motion(self._solution[0])
 
-    def amplitude_along(self, solution: FloatArray) -> Gradient:
+    def gradient_for_motion(self, solution: FloatArray) -> Gradient:
         """Return the gradient of the amplitude for given derivatives of the motion, shape (k, s, n, m)."""
         # to first order the value of an extremum does not depend on its place
         by = [0.5 * sign * place.weights @ solution[place.panel, :, 0, :] for sign, _, place in self._swing]
@@ -397,7 +397,7 @@ def crossing_gradient(
     if not abs(test[-1]) * abs(motion.values[-1]) > 1e-9 * float(np.abs(test * motion.values).max()):
         raise LinkworkError(f"the {kind.value} does not move along {along}: its place there has no derivative")
     shift = -test[:-1] / test[-1]
-    amplitude = motion.amplitude_along(_fold_motion(motion, shift)) if kind is Crossing.FOLD else motion.amplitude
+    amplitude = motion.gradient_for_motion(_fold_motion(motion, shift)) if kind is Crossing.FOLD else motion.amplitude
     by = amplitude.by[:-1] + amplitude.by[-1] * shift
     at = motion.values[:-1]
     return PointGradient(
@@ -439,16 +439,16 @@ def _others(orbit: PeriodicOrbit, along: str, names: Sequence[str] | None) -> tu
 _Step = Callable[[MotionGradient], tuple[FloatArray, float]]
 
 
-def _locate_motion(orbit: PeriodicOrbit, along: str, step_of: _Step, what: str) -> PeriodicOrbit:
+def _locate_motion(orbit: PeriodicOrbit, along: str, newton_step: _Step, what: str) -> PeriodicOrbit:
     """Find the special point near a motion by Newton's method and return the motion there.
 
     Raises LinkworkError if Newton's method does not converge to a point near the motion.
     """
-    begun = value_of(orbit.parameters, orbit.drive, along)
+    begun = parameter_value(orbit.parameters, orbit.drive, along)
     for _ in range(_STEPS):
         motion = MotionGradient(orbit, (along,))
         try:
-            change, step = step_of(motion)
+            change, step = newton_step(motion)
         except (np.linalg.LinAlgError, ZeroDivisionError):
             # the condition does not depend on the parameter
             break
@@ -457,10 +457,10 @@ def _locate_motion(orbit: PeriodicOrbit, along: str, step_of: _Step, what: str) 
             break
         parameters, drive = with_values(orbit.parameters, orbit.drive, {along: value})
         start = orbit.start + change
-        if step_of is _fold_step:
+        if newton_step is _fold_step:
             orbit, _ = trial_orbit(operating_point(parameters, drive), start, orbit.turns)
         else:
-            orbit = orbit_of(parameters, drive, turns=orbit.turns, start=start, settle=False)
+            orbit = newton_orbit(parameters, drive, turns=orbit.turns, start=start, settle=False)
         if abs(step) <= _LAST * abs(value):
             return orbit
     raise LinkworkError(f"no {what} along {along} was found near {begun:.9g}")

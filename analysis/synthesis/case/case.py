@@ -296,10 +296,10 @@ def load_synthesis_case(path: str | Path, overrides: Mapping[str, Any] | None = 
         If bounds and constraints contradict one another.
     """
     path = Path(path)
-    return synthesis_case_from(read_tables(path), folder=path.parent, title=path.stem, overrides=overrides)
+    return read_synthesis_case(read_tables(path), folder=path.parent, title=path.stem, overrides=overrides)
 
 
-def synthesis_case_from(
+def read_synthesis_case(
     data: Mapping[str, Any], *, folder: Path, title: str = "", overrides: Mapping[str, Any] | None = None
 ) -> SynthesisCase:
     """Read a synthesis from the tables of a case file; names of further files are relative to ``folder``."""

@@ -113,7 +113,7 @@ class Make:
             own |= {f"{link}_mass": share * mass, f"{link}_inertia": share * inertia}
         return own
 
-    def load_along(self, c: Any, s: Any) -> tuple[Any, Any]:
+    def load_components(self, c: Any, s: Any) -> tuple[Any, Any]:
         """Return the components of the load along and across the ground link (N), whose direction has cosine c and sine s."""
         x, y = self.load
         return c * x + s * y, c * y - s * x
@@ -253,7 +253,7 @@ def pin_functions(
         }
     )
     p = parameters.constants()
-    load = make.load_along(casadi.cos(d.ground_angle), casadi.sin(d.ground_angle))
+    load = make.load_components(casadi.cos(d.ground_angle), casadi.sin(d.ground_angle))
     w2 = make.speed
     g = plant.position(crank_angle, 0.0, p)
     k = plant.coefficients(g, p)
@@ -352,7 +352,7 @@ def pin_forces(
     made = make.moving(linkage)
     heavy = HEAVY * (made.crank_mass + made.coupler_mass + made.rocker_mass)
     parameters = replace(made, slider_mass=heavy, slider_stiffness=0.0, slider_damping=0.0, slider_coulomb_friction=0.0)
-    x, y = make.load_along(np.cos(linkage.ground_angle), np.sin(linkage.ground_angle))
+    x, y = make.load_components(np.cos(linkage.ground_angle), np.sin(linkage.ground_angle))
     weight = heavy * make.gravity * float(np.sin(linkage.ground_angle))
     acting = Inputs(speed=make.speed, force=weight, load_x=float(x), load_y=float(y))
     start = InitialState(crank_angle=begin + linkage.crank_phase)

@@ -16,7 +16,7 @@ from linkwork.five_bar.parameters import FiveBarParameters
 
 from ...display import Shown
 from ...files import write_csv
-from ...run import parameters_to
+from ...run import parameter_tables
 from ...units import with_unit
 from ..linkage.kernels import PLACES
 from ..linkage.linkage import Linkage, SliderCrank, wrapped
@@ -393,14 +393,14 @@ class Solution(Shown):
         if not self.verdicts.full_turn and at is not None:
             # a crank that cannot turn fully: from the first target to the last
             run = {"stop_time": with_unit(float(np.ptp(at)) / make.speed, "s")}
-        across, along = make.load_along(cos(linkage.ground_angle), sin(linkage.ground_angle))
+        across, along = make.load_components(cos(linkage.ground_angle), sin(linkage.ground_angle))
         load: Any = {"fx": with_unit(across, "N"), "fy": with_unit(along, "N")}
         if isinstance(linkage, SliderCrank):
             # at the slider alone, which the plant loads along its guide
             load = with_unit(along if linkage.point_is_pin else 0.0, "N")
         return {
             "title": title,
-            **parameters_to(make.plant(linkage)),
+            **parameter_tables(make.plant(linkage)),
             "initial": {"crank_angle": with_unit(remainder(start, tau), "rad")},
             "drive": {"speed": with_unit(self.direction * make.speed, "rad/s")},
             **({"load": load} if any(make.load) else {}),

@@ -31,7 +31,7 @@ from ..task.limits import Limits, limits_by_kind
 from ..task.task import Normal, normal_form
 from .program import KEPT, Program
 from .refine import ITERATIONS, Refinement
-from .start import USUAL_SEARCH, Answer, Search, Start, apart, inside, outside, over_cores, start_of
+from .start import USUAL_SEARCH, Answer, Search, Start, apart, as_start, inside, outside, over_cores
 from .statement import Objective
 
 FloatArray = NDArray[np.float64]
@@ -410,7 +410,7 @@ def violated(
     ratios = [linkage.pivot.ratio] if isinstance(linkage, FiveBar) else []
     (limits,) = limits_by_kind(task, normal, bounds, constraints, [linkage.kind], ratios)
     pivot = limits.second_crank(normal.unit)
-    start = start_of(solution, normal, pivot)
+    start = as_start(solution, normal, pivot)
     answer = Polisher(normal, limits, pivot).kept(start)
     if answer.feasible:
         return ""

@@ -76,7 +76,7 @@ class Program(Statement):
         objective, constraints = self._evaluate(z, parameters)
         return float(objective), np.asarray(constraints).ravel()
 
-    def slopes_at(self, z: FloatArray, parameters: FloatArray) -> tuple[FloatArray, FloatArray]:
+    def gradient_and_jacobian(self, z: FloatArray, parameters: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return the gradient of the objective, shape (k,), and the Jacobian of the constraints, shape (m, k)."""
         gradient, jacobian = (np.asarray(value) for value in self._differentiate(z, parameters))
         return gradient.ravel(), jacobian
@@ -238,7 +238,9 @@ class Program(Statement):
         over = np.maximum(self.g_low - g, g - self.g_high) if np.isfinite(g).all() else np.full(len(g), inf)
         violation = float(over.max(initial=0.0))
         worst = self.labels[int(np.argmax(over))] if len(over) else None
-        ended = self.start_at(z, start, f * (float(parameters[2]) if self.objective in ("worst", *SOUGHT) else 1.0))
+        ended = self.recover_start(
+            z, start, f * (float(parameters[2]) if self.objective in ("worst", *SOUGHT) else 1.0)
+        )
         return Answer(
             start=ended,
             feasible=violation <= KEPT and bool(np.isfinite(z).all()) and isfinite(ended.quality),
@@ -250,7 +252,7 @@ class Program(Statement):
             iterations=0,
         )
 
-    def start_at(self, z: FloatArray, start: Start, quality: float) -> Start:
+    def recover_start(self, z: FloatArray, start: Start, quality: float) -> Start:
         """Convert unknowns to a start; the stations' rotations are those of ``start`` unless all of them are unknowns."""
         end = len(UNKNOWNS) + pivot_size(self.pivot)
         rotation = None if self.normal.timed else start.rotation

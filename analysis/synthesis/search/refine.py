@@ -295,7 +295,7 @@ class _Descent:
         # SLSQP asks for each twice at the same unknowns: for the measure and for the constraints
         self.curve = _cache_last(lambda z: refinement.traced(z, parameters))
         self._evaluate = _cache_last(lambda z: refinement.program.stated(z, parameters))
-        self._differentiate = _cache_last(lambda z: refinement.program.slopes_at(z, parameters))
+        self._differentiate = _cache_last(lambda z: refinement.program.gradient_and_jacobian(z, parameters))
 
     def begin(self) -> FloatArray:
         y = np.zeros(self._stretch.shape[1] + self._bound_unknown)

@@ -43,10 +43,10 @@ from .start import (
     USUAL_SEARCH,
     Answer,
     Search,
+    as_start,
     closed_form,
     make_linkage,
     random_pivot,
-    start_of,
 )
 
 #: Stations of an untimed path with a moving pivot: more than with a fixed one, because harmonics cause waves in the curve.
@@ -257,7 +257,7 @@ def _search_kind(
 
     Linkages without defects rank first: if the limits do not exclude defects, a second search excludes them.
     """
-    begin = [start_of(guess, normal, pivot) for guess in guesses]
+    begin = [as_start(guess, normal, pivot) for guess in guesses]
     random = np.random.default_rng(search.seed)
     again = AGAIN if normal.exact and not normal.timed and normal.n <= MOST_EXACT else 1
     scanned = scan(normal, limits, seed=search.seed, candidates=search.candidates, starts=again * search.starts)
@@ -320,7 +320,7 @@ def improve(
     task = _prepare_task(task, constraints, pivot)
     normal = search_form(task, pivot)
     limits = make_limits(task, normal, bounds, constraints)
-    base, *begin = (start_of(of, normal, pivot) for of in (linkage, *guesses))
+    base, *begin = (as_start(of, normal, pivot) for of in (linkage, *guesses))
     random = np.random.default_rng(search.seed)
     begin += [replace(base, pivot=random_pivot(pivot, base.q[2], normal.unit, random)) for _ in range(search.starts)]
     done = polish(normal, limits, begin, pivot=pivot, search=search)

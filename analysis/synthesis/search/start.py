@@ -277,7 +277,7 @@ def make_start(
     return Start(q=q, branch=linkage.branch, pivot=v, rotation=rotation, given=True, linkage=kind)
 
 
-def start_of(of: Linkage | Solution, normal: Normal, pivot: PivotUnknown | None) -> Start:
+def as_start(of: Linkage | Solution, normal: Normal, pivot: PivotUnknown | None) -> Start:
     """Convert a linkage or solution to a start, with untimed stations at the solution's rotations or the nearest ones.
 
     Raises InputError for an open path if the rotations are not known: the nearest ones are found for closed paths only.
