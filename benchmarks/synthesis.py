@@ -103,12 +103,12 @@ def _jacobians(repeats, c, s, zero, q, out, jacobian):
 
 def curve_by_numpy(linkage: Linkage, rotation: FloatArray) -> ComplexArray:
     """Compute the coupler curve over arrays, by the plant's own loop closure with NumPy's square root."""
-    joined = rebound((kinematics,), {"sqrt": np.sqrt}).of(kinematics.joined)
+    close_loop = rebound((kinematics,), {"sqrt": np.sqrt}).of(kinematics.close_loop)
     q = linkage
     th2 = rotation + q.crank_phase
     c2, s2 = np.cos(th2), np.sin(th2)
     dx, dy = q.ground_length - q.crank_length * c2, -q.crank_length * s2
-    g = joined(c2, s2, dx, dy, q.coupler_length, q.rocker_length, float(q.branch))
+    g = close_loop(c2, s2, dx, dy, q.coupler_length, q.rocker_length, float(q.branch))
     point = q.point_distance * np.exp(1j * q.point_angle) * (g.c3 + 1j * g.s3)
     curve: ComplexArray = complex(q.pivot_x, q.pivot_y) + np.exp(1j * q.ground_angle) * (
         q.crank_length * (c2 + 1j * s2) + point

@@ -21,7 +21,7 @@ from numpy.typing import ArrayLike, NDArray
 from analysis.studies.youssef.problems import PACKAGING_POINTS_CM, PROBLEMS
 from analysis.synthesis import FullTurn, LargestLink, RockerFunction, TargetPath, Task, TimedPath, UntimedPath, turn
 from analysis.synthesis.task.constraint import USUAL, Constraint
-from analysis.synthesis.task.target import along, ring
+from analysis.synthesis.task.target import interpolate_polyline, ring
 
 FloatArray = NDArray[np.float64]
 Points = Sequence[tuple[float, float]]
@@ -85,7 +85,7 @@ def outlined(corners: ArrayLike, n: int = CURVE) -> FloatArray:
     """Return n points at equal distances along a closed polygon, shape (n, 2)."""
     line = ring(np.asarray(corners, dtype=float), True)
     length = float(np.hypot(*np.diff(line, axis=0).T).sum())
-    return along(line, np.linspace(0.0, length, n, endpoint=False))
+    return interpolate_polyline(line, np.linspace(0.0, length, n, endpoint=False))
 
 
 def drawn(seed: int) -> TargetPath:

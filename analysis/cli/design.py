@@ -237,7 +237,7 @@ def synthesize(
         if error.synthesis is None:
             raise
         result, stopped = error.synthesis, error
-    forces = chosen.forces(result.every)
+    forces = chosen.forces(result.with_variants)
     title = f"{chosen.title}: {format_count(len(result.solutions), 'linkage')}, {result.seconds:.1f} s"
     print_solutions(title, result.solutions, forces)
     best = assess(result.best, chosen.violated)

@@ -68,13 +68,13 @@ class Chosen:
 
     def start(self, drive: Any) -> list[float]:
         """Return a guess of the orbit's start: the case's coordinates at rest, and with a torque drive a crank speed."""
-        from ..periodic import resting
+        from ..periodic import rest_guess
 
         speed = None if self.guess_speed is None else quantity(self.guess_speed, "rad/s", "--guess-speed")
         if drive.speed_drive and speed is not None:
             raise click.UsageError("--guess-speed is for a case driven by a torque: here the speed is prescribed")
         other = ", or --guess-speed '300 rpm'"
-        return resting(self.case.parameters, drive, self.case.initial, speed, other=other)
+        return rest_guess(self.case.parameters, drive, self.case.initial, speed, other=other)
 
     def finish(self, written: Sequence[Path], problems: Sequence[str], *, interrupted: bool = False) -> None:
         """Report written files and problems; exit with an error code if there are problems or the command was interrupted."""

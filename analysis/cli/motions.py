@@ -55,7 +55,7 @@ def basins(
     """
     from .. import figures
     from ..periodic import basins as find_basins
-    from ..periodic import joined, search_orbits, turns_sought
+    from ..periodic import join_orbits, search_orbits, turns_sought
 
     parameters, drive = chosen.case.parameters, chosen.drive()
     start = chosen.start(drive)
@@ -74,7 +74,7 @@ def basins(
         points=points,
         position=spans[0],
         rate=spans[1],
-        found=joined(found),
+        found=join_orbits(found),
         n_jobs=jobs,
         progress=console.is_terminal,
     )

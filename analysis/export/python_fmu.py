@@ -24,7 +24,7 @@ from linkwork import wrapper
 from linkwork.mechanism import Mechanism
 
 from ..mechanisms import check
-from ..numerics.cache import put
+from ..numerics.cache import store_file
 from . import controllers
 from .archive import SOURCES, BuildError, documentation, write
 from .bill import with_bill
@@ -188,7 +188,7 @@ def build_controller(name: str, dest: Path | str = "build") -> Path:
         script.write_text(_CONTROLLER.format(module=module.stem, kind=kind), encoding="utf-8")
         options = {"canGetAndSetFMUstate": "true", "canHandleVariableCommunicationStepSize": "true"}
         made = FmuBuilder.build_FMU(script, dest=Path(stage) / "made", project_files=[package, module], **options)
-        put(target, made.read_bytes())
+        store_file(target, made.read_bytes())
     return target
 
 

@@ -24,7 +24,7 @@ from linkwork.parameters import fmi_name
 from ..files import unknown_name
 from ..mechanisms import InitialState, Parameters, mechanism_of, variable_units
 from ..numerics import symbolic
-from ..run import Inputs, expressions, given, takes_published
+from ..run import Inputs, checked_run, expressions, takes_published
 from ..units import Amount, in_si
 from .model import FloatArray, Layout, Modes, layout, sampled_channels
 
@@ -174,7 +174,7 @@ class _Balance:
     @classmethod
     def build(cls, parameters: Parameters, inputs: Inputs) -> _Balance:
         mechanism = mechanism_of(parameters)
-        given(mechanism, inputs, None)
+        checked_run(mechanism, inputs, None)
         if not inputs.held_exactly:
             raise InputError(f"{inputs}: at an equilibrium all of them must be constant")
         still = np.zeros((1, mechanism.size))
@@ -298,7 +298,7 @@ def _balance_with_held(
 ) -> tuple[_Balance, FloatArray]:
     """Return the equations of rest, and all coordinates, with the given values for held freedoms and zero elsewhere."""
     mechanism = mechanism_of(parameters)
-    inputs, _ = given(mechanism, inputs, None)
+    inputs, _ = checked_run(mechanism, inputs, None)
     coordinates = np.zeros(len(mechanism.freedoms))
     commands = {mechanism.freedoms[c.freedom].coordinate: c for c in mechanism.channels if c.kind == "command"}
     for name, value in (held or {}).items():

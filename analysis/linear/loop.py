@@ -25,9 +25,9 @@ from ..run import (
     Inputs,
     Trajectory,
     align,
+    checked_run,
     driven,
     encode,
-    given,
     sample,
     sample_times,
     started,
@@ -427,7 +427,7 @@ def control_loop(
         If the links cannot be joined at the start.
     """
     mechanism = mechanism_of(parameters)
-    inputs, initial = given(mechanism, inputs, initial)
+    inputs, initial = checked_run(mechanism, inputs, initial)
     channel = _channel(mechanism, controller.channel)
     if channel.argument in inputs:
         raise InputError(f"{channel.argument} is among the inputs, but it is the controller's")
@@ -474,7 +474,7 @@ class _Linear:
     ) -> None:
         one = model if isinstance(model, LinearModel) else model.mean()
         self.mechanism, self.places = one.mechanism, one.places
-        self.encoded = None if inputs is None else encode(given(self.mechanism, inputs, None)[0], self.mechanism)
+        self.encoded = None if inputs is None else encode(checked_run(self.mechanism, inputs, None)[0], self.mechanism)
         n, forces = 2 * len(self.mechanism.freedoms), list(one.layout.forces)
         self.forces, self.own = forces, forces.index(self.mechanism.input_names.index(channel))
         still, acting = one.state[:n], one.channels[forces]

@@ -27,7 +27,7 @@ from ..files import unknown_name
 from ..libraries import lazy
 from ..mechanisms import Parameters, mechanism_of
 from ..numerics import symbolic
-from ..run import Inputs, encode, expressions, given, sample, takes_published
+from ..run import Inputs, checked_run, encode, expressions, sample, takes_published
 
 if TYPE_CHECKING:
     import control
@@ -438,7 +438,7 @@ def sampled_channels(
     Raises InputError if the inputs belong to another mechanism, a state is not finite, or the inputs command a rate that
     differs from the rate in a state.
     """
-    inputs, _ = given(mechanism, inputs, None)
+    inputs, _ = checked_run(mechanism, inputs, None)
     encoded = encode(inputs, mechanism)
     for row in states:
         if not np.all(np.isfinite(row)):

@@ -17,7 +17,7 @@ from linkwork.mechanism import Mechanism
 
 from ..mechanisms import InitialState, Parameters, mechanism_of
 from ..numerics.fourier import trigonometric
-from ..run import Inputs, driven, given, simulate, speed_ratio, started, takes_published
+from ..run import Inputs, checked_run, driven, simulate, speed_ratio, started, takes_published
 from ..units import Amount, in_si
 from .model import (
     FloatArray,
@@ -233,7 +233,7 @@ def linearise_along(
         modes, period = turn.modes, turn.period
     else:
         states = full_states(mechanism, motion)
-        inputs, _ = given(mechanism, inputs, None)
+        inputs, _ = checked_run(mechanism, inputs, None)
         if period is None:
             period = _turn_time(mechanism, tuple(inputs.modes(mechanism).values()), states)
     if len(states) < LEAST_SAMPLES:
@@ -331,7 +331,7 @@ def settled_motion(
         If the run ends early, or the last two turns differ by more than 1e-7 of the mechanism's scales.
     """
     mechanism = mechanism_of(parameters)
-    inputs, initial = given(mechanism, inputs, initial)
+    inputs, initial = checked_run(mechanism, inputs, initial)
     modes, n = tuple(inputs.modes(mechanism).values()), len(mechanism.freedoms)
     its = layout(mechanism, modes)
     speeds = {c.freedom: (c, getattr(inputs, c.argument)) for c in mechanism.channels if c.kind == "command"}

@@ -33,7 +33,7 @@ def coordinate(value: Any, name: str) -> float:
     return value if value == 0 and isinstance(value, int) and value is not False else Quantity("m")(value, name)
 
 
-def given(value: Any) -> bool:
+def is_given(value: Any) -> bool:
     """Return whether an entry of a spring is given: the whole number 0 means that it is not."""
     return value != 0 or not isinstance(value, int)
 

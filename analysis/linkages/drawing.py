@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from .description import given
-from .parameters import Interface, size
+from .description import is_given
+from .parameters import Interface, length_and_mass
 from .structure import Freed, Geared, Pin, on_one_body, sliders
 from .writing import function, quoted
 
@@ -26,7 +26,7 @@ class Picture:
 
     def drawn(self) -> tuple[list[Marked], list[str]]:
         """Return the points of the picture, and its parts from the back to the front."""
-        d, parts, length = self.description, [], size(self.interface)[0]
+        d, parts, length = self.description, [], length_and_mass(self.interface)[0]
         points = dict.fromkeys(own for of in self.interface.points.values() for own in of)
         joints = [Marked(own, f"point {own}", f"*(b.at_{own}.x, b.at_{own}.y, 0.0)") for own in points]
         lines = sliders(self.structure)
@@ -41,7 +41,7 @@ class Picture:
             joints.append(Marked(f"{name}Block", f"the {block}", f"*(b.{origin}.x, b.{origin}.y, 0.0)"))
             joints.append(Marked(f"{name}End", f"direction of {name}", end))
             along = f'("{name}Block", "{joint.through}", "{name}End")'
-            springs = [own for own, spring in d.springs.items() if spring.at == name and given(spring.stiffness)]
+            springs = [own for own, spring in d.springs.items() if spring.at == name and is_given(spring.stiffness)]
             parts.append(f'Part("guide", ("{joint.through}", "{name}End"), "line of {name}")')
             parts += [f'Part("spring", {along}, "{own}", "{own}.stiffness")' for own in springs]
             parts.append(f'Part("slider", {along}, "{block}")')
@@ -60,7 +60,7 @@ class Picture:
             parts.append(f'Part("gear", ("{pin.name}", "{name}{rack.gear}Tick"), "pitch circle of {rack.gear}")')
         for name, gear in d.gears.items():
             carrier, pins = self.bearings(gear.bodies)
-            (x0, y0), (x1, y1) = (self.interface.own(carrier, pin) for pin in pins)
+            (x0, y0), (x1, y1) = (self.interface.coordinates(carrier, pin) for pin in pins)
             # the pitch point divides the line of centres so that both gears have the same velocity there
             share = f"p.{name}_ratio * (p.{name}_ratio - 1.0) / ((p.{name}_ratio - 1.0) ** 2 + 1e-12)"
             for wheel, bearing, part in zip(gear.bodies, pins, (share, f"({share} - 1.0)"), strict=True):

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from itertools import chain, count
 from typing import NamedTuple
 
-from .description import BODY, GROUND, Description, Spring, given
+from .description import BODY, GROUND, Description, Spring, is_given
 from .laws import expression, with_constants
 from .parameters import Interface
 from .structure import Dyad, Freed, Geared, Joint, Pin, Racked, Side, Step, sliders
@@ -51,7 +51,7 @@ class Motion:
         """Write the function that computes the stretches of all springs and their rates."""
         rows, fields = [], []
         for name, spring in self.description.springs.items():
-            free = f" - p.{name}_free" if given(spring.free) else ""
+            free = f" - p.{name}_free" if is_given(spring.free) else ""
             stretch, rate = f"{name}_stretch", f"{name}_rate"
             if name in self.along:
                 suffix = f"{free}_{self._kind(spring)}" if free else ""
@@ -91,9 +91,9 @@ class Motion:
     def resistance(self, name: str, spring: Spring) -> str:
         """Return the expression of the force of a spring's damper, friction and force law; empty if it has none of these."""
         words = []
-        if given(spring.damping):
+        if is_given(spring.damping):
             words.append(f"p.{name}_damping * s.{name}_rate")
-        if given(spring.friction):
+        if is_given(spring.friction):
             about = self.turned(spring)
             words.append(f"p.{name}_friction * tanh(s.{name}_rate / {'FRICTION_RATE' if about else 'FRICTION_SPEED'})")
         if spring.law:
@@ -101,7 +101,7 @@ class Motion:
         return " + ".join(words)
 
     def _pull(self, name: str, spring: Spring) -> str:
-        return f"p.{name}_stiffness * s.{name}_stretch" if given(spring.stiffness) else ""
+        return f"p.{name}_stiffness * s.{name}_stretch" if is_given(spring.stiffness) else ""
 
     def tension(self, name: str, spring: Spring) -> str:
         """Return the expression of the whole force of a spring that is not driven; it opposes the stretch."""
@@ -391,7 +391,7 @@ class Motion:
                 if body in self.interface.centres:
                     terms.append(f"- p.{body}_mass * (p.gx * m[{n}].centre.x + p.gy * m[{n}].centre.y)")
         for name, spring in self.description.springs.items():
-            if given(spring.stiffness):
+            if is_given(spring.stiffness):
                 terms.append(f"+ 0.5 * p.{name}_stiffness * s.{name}_stretch * s.{name}_stretch")
         s = "s: Springs, " if self.description.springs else ""
         doc = "Compute the energy of the springs, and of gravity with zero at the ground's origin (J)."

@@ -36,7 +36,7 @@ class Places:
 
         ``frame`` is the variable of the body's pose, by default its pose in the ground; "own" is the body's own frame.
         """
-        x, y = self.interface.own(body, own)
+        x, y = self.interface.coordinates(body, own)
         if body == GROUND or frame == "own":
             return f"fixed({x}, {y}, {self.n})"
         frame = frame or f"{body}_frame"
@@ -51,7 +51,7 @@ class Places:
 
     def hung(self, pin: str, turn: str, body: str, own: str) -> str:
         """Return the expression of the pose of a body from the position of its point ``own`` and its direction ``turn``."""
-        x, y = self.interface.own(body, own)
+        x, y = self.interface.coordinates(body, own)
         if (x, y) == ("0.0", "0.0"):
             return f"Frame({pin}, {turn})"
         return f"Frame(minus({pin}, arm({turn}, {x}, {y})), {turn})"
@@ -186,9 +186,9 @@ class Places:
 
     def own_arm(self, side: Side, body: str, to: str, start: str, axes: str) -> str:
         """Return the vector, in a side's body, from its point ``start`` to the point ``to`` of one of the side's bodies."""
-        sx, sy = self.interface.own(side.body, start)
+        sx, sy = self.interface.coordinates(side.body, start)
         if body == side.body:
-            x, y = self.interface.own(body, to)
+            x, y = self.interface.coordinates(body, to)
             result = f"fixed({_difference(x, sx)}, {_difference(y, sy)}, {self.n})"
         else:
             result = self.point(body, to, f"{body}_in_{side.body}")
@@ -222,7 +222,7 @@ class Places:
                 frame = self.hung(place, f"{body}_turn", body, joint.through)
         self.lines.append(f"{body}_frame = {frame}")
         for own in side.bodies[1:]:
-            self.lines.append(f"{own}_frame = within({body}_frame, {own}_in_{body})")
+            self.lines.append(f"{own}_frame = composed_frame({body}_frame, {own}_in_{body})")
 
     def insides(self, step: Dyad) -> None:
         """Write the poses of the bodies inside the two sides of a dyad, relative to the side's first body."""
@@ -252,7 +252,7 @@ class Places:
         for side, pin, turn in zip(step.sides, pins, turns):
             self.lines.append(f"{side.body}_in_{lead} = {self.hung(pin, turn, side.body, side.joint.name)}")
             for own in side.bodies[1:]:
-                self.lines.append(f"{own}_in_{lead} = within({side.body}_in_{lead}, {own}_in_{side.body})")
+                self.lines.append(f"{own}_in_{lead} = composed_frame({side.body}_in_{lead}, {own}_in_{side.body})")
 
     def dyad(self, step: Dyad) -> None:
         """Write the poses of the bodies of a dyad."""

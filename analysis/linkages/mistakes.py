@@ -8,7 +8,7 @@ from itertools import chain
 
 from linkwork.errors import ParameterError
 
-from .description import GROUND, Description, LinkageError, given
+from .description import GROUND, Description, LinkageError, is_given
 from .laws import check_law
 
 
@@ -98,7 +98,7 @@ def _springs(d: Description, owners: Mapping[str, set[str]]) -> Found:
             known = ", ".join((*d.bodies, GROUND))
             yield f"{where}.bodies", f"are {' and '.join(spring.bodies)}", f"they must be two of {known}"
         check_law(spring.law, spring.constants, f"linkage.{where}.law")
-        acts = map(given, (spring.stiffness, spring.damping, spring.friction))
+        acts = map(is_given, (spring.stiffness, spring.damping, spring.friction))
         if not (any(acts) or spring.law or spring.driven):
             yield where, "does nothing", "it must have a stiffness, damping, friction or law, or be driven"
 

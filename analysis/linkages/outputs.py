@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import NamedTuple
 
-from .description import given
+from .description import is_given
 from .dynamics import Motion
 from .parameters import spring_angle_name
 from .structure import Pin, Slider, sliders
@@ -84,7 +84,7 @@ class Outputs:
             yield Output(f"{name}.velocity", "m/s", "Its rate", rest, f"{name}_velocity")
         for name, spring in self.description.springs.items():
             if spring.between:
-                free = f" + p.{name}_free_length" if given(spring.free) else ""
+                free = f" + p.{name}_free_length" if is_given(spring.free) else ""
                 yield Output(f"{name}.length", "m", f"Length of {name}", "*POSITION", f"s.{name}_stretch{free}")
             elif spring.at and name not in self.motion.along and self.motion.turned(spring):
                 text = f"Angle of {spring.at} from that at which {name} is free"

@@ -15,16 +15,16 @@ from linkwork.errors import AssemblyError, LinkworkError
 from linkwork.mechanism import Mechanism
 
 from ..mechanisms import MECHANISMS, register
-from ..numerics.cache import code_folder, put
+from ..numerics.cache import code_folder, store_file
 from .contacts import Contacts
-from .description import GROUND, Description, LinkageError, given
+from .description import GROUND, Description, LinkageError, is_given
 from .drawing import Picture
 from .dynamics import Motion
 from .equations import Places
 from .laws import WRITTEN
 from .mistakes import check_entries
 from .outputs import Outputs
-from .parameters import Drive, interface, size
+from .parameters import Drive, interface, length_and_mass
 from .structure import Structure, analyse
 from .variables import Variables
 from .writing import function, listed, quoted
@@ -209,7 +209,7 @@ class Package:
         own.mkdir(parents=True, exist_ok=True)
         for file, text in self.files.items():
             if not (own / file).is_file() or (own / file).read_text(encoding="utf-8") != text:
-                put(own / file, text.encode())
+                store_file(own / file, text.encode())
         if str(place) not in sys.path:
             sys.path.append(str(place))
         importlib.invalidate_caches()
@@ -277,7 +277,7 @@ class Package:
         places = made.modules[-1].places(made.state(start.initial), start.parameters.constants())
         for name, spring in self.description.springs.items():
             bodies = () if name in self.motion.along else self.motion.turned(spring)
-            if not bodies or not given(spring.free):
+            if not bodies or not is_given(spring.free):
                 continue
             one, other = (0.0 if b == GROUND else planar.turn_angle(getattr(places, f"{b}_frame").turn) for b in bodies)
             free, angle = getattr(start.parameters, f"{name}_free_angle"), remainder(other - one, tau)
@@ -298,7 +298,7 @@ class Package:
         blocks += Contacts(motion).blocks() if self.description.friction else ()
         # only now it is known which joint forces there are
         self.outputs = Outputs(motion)
-        scale = _error_scale(self.interface.drives, *size(self.interface))
+        scale = _error_scale(self.interface.drives, *length_and_mass(self.interface))
         body = "\n\n\n".join([*blocks, self.outputs.function(), scale, self.picture.positions()])
         return _EQUATIONS.format(
             name=self.description.name,

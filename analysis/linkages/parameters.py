@@ -12,7 +12,7 @@ from linkwork.errors import ParameterError
 from linkwork.parameters import field_name
 
 from ..files import Quantity, unknown_name
-from .description import BODY, GROUND, Body, Description, LinkageError, given
+from .description import BODY, GROUND, Body, Description, LinkageError, is_given
 from .laws import periodic
 from .structure import Dyad, Freed, Geared, Pin, Racked, Slider, Structure
 
@@ -113,7 +113,7 @@ class Interface:
     points: Mapping[str, Mapping[str, tuple[str, str]]]
     centres: Mapping[str, tuple[str, str]]
 
-    def own(self, body: str, point: str) -> tuple[str, str]:
+    def coordinates(self, body: str, point: str) -> tuple[str, str]:
         """Return the coordinates of a point in the frame of its body; zero if the body has no such point."""
         return self.points[body].get(point, ("0.0", "0.0"))
 
@@ -127,7 +127,7 @@ class Interface:
 
     def travel(self, slide: Slider) -> str:
         """Return the expression of position and velocity of a block along its line, from the record of poses b."""
-        (holder, block), (x, y) = slide.bodies, self.own(slide.bodies[0], slide.through)
+        (holder, block), (x, y) = slide.bodies, self.coordinates(slide.bodies[0], slide.through)
         return f"block_position({self.frame(holder, 'b.')}, {x}, {y}, b.{slide.name}_line, b.{block}_frame)"
 
 
@@ -153,7 +153,7 @@ def freedoms(description: Description, structure: Structure) -> tuple[Drive, ...
                 Quantity(unit)(table.start, f"{where}.start"),
                 Quantity(rate_unit)(table.speed, f"{where}.speed"),
                 inputs,
-                bool(inputs) and given(table.speed),
+                bool(inputs) and is_given(table.speed),
                 _turns_back(description, structure, len(found))
                 if turns and not _wound(description, table.joint)
                 else 0,
@@ -166,7 +166,7 @@ def _wound(description: Description, pin: str) -> bool:
     """Return whether a spring about a pin is wound up further by every turn."""
     springs = [spring for spring in description.springs.values() if spring.at == pin]
     return any(
-        given(spring.stiffness) or (spring.law and not periodic(spring.law, spring.constants)) for spring in springs
+        is_given(spring.stiffness) or (spring.law and not periodic(spring.law, spring.constants)) for spring in springs
     )
 
 
@@ -418,7 +418,7 @@ def _spring(name: str, description: Description, structure: Structure, drive: Dr
         (f"free_{kind}", spring.free, unit, f"The {kind} at which {name} is free", "free", "spring"),
     )
     for own, value, in_unit, text, rule, role in rows:
-        if given(value):
+        if is_given(value):
             reader = Quantity(in_unit) if rule else Quantity(in_unit, least=0.0)
             number = reader(value, f"{where}.{own.removesuffix(f'_{kind}')}")
             yield Parameter(
@@ -439,7 +439,7 @@ def _check_names(found: list[Parameter]) -> None:
             )
 
 
-def size(found: Interface) -> tuple[float, float]:
+def length_and_mass(found: Interface) -> tuple[float, float]:
     """Return the greatest length or coordinate (m) and the mass of all bodies (kg), each 1 if there is none."""
     lengths = [abs(p.value) for p in found.parameters if p.unit == "m" and p.role not in ("spring", "law", "friction")]
     masses = [p.value for p in found.parameters if p.unit == "kg"]

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import NamedTuple
 
-from .description import given
+from .description import is_given
 from .parameters import Drive, Interface
 from .structure import Pin, sliders
 from .symbols import symbol
@@ -52,7 +52,7 @@ class Variables:
         for name, spring in self.description.springs.items():
             pinned = spring.at and spring.at not in freed and isinstance(self.structure.joints[spring.at], Pin)
             about = spring.bodies or pinned
-            if about and given(spring.free):
+            if about and is_given(spring.free):
                 found |= {f"{name}_COS": f"cos(self.{name}_free_angle)", f"{name}_SIN": f"sin(self.{name}_free_angle)"}
         if self.description.gravity:
             direction = "self.ground_gravity_direction"

@@ -46,7 +46,7 @@ def alone(folder: Path) -> FileLock:
     return FileLock(folder.with_suffix(".lock"))
 
 
-def put(path: Path, content: bytes) -> None:
+def store_file(path: Path, content: bytes) -> None:
     """Write a file so that no other process sees it half written."""
     part = path.with_suffix(f".{os.getpid()}")
     try:
@@ -57,9 +57,9 @@ def put(path: Path, content: bytes) -> None:
 
 
 def keep(path: Path, content: bytes) -> None:
-    """Write a file of the cache as `put` does; do nothing if the disk is full or read-only: the cache can do without it."""
+    """Write a file of the cache as `store_file` does; do nothing if the disk is full or read-only: the cache can do without."""
     with suppress(OSError):
-        put(path, content)
+        store_file(path, content)
 
 
 def hashes_below(folder: Path) -> dict[str, str]:

@@ -42,7 +42,7 @@ from linkwork.errors import LinkworkError
 
 from . import lanes as vectors
 from . import linking
-from .cache import alone, code_folder, keep, put
+from .cache import alone, code_folder, keep, store_file
 
 VECTOR = float64[::1]
 MATRIX = float64[:, ::1]
@@ -462,7 +462,7 @@ class Kernel:
         made, path = self._dispatcher(linking.NotingCompiler), self.carried
         made.compile(*self.signature)
         path.parent.mkdir(exist_ok=True)
-        put(path, linking.for_any_processor(made))
+        store_file(path, linking.for_any_processor(made))
         return path
 
     def _dispatcher(self, compiler: type) -> Any:

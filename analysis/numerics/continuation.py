@@ -271,7 +271,7 @@ class Follower:
             )
         return self._point(found, direction * fixed)
 
-    def along(self, y: ArrayLike, parameter: float, tangent: ArrayLike) -> Point:
+    def start_with_tangent(self, y: ArrayLike, parameter: float, tangent: ArrayLike) -> Point:
         """Return a first `Point` at a given solution with a given tangent (unscaled, shape (n + 1,)), to switch branches."""
         direction = np.asarray(tangent, dtype=float) / self.scale
         evaluation = self.evaluate(np.asarray(y, dtype=float), parameter)

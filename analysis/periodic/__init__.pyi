@@ -53,13 +53,13 @@ from .motion.orbit import OrbitEquations as OrbitEquations
 from .motion.orbit import PeriodicOrbit as PeriodicOrbit
 from .motion.orbit import Turn as Turn
 from .motion.orbit import newton_orbit as newton_orbit
-from .motion.orbit import resting as resting
+from .motion.orbit import rest_guess as rest_guess
 from .motion.search import Jump as Jump
 from .motion.search import Orbits as Orbits
 from .motion.search import Sweep as Sweep
 from .motion.search import find_orbit as find_orbit
 from .motion.search import find_orbits as find_orbits
-from .motion.search import joined as joined
+from .motion.search import join_orbits as join_orbits
 from .motion.search import search_orbits as search_orbits
 from .motion.search import sweep as sweep
 from .motion.search import unsought as unsought

@@ -58,8 +58,8 @@ from .fmu import unpacking_folder as unpacking_folder
 from .hamming import Hamming as Hamming
 from .inputs import Inputs as Inputs
 from .inputs import align as align
+from .inputs import checked_run as checked_run
 from .inputs import encode as encode
-from .inputs import given as given
 from .inputs import speed_ratio as speed_ratio
 from .masses import Mass as Mass
 from .masses import in_sentences as in_sentences

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 
 from ..mechanisms import InitialState, Parameters, mechanism_of
 from .arguments import driven, published_set, turn_durations
-from .inputs import Inputs, given
+from .inputs import Inputs, checked_run
 from .masses import Mass, mass_origins
 
 
@@ -39,7 +39,7 @@ class Case:
 
     def __post_init__(self) -> None:
         # inputs and start of another mechanism are refused here, not when it is run
-        _, initial = given(mechanism_of(self.parameters), self.inputs, self.initial)
+        _, initial = checked_run(mechanism_of(self.parameters), self.inputs, self.initial)
         object.__setattr__(self, "initial", initial)
 
 

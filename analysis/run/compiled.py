@@ -333,7 +333,7 @@ BATCH = types.NamedTuple(
 )
 
 
-def of_one(source: Source, p: NDArray[np.float64], scale: NDArray[np.float64], steady: bool) -> Batch:
+def single_batch(source: Source, p: NDArray[np.float64], scale: NDArray[np.float64], steady: bool) -> Batch:
     """Return a single run as a batch of one; it shares the torque laws with the source."""
     sizes = [[len(source.coefficients), len(source.harmonics)]]
     inputs = (source.breaks, source.coefficients, source.harmonics, source.laws)
@@ -417,14 +417,14 @@ def run(problem, source, batch, watch, state, samples, status, most, budget):
 
 
 @inner
-def put(lane, lanes, values, many):
+def write_lane(lane, lanes, values, many):
     """Write values into one lane of the array ``many``, which is in lanes."""
     for i in range(values.shape[0]):
         many[lanes * i + lane] = values[i]
 
 
 @inner
-def take(lane, lanes, many, values):
+def read_lane(lane, lanes, many, values):
     """Read the values of one lane of the array ``many``, which is in lanes."""
     for i in range(values.shape[0]):
         values[i] = many[lanes * i + lane]
@@ -440,15 +440,15 @@ def rows(equation, lanes, modes, p, states, forces, out):
     x, u = np.empty(lanes * states.shape[1]), np.empty(lanes * forces.shape[1])
     y = np.empty(lanes * out.shape[1])
     for lane in range(lanes):
-        put(lane, lanes, modes, modes_of)
-        put(lane, lanes, p, p_of)
+        write_lane(lane, lanes, modes, modes_of)
+        write_lane(lane, lanes, p, p_of)
     for first in range(0, states.shape[0], lanes):
         count = min(lanes, states.shape[0] - first)
         for lane in range(lanes):
             # the last row also fills lanes without a row
             row = first + min(lane, count - 1)
-            put(lane, lanes, states[row], x)
-            put(lane, lanes, forces[row], u)
+            write_lane(lane, lanes, states[row], x)
+            write_lane(lane, lanes, forces[row], u)
         if count == lanes:
             evaluate(equation, 0.0, x, modes_of, u, p_of, out[first:])
         else:

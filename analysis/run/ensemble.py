@@ -30,7 +30,7 @@ from .arguments import driven, started, takes_options, takes_published
 from .batches import NOT_RUN, Result, Task, solve
 from .equations import machine
 from .events import shown
-from .inputs import Inputs, compiled_source, encode, given
+from .inputs import Inputs, checked_run, compiled_source, encode
 from .prepared import compute_outputs
 from .signals import Function
 from .simulation import MOST_STEPS, RunOptions, check_settings, sample_times
@@ -392,11 +392,11 @@ def _check_runs(
 ) -> tuple[Sequence[Inputs], list[InitialState]]:
     """Check the inputs and initial states and return those of each run; see `simulate_many` for what inputs must share."""
     all_inputs, starts = _one_per_run(inputs, count, "inputs"), _one_per_run(initial, count, "initial states")
-    nothing, rest = given(mechanism, None, None)
+    nothing, rest = checked_run(mechanism, None, None)
     if not isinstance(all_inputs, Varied):
         all_inputs = [nothing if i is None else i for i in all_inputs]
     read = {
-        id(s): rest if s is None else s if isinstance(s, mechanism.initial) else given(mechanism, None, s)[1]
+        id(s): rest if s is None else s if isinstance(s, mechanism.initial) else checked_run(mechanism, None, s)[1]
         for s in distinct(starts)
     }
     starts = [read[id(s)] for s in starts]
@@ -405,7 +405,7 @@ def _check_runs(
     for one in distinct(all_inputs):
         names = tuple(one) if isinstance(one, Inputs) else ()
         if not names or names not in accepted:
-            given(mechanism, one, None)
+            checked_run(mechanism, one, None)
             accepted.add(names)
             ways.add(tuple(one.modes(mechanism).values()))
     if len(ways) > 1:

@@ -267,7 +267,7 @@ def speed_ratio(name: str, value: float, reference: str, speed: float) -> Fracti
     return ratio
 
 
-def given(mechanism: Mechanism, inputs: Inputs | None, initial: InitialState | None) -> tuple[Inputs, Any]:
+def checked_run(mechanism: Mechanism, inputs: Inputs | None, initial: InitialState | None) -> tuple[Inputs, Any]:
     """Check the inputs and the initial state of a run and return them; the defaults are no inputs and the state of rest.
 
     The state may be a mapping, as for `read_start`.

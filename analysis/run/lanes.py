@@ -31,10 +31,10 @@ from .compiled import (
     lane_motion,
     make_room,
     next_size,
-    put,
+    read_lane,
     refused,
     sample_step,
-    take,
+    write_lane,
 )
 from .equations import CLEARANCE, DERIVATIVE
 from .locating import end_step, locate_events
@@ -199,8 +199,8 @@ def _take_run(lane, first, most, v, w):
         return end
     v.run[lane] = i
     v.phase[lane] = _BETWEEN
-    put(lane, LANES, w.batch.p[i], v.p)
-    put(lane, LANES, w.batch.scales[i], v.scale)
+    write_lane(lane, LANES, w.batch.p[i], v.p)
+    write_lane(lane, LANES, w.batch.scales[i], v.scale)
     return i + 1
 
 
@@ -215,8 +215,8 @@ def _enter(lane, v, w):
             v.run[lane] = -1
             return
         carry.midway = 1
-    put(lane, LANES, w.state.x[i], v.x)
-    put(lane, LANES, w.state.u[i], v.u)
+    write_lane(lane, LANES, w.state.x[i], v.x)
+    write_lane(lane, LANES, w.state.u[i], v.u)
     v.phase[lane] = _ENTERED
 
 
@@ -237,7 +237,7 @@ def _fill(first, most, v, w):
                 if w.state.carries[v.run[lane]].steps < most:
                     busy += 1
                     break
-                take(lane, LANES, v.x, w.state.x[v.run[lane]])
+                read_lane(lane, LANES, v.x, w.state.x[v.run[lane]])
                 v.run[lane] = -1
     return busy, first
 
@@ -257,8 +257,8 @@ def _choose_sizes(v, w):
             carry = w.state.carries[i]
             if v.phase[lane] == _ENTERED:
                 v.phase[lane] = _INSIDE
-                take(lane, LANES, v.z, w.room.k[0])
-                put(lane, LANES, w.room.k[0], v.k[0])
+                read_lane(lane, LANES, v.z, w.room.k[0])
+                write_lane(lane, LANES, w.room.k[0], v.k[0])
                 choose_first(_motion(i, w))
             v.h[lane], v.last[lane] = next_size(carry)
             carry.steps += 1
@@ -268,10 +268,10 @@ def _choose_sizes(v, w):
 def _end_at_limit(lane, v, w):
     """End a lane's run at the limit of assembly, which lies inside its step."""
     i, h = v.run[lane], v.h[lane]
-    take(lane, LANES, v.x, w.state.x[i])
-    take(lane, LANES, v.y, w.room.y)
+    read_lane(lane, LANES, v.x, w.state.x[i])
+    read_lane(lane, LANES, v.y, w.room.y)
     for s in range(STAGES + 1):
-        take(lane, LANES, v.k[s], w.room.k[s])
+        read_lane(lane, LANES, v.k[s], w.room.k[s])
     motion = _motion(i, w)
     what, cut = locate_events(v.clearance[lane], h, motion)
     sample_step(motion.carry.begin + (motion.carry.elapsed + cut * h), h, motion)
@@ -295,7 +295,7 @@ def _decide(lane, least, v, w):
     carry.rejected += 1
     carry.step = shorter(h, error)
     if not carry.step >= least:
-        take(lane, LANES, v.x, w.state.x[i])
+        read_lane(lane, LANES, v.x, w.state.x[i])
         w.status[i] = refused(h, _motion(i, w))
         v.run[lane] = -1
 
@@ -313,7 +313,7 @@ def _accept_step(lane, v, w):
         carry.elapsed = 0.0
         carry.interval += 1
         carry.midway = 0
-        take(lane, LANES, v.x, w.state.x[i])
+        read_lane(lane, LANES, v.x, w.state.x[i])
         v.phase[lane] = _BETWEEN
     else:
         carry.elapsed += v.h[lane]
@@ -347,7 +347,7 @@ def _run(lanes, work, most, budget):
                 _accept_step(lane, v, w)
     for lane in range(LANES):
         if v.run[lane] >= 0:
-            take(lane, LANES, v.x, w.state.x[v.run[lane]])
+            read_lane(lane, LANES, v.x, w.state.x[v.run[lane]])
 
 
 @kernel(
@@ -364,5 +364,5 @@ def run_in_lanes(code, fits, problem, source, batch, watch, state, samples, stat
     room = make_room(states, problem.outputs, channels)
     v = _make_lanes(code, states, problem.modes.shape[0], channels, batch.p.shape[1])
     for lane in range(LANES):
-        put(lane, LANES, problem.modes, v.modes)
+        write_lane(lane, LANES, problem.modes, v.modes)
     _run(v, Work(fits, problem, source, batch, watch, state, samples, status, room), most, budget)

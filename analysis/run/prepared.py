@@ -21,7 +21,7 @@ from .angles import WholeTurns
 from .cautions import MANY_STEPS, disturbance_rates, energy_balance, stiffness, too_slow
 from .equations import OUTPUTS, chosen_outputs, machine
 from .events import Event, RunInterrupted, shown
-from .inputs import Encoded, Inputs, align, compile_function, compiled_source, encode, given
+from .inputs import Encoded, Inputs, align, checked_run, compile_function, compiled_source, encode
 from .sampling import NotFiniteError, sample
 from .trajectory import Occurrence, Trajectory
 
@@ -76,7 +76,7 @@ class Run:
 
     def __post_init__(self) -> None:
         self.mechanism = mechanism_of(self.parameters)
-        self.inputs, self.initial = given(self.mechanism, self.inputs, self.initial)
+        self.inputs, self.initial = checked_run(self.mechanism, self.inputs, self.initial)
         self.encoded = align(encode(self.inputs, self.mechanism), self.settings.times)
         self.p = self.parameters.constants()
         self.modes = tuple(float(value) for value in self.encoded.modes.values())
@@ -169,7 +169,7 @@ class Run:
             start = replace(start, energy=self.mechanism.equations.energy(tuple(start.x.tolist()), self.p))
         problem = make_problem(self.encoded, self.settings, self.mechanism.switched(self.p))
         source, kept = compiled_source(self.encoded)
-        batch = compiled.of_one(source, np.array([*self.p, start.energy]), start.scale, self.encoded.steady)
+        batch = compiled.single_batch(source, np.array([*self.p, start.energy]), start.scale, self.encoded.steady)
         watch, watching = self._watch(self._balance() if balanced else ())
         kept += watching
         times, most = self.settings.times, self.settings.max_steps

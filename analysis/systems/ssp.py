@@ -22,7 +22,7 @@ from linkwork.variables import UNITS as MECHANICAL
 from ..export.controllers import UNITS
 from ..files import output
 from ..libraries import lazy
-from ..numerics.cache import code_folder, put
+from ..numerics.cache import code_folder, store_file
 from .layout import boxes
 from .wiring import REAL, End, Part, Port, Wiring, WiringError
 
@@ -201,7 +201,7 @@ def read_ssp(path: str | Path) -> Wiring:
             if not getattr(element, "source", None):
                 raise WiringError(f"{getattr(element, 'name', 'an element')} is no FMU: a system is read on one level")
             fmu = folder / Path(element.source).name
-            put(fmu, (archive.unpacked_path / element.source).read_bytes())
+            store_file(fmu, (archive.unpacked_path / element.source).read_bytes())
             bindings = [*(element.parameter_bindings or ()), *(system.parameter_bindings or ())]
             texts = _starts(archive.unpacked_path, bindings, element.name, own=len(element.parameter_bindings or ()))
             part = Part.of(element.name, fmu, {})

@@ -13,7 +13,7 @@ from linkwork.errors import InputError, MissingParameterError, ParameterError
 from ..files import Many, Quantity, Table, Whole, as_table, entry, flag, overridden, read, read_tables, text, unchanged
 from ..linkages import with_linkage
 from ..mechanisms import mechanism_of, name_in_files
-from ..periodic import default_variable, parameter_unit, resting, steady_drive
+from ..periodic import default_variable, parameter_unit, rest_guess, steady_drive
 from ..run import case_mechanism, read_case, with_names_of_files
 from ..units import with_unit
 from .result import Tuned
@@ -124,7 +124,7 @@ def read_tuning_case(
     wish = Wish(
         parameters=case.parameters,
         drive=drive,
-        start=resting(case.parameters, drive, case.initial),
+        start=rest_guess(case.parameters, drive, case.initial),
         speeds=wanted.speeds,
         over=wanted.over,
         between=wanted.between,

@@ -233,7 +233,7 @@ class Found:
         rows = np.vstack([gaps, self._row.slopes(self.expansion)])
         return -np.linalg.solve(rows[:, :n], rows[:, n:])
 
-    def along(self, slopes: FloatArray) -> FloatArray:
+    def total_derivatives(self, slopes: FloatArray) -> FloatArray:
         """Return total derivatives by the changes, (..., k), from those by y, the level and the changes, (..., n + 1 + k)."""
         n = len(self.spot.y) + 1
         found: FloatArray = slopes[..., n:] + slopes[..., :n] @ self.slopes
@@ -246,7 +246,7 @@ class Found:
         angle = float(angle % (self.spot.turns * v.flow.period))
         panel = int(np.searchsorted(np.cumsum(v.h), angle).clip(0, len(v.h) - 1))
         by_y, by_constant = v.output_derivatives(panel, number)
-        nodes = self.along(np.einsum("sn,snm->sm", by_y, found.ways[panel]) + by_constant @ found.constants)
+        nodes = self.total_derivatives(np.einsum("sn,snm->sm", by_y, found.ways[panel]) + by_constant @ found.constants)
         # the polynomial through the panel's nodes, by Lagrange
         away = v.angles[panel] - v.angles[panel][:, None]
         np.fill_diagonal(away, 1.0)
@@ -336,7 +336,7 @@ def series(turn: Turn, samples: NDArray[np.float64]) -> Callable[[Any], Any]:
 def curve(turn: Turn, limit: Limit) -> Callable[[Any], Any]:
     """Return the limited quantity as a function of the crank angle: an output, or the magnitude of the force in a joint."""
     # series of the components, which are smooth where the magnitude is not
-    parts = [series(turn, turn.around(part)) for part in limit.parts]
+    parts = [series(turn, turn.oscillation(part)) for part in limit.parts]
     return lambda angle: reduce(np.hypot, (part(angle) for part in parts))
 
 
@@ -351,7 +351,7 @@ def greatest(turn: Turn, limit: Limit) -> tuple[float, tuple[float, ...]]:
 
     There is one angle, of the greatest magnitude; for an amplitude there are two, of the greatest and of the least value.
     """
-    samples = reduce(np.hypot, (turn.around(part) for part in limit.parts))
+    samples = reduce(np.hypot, (turn.oscillation(part) for part in limit.parts))
     places = [np.abs(samples).argmax()]
     if limit.output.startswith(AMPLITUDE):
         places = [samples.argmax(), samples.argmin()]
@@ -417,7 +417,7 @@ class Inside:
 
     def slopes(self, x: FloatArray) -> FloatArray:
         found = self.place.at(x)
-        return found.along(margin_slopes(found.expansion, self.kind, self.radius))
+        return found.total_derivatives(margin_slopes(found.expansion, self.kind, self.radius))
 
 
 class Beyond:
@@ -521,7 +521,7 @@ class Below:
         (found, turn), names = self._at(x), self._wish.mechanism.output_names
         total, parts = np.zeros(len(x)), self.limit.parts
         for angle, sign in zip(self.angles, (1.0, -1.0)):
-            values = [float(series(turn, turn.around(part))(angle)) for part in parts]
+            values = [float(series(turn, turn.oscillation(part))(angle)) for part in parts]
             slopes = [found.output_slopes(names.index(part), angle) for part in parts]
             if len(self.angles) > 1:
                 total += 0.5 * sign * slopes[0]

@@ -325,7 +325,7 @@ def _doubling(wish: Wish, orbit: PeriodicOrbit, response: Response) -> SpecialPo
         for point in branch.special if 2 * branch.turns == orbit.turns else ():
             there = point.orbit
             scale = motion_scales(there.parameters, there.drive, there.start)
-            away = np.abs(there.flow.within(there.start - orbit.start) / scale).max()
+            away = np.abs(there.flow.remove_turns(there.start - orbit.start) / scale).max()
             near = abs(wish.level(there) - wish.level(orbit)) < NEXT * (response.high - response.low)
             if point.kind is Crossing.PERIOD_DOUBLING and near and away < NEXT:
                 return point

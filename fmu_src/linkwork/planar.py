@@ -133,7 +133,7 @@ def turned(t: Turn, a: Vector) -> Vector:
     return Vector(rx, ry, ux - ry * t.w, uy + rx * t.w, (*share, last))
 
 
-def both(t: Turn, r: Turn) -> Turn:
+def composed_turn(t: Turn, r: Turn) -> Turn:
     """Return the direction of a body that has the direction ``r`` relative to a body of direction ``t``."""
     columns = tuple(g + h for g, h in zip(t.columns, r.columns))
     return Turn(t.c * r.c - t.s * r.s, t.s * r.c + t.c * r.s, t.w + r.w, columns)
@@ -149,9 +149,9 @@ def point(f: Frame, x: float, y: float) -> Vector:
     return plus(f.origin, arm(f.turn, x, y))
 
 
-def within(f: Frame, inner: Frame) -> Frame:
+def composed_frame(f: Frame, inner: Frame) -> Frame:
     """Return the pose of a body whose pose relative to the body ``f`` is ``inner``."""
-    return Frame(plus(f.origin, turned(f.turn, inner.origin)), both(f.turn, inner.turn))
+    return Frame(plus(f.origin, turned(f.turn, inner.origin)), composed_turn(f.turn, inner.turn))
 
 
 def rolled(carrier: Turn, line: Turn, start: Vector, block: Vector, offset: float, radius: float) -> Turn:
@@ -165,7 +165,7 @@ def rolled(carrier: Turn, line: Turn, start: Vector, block: Vector, offset: floa
     *share, bias = ((line.c * g[0] + line.s * g[1]) / radius for g in arm.columns)
     rate = (line.c * arm.vx + line.s * arm.vy) / radius
     turn = Turn(cos(angle), sin(angle), rate, (*share, bias + way * line.w * line.w / radius))
-    return both(carrier, turn)
+    return composed_turn(carrier, turn)
 
 
 def hung(pin: Vector, t: Turn, own: Vector) -> Frame:

@@ -236,7 +236,7 @@ def test_an_arm_that_hangs_on_a_crank_turns_back_in_its_pin() -> None:
     starts = [orbit.passages() for orbit in thirds]
     assert [len(passed) for passed in starts] == [3] * len(thirds)
     flow, everything = orbit.flow, np.vstack(starts)
-    apart = np.abs(flow.within(everything[:, None] - everything)).max(axis=2)
+    apart = np.abs(flow.remove_turns(everything[:, None] - everything)).max(axis=2)
     assert apart[~np.eye(len(apart), dtype=bool)].min() > 1e-3
 
 

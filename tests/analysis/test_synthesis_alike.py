@@ -84,9 +84,9 @@ def test_the_ellipse_is_traced_by_one_linkage_in_four_places() -> None:
     assert "mirror image" in syn.format_variants(found.best)
     assert [s.error for s in variants] == pytest.approx([found.best.error] * len(variants), rel=1e-3)
     columns = found.columns()
-    assert columns["rank"] == [float(k) for k in range(1, len(found.every) + 1)]
+    assert columns["rank"] == [float(k) for k in range(1, len(found.with_variants) + 1)]
     assert columns["variant of"].count(1.0) == len(variants)
-    assert len(columns["variant of"]) == len(found.every) > len(found.solutions)
+    assert len(columns["variant of"]) == len(found.with_variants) > len(found.solutions)
 
 
 @pytest.mark.parametrize("name", [*SIZES, *ANGLES, "output_angle"])

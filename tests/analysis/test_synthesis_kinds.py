@@ -115,8 +115,8 @@ class TestQuickReturn:
     def test_stroke_and_time_ratio_are_those_asked_for(self, ratio: float, least: float) -> None:
         task = syn.QuickReturn(stroke="80 mm", time_ratio=ratio)
         found = syn.synthesize(task, constraints=[syn.LeastTransmission(angle=radians(least))])
-        assert len(found.every) == 2
-        for s in found.every:
+        assert len(found.with_variants) == 2
+        for s in found.with_variants:
             stroke, time = textbook(s.linkage)
             assert stroke == pytest.approx(0.08, rel=1e-8)
             assert time == pytest.approx(ratio, rel=1e-4)
@@ -166,8 +166,8 @@ class TestQuickSwing:
     @pytest.mark.parametrize(("swing", "ratio"), [(40.0, 1.0), (60.0, 1.1), (-60.0, 1.1), (-80.0, 1.3), (100.0, 1.5)])
     def test_the_rocker_swings_as_it_is_asked(self, swing: float, ratio: float) -> None:
         found = syn.synthesize(syn.QuickSwing(swing=f"{swing} deg", time_ratio=ratio), constraints=[])
-        assert {s.linkage.branch for s in found.every} == {1, -1}
-        for s in found.every:
+        assert {s.linkage.branch for s in found.with_variants} == {1, -1}
+        for s in found.with_variants:
             phi = np.linspace(0.0, 2.0 * pi, 20001)
             angle = s.linkage.rocker_angle(np.sign(swing) * phi)
             slow = phi[np.argmax(angle * np.sign(swing))]
@@ -206,7 +206,7 @@ class TestQuickSwing:
 
     def test_a_swing_to_the_right_is_one_to_the_left_seen_from_behind(self) -> None:
         left, right = (
-            {s.linkage.branch: s.linkage for s in syn.synthesize(task, constraints=[]).every}
+            {s.linkage.branch: s.linkage for s in syn.synthesize(task, constraints=[]).with_variants}
             for task in (syn.QuickSwing(swing=swing, time_ratio=1.2) for swing in ("40 deg", "-40 deg"))
         )
         phi = syn.turn(36)

@@ -27,7 +27,7 @@ from analysis.periodic.motion.tracks import (
     make_tracks,
     set_scale,
 )
-from analysis.run.compiled import take
+from analysis.run.compiled import read_lane
 from linkwork.five_bar.published import SETS
 
 RIG = SETS["rig-2-spring-c"].parameters
@@ -46,7 +46,7 @@ def follow_all(section: Any, columns: int, end: float, tolerances: Any, starts: 
                 if owner[lane] >= 0:
                     statuses[owner[lane]] = v.status[lane]
                     if v.status[lane] == DONE:
-                        take(lane, LANES, v.x, rows[owner[lane]])
+                        read_lane(lane, LANES, v.x, rows[owner[lane]])
                 owner[lane], v.status[lane] = -1, IDLE
                 if place == starts.shape[0]:
                     break

@@ -177,7 +177,7 @@ def test_transmission_angle_is_that_of_the_triangle(case: Case) -> None:
     th2, u, *_ = case.state
     p = case.parameters.constants()
     angle = K.transmission_angle(K.position(th2, u, p), p)
-    distance, low, high = K.apart((th2, u), p)
+    distance, low, high = K.joint_distance((th2, u), p)
     assert 0.0 <= angle <= pi
     assert low <= distance <= high
     # law of cosines at C
@@ -191,7 +191,7 @@ def test_margins_and_square_say_how_far_the_limit_of_assembly_is(case: Case) -> 
     p = case.parameters.constants()
     g = K.position(th2, u, p)
     stretched, folded = K.assembly_margin(th2, u, p)
-    distance, low, high = K.apart((th2, u), p)
+    distance, low, high = K.joint_distance((th2, u), p)
     assert stretched == pytest.approx(high - distance, abs=1e-14)
     assert folded == pytest.approx(distance - low, abs=1e-14)
     assert stretched > 0.0

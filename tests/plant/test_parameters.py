@@ -11,7 +11,7 @@ import pytest
 from hypothesis import given, settings
 
 from linkwork.errors import LinkworkError, MissingParameterError, ParameterError, UnknownNameError
-from linkwork.five_bar.kinematics import apart
+from linkwork.five_bar.kinematics import joint_distance
 from linkwork.five_bar.parameters import InitialState
 from linkwork.five_bar.published import SETS, TABLE_3_1
 from linkwork.parameters import field_name, fmi_name
@@ -293,9 +293,9 @@ def test_gravity_in_the_frame_of_an_inclined_ground_link() -> None:
 
 
 def test_how_far_the_pins_are_apart() -> None:
-    assert apart((0.0, 0.01), TABLE_3_1.constants())[0] == pytest.approx(0.1535 + 0.01 - 0.05, rel=1e-14)
+    assert joint_distance((0.0, 0.01), TABLE_3_1.constants())[0] == pytest.approx(0.1535 + 0.01 - 0.05, rel=1e-14)
     turned = replace(TABLE_3_1, slider_guide_angle=pi / 2)
-    assert apart((pi / 2, 0.05), turned.constants())[0] == pytest.approx(0.1535, rel=1e-14)
+    assert joint_distance((pi / 2, 0.05), turned.constants())[0] == pytest.approx(0.1535, rel=1e-14)
 
 
 # ------------------------------------------------------------------ published sets: Youssef's tables

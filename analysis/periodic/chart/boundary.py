@@ -241,7 +241,7 @@ def orbit_monodromy(operation: Plane, *, start: ArrayLike | None = None, near: G
     def matrix(x: float, y: float) -> NDArray[np.float64]:
         nonlocal last
         parameters, drive = operation(x, y)
-        for place in (last, *(() if near is None else near.around(x, y))):
+        for place in (last, *(() if near is None else near.nearby_starts(x, y))):
             try:
                 orbit = newton_orbit(parameters, drive, start=place, settle=False)
                 break

@@ -554,7 +554,7 @@ def unmet_lines(beside: Coexistence, lines: Sequence[float], boundaries: Sequenc
 def _belongs(found: Grid, orbit: PeriodicOrbit, place: Sequence[float]) -> bool:
     """Return whether an orbit belongs to the motion of a grid: whether its start is near one at a point around ``place``."""
     scale = orbit.scale
-    distance = np.linalg.norm((found.around(*place) - orbit.start) / scale, axis=1)
+    distance = np.linalg.norm((found.nearby_starts(*place) - orbit.start) / scale, axis=1)
     return bool(np.any(distance < SAME_MOTION))
 
 

@@ -138,7 +138,7 @@ class Grid:
         """Return the reason why a point has no orbit; empty if it has one."""
         return REASONS.get(Status(self.status[row, column]), "")
 
-    def around(self, x: float, y: float) -> FloatArray:
+    def nearby_starts(self, x: float, y: float) -> FloatArray:
         """Return the starts of the orbits at the nine or fewer grid points around (x, y), roughly nearest first; (k, n)."""
         across, up = (np.argsort(np.abs(axis - value))[:3] for axis, value in ((self.x, x), (self.y, y)))
         starts = self.starts[np.ix_(up, across)].reshape(-1, self.starts.shape[-1])

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from ...numerics.codegen import CUBE, MATRIX, VECTOR, copy, inline, inner, kernel, part
 from ...numerics.references import refer
 from ...numerics.vectors import LANES
-from ...run.compiled import take
+from ...run.compiled import read_lane
 from ..motion.collocation import NODES, close, lay_elements, make_desk, repeat_last, row_count, spread
 from ..motion.drive import SAME
 from ..motion.kernels import (
@@ -175,7 +175,7 @@ def solve_from_left(section, points, search, guess, found, tables):
             what, tail = close(own, m, y[0, :rows], w[0, :rows], desk)
             if what == NO_STEP:
                 # try more elements; the start is good enough to continue from
-                take(0, LANES, y[0, 0], start)
+                read_lane(0, LANES, y[0, 0], start)
                 more, tail = divide(own, search, level + 1, start, (y[0], w[0]), desk, room)
                 level, known = max(more, 0), 0
                 what = DONE if more >= 0 else NO_STEP
@@ -203,7 +203,7 @@ def solve_from_left(section, points, search, guess, found, tables):
             continue
         passed += 1
         if by_collocation:
-            take(0, LANES, y[0, 0], starts[row])
+            read_lane(0, LANES, y[0, 0], starts[row])
             for j in range(n):
                 for i in range(n):
                     monodromies[row, j * n + i] = desk.monodromy[i, j]
@@ -380,7 +380,7 @@ def _record(lane, point, seekers, v, room, carry):
 def _continue_search(lane, point, seekers, v, room, carry):
     """Continue the search of a lane after its integration; if it is over, mark the lane free: ``seekers.place[lane]`` = -1."""
     hunt, most, status = _hunt(lane, seekers.hunts), point.search.most, v.status[lane]
-    take(lane, LANES, v.x, v.z)
+    read_lane(lane, LANES, v.x, v.z)
     if seekers.polishing[lane]:
         what = newton_next(point.own, most, status, v.z, hunt)
     else:
@@ -484,7 +484,7 @@ def _settle(section, turn, near, most, starts, known, ends, tables):
         for lane in range(LANES):
             while v.status[lane] != RUNNING:
                 if rows[lane] >= 0:
-                    take(lane, LANES, v.x, v.z)
+                    read_lane(lane, LANES, v.x, v.z)
                 elif following < starts.shape[0]:
                     rows[lane], turns[lane] = following, 0
                     following += 1

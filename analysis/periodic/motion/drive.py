@@ -18,7 +18,7 @@ from linkwork.parameters import field_name
 
 from ...files import unknown_name
 from ...mechanisms import InitialState, Parameters, mechanism_of, variable_units
-from ...run import InductionMotor, Inputs, driven, given, speed_ratio, started, takes_published
+from ...run import InductionMotor, Inputs, checked_run, driven, speed_ratio, started, takes_published
 from ...units import Amount, in_si
 from .flow import Crank, Flow, find_crank, find_turning_freedom, flow
 
@@ -399,7 +399,7 @@ def steady_drive(
         If nothing drives the crank, or another freedom is commanded to move without end.
     """
     mechanism = mechanism_of(parameters)
-    inputs, initial = given(mechanism, inputs, initial)
+    inputs, initial = checked_run(mechanism, inputs, initial)
     modes = inputs.modes(mechanism)
     crank, ratios = _choose_crank(mechanism, inputs, initial, modes)
     constant: dict[str, float] = {}

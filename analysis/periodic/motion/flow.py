@@ -222,7 +222,7 @@ class Flow:
             x[place] = value
         return tuple(x)
 
-    def within(self, away: NDArray[np.float64]) -> NDArray[np.float64]:
+    def remove_turns(self, away: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return differences of y, shape (..., n), with whole turns of angles removed."""
         return away - self._whole(away)
 

@@ -130,7 +130,7 @@ class Turn:
         The Fourier series of the turn is evaluated on a grid eight times as fine, and parabolas are laid through its greatest
         and its least values: good to a millionth of the amplitude if the samples are enough for the series.
         """
-        u = self.around(self.swing)
+        u = self.oscillation(self.swing)
         n = 8 * len(u)
         fine = np.fft.irfft(np.fft.rfft(u), n) * (n / len(u))
         top = np.array([fine.argmax(), fine.argmin()])
@@ -140,7 +140,7 @@ class Turn:
         size = 0.5 * float(np.ptp(at + beyond))
         return size if size > self.rounding else 0.0
 
-    def around(self, name: str) -> FloatArray:
+    def oscillation(self, name: str) -> FloatArray:
         """Return an output; from an angle that goes round, its mean increase is subtracted; shape (n,)."""
         values = self[name]
         if name not in self.angles:
@@ -165,7 +165,7 @@ class Turn:
                 f"order {order} of an orbit of {self.turns} turn(s) with {len(self.angle)} samples: its orders are "
                 f"multiples of 1/{self.turns} up to {(len(self.angle) - 1) // 2 / self.turns:g}"
             )
-        return 2.0 * float(np.abs(np.fft.rfft(self.around(name))[int(number)])) / len(self.angle)
+        return 2.0 * float(np.abs(np.fft.rfft(self.oscillation(name))[int(number)])) / len(self.angle)
 
 
 def _time(speed: FloatArray, way: float) -> tuple[FloatArray, float]:
@@ -440,7 +440,7 @@ def newton_orbit(
             pass
     for number in range(SETS):
         for place in spread_starts(parameters, drive, guess, STARTS, number):
-            found = approach(point, turns, place)
+            found = approach_orbit(point, turns, place)
             if found is None:
                 continue
             try:
@@ -492,7 +492,7 @@ def _count_rounds(point: OperatingPoint, start: FloatArray, turns: int) -> dict[
     return {name: times for name, i in swinging.items() if (times := round(shift[i] / flow.ways[i]))}
 
 
-def approach(
+def approach_orbit(
     point: OperatingPoint, turns: int, place: FloatArray, known: FloatArray | None = None
 ) -> FloatArray | None:
     """Search for a periodic motion from a guess that may be far from it; return its start, None if the search fails.
@@ -578,7 +578,7 @@ def first_guess(flow: Flow, drive: Drive, start: ArrayLike | None, speed: float 
 
 
 @takes_published()
-def resting(
+def rest_guess(
     parameters: Parameters, drive: Drive, initial: Any, speed: float | None = None, *, other: str = ""
 ) -> list[float]:
     """Return a guess of y for a periodic motion: rest at the coordinates of ``initial``.

@@ -32,8 +32,8 @@ from .kernels import Status
 from .orbit import (
     SEARCH_TOLERANCE,
     PeriodicOrbit,
-    approach,
     approach_even,
+    approach_orbit,
     first_guess,
     newton_orbit,
     require_turns,
@@ -234,7 +234,7 @@ def _settle(point: OperatingPoint, state: FloatArray) -> PeriodicOrbit:
                 orbit = newton_orbit(point.parameters, point.drive, turns=turns, start=start, settle=False)
             except OrbitError:
                 continue
-            if np.abs(point.flow.within(orbit.start - start) / scale).max() >= 1e-3:
+            if np.abs(point.flow.remove_turns(orbit.start - start) / scale).max() >= 1e-3:
                 continue
             if orbit.verdict(0.0).stability is Stability.STABLE:
                 return orbit
@@ -246,7 +246,7 @@ def _settle(point: OperatingPoint, state: FloatArray) -> PeriodicOrbit:
         disturbed = start + _DISTURBANCE * scale * away / np.abs(away).max()
     most, after = (n * point.flow.turns for n in (PERIODS[-1], JUMP_TURNS))
     reason = f"no steady motion with a period of up to {most} turns after {after} turns"
-    residual = float(np.abs(point.flow.within(point.period(start, 1).shift) / scale).max())
+    residual = float(np.abs(point.flow.remove_turns(point.period(start, 1).shift) / scale).max())
     raise OrbitError(reason, point.flow, start, residual, 0)
 
 
@@ -453,7 +453,9 @@ def search_orbits(
     a turn, unless the drive says how often it goes round.
     """
     if not isinstance(turns, int):
-        return joined([search_orbits(parameters, drive, turns=number, start=start) for number in sorted(set(turns))])
+        return join_orbits(
+            [search_orbits(parameters, drive, turns=number, start=start) for number in sorted(set(turns))]
+        )
     mechanism, known = mechanism_of(parameters), list(known)
     flow = drive.flow(mechanism)
     drives = [(drive, turns), *((orbit.drive, orbit.turns) for orbit in known)]
@@ -470,7 +472,7 @@ def search_orbits(
         if kind not in parts:
             alike = [orbit for orbit in known if orbit.drive.ratios == own.ratios]
             parts[kind] = _search_rounds(operating_point(parameters, own), of, start, alike)
-    return joined(list(parts.values()))
+    return join_orbits(list(parts.values()))
 
 
 def _search_rounds(
@@ -511,7 +513,7 @@ def _search_rounds(
     return Orbits(orbits=tuple(orbits), agreed=agreed and many.index == whole, index=many.index, index_of_all=whole)
 
 
-def joined(parts: Sequence[Orbits]) -> Orbits:
+def join_orbits(parts: Sequence[Orbits]) -> Orbits:
     """Join the results of several searches into one."""
     whole = parts[0].index_of_all
     return Orbits(
@@ -539,12 +541,12 @@ class _Found:
 
     def knows(self, start: FloatArray, near: float = SAME) -> bool:
         """Return whether a start belongs to a known motion."""
-        away = np.abs(self.point.flow.within(self.known - start)) / self.scale
+        away = np.abs(self.point.flow.remove_turns(self.known - start)) / self.scale
         return bool((away.max(axis=1) < near).any()) if len(away) else False
 
     def seek(self, place: FloatArray, *, divide: bool) -> bool:
         """Search from a guess, with the known motions divided out if ``divide``; return whether a new motion was found."""
-        start = approach(self.point, self.turns, place, self.known if divide else None)
+        start = approach_orbit(self.point, self.turns, place, self.known if divide else None)
         if start is None or (not divide and self.knows(start, _NEAR)):
             return False
         try:
@@ -558,7 +560,7 @@ class _Found:
             return False
         passed = orbit.passages()
         # a motion that is back at its start before the last turn has a shorter period
-        away = np.abs(self.point.flow.within(passed - orbit.start)) / self.scale
+        away = np.abs(self.point.flow.remove_turns(passed - orbit.start)) / self.scale
         period = next((n for n in range(1, len(passed)) if away[n].max() < SAME), len(passed))
         self.known = np.vstack([self.known, passed[:period]])
         self.index += period * int(np.sign(np.linalg.det(np.eye(len(orbit.start)) - orbit.monodromy)))
@@ -608,7 +610,8 @@ def _reached(
         return stable[0]
     scale = point.scale(guess)
     apart = [
-        float(np.abs(point.flow.within(orbit.passages() - arrived.start) / scale).max(axis=1).min()) for orbit in stable
+        float(np.abs(point.flow.remove_turns(orbit.passages() - arrived.start) / scale).max(axis=1).min())
+        for orbit in stable
     ]
     nearest = int(np.argmin(apart))
     if first is not None and turns == 1 and point.flow.ways.any() and apart[nearest] > _ARRIVED:

@@ -15,7 +15,7 @@ from linkwork.limits import LIMIT_SINE, NEAR_LIMIT
 
 from ...numerics.codegen import evaluate, inner, part
 from ...numerics.vectors import LANES, fused, load, store
-from ...run.compiled import put, take
+from ...run.compiled import read_lane, write_lane
 from ...run.stepping import NODES, STAGES, following, shorter
 from ...run.stepping_in_lanes import errors_in_lanes, stage_in_lanes
 from .flow import GAP, IN_LANES, PLAIN, VARIATIONAL
@@ -79,7 +79,7 @@ def begin(lane, section, start, end, tolerance, v):
     """Begin a motion in a lane, from the crank angle 0 to ``end``, and set its status: RUNNING, or a failure at the start."""
     n = start.shape[0]
     start_piece(n, start, v.z)
-    put(lane, LANES, v.z, v.x)
+    write_lane(lane, LANES, v.z, v.x)
     v.angle[lane], v.end[lane], v.tolerance[lane] = 0.0, end, tolerance
     v.slowest[lane] = STALL * start[n - 1] if section.torque else 0.0
     if section.torque and not v.slowest[lane] > 0.0:
@@ -136,7 +136,7 @@ def _judge(lane, section, last, v):
         # beyond the limit of assembly the error is NaN
         v.step[lane] = shorter(h, error)
         if v.step[lane] < LEAST_STEP:
-            take(lane, LANES, v.x, v.z)
+            read_lane(lane, LANES, v.x, v.z)
             near = _clearance(section, v.z, v.angle[lane], v) < NEAR_LIMIT
             v.status[lane] = LIMIT if near else NO_STEP
         return v.status[lane] != RUNNING

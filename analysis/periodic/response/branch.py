@@ -142,7 +142,7 @@ def _turn_columns(orbit: PeriodicOrbit, first: Turn) -> dict[str, Callable[[Turn
     columns: dict[str, Callable[[Turn], float]] = {
         f"mean {label(rate)} [rad/s]": lambda turn: orbit.flow.period * orbit.turns / turn.period,
         f"amplitude of {what}": lambda turn: turn.amplitude,
-        f"mean of {what}": lambda turn: float(turn.around(swing).mean()),
+        f"mean of {what}": lambda turn: float(turn.oscillation(swing).mean()),
     }
     for order in (1, 2, 3):
         columns[f"harmonic {order} of {what}"] = lambda turn, order=order: turn.harmonic(swing, order)  # type: ignore[misc]
@@ -257,7 +257,7 @@ def switch(
     scale = follower.scale[:-1]
     scaled = (orbit.monodromy + np.eye(len(scale))) * scale / scale[:, None]
     vector = np.linalg.svd(scaled)[2][-1] * scale
-    base = follower.along(orbit.start, doubling.parameter, np.append(vector, 0.0))
+    base = follower.start_with_tangent(orbit.start, doubling.parameter, np.append(vector, 0.0))
     for length in (_SWITCH, 4.0 * _SWITCH, 0.25 * _SWITCH, 16.0 * _SWITCH):
         taken = follower.step(base, length)
         # a step back to the undoubled branch does not count
@@ -486,6 +486,6 @@ def passes(branch: Branch, value: float, motion: NDArray[np.float64], width: flo
     ends = [branch.orbits[i] for i in (branch.parameter.argmin(), branch.parameter.argmax())]
     scale = np.append(np.max([o.scale for o in ends], axis=0), width)
     points = np.column_stack([[orbit.start for orbit in branch.orbits], branch.parameter])
-    away = ends[0].flow.within(points[:, :-1] - motion)
+    away = ends[0].flow.remove_turns(points[:, :-1] - motion)
     near = np.abs(away / scale[:-1]).max(axis=1).argmin()
     return distance(points / scale, np.append(points[near, :-1] - away[near], value) / scale) < _ON

@@ -393,7 +393,7 @@ class _Search:
             return any(
                 turns == 2 * orbit.turns
                 and abs(value - special.parameter) < reach
-                and np.abs(orbit.flow.within(y - orbit.start) / scale).max() < 0.1
+                and np.abs(orbit.flow.remove_turns(y - orbit.start) / scale).max() < 0.1
                 for turns, value, y in ends
             )
 
@@ -475,7 +475,7 @@ def _passes(branch: Branch, value: float, orbit: PeriodicOrbit) -> bool:
     """Return whether a branch has an orbit at one of its ends."""
     return any(
         abs(branch.parameter[i] - value) <= 1e-9 * abs(value)
-        and float(np.abs(orbit.flow.within(branch.orbits[i].start - orbit.start) / orbit.scale).max()) < SAME
+        and float(np.abs(orbit.flow.remove_turns(branch.orbits[i].start - orbit.start) / orbit.scale).max()) < SAME
         for i in (0, -1)
     )
 

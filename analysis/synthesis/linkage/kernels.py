@@ -1,6 +1,6 @@
 """Compute coupler curves and their exact derivatives for many crank angles or many linkages: compiled kernels.
 
-The loop is closed by `kinematics.joined`, the plant's own function; the derivatives are those of loop closure, projected on
+The loop is closed by `kinematics.close_loop`, the plant's own function; the derivatives are those of loop closure, projected on
 the rocker and on the coupler as in `kinematics.coefficients`, with respect to every dimension. The loops run over arrays
 without branches, so that the compiler can vectorise over crank angles; if the links cannot be joined the square root is NaN,
 which the callers check.
@@ -26,7 +26,7 @@ from ...numerics.codegen import CUBE, MATRIX, VECTOR, inner, kernel
 def guided(c2, s2, dx, dy, l3, l4, branch):
     """Return the `kinematics.Position` of a slider-crank: C is on a guide at right angles to the ground link, dx from B.
 
-    The arguments are those of `joined`, and may be CasADi symbols. For branch +1, C lies to the left of the perpendicular from
+    The arguments are those of `close_loop`, and may be CasADi symbols. For branch +1, C lies to the left of the perpendicular from
     B to the guide.
     """
     c3 = dx / l3
@@ -35,14 +35,14 @@ def guided(c2, s2, dx, dy, l3, l4, branch):
 
 
 #: The plant's own loop closure, and that of a slider-crank, for use in the kernels.
-joined, _guided = inner(kinematics.joined), inner(guided)
+close_loop, _guided = inner(kinematics.close_loop), inner(guided)
 
 
 @inner
 def closed(c2, s2, dx, dy, l3, l4, branch):
     """Return the `kinematics.Position` of a four-bar, or of a slider-crank if the rocker has length zero."""
     if l4 > 0.0:
-        return joined(c2, s2, dx, dy, l3, l4, branch)
+        return close_loop(c2, s2, dx, dy, l3, l4, branch)
     return _guided(c2, s2, dx, dy, l3, l4, branch)
 
 

@@ -371,7 +371,7 @@ class Linkage:
     @staticmethod
     def closure() -> Callable[..., Any]:
         """Return the plant's function that closes the loop, for CasADi symbols; see `kernels.guided`."""
-        joined: Callable[..., Any] = traced(FIVE_BAR).joined
+        joined: Callable[..., Any] = traced(FIVE_BAR).close_loop
         return joined
 
     @staticmethod

@@ -31,7 +31,7 @@ from ..task.limits import Limits, limits_by_kind
 from ..task.task import Normal, normal_form
 from .program import KEPT, Program
 from .refine import ITERATIONS, Refinement
-from .start import USUAL_SEARCH, Answer, Search, Start, apart, as_start, inside, outside, over_cores
+from .start import USUAL_SEARCH, Answer, Search, Start, as_start, inside, keep_distinct, outside, over_cores
 from .statement import Objective
 
 FloatArray = NDArray[np.float64]
@@ -108,7 +108,7 @@ class Polished:
         others = tuple(a for a in found if not a.feasible)
         return cls(kept=tuple(kept), others=others, done=len(found), interrupted=interrupted, begun=tuple(begun))
 
-    def joined(self, other: Polished) -> Polished:
+    def merged(self, other: Polished) -> Polished:
         """Return the answers of both searches, such as for two kinds of linkages, in one record."""
         return Polished(
             kept=self.kept + other.kept,
@@ -249,7 +249,7 @@ def distinct(
             mark[[8, 12]] = 0.0
         return np.append(mark, side)
 
-    return apart(answers, mark, distance, count)
+    return keep_distinct(answers, mark, distance, count)
 
 
 class Polisher:

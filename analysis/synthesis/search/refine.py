@@ -98,7 +98,7 @@ class Refinement:
         if not np.isfinite(curve).all():
             return inf
         if self.normal.quality == "worst":
-            return float(max(near.distance.max() for near in self.apart(curve)))
+            return float(max(near.distance.max() for near in self.both_distances(curve)))
         return self.area(curve)[0]
 
     def area(self, curve: FloatArray) -> tuple[float, FloatArray]:
@@ -110,7 +110,7 @@ class Refinement:
         closed = self.normal.closed
         steps = np.diff(ring(curve.T, closed), axis=0).T
         lengths = np.maximum(np.hypot(*steps), 1e-300)
-        missed, away = self.apart(curve)
+        missed, away = self.both_distances(curve)
         w = self._weights * np.hypot(*np.diff(ring(self._line.T, closed), axis=0).T)
         v = self._weights[_nearest(_midpoints(curve, closed), self._line, closed)[1]]
         for near, weight in ((missed, w), (away, v * lengths)):
@@ -123,7 +123,7 @@ class Refinement:
         total = float(w @ missed.distance + (v * lengths) @ away.distance)
         return 0.5 * self._scale * total, 0.5 * self._scale * gradient
 
-    def apart(self, curve: FloatArray) -> tuple[Near, Near]:
+    def both_distances(self, curve: FloatArray) -> tuple[Near, Near]:
         """Compute the distances of the target's pieces from the curve, and of the curve's pieces from the target.
 
         A piece is represented by its middle; if the greatest distance is minimised, the target's corners count as well.
@@ -208,13 +208,13 @@ class Refinement:
             return (lambda _: (),)
 
         def great(curve: FloatArray) -> Sequence[Any]:
-            both = self.apart(curve)
+            both = self.both_distances(curve)
             most = max(float(near.distance.max()) for near in both)
             return [np.nonzero(near.distance >= GREAT * most)[0] for near in both]
 
         def few(curve: FloatArray) -> Sequence[Any]:
             corners = self._outline.shape[1]
-            missed, away = (np.arange(len(near.distance)) for near in self.apart(curve))
+            missed, away = (np.arange(len(near.distance)) for near in self.both_distances(curve))
             return np.concatenate([missed[:corners], missed[corners::STRIDE]]), away[::STRIDE]
 
         return few, great, great
@@ -324,7 +324,7 @@ class _Descent:
 
     def _bounded_distances(self, z: FloatArray) -> list[tuple[Near, Any]]:
         """Return the two sets of distances of `Refinement.apart`, each with the indices of those that are bounded."""
-        return list(zip(self._refinement.apart(self.curve(z)[0]), self._chosen))
+        return list(zip(self._refinement.both_distances(self.curve(z)[0]), self._chosen))
 
     def constraints(self) -> list[dict[str, Any]]:
         """Return the constraints for SLSQP: those of the program, its bounds, and the bound of the distances."""

@@ -30,7 +30,7 @@ from ..linkage.linkage import BY_SHORTEST, Linkage, SliderCrank
 from ..task.constraint import TURNING, InfeasibleError
 from ..task.limits import Limits
 from ..task.task import Normal
-from .start import Start, apart
+from .start import Start, keep_distinct
 
 FloatArray = NDArray[np.float64]
 ComplexArray = NDArray[np.complex128]
@@ -596,4 +596,4 @@ def _distinct_starts(found: list[Candidates], starts: int, limits: Limits) -> li
         )
         return np.array([*np.log(links), cos(begin), sin(begin), 5.0 * start.branch, *second])
 
-    return apart(sorted(best, key=lambda start: start.quality), mark, APART, starts)
+    return keep_distinct(sorted(best, key=lambda start: start.quality), mark, APART, starts)

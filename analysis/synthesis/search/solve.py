@@ -99,16 +99,16 @@ class Synthesis(Shown):
         return self.solutions[0]
 
     def columns(self) -> dict[str, list[float]]:
-        """Return rank, errors, verdicts (1 or 0) and dimensions of `every` solution; SI, units in the names.
+        """Return rank, errors, verdicts (1 or 0) and dimensions of the solutions and their variants; SI, units in the names.
 
         For a variant, ``variant of`` is the rank of the solution that represents it; otherwise it is 0.
         """
-        columns = solution_columns(self.every)
+        columns = solution_columns(self.with_variants)
         of = [float(rank) for rank, s in enumerate(self.solutions, start=1) for _ in s.variants]
         return {"rank": columns["rank"], "variant of": [0.0] * len(self.solutions) + of} | columns
 
     @property
-    def every(self) -> tuple[Solution, ...]:
+    def with_variants(self) -> tuple[Solution, ...]:
         """Return the solutions, followed by the variants of each."""
         return (*self.solutions, *(variant for s in self.solutions for variant in s.variants))
 
@@ -222,7 +222,7 @@ def synthesize(
         except KeyboardInterrupt:
             done = replace(done, interrupted=True)
             break
-        done = done.joined(part)
+        done = done.merged(part)
         found.append(make_solutions(task, normal, limits, part, own, search.solutions))
         if done.interrupted:
             break
@@ -267,12 +267,12 @@ def _search_kind(
     rest, met = scanned[search.starts :], bool(done.kept) and done.kept[0].start.quality < EXACT
     if rest and not met and not done.interrupted:
         more = polish(normal, limits, rest, pivot=pivot, search=search)
-        done = replace(done.joined(more), kept=tuple(kept_answers([*done.kept, *more.kept])))
+        done = replace(done.merged(more), kept=tuple(kept_answers([*done.kept, *more.kept])))
     sound = limits.sound(normal)
     if done.interrupted or sound is None:
         return done
     try:
-        return _search_kind(normal, sound, guesses, pivot, search).joined(done)
+        return _search_kind(normal, sound, guesses, pivot, search).merged(done)
     except InfeasibleError:
         return done
 

@@ -308,7 +308,7 @@ def closed_form(task: Task) -> tuple[Solution, ...]:
     return ()
 
 
-def apart(items: Iterable[Item], mark: Callable[[Item], FloatArray], distance: float, count: int) -> list[Item]:
+def keep_distinct(items: Iterable[Item], mark: Callable[[Item], FloatArray], distance: float, count: int) -> list[Item]:
     """Return the first ``count`` items that are distinct from those chosen before.
 
     ``mark`` gives an item's vector. Two items are distinct if a component of their vectors differs by at least ``distance``.

@@ -257,7 +257,7 @@ class Demand:
         """Return the functions of the dimensions that must be at most zero."""
         raise NotImplementedError
 
-    def sought(self, way: Way, normal: Normal) -> Least | None:
+    def least_function(self, way: Way, normal: Normal) -> Least | None:
         """Return the function that is minimised instead of an error; None if there is none."""
         return None
 
@@ -385,7 +385,7 @@ class _Forces(Demand):
     make: Make
     pins: str
 
-    def along(self, way: Way) -> Along:
+    def pin_force_function(self, way: Way) -> Along:
         """Return the magnitudes of the pin forces (N) as a function of the crank's rotation, with a column for each pin."""
         ends, turn = way.ends("a force on the pins"), way.turn
 
@@ -433,7 +433,7 @@ class MaxPinForce(_Forces):
 
     def requires(self, way: Way) -> tuple[Require, ...]:
         """Return the required functions."""
-        forces = self.along(way)
+        forces = self.pin_force_function(way)
 
         def excess(d: Any, rotation: Any) -> Any:
             return forces.function(d, rotation) - self.force
@@ -468,12 +468,12 @@ class LeastPinForce(_Forces):
         """Return no required functions, since the pin force is the objective."""
         return ()
 
-    def sought(self, way: Way, normal: Normal) -> Least:
+    def least_function(self, way: Way, normal: Normal) -> Least:
         """Return the function that is minimised instead of an error, with the bound of the greatest error."""
         error = quantity(self.error, "rad" if normal.of_rocker else "m", "greatest error")
         if not (isfinite(error) and error > 0.0):
             raise ParameterError("greatest error", self.error, "be a finite number greater than zero")
-        return Least(self.along(way), error / normal.unit)
+        return Least(self.pin_force_function(way), error / normal.unit)
 
 
 #: The constraints on pin forces.

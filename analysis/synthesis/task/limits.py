@@ -168,7 +168,7 @@ def make_limits(
         turn, way = max(turn or 0.0, way), None
     straight = given["point_distance"][1] == 0.0 or given["point_angle"] in ((0.0, 0.0), (pi, pi), (-pi, -pi))
     over = Way(turn is not None, normal.rotation, straight, linkage)
-    least = [found for c in constraints if isinstance(c, Demand) and (found := c.sought(over, normal))]
+    least = [found for c in constraints if isinstance(c, Demand) and (found := c.least_function(over, normal))]
     if len(least) > 1:
         raise InputError("more than one thing is to be minimised: a search has one objective")
     branches = {c.branch for c in constraints if isinstance(c, Assembly)}

@@ -73,7 +73,7 @@ def halves(lengths: FloatArray, closed: bool) -> FloatArray:
     return both
 
 
-def along(vertices: FloatArray, s: ArrayLike) -> FloatArray:
+def interpolate_polyline(vertices: FloatArray, s: ArrayLike) -> FloatArray:
     """Interpolate points of a polyline at arc lengths s, shape (len(s), 2)."""
     lengths = arc_lengths(vertices)
     return np.column_stack([np.interp(np.asarray(s, dtype=float), lengths, column) for column in vertices.T])
@@ -261,7 +261,7 @@ class TargetPath:
         if n < least:
             raise InputError(f"{n} points are asked for: there must be at least {least}")
         s = np.linspace(0.0, self.length, n, endpoint=not self.closed)
-        return TargetPath(points=along(ring(self.points, self.closed), s), closed=self.closed)
+        return TargetPath(points=interpolate_polyline(ring(self.points, self.closed), s), closed=self.closed)
 
     def transformed(
         self, *, scale: float = 1.0, angle: float = 0.0, shift: tuple[float, float] = (0.0, 0.0)
@@ -401,7 +401,7 @@ def distance_to(curve: ArrayLike, points: ArrayLike, *, closed: bool = True) -> 
 def _cut_into_pieces(vertices: FloatArray) -> tuple[FloatArray, float]:
     """Divide a polyline into `PIECES` pieces of equal length; return their midpoints, shape (PIECES, 2), and its length."""
     length = float(arc_lengths(vertices)[-1])
-    return along(vertices, (np.arange(PIECES) + 0.5) * (length / PIECES)), length
+    return interpolate_polyline(vertices, (np.arange(PIECES) + 0.5) * (length / PIECES)), length
 
 
 def area_between(curve: ArrayLike, target: TargetPath, *, closed: bool = True) -> float:

@@ -14,7 +14,7 @@ UNJOINED = Unjoined(
     "the links cannot be joined",
     "crank pin and slider pin are {:.9g} m apart, coupler and rocker span from {:.9g} m to {:.9g} m",
     "coupler and rocker are collinear to {:.3f} deg",
-    kinematics.apart,
+    kinematics.joint_distance,
 )
 
 

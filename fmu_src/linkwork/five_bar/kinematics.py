@@ -51,7 +51,7 @@ def assembly_square(th2: float, u: float, p: Constants) -> float:
     return p.l3 * p.l3 * d2 - a * a
 
 
-def apart(x: Sequence[float], p: Constants) -> tuple[float, float, float]:
+def joint_distance(x: Sequence[float], p: Constants) -> tuple[float, float, float]:
     """Return the distance from crank pin to slider pin, and its least and greatest value that coupler and rocker allow (m)."""
     dx, dy = p.l1 + x[1] * p.ca - p.l2 * cos(x[0]), x[1] * p.sa - p.l2 * sin(x[0])
     return sqrt(dx * dx + dy * dy), fabs(p.l3 - p.l4), p.l3 + p.l4
@@ -72,10 +72,10 @@ def position(th2: float, u: float, p: Constants) -> Position:
     """
     c2 = cos(th2)
     s2 = sin(th2)
-    return joined(c2, s2, p.l1 + u * p.ca - p.l2 * c2, u * p.sa - p.l2 * s2, p.l3, p.l4, p.branch)
+    return close_loop(c2, s2, p.l1 + u * p.ca - p.l2 * c2, u * p.sa - p.l2 * s2, p.l3, p.l4, p.branch)
 
 
-def joined(c2: float, s2: float, dx: float, dy: float, l3: float, l4: float, branch: float) -> Position:
+def close_loop(c2: float, s2: float, dx: float, dy: float, l3: float, l4: float, branch: float) -> Position:
     """Return the position with C at the intersection of the circles about B and D, for the vector (dx, dy) from B to D.
 
     The crank's direction ``c2, s2`` is passed through. The caller decides what moves D: in `position` it is the slider.

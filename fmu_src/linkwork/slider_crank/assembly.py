@@ -14,7 +14,7 @@ UNJOINED = Unjoined(
     "the rod does not reach the guide",
     "the crank pin is {:.9g} m from the guide, the rod is {:.9g} m long, {:.9g} m too short",
     "the rod is within {:.3f} deg of perpendicular to the guide",
-    kinematics.apart,
+    kinematics.joint_distance,
 )
 
 

@@ -58,7 +58,7 @@ def assembly_square(th: float, s1: float, p: Constants) -> float:
     return p.a2 * p.a2 - f * f - g * g
 
 
-def apart(x: Sequence[float], p: Constants) -> tuple[float, float, float]:
+def joint_distance(x: Sequence[float], p: Constants) -> tuple[float, float, float]:
     """Return the distance of the crank pin from the guide, the rod's length, and by how much the rod is too short (m)."""
     distance = sqrt(p.a2 * p.a2 - assembly_square(x[0], x[1], p))
     return distance, p.a2, distance - p.a2
