@@ -47,7 +47,7 @@ PENALTY = 10.0
 #: Greatest number of evaluations of a simplex for each unknown.
 EVALUATIONS = 600
 #: The plant's loop closure over arrays; its square root is zero where the links cannot be joined.
-_joined = rebound((kinematics,), {"sqrt": lambda square: np.sqrt(np.maximum(square, 0.0))}).joined
+_close_loop = rebound((kinematics,), {"sqrt": lambda square: np.sqrt(np.maximum(square, 0.0))}).close_loop
 
 
 def initial_simplex(first: FloatArray, edge: float) -> FloatArray:
@@ -215,7 +215,7 @@ class BlackBox:
         """Return the directions of coupler and rocker, shape (m, n); they are not unit vectors if the links are stretched."""
         dx, dy = self._pins(q, rotation)
         with np.errstate(divide="ignore", invalid="ignore"):
-            g = _joined(0.0, 0.0, dx, dy, q[:, 4, None], q[:, 5, None], float(self.branch))
+            g = _close_loop(0.0, 0.0, dx, dy, q[:, 4, None], q[:, 5, None], float(self.branch))
         coupler, rocker = g.c3 + 1j * g.s3, g.c4 + 1j * g.s4
         # if B is on D, take any direction
         return np.nan_to_num(coupler, nan=1.0), np.nan_to_num(rocker, nan=1.0)
