@@ -184,7 +184,7 @@ FAULTS: tuple[tuple[str, str, str | None, Change], ...] = (
     ("De[sS]erializeFMU[sS]tate", "half of the bytes", WRONG, _bytes(lambda data: data[: len(data) // 2])),
     ("De[sS]erializeFMU[sS]tate", "a byte changed", None, _bytes(lambda data: data[:-9] + b"\x55" + data[-8:])),
     ("GetDirectionalDerivative|GetAdjointDerivative", "unknown unknown", WRONG, swapped(0, _unknown)),
-    ("GetDirectionalDerivative|GetAdjointDerivative", "unknown known", WRONG, swapped(2, lambda walk, a: _unknown(walk, a[2:]))),
+    ("GetDirectionalDerivative|GetAdjointDerivative", "unknown known", WRONG, swapped(2, lambda w, a: _unknown(w, a[2:3]))),
     ("GetDirectionalDerivative|GetAdjointDerivative", "NULL seed", WRONG, swapped(4, None)),
     ("GetDirectionalDerivative|GetAdjointDerivative", "NaN seed", None, _fill(4, NAN)),
     (_VECTORS, "one too many", WRONG, _longer),

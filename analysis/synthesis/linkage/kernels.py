@@ -26,8 +26,8 @@ from ...numerics.codegen import CUBE, MATRIX, VECTOR, inner, kernel
 def guided(c2, s2, dx, dy, l3, l4, branch):
     """Return the `kinematics.Position` of a slider-crank: C is on a guide at right angles to the ground link, dx from B.
 
-    The arguments are those of `close_loop`, and may be CasADi symbols. For branch +1, C lies to the left of the perpendicular from
-    B to the guide.
+    The arguments are those of `close_loop`, and may be CasADi symbols. For branch +1, C lies to the left of the perpendicular
+    from B to the guide.
     """
     c3 = dx / l3
     s3 = branch * (1.0 - c3 * c3) ** 0.5
