@@ -122,7 +122,7 @@ def test_the_constraints_of_the_greatest_distance_have_exact_slopes() -> None:
     refinement = Refinement(program)
     z, parameters = program.at(make_start(known, normal, rotation=np.linspace(0.0, 2.0 * pi, normal.n)))
     curve, slopes = refinement.traced(z, parameters)
-    some = [np.arange(len(near.distance)) for near in refinement.apart(curve)]
+    some = [np.arange(len(near.distance)) for near in refinement.both_distances(curve)]
     down = _Descent(
         refinement, z, parameters, refinement._scaled_directions(curve, slopes), refinement.measure(curve), some
     )
