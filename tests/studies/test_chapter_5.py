@@ -13,10 +13,12 @@ from analysis.periodic import Drive, Stability, confirm
 from analysis.studies.youssef.chapter_5 import (
     ALL_HARMONICS,
     SAME_GROUND,
+    SWEEPS,
     closed,
     cut_errors,
     held,
     nine_terms,
+    regions,
     removing,
     to_the_letter,
     without_factor,
@@ -92,6 +94,17 @@ def test_without_the_rate_of_the_mass_the_region_is_four_times_too_wide(inertia_
 def test_both_couplers_are_the_same_at_equal_links() -> None:
     one, other = (right(mechanism(1.0)) for mechanism in (held, closed))
     assert (one.low, one.high) == pytest.approx((other.low, other.high), abs=1e-9)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("number", list(SWEEPS))
+def test_the_right_linear_equation_gives_the_same_verdicts(number: str) -> None:
+    linear = {
+        "true orbit": regions(number)["linear equation"],
+        SAME_GROUND: [hill(closed(x)) for x in SWEEPS["5.3"].values],
+    }
+    by_linear = [[case.outcome for case in s.cases] for s in SWEEPS[number].judge(linear)]
+    assert by_linear == [[case.outcome for case in s.cases] for s in result(number).statements]
 
 
 @pytest.mark.slow

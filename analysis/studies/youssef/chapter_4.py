@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from functools import cache, partial
-from itertools import pairwise
+from itertools import pairwise, product
 from math import pi, sqrt
 
 import numpy as np
@@ -24,6 +24,7 @@ from ...youssef import (
     HarmonicMotion,
     SliderEquation,
     Variant,
+    harmonic_balance,
     hill_multipliers,
     nonlinear_harmonic_balance,
     resonance,
@@ -49,8 +50,8 @@ acts near the resonance alone, where the curves are those of a single mass.
 
 **What does not.** (4.21) lacks M' zeta', the rate of the periodic mass, and its H1 is three times too large. The
 expansion (4.23) keeps harmonics of second order but not the part of second order of the mean, and (4.34) puts
-lambda_c for lambda_c k0. The program of appendix 2 halves besides the crank's terms in the inertia and in the factors
-of spring and damper, and its K is wrong: its resonances are 0.02 to 0.07 rad/s too low, which its steps of 0.1 rad/s
+lambda_c for lambda_c k0. The program of appendix 2 also halves the crank's terms in the inertia and in the factors of
+spring and damper, and its K is wrong: its resonances are 0.02 to 0.07 rad/s too low, which its steps of 0.1 rad/s
 hide in part. The force of (4.21), right to first order alone, has a third of its second harmonic, and with the halved
 factors a sixth, so that the slider's is seven times too small. So the thesis could call the second harmonic negligible
 everywhere; in truth it is so above 22 rad/s alone, and near half the natural frequency it is the greater. The frequency
@@ -71,6 +72,8 @@ APART = (np.abs(SPEEDS - 15.5) > 1.0) & (np.abs(SPEEDS - 31.0) > 2.0)
 DAMPERS = tuple(0.2 * n for n in range(1, 7))
 #: omega_c (1/s) at which second harmonics are compared: the thesis's value, which removes all instability.
 COMPARED_AT = 0.45
+#: Order of the balance by which harmonics above the second are judged, and its speeds (rad/s).
+MANY, EVEN = 10, np.arange(9.0, 40.01, 0.02).round(2)
 #: Amplitude above which a speed is in the region of resonance, and distance (rad/s) from which it is outside: our choice.
 LARGE, OUTSIDE = 0.1, 3.0
 #: Half the step in speed (rad/s) of appendix 2, to which its output locates a resonance.
@@ -98,6 +101,16 @@ def harmonic(
 ) -> NDArray[np.float64]:
     """Return the amplitude of the n-th harmonic at each speed (rad/s)."""
     return np.array([linear(speed, inertia_ratio, omega_c, variant).harmonic(n) for speed in speeds.tolist()])
+
+
+def ten_harmonics(inertia_ratio: float) -> NDArray[np.float64]:
+    """Return the amplitudes of the harmonics 0 to `MANY` at the speeds `EVEN` with omega_c `COMPARED_AT`, a row a speed."""
+    once = equation(inertia_ratio, Variant.EXACT)
+    motions = (
+        harmonic_balance(replace(once, spring=SQUARE_OF_OMEGA_K / speed**2, damping=COMPARED_AT / speed), MANY)
+        for speed in EVEN.tolist()
+    )
+    return np.array([motion.series.amplitudes for motion in motions])
 
 
 def peak(n: int, inertia_ratio: float, omega_c: float, variant: Variant = Variant.EXACT) -> tuple[float, float]:
@@ -140,8 +153,12 @@ def growth(n: int) -> list[Case]:
     near_it = np.arange(28.0, 34.0, 0.02) if n == 1 else np.arange(14.8, 16.2, 0.01)
     widths = [np.count_nonzero(harmonic(n, near_it, ratio) > level) for ratio in INERTIA_RATIOS]
     return [
-        at_least(f"{word} harmonic outside the resonance, least", 1.0, min(ratios)),
-        at_least(f"width of its resonance, amplitudes above {level:g}", 1.0, min(b / a for a, b in pairwise(widths))),
+        at_least(f"{word} harmonic outside the resonances", 1.0, min(ratios)),
+        at_least(
+            f"width of the {word} harmonic's resonance, amplitudes above {level:g}",
+            1.0,
+            min(b / a for a, b in pairwise(widths)),
+        ),
     ]
 
 
@@ -152,14 +169,14 @@ def listed_cases() -> tuple[Case, ...]:
         found = (resonance(chapter_4(ratio), variant=variant) for variant in (Variant.FORTRAN, Variant.EXACT))
         for side, by_listing, right in zip(("lower", "upper"), *found):
             cases.append(near(f"{side} root; I4 = {ratio:g}", f"{by_listing:.4f}", right, HALF_STEP, "rad/s"))
-    for n, ratio in (*((1, ratio) for ratio in INERTIA_RATIOS), (2, 1.0)):
+    for n, ratio in product((1, 2), INERTIA_RATIOS):
         (at, by_listing), (right_at, right) = (
             peak(n, ratio, DAMPERS[0], variant) for variant in (Variant.FORTRAN, Variant.EXACT)
         )
         word = ("first", "second")[n - 1]
         if n == 1:
-            cases.append(near(f"its peak, damped; I4 = {ratio:g}", f"{at:.4f}", right_at, HALF_STEP, "rad/s"))
-        label = f"greatest {word} harmonic, damped; I4 = {ratio:g}"
+            cases.append(near(f"speed of the peak, damped; I4 = {ratio:g}", f"{at:.4f}", right_at, HALF_STEP, "rad/s"))
+        label = f"peak of the {word} harmonic, damped; I4 = {ratio:g}"
         cases.append(near(label, f"{by_listing:.4g}", right, ABOUT * by_listing))
     return tuple(cases)
 
@@ -178,8 +195,9 @@ def compute_first() -> StudyResult:
             Statement(
                 "The figures show that resonance for the first harmonic occurs in the region of ([omega_k] - d) < "
                 "[omega] < [omega_k] where d = 1 rad./sec.",
-                text("4.5.1, L3137-3143"),
-                "distance of the resonance, the lower root, below omega_k = 31.623 rad/s",
+                text("4.5.1, L3139-3143"),
+                "distance below omega_k = 31.623 rad/s of the resonance by the right equation: the lower of the two "
+                "neighbouring speeds at which the determinant of (4.33) vanishes, the lower and the upper root",
                 f"above 0, and {100 * ABOUT:g} % of d, the rule for *in the region of*",
                 (
                     *(
@@ -204,9 +222,9 @@ def compute_first() -> StudyResult:
             Statement(
                 "[T]heir deviation from the idealised spring-mass system accounts for the oscillating inertia of the rocker.",
                 text("4.5.1, L3143-3146"),
-                "deviation of the lower root from omega_k with the mean alone of the mass that the slider feels, (m4 + m5) and "
-                "the rocker's share, relative to the whole: read as the inertia of the rocker, which oscillates; the part "
-                "that varies with the crank angle makes the rest",
+                "deviation from omega_k that the mean of M makes, which is 1 and the rocker's share, relative to that of the "
+                "lower root; *oscillating inertia of the rocker* is read as the inertia of the rocker, which oscillates; the "
+                "mean of K and what varies with the crank angle make the rest",
                 ALIKE_WORDS,
                 tuple(near(f"I4 = {ratio:g}", 1.0, by_mean[ratio] / x, ALIKE) for ratio, x in below.items()),
             ),
@@ -214,17 +232,18 @@ def compute_first() -> StudyResult:
                 "Fig. (4.3) and fig. (4.4) also show that the amplitude of oscillation decreases with decrease of I4 "
                 "and that as I4 increases it widens the region of resonance.",
                 text("4.5.1, L3156-3162; the same in L3197-3201"),
-                "amplitude, away from the resonance, and width, above levels of the amplitude, relative to those at the next "
-                "smaller I4; speeds and levels are ours",
+                "amplitudes by the right equation from 9 to 40 rad/s, but farther than 1 rad/s from 15.5 rad/s and 2 rad/s "
+                "from 31 rad/s, and range of speeds in which they exceed a level, both relative to those at the next smaller "
+                "I4, least; speeds and levels are ours",
                 SIGN,
                 (*growth(1), *growth(2)),
             ),
             Statement(
                 "THIS PROG. INV[E]STIG[A]TES RESONANCE IN PRES[EN]CE OF DAMPING",
                 listing("appendix 2, L8398"),
-                "both speeds at which the determinant of (4.33) vanishes without a damper; speed and size of the greatest "
-                f"first harmonic and size of the second with omega_c = {DAMPERS[0]:g} 1/s, the listing's first damper: by the "
-                "listing, run with I4 set to each, and by the right equation",
+                "both roots without a damper; speed and height of the peak of the first harmonic and height of the second's "
+                f"with omega_c = {DAMPERS[0]:g} 1/s, the listing's first damper: by the listing, run with I4 set to each (it "
+                "has I4 = 1), and by the right equation",
                 f"{HALF_STEP:g} rad/s, half the step of the listing in speed; {ABOUT:g} of the amplitude, the rule for *about*",
                 listed_cases(),
                 "M' zeta' is missing, the crank's terms in the inertia and in the factors of spring and damper are halved, K "
@@ -238,9 +257,23 @@ def compute_second() -> StudyResult:
     """Compute Fig 4.4: the second harmonic, and its size beside the first."""
     columns = undamped_columns(2)
     shares = np.max([columns[f"I4 = {r:g}; corrected [1]"] / harmonic(1, SPEEDS, r) for r in INERTIA_RATIOS], axis=0)
+    last = SPEEDS[shares > SMALL].max()
+    spans = [(low, high, f"{low:g} to {high:g} rad/s") for low, high in ((22.5, 40.0), (16.5, 22.5), (9.0, 14.5))]
+    seconds = {words: shares[(low <= SPEEDS) & (high >= SPEEDS)].max() for low, high, words in spans}
     its_own = SPEEDS[(SPEEDS >= 14.5) & (SPEEDS <= 16.5)]
-    damped_shares = [np.divide(*(harmonic(n, its_own, r, COMPARED_AT) for n in (2, 1))).max() for r in INERTIA_RATIOS]
-    ranges, last = ((22.5, 40.0), (16.5, 22.5), (9.0, 14.5)), SPEEDS[shares > SMALL].max()
+    seconds[f"14.5 to 16.5 rad/s, omega_c = {COMPARED_AT:g} 1/s"] = max(
+        np.divide(*(harmonic(n, its_own, r, COMPARED_AT) for n in (2, 1))).max() for r in INERTIA_RATIOS
+    )
+    ten = [ten_harmonics(r) for r in INERTIA_RATIOS]
+    greatest = f"greatest over greatest, omega_c = {COMPARED_AT:g} 1/s"
+    seconds[greatest] = max(x[:, 2].max() / x[:, 1].max() for x in ten)
+    highers = {
+        f"{low:g} to {high:g} rad/s, omega_c = {COMPARED_AT:g} 1/s": max(
+            (x[:, 3:].max(axis=1) / x[:, 1])[(low <= EVEN) & (high >= EVEN)].max() for x in ten
+        )
+        for low, high in ((16.5, 40.0), (9.0, 16.5))
+    }
+    highers[greatest] = max(x[:, 3:].max() / x[:, 1].max() for x in ten)
     first, second = ([resonance(chapter_4(r), harmonic=n)[1] for r in INERTIA_RATIOS] for n in (1, 2))
     return StudyResult(
         number="4.4",
@@ -252,13 +285,15 @@ def compute_second() -> StudyResult:
                 "Resonance occurs below the value of [omega] = [omega_k] and [omega] = [omega_k/2]. How much below depends on "
                 "the value of I4.",
                 text("4.5.3 a, L3188-3195"),
-                "upper root of the determinant at the three I4, which falls with I4",
+                "upper roots by the right equation at the three I4, greatest, and their change from one I4 to the next",
                 SIGN,
                 (
-                    at_most("first harmonic, greatest", OMEGA_K, max(first), "rad/s"),
-                    at_most("second harmonic, greatest", 0.5 * OMEGA_K, max(second), "rad/s"),
+                    at_most("root of the first harmonic", OMEGA_K, max(first), "rad/s"),
+                    at_most("root of the second harmonic", 0.5 * OMEGA_K, max(second), "rad/s"),
                     *(
-                        at_most(f"{word} harmonic, growth with I4, greatest", 0.0, np.diff(x).max(), "rad/s")
+                        at_most(
+                            f"change of the root with I4, {word} harmonic, greatest", 0.0, np.diff(x).max(), "rad/s"
+                        )
                         for word, x in (("first", first), ("second", second))
                     ),
                 ),
@@ -267,18 +302,18 @@ def compute_second() -> StudyResult:
                 "It is also clear by comparing the amplitude values in both figures that the first harmonic of the "
                 "solution is dominant and the second harmonic may be neglected in comparison.",
                 text("4.5.1, L3162-3168; the same in L3210-3214"),
-                "second harmonic relative to the first at the same speed, greatest of the three I4 over ranges of speeds that "
-                "are ours; about its own resonance, where without a damper it has no bound, with that of 5.3.2",
-                f"{SMALL:g}, the rule for *negligible*",
+                "second harmonic relative to the first, and greatest of the third to the tenth, since L3212 has *higher "
+                "harmonics*, relative to it, by the right equation: at the same speed over ranges of speeds that are ours, and "
+                f"the greatest over the greatest from 9 to 40 rad/s in steps of 0.02 rad/s; the most of the three I4; omega_c "
+                f"= {COMPARED_AT:g} 1/s is that of 5.3.2, where without a damper a harmonic has no bound",
+                f"1 for *dominant*, the greater; {SMALL:g}, the rule for *negligible*",
                 (
-                    *(
-                        at_most(f"{low:g} to {high:g} rad/s", SMALL, shares[(low <= SPEEDS) & (high >= SPEEDS)].max())
-                        for low, high in ranges
-                    ),
-                    at_most(f"14.5 to 16.5 rad/s, omega_c = {COMPARED_AT:g} 1/s", SMALL, max(damped_shares)),
+                    *(at_most(f"first dominant; {words}", 1.0, share) for words, share in seconds.items()),
+                    *(at_most(f"second negligible; {words}", SMALL, share) for words, share in seconds.items()),
+                    *(at_most(f"higher negligible; {words}", SMALL, share) for words, share in highers.items()),
                 ),
-                f"it is small above {last / OMEGA_K:.1f} omega_k alone; near omega_k/2, where it has its own resonance, it is "
-                "the greater",
+                f"the second is small above {last / OMEGA_K:.1f} omega_k alone; near omega_k/2, where it has its own "
+                "resonance, it is the greater, and near omega_k/3 the third has its own",
             ),
         ),
     )
@@ -336,8 +371,8 @@ def compute_deviation() -> StudyResult:
                 "However, as shown in fig. (4.5), this deviation decreases linearly with decrease of inertia ratio "
                 "I4 and becomes zero when I4=0.",
                 text("4.5.1, L3146-3150"),
-                "greatest distance of the deviation from omega_k of the resonance, the lower root of the determinant, from the "
-                "straight line through zero and its value at I4 = 1.5, relative to that value; deviation at I4 = 0",
+                "greatest distance of the deviation of the lower root from omega_k, by the right equation, from the straight "
+                "line through zero and its value at I4 = 1.5, an end of ours, relative to that value; deviation at I4 = 0",
                 f"{ALIKE_WORDS}; 1e-6 rad/s, above rounding errors",
                 (
                     at_most("distance from the line", ALIKE, bent),
@@ -348,7 +383,7 @@ def compute_deviation() -> StudyResult:
                 "In fact for the case I4=0 the equation of motion of the slider reduces to a second order linear "
                 "differential equation describing an idealised spring-mass system.",
                 text("4.5.1, L3152-3156"),
-                "greatest coefficient of the right equation beyond a mass on a spring",
+                "greatest harmonic or mean of M - 1, K and F of the right equation at I4 = 0",
                 "1e-12, above rounding errors",
                 (at_most("", 1e-12, rest),),
             ),
@@ -403,18 +438,27 @@ def one_mass(inertia_ratio: float, omega_c: float) -> NDArray[np.float64]:
     return amplitude
 
 
+def from_one_mass(inertia_ratio: float, omega_c: float) -> float:
+    """Return the greatest distance of the first harmonic from that of a single mass, relative to its peak."""
+    near_peak = harmonic(1, CLOSE, inertia_ratio, omega_c)
+    return float(np.abs(near_peak - one_mass(inertia_ratio, omega_c)).max() / peak(1, inertia_ratio, omega_c)[1])
+
+
 @cache
 def damped(inertia_ratio: float) -> dict[str, float]:
     """Return the measures, by name, by which `_curves` and `_dampers` judge the dampers at an I4."""
     weak, strong = (harmonic(1, SPEEDS, inertia_ratio, d) for d in (DAMPERS[0], STRONGEST))
-    near_peak = harmonic(1, CLOSE, inertia_ratio, DAMPERS[0])
     (at, height), (at_strong, _) = (peak(1, inertia_ratio, d) for d in (DAMPERS[0], STRONGEST))
     outside = np.abs(SPEEDS - at) > OUTSIDE
+    at_second, second_height = peak(2, inertia_ratio, DAMPERS[0])
+    outside_both = outside & (np.abs(SPEEDS - at_second) > OUTSIDE)
+    seconds = [harmonic(2, SPEEDS[outside_both], inertia_ratio, d) for d in (DAMPERS[0], STRONGEST)]
     return {
-        "outside": np.abs(strong - weak)[outside].max() / height,
+        "first harmonic": np.abs(strong - weak)[outside].max() / height,
+        "second harmonic": np.abs(seconds[1] - seconds[0]).max() / second_height,
         "of the free motion": free_frequency(inertia_ratio, STRONGEST) - free_frequency(inertia_ratio, DAMPERS[0]),
         "of the peak": at_strong - at,
-        "one mass": np.abs(near_peak - one_mass(inertia_ratio, DAMPERS[0])).max() / height,
+        "one mass": max(from_one_mass(inertia_ratio, d) for d in DAMPERS),
     }
 
 
@@ -445,16 +489,22 @@ def _curves() -> tuple[Statement, ...]:
         Statement(
             "The amplitude of oscillation is not affected, on the scale of the graph, outside the resonance region.",
             text("4.5.2, L3176-3178; the same in L3203-3204"),
-            f"change of the amplitude from omega_c = {DAMPERS[0]:g} to {STRONGEST:g} 1/s, 9 to 40 rad/s but farther than "
-            f"{OUTSIDE:g} rad/s, ours, from the resonance, relative to the peak at {DAMPERS[0]:g} 1/s",
+            f"change of the harmonics from omega_c = {DAMPERS[0]:g} to {STRONGEST:g} 1/s by the right equation, 9 to 40 rad/s "
+            f"but farther than {OUTSIDE:g} rad/s, ours, from the peak, and the second also from its own, relative to the peak "
+            f"at {DAMPERS[0]:g} 1/s; the second since L3203 has *the solution*",
             ALIKE_WORDS,
-            tuple(at_most(label, ALIKE, found["outside"]) for label, found in both.items()),
+            tuple(
+                at_most(f"{name}; {label}", ALIKE, found[name])
+                for label, found in both.items()
+                for name in ("first harmonic", "second harmonic")
+            ),
         ),
         Statement(
             "The resonance curves are similar to a second order linear system",
             text("4.5.3 d, L3206-3208"),
-            "greatest distance from the amplitude of one mass on a spring, with the means of M and K and the first "
-            f"harmonic of F, relative to the peak; omega_c = {DAMPERS[0]:g} 1/s, 27 to 35 rad/s, a range of ours",
+            "greatest distance of the first harmonic from the amplitude of one mass on a spring, with the means of M and K and "
+            "the first harmonic of F, relative to the peak; right equation, 27 to 35 rad/s, ours, greatest of omega_c = "
+            f"{DAMPERS[0]:g} to {STRONGEST:g} 1/s",
             f"{ABOUT:g}, the rule for *similar*",
             tuple(at_most(label, ABOUT, found["one mass"]) for label, found in both.items()),
         ),
@@ -470,8 +520,8 @@ def _dampers() -> tuple[Statement, ...]:
         Statement(
             "The natural frequency decreases slightly with increase of damping.",
             text("4.5.2, L3178-3180"),
-            f"change of the frequency from omega_c = {DAMPERS[0]:g} to {STRONGEST:g} 1/s: of the free motion, by its "
-            "multipliers, and of the peak of the curves, which the figures show",
+            f"change of the frequency from omega_c = {DAMPERS[0]:g} to {STRONGEST:g} 1/s by the right equation: of the free "
+            "motion, by its multipliers, and of the peak of the curves, which the figures show",
             f"{SIGN}: omega_c = {STRONGEST:g} 1/s is {100 * ratio:.1f} % of the critical, which can lower a frequency by no "
             f"more than {50 * ratio**2:.2f} %, less than the rule for *slightly* asks and than a graph shows",
             tuple(
@@ -490,7 +540,8 @@ def _dampers() -> tuple[Statement, ...]:
             "It also shows that a smaller value of damping eliminated resonance for the case of [I4]=0.5 than that for "
             "[I4] = 1.",
             text("4.5.2, L3182-3184"),
-            f"damper that keeps the amplitude below {level:g}, ours, relative to that at I4 = 1",
+            f"damper that keeps the first harmonic of zeta below {level:g}, a level of ours, at I4 = 0.5, relative to that at "
+            "I4 = 1; right equation",
             SIGN,
             (at_most("", 1.0, needed[1] / needed[0]),),
         ),

@@ -27,12 +27,17 @@ from .runs import SPEED, table_3_1
 #: Greatest rounding error, crank lengths sigma2 from which an order is computed, and tolerance of a limit at the shorter one.
 ROUNDING, SHORT, LIMIT = 1e-9, (0.002, 0.001), 0.01
 TURN = np.linspace(0.0, 2.0 * pi, 361)
+#: sigma3 of the linearised kinematics, the least of Fig 5.3: at sigma3 = 1 its place in (4.8) would not show.
+COUPLER = 0.8
+#: Speeds (rad/s) and inertia ratios at which the recurrence is solved.
+BALANCED_AT = tuple((speed, ratio) for speed in (10.0, 25.0, 40.0) for ratio in (0.5, 1.0, 1.5))
 
 
-def with_crank(sigma2: float, inertia_ratio: float = 1.0) -> FiveBarParameters:
-    """Return the mechanism of chapters IV and V with another crank, sigma2 = l2/l4."""
+def with_crank(sigma2: float, inertia_ratio: float = 1.0, sigma3: float = 1.0) -> FiveBarParameters:
+    """Return the mechanism of chapters IV and V with another crank and coupler, sigma2 = l2/l4 and sigma3 = l3/l4."""
     mechanism = chapter_4(inertia_ratio)
-    return replace(mechanism, crank_length=sigma2 * mechanism.rocker_length)
+    rocker = mechanism.rocker_length
+    return replace(mechanism, crank_length=sigma2 * rocker, coupler_length=sigma3 * rocker)
 
 
 def angles(parameters: FiveBarParameters, zeta: float = 0.0) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
@@ -44,28 +49,47 @@ def angles(parameters: FiveBarParameters, zeta: float = 0.0) -> tuple[NDArray[np
 
 
 @cache
-def datum(sigma2: float, rocker: float | None = None) -> Datum:
+def datum(sigma2: float, rocker: float | None = None, sigma3: float = 1.0) -> Datum:
     """Return the datum: the rocker's angle by (4.1) unless it is given, crank's and coupler's by the closure (4.6)."""
-    swing = angles(with_crank(sigma2))[1]
+    swing = angles(with_crank(sigma2, sigma3=sigma3))[1]
     middle = 0.5 * (swing.max() + swing.min()) if rocker is None else rocker
 
     def closure(x: NDArray[np.float64]) -> list[float]:
-        gap = sigma2 * np.exp(1j * x[0]) - 1.0 - np.exp(1j * middle) + np.exp(1j * x[1])
+        gap = sigma2 * np.exp(1j * x[0]) - 1.0 - np.exp(1j * middle) + sigma3 * np.exp(1j * x[1])
         return [gap.real / sigma2, gap.imag / sigma2]
 
-    crank, coupler = fsolve(closure, [DATUM.crank, pi - middle], xtol=1e-11).tolist()
+    crank, coupler = fsolve(closure, [DATUM.crank, 0.5 * middle], xtol=1e-11).tolist()
     return Datum(crank, coupler, middle)
 
 
 def deviations(sigma2: float) -> tuple[float, float]:
     """Return the greatest errors of xi3 and xi4 (rad) by (4.8) over a turn, with the slider at zeta = sigma2/2."""
-    alpha, a3, a4 = datum(sigma2)
-    zeta, s = 0.5 * sigma2, sin(a4 - a3)
-    by_print = (
-        a + (cos(b) * zeta - sigma2 * np.cos(TURN - b) + sigma2 * cos(alpha - b)) / s for a, b in ((a3, a4), (a4, a3))
-    )
-    first, second = (float(np.abs(x - true).max()) for x, true in zip(by_print, angles(with_crank(sigma2), zeta)))
+    zeta = 0.5 * sigma2
+    true = angles(with_crank(sigma2, sigma3=COUPLER), zeta)
+    start = datum(sigma2, sigma3=COUPLER)
+    errors = (np.abs(at + xi - x).max() for at, xi, x in zip(start[1:], _by_print(sigma2, zeta), true))
+    first, second = map(float, errors)
     return first, second
+
+
+def _by_print(sigma2: float, zeta: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return xi3 and xi4 (rad) by (4.8) over a turn."""
+    alpha, a3, a4 = datum(sigma2, sigma3=COUPLER)
+    by_rocker, by_coupler = (cos(a) * zeta - sigma2 * np.cos(TURN - a) + sigma2 * cos(alpha - a) for a in (a4, a3))
+    return by_rocker / (COUPLER * sin(a4 - a3)), by_coupler / sin(a4 - a3)
+
+
+def eliminations(sigma2: float) -> dict[str, float]:
+    """Return the greatest residuals of (4.5) and (4.7) over a turn with xi3 and xi4 by (4.8), relative to sigma2."""
+    zeta = 0.5 * sigma2
+    (alpha, a3, a4), (xi3, xi4) = datum(sigma2, sigma3=COUPLER), _by_print(sigma2, zeta)
+    x, y = sin(a4) * xi4 - COUPLER * sin(a3) * xi3 - zeta, COUPLER * cos(a3) * xi3 - cos(a4) * xi4
+    crank = sigma2 * np.exp(1j * TURN)
+    left = {
+        "(4.5)": x + 1j * y - np.exp(1j * a4) + crank + COUPLER * np.exp(1j * a3) - 1.0,
+        "(4.7)": x + 1j * y + crank - sigma2 * np.exp(1j * alpha),
+    }
+    return {name: float(np.abs(values).max()) / sigma2 for name, values in left.items()}
 
 
 def residuals() -> dict[str, float]:
@@ -123,9 +147,14 @@ def coefficients(sigma2: float, inertia_ratio: float = 1.0) -> dict[str, float]:
 
 
 def constant_parts() -> dict[str, float]:
-    """Return |h0|/k0 and |g0|/k0 by the right equation, for chapter IV's mechanism and rig 2."""
+    """Return |h0|/k0 and |g0|/k0 by the right equation, for mechanisms of chapter V and rig 2."""
     found = {}
-    for words, mechanism in (("I4 = 2", chapter_4(2.0)), ("rig 2, spring C", SETS["rig-2-spring-c"].parameters)):
+    for words, mechanism in (
+        ("I4 = 2", chapter_4(2.0)),
+        ("sigma2 = 0.1, I4 = 1", with_crank(0.1)),
+        ("sigma3 = 1.2, I4 = 2", with_crank(SIGMA2, 2.0, 1.2)),
+        ("rig 2, spring C", SETS["rig-2-spring-c"].parameters),
+    ):
         equation = slider_equation(mechanism, 25.0)
         for name, part in (("h0", equation.stiffness), ("g0", equation.force)):
             found[f"{name}; {words}"] = abs(part.mean) / equation.spring_factor.mean
@@ -144,15 +173,19 @@ def _first_order_quotient(part: FourierSeries, by: FourierSeries) -> tuple[float
     return mean, *((x[1] - mean * y[1]) / by.mean for x, y in ((part.cos, by.cos), (part.sin, by.sin)))
 
 
-def expansion(sigma2: float) -> NDArray[np.float64]:
-    """Return the truncation error of the expansion (4.23), (4.24) of S/I, with the coefficients of (4.21) at the printed datum.
+def expansion(sigma2: float) -> dict[str, NDArray[np.float64]]:
+    """Return the errors of the expansions (4.23) to (4.28) of S/I, K/I and F/I, with the coefficients of (4.21), by name.
 
-    It is given by the magnitudes of its complex Fourier coefficients: mean, first and second harmonic; shape (3,).
+    Each is given by the magnitudes of its complex Fourier coefficients: mean, first and second harmonic; shape (3,).
     """
     parts = printed(ratios(with_crank(sigma2)))
-    kept, angle = convert(parts, Form.SERIES).spring, np.linspace(0.0, 2.0 * pi, 64, endpoint=False)
-    left = FourierSeries.from_samples(parts.spring(angle) / parts.inertia(angle) - kept(angle), 2)
-    return np.abs(left.exponential[2:])
+    kept, angle = convert(parts, Form.SERIES), np.linspace(0.0, 2.0 * pi, 64, endpoint=False)
+    found = {}
+    for name, words in (("spring", "(4.23), S"), ("stiffness", "(4.25), K"), ("force", "(4.27), F")):
+        quotient = getattr(parts, name)(angle) / parts.inertia(angle)
+        left = FourierSeries.from_samples(quotient - getattr(kept, name)(angle), 2)
+        found[words] = np.abs(left.exponential[2:])
+    return found
 
 
 def recurrence(equation: SliderEquation, mean: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
@@ -181,16 +214,19 @@ def recurrence(equation: SliderEquation, mean: float) -> tuple[NDArray[np.float6
 
 
 def balanced(omega_c: float, as_printed: bool = True) -> float:
-    """Return the relative error of the solution of (4.34) against the balance of (4.29), at 25 rad/s and I4 = 1.
+    """Return the greatest relative error of the solution of (4.34) against the balance of (4.29), at `BALANCED_AT`.
 
     If it is not taken as printed, (4.34) has lambda_c k0 in place of lambda_c.
     """
-    equation = slider_equation(chapter_4(1.0, omega_c), 25.0, variant=Variant.PRINTED, form=Form.SERIES)
-    mean = equation.damping * (1.0 if as_printed else equation.damping_factor.mean)
-    found = np.linalg.solve(*recurrence(equation, mean))
-    series = two_harmonics(equation).series
-    true = np.array([series.cos[0], series.cos[1], series.sin[1], series.cos[2], series.sin[2]])
-    return float(np.abs(found - true).max() / np.abs(true).max())
+    errors = []
+    for speed, ratio in BALANCED_AT:
+        equation = slider_equation(chapter_4(ratio, omega_c), speed, variant=Variant.PRINTED, form=Form.SERIES)
+        mean = equation.damping * (1.0 if as_printed else equation.damping_factor.mean)
+        found = np.linalg.solve(*recurrence(equation, mean))
+        series = two_harmonics(equation).series
+        true = np.array([series.cos[0], series.cos[1], series.sin[1], series.cos[2], series.sin[2]])
+        errors.append(float(np.abs(found - true).max() / np.abs(true).max()))
+    return max(errors)
 
 
 def compute() -> StudyResult:
@@ -199,14 +235,15 @@ def compute() -> StudyResult:
     orders = [float(np.log2(x / y)) for x, y in zip(small, smaller)]
     own = datum(SIGMA2)
     crank, coupler, _ = map(degrees, datum(SIGMA2, DATUM.rocker))
-    left = np.log2(expansion(SHORT[0]) / expansion(SHORT[1]))
+    longer, shorter = (expansion(x) for x in SHORT)
+    left = {name: np.log2(longer[name] / shorter[name]) for name in longer}
     mechanism = chapter_4(1.0)
     parts = printed(ratios(mechanism))
     seconds = np.array([(x.cos[1], x.sin[1]) for x in (parts.spring, parts.inertia, parts.stiffness)])
     apart = parts.spring.mean / np.abs(seconds).max()
     solution = (
-        "solution of (4.33) with these coefficients against the balance of two harmonics of (4.29), relative to its greatest "
-        "coefficient, at 25 rad/s and I4 = 1"
+        "error of the solution of (4.33) with these coefficients against the balance of two harmonics of (4.29), relative to "
+        "the greatest of its coefficients, the most at 10, 25 and 40 rad/s and I4 = 0.5, 1 and 1.5, which are ours"
     )
     ways = {
         "right": _quotients(slider_equation(mechanism, 1.0)),
@@ -219,13 +256,17 @@ def compute() -> StudyResult:
     return StudyResult(
         number="4.2",
         claim="The equations (4.1) to (4.35), one by one, each against the plant or the equations before it.",
+        assignment="The right linear equation is (M zeta')' + lambda_c zeta' + (lambda_k^2 + K) zeta = F: the equation of the "
+        "mechanism, linearised exactly about zeta = u/l4 = 0, with ' = d/d(theta), M, K and F of the period of the crank, "
+        "lambda_k = omega_k/omega, omega_k^2 = k/(m4 + m5), lambda_c = omega_c/omega and omega_c = mu/(m4 + m5).",
         columns=columns,
         statements=(
             Statement(
                 "The angles [alpha] and [alpha3] are then calculated accordingly.",
                 text("4.1, eqs (4.1), (4.6), L2404-2417"),
-                "datum by (4.1) and the closure (4.6) at sigma2 = 0.05, sigma = sigma3 = 1 beside that of appendices 2 to 4, "
-                "ALF, ALF3, ALF4 (L8404)",
+                "datum by (4.1) and the closure (4.6) at sigma2 = 0.05, sigma3 = 1 and sigma = 1, which the thesis does not "
+                "state but its angles give, beside that of appendices 2 to 4: ALF, ALF3, ALF4 (L8404), where the scan's "
+                "120.99. is read 120.,9., two numbers",
                 "half a degree: the listings have whole ones",
                 tuple(
                     near(
@@ -242,27 +283,38 @@ def compute() -> StudyResult:
             Statement(
                 "Substituting equations (4.6[)] into equations (4.5) we obtain: [(4.7)] and hence [(4.8)]",
                 text("4.1, eqs (4.2) to (4.8), L2459-2477"),
-                "order in the crank's length of the error of (4.8) against the closed linkage, the slider off by "
-                f"half of sigma2, from sigma2 = {SHORT[0]:g} to {SHORT[1]:g}",
-                "2, the first order that is neglected in (4.4); 0.05, as an order is a whole number",
-                tuple(near(name, 2.0, x, 0.05) for name, x in zip(("xi3", "xi4"), orders)),
+                "residuals of (4.5) and (4.7), relative to sigma2, with xi3 and xi4 by (4.8); order in the crank's length of "
+                f"the errors of xi3 and xi4 against the closed linkage, from sigma2 = {SHORT[0]:g} to {SHORT[1]:g}; greatest "
+                f"over a turn, at zeta = sigma2/2, sigma = 1 and sigma3 = {COUPLER:g}, which are ours",
+                f"{ROUNDING:g}, above rounding errors; 2, the first order that is neglected in (4.4), and 0.05, as an order is "
+                "a whole number",
+                (
+                    *(at_most(f"residual of {name}", ROUNDING, x) for name, x in eliminations(SHORT[0]).items()),
+                    *(near(f"order of the error of {name}", 2.0, x, 0.05) for name, x in zip(("xi3", "xi4"), orders)),
+                ),
             ),
             Statement(
-                "[T]hen by application of the Lagrangian multiplier method stated in equation (2.5) the following "
-                "equations are obtained.",
-                text("4.2.1, eqs (4.9) to (4.20), L2499-2613"),
-                "residual in a motion of Table 3.1 without gravity by our equations of motion, with the pin force at C for the "
-                "multipliers and the damper's term in (4.18), lost in the scan, by (4.13); relative to the greatest term",
+                "Assuming a constant crank angular speed [omega], i.e. [(4.9)] and no gravitational forces, then by "
+                "application of the Lagrangian multiplier method stated in equation (2.5) the following equations are "
+                "obtained.",
+                text("4.2.1, eqs (4.9) to (4.20), L2495-2613"),
+                "residual of each, with the accelerations and, for the multipliers, the pin force at C by our equations of "
+                "motion, for the mechanism of Table 3.1 without gravity at 25 crank angles with slider positions and "
+                "velocities that are ours; the damper's term of (4.18), illegible in the scan, by (4.13); greatest, relative "
+                "to the greatest term",
                 f"{ROUNDING:g}, above rounding errors",
                 tuple(at_most(name, ROUNDING, x) for name, x in residuals().items()),
             ),
             Statement(
-                "[T]he following linearised equation of motion of the slider may be obtained. [(4.21)]",
+                "If equations (4.3a) and (4.8) are substituted into this slider equation, and second and higher order "
+                "multiples of [zeta] and its derivatives are ignored the following linearised equation of motion of the slider "
+                "may be obtained. [(4.21)]",
                 text("4.2.1, eq (4.21), L2620-2794"),
-                "coefficients over A1 + B1 cos + C1 sin, relative to the right ones, at I4 = 1 and sigma2 = "
-                f"{SHORT[1]:g}, about their own datum, massless coupler and centre of mass of the rocker on the "
-                "slider; the factor of zeta' without a damper relative to M'",
-                f"{LIMIT:g}, more than the terms of second order",
+                "coefficients of first order after division by A1 + B1 cos + C1 sin, the factor of the spring, relative to "
+                f"those of the right equation, at I4 = 1 and sigma2 = {SHORT[1]:g}, about the datum by (4.1) and (4.6), with "
+                "massless coupler and centre of mass of the rocker on the slider as in 4.5; the factor of zeta' without a "
+                "damper relative to M'",
+                f"{LIMIT:g}, more than the terms of second order, which are about sigma2 times as large",
                 (
                     *(
                         Case(label=name, computed=None, why="its sign cannot be read, its size is right")
@@ -275,54 +327,60 @@ def compute() -> StudyResult:
                 "R1 and S1 are read from U and V of appendix 2 (L8449-8450): the scan's lines of them (L2786-2794) are not "
                 "whole and have terms in r4 and mr3 only, which vanish under these conditions. G1 vanishes too; Q1 in the "
                 "scan has a term in I4 (L2781), where the right equation has none of first order and the programs have no "
-                "mean of the force: it is not judged, nor are the terms with the coupler's mass and with r4",
+                "mean of the force: it is not judged, nor are the terms with the coupler's mass and with r4, which no result "
+                "of chapters IV and V needs",
             ),
             Statement(
                 "The coefficients B1, C1, H1, P1, [Q1], E1 and F1 are much smaller than those of A1 a[nd] D1 by at "
                 "least a factor [...] in the worst cases.",
                 text("4.3, L2797-2801"),
-                why=f"the factor cannot be read, and Q1 is our reading; at I4 = 1 the greatest of those that can is "
-                f"1/{apart:.0f} of A1",
+                why="the factor cannot be read, and Q1 is our reading; at I4 = 1 and sigma2 = 0.05 the greatest of the others "
+                f"is 1/{apart:.0f} of A1",
             ),
             Statement(
-                "... where [epsilon] is a small parameter and [h0], g0 << k0.",
-                text("4.3, eq (4.22), L2837"),
+                "Therefore we may write : [(4.22)] where [epsilon] is a small parameter and [h0], g0 << k0.",
+                text("4.3, eq (4.22), L2801-2837"),
                 "means of K and F of the right linear equation, in size, over that of the spring's factor, which is 1: G1 and "
-                "Q1 over A1; at I4 = 2, the greatest of Fig 4.3 to 5.4, and of rig 2, whose coupler has mass",
+                "Q1 over A1; at the ends of Fig 5.1 to 5.3, with sigma2 = 0.05 and sigma3 = 1 unless another is named, and for "
+                "rig 2, whose coupler has mass",
                 f"{SMALL:g}, the rule for *small*, as *<<* says",
                 tuple(at_most(name, SMALL, x) for name, x in constant_parts().items()),
                 "G1 as printed vanishes with a massless coupler; in the scan Q1 has a term in I4 (L2781), by which g0 would be "
-                f"{scanned_mean(2.0):.2g} of k0 at most; the programs have no mean of the force; what is left by the right "
+                f"{scanned_mean(2.0):.2g} of k0 at I4 = 2; the programs have no mean of the force; what is left by the right "
                 "equation is of second order in the crank's length",
             ),
             Statement(
                 "[W]hich, if terms in the order of third and higher powers of [epsilon] are ignored, may be written "
-                "[(4.23)]",
-                text("4.3, eqs (4.22) to (4.24), L2843-2869"),
-                "order of what (4.23) and (4.24) leave out of the quotient of the printed coefficients, from sigma2 "
-                f"= {SHORT[0]:g} to {SHORT[1]:g}; I4 = 1",
+                "[(4.23)] ... Similarly the stiffness term may be written : [(4.25)] ... In a similar manner the right hand "
+                "side may be written : [(4.27)]",
+                text("4.3, eqs (4.22) to (4.28), L2853-2916"),
+                "order in the crank's length of what (4.23) to (4.28) leave out of S, the factor of damper and spring, and of "
+                f"K and F, each a quotient of the printed coefficients, from sigma2 = {SHORT[0]:g} to {SHORT[1]:g}; I4 = 1; b4 "
+                "of (4.26) with k3 k6 + k4 k5, as the listing has it (L8448), where the scan has k3 k5 + k4 k5",
                 "3; 0.05, as an order is a whole number",
                 tuple(
-                    at_least(name, 2.95, x, why="the mean has a part of second order too")
-                    for name, x in zip(("mean", "first harmonic", "second harmonic"), left)
+                    at_least(f"{part}; {name}", 2.95, x, why="the mean has a part of second order too")
+                    for part, orders_of in left.items()
+                    for name, x in zip(("mean", "first harmonic", "second harmonic"), orders_of)
                 ),
             ),
             Statement(
                 "Equating constant terms and coefficients of Cos[theta], Sin[theta], Cos2[theta] and Sin2[theta] on "
                 "both sides of equation (4.31) we obtain the [f]ollowing recurrence relationships.",
                 text("4.4.1, eqs (4.30) to (4.33), L2988-3049"),
-                f"{solution}, without a damper",
+                f"{solution}; without a damper; signs that the scan of (4.32) has lost are those of (4.34) at lambda_c = 0",
                 f"{ROUNDING:g}, above rounding errors",
                 (at_most("", ROUNDING, balanced(0.0)),),
             ),
             Statement(
-                "... then multiplying and equating the coefficients of the trig[o]nometric functions of [theta] on both sides "
-                "of that equation in a similar manner to the preceding section, we obtain [(4.34)]",
-                text("4.4.2, eqs (4.34), (4.35), L3055-3099"),
-                f"{solution}, with a damper of omega_c = mu/(m4 + m5) = 1.2 1/s, the greatest of appendix 2",
+                "Assuming a solution of [zeta] as described in (4.30) and substituting it in equation (4.29), then multiplying "
+                "and equating the coefficients of the trig[o]nometric functions of [theta] on both sides of that equation in a "
+                "similar manner to the preceding section, we obtain the following recurrence relationships, [(4.34)]",
+                text("4.4.2, eqs (4.34), (4.35), L3053-3099"),
+                f"{solution}; with a damper of omega_c = 1.2 1/s, the greatest of appendix 2",
                 f"{ROUNDING:g}, above rounding errors",
                 (at_most("", ROUNDING, balanced(1.2)),),
-                "2 lambda_c and 4 lambda_c stand for 2 lambda_c k0 and 4 lambda_c k0",
+                "2 lambda_c and 4 lambda_c stand for 2 lambda_c k0 and 4 lambda_c k0, in the listing too (L8489, L8501)",
             ),
         ),
     )
