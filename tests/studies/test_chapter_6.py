@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from itertools import product
 
 import numpy as np
 import pytest
 from scipy.stats import mannwhitneyu
 
+from analysis.studies.statements import near
 from analysis.studies.youssef import search
 from analysis.studies.youssef.chapter_6 import best, half_units, pairing_area, rounded, straight_error
 from analysis.studies.youssef.packaging import TRAVEL_CM, nineteen_points, straightest
@@ -95,6 +97,22 @@ def test_error_over_the_rounding_of_printed_digits() -> None:
     assert rounded("ellipse-a")[""] == pytest.approx(published.ELLIPSE_A_OVER_ROUNDING, abs=5e-3)
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["ellipse-a", "ellipse-b", "ellipse-a-bounded", "path-a"])
+def test_no_other_digit_in_a_single_place_gives_the_stated_error(name: str) -> None:
+    p, unit = PROBLEMS[name], np.array([0.01] * 7 + [np.radians(1.0)] * 3)
+    printed = [repr(round(float(x), 6)) for x in p.linkage.vector / unit]
+    tolerance = near("", str(p.error), 0.0).upper - p.error
+    for k, number in enumerate(printed):
+        places = (place for place, old in enumerate(number) if old.isdigit())
+        for place, digit in product(places, "0123456789"):
+            values = [float(x) for x in printed]
+            values[k] = float(number[:place] + digit + number[place + 1 :])
+            if values[k]:
+                found = p.error_of(Linkage.from_vector(np.array(values) * unit, 1))
+                assert abs(found - p.error) > tolerance, (k, values[k], found)
+
+
 def test_half_units_of_printed_digits() -> None:
     """5.083, 2.615, 4.148 and 3.75 cm, 41.88 deg; the rest is not printed."""
     expected = [0.0, 0.0, 5e-6, 5e-6, 5e-6, 5e-5, 0.0, 0.0, np.radians(5e-3), 0.0]
@@ -131,6 +149,10 @@ class TestSearch:
             for away, expected in zip(search.residuals(self.vector(linkage)), sides):
                 assert away @ away == pytest.approx(expected, rel=1e-9)
             assert search.error(self.vector(linkage)) == pytest.approx(min(sides), rel=1e-9)
+
+    def test_its_rocker_error_is_that_of_the_package(self) -> None:
+        p = PROBLEMS["rocker"]
+        assert search.rocker_error(self.vector(p.linkage)) == pytest.approx(p.error_of(p.linkage), rel=1e-9)
 
     def test_sets_are_within_their_bounds_and_close(self) -> None:
         sets = search.starting_sets(np.random.default_rng(1), [])

@@ -226,13 +226,9 @@ def compute() -> StudyResult:
     by_print, by_print_path = error_of(ROCKER, readings(ROCKER)[0]), error_of(PATH, mended())
     left = " and ".join(f"{error[-1] / error[0]:.2f} ({n} harmonics)" for n, error in errors.items())
     hollow = " and ".join(
-        f"that of {n} is hollow over {c.hollow_deg:.0f} deg, with a least radius of {c.hollow_curvature:.0f} cm"
+        f"that of {n} is hollow over {c.hollow_deg:.0f} deg, with a radius of {c.hollow_curvature:.0f} cm at least"
         for n, c in cams.items()
         if c.hollow_deg
-    )
-    small = (
-        f"{ROLLER:g} cm, the radius of the roller, our choice: the pitch curve is nowhere sharper where it is convex "
-        f"({hollow}); the pressure angle is within 30 deg, the usual limit of a sliding follower"
     )
     differs = (
         "twice the friction in the guide, coupler and slider a tenth heavier, and a load of "
@@ -248,10 +244,11 @@ def compute() -> StudyResult:
                 "[A]n arrangement that is simple in principle but suffers from the defects of limited adaptability and "
                 "mechanical complications. Examples include secondary linkages, cams and latch mechanisms.",
                 text("7.1.1 (a), L5303-5309"),
-                "least radius of curvature of the smallest plate cam for the two harmonics of Fig 7.11 and 7.12; weighted "
-                "error of the rocker function with one harmonic, which a Scotch yoke on the crank shaft gives, over that "
-                "with the pivot fixed",
-                f"{small}; {SEEN_FALL}",
+                "smallest plate cam for the two harmonics of Fig 7.11 and 7.12, its roller guided through its shaft, with a "
+                "pressure angle within 30 deg, the usual limit of a sliding follower: least radius of curvature of the path of "
+                f"the roller's centre where it is convex ({hollow}); weighted error of the rocker function with one harmonic, "
+                "which a Scotch yoke on the crank shaft gives, over that with the pivot fixed",
+                f"{ROLLER:g} cm, the radius of the roller, our choice; {SEEN_FALL}",
                 (
                     *(
                         at_least(f"cam of {n}, base radius {c.base:.1f} cm", ROLLER, c.curvature, "cm")
@@ -342,8 +339,8 @@ def compute() -> StudyResult:
                 "enough against *any*",
                 tuple(at_least(words, 1.0 + ALIKE, ratio) for words, ratio in changes.items()),
                 "the motion that the slider needs for a desired output depends on neither load nor speed, as no equation "
-                f"of the method has them; at twice the speed the error is {faster_error:.2f} times as great, since the "
-                "feedback follows less closely",
+                f"of the method has them; at twice the speed, where the error is {faster_error:.2f} times as great, it is the "
+                "feedback that follows less closely: a motion calculated again would be the same",
             ),
             Statement(
                 "The direct search merely experiments with a number of cycles, after which the controller adjusts itself, "

@@ -86,6 +86,7 @@ def compute() -> StudyResult:
     areas = {who: CM2_PER_M2 * pairing_area(desired, curve, window=3) for who, curve in curves.items()}
     reach = {who: CM_PER_METRE * hausdorff(curve, packaging_path()) for who, curve in curves.items()}
     printed, count = straightest(curves["printed"])
+    other, _ = straightest(replace(p.linkage, branch=-p.linkage.branch).path(turn(N)))
     rotation = 2.0 * pi * (count - 1) / N
     part = ours.straight()
     assert part is not None
@@ -135,7 +136,8 @@ def compute() -> StudyResult:
                     at_most("height of the crank shaft", line, above, "cm"),
                 ),
                 f"{CM_PER_METRE * printed.flatness:.1f} cm off straight, within {degrees(rotation):.0f} deg; th20 is not "
-                "printed, and any 120 deg are taken as the first",
+                "printed, and any 120 deg are taken as the first; nor is the closure: by the other it would be "
+                f"{other.flatness / other.travel:.2f} off straight",
             ),
             Statement(
                 "Optimisation is then performed to find the optimum linkage from which 72 actual output points are "

@@ -164,6 +164,7 @@ def compute() -> StudyResult:
                 f"{CM_PER_METRE * LONGEST:.2f} cm, the longest of the two printed linkages",
                 f"above {1.0 + ALIKE:g}, the rule for *the same*: a condition that costs nothing would leave it",
                 (at_least("area", 1.0 + ALIKE, timed.area / path.area),),
+                "the first sentence says no more than that the error is minimised",
             ),
             Statement(
                 "An approximation to the desired output may, therefore, be obtained by taking both function and path "
@@ -182,9 +183,11 @@ def compute() -> StudyResult:
             Statement(
                 "The minimum occurs when either Coswt = [+-1] whichever yields the least value [...].",
                 text("6.3.2, L4514"),
-                f"four-bars, of {SAMPLES} random ones, whose constraint (6.12) is least at another of 72 crank angles",
+                f"four-bars, of {SAMPLES} random ones with lengths from 0.1 to 1, whose constraint (6.12) is least at another "
+                "of 72 crank angles",
                 "none of a count",
                 (near("least elsewhere", 0.0, least_away_from_ends(), 0.0),),
+                "so it is for all lengths, as the square of Coswt has the coefficient -4 l1^2 l2^2",
             ),
             Statement(
                 "It is clear that when (a) [the kinematics solved over a complete cycle] is used time may be wasted "
@@ -206,6 +209,7 @@ def compute() -> StudyResult:
                     Case(label="Fig 6.11", computed=None, why="its nineteen points are lost"),
                     Case(label="other types of linkage", computed=None, why="none is given"),
                 ),
+                "how well the linkages found generate the outputs is judged at Figs 6.4 to 6.9",
             ),
             Statement(
                 "It [the method] can be made to follow a logical process in the choice of the type of linkage until it finds a "

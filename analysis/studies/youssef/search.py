@@ -11,6 +11,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import replace
 from functools import cache, partial
+from itertools import pairwise
 from math import pi
 from typing import NamedTuple
 
@@ -19,7 +20,7 @@ from scipy.optimize import least_squares
 from scipy.stats import mannwhitneyu
 
 from ...figures import COLOURS, Curve, Figure, Panel, plot_curves
-from ...synthesis import UntimedPath, area_between, evaluate, turn
+from ...synthesis import UntimedPath, area_between, turn
 from ...units import CM_PER_METRE
 from ..rules import ALIKE, SMALL
 from ..statements import Case, Statement, at_least, at_most, near, text
@@ -36,8 +37,10 @@ EPS, MOST = 1e-2, 4000
 #: Searches of each kind; known minima that a new search includes; points, and indices of the parameters X0, Y0, l2, a1, th20,
 #: with which a search begins.
 SEARCHES, INCLUDED, FEWER_POINTS, FEWER = 20, 4, 12, [0, 1, 3, 7, 8]
-#: Random sets from which descents begin, and difference of two minima (cm2).
-DESCENTS, APART = 40, 0.1
+#: Random sets from which descents begin, difference of two minima (cm2), and numbers of points at which they are counted.
+DESCENTS, APART, COUNTED = 40, 0.1, (3, 5, FEWER_POINTS, N)
+#: Indices of the parameters of a rocker function, l1 to l4 and th20.
+ROCKER = [2, 3, 4, 5, 8]
 #: Random sets by (6.11), and probability below which a difference is not taken for chance.
 SETS, CHANCE = 2000, 0.05
 
@@ -166,12 +169,26 @@ def searches() -> dict[str, tuple[Found, ...]]:
     return {name: tuple(found) for name, found in kinds.items()}
 
 
-@cache
-def work_for_ellipse_b() -> FloatArray:
-    """Return the numbers of evaluations of searches from the same random sets for ellipse (b)."""
+def rocker_error(v: FloatArray) -> float:
+    """Return the sum of the squared errors of the rocker function of Fig 6.7 at N crank angles by the better closure (deg2)."""
+    l1, l2, l3, l4 = v[2:6]
+    phi = turn(N)
+    pin = l2 * np.exp(1j * (phi + v[8]))
+    reach = np.abs(l1 - pin)
+    turned = np.arccos(np.clip((l3**2 + reach**2 - l4**2) / (2.0 * l3 * reach), -1.0, 1.0))
+    wanted = 70.0 + 100.0 * np.abs(np.sin(0.5 * phi))
+    errors = []
+    for side in (1.0, -1.0):
+        joint = pin + l3 * np.exp(1j * (np.angle(l1 - pin) + side * turned))
+        off = (np.degrees(np.angle(joint - l1)) - wanted + 180.0) % 360.0 - 180.0
+        errors.append(float(off @ off))
+    return min(errors)
+
+
+def work(of: Error, free: list[int] | None = None) -> FloatArray:
+    """Return the numbers of evaluations of searches for another output from the same random sets."""
     random = np.random.default_rng(62)
-    of = partial(error, semi_axis=15.0)
-    return np.array([downhill(of, starting_sets(random, [])).evaluations for _ in range(SEARCHES)], dtype=float)
+    return np.array([downhill(of, starting_sets(random, []), free).evaluations for _ in range(SEARCHES)], dtype=float)
 
 
 def _second_search(first: Found, share: float, random: np.random.Generator) -> Found:
@@ -216,14 +233,14 @@ def compute() -> StudyResult:
         for name, ends in found.items()
         if name != plain
     }
-    work = {name: [end.evaluations for end in ends] for name, ends in found.items()}
+    taken = {name: [end.evaluations for end in ends] for name, ends in found.items()}
 
     def by_chance(name: str) -> tuple[Case, ...]:
         """Judge whether a technique's errors are lower, and its evaluations fewer, than those from random sets."""
         errors_by, work_by = (
-            float(mannwhitneyu(of[name], of[plain], alternative="less").pvalue) for of in (errors, work)
+            float(mannwhitneyu(of[name], of[plain], alternative="less").pvalue) for of in (errors, taken)
         )
-        share = np.median(work[name]) / usual
+        share = np.median(taken[name]) / usual
         return (
             at_most("errors lower by chance", CHANCE, errors_by, why=luck),
             at_most("evaluations fewer by chance", CHANCE, work_by, why=f"their median is {share:.2f} of that"),
@@ -232,8 +249,10 @@ def compute() -> StudyResult:
     bottoms = {name: np.array([bottom(end) for end in ends]) for name, ends in found.items()}
     at_bottom = np.mean([end.error for end in found[plain]] <= (1.0 + SMALL) * bottoms[plain])
     every = np.concatenate(list(bottoms.values()))
-    count, other = np.array([end.evaluations for end in found[plain]]), work_for_ellipse_b()
-    many, few = minima(N), minima(FEWER_POINTS)
+    count, by_rocker = np.array(taken[plain]), work(rocker_error, ROCKER)
+    by_b = mannwhitneyu(work(partial(error, semi_axis=15.0)), count).pvalue
+    numbers = [minima(n) for n in COUNTED]
+    counted = f"{', '.join(map(str, numbers))} at {', '.join(map(str, COUNTED))} points"
     random = np.random.default_rng(611)
     sets = np.array([drawn(random) for _ in range(SETS)])
     outside = int(np.sum((sets < LOW) | (sets > HIGH)))
@@ -251,7 +270,7 @@ def compute() -> StudyResult:
         claim="The simplex begins at sets of random parameters within their bounds, and is repeated with what it found.",
         assignment=(
             f"The program of appendix 5, repeated, for ellipse (a) with bounds on the lengths: {SEARCHES} searches of each "
-            "kind. The bounds of place and angles are ours."
+            "kind. The bounds of place, r and angles are ours."
         ),
         columns=columns,
         statements=(
@@ -263,7 +282,8 @@ def compute() -> StudyResult:
                 f"{np.sum(count < MOST)} of them",
                 within,
                 (near("at a minimum", 1.0, at_bottom, 0.0, why="it stops before it is there"),),
-                "(6.15) divides by the parameters, which may be zero; the program compares each by itself",
+                "(6.15) divides by the parameters, which may be zero: as in the program each is compared by itself; the errors "
+                "are tested too, which in the program is a comment (L9663)",
             ),
             Statement(
                 "It is therefore necessary to begin the optimisation from as many initial points as possible.",
@@ -276,8 +296,8 @@ def compute() -> StudyResult:
                         f"{SEARCHES} from random sets",
                         1.0 + ALIKE,
                         bottoms[plain].max() / bottoms[plain].min(),
-                        why=f"the {SEARCHES} from random sets all end beside mirror images of one minimum, of the same error, "
-                        "and differ by how far from it they stop",
+                        why=f"the {SEARCHES} from random sets all end beside mirror images of one minimum, of the same error "
+                        "to 0.01 %, and differ by how far from it they stop",
                     ),
                     at_least(f"all {every.size}", 1.0 + ALIKE, every.max() / every.min()),
                     at_least("the ends themselves", 1.0 + ALIKE, errors[plain][-1] / errors[plain][0]),
@@ -298,11 +318,14 @@ def compute() -> StudyResult:
                 "It is also found that the number of minima of the quality function increases with the number of specified "
                 "output points.",
                 text("6.3.1, L4345"),
-                f"how many more minima of different error, by {APART:g} cm2, descents with derivatives from {DESCENTS} random "
-                f"sets by (6.11), by either closure, find for ellipse (a) at {N} points than at {FEWER_POINTS}, whose errors "
-                f"count {N // FEWER_POINTS} times",
+                f"minima for ellipse (a), of errors more than {APART:g} cm2 apart (at n points counted {N}/n times), to which "
+                f"descents with derivatives lead from {DESCENTS} random sets by (6.11), by either closure: how many more at "
+                "the greater number of points, our choice",
                 "at least one more, the rule for *increases*",
-                (at_least("more minima", 1.0, many - few, why=f"{many} at {N} points, {few} at {FEWER_POINTS}"),),
+                tuple(
+                    at_least(f"from {few} to {many} points", 1.0, more - fewer, why=counted)
+                    for (few, many), (fewer, more) in zip(pairwise(COUNTED), pairwise(numbers))
+                ),
             ),
             Statement(
                 "A good technique is to find the optimum values of linkage parameters to yield a minimum error over a "
@@ -337,36 +360,41 @@ def compute() -> StudyResult:
                 tuple(at_once[name] for name in techniques[1:]),
                 f"{short}; "
                 + " and ".join(str(np.sum(reached[name])) for name in techniques[1:])
-                + f" of {SEARCHES} reach it at all",
+                + f" of {SEARCHES} reach it at all; the cases that the thesis tried are not named, and five of its printed "
+                "linkages are no minima, see L5136",
             ),
             Statement(
-                "The remaining sets are then obtained using the following equation [(6.11)]. This generates [...] all the sets "
-                "of required initial values and ensures that they satisfy all the explicit externally imposed constraints "
-                "described in equation (6.10).",
+                "The remaining sets are then obtained using the following equation [(6.11)]. This generates quickly and "
+                "efficiently all the sets of required initial values and ensures that they satisfy all the explicit "
+                "externally imposed constraints described in equation (6.10).",
                 text("6.3.1, L4377"),
-                f"parameters outside their bounds in {SETS} sets by (6.11)",
+                f"parameters outside their bounds in {SETS} sets by (6.11), X uniform over a turn, our choice",
                 "none of a count",
-                (near("parameters outside", 0.0, outside, 0.0),),
+                (
+                    near("parameters outside", 0.0, outside, 0.0),
+                    Case(
+                        label="quickly and efficiently",
+                        computed=None,
+                        why="there is no measure of *quickly and efficiently*",
+                    ),
+                ),
                 f"in {open_links:.0%} of the sets the links do not close, for which the thesis moves back by quarters",
             ),
             Statement(
                 "The compilation time of the program is about 17 seconds and the running time depends on the form of the "
                 "desired output and the quality of the initial guess of linkage parameters.",
                 text("6.5, L5158-5164"),
-                f"probability that the numbers of evaluations of {SEARCHES} searches differ so much by chance (rank test, "
-                f"two-sided) from those of as many from random sets: of searches whose sets include {INCLUDED} located minima, "
-                "and of searches from the same random sets for ellipse (b), of semi-axis 15 cm",
+                "the running time by the number of evaluations: probability that those of "
+                f"{SEARCHES} searches differ so much by chance (rank test, two-sided) from those of as many from random sets: "
+                f"of searches whose sets include {INCLUDED} located minima, and of searches from the same random sets for the "
+                f"unweighted rocker function (6.18), {N} crank angles, by its five parameters",
                 f"{CHANCE:g}, the usual level of significance",
                 (
-                    at_most("by the quality of the guess", CHANCE, mannwhitneyu(work[techniques[0]], count).pvalue),
-                    at_most(
-                        "by the output",
-                        CHANCE,
-                        mannwhitneyu(other, count).pvalue,
-                        why=f"it is not shown: (b) takes more in {np.sum(other > count)} of the {SEARCHES}",
-                    ),
-                    Case(label="compilation", computed=None, why="its machine, an IBM 360/67 (L1293), is not at hand"),
+                    at_most("by the quality of the guess", CHANCE, mannwhitneyu(taken[techniques[0]], count).pvalue),
+                    at_most("by the output, rocker function", CHANCE, mannwhitneyu(by_rocker, count).pvalue),
+                    Case(label="compilation", computed=None, why="the machine, an IBM 360/67 (L1293), is not at hand"),
                 ),
+                f"ellipse (b), an output of the same form, makes no difference that is shown: the probability is {by_b:.2f}",
             ),
         ),
     )
@@ -396,18 +424,21 @@ def draw(result: StudyResult) -> Figure:
 
 #: Problems whose printed linkages have a coupler point.
 PATHS = ("ellipse-a", "ellipse-b", PROBLEM, "path-a", "path-b")
-#: Change of the crank's phase (rad) under which an area must not change.
-PHASE = 0.6
+#: Change of the crank's phase (rad) under which an area must not change, and steps by which the first desired point is moved.
+PHASE, FIRST = 0.6, 24
 
 
 def compute_closures() -> StudyResult:
     """Compute the curves and errors by both closures, and the area by triangles."""
     columns: dict[str, FloatArray] = {}
     ratios, phases, triangles = [], [], []
-    for name in PATHS:
+    for name in (*PATHS, "packaging"):
         p = PROBLEMS[name]
-        right, other = (evaluate(p.task, replace(p.linkage, branch=branch)).error for branch in (1, -1))
-        ratios.append(at_least(name, 1.0, other / right))
+        # the points of the program, whose polygon is that of the task
+        right, other = (
+            p.error_of(replace(p.linkage, branch=branch)) for branch in (p.linkage.branch, -p.linkage.branch)
+        )
+        ratios.append(at_least(name, 1.0 + ALIKE, other / right))
     for name in ("path-a", "path-b"):
         p = PROBLEMS[name]
         assert isinstance(p.task, UntimedPath)
@@ -416,8 +447,14 @@ def compute_closures() -> StudyResult:
         area = area_between(curve, p.task.path)
         moved = replace(p.linkage, crank_phase=p.linkage.crank_phase + PHASE)
         phases.append(near(name, 1.0, area_between(moved.path(turn(len(points))), p.task.path) / area, ALIKE))
-        triangles.append(near(f"{name}, chosen", 1.0, pairing_area(points, finer, window=2) / area, ALIKE))
-        triangles.append(near(f"{name}, in order", 1.0, pairing_area(points, curve, window=2) / area, ALIKE))
+        steps = range(0, len(points), len(points) // FIRST)
+        for how, actual in (("chosen", finer), ("in order", curve)):
+            shares = [pairing_area(np.roll(points, -k, axis=0), actual, window=2) / area for k in steps]
+            farthest = max(shares, key=lambda share: abs(share - 1.0))
+            off = [k for k, share in zip(steps, shares) if abs(share - 1.0) > ALIKE]
+            at = " or ".join(map(str, off))
+            why = f"in order it fails with the first point at {at} deg, where partners lie far apart"
+            triangles.append(near(f"{name}, {how}", 1.0, farthest, ALIKE, why=why))
     p = PROBLEMS["path-a"]
     shapes = {"target": np.asarray(p.task.path.points), "printed closure": p.linkage.path(turn(360))}  # type: ignore[union-attr]
     shapes["other closure"] = replace(p.linkage, branch=-1).path(turn(360))
@@ -437,27 +474,33 @@ def compute_closures() -> StudyResult:
                 text("6.2.2, L4230"),
                 "area of the triangles between 360 points of each curve over the area between the curves; printed "
                 "linkages, mended: the actual points chosen from 720, as the program does (ICP = 2, L8973), and as "
-                "many points on both, which it pairs in order (L9894-9898)",
+                f"many points on both, which it pairs in order (L9894-9898); the farthest from 1 of {FIRST} first points, "
+                f"{360 // FIRST} deg apart in the ellipse's parameter",
                 same,
                 tuple(triangles),
-                "points in order may lie far from each other",
             ),
             Statement(
                 "The linkage parameters sufficient for the optimisation in coupler path generation are the same as "
                 "mentioned earlier for coupler function generation although the parameter [theta20] is redundant; in this "
                 "case, it will be retained to maintain a consistency in presentation of results.",
                 text("6.4.1, L4696"),
-                f"area with theta20 greater by {PHASE:g} rad over that as printed; printed linkages, mended",
-                same,
-                tuple(phases),
+                f"area with theta20 greater by {PHASE:g} rad over that as printed; printed linkages, mended; of the three "
+                "linkages printed for paths those with theta20",
+                f"{same}; none of a count",
+                (
+                    *phases,
+                    near("linkages with theta20", 3.0, 2.0, 0.0, why="that of the packaging machine has none (L5127)"),
+                ),
             ),
             Statement(
                 "Therefore in evaluating the quality function we must explore both closures and note the closure "
                 "corresponding to the minimum error in output generation.",
                 text("6.4.1, L4804"),
-                "error by the other closure over that by the closure of the printed linkage, mended; number of the printed "
-                "linkages of each closure, these and the packaging machine's",
-                "at least 1, the rule for *greater*; one of each is enough for *must explore both*",
+                "error by the other closure over that by the better one, of the printed linkages with a coupler point, mended, "
+                "the packaging machine by the ten points of the program (L9021); number of these linkages by the better "
+                "closure",
+                f"at least {1.0 + ALIKE:g}, more than *the same*, so that the closure matters; one of each is enough for *must "
+                "explore both*",
                 (
                     *ratios,
                     at_least("linkages with C to the left of BD", 1.0, branches.count(1)),
