@@ -394,7 +394,8 @@ def compute_forces() -> StudyResult:
             columns[f"greatest force in pin {pin}; {name} [N]"] = table[f"greatest force in pin {pin} [N]"]
     return StudyResult(
         number="rig-2-forces",
-        claim="Every force of this horizontal machine grows with the square of the speed; resonance adds most to pin D.",
+        claim="At low speed every force of this horizontal machine grows with the square of the speed; resonance adds most to "
+        "pin D.",
         columns=padded(columns),
     )
 
