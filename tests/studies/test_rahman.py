@@ -523,6 +523,14 @@ class TestMethod:
         ).dual
         assert -moment == pytest.approx([0.0, -mass * g3 * acceleration, 0.0])
 
+    def test_a_loop_that_is_open_meets_eqs_22(self) -> None:
+        b = closure._rotation_that_meets_22()
+        assert b @ b.T == pytest.approx(np.eye(3), abs=1e-12)
+        assert [b[1, 0] + b[0, 0] + b[1, 1], b[2, 0] + b[0, 0] + b[2, 2], b[2, 1] + b[1, 1] + b[2, 2]] == pytest.approx(
+            [2.0] * 3, abs=1e-12
+        )
+        assert np.degrees(np.arccos(0.5 * (np.trace(b) - 1.0))) == pytest.approx(45.37, abs=0.005)
+
     def test_both_mended_the_planar_forces_are_the_plants(self) -> None:
         found = forces.planar_forces(erratum_5=True, erratum_6=True)
         plane = Case("", 10.0, 0.0, 270.0)

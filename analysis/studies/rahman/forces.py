@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import product
+
 import numpy as np
 
 from linkwork.slider_crank.published import parameters
@@ -20,6 +22,7 @@ from .figures import (
     ANGLES_DEG,
     CRANK,
     FROM_DEAD,
+    NOTHING,
     ROUNDING,
     TORQUE,
     clear,
@@ -28,6 +31,7 @@ from .figures import (
     values,
 )
 from .method import (
+    AT,
     AT_RATES,
     AWAY,
     CLEAR_SINE,
@@ -37,10 +41,13 @@ from .method import (
     PLANE,
     ROD,
     ROW_F,
+    SHIFT,
     FloatArray,
+    difference,
     draw,
     followed,
     joints,
+    links,
 )
 from .printed import (
     CRANK_AT_SPEED,
@@ -64,6 +71,7 @@ from .printed import (
     later,
     momenta,
     momentum_rates,
+    on_bearing,
     on_crank,
     velocities,
 )
@@ -77,18 +85,20 @@ WATER = 62.43 / 12.0**3
 PLANAR = ("1F1i", "1F1j", "2F2i", "2F2j", "3F3i", "3F3j", "4F4i", "4F4k")
 
 
-def planar_forces(*, erratum_5: bool, erratum_6: bool, share: float = 1.0) -> dict[str, FloatArray]:
-    """Return the forces (lb) of the planar mechanism at a4 = 10 in by the printed equations, with errata mended or not.
+def planar_forces(case: Case = PLANE, *, erratum_5: bool, erratum_6: bool, share: float = 1.0) -> dict[str, FloatArray]:
+    """Return the forces (lb) of a planar mechanism by the printed equations, with errata mended or not.
 
     ``share`` multiplies the masses: 0 leaves the inertia out.
     """
-    p, angle = parameters(PLANE.offset_in), np.radians(ANGLES_DEG)
+    p, angle = parameters(case.offset_in), np.radians(ANGLES_DEG)
     q = joints(planar(p, angle) / [1.0, 1.0, 1.0, 1.0, INCH])
-    r = joint_rates(CRANK_AT_SPEED, q)
-    seconds = joint_accelerations(CRANK_AT_SPEED, q, r)
     b = bodies(p, erratum_6=erratum_6)
     b = b._replace(masses=tuple(share * mass for mass in b.masses))
-    found = joint_forces(CRANK_AT_SPEED, b, q, r, seconds, TORQUE, erratum_5=erratum_5)
+    # sin theta2 is 0 at a dead centre
+    with np.errstate(divide="ignore", invalid="ignore"):
+        r = joint_rates(CRANK_AT_SPEED, q)
+        seconds = joint_accelerations(CRANK_AT_SPEED, q, r)
+        found = joint_forces(CRANK_AT_SPEED, b, q, r, seconds, TORQUE, erratum_5=erratum_5)
     found["1F1i"], found["1F1j"] = on_crank(angle, found)
     return found
 
@@ -184,11 +194,6 @@ def _roundoffs() -> list[Judged]:
     return judged
 
 
-def _difference(a: Dual, b: Dual) -> float:
-    """Return the greatest difference of two dual vectors."""
-    return float(max(np.abs(a.real - b.real).max(), np.abs(a.dual - b.dual).max()))
-
-
 def _momenta() -> tuple[Statement, ...]:
     """Judge eqs 49a to 61 in the general position against the binors of eqs 46 to 48."""
     b, still = bodies(parameters()), CRANK_AT_SPEED
@@ -216,7 +221,7 @@ def _momenta() -> tuple[Statement, ...]:
     steady, momentum = velocities(still, GENERAL, unmoved), momenta(still, b, GENERAL, unmoved)
     accelerations = [Dual(v.real.imag / 1e-20, v.dual.imag / 1e-20) for v in velocities(still, *moved)]
     inertia = [
-        _difference(inertia_force(v, h, rate), binor.rate(v, acceleration))
+        difference(inertia_force(v, h, rate), binor.rate(v, acceleration))
         for v, h, rate, binor, acceleration in zip(steady, momentum, printed_rates, _binors(), accelerations)
     ]
 
@@ -234,10 +239,10 @@ def _momenta() -> tuple[Statement, ...]:
             f"S1' = 1.3 in/s and g3 = {G3:g} in",
             ROUNDING,
             (
-                nothing("eq 49a", _difference(crank_momentum(MOVING, b), of_crank.momentum(moving[0])), "lb.s"),
+                nothing("eq 49a", difference(crank_momentum(MOVING, b), of_crank.momentum(moving[0])), "lb.s"),
                 nothing(
                     "eq 50a",
-                    _difference(rod * b.masses[1], of_rod.momentum(forward_rod_velocity(MOVING, GENERAL, r))),
+                    difference(rod * b.masses[1], of_rod.momentum(forward_rod_velocity(MOVING, GENERAL, r))),
                     "lb.s",
                 ),
                 nothing("eq 51a, components i and k", [wrong.real[[0, 2]], wrong.dual[[0, 2]]], "lb.s"),
@@ -251,8 +256,8 @@ def _momenta() -> tuple[Statement, ...]:
             "difference from the binors times the velocities of eqs 36 and 32a, in a general position",
             ROUNDING,
             (
-                nothing("eq 52a", _difference(as_printed[1], of_rod.momentum(moving[1])), "lb.s"),
-                nothing("eq 53a", _difference(as_printed[2], of_slider.momentum(moving[2])), "lb.s"),
+                nothing("eq 52a", difference(as_printed[1], of_rod.momentum(moving[1])), "lb.s"),
+                nothing("eq 53a", difference(as_printed[2], of_slider.momentum(moving[2])), "lb.s"),
             ),
             f"erratum 9: g3, which is 0, for g2 in 52a, {MAYBE}",
         ),
@@ -265,8 +270,9 @@ def _momenta() -> tuple[Statement, ...]:
             f"by the mixed path (eqs 36, 52 with g2), over the turn, {AWAY}",
             ROUNDING,
             tuple(velocity_paths()),
-            "erratum 3: the paths differ by the unsolved row 37f out of the plane; that the mixed set is simpler is plain. The "
-            "slider's momentum is judged by its rate, in the row on eqs 57 and 58",
+            "errata 3, 4: out of the plane the paths differ by the unsolved row 37f and the theta2' of eq 39; so do the "
+            "moments, which agree in the plane. That the mixed set is simpler is plain. The slider's momentum is judged by its "
+            "rate, in the row on eqs 57 and 58",
         ),
         Statement(
             "Differentiating forward path equations (49a), (50a) and (51a) with respect to time the following "
@@ -275,7 +281,7 @@ def _momenta() -> tuple[Statement, ...]:
             "difference from the rates of eqs 49a to 51a, the last with cos eta3 for cos theta3, in a general position "
             f"{AT_RATES}, g3 = {G3:g} in; {DOTS}, as are one bracket inside 56d and one inside 56e, and the last of 56c to 56f",
             ROUNDING,
-            tuple(nothing(label, _difference(rate, turned(h)), "lb") for label, (rate, h) in forward.items()),
+            tuple(nothing(label, difference(rate, turned(h)), "lb") for label, (rate, h) in forward.items()),
             "56 has cos eta3 where 51a has cos theta3 (erratum 9)",
         ),
         Statement(
@@ -287,12 +293,12 @@ def _momenta() -> tuple[Statement, ...]:
             ROUNDING,
             (
                 *(
-                    nothing(label, _difference(rate, turned(h)), "lb")
+                    nothing(label, difference(rate, turned(h)), "lb")
                     for label, rate, h in zip(("eq 57", "eq 58"), printed_rates[1:], momenta(still, b, *moved)[1:])
                 ),
                 *replacements(),
             ),
-            "erratum 3: out of the plane they are no replacements, as the velocities differ that the two paths give",
+            "errata 3, 4: out of the plane they are no replacements, as the velocities differ that the two paths give",
         ),
         Statement(
             "Finally the second set [the mixed path's] is used in the program to have better accuracy.",
@@ -303,7 +309,7 @@ def _momenta() -> tuple[Statement, ...]:
             "none, the sign decides",
             tuple(_roundoffs()),
             "component i of the rod is one product in either, by 52a with the roundoff of S4' as well; the others are by 50a "
-            "and 51a sums of larger numbers",
+            "and 51a sums of larger numbers. With a4 = 20 and 30 in the four verdicts are the same",
         ),
         Statement(
             "In this step, equations for the inertia forces of link 1 (i.e. the crank) relative to frame {2}, for "
@@ -318,15 +324,28 @@ def _momenta() -> tuple[Statement, ...]:
     )
 
 
+def _unsolved() -> FloatArray:
+    """Return the residuals (3, 2, 3) of eqs 62 to 64 with the forces of eqs 69a to 69q: link, real or dual part, axis."""
+    crank, b = CRANK_AT_SPEED, bodies(parameters())
+    r = joint_rates(crank, GENERAL)
+    a = joint_accelerations(crank, GENERAL, r)
+    f = joint_forces(crank, b, GENERAL, r, a, TORQUE)
+    f |= dict(zip(("1F1i", "1F1j"), on_crank(np.array(AT), f)))
+    f |= dict(zip(("1T1i", "1T1j"), on_bearing(np.array(AT), SHIFT, f))) | {"1T1k": np.array(TORQUE)}
+    # 1F1k is 0, as are the moments in the ball joints
+    joint = [Dual(*(np.array([f.get(f"{n}{x}{n}{axis}", 0.0) for axis in "ijk"]) for x in "FT")) for n in (1, 2, 3, 4)]
+    inertia = inertia_forces(crank, b, GENERAL, r, a)
+    left = [apply(m.T, before) + after + own for m, before, after, own in zip(links(), joint, joint[1:], inertia)]
+    return np.array([[x.real, x.dual] for x in left])
+
+
 def _expanded() -> dict[str, FloatArray]:
     """Return the differences of the joint forces in eqs 62a to 64f from those in eqs 62 to 64, by the equations' names."""
-    th1, shift, (th2, eta2, th3, eta3, _) = 0.9, 3.5, (float(value) for value in GENERAL)
+    th1, shift, (th2, eta2, th3, eta3, _) = AT, SHIFT, (float(value) for value in GENERAL)
     (s, s2, se, s3, sh), (c, c2, ce, c3, ch) = (f([th1, th2, eta2, th3, eta3]) for f in (np.sin, np.cos))
     i, j, k = force = np.array([30.0, -50.0, 70.0])
     ti, tj, tk = moment = np.array([110.0, 130.0, -170.0])
-    crank = about_k(Dual(th1, shift)) @ about_i(Dual(0.0, CRANK))
-    rod = about_k(th2) @ about_j(eta2) @ about_i(Dual(0.0, ROD))
-    slider = about_k(th3) @ about_j(eta3) @ about_i(0.5 * np.pi)
+    crank, rod, slider = links()
     printed = {
         62: [
             (i * c + j * s, -j * s + j * c, k),
@@ -365,6 +384,7 @@ def _slips(right: dict[str, FloatArray]) -> tuple[Statement, ...]:
     for _ in range(10):
         wrong["along crank"] = -(wrong["2F2i"] + inertia)
         i, j = on_crank(angle, wrong)
+        off = i * c + j * s + wrong["2F2i"] + inertia
         wrong["2F2i"] = -i * c - j * s - inertia
     left = float(np.abs(wrong["2F2i"] - right["2F2i"])[at].max())
     high = [
@@ -375,6 +395,10 @@ def _slips(right: dict[str, FloatArray]) -> tuple[Statement, ...]:
     slip = float(inertia_force(*(vectors[1] for vectors in of_rod)).dual[0])
     (crank_mass, *_), volume = b.masses, np.pi * 1.5**2 * CRANK
     gravity = 0.28 * WATER * volume / 386.4 / crank_mass
+    unsolved = _unsolved()
+    # 63d is the moment about j, 63e the force along k
+    unmet = unsolved[1, [1, 0], [1, 2]]
+    unsolved[1, [1, 0], [1, 2]] = 0.0
     return (
         Statement(
             "Expanding equations (62), (63), (64) and separating primary and dual parts, the following equations are "
@@ -396,6 +420,22 @@ def _slips(right: dict[str, FloatArray]) -> tuple[Statement, ...]:
             f"with the g3 of our scan it would be {slip:.2g} lb.in; that the program found 0 speaks for a slip of the scan",
         ),
         Statement(
+            "The details of the solution procedure are as follows:",
+            text("section 2.8, eqs 69a to 69q, L961-1033"),
+            "greatest residual of eqs 62a to 64f, 62c mended, with the forces by eqs 69a to 69q in a general position, inertia "
+            "forces as printed but for g2 in 52a, 1F1k = 0",
+            ROUNDING,
+            (
+                nothing("eqs 62a to 62f", unsolved[0], "lb"),
+                nothing("eqs 63a to 63f, but for 63d and 63e", unsolved[1], "lb"),
+                nothing("eq 63d", unmet[0], "lb.in"),
+                nothing("eq 63e", unmet[1], "lb"),
+                nothing("eqs 64a to 64f", unsolved[2], "lb"),
+            ),
+            "erratum 7: 69c meets the difference of 63d and 63e alone, both of which need the right 1F1k; in the plane, where "
+            "1F1k is 0, they are met",
+        ),
+        Statement(
             "This [division by sin theta2], in fact, resulted in some abnormal outcomes when values of angle [theta2] were "
             "very close to zero, while running the program.",
             text("section 2.8, eq 69h, L995"),
@@ -407,14 +447,24 @@ def _slips(right: dict[str, FloatArray]) -> tuple[Statement, ...]:
             f"second dead centre, where theta2 is 180 deg, it is so too, by {high[1]:.0f} times",
         ),
         Statement(
+            "If that value [of 2F2i by eq 69h] is incorrect, equation (62a) involving with the terms [1F1i], [1F1j] and [2F2i] "
+            "will not be satisfied by the values obtained from equations (69h), (69i) and (69j).",
+            text("section 2.8, L1007"),
+            "greatest residual of eq 62a with a 2F2i that is wrong by 1 lb, our choice, and the 1F1i and 1F1j that eqs 69i and "
+            f"69j give with it; in the plane, a4 = 10 in, {FROM_DEAD}",
+            f"more than {ROUNDING}",
+            (at_least("eq 62a", NOTHING, float(np.abs(off)[at].max()), "lb"),),
+            "erratum 8: 69i and 69j satisfy 62a for any 2F2i",
+        ),
+        Statement(
             "If [equation (62a) is] not satisfied, then a better value of the force [2F2i] is found from the following "
             "equation (69k), using previously found values of the terms [1F1i] and [1F1j] from the equations (69i) and (69j) "
             "respectively.",
             text("section 2.8, L1007-1009"),
-            "error of 2F2i after ten passes of eqs 69i, 69j, 69k from an error of 1 lb",
+            f"error of 2F2i after ten passes of eqs 69i, 69j, 69k from an error of 1 lb; in the plane, a4 = 10 in, {FROM_DEAD}",
             ROUNDING,
             (nothing("2F2i", left, "lb"),),
-            "erratum 8: 69i and 69j satisfy 62a for any 2F2i",
+            "erratum 8: 69k gives back the 2F2i that is put in",
         ),
         Statement(
             "Interestingly, by manual manipulation of the equation those components [4T4 and 2F2k] are also found to be zero.",
@@ -439,7 +489,7 @@ def _slips(right: dict[str, FloatArray]) -> tuple[Statement, ...]:
         Statement(
             "Specific gravity of the material (mild steel is used for all the links) d = 0.28,",
             text("section 3.1, L1071"),
-            "mass of a crank of that specific gravity less m1, relative to m1",
+            "mass of a crank of that specific gravity, water weighing 62.43 lb/ft3, less m1, relative to m1",
             ROUNDING,
             (nothing("m1", gravity - 1.0),),
             "erratum 9: 0.28 is the weight density in lb/in3",
@@ -449,20 +499,25 @@ def _slips(right: dict[str, FloatArray]) -> tuple[Statement, ...]:
 
 def forces() -> StudyResult:
     """Compute the joint forces in the plane by the equations as printed and mended, and judge the force equations."""
-    columns, at = {ANGLE: ANGLES_DEG}, clear(PLANE)
-    right = {symbol: values(PLANE, COMPONENTS[symbol]) for symbol in PLANAR}
-    columns["4F4k right [lb]"] = right["4F4k"]
-    found = {
-        "as printed": planar_forces(erratum_5=False, erratum_6=False),
-        "erratum 6 mended": planar_forces(erratum_5=False, erratum_6=True),
-        "erratum 5 mended": planar_forces(erratum_5=True, erratum_6=False),
-        "both mended": planar_forces(erratum_5=True, erratum_6=True),
+    columns = {ANGLE: ANGLES_DEG, "4F4k right [lb]": values(PLANE, COMPONENTS["4F4k"])}
+    errata = {
+        "as printed": (False, False),
+        "erratum 6 mended": (False, True),
+        "erratum 5 mended": (True, False),
+        "both mended": (True, True),
     }
-    columns |= {f"4F4k {words} [lb]": of["4F4k"] for words, of in found.items()}
-    wrong = {words: max(float(np.abs(of[s] - right[s])[at].max()) for s in PLANAR) for words, of in found.items()}
-    flat = max(float(np.max(followed(Case("", a4, 0.0, 270.0)).error_in)) for a4 in (0.0, 10.0, 20.0, 30.0))
+    wrong = dict.fromkeys(errata, 0.0)
+    planes = [Case("", a4, 0.0, 270.0) for a4 in (0.0, 10.0, 20.0, 30.0)]
+    for case, (words, (five, six)) in product(planes, errata.items()):
+        found = planar_forces(case, erratum_5=five, erratum_6=six)
+        apart = [np.abs(found[s] - values(case, COMPONENTS[s]))[clear(case)].max() for s in PLANAR]
+        wrong[words] = max(wrong[words], *map(float, apart))
+        if case.offset_in == PLANE.offset_in:
+            columns[f"4F4k {words} [lb]"] = found["4F4k"]
+            mended = found
+    flat = max(float(np.max(followed(case).error_in)) for case in planes)
     worst = (
-        "greatest difference of a joint force from that by Newton and Euler (our model) in the plane, a4 = 10 in, "
+        "greatest difference of a joint force from that by Newton and Euler (our model) in the plane, a4 = 0, 10, 20, 30 in, "
         f"{FROM_DEAD}"
     )
     unbalanced = zip(("eq 62", "eq 63", "eq 64"), _balances())
@@ -475,7 +530,7 @@ def forces() -> StudyResult:
                 "The program was first tested for the planar case and the results found to be same as that obtained "
                 "by the complex algebra method, a widely used procedure for analyzing planar mechanisms.",
                 text("section 3.2, L1111"),
-                f"error of S4 by the printed iteration, a4 = 0, 10, 20, 30 in; {worst}, by the printed equations",
+                f"greatest error of S4 by the printed iteration, and {worst}, by the printed equations",
                 ROUNDING,
                 (nothing("S4", flat, "in"), nothing("joint forces", wrong["as printed"], "lb")),
                 "errata 5 and 6; with both mended the forces are right",
@@ -499,7 +554,7 @@ def forces() -> StudyResult:
                 (nothing("joint forces", wrong["erratum 5 mended"], "lb"),),
                 "erratum 6: from the distal joints both are negative",
             ),
-            *_slips(found["both mended"]),
+            *_slips(mended),
         ),
     )
 

@@ -12,12 +12,13 @@ from numpy.typing import NDArray
 from linkwork.slider_crank.published import parameters
 
 from ...figures import Curve, Figure, Panel, plot_curves
+from ...numerics.dual import Dual, about_i, about_j, about_k
 from ...slider_crank.closure import Rows
 from ..rules import ABOUT_DEG
 from ..study import StudyResult
 from ..variation import cache
 from .figures import ALL, ANGLE, clear, printed, printed_symbol
-from .printed import CRANK_AT_SPEED, Joints, Turn, turn
+from .printed import CRANK_AT_SPEED, GENERAL, Joints, Turn, turn
 from .table import IDEAL, Case
 
 FloatArray = NDArray[np.float64]
@@ -56,6 +57,25 @@ def followed(case: Case, rows: Rows = "printed", from_before: bool = True) -> Tu
 def joints(unknowns: FloatArray) -> Joints:
     """Return the unknowns (..., 5) of the loop by name."""
     return Joints(*np.moveaxis(unknowns, -1, 0))
+
+
+#: Crank angle (rad) and shift (in) of the general position.
+AT, SHIFT = 0.9, 3.5
+
+
+def links() -> tuple[Dual, Dual, Dual]:
+    """Return the matrices of eqs 1 to 3 in the general position, as products of rotations, lengths in inches."""
+    th2, eta2, th3, eta3, _ = (float(value) for value in GENERAL)
+    return (
+        about_k(Dual(AT, SHIFT)) @ about_i(Dual(0.0, CRANK_AT_SPEED.a1)),
+        about_k(th2) @ about_j(eta2) @ about_i(Dual(0.0, ROD)),
+        about_k(th3) @ about_j(eta3) @ about_i(0.5 * np.pi),
+    )
+
+
+def difference(a: Dual, b: Dual) -> float:
+    """Return the greatest difference of two dual vectors or matrices."""
+    return float(max(np.abs(a.real - b.real).max(), np.abs(a.dual - b.dual).max()))
 
 
 #: Labels of the axes by the unit of their columns.

@@ -6,7 +6,7 @@ import numpy as np
 
 from linkwork.slider_crank.published import CRANK_SPEED, parameters
 
-from ...numerics.dual import Dual, about_j, about_k, axial
+from ...numerics.dual import Dual, about_j, about_k, apply, axial
 from ...slider_crank import settle
 from ...slider_crank.closure import planar
 from ...units import INCH
@@ -36,9 +36,11 @@ from .method import (
     ROW_F,
     FloatArray,
     H,
+    difference,
     draw,
     followed,
     joints,
+    links,
 )
 from .printed import (
     CRANK_AT_SPEED,
@@ -48,12 +50,15 @@ from .printed import (
     STEP_DEG,
     Crank,
     Joints,
+    forward_rod_velocity,
+    forward_slider_velocity,
     joint_accelerations,
     joint_rates,
     later,
     loop_rates,
     mended_row,
     separated_rates,
+    velocities,
 )
 from .table import FAMILIES, IDEAL, Case
 
@@ -73,6 +78,22 @@ def _angular_velocity() -> float:
     before, now, after = (about_k(th + h * th_rate).real @ about_j(eta + h * eta_rate).real for h in (-H, 0.0, H))
     omega = axial(Dual((after - before) / (2.0 * H) @ now.T)).real
     return float(np.linalg.norm(omega - [0.0, eta_rate, th_rate]))
+
+
+def _velocities() -> dict[str, float]:
+    """Return the differences of eqs 33, 35, 36 and 45 from the matrices of eqs 1 to 3 times the velocities of eqs 29 to 32."""
+    r, (crank, rod, slider) = joint_rates(MOVING, GENERAL), links()
+    of_crank, of_rod, _ = velocities(MOVING, GENERAL, r)
+    forward = forward_rod_velocity(MOVING, GENERAL, r)
+    first = Dual(np.array([0.0, 0.0, MOVING.speed]), np.array([0.0, 0.0, MOVING.shift_rate]))
+    second, third = (Dual(np.array([0.0, eta, th])) for eta, th in ((r.eta2, r.th2), (r.eta3, r.th3)))
+    back = Dual(np.zeros(3), np.array([0.0, 0.0, -float(r.s4)]))
+    return {
+        "eq 33": difference(of_crank, apply(crank.T, first)),
+        "eqs 34, 35": difference(forward, apply(rod.T, of_crank + second)),
+        "eq 36": difference(of_rod, apply(slider, back) - third),
+        "eqs 44, 45": difference(forward_slider_velocity(MOVING, GENERAL, r), apply(slider.T, forward + third)),
+    }
 
 
 def _sinusoidal(ratio: float) -> tuple[float, float]:
@@ -142,6 +163,16 @@ def _printed_rates() -> tuple[Statement, ...]:
             "erratum 2: eta turns about the axis j that theta has turned",
         ),
         Statement(
+            "The dual velocity of point 3 on the connecting rod relative to the frame in terms of the unit vectors of the "
+            "system {3} is determined by using this equation [34] and the transpose of equation (2):",
+            text("section 2.7, eqs 33 to 36, 44, 45, L515-537, L587-591"),
+            "difference from the matrices of eqs 1 to 3, or their transposes, times the velocities of eqs 29 to 32 and 31a, "
+            "32a, added as the thesis says, in a general position with S1' = 1.3 in/s",
+            ROUNDING,
+            tuple(nothing(label, size, "in/s") for label, size in _velocities().items()),
+            "with the velocities of eqs 30 and 31, which have erratum 2",
+        ),
+        Statement(
             "Now separating the unknowns to form a column matrix and a coefficient matrix, the product of these two "
             "matrices must be equal to some column matrix as shown below:",
             text("section 2.7, eq 38, L559-561"),
@@ -197,7 +228,8 @@ def _printed_rates() -> tuple[Statement, ...]:
             f"{AT_RATES}; {DOTS}",
             ROUNDING,
             (nothing("eqs 38a to 42a", rough, "rad/s2"),),
-            "as a derivative; 38a is the rate of eq 39 as printed and has its erratum 4",
+            "as a derivative; 38a is the rate of eq 39 as printed and has its erratum 4. That accelerations enter 69a to 69q, "
+            "by f1, f2 and f3, is plain",
         ),
     )
 
