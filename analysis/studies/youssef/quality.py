@@ -132,6 +132,12 @@ def least_away_from_ends() -> int:
     return int((found.min(axis=1) < found[:, [0, 36]].min(axis=1) - 1e-12).sum())
 
 
+def wrong_by_extremes() -> int:
+    """Count the random four-bars of which the two extremes say otherwise than all crank angles whether they close."""
+    closes = arguments() >= 0.0
+    return int((closes[:, [0, 36]].all(axis=1) != closes.all(axis=1)).sum())
+
+
 def late_violations() -> float:
     """Return the share of the random four-bars that close at the first crank angle, but not at every later one."""
     found = arguments()
@@ -191,11 +197,19 @@ def compute() -> StudyResult:
             ),
             Statement(
                 "It is clear that when (a) [the kinematics solved over a complete cycle] is used time may be wasted "
-                "in solving the system equations if the constraints are violated at later stages in the crank cycle.",
-                text("6.3.2, L4541"),
-                "share of the four-bars among them that close at first and not at a later of 72 crank angles",
-                f"one of the {SAMPLES}, enough for *may be*",
-                (at_least("close at first only", 1.0 / SAMPLES, late),),
+                "in solving the system equations if the constraints are violated at later stages in the crank cycle. However, "
+                "(b) [the constraint (6.14)] is a straightforward evaluation of a constant relation and it is clearly "
+                "preferable.",
+                text("6.3.2, L4541-4549"),
+                "share of the four-bars among them that close at first and not at a later of 72 crank angles; number of them "
+                "of which (6.14) says otherwise than all these angles; values of (6.12) for (6.14) over those for a whole "
+                "cycle",
+                f"one of the {SAMPLES}, enough for *may be*; none of a count; at most 1, since it is preferable",
+                (
+                    at_least("close at first only", 1.0 / SAMPLES, late),
+                    near("not the same", 0.0, wrong_by_extremes(), 0.0),
+                    at_most("values by (b) over (a)", 1.0, 2.0 / 72.0),
+                ),
             ),
             Statement(
                 "The method described can find a planar linkage to generate a given output. It can [deal] with any type of "
