@@ -257,17 +257,18 @@ def to_the_letter(given: SliderEquation) -> tuple[tuple[float, float], ...]:
 
 def zeroth_boundary() -> tuple[Case, ...]:
     """Count the boundaries near lambda_k^2 = 0, and take the multipliers on both sides of the zeroth."""
-    count, above, below = [], [], []
+    counts: list[int] = []
+    sides: dict[float, list[float]] = {1.5: [], 0.5: []}
     for ratio in COMPARED:
         found = equation(chapter_4(ratio))
         boundaries = boundary_stiffnesses(found, 1, count=3).real
-        count.append(np.count_nonzero(boundaries < 0.5))
-        for factor, values in ((1.5, above), (0.5, below)):
-            values.append(np.abs(hill_multipliers(found.stiffened(factor * boundaries[0]))).max())
+        counts.append(int(np.count_nonzero(boundaries < 0.5)))
+        for factor, sizes in sides.items():
+            sizes.append(float(np.abs(hill_multipliers(found.stiffened(factor * boundaries[0]))).max()))
     return (
-        near("boundaries", 1.0, max(count), 0.0),
-        at_most("multiplier above the boundary", 1.0 + 1e-9, max(above)),
-        at_most("multiplier below the boundary", 1.0 + 1e-9, min(below)),
+        near("boundaries", 1.0, max(counts), 0.0),
+        at_most("multiplier above the boundary", 1.0 + 1e-9, max(sides[1.5])),
+        at_most("multiplier below the boundary", 1.0 + 1e-9, min(sides[0.5])),
     )
 
 
