@@ -375,7 +375,7 @@ def compute() -> StudyResult:
             Statement(
                 "Assuming a solution of [zeta] as described in (4.30) and substituting it in equation (4.29), then multiplying "
                 "and equating the coefficients of the trig[o]nometric functions of [theta] on both sides of that equation in a "
-                "similar manner to the preceding section, we obtain the following recurrence relationships, [(4.34)]",
+                "similar manner to the preceding section, we obtain ... [(4.34)]",
                 text("4.4.2, eqs (4.34), (4.35), L3053-3099"),
                 f"{solution}; with a damper of omega_c = 1.2 1/s, the greatest of appendix 2",
                 f"{ROUNDING:g}, above rounding errors",
