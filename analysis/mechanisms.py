@@ -145,7 +145,7 @@ def _faults_of_equations(m: Mechanism) -> Iterator[str]:
             yield f"the constants are a {type(p).__name__}: they must be a NamedTuple"
             return
         u = (0.0,) * len(m.channels)
-        acting = m.idle(p)
+        acting = m.idle_inputs(p)
         for what, size, found in (
             ("outputs", len(m.output_names), e.outputs(x, acting, 0.0, p)),
             ("derivative", m.size, e.derivative(x, acting, p)),
@@ -163,7 +163,7 @@ def _faults_of_drawing(m: Mechanism) -> Iterator[str]:
     known = m.first_set
     p, x = known.parameters.constants(), m.state(known.initial)
     names = [joint.name for joint in m.drawing.joints]
-    found = m.drawing.positions(x, m.idle(p), p)
+    found = m.drawing.positions(x, m.idle_inputs(p), p)
     if len(found) != 3 * len(names):
         yield f"its picture has {len(found)} coordinates of {len(names)} joints: it must have three of each"
     parameters = {v.name for v in m.variables if v.causality == "parameter" and v.kind == "Real"}

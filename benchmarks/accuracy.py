@@ -70,7 +70,7 @@ def right_hand_side(parameters: Parameters, inputs: Inputs, states: NDArray[np.f
     """Return the time of one compiled right-hand side (s), evaluated at states without forces one after the other."""
     mechanism = mechanism_of(parameters)
     p = parameters.constants()
-    equation = machine(mechanism, mechanism.switched(p)).addresses[DERIVATIVE]
+    equation = machine(mechanism, mechanism.is_switched_on(p)).addresses[DERIVATIVE]
     modes = np.array([*encode(inputs, mechanism).modes.values()], dtype=float)
     arguments = (equation, modes, np.array([*p, 0.0]), states, np.zeros(len(mechanism.channels)))
     return best_time(lambda: _in_turn(*arguments), 20) / len(states)

@@ -37,7 +37,7 @@ def in_process(tolerance: float) -> Trajectory:
 
 def acting(torque: float) -> dynamics.Inputs:
     """Return the plant's inputs: a torque on the crank, the shift held."""
-    return dynamics.applied((0.0, 1.0), (torque, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0), PARAMETERS.constants())
+    return dynamics.apply_inputs((0.0, 1.0), (torque, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0), PARAMETERS.constants())
 
 
 def by_scipy(method: str, tolerance: float) -> np.ndarray:
@@ -91,7 +91,7 @@ def runs() -> None:
 
 def _scalar_turn() -> None:
     p = PARAMETERS.constants()
-    inputs = dynamics.applied((1.0, 1.0), (0.0,) * 7, p)
+    inputs = dynamics.apply_inputs((1.0, 1.0), (0.0,) * 7, p)
     for angle in ANGLES.tolist():
         x = (angle, INITIAL.shift_position, INITIAL.crank_speed, 0.0, 0.0, 0.0)
         q = position(x[0], x[1], p)

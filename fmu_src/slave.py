@@ -125,7 +125,7 @@ class LinkworkSlave(Fmi2Slave):
         values = dict(zip(self._names, self._values))
         own, master = values["solver.tolerance"], self._master_tolerance
         tolerance = own if master is None else min(own, max(master, TOLERANCE_RANGE[0]))
-        return Plant.of_values(self.mechanism, values, tolerance=tolerance, time=self._start_time)
+        return Plant.from_values(self.mechanism, values, tolerance=tolerance, time=self._start_time)
 
     # Lifecycle
 

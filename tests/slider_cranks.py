@@ -86,7 +86,7 @@ class Case(NamedTuple):
 
     def under(self, drive: str) -> dynamics.State:
         """The state as one of `DRIVES` has it: a groove determines shift and axial velocity."""
-        return dynamics.grooved(self.state, DRIVES[drive][2], self.p)
+        return dynamics.impose_groove(self.state, DRIVES[drive][2], self.p)
 
 
 def draw(uniform: Uniform, choose: Callable[[], bool]) -> Case:

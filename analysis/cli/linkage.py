@@ -52,7 +52,7 @@ def linkage(file: str, equations: bool, out: str, animation: bool) -> None:
 
 def _print_structure(package: Package) -> None:
     """Print the number of bodies, joints and freedoms, and the steps that give the positions of the bodies."""
-    from ..linkages import Dyad, Geared, Racked
+    from ..linkages import Dyad, GearStep, RackStep
 
     d, structure = package.description, package.structure
     lost = 3 * len(structure.bodies) - len(structure.freedoms)
@@ -67,9 +67,9 @@ def _print_structure(package: Package) -> None:
             outer = " and ".join(side.joint.name for side in step.sides)
             bodies = ", ".join(step.bodies)
             rows.append((bodies, f"dyad {step.kind}", f"held at {outer}, joined at {step.inner.name}"))
-        elif isinstance(step, Geared):
+        elif isinstance(step, GearStep):
             rows.append((step.body, "gear", f"pinned at {step.pin.name}, geared to {step.mate}"))
-        elif isinstance(step, Racked):
+        elif isinstance(step, RackStep):
             by = "rack" if step.turns else "gear"
             rows.append((step.body, step.rack, f"held at {step.joint.name}, moved by the {by} {step.mate}"))
         else:

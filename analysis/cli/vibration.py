@@ -123,7 +123,7 @@ def resonance(
     parameters, title = chosen.case.parameters, chosen.case.title
     mechanism = mechanism_of(parameters)
     # if there are several cranks, the case says which are commanded; the ratios of their speeds are kept
-    vary = vary or default_variable(mechanism, chosen.drive() if len(mechanism.cyclic) > 1 else None)
+    vary = vary or default_variable(mechanism, chosen.drive() if len(mechanism.cyclic_freedoms) > 1 else None)
     over_speed = vary in speed_names(mechanism)
     if over_speed and chosen.speed is not None:
         raise click.UsageError(

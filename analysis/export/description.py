@@ -291,7 +291,7 @@ def _value(variable: Variable, start: float | int | str) -> dict[str, str]:
 def started(mechanism: Mechanism) -> Plant:
     """Return the plant of a mechanism at its start, with the start values of all parameters and inputs."""
     values = {v.name: v.start for v in mechanism.variables}
-    return Plant.of_values(mechanism, values, time=mechanism.experiment[0])
+    return Plant.from_values(mechanism, values, time=mechanism.experiment[0])
 
 
 # Structure

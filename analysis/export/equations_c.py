@@ -82,7 +82,7 @@ def _switched_calls(mechanism: Mechanism, numbers: int) -> str:
     With the switch on, the solution that the equations contain, an array of ``numbers``, is computed once and passed to the
     function that needs it. Derivatives are always those with the switch on, because the constants may change too.
     """
-    on = f"arg[3][{mechanism.switch_place}] != 0.0"
+    on = f"arg[3][{mechanism.switch_index}] != 0.0"
     sides = "(const double** arg, double** res, int* iw, double* w, int mem)"
     pair = f"return ({on} ? equations_clearance_on : equations_clearance_off)(arg, res, iw, w, mem);"
     text = f"\nint equations_clearance{sides} {{\n  {pair}\n}}\n"
@@ -226,7 +226,7 @@ def _with_solution(
     casadi = symbolic.library()
     found: dict[str, tuple[Any, Any]] = {}
 
-    def settled(solution: tuple[Any, ...]) -> tuple[Any, ...]:
+    def mark_converged(solution: tuple[Any, ...]) -> tuple[Any, ...]:
         expressions = casadi.vertcat(*solution)
         # outputs and derivative have the same solution: it gets the same symbols
         graph = str(casadi.Function("solution", [s.x, s.modes, s.u, s.p], [expressions], {"cse": True}).serialize())
@@ -239,11 +239,11 @@ def _with_solution(
         k = k._replace(**{mechanism.switch: float(switched)})
     modes, channels = (tuple(casadi.vertsplit(v)) if v.numel() else () for v in (s.modes, s.u))
     others = {"sqrt": lambda value: casadi.sqrt(value + TINY)} if smooth else {}
-    functions = symbolic.traced(mechanism.modules, settled=settled, **others)
+    functions = symbolic.traced(mechanism.modules, mark_converged=mark_converged, **others)
     x = tuple(casadi.vertsplit(s.x))
 
     def traced(what: str, *further: Any) -> Any:
-        acting = functions.of(mechanism.equations.applied)(modes, channels, k)
+        acting = functions.of(mechanism.equations.apply_inputs)(modes, channels, k)
         result = functions.of(getattr(mechanism.equations, what))(x, acting, *further, k)
         return casadi.densify(casadi.vertcat(*result) if isinstance(result, tuple) else casadi.SX(result))
 
@@ -268,7 +268,7 @@ def beginning(mechanism: Mechanism, modes: Any, u: Any) -> tuple[Any, ...]:
     k = parameters.constants()
     channels = tuple(casadi.vertsplit(u)) if mechanism.channels else ()
     e = mechanism.equations
-    acting = functions.of(e.applied)(tuple(casadi.vertsplit(modes)) if mechanism.modes else (), channels, k)
+    acting = functions.of(e.apply_inputs)(tuple(casadi.vertsplit(modes)) if mechanism.modes else (), channels, k)
     x = functions.of(e.start)((*casadi.vertsplit(state), 0.0, 0.0), acting, k)
     energy = functions.of(e.energy)(x, k)
     scale = functions.of(mechanism.error_scale)(parameters, x)
@@ -324,7 +324,7 @@ def _sizes(mechanism: Mechanism, kind: Kind) -> str:
         # with the energy at the start
         "CONSTANTS": len(mechanism.constants._fields) + 1,
         # index of the constant that chooses the functions; -1 if there is no choice
-        "SWITCH": mechanism.switch_place,
+        "SWITCH": mechanism.switch_index,
     }
     constants = {
         "LIMIT_CLEARANCE": limits.LIMIT_SINE,
@@ -351,7 +351,7 @@ def _sizes(mechanism: Mechanism, kind: Kind) -> str:
 
 def _unjoined(mechanism: Mechanism) -> list[str]:
     """Return the C macros of the messages for links that cannot be joined, or hardly."""
-    said = mechanism.unjoined or limits.Unjoined("the links cannot be joined", "", "")
+    said = mechanism.unjoined or limits.UnjoinedMessages("the links cannot be joined", "", "")
     numbers = [f"(r)[{n}]" for n in range(said.apart.count("{"))]
     return [
         f"#define UNJOINED {_text(said.fact)}",

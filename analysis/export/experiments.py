@@ -125,7 +125,7 @@ def _reference(
 
     first = rounded(0, None)
     starts = {v.name: v.start for v in mechanism.variables}
-    plant = Plant.of_values(mechanism, {**starts, **values, **first}, tolerance=REFERENCE, time=times[0])
+    plant = Plant.from_values(mechanism, {**starts, **values, **first}, tolerance=REFERENCE, time=times[0])
     stimuli = [[times[0], *(first[name] for name in mechanism.input_names)]]
     outputs = list(plant.outputs())
     places = _result_places(mechanism)

@@ -58,7 +58,7 @@ def web_sources(mechanism: Mechanism) -> dict[str, str]:
 
 def crank_number(mechanism: Mechanism) -> int:
     """Return the number of the first freedom that turns; -1 if there is none."""
-    return next(iter(mechanism.cyclic), -1)
+    return next(iter(mechanism.cyclic_freedoms), -1)
 
 
 def _header(mechanism: Mechanism) -> str:
@@ -163,5 +163,5 @@ def _places(mechanism: Mechanism, x: Any, modes: Any, u: Any, p: Any) -> Any:
     if mechanism.switch:  # the positions of the joints do not depend on friction
         k = k._replace(**{mechanism.switch: 0.0})
     modes, channels = (tuple(casadi.vertsplit(v)) if v.numel() else () for v in (modes, u))
-    acting = functions.of(mechanism.equations.applied)(modes, channels, k)
+    acting = functions.of(mechanism.equations.apply_inputs)(modes, channels, k)
     return casadi.vertcat(*functions.of(drawing.positions)(tuple(casadi.vertsplit(x)), acting, k))

@@ -37,7 +37,9 @@ def plot_orbit(orbit: PeriodicOrbit, *, title: str = "") -> Figure:
     names = [freedom.coordinate for freedom in free]
     if not orbit.drive.speed_drive:
         names.append(crank.rate)
-    names += [name for n in mechanism.cyclic for name in mechanism.names("drive", mechanism.freedoms[n].coordinate)]
+    names += [
+        name for n in mechanism.cyclic_freedoms for name in mechanism.names("drive", mechanism.freedoms[n].coordinate)
+    ]
 
     def closed(name: str) -> tuple[np.ndarray, str]:
         """Return an output over the period in display units, with its value at the end of the period, and its axis label."""

@@ -52,7 +52,7 @@ def places(mechanism: Mechanism, parameters: Any, coordinates: Array) -> dict[st
     drawing = mechanism.drawing
     assert drawing is not None
     p = parameters.constants()
-    acting = mechanism.idle(p)
+    acting = mechanism.idle_inputs(p)
     found = np.full((len(coordinates), len(drawing.joints), 3), np.nan)
     rest = (0.0,) * (mechanism.size - len(mechanism.freedoms))
     for row, q in zip(found, coordinates):

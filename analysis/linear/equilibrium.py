@@ -102,14 +102,14 @@ class Equilibrium:
     iterations: int
 
     def __repr__(self) -> str:
-        return f"<Equilibrium: {mechanism_of(self.parameters).where(self.coordinates.tolist())}>"
+        return f"<Equilibrium: {mechanism_of(self.parameters).describe_state(self.coordinates.tolist())}>"
 
     def __getitem__(self, name: str) -> float:
         mechanism, p = mechanism_of(self.parameters), self.parameters.constants()
         if name not in mechanism.output_names:
             raise unknown_name(name, mechanism.output_names, f"output {name!r}")
         modes, channels = sampled_channels(mechanism, self.inputs, np.zeros(1), np.array([self.state]))
-        applied = mechanism.equations.applied(tuple(map(float, modes)), tuple(channels[0].tolist()), p)
+        applied = mechanism.equations.apply_inputs(tuple(map(float, modes)), tuple(channels[0].tolist()), p)
         outputs = mechanism.equations.outputs(self.state, applied, 0.0, p)
         return float(outputs[mechanism.output_names.index(name)])
 
@@ -256,7 +256,7 @@ class _Balance:
         self, q: FloatArray, forces: FloatArray, stiffness: FloatArray, residual: float, iterations: int
     ) -> Equilibrium:
         # `start` sets a freedom that is tied to another
-        applied = self.mechanism.equations.applied(
+        applied = self.mechanism.equations.apply_inputs(
             tuple(map(float, self.modes)), tuple(self.channels.tolist()), self.parameters.constants()
         )
         state = self.mechanism.equations.start(self._state(q), applied, self.parameters.constants())
@@ -267,7 +267,7 @@ class _Balance:
         )  # fmt: skip
 
     def _words(self, q: FloatArray) -> str:
-        return self.mechanism.where(self._state(q))
+        return self.mechanism.describe_state(self._state(q))
 
     def _state(self, q: FloatArray) -> tuple[float, ...]:
         return (*q.tolist(), *[0.0] * (self.mechanism.size - len(q)))

@@ -262,7 +262,7 @@ def _resample(mechanism: Mechanism, turn: Turn) -> tuple[FloatArray, FloatArray]
     n, count, period = len(turn.time), len(mechanism.freedoms), turn.period
     ways = (turn.states[:, :count] - turn.states[0, :count]).T
     # the crank is the cyclic freedom whose angle has equal steps
-    crank = min(mechanism.cyclic, key=lambda k: float(np.ptp(np.diff(ways[k]))))
+    crank = min(mechanism.cyclic_freedoms, key=lambda k: float(np.ptp(np.diff(ways[k]))))
     angle, way = ways[crank], ways[crank][-1] * n / (n - 1)
     wanted = period * np.arange(n) / n
     lead = trigonometric(turn.time - wanted, way)

@@ -1,9 +1,9 @@
 from .builder import Builder as Builder
-from .builder import described as described
 from .builder import has_linkage as has_linkage
 from .builder import linkage as linkage
 from .builder import load_linkage as load_linkage
 from .builder import load_package as load_package
+from .builder import read_description as read_description
 from .builder import with_linkage as with_linkage
 from .description import Description as Description
 from .description import LinkageError as LinkageError
@@ -13,9 +13,9 @@ from .reach import Reach as Reach
 from .reach import dead_centres as dead_centres
 from .reach import reach as reach
 from .sections import SECTIONS as SECTIONS
-from .sections import Made as Made
-from .sections import millimetres as millimetres
+from .sections import LinkBody as LinkBody
+from .sections import format_millimetres as format_millimetres
 from .structure import Dyad as Dyad
-from .structure import Geared as Geared
-from .structure import Racked as Racked
+from .structure import GearStep as GearStep
+from .structure import RackStep as RackStep
 from .template import TEXT as TEXT

@@ -20,7 +20,7 @@ from .package import Package
 LINKAGE = "linkage"
 
 
-def described(tables: Mapping[str, Any]) -> Description:
+def read_description(tables: Mapping[str, Any]) -> Description:
     """Read a description from the content of the table ``[linkage]`` of a file.
 
     Raises
@@ -38,9 +38,9 @@ def has_linkage(tables: Mapping[str, Any]) -> bool:
 
 
 def with_linkage(tables: Mapping[str, Any], folder: Path) -> Mapping[str, Any]:
-    """Compile the linkage described in the tables of a case; return tables that name it as their published set.
+    """Compile the linkage that the tables of a case describe; return tables that name it as their published set.
 
-    If the tables name a file, the tables beside the linkage in that file hold too, unless they are overridden: `_merged`.
+    If the tables name a file instead, its other tables hold too, unless those of the case override them: see `_merge_tables`.
 
     Raises
     ------
@@ -57,9 +57,9 @@ def with_linkage(tables: Mapping[str, Any], folder: Path) -> Mapping[str, Any]:
     named = _named_files(folder / own) if isinstance(own, str) else []
     made: dict[str, Any] = {}
     for path, below in reversed(named):
-        made = _merged(made, _with_absolute_files(_without_linkage(below, "title", "tune"), path.parent))
+        made = _merge_tables(made, _with_absolute_files(_without_linkage(below, "title", "tune"), path.parent))
     rest = _without_linkage(tables)
-    return {"published": _package(named[-1][1] if named else tables).mechanism().name, **_merged(made, rest)}
+    return {"published": _package(named[-1][1] if named else tables).mechanism().name, **_merge_tables(made, rest)}
 
 
 def _without_linkage(tables: Mapping[str, Any], *others: str) -> dict[str, Any]:
@@ -70,7 +70,10 @@ def _without_linkage(tables: Mapping[str, Any], *others: str) -> dict[str, Any]:
 
 
 def _named_files(path: Path) -> list[tuple[Path, Mapping[str, Any]]]:
-    """Return the file at ``path`` and the files that it names in turn, each with its tables; the last has the linkage."""
+    """Return the file at ``path`` and the files that it names one after the other, each with its tables.
+
+    The last file is the one that describes the linkage.
+    """
     found: list[tuple[Path, Mapping[str, Any]]] = []
     while True:
         if any(path.resolve() == known.resolve() for known, _ in found):
@@ -79,7 +82,7 @@ def _named_files(path: Path) -> list[tuple[Path, Mapping[str, Any]]]:
             )
         tables = files.read_tables(path)
         if not has_linkage(tables):
-            raise _no_linkage(path)
+            raise _no_linkage_error(path)
         found.append((path, tables))
         if not isinstance(tables[LINKAGE], str):
             return found
@@ -98,24 +101,24 @@ def _with_absolute_files(table: Any, folder: Path) -> Any:
     }
 
 
-def _merged(base: Mapping[str, Any], tables: Mapping[str, Any], *, top: bool = True) -> dict[str, Any]:
+def _merge_tables(base: Mapping[str, Any], tables: Mapping[str, Any], *, top: bool = True) -> dict[str, Any]:
     """Return ``base`` overridden by ``tables``, entry by entry; at the top level runs and drives are replaced as a whole."""
     merged = {**base, **tables}
     for name, table in tables.items():
         whole = top and (name in ("run", "drive") or name.endswith("Drive"))
         if not whole and isinstance(table, Mapping) and isinstance(below := base.get(name), Mapping):
-            merged[name] = _merged(below, table, top=False)
+            merged[name] = _merge_tables(below, table, top=False)
     return merged
 
 
-def _no_linkage(path: str | Path) -> InputError:
+def _no_linkage_error(path: str | Path) -> InputError:
     return InputError(f"{path} describes no linkage: it must have a table [linkage] with bodies")
 
 
 def _package(tables: Mapping[str, Any]) -> Package:
     """Return the package of the linkage in the tables of a file; its title is by default that of the file."""
     title = {"title": tables["title"]} if "title" in tables else {}
-    return Package(described({**title, **tables[LINKAGE]}))
+    return Package(read_description({**title, **tables[LINKAGE]}))
 
 
 def load_linkage(path: str | Path) -> Mechanism:
@@ -297,15 +300,17 @@ class Builder:
     ) -> Builder:
         """Add a spring with damper, dry friction and force law: between two points, at a joint, or between two bodies.
 
+        Give one of ``between``, ``at`` and ``bodies``.
+
         Parameters
         ----------
         name : str
         between : (str, str), optional
-            Two points; or
+            Two points.
         at : str, optional
-            a pin or a slide; or
+            A pin or a slide.
         bodies : (str, str), optional
-            two bodies whose relative rotation twists the spring.
+            Two bodies whose relative rotation twists the spring.
         stiffness, damping : optional
             In N/m and N.s/m; about a pin or between two bodies in N.m/rad and N.m.s/rad.
         free : optional
@@ -317,7 +322,8 @@ class Builder:
         constants : mapping, optional
             Constants of the law, by their names in it.
         driven : bool, optional
-            Whether an input drives it, such as a cylinder, or a motor at a joint whose coordinate is not a freedom.
+            Whether an input adds a force that lengthens it, as in a cylinder, or a torque that twists it, as of a motor. It may
+            also be at a joint whose coordinate is not a freedom.
         """
         return self._add(
             "springs", name, between=between, at=at, bodies=bodies, stiffness=stiffness, damping=damping, free=free,
@@ -359,14 +365,16 @@ class Builder:
     ) -> Builder:
         """Drive a joint, whose coordinate becomes a freedom, or press two points apart by a force, as a cylinder does.
 
+        Give either ``joint`` or ``between``.
+
         Parameters
         ----------
         name : str
             Name of the freedom, or of the cylinder.
         joint : str, optional
-            A pin or a slide: its ``speed`` is commanded (rad/s, m/s), or without a speed its torque or force is an input; or
+            A pin or a slide: its ``speed`` is commanded (rad/s, m/s), or without a speed its torque or force is an input.
         between : (str, str), optional
-            two points: the force between them is an input.
+            Two points; the force between them is an input.
         speed, start : optional
             For a joint: see `freedom`.
 
@@ -390,7 +398,7 @@ class Builder:
         ------
         LinkageError, ParameterError
         """
-        return Package(described(self.tables)).mechanism()
+        return Package(read_description(self.tables)).mechanism()
 
 
 def linkage(

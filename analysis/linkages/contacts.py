@@ -10,15 +10,15 @@ from .writing import function
 
 
 class Contacts:
-    """Writer of the friction functions of one linkage: joint forces, and their changes with a contact force of 1 N."""
+    """Writer of the friction functions of one linkage: `rubbing`, `contacts` and `responses`."""
 
     def __init__(self, motion: Motion) -> None:
         self.motion, self.interface = motion, motion.interface
         self.joints = [motion.structure.joints[name] for name in motion.description.friction]
 
     def blocks(self) -> Iterator[str]:
-        """Write the functions of unit friction, of the joint forces with friction, and of their changes by unit friction."""
-        yield self._rubbing()
+        """Write three functions: friction for joint forces of 1 N, forces in joints with friction, and their changes by it."""
+        yield self._unit_friction()
         rows = ["return ("]
         for joint in self.joints:
             f, line = f"f.in_{joint.name}", f"b.{joint.name}_line"
@@ -30,7 +30,7 @@ class Contacts:
         yield function(signature, "Return the forces in the joints with friction (N).", [*rows, ")"])
         n = self.motion.n
         rows = [
-            "bodies = tuple(still(body) for body in m)",
+            "bodies = tuple(remove_bias(body) for body in m)",
             "found = []",
             "for unit in units:",
             f"    along = generalised_forces(bodies, unit.wrenches, {n})",
@@ -43,7 +43,7 @@ class Contacts:
         doc = "Return the changes of these forces with friction by a force of 1 N in each of the joints."
         yield function(f"{signature} -> tuple[tuple[tuple[float, float], ...], ...]", doc, rows)
 
-    def _rubbing(self) -> str:
+    def _unit_friction(self) -> str:
         rows, units = ["none = Wrench(0.0, 0.0, 0.0)"], []
         for joint in self.joints:
             name = joint.name
@@ -53,12 +53,14 @@ class Contacts:
                 one, other = self.interface.turn(first, "b."), self.interface.turn(second, "b.")
                 rows.append(f"{slip} = {other}.w - {one}.w")
                 rows.append(f"{rub} = p.{name}_friction_radius * tanh({slip} / FRICTION_RATE)")
-                on = {first: f"torque({rub})", second: f"torque(-{rub})"}
+                on = {first: f"torque_wrench({rub})", second: f"torque_wrench(-{rub})"}
             else:
                 rows.append(f"{slip} = {self.interface.travel(joint)}[1]")
                 rows.append(f"{rub} = p.{name}_friction_coefficient * tanh({slip} / FRICTION_SPEED)")
                 at = f"b.{second}_frame.origin"
-                one, other = (f"force({r} * b.{name}_line.c, {r} * b.{name}_line.s, {at})" for r in (rub, f"-{rub}"))
+                one, other = (
+                    f"force_wrench({r} * b.{name}_line.c, {r} * b.{name}_line.s, {at})" for r in (rub, f"-{rub}")
+                )
                 on = {first: one, second: other}
             wrenches = "".join(f"{on.get(body, 'none')}, " for body in self.motion.bodies)
             units.append(f"    Rubbing(({wrenches}), {rub} * {slip}),")

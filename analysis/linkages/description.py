@@ -46,8 +46,8 @@ def _name(value: Any, name: str) -> str:
     return text
 
 
-def _named(reader: Any) -> Any:
-    """Return the reader of a table whose entries have names chosen by the user."""
+def _named_entries(reader: Any) -> Any:
+    """Return the reader of a table whose entries have names chosen by the user; ``reader`` reads the value of an entry."""
 
     def read(value: Any, name: str) -> dict[str, Any]:
         return {
@@ -80,7 +80,7 @@ class Body:
         Cross-section and material, which give mass, centre of mass and inertia: for a bar, or a plate with corners.
     """
 
-    points: Mapping[str, tuple[float, float]] = entry(_named(_PLACE), factory=dict)
+    points: Mapping[str, tuple[float, float]] = entry(_named_entries(_PLACE), factory=dict)
     bar: tuple[str, ...] = entry(Many(_name, length=2), ())
     length: float = entry(Quantity("m", above=0.0), 0.0)
     mass: float | None = entry(Quantity("kg", least=0.0), None)
@@ -302,16 +302,16 @@ class Description:
     name: str = entry(files.text)
     title: str = entry(files.text, "")
     source: str = entry(files.text, "described")
-    ground: Mapping[str, tuple[float, float]] = entry(_named(_PLACE))
-    bodies: Mapping[str, Body] = entry(_named(Table(Body)))
-    slides: Mapping[str, Slide] = entry(_named(Table(Slide)), factory=dict)
-    slots: Mapping[str, Slot] = entry(_named(Table(Slot)), factory=dict)
-    gears: Mapping[str, Gear] = entry(_named(Table(Gear)), factory=dict)
-    racks: Mapping[str, Rack] = entry(_named(Table(Rack)), factory=dict)
-    springs: Mapping[str, Spring] = entry(_named(Table(Spring)), factory=dict)
-    freedoms: Mapping[str, FreedomTable] = entry(_named(_freedom), factory=dict)
-    assembly: Mapping[str, int] = entry(_named(files.Whole()), factory=dict)
-    friction: Mapping[str, Any] = entry(_named(files.unchanged), factory=dict)
+    ground: Mapping[str, tuple[float, float]] = entry(_named_entries(_PLACE))
+    bodies: Mapping[str, Body] = entry(_named_entries(Table(Body)))
+    slides: Mapping[str, Slide] = entry(_named_entries(Table(Slide)), factory=dict)
+    slots: Mapping[str, Slot] = entry(_named_entries(Table(Slot)), factory=dict)
+    gears: Mapping[str, Gear] = entry(_named_entries(Table(Gear)), factory=dict)
+    racks: Mapping[str, Rack] = entry(_named_entries(Table(Rack)), factory=dict)
+    springs: Mapping[str, Spring] = entry(_named_entries(Table(Spring)), factory=dict)
+    freedoms: Mapping[str, FreedomTable] = entry(_named_entries(_freedom), factory=dict)
+    assembly: Mapping[str, int] = entry(_named_entries(files.Whole()), factory=dict)
+    friction: Mapping[str, Any] = entry(_named_entries(files.unchanged), factory=dict)
     loads: tuple[PointLoad, ...] = entry(Many(_load), ())
     torques: tuple[str, ...] = entry(Many(_name), ())
     gravity: float = entry(Quantity("m/s2", least=0.0), 0.0)

@@ -6,11 +6,11 @@ from typing import NamedTuple
 
 from .description import is_given
 from .parameters import Interface, length_and_mass
-from .structure import Freed, Geared, Pin, on_one_body, sliders
-from .writing import function, quoted
+from .structure import FreedomStep, GearStep, Pin, carrier_joints, sliders
+from .writing import function, quote
 
 
-class Marked(NamedTuple):
+class PicturePoint(NamedTuple):
     """A point of the picture: its name, its label, and the expression of its position."""
 
     name: str
@@ -24,11 +24,11 @@ class Picture:
     def __init__(self, interface: Interface) -> None:
         self.description, self.structure, self.interface = interface.description, interface.structure, interface
 
-    def drawn(self) -> tuple[list[Marked], list[str]]:
+    def points_and_parts(self) -> tuple[list[PicturePoint], list[str]]:
         """Return the points of the picture, and its parts from the back to the front."""
         d, parts, length = self.description, [], length_and_mass(self.interface)[0]
         points = dict.fromkeys(own for of in self.interface.points.values() for own in of)
-        joints = [Marked(own, f"point {own}", f"*(b.at_{own}.x, b.at_{own}.y, 0.0)") for own in points]
+        joints = [PicturePoint(own, f"point {own}", f"*(b.at_{own}.x, b.at_{own}.y, 0.0)") for own in points]
         lines = sliders(self.structure)
         for name, joint in lines.items():
             block, line, start, origin = (
@@ -38,22 +38,22 @@ class Picture:
                 f"{joint.bodies[1]}_frame.origin",
             )
             end = f"*({start}.x + {length!r} * {line}.c, {start}.y + {length!r} * {line}.s, 0.0)"
-            joints.append(Marked(f"{name}Block", f"the {block}", f"*(b.{origin}.x, b.{origin}.y, 0.0)"))
-            joints.append(Marked(f"{name}End", f"direction of {name}", end))
+            joints.append(PicturePoint(f"{name}Block", f"the {block}", f"*(b.{origin}.x, b.{origin}.y, 0.0)"))
+            joints.append(PicturePoint(f"{name}End", f"direction of {name}", end))
             along = f'("{name}Block", "{joint.through}", "{name}End")'
             springs = [own for own, spring in d.springs.items() if spring.at == name and is_given(spring.stiffness)]
             parts.append(f'Part("guide", ("{joint.through}", "{name}End"), "line of {name}")')
             parts += [f'Part("spring", {along}, "{own}", "{own}.stiffness")' for own in springs]
             parts.append(f'Part("slider", {along}, "{block}")')
         for name, rack in d.racks.items():
-            pin, slide, _ = on_one_body(name, rack, self.structure.joints)
+            pin, slide, _ = carrier_joints(name, rack, self.structure.joints)
             side, line = "" if slide.bodies[1] == rack.rack else "-", f"b.{slide.name}_line"
             x, y = (f"b.at_{pin.name}.{c} {s} {side}p.{name}_radius * {line}.{t}" for c, s, t in ("x+s", "y-c"))
-            joints.append(Marked(f"{name}Pitch", f"pitch point of {name}", f"*({x}, {y}, 0.0)"))
+            joints.append(PicturePoint(f"{name}Pitch", f"pitch point of {name}", f"*({x}, {y}, 0.0)"))
             ends = {f"{name}Line": "-", f"{name}LineEnd": "+"}
             for end, sign in ends.items():
                 x1, y1 = (f"{at} {sign} {0.5 * length!r} * {line}.{t}" for at, t in ((x, "c"), (y, "s")))
-                joints.append(Marked(end, f"pitch line of {rack.rack}", f"*({x1}, {y1}, 0.0)"))
+                joints.append(PicturePoint(end, f"pitch line of {rack.rack}", f"*({x1}, {y1}, 0.0)"))
             parts.append(f'Part("axis", {tuple(ends)!r}, "pitch line of {rack.rack}")')
             tick = f"arm(b.{rack.gear}_frame.turn, p.{name}_radius, 0.0)"
             joints.append(self.tick(name, rack.gear, pin.name, tick))
@@ -76,13 +76,15 @@ class Picture:
                 parts.append(f'Part("link", {through!r}, "{name}")')
         return joints, parts
 
-    def tick(self, pair: str, gear: str, pin: str, arm: str) -> Marked:
-        """Return the mark of a gear on its pitch circle; the expression ``arm`` leads there from the bearing ``pin``."""
-        return Marked(f"{pair}{gear}Tick", f"mark on {gear}", f"*(b.at_{pin}.x + {arm}.x, b.at_{pin}.y + {arm}.y, 0.0)")
+    def tick(self, pair: str, gear: str, pin: str, arm: str) -> PicturePoint:
+        """Return a point that marks a gear on its pitch circle; the expression ``arm`` leads there from the bearing ``pin``."""
+        return PicturePoint(
+            f"{pair}{gear}Tick", f"mark on {gear}", f"*(b.at_{pin}.x + {arm}.x, b.at_{pin}.y + {arm}.y, 0.0)"
+        )
 
     def bearings(self, bodies: tuple[str, ...]) -> tuple[str, tuple[str, ...]]:
         """Return the name of the body that carries two gears, and the names of their two pins on it."""
-        step = next(s for s in self.structure.steps if isinstance(s, Geared) and {s.body, s.mate} == set(bodies))
+        step = next(s for s in self.structure.steps if isinstance(s, GearStep) and {s.body, s.mate} == set(bodies))
         joints = [joint for joint in self.structure.joints.values() if isinstance(joint, Pin)]
         return step.parent, tuple(
             next(joint.name for joint in joints if {own, step.parent} <= set(joint.bodies)) for own in bodies
@@ -90,12 +92,15 @@ class Picture:
 
     def positions(self) -> str:
         """Write the function that computes the positions of the picture's points."""
-        rows = ("b = places(x, p)", "return (", *(f"    {joint.place}," for joint in self.drawn()[0]), ")")
+        rows = ("b = places(x, p)", "return (", *(f"    {joint.place}," for joint in self.points_and_parts()[0]), ")")
         signature = "positions(x: tuple[float, ...], i: Applied, p: Constants) -> tuple[float, ...]"
         return function(signature, "Compute the places of the points of the picture.", rows)
 
-    def moves(self, own: str) -> str:
-        """Return the source of the argument with the parameters that follow when a point is dragged; empty if none does."""
+    def drag_argument(self, own: str) -> str:
+        """Return the source of the argument `Joint.moves` of a point: the parameters that follow when it is dragged.
+
+        The result is empty if no parameter follows.
+        """
         names = {p.name for p in self.interface.parameters}
         for body, points in self.interface.points.items():
             if own in points:
@@ -104,7 +109,7 @@ class Picture:
                 turned = [
                     f"initial.{self.interface.drives[step.freedom].name}_angle"
                     for step in self.structure.steps
-                    if isinstance(step, Freed)
+                    if isinstance(step, FreedomStep)
                     and step.body == body
                     and isinstance(step.joint, Pin)
                     and bar
@@ -112,7 +117,7 @@ class Picture:
                 ]
                 moves = [name for name in found if name in names] + turned
                 if moves:
-                    return f", ({''.join(f'{quoted(name)}, ' for name in moves[:2])})"
+                    return f", ({''.join(f'{quote(name)}, ' for name in moves[:2])})"
         return ""
 
     def paths(self) -> list[str]:

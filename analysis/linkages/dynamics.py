@@ -9,8 +9,8 @@ from typing import NamedTuple
 from .description import BODY, GROUND, Description, Spring, is_given
 from .laws import expression, with_constants
 from .parameters import Interface
-from .structure import Dyad, Freed, Geared, Joint, Pin, Racked, Side, Step, sliders
-from .writing import function, record, tupled
+from .structure import Dyad, FreedomStep, GearStep, Joint, Pin, RackStep, Side, Step, sliders
+from .writing import function, record, tuple_source
 
 
 class Reaction(NamedTuple):
@@ -23,7 +23,7 @@ class Reaction(NamedTuple):
 
 
 def springs_by_freedom(description: Description, interface: Interface) -> dict[str, int]:
-    """Return the springs that act along a freedom, by name, with the number of the freedom."""
+    """Return, by name of each spring that acts along a freedom, the index of the freedom."""
     numbers = {drive.joint: n for n, drive in enumerate(interface.drives)}
     return {name: numbers[s.at] for name, s in description.springs.items() if s.at in numbers}
 
@@ -38,10 +38,10 @@ class Motion:
         self.bodies = self.structure.bodies
         self.reactions: list[Reaction] = []
         #: steps with racks, in the order in which their forces are computed
-        self.racked = [step for step in reversed(self.structure.steps) if isinstance(step, Racked)]
+        self.racked = [step for step in reversed(self.structure.steps) if isinstance(step, RackStep)]
 
     def owner(self, own: str) -> str:
-        """Return the body that has a point: a moving one if there is one, otherwise the ground."""
+        """Return the body that has the point ``own``: the first moving body with it, or the ground if there is none."""
         having = [body for body in self.description.bodies if own in self.interface.points[body]]
         return having[0] if having else GROUND
 
@@ -62,7 +62,7 @@ class Motion:
                 rows.append(f"{stretch} = {name}_length{f'{free}_length' if free else ''}")
                 fields += [f"{name}_x", f"{name}_y"]
             else:
-                if turned := self.turned(spring):
+                if turned := self.twisted_bodies(spring):
                     first, second = turned
                     angle = f"p.{name}_COS, p.{name}_SIN" if free else "1.0, 0.0"
                     one, other = self.interface.turn(first, "b."), self.interface.turn(second, "b.")
@@ -80,7 +80,7 @@ class Motion:
             signature, "Compute the stretches of all springs.", [*rows, f"return Springs({', '.join(fields)})"]
         )
 
-    def turned(self, spring: Spring) -> tuple[str, ...]:
+    def twisted_bodies(self, spring: Spring) -> tuple[str, ...]:
         """Return the two bodies between which a spring is twisted; empty if it is no torsion spring."""
         joint = self.structure.joints.get(spring.at)
         return spring.bodies or (joint.bodies if isinstance(joint, Pin) else ())
@@ -94,7 +94,7 @@ class Motion:
         if is_given(spring.damping):
             words.append(f"p.{name}_damping * s.{name}_rate")
         if is_given(spring.friction):
-            about = self.turned(spring)
+            about = self.twisted_bodies(spring)
             words.append(f"p.{name}_friction * tanh(s.{name}_rate / {'FRICTION_RATE' if about else 'FRICTION_SPEED'})")
         if spring.law:
             words.append(f"{name}_law(s.{name}_stretch, s.{name}_rate{', p' if spring.constants else ''})")
@@ -113,19 +113,19 @@ class Motion:
             if spring.law:
                 doc = f"Return the force of {name} at a stretch and its rate (N, N.m)."
                 p = ", p: Constants" if spring.constants else ""
-                law = expression(spring.law, bool(self.turned(spring)), f"linkage.springs.{name}.law")
+                law = expression(spring.law, bool(self.twisted_bodies(spring)), f"linkage.springs.{name}.law")
                 text = with_constants(law, spring.constants, name)
                 yield function(f"{name}_law(x: float, v: float{p}) -> float", doc, [f"return {text}"])
 
-    def acting(self) -> Iterator[str]:
-        """Write the function that computes the applied forces on all bodies and along all freedoms."""
+    def applied_forces(self) -> Iterator[str]:
+        """Write the force laws of springs, and the function that computes the forces on all bodies and along all freedoms."""
         on: dict[str, list[str]] = {body: [] for body in self.bodies}
         along: list[list[str]] = [[] for _ in range(self.n)]
         rows, lost, gained = [], [], []
         if self.description.gravity:
             for body in self.interface.centres:
                 on[body].append(
-                    f"force(p.{body}_mass * p.gx, p.{body}_mass * p.gy, m[{self.bodies.index(body)}].centre)"
+                    f"force_wrench(p.{body}_mass * p.gx, p.{body}_mass * p.gy, m[{self.bodies.index(body)}].centre)"
                 )
         for name, spring in self.description.springs.items():
             resists, pulls = self.resistance(name, spring), self._pull(name, spring)
@@ -134,7 +134,7 @@ class Motion:
                 lost.append(f"{name}_resistance * s.{name}_rate")
             total = " + ".join(filter(None, (pulls, f"{name}_resistance" if resists else ""))) or "0.0"
             if spring.driven:
-                named = f"{name}.{'torque' if self.turned(spring) else 'force'}"
+                named = f"{name}.{'torque' if self.twisted_bodies(spring) else 'force'}"
                 drive = next(load for load in self.interface.loads if load.name == named)
                 total += f" - i.{drive.field}"
                 gained.append(f"i.{drive.field} * s.{name}_rate")
@@ -147,44 +147,46 @@ class Motion:
                 for own, sign in ((p, ""), (q, "-")):
                     if self.owner(own) != GROUND:
                         f = f"{sign}{name}_force * s."
-                        on[self.owner(own)].append(f"force({f}{name}_x, {f}{name}_y, b.at_{own})")
+                        on[self.owner(own)].append(f"force_wrench({f}{name}_x, {f}{name}_y, b.at_{own})")
                 continue
-            turned = self.turned(spring)
+            turned = self.twisted_bodies(spring)
             first, second = turned or self.structure.joints[spring.at].bodies
             for body, sign in ((second, "-"), (first, "")):
                 if body == GROUND:
                     continue
                 if turned:
-                    on[body].append(f"torque({sign}{name}_force)")
+                    on[body].append(f"torque_wrench({sign}{name}_force)")
                 else:
                     line, f = f"b.{spring.at}_line", f"{sign}{name}_force"
-                    on[body].append(f"force({f} * {line}.c, {f} * {line}.s, b.{second}_frame.origin)")
+                    on[body].append(f"force_wrench({f} * {line}.c, {f} * {line}.s, b.{second}_frame.origin)")
         for load in self.description.loads:
             own = load.point
             if load.frame == BODY:
                 turn = self.interface.turn(self.owner(own), "b.")
-                rows.append(f"{own}_load_x, {own}_load_y = directed({turn}, i.{own}_load_x, i.{own}_load_y)")
+                rows.append(f"{own}_load_x, {own}_load_y = to_ground_axes({turn}, i.{own}_load_x, i.{own}_load_y)")
             x, y = (f"{'' if load.frame == BODY else 'i.'}{own}_load_{axis}" for axis in "xy")
-            on[self.owner(own)].append(f"force({x}, {y}, b.at_{own})")
+            on[self.owner(own)].append(f"force_wrench({x}, {y}, b.at_{own})")
             gained += [f"{x} * b.at_{own}.vx", f"{y} * b.at_{own}.vy"]
         for body in self.description.torques:
-            on[body].append(f"torque(i.{body}_torque)")
+            on[body].append(f"torque_wrench(i.{body}_torque)")
             gained.append(f"i.{body}_torque * b.{body}_frame.turn.w")
         nothing = "Wrench(0.0, 0.0, 0.0)"
         rows.append("wrenches = (")
         for terms in on.values():
-            only = terms[0] if len(terms) == 1 else f"added({', '.join(terms)})" if terms else nothing
+            only = terms[0] if len(terms) == 1 else f"add_wrenches({', '.join(terms)})" if terms else nothing
             rows.append(f"    {only},")
         rows.append(")")
         freedoms = [" ".join(terms) or "0.0" for terms in along]
         rows.append(f"along = ({', '.join(freedoms)},)")
-        rows.append(f"return Acting(wrenches, along, {' + '.join(lost) or '0.0'}, {' + '.join(gained) or '0.0'})")
+        rows.append(
+            f"return AppliedForces(wrenches, along, {' + '.join(lost) or '0.0'}, {' + '.join(gained) or '0.0'})"
+        )
         yield from self.laws()
         doc = "Forces on the bodies and along the freedoms, power lost in dampers and friction, and of the loads (W)."
         fields = {"wrenches": "tuple[Wrench, ...]", "along": "tuple[float, ...]", "lost": "float", "gained": "float"}
-        yield record("Acting", doc, fields)
+        yield record("AppliedForces", doc, fields)
         s = "s: Springs, " if self.description.springs else ""
-        signature = f"acting(b: Places, m: tuple[Mass, ...], {s}i: Applied, p: Constants) -> Acting"
+        signature = f"applied_forces(b: Places, m: tuple[Mass, ...], {s}i: Applied, p: Constants) -> AppliedForces"
         yield function(signature, "Compute what acts on the bodies and along the freedoms, but for the drives.", rows)
 
     def masses(self) -> str:
@@ -207,10 +209,10 @@ class Motion:
 
     def forces(self) -> Iterator[str]:
         """Write the function that computes all joint forces, from the last dyad back to the ground."""
-        rows = [f"on_{body} = needed(m[{n}], e, wrenches[{n}])" for n, body in enumerate(self.bodies)]
+        rows = [f"on_{body} = required_wrench(m[{n}], e, wrenches[{n}])" for n, body in enumerate(self.bodies)]
         taken: set[str] = set()
 
-        def reaction(joint: Joint, by: str, on: str, force: str) -> None:
+        def add_reaction(joint: Joint, by: str, on: str, force: str) -> None:
             # the forces in a pin of several bodies are C, C2, C3, without the names of other joints and racks
             others = {*self.structure.joints, *self.description.racks}
             further = (f"{joint.name}{n}" for n in count(2) if f"{joint.name}{n}" not in others)
@@ -219,39 +221,39 @@ class Motion:
             self.reactions.append(Reaction(name, joint, by, on))
             rows.append(f"in_{name} = {force}")
 
-        def supported(joint: Joint, by: str, on: str) -> None:
-            reaction(joint, by, on, f"on_{on}")
+        def add_support(joint: Joint, by: str, on: str) -> None:
+            add_reaction(joint, by, on, f"on_{on}")
             if by != GROUND:
-                rows.append(f"on_{by} = added(on_{by}, on_{on})")
+                rows.append(f"on_{by} = add_wrenches(on_{by}, on_{on})")
 
-        def toothed(step: Geared | Racked, name: str, force: str) -> None:
+        def add_tooth_force(step: GearStep | RackStep, name: str, force: str) -> None:
             rows.append(f"{name} = {force}")
-            rows.append(f"on_{step.body} = less(on_{step.body}, {name})")
+            rows.append(f"on_{step.body} = subtract_wrenches(on_{step.body}, {name})")
             if step.mate != GROUND:
-                rows.append(f"on_{step.mate} = added(on_{step.mate}, {name})")
+                rows.append(f"on_{step.mate} = add_wrenches(on_{step.mate}, {name})")
 
-        def back(step: Step) -> None:
-            if isinstance(step, Freed):
-                supported(step.joint, step.parent, step.body)
-            elif isinstance(step, Geared):
-                toothed(step, "mesh_force", self._mesh(step))
-                supported(step.pin, step.parent, step.body)
-            elif isinstance(step, Racked):
-                toothed(step, f"in_{step.rack}", self._teeth(step))
-                supported(step.joint, step.parent, step.body)
+        def add_step(step: Step) -> None:
+            if isinstance(step, FreedomStep):
+                add_support(step.joint, step.parent, step.body)
+            elif isinstance(step, GearStep):
+                add_tooth_force(step, "mesh_force", self._mesh(step))
+                add_support(step.pin, step.parent, step.body)
+            elif isinstance(step, RackStep):
+                add_tooth_force(step, f"in_{step.rack}", self._teeth(step))
+                add_support(step.joint, step.parent, step.body)
             else:
                 first, second = step.ends
-                reaction(step.inner, second, first, self._inner(step))
+                add_reaction(step.inner, second, first, self._inner(step))
                 inner = f"in_{self.reactions[-1].name}"
-                rows.append(f"on_{first} = less(on_{first}, {inner})")
-                rows.append(f"on_{second} = added(on_{second}, {inner})")
+                rows.append(f"on_{first} = subtract_wrenches(on_{first}, {inner})")
+                rows.append(f"on_{second} = add_wrenches(on_{second}, {inner})")
                 for side in step.sides:
                     for inside in reversed(side.inside):
-                        back(inside)
-                    supported(side.joint, side.parent, side.body)
+                        add_step(inside)
+                    add_support(side.joint, side.parent, side.body)
 
         for step in reversed(self.structure.steps):
-            back(step)
+            add_step(step)
         names = [f"in_{r.name}" for r in self.reactions] + [f"in_{r.rack}" for r in self.racked]
         doc = "Forces in the joints, each of one body on another, and their moments about the ground's origin."
         yield record("Forces", doc, dict.fromkeys(names, "Wrench"))
@@ -259,26 +261,26 @@ class Motion:
         arguments = "b: Places, m: tuple[Mass, ...], wrenches: tuple[Wrench, ...], e: tuple[float, ...], p: Constants"
         yield function(f"forces({arguments}) -> Forces", doc, [*rows, f"return Forces({', '.join(names)})"])
 
-    def _mesh(self, step: Geared) -> str:
+    def _mesh(self, step: GearStep) -> str:
         pins = [
             j
             for j in self.structure.joints.values()
             if isinstance(j, Pin) and {step.mate, step.parent} <= set(j.bodies)
         ]
         ratio = f"1.0 / p.{step.gear}_ratio" if step.inverse else f"p.{step.gear}_ratio"
-        return f"mesh(b.at_{step.pin.name}, b.at_{pins[0].name}, {ratio}, on_{step.body})"
+        return f"force_from_mate(b.at_{step.pin.name}, b.at_{pins[0].name}, {ratio}, on_{step.body})"
 
-    def _teeth(self, step: Racked) -> str:
-        """Return the expression of the tooth force that a rack or a gear receives from its mate."""
+    def _teeth(self, step: RackStep) -> str:
+        """Return the expression of the tooth force on the body of a step, a rack or a gear, from its mate."""
         side = "" if step.slide.bodies[0] == step.parent else "-"
-        call = "rack_on_gear" if step.turns else "gear_on_rack"
+        call = "force_on_gear" if step.turns else "force_on_rack"
         line = f"b.{step.slide.name}_line"
         return f"{call}(b.at_{step.pin.name}, {line}, {side}p.{step.rack}_radius, on_{step.body})"
 
     def _inner(self, step: Dyad) -> str:
         def total(side: Side) -> str:
             names = [f"on_{body}" for body in side.bodies]
-            return names[0] if len(names) == 1 else f"added({', '.join(names)})"
+            return names[0] if len(names) == 1 else f"add_wrenches({', '.join(names)})"
 
         one, other = (total(side) for side in step.sides)
         outer = [f"b.at_{s.joint.name}" if isinstance(s.joint, Pin) else f"b.{s.joint.name}_line" for s in step.sides]
@@ -294,8 +296,8 @@ class Motion:
 
     # Equations of motion
 
-    def applied(self) -> Iterator[str]:
-        """Write the record of the inputs that are in effect, and the function that selects them by the modes."""
+    def inputs(self) -> Iterator[str]:
+        """Write the record of the inputs in effect, and the function that computes it from the modes and the channels."""
         fields, values, names = [], [], []
         modes = [f"{drive.name}_mode" for drive in self.interface.drives if drive.table]
         for drive in self.interface.drives:
@@ -311,26 +313,26 @@ class Motion:
         loads = [load.field for load in self.interface.loads]
         doc = "Loads along the freedoms, whether their rates are commanded, their accelerations then; other loads."
         yield record("Applied", doc, dict.fromkeys((*fields, *loads), "float"))
-        rows = [f"{tupled(modes)} = modes"] if modes else []
-        rows += [f"{tupled((*names, *loads))} = u", f"return Applied({', '.join((*values, *loads))})"]
-        signature = "applied(modes: tuple[float, ...], u: tuple[float, ...], p: Constants) -> Applied"
+        rows = [f"{tuple_source(modes)} = modes"] if modes else []
+        rows += [f"{tuple_source((*names, *loads))} = u", f"return Applied({', '.join((*values, *loads))})"]
+        signature = "apply_inputs(modes: tuple[float, ...], u: tuple[float, ...], p: Constants) -> Applied"
         yield function(signature, "Return what acts on the linkage from the values of the modes and the inputs.", rows)
 
-    def _held(self) -> tuple[str, str]:
+    def _commanded_rates(self) -> tuple[str, str]:
         """Return the expressions of two tuples: which rates are commanded, and the commanded accelerations."""
         held = ", ".join(f"i.{d.name}_held" if d.table else "0.0" for d in self.interface.drives)
         known = ", ".join(f"i.{d.name}_given" if d.table else "0.0" for d in self.interface.drives)
         return f"({held},)", f"({known},)"
 
     def motion(self) -> Iterator[str]:
-        """Write the functions of accelerations, energies, jumps and derivatives."""
+        """Write the functions of accelerations, derivative, energies, jumps, start and clearance."""
         n, drives = range(self.n), self.interface.drives
-        held, known = self._held()
+        held, known = self._commanded_rates()
         s = "s, " if self.description.springs else ""
         rows = ["b = places(x, p)", "m = masses(b, p)"]
         if s:
             rows.append("s = springs(b, x, p)")
-        rows += [f"a = acting(b, m, {s}i, p)", f"f = generalised_forces(m, a.wrenches, {self.n})"]
+        rows += [f"a = applied_forces(b, m, {s}i, p)", f"f = generalised_forces(m, a.wrenches, {self.n})"]
         right = [f"f[{k}] + a.along[{k}] + i.{drives[k].name}_load" for k in n]
         rows += [f"right = ({', '.join(right)},)", f"matrix = mass_matrix(m, {self.n})"]
         rows += [
@@ -346,13 +348,13 @@ class Motion:
                 "    units = rubbing(b, p)",
                 "    without = contacts(forces(b, m, wrenches, e, p), b)",
                 "    sizes = contact_forces(without, responses(b, m, units, matrix, held_ones, p))",
-                "    wrenches = rubbed(wrenches, units, sizes)",
+                "    wrenches = add_friction(wrenches, units, sizes)",
                 "    lost = lost + sum(size * unit.lost for size, unit in zip(sizes, units))",
                 f"    f = generalised_forces(m, wrenches, {self.n})",
-                f"    right = {tupled(right)}",
+                f"    right = {tuple_source(right)}",
                 f"    e = accelerations(matrix, right, held_ones, {known})",
             ]
-        rows.append("inertial = multiplied(matrix, e)")
+        rows.append("inertial = multiply(matrix, e)")
         loads = [
             f"i.{d.name}_load{f' + held_ones[{k}] * (inertial[{k}] - right[{k}])' if d.table else ''}"
             for k, d in enumerate(drives)
@@ -414,7 +416,7 @@ class Motion:
             f"change = accelerations(matrix, ({'0.0, ' * self.n}), {held}, ({', '.join(changes)},))",
             f"before = ({', '.join(f'x[{self.n + k}]' for k in n)},)",
             "after = tuple(a + b for a, b in zip(before, change))",
-            "gained = zip(after, multiplied(matrix, after), before, multiplied(matrix, before))",
+            "gained = zip(after, multiply(matrix, after), before, multiply(matrix, before))",
             "work = 0.5 * sum(a * b - c * d for a, b, c, d in gained)",
             f"return ({', '.join(f'x[{k}]' for k in n)}, *after, x[{2 * self.n}], x[{2 * self.n + 1}] + work)",
         ]

@@ -10,12 +10,15 @@ from collections.abc import Iterable, Iterator
 
 from .description import GROUND
 from .parameters import Interface
-from .structure import Dyad, Freed, Geared, Pin, Racked, Side, Slider, sliders
+from .structure import Dyad, FreedomStep, GearStep, Pin, RackStep, Side, Slider, sliders
 from .writing import function, record
 
 
-class Places:
-    """Writer of the function that computes the poses of all bodies of one linkage."""
+class PoseWriter:
+    """Writer of the function that computes the poses of all bodies of one linkage.
+
+    Its methods write lines of that function, or return expressions for them.
+    """
 
     def __init__(self, interface: Interface) -> None:
         self.structure, self.interface = interface.structure, interface
@@ -32,74 +35,84 @@ class Places:
     # Places
 
     def point(self, body: str, own: str, frame: str = "") -> str:
-        """Return the expression of a point of a body.
+        """Return the expression of the position of a body's point.
 
-        ``frame`` is the variable of the body's pose, by default its pose in the ground; "own" is the body's own frame.
+        ``frame`` is the variable of the body's pose, by default that in the ground; with "own" the position is that in the
+        body's own frame.
         """
         x, y = self.interface.coordinates(body, own)
         if body == GROUND or frame == "own":
-            return f"fixed({x}, {y}, {self.n})"
+            return f"fixed_vector({x}, {y}, {self.n})"
         frame = frame or f"{body}_frame"
         return f"{frame}.origin" if (x, y) == ("0.0", "0.0") else f"point({frame}, {x}, {y})"
 
-    def at(self, body: str, own: str) -> str:
-        """Return the variable of a point of a body whose pose is known; write its line at the first use."""
+    def point_variable(self, body: str, own: str) -> str:
+        """Return the variable of the point ``own`` of a body whose pose is known; write its line at the first use."""
         if own not in self.places:
             self.lines.append(f"at_{own} = {self.point(body, own)}")
             self.places[own] = f"at_{own}"
         return self.places[own]
 
-    def hung(self, pin: str, turn: str, body: str, own: str) -> str:
-        """Return the expression of the pose of a body from the position of its point ``own`` and its direction ``turn``."""
+    def pose_at_pin(self, pin: str, turn: str, body: str, own: str) -> str:
+        """Return the expression of the pose of a body that has its point ``own`` at ``pin`` and the direction ``turn``."""
         x, y = self.interface.coordinates(body, own)
         if (x, y) == ("0.0", "0.0"):
             return f"Frame({pin}, {turn})"
-        return f"Frame(minus({pin}, arm({turn}, {x}, {y})), {turn})"
+        return f"Frame(subtract_vectors({pin}, arm({turn}, {x}, {y})), {turn})"
 
-    def inclined(self, turn: str, joint: Slider, sign: int = 1) -> str:
-        """Return the direction of a body's guide line from that of the body; with sign -1, the body's from that of the line."""
+    def incline_turn(self, turn: str, joint: Slider, sign: int = 1) -> str:
+        """Return the expression of the direction of a slide's line from ``turn``, the direction of the body that has the line.
+
+        With ``sign`` -1 ``turn`` is the direction of the line, and the result that of the body.
+        """
         if not joint.inclined:
             return turn
-        return f"inclined({turn}, p.{joint.name}_COS, {'-' if sign < 0 else ''}p.{joint.name}_SIN)"
+        return f"incline_direction({turn}, p.{joint.name}_COS, {'-' if sign < 0 else ''}p.{joint.name}_SIN)"
 
-    def freed(self, step: Freed, lead: str = "") -> None:
+    def place_freed(self, step: FreedomStep, lead: str = "") -> None:
         """Write the pose of a body that a freedom joins to a known one, in the ground or relative to the body ``lead``."""
         suffix = f"in_{lead}" if lead else "frame"
         parent = "" if step.parent in (GROUND, lead) else f"{step.parent}_{suffix}"
         own = "own" if lead and step.parent == lead else parent
-        parent_turn = f"{parent}.turn" if parent else f"held(1.0, 0.0, {self.n})"
+        parent_turn = f"{parent}.turn" if parent else f"fixed_direction(1.0, 0.0, {self.n})"
         turn = f"{step.body}_turn"
         joint, drive = step.joint, self.interface.drives[step.freedom]
         terms, constants = (dict(self.angles[step.parent][0]), list(self.angles[step.parent][1]))
         sign = "-" if step.sign < 0 else ""
         if isinstance(joint, Pin):
             terms[step.freedom] = f"{sign}1.0"
-            self.lines.append(f"{turn} = {self.angled(terms, constants)}")
+            self.lines.append(f"{turn} = {self.linear_turn(terms, constants)}")
             pin = self.point(step.parent, joint.name, own)
             if not lead:
-                pin = self.at(step.parent, joint.name)
-            frame = self.hung(pin, turn, step.body, joint.name)
+                pin = self.point_variable(step.parent, joint.name)
+            frame = self.pose_at_pin(pin, turn, step.body, joint.name)
         else:
-            travel = f"travelled({drive.variable}, {self.share({step.freedom: '1.0'})}, v)"
+            travel = f"linear_arm({drive.variable}, {self.derivative_tuple({step.freedom: '1.0'})}, v)"
             if joint.inclined:
                 constants.append(f"{sign}p.{joint.name}_direction")
             if not lead:
                 self.travels[joint.name] = {step.freedom: "1.0"}, []
-            frame = self.slid(step, joint, parent_turn, travel, own)
+            frame = self.slide_pose(step, joint, parent_turn, travel, own)
         self.angles[step.body] = terms, constants
         self.lines.append(f"{step.body}_{suffix} = {frame}")
 
-    def slid(self, step: Freed | Racked, joint: Slider, parent_turn: str, travel: str, own: str = "") -> str:
-        """Write the direction of a body that slides on its parent, or guides its parent, and return its pose."""
+    def slide_pose(
+        self, step: FreedomStep | RackStep, joint: Slider, parent_turn: str, travel: str, own: str = ""
+    ) -> str:
+        """Write the line for the direction of ``step.body``; return the expression of the body's pose.
+
+        The body is the block or the guide of the slide ``joint`` on its parent, and ``travel`` the arm from the start of the
+        guide line to the block.
+        """
         turn = f"{step.body}_turn"
         if joint.bodies[1] == step.body:
-            self.lines.append(f"{turn} = {self.inclined(parent_turn, joint)}")
-            return f"Frame(plus({self.point(step.parent, joint.through, own)}, turned({turn}, {travel})), {turn})"
-        self.lines.append(f"{turn} = {self.inclined(parent_turn, joint, -1)}")
-        through = f"minus({self.point(step.parent, '', own)}, turned({parent_turn}, {travel}))"
-        return self.hung(through, turn, step.body, joint.through)
+            self.lines.append(f"{turn} = {self.incline_turn(parent_turn, joint)}")
+            return f"Frame(add_vectors({self.point(step.parent, joint.through, own)}, rotate_arm({turn}, {travel})), {turn})"
+        self.lines.append(f"{turn} = {self.incline_turn(parent_turn, joint, -1)}")
+        through = f"subtract_vectors({self.point(step.parent, '', own)}, rotate_arm({parent_turn}, {travel}))"
+        return self.pose_at_pin(through, turn, step.body, joint.through)
 
-    def pinion(self, step: Racked) -> None:
+    def place_pinion(self, step: RackStep) -> None:
         """Write the pose of a gear from the position of its rack."""
         radius, offset = f"p.{step.rack}_radius", f"p.{step.rack}_offset"
         turn = f"{step.body}_turn"
@@ -111,16 +124,18 @@ class Places:
                 terms[number] = f"({terms.get(number, '0.0')} + {factor} / {radius})"
             constants = [*own_constants, f"({' + '.join((*start, f'-{offset}'))}) / {radius}"]
             self.angles[step.body] = terms, constants
-            self.lines.append(f"{turn} = {self.angled(terms, constants)}")
+            self.lines.append(f"{turn} = {self.linear_turn(terms, constants)}")
         else:
             holder, block = step.slide.bodies
-            carrier, origin = self.interface.turn(step.parent), self.at(holder, step.slide.through)
-            line = self.inclined(self.interface.turn(holder), step.slide)
-            self.lines.append(f"{turn} = rolled({carrier}, {line}, {origin}, {block}_frame.origin, {offset}, {radius})")
-        pin = self.at(step.parent, step.pin.name)
-        self.lines.append(f"{step.body}_frame = {self.hung(pin, turn, step.body, step.pin.name)}")
+            carrier, origin = self.interface.turn(step.parent), self.point_variable(holder, step.slide.through)
+            line = self.incline_turn(self.interface.turn(holder), step.slide)
+            self.lines.append(
+                f"{turn} = gear_direction({carrier}, {line}, {origin}, {block}_frame.origin, {offset}, {radius})"
+            )
+        pin = self.point_variable(step.parent, step.pin.name)
+        self.lines.append(f"{step.body}_frame = {self.pose_at_pin(pin, turn, step.body, step.pin.name)}")
 
-    def rack(self, step: Racked) -> None:
+    def place_rack(self, step: RackStep) -> None:
         """Write the pose of a rack from the angle of its gear."""
         radius, offset = f"p.{step.rack}_radius", f"p.{step.rack}_offset"
         (terms, constants), (own_terms, own_constants) = self.angles[step.mate], self.angles[step.parent]
@@ -132,27 +147,30 @@ class Places:
         start = [f"{radius} * ({angle} - ({' + '.join(own_constants) or '0.0'}))", offset]
         self.travels[step.slide.name] = share, start
         way = " + ".join((*(f"{f} * {self.interface.drives[n].variable}" for n, f in share.items()), *start))
-        travel = f"travelled({way}, {self.share(share)}, v)"
-        frame = self.slid(step, step.slide, self.interface.turn(step.parent), travel)
+        travel = f"linear_arm({way}, {self.derivative_tuple(share)}, v)"
+        frame = self.slide_pose(step, step.slide, self.interface.turn(step.parent), travel)
         sign = "" if step.slide.bodies[1] == step.body else "-"
         inclined = [f"{sign}p.{step.slide.name}_direction"] if step.slide.inclined else []
         self.angles[step.body] = own_terms, [*own_constants, *inclined]
         self.lines.append(f"{step.body}_frame = {frame}")
 
-    def share(self, terms: dict[int, str]) -> str:
-        """Return the derivatives of an angle with respect to the coordinates, as a tuple."""
+    def derivative_tuple(self, terms: dict[int, str]) -> str:
+        """Return the source of the tuple of derivatives by the coordinates; ``terms`` has those that are not zero."""
         return f"({', '.join(terms.get(n, '0.0') for n in range(self.n))},)"
 
-    def angled(self, terms: dict[int, str], constants: Iterable[str]) -> str:
-        """Return the expression of a direction whose angle is linear in the coordinates."""
+    def linear_turn(self, terms: dict[int, str], constants: Iterable[str]) -> str:
+        """Return the expression of a direction whose angle is linear in the coordinates.
+
+        ``terms`` has the coefficients by index of the freedom, ``constants`` the constant terms of the angle.
+        """
         words = []
         for number, factor in terms.items():
             name = self.interface.drives[number].variable
             words.append({"1.0": name, "-1.0": f"-{name}"}.get(factor, f"{factor} * {name}"))
         angle = " + ".join((*words, *constants)) or "0.0"
-        return f"angled({angle.replace('+ -', '- ')}, {self.share(terms)}, v)"
+        return f"linear_direction({angle.replace('+ -', '- ')}, {self.derivative_tuple(terms)}, v)"
 
-    def geared(self, step: Geared) -> None:
+    def place_geared(self, step: GearStep) -> None:
         """Write the pose of a gear from the angle of its mate."""
         ratio, phase = f"p.{step.gear}_ratio", f"p.{step.gear}_phase"
         (mate, mate_constants), (carrier, carrier_constants) = self.angles[step.mate], self.angles[step.parent]
@@ -167,15 +185,17 @@ class Places:
         constants = [angle if step.inverse else f"{angle} + {phase}"]
         self.angles[step.body] = terms, constants
         turn = f"{step.body}_turn"
-        self.lines.append(f"{turn} = {self.angled(terms, constants)}")
-        self.lines.append(
-            f"{step.body}_frame = {self.hung(self.at(step.parent, step.pin.name), turn, step.body, step.pin.name)}"
-        )
+        self.lines.append(f"{turn} = {self.linear_turn(terms, constants)}")
+        pin = self.point_variable(step.parent, step.pin.name)
+        self.lines.append(f"{step.body}_frame = {self.pose_at_pin(pin, turn, step.body, step.pin.name)}")
 
     # Dyads
 
-    def end(self, side: Side, body: str, joint: Pin) -> str:
-        """Return the vector from a side's outer joint to the dyad's inner pin, in the axes of the side's body or guide line."""
+    def arm_to_inner_pin(self, side: Side, body: str, joint: Pin) -> str:
+        """Return the expression of the arm from a side's outer joint to the dyad's inner pin ``joint``, a point of ``body``.
+
+        It is given in the axes of the side's body or, if that body guides the slide at the outer joint, of the guide line.
+        """
         if isinstance(side.joint, Pin):
             start, axes = side.joint.name, ""
         elif side.joint.bodies[1] == side.body:
@@ -185,87 +205,94 @@ class Places:
         return self.own_arm(side, body, joint.name, start, axes)
 
     def own_arm(self, side: Side, body: str, to: str, start: str, axes: str) -> str:
-        """Return the vector, in a side's body, from its point ``start`` to the point ``to`` of one of the side's bodies."""
+        """Return the expression of the arm from the point ``start`` of a side's first body to the point ``to`` of ``body``.
+
+        ``body`` is any body of the side. The arm is given in the frame of the first body or, if ``axes`` names a slide of it,
+        in the axes of that slide's line.
+        """
         sx, sy = self.interface.coordinates(side.body, start)
         if body == side.body:
             x, y = self.interface.coordinates(body, to)
-            result = f"fixed({_difference(x, sx)}, {_difference(y, sy)}, {self.n})"
+            result = f"fixed_vector({_difference(x, sx)}, {_difference(y, sy)}, {self.n})"
         else:
             result = self.point(body, to, f"{body}_in_{side.body}")
             if (sx, sy) != ("0.0", "0.0"):
-                result = f"minus({result}, fixed({sx}, {sy}, {self.n}))"
-        return f"turned(held(p.{axes}_COS, -p.{axes}_SIN, {self.n}), {result})" if axes else result
+                result = f"subtract_vectors({result}, fixed_vector({sx}, {sy}, {self.n}))"
+        return f"rotate_arm(fixed_direction(p.{axes}_COS, -p.{axes}_SIN, {self.n}), {result})" if axes else result
 
-    def line(self, side: Side) -> tuple[str, str]:
+    def guide_line(self, side: Side) -> tuple[str, str]:
         """Write the line along which a side slides; return the variables of its origin and direction."""
         joint = side.joint
         assert isinstance(joint, Slider)
         parent = self.interface.turn(side.parent)
         name = f"{joint.name}_line"
         if joint.bodies[1] == side.body:
-            self.lines.append(f"{name} = {self.inclined(parent, joint)}")
-            return self.at(side.parent, joint.through), name
+            self.lines.append(f"{name} = {self.incline_turn(parent, joint)}")
+            return self.point_variable(side.parent, joint.through), name
         self.lines.append(f"{name} = {parent}")
         return f"{side.parent}_frame.origin", name
 
-    def placed(self, side: Side, turn: str, along: str = "", origin: str = "", line: str = "") -> None:
-        """Write the poses of a side's bodies from the direction of the first, or from its position along a line."""
+    def place_side(self, side: Side, turn: str, along: str = "", origin: str = "", line: str = "") -> None:
+        """Write the poses of a side's bodies: from the direction ``turn`` of the first body if its joint is a pin.
+
+        If it is a slide, they follow from the arm ``along`` the line that starts at ``origin`` and has the direction ``line``.
+        """
         joint, body = side.joint, side.body
         if isinstance(joint, Pin):
-            frame = self.hung(self.at(side.parent, joint.name), turn, body, joint.name)
+            frame = self.pose_at_pin(self.point_variable(side.parent, joint.name), turn, body, joint.name)
         else:
-            place = f"plus({origin}, turned({line}, {along}))"
+            place = f"add_vectors({origin}, rotate_arm({line}, {along}))"
             if joint.bodies[1] == body:
                 frame = f"Frame({place}, {line})"
             else:
-                self.lines.append(f"{body}_turn = {self.inclined(line, joint, -1)}")
-                frame = self.hung(place, f"{body}_turn", body, joint.through)
+                self.lines.append(f"{body}_turn = {self.incline_turn(line, joint, -1)}")
+                frame = self.pose_at_pin(place, f"{body}_turn", body, joint.through)
         self.lines.append(f"{body}_frame = {frame}")
         for own in side.bodies[1:]:
             self.lines.append(f"{own}_frame = composed_frame({body}_frame, {own}_in_{body})")
 
-    def insides(self, step: Dyad) -> None:
+    def place_inner_bodies(self, step: Dyad) -> None:
         """Write the poses of the bodies inside the two sides of a dyad, relative to the side's first body."""
         for side in step.sides:
             kept = dict(self.angles)
             self.angles[side.body] = {}, []
             for inside in side.inside:
-                if isinstance(inside, Freed):
-                    self.freed(inside, side.body)
+                if isinstance(inside, FreedomStep):
+                    self.place_freed(inside, side.body)
                 else:
-                    self.nested(inside, side.body)
+                    self.place_nested_dyad(inside, side.body)
             self.angles = kept
 
-    def nested(self, step: Dyad, lead: str) -> None:
-        """Write the poses of an RRR dyad relative to the body ``lead``, whose own pose is not known yet."""
+    def place_nested_dyad(self, step: Dyad, lead: str) -> None:
+        """Write the poses of the bodies of an RRR dyad relative to the body ``lead``, whose own pose is not known yet."""
         name, (one, other) = step.inner.name, step.sides
         assert isinstance(step.inner, Pin)
         self.lines.append(f"# dyad RRR in the {lead}: {one.body} and {other.body}, joined at {name}")
-        self.insides(step)
+        self.place_inner_bodies(step)
         frames = ["own" if side.parent == lead else f"{side.parent}_in_{lead}" for side in step.sides]
         pins = [self.point(side.parent, side.joint.name, frame) for side, frame in zip(step.sides, frames)]
         turns = [f"{side.body}_turn_in_{lead}" for side in step.sides]
-        first, second = (self.end(side, end, step.inner) for side, end in zip(step.sides, step.ends))
+        first, second = (self.arm_to_inner_pin(side, end, step.inner) for side, end in zip(step.sides, step.ends))
         call = f"pin_pin_pin({pins[0]}, {pins[1]}, {first}, {second}, p.{name}_assembly, v)"
         self.lines.append(f"{turns[0]}, {turns[1]}, margin_{name} = {call}")
         self.margins.append(f"margin_{name}")
         for side, pin, turn in zip(step.sides, pins, turns):
-            self.lines.append(f"{side.body}_in_{lead} = {self.hung(pin, turn, side.body, side.joint.name)}")
+            self.lines.append(f"{side.body}_in_{lead} = {self.pose_at_pin(pin, turn, side.body, side.joint.name)}")
             for own in side.bodies[1:]:
                 self.lines.append(f"{own}_in_{lead} = composed_frame({side.body}_in_{lead}, {own}_in_{side.body})")
 
-    def dyad(self, step: Dyad) -> None:
+    def place_dyad(self, step: Dyad) -> None:
         """Write the poses of the bodies of a dyad."""
         name = step.inner.name
         self.lines.append(f"# dyad {step.kind}: {' and '.join(s.body for s in step.sides)}, joined at {name}")
-        self.insides(step)
+        self.place_inner_bodies(step)
         branch, margin = f"p.{name}_assembly", f"margin_{name}"
         turns = [f"{side.body}_turn" for side in step.sides]
-        pins = [self.at(s.parent, s.joint.name) if isinstance(s.joint, Pin) else "" for s in step.sides]
-        lines = [self.line(s) if isinstance(s.joint, Slider) else ("", "") for s in step.sides]
+        pins = [self.point_variable(s.parent, s.joint.name) if isinstance(s.joint, Pin) else "" for s in step.sides]
+        lines = [self.guide_line(s) if isinstance(s.joint, Slider) else ("", "") for s in step.sides]
         along = [f"{s.joint.name}_along" for s in step.sides]
         if isinstance(step.inner, Pin):
-            arms = [self.end(side, end, step.inner) for side, end in zip(step.sides, step.ends)]
+            arms = [self.arm_to_inner_pin(side, end, step.inner) for side, end in zip(step.sides, step.ends)]
             if step.kind == "RRR":
                 call = f"pin_pin_pin({pins[0]}, {pins[1]}, {arms[0]}, {arms[1]}, {branch}, v)"
                 self.lines.append(f"{turns[0]}, {turns[1]}, {margin} = {call}")
@@ -282,9 +309,9 @@ class Places:
             self._to_block(step, step.inner, pins[0], lines[1], margin)
         self.margins.append(margin)
         for side, turn, way, (origin, line) in zip(step.sides, turns, along, lines):
-            self.placed(side, turn, way, origin, line)
+            self.place_side(side, turn, way, origin, line)
         if isinstance(step.inner, Pin):
-            self.at(step.ends[0], name)
+            self.point_variable(step.ends[0], name)
 
     def _between_pins(self, step: Dyad, inner: Slider, pins: list[str], branch: str, margin: str) -> None:
         holder, block = (0, 1) if step.sides[0].body == inner.bodies[0] else (1, 0)
@@ -293,7 +320,7 @@ class Places:
         b = self.own_arm(second, second.body, second.joint.name, "", "")
         call = f"pin_slide_pin({pins[holder]}, {pins[block]}, {a}, {b}, {branch}, v)"
         self.lines.append(f"{inner.name}_line, {inner.name}_along, {margin} = {call}")
-        self.lines.append(f"{first.body}_turn = {self.inclined(f'{inner.name}_line', inner, -1)}")
+        self.lines.append(f"{first.body}_turn = {self.incline_turn(f'{inner.name}_line', inner, -1)}")
         self.lines.append(f"{second.body}_turn = {inner.name}_line")
 
     def _to_block(self, step: Dyad, inner: Slider, pin: str, line: tuple[str, str], margin: str) -> None:
@@ -302,11 +329,11 @@ class Places:
         outer = second.joint
         assert isinstance(outer, Slider)
         own = outer.bodies[1] == second.body
-        turn = direction if own else self.inclined(direction, outer, -1)
+        turn = direction if own else self.incline_turn(direction, outer, -1)
         start, axes = ("", "") if own else (outer.through, outer.name if outer.inclined else "")
         across = f"{inner.name}_line"
         holds = inner.bodies[0] == second.body
-        self.lines.append(f"{across} = {self.inclined(turn, inner) if holds else turn}")
+        self.lines.append(f"{across} = {self.incline_turn(turn, inner) if holds else turn}")
         if holds:
             a = self.own_arm(first, first.body, first.joint.name, "", "")
             b = self.own_arm(second, second.body, inner.through, start, axes)
@@ -314,7 +341,7 @@ class Places:
         else:
             a = self.own_arm(first, first.body, first.joint.name, inner.through, inner.name if inner.inclined else "")
             b = self.own_arm(second, second.body, "", start, axes)
-            body_turn = self.inclined(across, inner, -1)
+            body_turn = self.incline_turn(across, inner, -1)
         call = f"pin_slide_slide({pin}, {origin}, {direction}, {across}, {a}, {b}, v)"
         self.lines.append(f"{outer.name}_along, {inner.name}_along, {margin} = {call}")
         self.lines.append(f"{first.body}_turn = {body_turn}")
@@ -327,30 +354,30 @@ class Places:
             self.lines.append(f"{drive.variable} = x[{n}]")
         self.lines.append(f"v = ({', '.join(f'x[{self.n + n}]' for n in range(self.n))},)")
         for step in self.structure.steps:
-            if isinstance(step, Freed):
+            if isinstance(step, FreedomStep):
                 self.lines.append(
                     f"# the freedom {self.interface.drives[step.freedom].name}: {step.body} from {step.parent}"
                 )
-                self.freed(step)
-            elif isinstance(step, Geared):
+                self.place_freed(step)
+            elif isinstance(step, GearStep):
                 self.lines.append(f"# {step.body}, geared to {step.mate}")
-                self.geared(step)
-            elif isinstance(step, Racked):
+                self.place_geared(step)
+            elif isinstance(step, RackStep):
                 self.lines.append(f"# {step.body}, in the teeth of {step.mate}")
-                (self.pinion if step.turns else self.rack)(step)
+                (self.place_pinion if step.turns else self.place_rack)(step)
             else:
-                self.dyad(step)
+                self.place_dyad(step)
         margin = "1.0"
         for name in self.margins:
             margin = name if margin == "1.0" else f"lesser({margin}, {name})"
         for body in (GROUND, *self.structure.bodies):
             for own in self.interface.points[body]:
-                self.at(body, own)
+                self.point_variable(body, own)
         fields = [f"{body}_frame" for body in self.structure.bodies] + list(self.places.values())
         fields += [f"{name}_line" for name in sliders(self.structure)]
         for name, joint in sliders(self.structure).items():
             if not any(line.startswith(f"{name}_line") for line in self.lines):
-                self.lines.append(f"{name}_line = {self.inclined(self.interface.turn(joint.bodies[0]), joint)}")
+                self.lines.append(f"{name}_line = {self.incline_turn(self.interface.turn(joint.bodies[0]), joint)}")
         self.lines += [f"clearance = {margin}", f"return Places({', '.join(fields)}, clearance)"]
         kinds = {"frame": "Frame", "line": "Turn"}
         types = {name: kinds.get(name.rpartition("_")[2], "Vector") for name in fields} | {"clearance": "float"}

@@ -75,16 +75,16 @@ def expression(law: Law, about: bool, name: str) -> str:
         If a row of a table is of other kinds of quantities, or the rows are not in order.
     """
     if isinstance(law, str):
-        return ast.unparse(_Written().visit(ast.parse(law, mode="eval")))
+        return ast.unparse(_WithoutBranches().visit(ast.parse(law, mode="eval")))
     units = ("rad", "N.m") if about else ("m", "N")
     rows = [[quantity(value, unit, name) for value, unit in zip(row, units)] for row in law]
     return _table(rows, name)
 
 
-class _Written(ast.NodeTransformer):
-    """Writes powers as `math.pow`, which raises where ``**`` gives a complex number, and max, min and abs by `math.fabs`.
+class _WithoutBranches(ast.NodeTransformer):
+    """Syntax transformer: max, min and abs become expressions with `math.fabs`, and powers become `math.pow`.
 
-    Whole constant powers stay.
+    `math.pow` raises an error where ``**`` gives a complex number; powers with a whole constant exponent stay.
     """
 
     def visit_BinOp(self, node: ast.BinOp) -> ast.expr:
@@ -134,8 +134,8 @@ def check_law(law: Law, known: Mapping[str, Any], name: str) -> None:
             raise ParameterError(where, known[own], "have a name of small letters that is no function, x or v")
 
 
-def periodic(law: Law, known: Mapping[str, tuple[float, str]]) -> bool:
-    """Return whether a force law about a pin has the period of a turn."""
+def is_periodic(law: Law, known: Mapping[str, tuple[float, str]]) -> bool:
+    """Return whether a force law about a pin is periodic with a turn."""
     if not isinstance(law, str):
         return False
     names = vars(math) | {"abs": abs, "max": max, "min": min} | {name: value for name, (value, _) in known.items()}
@@ -150,7 +150,7 @@ def periodic(law: Law, known: Mapping[str, tuple[float, str]]) -> bool:
 
 
 def with_constants(formula: str, known: Mapping[str, Any], prefix: str) -> str:
-    """Return a law with each constant written as a field of the parameters p."""
+    """Return a law with each constant written as a field of the parameters p, whose names begin with ``prefix``."""
     if not known:
         return formula
     return re.sub(rf"\b({'|'.join(known)})\b", rf"p.{prefix}_\1", formula)
@@ -161,7 +161,7 @@ def _finite(value: object) -> bool:
 
 
 def _table(rows: Sequence[Sequence[float]], name: str) -> str:
-    """Return piecewise linear interpolation, extrapolated at both ends, as a straight line plus terms in abs(x - x_k)."""
+    """Return the expression of linear interpolation, extrapolated at both ends: a line plus terms in abs(x - x_k)."""
     if any(b[0] <= a[0] for a, b in pairwise(rows)):
         raise ParameterError(name, [list(row) for row in rows], "have rows of rising x")
     slopes = [(b[1] - a[1]) / (b[0] - a[0]) for a, b in pairwise(rows)]

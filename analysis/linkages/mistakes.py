@@ -29,7 +29,7 @@ def check_entries(description: Description) -> None:
             owners.setdefault(own, set()).add(name)
     found = chain(_bodies(d), _gears(d, owners), _slots(d, owners), _springs(d, owners), _freedoms(d, owners))
     for where, wrong, right in chain(
-        found, _twice("loads", [load.point for load in d.loads]), _twice("torques", d.torques)
+        found, _find_duplicates("loads", [load.point for load in d.loads]), _find_duplicates("torques", d.torques)
     ):
         raise LinkageError(f"linkage.{where} {wrong}: {right}")
 
@@ -38,7 +38,7 @@ def check_entries(description: Description) -> None:
 Found = Iterator[tuple[str, str, str]]
 
 
-def _twice(where: str, names: Iterable[str]) -> Found:
+def _find_duplicates(where: str, names: Iterable[str]) -> Found:
     names = list(names)
     for name in names:
         if names.count(name) > 1:

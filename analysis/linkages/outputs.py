@@ -10,8 +10,8 @@ from .dynamics import Motion
 from .parameters import spring_angle_name
 from .structure import Pin, Slider, sliders
 from .symbols import symbol
-from .variables import display
-from .writing import function, quoted
+from .variables import display_argument
+from .writing import function, quote
 
 
 class Output(NamedTuple):
@@ -26,7 +26,7 @@ class Output(NamedTuple):
     @property
     def variable(self) -> str:
         """Source text of the variable in the package."""
-        known = f'"{self.name}", "{self.unit}", {quoted(self.text)}, {quoted(symbol(self.name, self.unit))}'
+        known = f'"{self.name}", "{self.unit}", {quote(self.text)}, {quote(symbol(self.name, self.unit))}'
         return f"output({known}{self.rest and f', {self.rest}'})"
 
 
@@ -42,14 +42,14 @@ class Outputs:
 
     def variables(self) -> Iterator[str]:
         """Yield the source texts of the output variables, in their order."""
-        yield from (output.variable for output in self._all())
+        yield from (output.variable for output in self._outputs())
         lost = "dampers and friction"
         if any(spring.law for spring in self.description.springs.values()):
             lost = "dampers and friction, and against force laws, which may give it back,"
         sources = ("springs and gravity", lost, "drives and loads")
-        yield f"*energy_outputs({', '.join(map(quoted, sources))})"
+        yield f"*energy_outputs({', '.join(map(quote, sources))})"
 
-    def _all(self) -> Iterator[Output]:
+    def _outputs(self) -> Iterator[Output]:
         """Yield the outputs in their order, without the energies."""
         n = len(self.interface.drives)
         for k, drive in enumerate(self.interface.drives):
@@ -57,7 +57,7 @@ class Outputs:
             text = f"{'Angle' if turn else 'Position'} of the freedom {drive.name}, at {drive.joint}"
             shown = f"*POSITION, {_DEGREES}" if turn else "*POSITION"
             yield Output(drive.coordinate, drive.unit, text, shown, f"x[{k}]")
-            shown = f'*RATE, rate_of="{drive.coordinate}"{display(rate_unit)}'
+            shown = f'*RATE, rate_of="{drive.coordinate}"{display_argument(rate_unit)}'
             yield Output(drive.rate, rate_unit, "Its rate", shown, f"x[{n + k}]")
             of = f'rate_of="{drive.rate}"'
             yield Output(f"{drive.name}.acceleration", f"{rate_unit}2", "Its acceleration", of, f"m.accelerations[{k}]")
@@ -76,7 +76,7 @@ class Outputs:
         for own in sorted(moving - set(self.description.ground)):
             for axis in "xy":
                 yield Output(f"{own}.{axis}", "m", f"Point {own}, {axis}", "*POSITION", f"b.at_{own}.{axis}")
-        for slide in self._following():
+        for slide in self._dependent_slides():
             name, block = slide.name, slide.bodies[1]
             text = f"Position of the {block} on the line of {name}"
             yield Output(f"{name}.position", "m", text, "*POSITION", f"{name}_position")
@@ -86,7 +86,7 @@ class Outputs:
             if spring.between:
                 free = f" + p.{name}_free_length" if is_given(spring.free) else ""
                 yield Output(f"{name}.length", "m", f"Length of {name}", "*POSITION", f"s.{name}_stretch{free}")
-            elif spring.at and name not in self.motion.along and self.motion.turned(spring):
+            elif spring.at and name not in self.motion.along and self.motion.twisted_bodies(spring):
                 text = f"Angle of {spring.at} from that at which {name} is free"
                 yield Output(spring_angle_name(self.description, name), "rad", text, "*POSITION", f"s.{name}_stretch")
             elif spring.bodies:
@@ -106,7 +106,7 @@ class Outputs:
             yield Output("assembly.clearance", "1", text, "*POSITION", "b.clearance")
         for name, spring in self.description.springs.items():
             if not spring.driven:
-                turned = self.motion.turned(spring)
+                turned = self.motion.twisted_bodies(spring)
                 what, unit = ("torque", "N.m") if turned else ("force", "N")
                 of = f", on the {turned[0]}" if turned else ""
                 text = f"{what.title()} of {name} against its stretch{of}"
@@ -136,7 +136,7 @@ class Outputs:
             along = f"{sign}({line}.c * f.in_{rack.rack}.x + {line}.s * f.in_{rack.rack}.y)"
             yield Output(f"{rack.rack}.force", "N", text, "", along)
 
-    def _following(self) -> list[Slider]:
+    def _dependent_slides(self) -> list[Slider]:
         """Return the slides whose positions are not freedoms but follow from them."""
         freed = {drive.joint for drive in self.interface.drives}
         return [slide for name, slide in sliders(self.structure).items() if name not in freed]
@@ -150,12 +150,12 @@ class Outputs:
             "b = m.places",
             *(["s = m.springs"] if s else []),
         ]
-        rows += [f"{d.name}_position, {d.name}_velocity = {self.interface.travel(d)}" for d in self._following()]
+        rows += [f"{d.name}_position, {d.name}_velocity = {self.interface.travel(d)}" for d in self._dependent_slides()]
         rows += ["kinetic = kinetic_energy(m.masses)", f"potential = potential_energy(m.masses, {s}p)"]
         n = len(self.interface.drives)
         lost, supplied = f"x[{2 * n}]", f"x[{2 * n + 1}]"
         balance = f"kinetic + potential - start_energy + {lost} - {supplied}"
-        values = (*(output.value for output in self._all()), "kinetic", "potential", lost, supplied, balance)
+        values = (*(output.value for output in self._outputs()), "kinetic", "potential", lost, supplied, balance)
         rows += ["return (", *(f"    {value}," for value in values), ")"]
         signature = "outputs(x: tuple[float, ...], i: Applied, start_energy: float, p: Constants) -> tuple[float, ...]"
         return function(signature, "Compute all real outputs, in the order of the interface.", rows)

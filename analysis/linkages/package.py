@@ -20,14 +20,14 @@ from .contacts import Contacts
 from .description import GROUND, Description, LinkageError, is_given
 from .drawing import Picture
 from .dynamics import Motion
-from .equations import Places
+from .equations import PoseWriter
 from .laws import WRITTEN
 from .mistakes import check_entries
 from .outputs import Outputs
 from .parameters import Drive, interface, length_and_mass
 from .structure import Structure, analyse
 from .variables import Variables
-from .writing import function, listed, quoted
+from .writing import function, indent_lines, quote
 
 _FRICTION = ("FRICTION_RATE", "FRICTION_SPEED", "contact_forces", "jamming_margin", "lesser")
 
@@ -97,7 +97,7 @@ VARIABLES = (
 
 def check_assembly(parameters: Parameters, x: tuple[float, ...]) -> None:
     """Make sure that the bodies can be joined."""
-    planar.check_clearance(equations.places, x, parameters.constants(), MECHANISM.where(x))
+    planar.check_clearance(equations.places, x, parameters.constants(), MECHANISM.describe_state(x))
 
 
 MECHANISM = Mechanism(
@@ -218,7 +218,7 @@ class Package:
         try:
             made.check_assembly(start.parameters, made.state(start.initial))
         except AssemblyError as error:
-            signs = ", linkage.assembly" if any(dyad.assembled for dyad in self.structure.dyads) else ""
+            signs = ", linkage.assembly" if any(dyad.has_two_assemblies for dyad in self.structure.dyads) else ""
             raise LinkageError(
                 f"{error}{self._unreachable(made)}: the start in linkage.freedoms{signs} or the lengths must be others"
             ) from None
@@ -256,7 +256,7 @@ class Package:
         start = made.published[made.name]
         x, p = made.state(start.initial), start.parameters.constants()
         try:
-            if all(map(isfinite, made.equations.derivative(x, made.idle(p), p))):
+            if all(map(isfinite, made.equations.derivative(x, made.idle_inputs(p), p))):
                 return
         except (ValueError, TypeError, ArithmeticError):
             pass
@@ -276,7 +276,7 @@ class Package:
         start = made.published[made.name]
         places = made.modules[-1].places(made.state(start.initial), start.parameters.constants())
         for name, spring in self.description.springs.items():
-            bodies = () if name in self.motion.along else self.motion.turned(spring)
+            bodies = () if name in self.motion.along else self.motion.twisted_bodies(spring)
             if not bodies or not is_given(spring.free):
                 continue
             one, other = (0.0 if b == GROUND else planar.turn_angle(getattr(places, f"{b}_frame").turn) for b in bodies)
@@ -292,9 +292,9 @@ class Package:
 
     def _equations(self) -> str:
         motion = self.motion
-        blocks = [*motion.applied(), *Places(self.interface).blocks(), motion.masses()]
+        blocks = [*motion.inputs(), *PoseWriter(self.interface).blocks(), motion.masses()]
         blocks += motion.springs() if self.description.springs else ()
-        blocks += [*motion.acting(), *motion.motion(), *motion.forces()]
+        blocks += [*motion.applied_forces(), *motion.motion(), *motion.forces()]
         blocks += Contacts(motion).blocks() if self.description.friction else ()
         # only now it is known which joint forces there are
         self.outputs = Outputs(motion)
@@ -304,39 +304,39 @@ class Package:
             name=self.description.name,
             state=", ".join((*(d.coordinate for d in self.interface.drives), *(d.rate for d in self.interface.drives))),
             imports=_imports(body),
-            constants=listed((f"{name}: float" for name in self.variables.constants()), end=""),
+            constants=indent_lines((f"{name}: float" for name in self.variables.constants()), end=""),
             body=body,
         )
 
     def _mechanism(self) -> str:
         d, v = self.description, self.variables
-        joints, parts = self.picture.drawn()
+        joints, parts = self.picture.points_and_parts()
         title = d.title or d.name
         return _MECHANISM.format(
             name=d.name,
             title=title.replace('"', "'").replace("\\", "/"),
             rules=v.rules(),
-            fields=listed(v.fields(), end=""),
-            values=listed(v.constants().values(), 12),
-            initial=listed((f"{start.name}: float = {start.rest!r}" for start in v.starts), end=""),
-            variables=listed([*v.parameters(), *v.inputs(), *self.outputs.variables()]),
-            quoted_name=quoted(d.name),
-            quoted_title=quoted(title),
-            fmu=quoted("".join(part[:1].upper() + part[1:] for part in re.split(r"[^A-Za-z0-9]+", d.name))),
-            notes=quoted(f"Source: {d.source}."),
+            fields=indent_lines(v.fields(), end=""),
+            values=indent_lines(v.constants().values(), 12),
+            initial=indent_lines((f"{start.name}: float = {start.rest!r}" for start in v.starts), end=""),
+            variables=indent_lines([*v.parameters(), *v.inputs(), *self.outputs.variables()]),
+            quoted_name=quote(d.name),
+            quoted_title=quote(title),
+            fmu=quote("".join(part[:1].upper() + part[1:] for part in re.split(r"[^A-Za-z0-9]+", d.name))),
+            notes=quote(f"Source: {d.source}."),
             started=", ".join(f"{start.name}={start.value!r}" for start in v.starts),
-            driven=v.driven(),
-            origins=listed(v.origins(), 16),
-            source=quoted(d.source),
-            freedoms=listed(v.freedoms(), 8),
-            channels=listed(v.channels(), 8),
-            positions=listed(map(quoted, v.placing()), 8),
-            joints=listed(
-                (f"Joint({quoted(j.name)}, {quoted(j.text)}{self.picture.moves(j.name)})" for j in joints), 12
+            driven=v.commanded_rates(),
+            origins=indent_lines(v.origins(), 16),
+            source=quote(d.source),
+            freedoms=indent_lines(v.freedoms(), 8),
+            channels=indent_lines(v.channels(), 8),
+            positions=indent_lines(map(quote, v.position_parameters()), 8),
+            joints=indent_lines(
+                (f"Joint({quote(j.name)}, {quote(j.text)}{self.picture.drag_argument(j.name)})" for j in joints), 12
             ),
-            parts=listed(parts, 12),
-            paths="".join(f"{quoted(name)}, " for name in self.picture.paths()),
-            links=listed(v.links(), 8),
+            parts=indent_lines(parts, 12),
+            paths="".join(f"{quote(name)}, " for name in self.picture.paths()),
+            links=indent_lines(v.links(), 8),
             switch="rough" if d.friction else "",
         )
 
@@ -350,7 +350,7 @@ def _imports(body: str) -> str:
         used = [name for name in names if re.search(rf"\b{name}\b", body)]
         if used:
             found.append(
-                f"from {module} import (\n{listed(used)}\n)"
+                f"from {module} import (\n{indent_lines(used)}\n)"
                 if len(used) > 4
                 else f"from {module} import {', '.join(used)}"
             )

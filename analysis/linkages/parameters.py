@@ -13,8 +13,8 @@ from linkwork.parameters import field_name
 
 from ..files import Quantity, unknown_name
 from .description import BODY, GROUND, Body, Description, LinkageError, is_given
-from .laws import periodic
-from .structure import Dyad, Freed, Geared, Pin, Racked, Slider, Structure
+from .laws import is_periodic
+from .structure import Dyad, FreedomStep, GearStep, Pin, RackStep, Slider, Structure
 
 
 class Parameter(NamedTuple):
@@ -123,7 +123,7 @@ class Interface:
 
     def turn(self, body: str, of: str = "") -> str:
         """Return the expression of the direction of a body, a field of the record ``of``."""
-        return f"{of}{body}_frame.turn" if body != GROUND else f"held(1.0, 0.0, {len(self.drives)})"
+        return f"{of}{body}_frame.turn" if body != GROUND else f"fixed_direction(1.0, 0.0, {len(self.drives)})"
 
     def travel(self, slide: Slider) -> str:
         """Return the expression of position and velocity of a block along its line, from the record of poses b."""
@@ -154,35 +154,36 @@ def freedoms(description: Description, structure: Structure) -> tuple[Drive, ...
                 Quantity(rate_unit)(table.speed, f"{where}.speed"),
                 inputs,
                 bool(inputs) and is_given(table.speed),
-                _turns_back(description, structure, len(found))
-                if turns and not _wound(description, table.joint)
+                _returning_turns(description, structure, len(found))
+                if turns and not _is_wound(description, table.joint)
                 else 0,
             )
         )
     return tuple(found)
 
 
-def _wound(description: Description, pin: str) -> bool:
-    """Return whether a spring about a pin is wound up further by every turn."""
+def _is_wound(description: Description, pin: str) -> bool:
+    """Return whether a spring about a pin is wound up further by every turn, so that a turn changes the configuration."""
     springs = [spring for spring in description.springs.values() if spring.at == pin]
     return any(
-        is_given(spring.stiffness) or (spring.law and not periodic(spring.law, spring.constants)) for spring in springs
+        is_given(spring.stiffness) or (spring.law and not is_periodic(spring.law, spring.constants))
+        for spring in springs
     )
 
 
-def _turns_back(description: Description, structure: Structure, freedom: int) -> int:
+def _returning_turns(description: Description, structure: Structure, freedom: int) -> int:
     """Count the turns of a freedom after which all gears are back at their angles; 0 if they never are, or a rack moves on."""
     angles, turns = {GROUND: 0.0}, 1
     for step in structure.steps:
         carrier = angles.get(step.parent, 0.0) if not isinstance(step, Dyad) else 0.0
-        if isinstance(step, Freed):
+        if isinstance(step, FreedomStep):
             own = step.freedom == freedom and isinstance(step.joint, Pin)
             angles[step.body] = carrier + (step.sign if own else 0)
-        elif isinstance(step, Geared):
+        elif isinstance(step, GearStep):
             ratio = description.gears[step.gear].ratio
             factor = 1.0 / ratio if step.inverse else ratio
             angles[step.body] = carrier + factor * (angles[step.mate] - carrier)
-        elif isinstance(step, Racked):
+        elif isinstance(step, RackStep):
             if not step.turns and angles[step.mate] != carrier:
                 return 0
             angles[step.body] = carrier
@@ -248,7 +249,7 @@ def interface(description: Description, structure: Structure) -> Interface:
             centres[name] = (x, y)
     for name in description.slots:
         points[name] = {description.slots[name].pin: ("0.0", "0.0")}
-    found += _joined(description, structure)
+    found += _joint_parameters(description, structure)
     found += _friction(description, structure)
     by_joint = {drive.joint: drive for drive in drives}
     for name, spring in description.springs.items():
@@ -268,7 +269,7 @@ def interface(description: Description, structure: Structure) -> Interface:
     return Interface(description, structure, tuple(found), drives, loads, points, centres)
 
 
-def _joined(description: Description, structure: Structure) -> Iterator[Parameter]:
+def _joint_parameters(description: Description, structure: Structure) -> Iterator[Parameter]:
     """Yield the parameters of slides, slots, gears and racks."""
     for joint in structure.joints.values():
         if isinstance(joint, Slider) and joint.inclined:
@@ -308,7 +309,7 @@ def _friction(description: Description, structure: Structure) -> Iterator[Parame
 
 def _assemblies(description: Description, structure: Structure) -> Iterator[Parameter]:
     """Yield the signs of the dyads that can be assembled in two ways."""
-    dyads = {dyad.inner.name: dyad for dyad in structure.dyads if dyad.assembled}
+    dyads = {dyad.inner.name: dyad for dyad in structure.dyads if dyad.has_two_assemblies}
     for name in description.assembly:
         if name not in dyads:
             there = ", ".join(dyads) or "none here"

@@ -61,7 +61,7 @@ def reach(mechanism: Mechanism, freedom: int = 0, *, most: float | None = None, 
         most = 0.5 * period or (pi if unit == "rad" else 1.0)
     known = mechanism.first_set
     p = known.parameters.constants()
-    acting, x = mechanism.idle(p), list(mechanism.state(known.initial))
+    acting, x = mechanism.idle_inputs(p), list(mechanism.state(known.initial))
     middle = x[freedom]
 
     def margin(q: float) -> float:

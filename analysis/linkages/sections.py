@@ -11,7 +11,7 @@ from ..sections import Bar, MassProperties, Plate, Rod, Section, Tube, density
 
 
 @dataclass(frozen=True, slots=True)
-class Made:
+class LinkBody:
     """Body of a link: a bar of constant section with an ``overhang`` (m) beyond each pin, or a plate with ``corners`` (m).
 
     ``words`` describe the body in messages.
@@ -30,32 +30,34 @@ class Made:
         return MassProperties(self.section.mass(body), (0.5 * length, 0.0), self.section.inertia(body))
 
     def origin(self, weighed: bool) -> str:
-        """Say where the mass properties come from: all from the section, or the mass from weighing (``weighed``)."""
+        """Return in words where the masses come from: all from the section, or the mass from weighing (``weighed``)."""
         return f"{'weighed, shaped as a ' if weighed else 'of a '}{self.words}"
 
 
-def millimetres(*lengths: float) -> str:
-    """Write lengths, given in metres, as text in millimetres."""
+def format_millimetres(*lengths: float) -> str:
+    """Format lengths, given in metres, as text in millimetres."""
     return " x ".join(f"{1e3 * length:g}" for length in lengths) + " mm"
 
 
-def _bar(width: float, thickness: float, material: float, overhang: float = 0.0) -> Made:
-    return Made(
-        Bar(width, thickness, material), f"bar of {millimetres(width, thickness)}, {material:g} kg/m3", overhang
+def _bar(width: float, thickness: float, material: float, overhang: float = 0.0) -> LinkBody:
+    return LinkBody(
+        Bar(width, thickness, material), f"bar of {format_millimetres(width, thickness)}, {material:g} kg/m3", overhang
     )
 
 
-def _rod(diameter: float, material: float, overhang: float = 0.0) -> Made:
-    return Made(Rod(diameter, material), f"rod of {millimetres(diameter)}, {material:g} kg/m3", overhang)
+def _rod(diameter: float, material: float, overhang: float = 0.0) -> LinkBody:
+    return LinkBody(Rod(diameter, material), f"rod of {format_millimetres(diameter)}, {material:g} kg/m3", overhang)
 
 
-def _tube(outer: float, inner: float, material: float, overhang: float = 0.0) -> Made:
-    return Made(Tube(outer, inner, material), f"tube of {millimetres(outer, inner)}, {material:g} kg/m3", overhang)
+def _tube(outer: float, inner: float, material: float, overhang: float = 0.0) -> LinkBody:
+    return LinkBody(
+        Tube(outer, inner, material), f"tube of {format_millimetres(outer, inner)}, {material:g} kg/m3", overhang
+    )
 
 
-def _plate(thickness: float, corners: tuple[Any, ...], material: float) -> Made:
-    words = f"plate of {millimetres(thickness)}, {len(corners)} corners, {material:g} kg/m3"
-    return Made(Plate(thickness, material), words, corners=corners)
+def _plate(thickness: float, corners: tuple[Any, ...], material: float) -> LinkBody:
+    words = f"plate of {format_millimetres(thickness)}, {len(corners)} corners, {material:g} kg/m3"
+    return LinkBody(Plate(thickness, material), words, corners=corners)
 
 
 _LENGTH = Quantity("m", above=0.0)

@@ -39,7 +39,7 @@ class Slider(NamedTuple):
 Joint = Pin | Slider
 
 
-class Freed(NamedTuple):
+class FreedomStep(NamedTuple):
     """A body whose joint with the known body ``parent`` is a freedom; ``sign`` is -1 if ``body`` is the joint's first body."""
 
     body: str
@@ -54,7 +54,7 @@ class Freed(NamedTuple):
         return (self.body,)
 
 
-class Geared(NamedTuple):
+class GearStep(NamedTuple):
     """A gear whose angle follows from that of its mate, both pinned to ``parent``.
 
     ``gear`` is the name of the pair in the description; ``inverse`` says whether the mate is its second gear.
@@ -68,7 +68,7 @@ class Geared(NamedTuple):
     inverse: bool
 
 
-class Racked(NamedTuple):
+class RackStep(NamedTuple):
     """A rack whose position follows from its gear, or a gear whose angle follows from its rack.
 
     ``body`` follows from ``mate``, and ``joint`` joins it to the carrier ``parent``. ``rack`` is the name of the pair in the
@@ -97,7 +97,7 @@ class Side(NamedTuple):
     body: str
     parent: str
     joint: Joint
-    inside: tuple[Freed | Dyad, ...]
+    inside: tuple[FreedomStep | Dyad, ...]
 
     @property
     def bodies(self) -> tuple[str, ...]:
@@ -132,12 +132,12 @@ class Dyad(NamedTuple):
         yield self
 
     @property
-    def assembled(self) -> bool:
+    def has_two_assemblies(self) -> bool:
         """Whether there are two assemblies to choose from."""
         return self.kind in ("RRR", "RRP", "RPR")
 
 
-Step = Freed | Geared | Racked | Dyad
+Step = FreedomStep | GearStep | RackStep | Dyad
 
 
 @dataclass(frozen=True, slots=True)
@@ -208,7 +208,7 @@ def joints(description: Description) -> dict[str, Joint]:
         for part in (rack.gear, rack.rack):
             if part not in known:
                 raise unknown_name(part, known, f"body {part}, of linkage.racks.{name}")
-        on_one_body(name, rack, found)
+        carrier_joints(name, rack, found)
     for own in description.bodies:
         if not any(own in joint.bodies for joint in found.values()):
             raise LinkageError(
@@ -217,8 +217,8 @@ def joints(description: Description) -> dict[str, Joint]:
     return found
 
 
-def on_one_body(name: str, rack: Rack, found: Mapping[str, Joint]) -> tuple[Pin, Slider, str]:
-    """Return the pin of a gear, the slide of its rack, and the body to which both joints connect them.
+def carrier_joints(name: str, rack: Rack, found: Mapping[str, Joint]) -> tuple[Pin, Slider, str]:
+    """Return the pin of a gear, the slide of its rack, and the carrier: the body to which both are joined.
 
     Raises
     ------
@@ -254,25 +254,25 @@ def sliders(structure: Structure) -> dict[str, Slider]:
 
 
 def lost_freedoms(description: Description, found: Mapping[str, Joint]) -> dict[str, int]:
-    """Return the number of freedoms that each joint, gear pair and rack removes."""
+    """Return the number of freedoms that each joint, gear pair and rack removes, by its name."""
     lost = {name: 2 * (len(joint.bodies) - 1) for name, joint in found.items()}
     return lost | dict.fromkeys((*description.gears, *description.racks), 1)
 
 
-def _count(description: Description) -> int:
+def _count_freedoms(description: Description) -> int:
     """Count the freedoms of a linkage by Gruebler's rule."""
     moving = len(description.bodies) + len(description.slots)
     return 3 * moving - sum(lost_freedoms(description, joints(description)).values())
 
 
-def _excess(description: Description) -> str:
-    """Name an entry whose removal would let an immobile linkage move; empty if there is none."""
+def _removal_hint(description: Description) -> str:
+    """Return a hint that names an entry whose removal would let an immobile linkage move; empty if there is none."""
     for table in ("racks", "gears", "slots", "slides", "bodies"):
         entries = getattr(description, table)
         for name in reversed(entries):
             others: Any = {table: {own: entry for own, entry in entries.items() if own != name}}
             try:
-                count = _count(replace(description, **others))
+                count = _count_freedoms(replace(description, **others))
             except LinkworkError:  # something else needs it
                 continue
             if 1 <= count <= MOST_FREEDOMS:
@@ -293,17 +293,21 @@ def analyse(description: Description) -> Structure:
         raise LinkageError("linkage.bodies has none: one at least must move")
     found = joints(description)
     lost, moving = lost_freedoms(description, found), len(description.bodies) + len(description.slots)
-    count = _count(description)
+    count = _count_freedoms(description)
     freedoms = dict(description.freedoms)
     says = (
         f"{description.name} has {count} freedoms by Gruebler's count, 3 of each of {moving} bodies less "
         f"{', '.join(f'{taken} at {name}' for name, taken in lost.items())}"
     )
     if not 1 <= count <= MOST_FREEDOMS:
-        hint = _excess(description) if count < 1 else "; more joints in linkage.slides or common points take some away"
+        hint = (
+            _removal_hint(description)
+            if count < 1
+            else "; more joints in linkage.slides or common points take some away"
+        )
         raise LinkageError(f"{says}: it must have 1 to {MOST_FREEDOMS}{hint}")
     if not freedoms:
-        freedoms = _proposed(description, found, count)
+        freedoms = _propose_freedoms(description, found, count)
     if len(freedoms) != count:
         raise LinkageError(
             f"{says}, but linkage.freedoms has {len(freedoms)} ({', '.join(freedoms)}): they must be as many"
@@ -341,16 +345,16 @@ def _choices(description: Description, found: Mapping[str, Joint], count: int) -
     return (some for some in combinations(simple, count) if not _solve(description, found, list(some))[1])
 
 
-def _proposed(description: Description, found: Mapping[str, Joint], count: int) -> dict[str, FreedomTable]:
+def _propose_freedoms(description: Description, found: Mapping[str, Joint], count: int) -> dict[str, FreedomTable]:
     """Return the first set of freedoms that determines all bodies, each named after its body."""
     for some in _choices(description, found, count):
         return {found[name].bodies[1]: FreedomTable(joint=name) for name in some}
     raise LinkageError(f"{description.name} is no chain of dyads, whatever joints are taken as freedoms")
 
 
-def _tree(root: str, found: Mapping[str, Joint], freed: list[str]) -> list[Freed]:
+def _tree(root: str, found: Mapping[str, Joint], freed: list[str]) -> list[FreedomStep]:
     """Return the steps that place the bodies which freedoms connect to the body ``root``, each after its parent."""
-    steps: list[Freed] = []
+    steps: list[FreedomStep] = []
     there = {root}
     growing = True
     while growing:
@@ -359,7 +363,7 @@ def _tree(root: str, found: Mapping[str, Joint], freed: list[str]) -> list[Freed
             first, second = found[name].bodies
             for parent, body, sign in ((first, second, 1), (second, first, -1)):
                 if parent in there and body not in there:
-                    steps.append(Freed(body, parent, found[name], number, sign))
+                    steps.append(FreedomStep(body, parent, found[name], number, sign))
                     there.add(body)
                     growing = True
     return steps
@@ -369,16 +373,16 @@ def _solve(description: Description, found: Mapping[str, Joint], freed: list[str
     """Return the steps that start at the ground, and the bodies that remain undetermined."""
     steps: list[Step] = list(_tree(GROUND, found, freed))
     #: bodies whose places are known, in order, and those whose angles are linear in the coordinates
-    known = dict.fromkeys((GROUND, *(step.body for step in _freed(steps))))
+    known = dict.fromkeys((GROUND, *(step.body for step in _freedom_steps(steps))))
     linear, travels = set(known), set(freed)
     moving = [*description.bodies, *description.slots]
     fixed = [joint for name, joint in found.items() if name not in freed]
     step: Step | None
     while unknown := [body for body in moving if body not in known]:
-        if step := next(_geared(description, fixed, known, linear, unknown), None):
+        if step := next(_gear_steps(description, fixed, known, linear, unknown), None):
             new = [step.body]
             linear.add(step.body)
-        elif racked := next(_racked(description, found, fixed, known, linear, travels), None):
+        elif racked := next(_rack_steps(description, found, fixed, known, linear, travels), None):
             step, new = racked, [racked.body]
             if racked.linear:
                 linear.add(racked.body)
@@ -398,18 +402,18 @@ def _solve(description: Description, found: Mapping[str, Joint], freed: list[str
     return steps, []
 
 
-def _next_dyad(fixed: list[Joint], trees: Mapping[str, list[Freed]], known: Mapping[str, None]) -> Dyad | None:
+def _next_dyad(fixed: list[Joint], trees: Mapping[str, list[FreedomStep]], known: Mapping[str, None]) -> Dyad | None:
     """Return the next dyad on the known bodies; None if there is none.
 
     Each side is a body with the bodies that freedoms join to it; if there is no such dyad, sides may also contain dyads.
     """
     if dyad := next(_dyads(fixed, trees, known), None):
         return dyad
-    groups: dict[str, list[Freed | Dyad]] = {}
+    groups: dict[str, list[FreedomStep | Dyad]] = {}
     for body, tree in trees.items():
-        if not any(_links(fixed, set(known), {body})):
+        if not any(_connecting_joints(fixed, set(known), {body})):
             continue
-        own: list[Freed | Dyad] = list(tree)
+        own: list[FreedomStep | Dyad] = list(tree)
         there = dict.fromkeys((body, *(step.body for step in tree)))
         while inner := next(
             (
@@ -425,13 +429,13 @@ def _next_dyad(fixed: list[Joint], trees: Mapping[str, list[Freed]], known: Mapp
     return next(_dyads(fixed, groups, known), None)
 
 
-def _freed(steps: list[Step]) -> Iterator[Freed]:
-    return (step for step in steps if isinstance(step, Freed))
+def _freedom_steps(steps: list[Step]) -> Iterator[FreedomStep]:
+    return (step for step in steps if isinstance(step, FreedomStep))
 
 
-def _geared(
+def _gear_steps(
     description: Description, fixed: list[Joint], known: Mapping[str, None], linear: set[str], unknown: list[str]
-) -> Iterator[Geared]:
+) -> Iterator[GearStep]:
     """Yield the unknown gears whose mates' angles are known."""
     pins = [joint for joint in fixed if isinstance(joint, Pin)]
     for name, gear in description.gears.items():
@@ -441,32 +445,32 @@ def _geared(
             for pin in pins:
                 carriers = [c for c in pin.bodies if body in pin.bodies and c in linear and c != mate]
                 if carriers:
-                    yield Geared(body, carriers[0], pin, name, mate, inverse)
+                    yield GearStep(body, carriers[0], pin, name, mate, inverse)
 
 
-def _racked(
+def _rack_steps(
     description: Description,
     found: Mapping[str, Joint],
     fixed: list[Joint],
     known: Mapping[str, None],
     linear: set[str],
     travels: set[str],
-) -> Iterator[Racked]:
+) -> Iterator[RackStep]:
     """Yield the racks whose gears are known and the gears whose racks are known.
 
     ``travels`` are the slides whose positions are linear in the coordinates.
     """
     for name, rack in description.racks.items():
-        pin, slide, carrier = on_one_body(name, rack, found)
+        pin, slide, carrier = carrier_joints(name, rack, found)
         if rack.rack not in known and slide in fixed and {rack.gear, carrier} <= linear:
-            yield Racked(rack.rack, carrier, slide, name, rack.gear, pin, slide, True)
+            yield RackStep(rack.rack, carrier, slide, name, rack.gear, pin, slide, True)
         if rack.gear not in known and pin in fixed and {rack.rack, carrier} <= known.keys():
             all_linear = slide.name in travels and carrier in linear
-            yield Racked(rack.gear, carrier, pin, name, rack.rack, pin, slide, all_linear)
+            yield RackStep(rack.gear, carrier, pin, name, rack.rack, pin, slide, all_linear)
 
 
-def _links(fixed: list[Joint], first: set[str], second: set[str]) -> Iterator[tuple[Joint, str, str]]:
-    """Yield the joints between two sets of bodies, with the body of each set."""
+def _connecting_joints(fixed: list[Joint], first: set[str], second: set[str]) -> Iterator[tuple[Joint, str, str]]:
+    """Yield each joint between a body of ``first`` and a body of ``second``, with these two bodies."""
     for joint in fixed:
         ends = [next((body for body in joint.bodies if body in some), "") for some in (first, second)]
         if all(ends):
@@ -474,29 +478,29 @@ def _links(fixed: list[Joint], first: set[str], second: set[str]) -> Iterator[tu
 
 
 def _dyads(
-    fixed: list[Joint], trees: Mapping[str, Sequence[Freed | Dyad]], known: Mapping[str, None]
+    fixed: list[Joint], trees: Mapping[str, Sequence[FreedomStep | Dyad]], known: Mapping[str, None]
 ) -> Iterator[Dyad]:
     """Yield the dyads on known bodies; ``trees`` are the steps that place further bodies relative to each unknown body."""
     base = set(known)
     sides = [
         Side(body, parent, joint, tuple(inside))
         for body, inside in trees.items()
-        for joint, parent, _ in _links(fixed, base, {body})
+        for joint, parent, _ in _connecting_joints(fixed, base, {body})
     ]
     for one, other in combinations(sides, 2):
         if set(one.bodies) & set(other.bodies) or one.joint.name == other.joint.name:
             continue
         pair = (one, other) if isinstance(one.joint, Pin) else (other, one)
-        for inner, first, second in _links(fixed, set(pair[0].bodies), set(pair[1].bodies)):
+        for inner, first, second in _connecting_joints(fixed, set(pair[0].bodies), set(pair[1].bodies)):
             if inner.name in (one.joint.name, other.joint.name):
                 continue
-            kind = _kind(pair, inner)
+            kind = _dyad_kind(pair, inner)
             # an inner slide must join the two bodies that are joined to known ones, not bodies inside the sides
             if kind and (isinstance(inner, Pin) or (first, second) == (pair[0].body, pair[1].body)):
                 yield Dyad(kind, pair, inner, (first, second))
 
 
-def _kind(sides: tuple[Side, Side], inner: Joint) -> str:
+def _dyad_kind(sides: tuple[Side, Side], inner: Joint) -> str:
     """Return the kind of a dyad from its three joints; empty if they do not determine its pose."""
     pinned = sum(isinstance(side.joint, Pin) for side in sides)
     if isinstance(inner, Pin):

@@ -9,7 +9,7 @@ from .description import is_given
 from .parameters import Drive, Interface
 from .structure import Pin, sliders
 from .symbols import symbol
-from .writing import quoted
+from .writing import quote
 
 
 class Start(NamedTuple):
@@ -21,7 +21,7 @@ class Start(NamedTuple):
     rest: float
 
 
-def display(unit: str) -> str:
+def display_argument(unit: str) -> str:
     """Return the argument that names a variable's display unit, deg or rpm; empty if it is the unit itself."""
     shown = {"rad": "deg", "rad/s": "rpm"}.get(unit)
     return f', display="{shown}"' if shown else ""
@@ -40,7 +40,7 @@ class Variables:
     # Parameters
 
     def constants(self) -> dict[str, str]:
-        """Return the constants of the equations by name, as expressions in the parameters.
+        """Return the constants of the equations: by name the expression of each in the parameters ``self``.
 
         Constants of laws have no capitals in their names, so that ``COS`` and ``SIN`` are free.
         """
@@ -82,26 +82,26 @@ class Variables:
     def parameters(self) -> Iterator[str]:
         """Yield the variables of the parameters, the modes and the initial state."""
         for p in self.interface.parameters:
-            sign = quoted(symbol(p.name, p.unit))
+            sign = quote(symbol(p.name, p.unit))
             if p.rule == "sign":
                 yield f'Variable("{p.name}", "parameter", "", "{p.text}: +1 or -1", {sign}, {p.value}, "Integer", -1, 1)'
                 continue
             least = "" if p.rule == "free" else ", minimum=0.0"
             role = f', role="{p.role}"' if p.role else ""
             of = f', of="{p.of}"' if p.of else ""
-            rest = f"{least}{display(p.unit)}{role}{of}"
-            yield f'Variable("{p.name}", "parameter", "{p.unit}", {quoted(p.text)}, {sign}, {p.value!r}{rest})'
+            rest = f"{least}{display_argument(p.unit)}{role}{of}"
+            yield f'Variable("{p.name}", "parameter", "{p.unit}", {quote(p.text)}, {sign}, {p.value!r}{rest})'
         for d in self.interface.drives:
             if d.table:
                 text = f"0: {d.table}.{d.load} acts; 1: the rate is {d.table}.speed"
                 yield f'Variable("{d.table}.mode", "parameter", "", "{text}", "", {int(d.commanded)}, "Integer", 0, 1)'
         for s in self.starts:
-            sign = quoted(symbol(s.name.replace("_", "."), s.unit, "0"))
+            sign = quote(symbol(s.name.replace("_", "."), s.unit, "0"))
             own = f'"initial.{s.name}", "parameter", "{s.unit}", "At the start", {sign}'
-            yield f"Variable({own}, {s.value!r}{display(s.unit)})"
+            yield f"Variable({own}, {s.value!r}{display_argument(s.unit)})"
         yield "tolerance_parameter()"
 
-    def placing(self) -> list[str]:
+    def position_parameters(self) -> list[str]:
         """Return the parameters that determine the poses of the bodies at the start."""
         names = [
             p.name for p in self.interface.parameters if p.unit in ("m", "rad", "1", "") and p.role in ("", "ratio")
@@ -121,8 +121,8 @@ class Variables:
     def _argument(self, drive: Drive, name: str) -> str:
         return f"{drive.name}_{name}" if self.several or not drive.table else name
 
-    def driven(self) -> str:
-        """Return the entries of the published set's ``drive``: the commanded rates."""
+    def commanded_rates(self) -> str:
+        """Return the source of the entries of the published set's ``drive``: the commanded rates."""
         driven = [d for d in self.interface.drives if d.commanded]
         return ", ".join(f'"{self._argument(d, "speed")}": {d.speed!r}' for d in driven)
 
@@ -130,7 +130,7 @@ class Variables:
         """Yield the entries that say where the mass properties come from."""
         for name, body in self.description.bodies.items():
             if body.section is not None:
-                yield f'"{name}.mass": {quoted(body.section.origin(body.mass is not None))}'
+                yield f'"{name}.mass": {quote(body.section.origin(body.mass is not None))}'
             elif body.mass is not None:
                 still = ", without a moment of inertia" if body.bar and body.inertia is None else ""
                 yield f'"{name}.mass": "as given{still}"'
@@ -164,7 +164,7 @@ class Variables:
             yield _input(f"{table}.{d.load}", d.load_unit, f"{what} along the freedom {d.name}")
             if d.table:
                 rate = f"{d.unit}/s"
-                shown = f", {d.speed!r}{display(rate)}"
+                shown = f", {d.speed!r}{display_argument(rate)}"
                 yield _input(f"{table}.speed", rate, f"Commanded rate of {d.name}", d.rate, shown)
                 text = "Rate of the commanded rate over a step"
                 yield _input(f"{table}.acceleration", f"{rate}2", text, f"{d.name}.acceleration")
@@ -173,8 +173,11 @@ class Variables:
 
 
 def _input(name: str, unit: str, text: str, of: str = "", rest: str = "") -> str:
-    """Return the variable of an input; its symbol is that of the variable ``of`` if one is given."""
-    return f'Variable("{name}", "input", "{unit}", {quoted(text)}, {quoted(symbol(of or name, unit))}{rest})'
+    """Return the source of an input's variable; its symbol is that of the variable ``of`` if one is given.
+
+    ``rest`` is the source of further arguments.
+    """
+    return f'Variable("{name}", "input", "{unit}", {quote(text)}, {quote(symbol(of or name, unit))}{rest})'
 
 
 def _last(drive: Drive, name: str) -> str:

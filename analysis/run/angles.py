@@ -96,7 +96,7 @@ def repeats(
 ) -> bool:
     """Return whether outputs and derivatives of a mechanism are the same at the states x and x + way, coordinates aside."""
     equations = mechanism.equations
-    acting = equations.applied(modes, tuple(u.tolist()), p)
+    acting = equations.apply_inputs(modes, tuple(u.tolist()), p)
     coordinates = coordinate_outputs(mechanism)
 
     def seen(y: NDArray[np.float64]) -> NDArray[np.float64]:

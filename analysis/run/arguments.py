@@ -137,7 +137,7 @@ def turn_durations(inputs: Inputs, mechanism: Mechanism) -> tuple[float, float] 
     for number, freedom in enumerate(mechanism.freedoms):
         if freedom.coordinate not in angles:
             continue
-        channel = mechanism.channel(number, "command")
+        channel = mechanism.channel_index(number, "command")
         parts = () if channel is None else inputs.parts(mechanism.channels[channel].argument)
         if len(parts) == 1 and isinstance(parts[0], (int, float)) and parts[0] != 0.0:
             found.append(tau / abs(parts[0]))

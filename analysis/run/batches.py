@@ -178,7 +178,7 @@ def _verdicts(task: Task, prepared: Prepared, ends: NDArray[np.float64]) -> tupl
         elif code == k.BAD_INPUT:
             status[i], messages[i] = code, str(run().lost(lost, t, x))
         else:
-            switched = task.mechanism.switched(prepared.batch.p[i])
+            switched = task.mechanism.is_switched_on(prepared.batch.p[i])
             limit = run().limit if switched else None
             steps, passed, needed = float(ends[i, 4]), t - float(task.settings.times[0]), 0.0
             if code == _GIVEN_UP:
@@ -304,7 +304,9 @@ def prepare(task: Task) -> Prepared:
                 p[:, n] = column
             if mechanism.switch:
                 columns = columns._replace(**{mechanism.switch: float(_switched(mechanism, p))})
-            applied = functions.of(equations.applied)(tuple(map(float, encoded.modes.values())), tuple(u.T), columns)
+            applied = functions.of(equations.apply_inputs)(
+                tuple(map(float, encoded.modes.values())), tuple(u.T), columns
+            )
             state = functions.of(equations.start)(tuple(x.T), applied, columns)
             clearance = np.broadcast_to(functions.of(equations.clearance)(state, applied, columns), len(x))
             p[:, -1] = functions.of(equations.energy)(state, columns)
@@ -332,7 +334,7 @@ def prepare(task: Task) -> Prepared:
 
 def _switched(mechanism: Mechanism, p: NDArray[np.float64]) -> bool:
     """Return whether the mechanism's switch is on in any row of constants."""
-    return mechanism.switch_place >= 0 and bool(p[:, mechanism.switch_place].any())
+    return mechanism.switch_index >= 0 and bool(p[:, mechanism.switch_index].any())
 
 
 def _map_distinct(make: Callable[[Any], Any], items: Sequence[Any]) -> list[Any]:

@@ -248,7 +248,7 @@ class _Continuous:
                     self.message = f"{error}, in the step from t = {solver.time:.9g} s"
                     return
                 if ended:
-                    where = self.prepared.mechanism.where(solver.state.tolist())
+                    where = self.prepared.mechanism.describe_state(solver.state.tolist())
                     limit = self.prepared.limit(np.asarray(solver.state))
                     self.status, self.message = 3, f"{limit} at t = {solver.time:.9g} s, {where}"
                     break

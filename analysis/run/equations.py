@@ -163,7 +163,7 @@ def expressions(mechanism: Mechanism, switched: bool = False) -> Traced:
                 f"the {what} of {mechanism.name} cannot be traced, as where it branches on its arguments: {_ALLOWED}"
             ) from error
 
-    applied = call("applied", tuple(casadi.vertsplit(modes)) if mechanism.modes else (), channels, k)
+    applied = call("apply_inputs", tuple(casadi.vertsplit(modes)) if mechanism.modes else (), channels, k)
     return Traced(
         Symbols(x, modes, u, casadi.vertcat(p, energy)),
         of("derivative", values, applied, k),

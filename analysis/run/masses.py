@@ -13,7 +13,7 @@ from linkwork.mechanism import Link, Mechanism, PublishedSet
 from linkwork.parameters import field_name
 
 from ..files import Kinds, Quantity, unknown_name
-from ..linkages import SECTIONS, Made, millimetres
+from ..linkages import SECTIONS, LinkBody, format_millimetres
 from ..mechanisms import Parameters, mechanism_of
 from ..sections import Section
 from .arguments import takes_published
@@ -40,7 +40,9 @@ class Mass(NamedTuple):
     stale: str = ""
 
 
-def _values(link: Link, units: Mapping[str, str], made: Made, length: float, mass: float | None) -> dict[str, float]:
+def _values(
+    link: Link, units: Mapping[str, str], made: LinkBody, length: float, mass: float | None
+) -> dict[str, float]:
     """Return mass, moment of inertia and centre of mass of a link (SI), by parameter names; ``mass`` is the weighed one."""
     own, (x, y), inertia = made.properties(length)
     if mass is not None:  # weighed: the shape, and so the radius of gyration, is that of the section
@@ -82,7 +84,7 @@ def with_sections(parameters: Parameters, **sections: Section) -> Parameters:
         if name not in links:
             raise unknown_name(name, links, f"link {name!r} of the {mechanism.name}")
         length = getattr(parameters, field_name(links[name].length))
-        values = _values(links[name], units, Made(section, ""), length, None)
+        values = _values(links[name], units, LinkBody(section, ""), length, None)
         parameters = replace(parameters, **{field_name(key): value for key, value in values.items()})
     return parameters
 
@@ -165,7 +167,7 @@ def mass_origins(
             length, own = get(field_name(link.length)), getattr(base, field_name(link.length))
             kept = [n for n in (link.mass, *link.centre[:1], link.inertia) if n not in flat]
             if kept and not isclose(length, own):
-                now, then = millimetres(length), millimetres(own)
+                now, then = format_millimetres(length), format_millimetres(own)
                 verb = "stays" if len(kept) == 1 else "stay"
                 stale = f"{link.length} is {now} where {source} has {then}, whose {', '.join(kept)} {verb}"
         found.append(Mass(name, get(field_name(name)), origin, stale))

@@ -116,12 +116,12 @@ class Run:
 
     def applied(self, u: NDArray[np.float64]) -> Any:
         """Return the inputs in the form that the equations take."""
-        return self.mechanism.equations.applied(self.modes, tuple(u.tolist()), self.p)
+        return self.mechanism.equations.apply_inputs(self.modes, tuple(u.tolist()), self.p)
 
     def limit(self, x: NDArray[np.float64]) -> str:
         """Return the message for a run that ended at a limit of the motion, at the state x."""
         idle = np.zeros(len(self.mechanism.channels))
-        return self.mechanism.limit(x.tolist(), self.applied(idle), self.p)
+        return self.mechanism.describe_limit(x.tolist(), self.applied(idle), self.p)
 
     def stiff(self, x: NDArray[np.float64], u: NDArray[np.float64], steps: float, passed: float) -> str:
         """Return a caution that the run is stiff or vibrates fast, or an empty text.
@@ -131,7 +131,7 @@ class Run:
         if steps < MANY_STEPS:
             return ""
         times, mechanism = self.settings.times, self.mechanism
-        turning = [abs(x[len(mechanism.freedoms) + i]) for i in mechanism.cyclic]
+        turning = [abs(x[len(mechanism.freedoms) + i]) for i in mechanism.cyclic_freedoms]
         usual = max([pi * (len(times) - 1) / float(np.ptp(times)), *(_HARMONICS * speed for speed in turning)])
         return stiffness(disturbance_rates(mechanism, x, self.applied(u), self.p), steps, passed, usual)
 
@@ -167,7 +167,7 @@ class Run:
             turns.take(start.x, sample(self.encoded, float(self.settings.times[0]), start.x, laws), laws, 0)
             # the energy at the start must be that of the reduced angles
             start = replace(start, energy=self.mechanism.equations.energy(tuple(start.x.tolist()), self.p))
-        problem = make_problem(self.encoded, self.settings, self.mechanism.switched(self.p))
+        problem = make_problem(self.encoded, self.settings, self.mechanism.is_switched_on(self.p))
         source, kept = compiled_source(self.encoded)
         batch = compiled.single_batch(source, np.array([*self.p, start.energy]), start.scale, self.encoded.steady)
         watch, watching = self._watch(self._balance() if balanced else ())
@@ -318,13 +318,13 @@ def verdict(
     # a microsecond, at any time
     at = f"t = {t:.9g} s" if abs(t) < 1e3 else f"t = {t:.6f} s"
     if status == k.LIMIT:
-        return 3, f"{limit(x) if limit else ASSEMBLY} at {at}, {mechanism.where(x.tolist())}"
+        return 3, f"{limit(x) if limit else ASSEMBLY} at {at}, {mechanism.describe_state(x.tolist())}"
     if status == k.NO_STEP:
-        return 4, f"the step size fell below what {at} can resolve, {mechanism.where(x.tolist())}"
+        return 4, f"the step size fell below what {at} can resolve, {mechanism.describe_state(x.tolist())}"
     if status == k.RUNNING and needed:
         return 4, f"stopped at {at}, as about {needed:.2g} steps would be needed"
     if status == k.RUNNING:
-        return 4, f"{settings.max_steps} steps did not suffice: stopped at {at}, {mechanism.where(x.tolist())}"
+        return 4, f"{settings.max_steps} steps did not suffice: stopped at {at}, {mechanism.describe_state(x.tolist())}"
     return 0, ""
 
 
@@ -351,7 +351,7 @@ def compute_outputs(
     from ..numerics.lanes import width
     from .compiled import rows
 
-    switched = mechanism.switched(p.tolist())
+    switched = mechanism.is_switched_on(p.tolist())
     if columns is None:
         outputs, count = machine(mechanism, switched, width()).addresses[OUTPUTS], len(mechanism.output_names)
     else:

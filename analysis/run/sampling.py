@@ -17,7 +17,7 @@ class NotFiniteError(InputError):
 
     def __init__(self, encoded: Encoded, number: int, t: float, x: NDArray[np.float64]) -> None:
         self.number = number
-        where = encoded.mechanism.where(x.tolist())
+        where = encoded.mechanism.describe_state(x.tolist())
         super().__init__(f"the input {encoded.value_name(number)} is not a finite number at t = {t:.9g} s, {where}")
 
 

@@ -161,7 +161,7 @@ def _motor(mechanism: Mechanism, crank: int) -> list[dict[str, Any]]:
 
 def _natural(mechanism: Mechanism, reference: dict[str, int], crank: int) -> int | None:
     """Return the reference of the stiffness for the natural frequency; -1 if it is in the energy, None without a frequency."""
-    if crank < 0 or len(mechanism.cyclic) == len(mechanism.freedoms):
+    if crank < 0 or len(mechanism.cyclic_freedoms) == len(mechanism.freedoms):
         return None
     return reference.get(stiffness_name(mechanism), -1)
 
@@ -199,7 +199,7 @@ def _picture(mechanism: Mechanism, reference: dict[str, int]) -> dict[str, Any]:
 def _moving(mechanism: Mechanism) -> list[str]:
     """Return the names of the outputs that have a rate and an acceleration, except crank angles."""
     rate_of = {v.rate_of: v.name for v in mechanism.variables if v.rate_of}
-    crank = [mechanism.freedoms[n].coordinate for n in mechanism.cyclic]
+    crank = [mechanism.freedoms[n].coordinate for n in mechanism.cyclic_freedoms]
     return [n for n in mechanism.output_names if n in rate_of and rate_of[n] in rate_of and n not in crank]
 
 
@@ -217,7 +217,9 @@ def _charts(mechanism: Mechanism) -> list[dict[str, Any]]:
         return {"title": title, "kind": kind, **unit, "curves": [{"name": n, "of": [names.index(n)]} for n in of]}
 
     forces = [{"name": joint, "of": [names.index(name) for name in parts]} for joint, parts in mechanism.joints.items()]
-    turning = [name for n in mechanism.cyclic for name in mechanism.names("drive", mechanism.freedoms[n].coordinate)]
+    turning = [
+        name for n in mechanism.cyclic_freedoms for name in mechanism.names("drive", mechanism.freedoms[n].coordinate)
+    ]
     powers = [{"name": "of drives and loads", "of": [power + 1]}, {"name": "lost", "of": [power]}]
     found = [
         outputs("Motion", "motion", _moving(mechanism)),

@@ -42,7 +42,7 @@ class _Model:
         self.initial = mechanism.initial(**start)
         self.modes = [float(values[mode.name]) for mode in mechanism.modes]
         self.p = self.parameters.constants()
-        self.traced = expressions(mechanism, mechanism.switched(self.p))
+        self.traced = expressions(mechanism, mechanism.is_switched_on(self.p))
         self.start = np.array(mechanism.state(self.initial))
         self.energy = mechanism.equations.energy(self.start.tolist(), self.p)
         self.rate_of = {v.rate_of: v.name for v in mechanism.variables if v.rate_of}

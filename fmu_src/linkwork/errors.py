@@ -11,7 +11,7 @@ class LinkworkError(Exception):
 _LISTED, _MISSING = 5, 12
 
 
-def _shown(value: object) -> str:
+def _show_value(value: object) -> str:
     """Return the text of a value for an error message, cut to a bounded length."""
     try:
         text = repr(value)
@@ -34,14 +34,14 @@ class ParameterError(LinkworkError, ValueError):
     value : object
         The value that was given.
     requirement : str
-        What would be right, as the end of the sentence "it must ...".
+        The words after "it must" in the message.
     """
 
     def __init__(self, name: str, value: object, requirement: str) -> None:
         self.name = name
         self.value = value
         self.requirement = requirement
-        super().__init__(f"parameter {name} is {_shown(value)}: it must {requirement}")
+        super().__init__(f"parameter {name} is {_show_value(value)}: it must {requirement}")
 
 
 class InputError(LinkworkError, ValueError):
@@ -49,7 +49,7 @@ class InputError(LinkworkError, ValueError):
 
 
 class UnknownNameError(ParameterError, InputError):
-    """An unknown name; ``known`` are the valid names, ``near`` the valid name that was probably meant, or None.
+    """A name is not valid; ``known`` are the valid names, ``near`` the valid name that was probably meant, or None.
 
     The message lists the valid names, or the nearest five if there are more than ten; ``words``, if given, replace the name.
     """

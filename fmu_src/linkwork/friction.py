@@ -29,7 +29,7 @@ def resistance(v: float, mu: float, fc: float) -> float:
 
 
 def contact_forces(smooth: tuple[Vector, ...], response: tuple[tuple[Vector, ...], ...]) -> tuple[float, ...]:
-    """Solve for the magnitudes s of contact forces (N) with friction proportional to them: s_j = sqrt(|F_j|^2 + F0^2).
+    """Solve for the magnitudes s_j = sqrt(|F_j|^2 + F0^2) of the contact forces (N) with friction proportional to them.
 
     ``smooth`` are the forces without friction; ``response[k]`` has the change of each force per newton of the k-th magnitude,
     so that F_j = smooth_j + sum_k response[k]_j s_k. Newton's method starts at the forces without friction.
@@ -37,8 +37,8 @@ def contact_forces(smooth: tuple[Vector, ...], response: tuple[tuple[Vector, ...
     least = FRICTION_FORCE * FRICTION_FORCE
     s = tuple(sqrt(x * x + y * y + least) for x, y in smooth)
     for _ in range(SWEEPS):
-        s = _swept(smooth, response, s)
-    return _swept(smooth, response, settled(s))
+        s = _newton_step(smooth, response, s)
+    return _newton_step(smooth, response, mark_converged(s))
 
 
 def jamming_margin(response: tuple[tuple[Vector, ...], ...]) -> float:
@@ -50,16 +50,16 @@ def jamming_margin(response: tuple[tuple[Vector, ...], ...]) -> float:
     return 1.0 - sqrt(1e-24 + sum(x * x + y * y for forces in response for x, y in forces)) / MOST_RESPONSE
 
 
-def settled(s: tuple[float, ...]) -> tuple[float, ...]:
-    """Return ``s``, the solution to within rounding, unchanged: it marks where differentiation may begin.
+def mark_converged(s: tuple[float, ...]) -> tuple[float, ...]:
+    """Return ``s``, the solution to within rounding, unchanged.
 
-    One more sweep of Newton's method from ``s`` has the derivatives of the solution, whatever the derivatives of ``s`` are.
-    Code that differentiates these equations can therefore skip the earlier sweeps.
+    The call marks where differentiation may begin: one more step of Newton's method from ``s`` has the derivatives of the
+    solution, whatever the derivatives of ``s`` are, so that code that differentiates these equations can skip the steps before.
     """
     return s
 
 
-def _swept(
+def _newton_step(
     smooth: tuple[Vector, ...], response: tuple[tuple[Vector, ...], ...], s: tuple[float, ...]
 ) -> tuple[float, ...]:
     """Take one step of Newton's method for the magnitudes ``s``; see `contact_forces`."""
@@ -76,10 +76,10 @@ def _swept(
         for j in n
     )
     right = tuple((forces[j][0] * smooth[j][0] + forces[j][1] * smooth[j][1] + least) / size[j] for j in n)
-    return solved(matrix, right)
+    return solve_linear(matrix, right)
 
 
-def solved(matrix: tuple[tuple[float, ...], ...], right: tuple[float, ...]) -> tuple[float, ...]:
+def solve_linear(matrix: tuple[tuple[float, ...], ...], right: tuple[float, ...]) -> tuple[float, ...]:
     """Solve linear equations without pivoting; the matrix is diagonally dominant, or symmetric positive definite."""
     if not right:
         return ()
@@ -90,5 +90,5 @@ def solved(matrix: tuple[tuple[float, ...], ...], right: tuple[float, ...]) -> t
         factor = row[0] / first[0]
         reduced.append(tuple(a - factor * b for a, b in zip(row[1:], first[1:])))
         values.append(value - factor * right[0])
-    rest = solved(tuple(reduced), tuple(values))
+    rest = solve_linear(tuple(reduced), tuple(values))
     return ((right[0] - sum(a * b for a, b in zip(first[1:], rest))) / first[0], *rest)

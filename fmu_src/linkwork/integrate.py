@@ -29,7 +29,7 @@ UNDEFINED = (ArithmeticError, ValueError)
 
 
 class Result(NamedTuple):
-    """Result of an integration: final state, step size with which to continue, numbers of steps tried and evaluations of f."""
+    """Result of an integration: final state, step size with which to continue, number of steps tried, of evaluations of f."""
 
     x: Vector
     step: float

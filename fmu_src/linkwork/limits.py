@@ -19,7 +19,7 @@ ASSEMBLY = "limit of assembly"
 JAMMING = "friction so strong that it may jam the links"
 
 
-class Unjoined(NamedTuple):
+class UnjoinedMessages(NamedTuple):
     """Messages for configurations in which the links cannot be joined, or hardly; the same in Python and in C.
 
     Attributes

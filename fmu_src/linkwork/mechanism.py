@@ -11,7 +11,7 @@ from types import MappingProxyType, ModuleType
 from typing import Any, NamedTuple
 
 from .errors import JammingError, LinkworkError
-from .limits import ASSEMBLY, JAMMING, LIMIT_SINE, NEAR_LIMIT, Unjoined
+from .limits import ASSEMBLY, JAMMING, LIMIT_SINE, NEAR_LIMIT, UnjoinedMessages
 from .parameters import Rules
 from .variables import Variable
 
@@ -77,7 +77,7 @@ class Channel(NamedTuple):
         ``force``; ``command``, the commanded rate of a freedom, whose jumps are impulses; or ``rate``, the rate of change of
         the command of the same freedom over a step.
     freedom : int
-        Number of the freedom that it drives; -1 if it drives none directly.
+        Index of the freedom that it drives; -1 if it drives none directly.
     displacement : str
         For a force that drives no freedom directly: the output that is the displacement of its point along the force.
     """
@@ -98,8 +98,9 @@ class Equations(NamedTuple):
 
     Attributes
     ----------
-    applied : callable
-        ``applied(modes, u, p)``: the applied inputs i of the other functions, from the values of modes and channels.
+    apply_inputs : callable
+        ``apply_inputs(modes, u, p)``: the record i of applied inputs that the other functions take, from the values of modes
+        and channels.
     derivative : callable
         ``derivative(x, i, p)``: time derivative of the state.
     outputs : callable
@@ -115,7 +116,7 @@ class Equations(NamedTuple):
         ``energy(x, p)``: mechanical energy (J).
     """
 
-    applied: Callable[..., Any]
+    apply_inputs: Callable[..., Any]
     derivative: Callable[..., Any]
     outputs: Callable[..., Any]
     clearance: Callable[..., float]
@@ -284,7 +285,7 @@ class Mechanism:
     error_scale : callable
         ``error_scale(parameters, x)``: magnitudes of the state's components below which the integrator's error is absolute,
         by arithmetic without branches.
-    unjoined : Unjoined or None
+    unjoined : UnjoinedMessages or None
         Messages of that error, which the FMU in C has too; None if the links can always be joined.
     switch : str
         Name of the only constant on which the equations may branch: whether it is zero or positive. They are traced once for
@@ -314,7 +315,7 @@ class Mechanism:
     equations: Equations
     check_assembly: Callable[[Any, Sequence[float]], None]
     error_scale: Callable[[Any, Sequence[float]], tuple[float, ...]]
-    unjoined: Unjoined | None = None
+    unjoined: UnjoinedMessages | None = None
     switch: str = ""
     links: tuple[Link, ...] = ()
     drawing: Drawing | None = None
@@ -347,24 +348,27 @@ class Mechanism:
         return type(self.first_set.parameters.constants())
 
     @cached_property
-    def switch_place(self) -> int:
+    def switch_index(self) -> int:
         """Index of the switch among the constants; -1 if there is none."""
         return int(self.constants._fields.index(self.switch)) if self.switch else -1
 
-    def switched(self, p: Sequence[float]) -> bool:
+    def is_switched_on(self, p: Sequence[float]) -> bool:
         """Return whether the switch is on; ``p`` are the constants, or numbers that begin with them."""
-        return self.switch_place >= 0 and p[self.switch_place] != 0.0
+        return self.switch_index >= 0 and p[self.switch_index] != 0.0
 
-    def limit(self, x: Sequence[float], i: Any, p: Any) -> str:
-        """Return in words which limit a motion with a small clearance reaches: of assembly, or jamming by friction."""
-        if self.switched(p) and abs(self.equations.clearance(x, i, p._replace(**{self.switch: 0.0}))) >= NEAR_LIMIT:
+    def describe_limit(self, x: Sequence[float], i: Any, p: Any) -> str:
+        """Describe in words which limit a motion with a small clearance reaches: that of assembly, or jamming by friction."""
+        if (
+            self.is_switched_on(p)
+            and abs(self.equations.clearance(x, i, p._replace(**{self.switch: 0.0}))) >= NEAR_LIMIT
+        ):
             return JAMMING
         return ASSEMBLY
 
-    def idle(self, p: Any) -> Any:
-        """Return the applied inputs i of the equations for constants p, all inputs zero and all modes at their defaults."""
+    def idle_inputs(self, p: Any) -> Any:
+        """Return the applied inputs i of the equations with all inputs zero and all modes at their defaults."""
         modes = tuple(float(mode.default) for mode in self.modes)
-        return self.equations.applied(modes, (0.0,) * len(self.channels), p)
+        return self.equations.apply_inputs(modes, (0.0,) * len(self.channels), p)
 
     def check_state(self, parameters: Any, x: Sequence[float], i: Any, p: Any) -> None:
         """Check that the links can be joined and do not jam, with a clearance of at least `limits.LIMIT_SINE`.
@@ -375,21 +379,21 @@ class Mechanism:
             If they cannot be joined; `JammingError` if friction may jam them.
         """
         self.check_assembly(parameters, x)
-        if self.switched(p) and not self.equations.clearance(x, i, p) >= LIMIT_SINE:
-            raise JammingError(f"{JAMMING} at {self.where(x)}")
+        if self.is_switched_on(p) and not self.equations.clearance(x, i, p) >= LIMIT_SINE:
+            raise JammingError(f"{JAMMING} at {self.describe_state(x)}")
 
     @cached_property
-    def cyclic(self) -> tuple[int, ...]:
-        """Numbers of the freedoms that turn as a crank does."""
+    def cyclic_freedoms(self) -> tuple[int, ...]:
+        """Indices of the freedoms that turn as a crank does."""
         return tuple(n for n, freedom in enumerate(self.freedoms) if freedom.period > 0.0 and not freedom.swings)
 
     @cached_property
     def torques(self) -> tuple[int, ...]:
-        """Numbers of the channels that are torques on freedoms that turn."""
-        return tuple(n for n, c in enumerate(self.channels) if c.kind == "force" and c.freedom in self.cyclic)
+        """Indices of the channels that are torques on freedoms that turn."""
+        return tuple(n for n, c in enumerate(self.channels) if c.kind == "force" and c.freedom in self.cyclic_freedoms)
 
-    def channel(self, freedom: int, kind: str) -> int | None:
-        """Return the number of the channel of a kind that drives a freedom directly; None where there is none."""
+    def channel_index(self, freedom: int, kind: str) -> int | None:
+        """Return the index of the channel of a kind that drives a freedom directly; None if there is none."""
         found = (n for n, c in enumerate(self.channels) if c.kind == kind and c.freedom == freedom)
         return next(found, None)
 
@@ -444,7 +448,7 @@ class Mechanism:
         return {v.name.removeprefix(prefix): v for v in self.variables if v.name.startswith(prefix)}
 
     def commands(self, modes: Mapping[str, int]) -> tuple[int, ...]:
-        """Return the numbers of the channels that command a rate in these ``modes``, values by name of the mode."""
+        """Return the indices of the channels that command a rate in these ``modes``, values by name of the mode."""
         return tuple(
             number
             for number, channel in enumerate(self.channels)
@@ -455,8 +459,8 @@ class Mechanism:
         mode = self.freedoms[channel.freedom].mode
         return mode is None or mode.arguments[modes[mode.name]] == channel.argument
 
-    def where(self, x: Sequence[float]) -> str:
-        """Describe the configuration of a state in words, by the coordinates of the freedoms."""
+    def describe_state(self, x: Sequence[float]) -> str:
+        """Describe a state in words, by the coordinates of the freedoms."""
         units = {v.name: v.unit for v in self.variables}
         words = []
         for freedom, value in zip(self.freedoms, x):

@@ -28,7 +28,7 @@ def field_name(name: str) -> str:
     return name.replace(".", "_", 1)
 
 
-class Least(NamedTuple):
+class LowerBound(NamedTuple):
     """A lower bound of one parameter that depends on others.
 
     Attributes
@@ -38,7 +38,7 @@ class Least(NamedTuple):
     of : callable
         ``of(parameters)`` returns the bound, by arithmetic without branches.
     requirement : str
-        What would be right, as the end of the sentence "it must ..."; ``%g`` is replaced by the bound.
+        The words after "it must" in the error message, with ``%g`` in place of the bound.
     """
 
     field: str
@@ -54,15 +54,15 @@ class Rules(NamedTuple):
     positive, free_sign : tuple of str
         Fields that must be greater than zero, and those that may have either sign; the others may be zero or greater.
     signs : mapping
-        Fields that are +1 or -1, and what the sign means, as the end of the sentence "it must be +1 or -1, ...".
-    least : tuple of Least
+        Fields that are +1 or -1, each with the meaning of the sign: the words after "it must be +1 or -1" in the error message.
+    least : tuple of LowerBound
         Lower bounds that depend on other parameters.
     """
 
     positive: tuple[str, ...] = ()
     free_sign: tuple[str, ...] = ()
     signs: Mapping[str, str] = MappingProxyType({})
-    least: tuple[Least, ...] = ()
+    least: tuple[LowerBound, ...] = ()
 
 
 def check_parameters(parameters: Any) -> None:

@@ -18,12 +18,12 @@ from collections.abc import Callable, Sequence
 from math import atan2, cos, fabs, sin, sqrt
 from typing import Any, NamedTuple
 
-from .friction import solved
-from .limits import LIMIT_SINE, Unjoined
+from .friction import solve_linear
+from .limits import LIMIT_SINE, UnjoinedMessages
 
 
 class Vector(NamedTuple):
-    """A position, or an arm from one point to another: components, their rates, and (x, y) of each column."""
+    """A position, or an arm from one point to another: components, their rates, and the columns (x, y), the bias last."""
 
     x: float
     y: float
@@ -33,7 +33,7 @@ class Vector(NamedTuple):
 
 
 class Turn(NamedTuple):
-    """A direction: cosine and sine of its angle, its angular velocity, and the columns of the angle."""
+    """A direction: cosine and sine of its angle, its angular velocity, and the columns of the angle, the bias last."""
 
     c: float
     s: float
@@ -72,27 +72,27 @@ Matrix = tuple[tuple[float, ...], ...]
 # Vectors and turns
 
 
-def fixed(x: float, y: float, n: int) -> Vector:
-    """Return a constant vector."""
+def fixed_vector(x: float, y: float, n: int) -> Vector:
+    """Return a constant vector as a `Vector` with n zero columns and no bias."""
     return Vector(x, y, 0.0, 0.0, ((0.0, 0.0),) * (n + 1))
 
 
-def held(c: float, s: float, n: int) -> Turn:
-    """Return a constant direction of cosine c and sine s."""
+def fixed_direction(c: float, s: float, n: int) -> Turn:
+    """Return a constant direction of cosine c and sine s as a `Turn` whose columns are zero."""
     return Turn(c, s, 0.0, (0.0,) * (n + 1))
 
 
 def ground(n: int) -> Frame:
     """Return the pose of the ground."""
-    return Frame(fixed(0.0, 0.0, n), held(1.0, 0.0, n))
+    return Frame(fixed_vector(0.0, 0.0, n), fixed_direction(1.0, 0.0, n))
 
 
-def angled(angle: float, share: tuple[float, ...], v: Rates) -> Turn:
+def linear_direction(angle: float, share: tuple[float, ...], v: Rates) -> Turn:
     """Return the direction at an angle that is linear in the coordinates; ``share`` are the derivatives of the angle."""
     return Turn(cos(angle), sin(angle), _dot(share, v), (*share, 0.0))
 
 
-def travelled(distance: float, share: tuple[float, ...], v: Rates) -> Vector:
+def linear_arm(distance: float, share: tuple[float, ...], v: Rates) -> Vector:
     """Return an arm along x whose length is linear in the coordinates; ``share`` are the derivatives of the length."""
     return Vector(distance, 0.0, _dot(share, v), 0.0, (*((d, 0.0) for d in share), (0.0, 0.0)))
 
@@ -102,13 +102,13 @@ def _dot(columns: tuple[float, ...], v: Rates) -> float:
     return sum(g * w for g, w in zip(columns, v))
 
 
-def plus(a: Vector, b: Vector) -> Vector:
+def add_vectors(a: Vector, b: Vector) -> Vector:
     """Add two vectors."""
     columns = tuple((g[0] + h[0], g[1] + h[1]) for g, h in zip(a.columns, b.columns))
     return Vector(a.x + b.x, a.y + b.y, a.vx + b.vx, a.vy + b.vy, columns)
 
 
-def minus(a: Vector, b: Vector) -> Vector:
+def subtract_vectors(a: Vector, b: Vector) -> Vector:
     """Return the vector a - b."""
     columns = tuple((g[0] - h[0], g[1] - h[1]) for g, h in zip(a.columns, b.columns))
     return Vector(a.x - b.x, a.y - b.y, a.vx - b.vx, a.vy - b.vy, columns)
@@ -121,7 +121,7 @@ def arm(t: Turn, x: float, y: float) -> Vector:
     return Vector(rx, ry, -ry * t.w, rx * t.w, (*share, (bias[0] - rx * ww, bias[1] - ry * ww)))
 
 
-def turned(t: Turn, a: Vector) -> Vector:
+def rotate_arm(t: Turn, a: Vector) -> Vector:
     """Return an arm ``a`` that moves in a body of direction ``t``, in outer axes, with centripetal and Coriolis bias."""
     rx, ry = t.c * a.x - t.s * a.y, t.s * a.x + t.c * a.y
     ux, uy = t.c * a.vx - t.s * a.vy, t.s * a.vx + t.c * a.vy
@@ -139,27 +139,29 @@ def composed_turn(t: Turn, r: Turn) -> Turn:
     return Turn(t.c * r.c - t.s * r.s, t.s * r.c + t.c * r.s, t.w + r.w, columns)
 
 
-def inclined(t: Turn, c: float, s: float) -> Turn:
+def incline_direction(t: Turn, c: float, s: float) -> Turn:
     """Return the direction at a fixed angle, of cosine c and sine s, from the direction ``t``."""
     return Turn(t.c * c - t.s * s, t.s * c + t.c * s, t.w, t.columns)
 
 
 def point(f: Frame, x: float, y: float) -> Vector:
     """Return the position of the point of a body that has the coordinates x and y in the body's frame."""
-    return plus(f.origin, arm(f.turn, x, y))
+    return add_vectors(f.origin, arm(f.turn, x, y))
 
 
 def composed_frame(f: Frame, inner: Frame) -> Frame:
     """Return the pose of a body whose pose relative to the body ``f`` is ``inner``."""
-    return Frame(plus(f.origin, turned(f.turn, inner.origin)), composed_turn(f.turn, inner.turn))
+    return Frame(add_vectors(f.origin, rotate_arm(f.turn, inner.origin)), composed_turn(f.turn, inner.turn))
 
 
-def rolled(carrier: Turn, line: Turn, start: Vector, block: Vector, offset: float, radius: float) -> Turn:
-    """Return the direction of a gear on a body of direction ``carrier``; its rack moves ``block`` along ``line``.
+def gear_direction(carrier: Turn, line: Turn, start: Vector, block: Vector, offset: float, radius: float) -> Turn:
+    """Return the direction of a gear that is pinned to a body of direction ``carrier`` and driven by a rack.
 
-    The angle of the gear relative to the carrier is (d - ``offset``)/``radius``; d is the distance of the block from ``start``.
+    The angle of the gear relative to the carrier is (d - ``offset``)/``radius``, where d is the distance along ``line``, the
+    direction of the slide between rack and carrier, from ``start`` on the holder of that slide to the origin ``block`` of
+    its block.
     """
-    arm = minus(block, start)
+    arm = subtract_vectors(block, start)
     way = line.c * arm.x + line.s * arm.y
     angle = (way - offset) / radius
     *share, bias = ((line.c * g[0] + line.s * g[1]) / radius for g in arm.columns)
@@ -168,9 +170,9 @@ def rolled(carrier: Turn, line: Turn, start: Vector, block: Vector, offset: floa
     return composed_turn(carrier, turn)
 
 
-def hung(pin: Vector, t: Turn, own: Vector) -> Frame:
-    """Return the pose of a body of direction ``t`` whose point ``own``, given in the body's axes, is at ``pin``."""
-    return Frame(minus(pin, turned(t, own)), t)
+def pose_at_pin(pin: Vector, t: Turn, own: Vector) -> Frame:
+    """Return the pose of a body of direction ``t`` that has its point ``own``, given in the body's axes, at ``pin``."""
+    return Frame(subtract_vectors(pin, rotate_arm(t, own)), t)
 
 
 # Dyads
@@ -182,10 +184,11 @@ def _angle(x: float, y: float, a: Vector) -> tuple[float, float]:
     return (x * a.x + y * a.y) / square, (y * a.x - x * a.y) / square
 
 
-def _spun(w: float, c: float, s: float, a: Vector, x: float, y: float) -> tuple[float, float]:
+def _rotation_bias(w: float, c: float, s: float, a: Vector, x: float, y: float) -> tuple[float, float]:
     """Return the bias of an arm in a body that turns at w, without the term of the body's angular bias.
 
-    ``a`` is the arm in the body's axes, (x, y) the same arm in outer axes; c and s are those of the body's direction.
+    ``a`` is the arm in the body's axes, (x, y) the same arm in outer axes; c and s are the cosine and sine of the body's
+    direction.
     """
     ux, uy = c * a.vx - s * a.vy, s * a.vx + c * a.vy
     bx, by = a.columns[-1]
@@ -216,7 +219,7 @@ def pin_pin_pin(p: Vector, q: Vector, a: Vector, b: Vector, branch: float, v: Ra
     g1 = [(ex * x2 + ey * y2) / across for ex, ey in rows]
     g2 = [(ex * x1 + ey * y1) / across for ex, ey in rows]
     w1, w2 = _dot(tuple(g1), v), _dot(tuple(g2), v)
-    (ax, ay), (bx, by) = _spun(w1, c1, s1, a, x1, y1), _spun(w2, c2, s2, b, x2, y2)
+    (ax, ay), (bx, by) = _rotation_bias(w1, c1, s1, a, x1, y1), _rotation_bias(w2, c2, s2, b, x2, y2)
     ex, ey = q.columns[-1][0] + bx - p.columns[-1][0] - ax, q.columns[-1][1] + by - p.columns[-1][1] - ay
     return (
         Turn(c1, s1, w1, (*g1, (ex * x2 + ey * y2) / across)),
@@ -225,9 +228,12 @@ def pin_pin_pin(p: Vector, q: Vector, a: Vector, b: Vector, branch: float, v: Ra
     )
 
 
-def _on_line(o: Vector, t: Turn, b: Vector) -> tuple[float, float, list[tuple[float, float]], tuple[float, float]]:
-    """Return the arm b of a block that stands at the origin o of its line: x and y; columns and bias of the arm's end."""
-    r = turned(t, b)
+def _block_arm(o: Vector, t: Turn, b: Vector) -> tuple[float, float, list[tuple[float, float]], tuple[float, float]]:
+    """Return the arm b of a block on a line of direction t, for a block at the line's origin o.
+
+    The result is x and y of the arm in outer axes, the columns of the arm's end, and the bias of the arm's end.
+    """
+    r = rotate_arm(t, b)
     *share, bias = ((g[0] + h[0], g[1] + h[1]) for g, h in zip(o.columns, r.columns))
     return r.x, r.y, share, bias
 
@@ -241,7 +247,7 @@ def pin_pin_slide(
     line. ``branch`` is the sign of the component of C - p along the line. Returns the direction of body 1, the position of the
     block as an arm along the line, and the sine of the angle between the arm a and the normal of the line.
     """
-    x0, y0, share, bias = _on_line(o, t, b)
+    x0, y0, share, bias = _block_arm(o, t, b)
     fx, fy = o.x + x0 - p.x, o.y + y0 - p.y
     off = t.c * fy - t.s * fx
     root = branch * sqrt(a.x * a.x + a.y * a.y - off * off)
@@ -254,7 +260,7 @@ def pin_pin_slide(
     g1 = [(t.c * ey - t.s * ex) / root for ex, ey in rows]
     gz = [-off * w - t.c * ex - t.s * ey for w, (ex, ey) in zip(g1, rows)]
     w1, vz = _dot(tuple(g1), v), _dot(tuple(gz), v)
-    ax, ay = _spun(w1, c1, s1, a, x1, y1)
+    ax, ay = _rotation_bias(w1, c1, s1, a, x1, y1)
     beta, ww, w2 = t.columns[-1], t.w * t.w, 2.0 * t.w * vz
     ex = bias[0] - z * t.s * beta - z * t.c * ww - w2 * t.s - p.columns[-1][0] - ax
     ey = bias[1] + z * t.c * beta - z * t.s * ww + w2 * t.c - p.columns[-1][1] - ay
@@ -275,8 +281,8 @@ def slide_pin_slide(
     The ends of their arms a and b are pinned together. Returns the positions of the blocks as arms along their lines, and the
     magnitude of the sine of the angle between the lines.
     """
-    x1, y1, share1, bias1 = _on_line(o, t, a)
-    x2, y2, share2, bias2 = _on_line(p, r, b)
+    x1, y1, share1, bias1 = _block_arm(o, t, a)
+    x2, y2, share2, bias2 = _block_arm(p, r, b)
     ex, ey = p.x + x2 - o.x - x1, p.y + y2 - o.y - y1
     sine = t.c * r.s - t.s * r.c
     z1, z2 = (ex * r.s - ey * r.c) / sine, (ex * t.s - ey * t.c) / sine
@@ -291,8 +297,8 @@ def slide_pin_slide(
     mx, my = _line_bias(r, z2, v2)
     fx, fy = bias2[0] + mx - bias1[0] - lx, bias2[1] + my - bias1[1] - ly
     return (
-        _slid(z1, v1, columns1, (fx * r.s - fy * r.c) / sine),
-        _slid(z2, v2, columns2, (fx * t.s - fy * t.c) / sine),
+        _sliding_arm(z1, v1, columns1, (fx * r.s - fy * r.c) / sine),
+        _sliding_arm(z2, v2, columns2, (fx * t.s - fy * t.c) / sine),
         fabs(sine),
     )
 
@@ -303,8 +309,8 @@ def _line_bias(t: Turn, z: float, vz: float) -> tuple[float, float]:
     return -t.s * (beta + w2) - t.c * ww, t.c * (beta + w2) - t.s * ww
 
 
-def _slid(z: float, rate: float, share: list[float], bias: float) -> Vector:
-    """Return an arm of length z along x, from its rate, the columns of its length and their bias."""
+def _sliding_arm(z: float, rate: float, share: list[float], bias: float) -> Vector:
+    """Return an arm of length z along x; ``share`` are the columns of its length, ``bias`` the bias of its length."""
     return Vector(z, 0.0, rate, 0.0, (*((g, 0.0) for g in share), (bias, 0.0)))
 
 
@@ -316,7 +322,7 @@ def pin_slide_pin(p: Vector, q: Vector, a: Vector, b: Vector, branch: float, v: 
     of the block as an arm along it, and the sine of the angle between the line and the normal of q - p.
     """
     dx, dy = q.x - p.x, q.y - p.y
-    lever = minus(b, a)
+    lever = subtract_vectors(b, a)
     dd, h = dx * dx + dy * dy, lever.y
     root = branch * sqrt(dd - h * h)
     c, s = (dx * root + dy * h) / dd, (dy * root - dx * h) / dd
@@ -334,7 +340,7 @@ def pin_slide_pin(p: Vector, q: Vector, a: Vector, b: Vector, branch: float, v: 
     beta = (c * ey - s * ex) / root
     return (
         Turn(c, s, w, (*share, beta)),
-        _slid(root - lever.x, vz, gz, c * ex + s * ey + h * beta),
+        _sliding_arm(root - lever.x, vz, gz, c * ex + s * ey + h * beta),
         branch * root / sqrt(dd),
     )
 
@@ -349,8 +355,8 @@ def pin_slide_slide(
     and that of body 1 along the slide from the end on body 2; and the magnitude of the sine of the angle between line and
     slide.
     """
-    x1, y1, share1, bias1 = _on_line(o, t, b)
-    pin = turned(r, a)
+    x1, y1, share1, bias1 = _block_arm(o, t, b)
+    pin = rotate_arm(r, a)
     ex, ey = p.x - pin.x - o.x - x1, p.y - pin.y - o.y - y1
     sine = t.c * r.s - t.s * r.c
     z, u = (ex * r.s - ey * r.c) / sine, (t.c * ey - t.s * ex) / sine
@@ -366,8 +372,8 @@ def pin_slide_slide(
     fx = p.columns[-1][0] - pin.columns[-1][0] - bias1[0] - lx - mx
     fy = p.columns[-1][1] - pin.columns[-1][1] - bias1[1] - ly - my
     return (
-        _slid(z, vz, gz, (fx * r.s - fy * r.c) / sine),
-        _slid(u, vu, gu, (t.c * fy - t.s * fx) / sine),
+        _sliding_arm(z, vz, gz, (fx * r.s - fy * r.c) / sine),
+        _sliding_arm(u, vu, gu, (t.c * fy - t.s * fx) / sine),
         fabs(sine),
     )
 
@@ -405,18 +411,21 @@ def generalised_forces(masses: tuple[Mass, ...], wrenches: tuple[Wrench, ...], n
 
 
 def accelerations(matrix: Matrix, forces: Rates, held: Rates, given: Rates) -> tuple[float, ...]:
-    """Solve for the accelerations of the freedoms; ``held`` is 1 where the acceleration is ``given``, 0 where it is free."""
+    """Solve the equations of motion for the accelerations of the freedoms.
+
+    ``held`` is 1 for a freedom with a prescribed acceleration, which ``given`` contains, and 0 for a free one.
+    """
     n = range(len(forces))
     free = [1.0 - h for h in held]
     rows = tuple(tuple(free[i] * free[j] * matrix[i][j] + (held[i] if i == j else 0.0) for j in n) for i in n)
     right = tuple(
         free[i] * (forces[i] - sum(matrix[i][j] * held[j] * given[j] for j in n)) + held[i] * given[i] for i in n
     )
-    return solved(rows, right)
+    return solve_linear(rows, right)
 
 
-def multiplied(matrix: Matrix, values: Rates) -> tuple[float, ...]:
-    """Multiply a matrix by a column."""
+def multiply(matrix: Matrix, values: Rates) -> tuple[float, ...]:
+    """Return the product of a matrix and a column vector."""
     return tuple(sum(a * b for a, b in zip(row, values)) for row in matrix)
 
 
@@ -427,17 +436,20 @@ class Rubbing(NamedTuple):
     lost: float
 
 
-def still(m: Mass) -> Mass:
-    """Return a body without its bias acceleration, with which changes of the joint forces are computed."""
+def remove_bias(m: Mass) -> Mass:
+    """Return a body with zero bias acceleration, for computing changes of the joint forces."""
     centre = m.centre._replace(columns=(*m.centre.columns[:-1], (0.0, 0.0)))
     turn = m.frame.turn._replace(columns=(*m.frame.turn.columns[:-1], 0.0))
     return m._replace(centre=centre, frame=m.frame._replace(turn=turn))
 
 
-def rubbed(wrenches: tuple[Wrench, ...], units: tuple[Rubbing, ...], sizes: Rates) -> tuple[Wrench, ...]:
-    """Add joint friction to the wrenches on the bodies: ``units`` per newton of joint force, times the forces ``sizes`` (N)."""
+def add_friction(wrenches: tuple[Wrench, ...], units: tuple[Rubbing, ...], sizes: Rates) -> tuple[Wrench, ...]:
+    """Return the wrenches on the bodies with joint friction added.
+
+    ``units`` has the friction in each joint for a joint force of 1 N, ``sizes`` the magnitude of each joint force (N).
+    """
     return tuple(
-        added(f, *(Wrench(size * g.x, size * g.y, size * g.moment) for size, g in zip(sizes, on)))
+        add_wrenches(f, *(Wrench(size * g.x, size * g.y, size * g.moment) for size, g in zip(sizes, on)))
         for f, *on in zip(wrenches, *(unit.wrenches for unit in units))
     )
 
@@ -453,38 +465,38 @@ def kinetic_energy(masses: tuple[Mass, ...]) -> float:
 # Forces on bodies
 
 
-def force(x: float, y: float, at: Vector) -> Wrench:
+def force_wrench(x: float, y: float, at: Vector) -> Wrench:
     """Return the wrench of a force (x, y) at the point ``at``."""
     return Wrench(x, y, at.x * y - at.y * x)
 
 
-def directed(t: Turn, x: float, y: float) -> tuple[float, float]:
+def to_ground_axes(t: Turn, x: float, y: float) -> tuple[float, float]:
     """Return the components of a force in the ground's axes from those in the axes of a body of direction ``t``."""
     return t.c * x - t.s * y, t.s * x + t.c * y
 
 
-def torque(moment: float) -> Wrench:
+def torque_wrench(moment: float) -> Wrench:
     """Return the wrench of a torque."""
     return Wrench(0.0, 0.0, moment)
 
 
-def added(*wrenches: Wrench) -> Wrench:
+def add_wrenches(*wrenches: Wrench) -> Wrench:
     """Add wrenches on one body."""
     return Wrench(sum(f.x for f in wrenches), sum(f.y for f in wrenches), sum(f.moment for f in wrenches))
 
 
-def less(f: Wrench, g: Wrench) -> Wrench:
-    """Return f - g for wrenches on one body."""
+def subtract_wrenches(f: Wrench, g: Wrench) -> Wrench:
+    """Return the difference f - g of two wrenches on one body."""
     return Wrench(f.x - g.x, f.y - g.y, f.moment - g.moment)
 
 
-def needed(m: Mass, accelerations: Rates, applied: Wrench) -> Wrench:
-    """Return the wrench that its joints must exert on a body: mass times acceleration minus the wrench ``applied``."""
+def required_wrench(m: Mass, accelerations: Rates, applied: Wrench) -> Wrench:
+    """Return the wrench that the joints of a body must exert on it: mass times acceleration minus the wrench ``applied``."""
     q = (*accelerations, 1.0)
     x = m.mass * sum(g[0] * a for g, a in zip(m.centre.columns, q))
     y = m.mass * sum(g[1] * a for g, a in zip(m.centre.columns, q))
     moment = m.inertia * sum(g * a for g, a in zip(m.frame.turn.columns, q))
-    return less(Wrench(x, y, moment + m.centre.x * y - m.centre.y * x), applied)
+    return subtract_wrenches(Wrench(x, y, moment + m.centre.x * y - m.centre.y * x), applied)
 
 
 def wrench_moment(f: Wrench, at: Vector) -> float:
@@ -493,34 +505,37 @@ def wrench_moment(f: Wrench, at: Vector) -> float:
 
 
 def pin_between_pins(p: Vector, c: Vector, q: Vector, on1: Wrench, on2: Wrench) -> Wrench:
-    """Return the force of body 2 on body 1 of a dyad RRR in the pin at c.
+    """Return the force of body 2 on body 1 of a dyad RRR in the pin at c; body 1 is pinned at p, body 2 at q.
 
-    ``on1`` and ``on2`` are here and below the wrenches that the joints must exert on bodies 1 and 2.
+    ``on1`` and ``on2`` are, here and in the functions below, the wrenches that the joints must exert on bodies 1 and 2.
     """
     ux, uy, wx, wy = c.x - p.x, c.y - p.y, c.x - q.x, c.y - q.y
     # u x F = m1, w x F = -m2
     m1, m2, cross = wrench_moment(on1, p), wrench_moment(on2, q), ux * wy - uy * wx
-    return force((m2 * ux + m1 * wx) / cross, (m2 * uy + m1 * wy) / cross, c)
+    return force_wrench((m2 * ux + m1 * wx) / cross, (m2 * uy + m1 * wy) / cross, c)
 
 
 def pin_to_block(p: Vector, c: Vector, t: Turn, on1: Wrench, on2: Wrench) -> Wrench:
-    """Return the force of the block on body 1 of a dyad RRP in the pin at c, where the block slides along t."""
+    """Return the force of the block on body 1 of a dyad RRP in the pin at c.
+
+    Body 1 is pinned at p; the block slides along t.
+    """
     ux, uy = c.x - p.x, c.y - p.y
     # u x F = m1; -F . t = along
     m1, along = wrench_moment(on1, p), on2.x * t.c + on2.y * t.s
     across = (m1 + along * (ux * t.s - uy * t.c)) / (ux * t.c + uy * t.s)
-    return force(-along * t.c - across * t.s, -along * t.s + across * t.c, c)
+    return force_wrench(-along * t.c - across * t.s, -along * t.s + across * t.c, c)
 
 
 def pin_of_blocks(c: Vector, t: Turn, r: Turn, on1: Wrench, on2: Wrench) -> Wrench:
-    """Return the force of block 2 on block 1 of a dyad PRP in the pin at c, where they slide along t and r."""
+    """Return the force of block 2 on block 1 of a dyad PRP in the pin at c; block 1 slides along t, block 2 along r."""
     # F . t = f1, F . r = -f2
     f1, f2, sine = on1.x * t.c + on1.y * t.s, on2.x * r.c + on2.y * r.s, t.c * r.s - t.s * r.c
-    return force((f1 * r.s + f2 * t.s) / sine, -(f1 * r.c + f2 * t.c) / sine, c)
+    return force_wrench((f1 * r.s + f2 * t.s) / sine, -(f1 * r.c + f2 * t.c) / sine, c)
 
 
 def slide_between_pins(p: Vector, q: Vector, t: Turn, on1: Wrench, on2: Wrench) -> Wrench:
-    """Return the force of body 2 on body 1 of a dyad RPR in the slide along t between them."""
+    """Return the force of body 2 on body 1 of a dyad RPR in the slide along t; body 1 is pinned at p, body 2 at q."""
     m1, m2 = wrench_moment(on1, p), wrench_moment(on2, q)
     # across the slide: its moments about p and q differ by (q - p) . t times it
     across = (m1 + m2) / ((q.x - p.x) * t.c + (q.y - p.y) * t.s)
@@ -529,18 +544,21 @@ def slide_between_pins(p: Vector, q: Vector, t: Turn, on1: Wrench, on2: Wrench) 
 
 
 def slide_to_block(p: Vector, t: Turn, r: Turn, on1: Wrench, on2: Wrench) -> Wrench:
-    """Return the force of body 2, which slides along t, on body 1 of a dyad RPP in the slide along r between them."""
+    """Return the force of body 2 on body 1 of a dyad RPP in the slide along r between them.
+
+    Body 1 is pinned at p; body 2 slides along t.
+    """
     m1, f2 = wrench_moment(on1, p), on2.x * t.c + on2.y * t.s
     across = -f2 / (t.s * r.c - t.c * r.s)
     x, y = -across * r.s, across * r.c
     return Wrench(x, y, m1 + p.x * y - p.y * x)
 
 
-def mesh(pin: Vector, other: Vector, ratio: float, on: Wrench) -> Wrench:
-    """Return the tooth force of its mate on a gear that is pinned at ``pin``, along their common tangent.
+def force_from_mate(pin: Vector, other: Vector, ratio: float, on: Wrench) -> Wrench:
+    """Return the tooth force on a gear from its mate, along their common tangent.
 
-    ``other`` is the centre of the mate; ``ratio`` is the speed of the gear divided by that of the mate, both relative to the
-    line of centres; ``on`` is the wrench that its joints must exert on the gear.
+    The gear is pinned at ``pin``, its mate at ``other``. ``ratio`` is the speed of the gear divided by that of the mate, both
+    relative to the line of centres; ``on`` is the wrench that the gear needs from its pin and teeth.
     """
     moment = wrench_moment(on, pin)
     dx, dy = pin.x - other.x, pin.y - other.y
@@ -549,20 +567,25 @@ def mesh(pin: Vector, other: Vector, ratio: float, on: Wrench) -> Wrench:
     return Wrench(x, y, moment + pin.x * y - pin.y * x)
 
 
-def gear_on_rack(pin: Vector, t: Turn, radius: float, on: Wrench) -> Wrench:
-    """Return the force of a gear pinned at ``pin`` on its rack, which slides along t, at their pitch point.
+def force_on_rack(pin: Vector, t: Turn, radius: float, on: Wrench) -> Wrench:
+    """Return the force that a gear exerts on its rack at the pitch point, along the direction t of the rack.
 
-    The pitch point is at the distance ``radius`` to the right of t from the pin, or to the left if ``radius`` is negative.
+    The gear is pinned at ``pin``; ``on`` is the wrench that the rack needs from its slide and teeth. The pitch point lies
+    ``radius`` from the pin, to the right if one looks along t, to the left if ``radius`` is negative.
     """
-    return _in_teeth(pin, t, radius, on.x * t.c + on.y * t.s)
+    return _tooth_force(pin, t, radius, on.x * t.c + on.y * t.s)
 
 
-def rack_on_gear(pin: Vector, t: Turn, radius: float, on: Wrench) -> Wrench:
-    """Return the force of a rack on its gear at their pitch point; the arguments are those of `gear_on_rack`."""
-    return _in_teeth(pin, t, radius, wrench_moment(on, pin) / radius)
+def force_on_gear(pin: Vector, t: Turn, radius: float, on: Wrench) -> Wrench:
+    """Return the force that a rack exerts on its gear at the pitch point, along the direction t of the rack.
+
+    The arguments are those of `force_on_rack`, but ``on`` is the wrench that the gear needs from its pin and teeth.
+    """
+    return _tooth_force(pin, t, radius, wrench_moment(on, pin) / radius)
 
 
-def _in_teeth(pin: Vector, t: Turn, radius: float, pull: float) -> Wrench:
+def _tooth_force(pin: Vector, t: Turn, radius: float, pull: float) -> Wrench:
+    """Return the wrench of a force ``pull`` (N) along t at the pitch point."""
     x, y = pull * t.c, pull * t.s
     return Wrench(x, y, (pin.x + radius * t.s) * y - (pin.y - radius * t.c) * x)
 
@@ -576,7 +599,7 @@ def turn_angle(t: Turn) -> float:
 
 
 def turn_difference(t: Turn, r: Turn, c: float, s: float) -> float:
-    """Return the angle from t to r minus the angle of cosine c and sine s, in (-pi, pi]."""
+    """Return the angle from t to r minus the angle with cosine c and sine s, in (-pi, pi]."""
     x, y = t.c * r.c + t.s * r.s, t.c * r.s - t.s * r.c
     return atan2(y * c - x * s, x * c + y * s)
 
@@ -588,7 +611,7 @@ def transmission(p: Vector, c: Vector, q: Vector) -> float:
 
 
 def block_position(f: Frame, x: float, y: float, t: Turn, block: Frame) -> tuple[float, float]:
-    """Return position and velocity of a block's origin along the line of body f through its point (x, y), of direction t."""
+    """Return position and velocity of a block's origin along a line of direction t of body f, from the point (x, y) of f."""
     start = point(f, x, y)
     dx, dy = block.origin.x - start.x, block.origin.y - start.y
     vx, vy = block.origin.vx - start.vx, block.origin.vy - start.vy
@@ -596,14 +619,14 @@ def block_position(f: Frame, x: float, y: float, t: Turn, block: Frame) -> tuple
 
 
 def distance(a: Vector, b: Vector) -> tuple[float, float, float, float]:
-    """Return the distance between two points, its rate, and the direction from a to b."""
+    """Return the distance between two points, its rate, and the components x and y of the unit vector from a to b."""
     dx, dy = b.x - a.x, b.y - a.y
     length = sqrt(dx * dx + dy * dy)
     cx, cy = dx / length, dy / length
     return length, cx * (b.vx - a.vx) + cy * (b.vy - a.vy), cx, cy
 
 
-UNJOINED = Unjoined(
+UNJOINED = UnjoinedMessages(
     "the bodies cannot be joined", "they do not reach each other", "the bodies of a dyad are in line to {:.3f} deg"
 )
 

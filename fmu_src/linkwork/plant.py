@@ -21,7 +21,7 @@ TOLERANCE_RANGE = (1e-13, 1e-2)
 
 
 def check_tolerance(tolerance: float) -> None:
-    """Make sure that ``tolerance`` is usable.
+    """Check that a tolerance of the integrator is within its range.
 
     Raises
     ------
@@ -34,7 +34,7 @@ def check_tolerance(tolerance: float) -> None:
 
 
 def mode_requirement(mode: Mode) -> str:
-    """Return the requirement on the value of a mode, as the end of the sentence "it must ..."."""
+    """Describe the values that a mode may have, as the end of the sentence "it must ..."."""
     words = [f"{number} ({word})" for number, word in enumerate(mode.values)]
     return f"be {', '.join(words[:-1])} or {words[-1]}"
 
@@ -95,7 +95,7 @@ class Plant:
             self.set_input(name, value)
         self._check_inputs()
         self._derive()
-        self.state: Vector = self._start(initial)
+        self.state: Vector = self._initial_state(initial)
         self._check_state(self.state)
         self._commanded.clear()
         self._step_size = 0.0
@@ -105,7 +105,7 @@ class Plant:
             raise InputError(f"the energy at the start is not finite: {self._describe_start(self.state)}")
 
     @classmethod
-    def of_values(
+    def from_values(
         cls, mechanism: Mechanism, values: Mapping[str, Any], *, tolerance: float | None = None, time: float = 0.0
     ) -> Plant:
         """Return the plant with the parameters, initial state, inputs and modes in ``values``, by FMI name.
@@ -134,7 +134,9 @@ class Plant:
         self._commands = self.mechanism.commands(self.modes)
 
     def tune(self, values: Mapping[str, Any]) -> None:
-        """Set all parameters, by FMI name; the start energy is shifted by the jump of the energy, so that no work is counted.
+        """Set all parameters, by FMI name, during a run.
+
+        The start energy is shifted by the jump of the energy, so that the change does not count as work.
 
         Raises
         ------
@@ -152,28 +154,30 @@ class Plant:
         """Return the names of the inputs that command a rate in any mode."""
         return {channel.name for channel in self.mechanism.channels if channel.kind == "command"}
 
-    def _start(self, initial: Any) -> Vector:
+    def _initial_state(self, initial: Any) -> Vector:
+        """Return the state at the start, in which commanded rates replace those of ``initial``."""
         x = list(self.mechanism.state(initial))
         for number in self._commands:
             x[self._commanded_rate(number)] = float(self.inputs[self.mechanism.channels[number].name])
-        return self._settled(tuple(x))
+        return self._complete_start(tuple(x))
 
     def _commanded_rate(self, number: int) -> int:
         """Return the index in the state of the rate that a channel commands."""
         return len(self.mechanism.freedoms) + self.mechanism.channels[number].freedom
 
-    def _applied(self) -> Any:
+    def _applied_inputs(self) -> Any:
         """Return the inputs in force in the form that the equations take."""
-        return self.mechanism.equations.applied(self._modes, tuple(self.inputs.values()), self._p)
+        return self.mechanism.equations.apply_inputs(self._modes, tuple(self.inputs.values()), self._p)
 
-    def _settled(self, x: Vector) -> Vector:
-        settled: Vector = self.mechanism.equations.start(x, self._applied(), self._p)
-        return settled
+    def _complete_start(self, x: Vector) -> Vector:
+        """Return a state with the components computed that other components determine."""
+        complete: Vector = self.mechanism.equations.start(x, self._applied_inputs(), self._p)
+        return complete
 
     def _check_state(self, x: Vector) -> None:
-        self.mechanism.check_state(self.parameters, self._settled(x), self._applied(), self._p)
+        self.mechanism.check_state(self.parameters, self._complete_start(x), self._applied_inputs(), self._p)
 
-    def _jumped(self, x: Vector, applied: Any, commanded: Collection[str]) -> Vector:
+    def _jump_rates(self, x: Vector, applied: Any, commanded: Collection[str]) -> Vector:
         """Return the state after the rates have jumped to the values that the inputs in ``commanded`` command."""
         names = self.mechanism.input_names
         if not any(names[number] in commanded for number in self._commands):
@@ -189,7 +193,7 @@ class Plant:
     def _near_limit(self, x: Vector) -> bool:
         """Return whether a failure at ``x`` is due to the limit of assembly."""
         try:
-            return abs(self.mechanism.equations.clearance(x, self._applied(), self._p)) < NEAR_LIMIT
+            return abs(self.mechanism.equations.clearance(x, self._applied_inputs(), self._p)) < NEAR_LIMIT
         except UNDEFINED:
             return True
 
@@ -225,8 +229,8 @@ class Plant:
             If an input is not finite, or so large that an output is not finite.
         """
         self._check_inputs()
-        i = self._applied()
-        x = self._jumped(self.state, i, self._commanded)
+        i = self._applied_inputs()
+        x = self._jump_rates(self.state, i, self._commanded)
         result = self.mechanism.equations.outputs(x, i, self.start_energy, self._p)
         if not all(map(isfinite, result)):
             largest = max(self.inputs, key=lambda name: abs(self.inputs[name]))
@@ -265,10 +269,10 @@ class Plant:
             way = "backwards" if time < self.time else "over a gap"
             raise StepError(f"a step {way}: it starts at t = {time:.9g} s, but the state is at t = {self.time:.9g} s")
         self._check_inputs()
-        i = self._applied()
+        i = self._applied_inputs()
         derivative, p = self.mechanism.equations.derivative, self._p
         # the step starts from every commanded rate, even from one that was not set again, as the contract says
-        x = self._jumped(self.state, i, self.inputs)
+        x = self._jump_rates(self.state, i, self.inputs)
         last = x
 
         def accept(y: Vector) -> None:
@@ -296,12 +300,19 @@ class Plant:
         self._commanded = set()
 
     def _explain(self, error: LinkworkError, time: float, last: Vector) -> LinkworkError:
-        """Return an error that adds the start time of the step and, if it is the cause, the limit of assembly near ``last``."""
+        """Return the error of a step with the step's start time and, if it is the cause, the limit of assembly.
+
+        ``last`` is the last accepted state of the step.
+        """
         if isinstance(error, IntegrationError):
             if self._near_limit(last):
-                limit = self.mechanism.limit(last, self._applied(), self._p)
-                return AssemblyError(f"in the step from t = {time:.9g} s: {limit} near {self.mechanism.where(last)}")
-            return IntegrationError(f"in the step from t = {time:.9g} s: {error}, at {self.mechanism.where(last)}")
+                limit = self.mechanism.describe_limit(last, self._applied_inputs(), self._p)
+                return AssemblyError(
+                    f"in the step from t = {time:.9g} s: {limit} near {self.mechanism.describe_state(last)}"
+                )
+            return IntegrationError(
+                f"in the step from t = {time:.9g} s: {error}, at {self.mechanism.describe_state(last)}"
+            )
         return type(error)(f"in the step from t = {time:.9g} s: {error}")
 
     # Saved state

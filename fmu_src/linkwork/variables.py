@@ -180,7 +180,10 @@ def crank_outputs(angle: str) -> tuple[Variable, Variable, Variable]:
 
 
 def energy_outputs(potential: str, dissipated: str, supplied: str) -> tuple[Variable, ...]:
-    """Return the outputs of the energies and their balance; each argument names the sources of one energy in words."""
+    """Return the outputs of the energies and their balance.
+
+    The arguments say in words where potential energy, dissipated work and supplied work come from.
+    """
     balance = "Energy balance: gained plus dissipated less supplied; zero but for error"
     return (
         output("energy.kinetic", "J", "Kinetic energy of all links", "", *RATE, minimum=0.0),

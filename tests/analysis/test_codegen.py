@@ -70,7 +70,7 @@ def test_machine_code_has_the_values_of_the_plain_functions(name: str, seed: int
     u = tuple(generator.normal(size=len(mechanism.channels)).tolist())
     for modes in np.ndindex(*[len(mode.values) for mode in mechanism.modes]):
         flags = tuple(map(float, modes))
-        i = equations.applied(flags, u, p)
+        i = equations.apply_inputs(flags, u, p)
         plain = {
             DERIVATIVE: equations.derivative(x, i, p),
             OUTPUTS: equations.outputs(x, i, 0.3, p),

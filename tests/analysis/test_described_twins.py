@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from analysis.export import NATIVE, build_native
-from analysis.linkages import Package, described
+from analysis.linkages import Package, read_description
 from analysis.linkages.parameters import interface
 from analysis.linkages.structure import analyse
 from analysis.mechanisms import FIVE_BAR, SLIDER_CRANK
@@ -158,21 +158,21 @@ def given(kind: str, case: Any) -> tuple[dict[str, float], dict[str, float]]:
 def test_a_described_twin_moves_as_the_hand_written_one(kind, tmp_path):
     """Accelerations, powers, forces and energies of 1000 random mechanisms in random states, both ways of driving."""
     hand, words, seeded = WORDS[kind]
-    made = Package(described(words(seeded(0).parameters))).mechanism(tmp_path)
+    made = Package(read_description(words(seeded(0).parameters))).mechanism(tmp_path)
     free, count = [n for n, f in enumerate(hand.freedoms) if f.coordinate != "shift.position"], len(hand.freedoms)
     kept = [*free, *(count + n for n in free), 2 * count, 2 * count + 1]
     groups, compared = OUTPUTS[kind.removeprefix("rough-")], 0
     for seed in range(200 if kind.startswith("rough") else 1000):
         case = seeded(seed)
-        d, x = described(words(case.parameters)), case.state
+        d, x = read_description(words(case.parameters)), case.state
         p = made.parameters(**{q.field: q.value for q in interface(d, analyse(d)).parameters}).constants()
         own = tuple(x[n] for n in kept)
         for mode in (0.0, 1.0):
             u, v = given(kind, case)
-            i = hand.equations.applied(
+            i = hand.equations.apply_inputs(
                 (mode, *(1.0 for _ in hand.modes[1:])), tuple(u[n] for n in hand.input_names), case.p
             )
-            j = made.equations.applied((mode,), tuple(v[n] for n in made.input_names), p)
+            j = made.equations.apply_inputs((mode,), tuple(v[n] for n in made.input_names), p)
             margin = hand.equations.clearance(x, i, case.p)
             if hand is FIVE_BAR:
                 assert made.equations.clearance(own, j, p) == pytest.approx(margin, rel=1e-10, abs=1e-10)
@@ -214,7 +214,7 @@ def test_a_described_twin_costs_little_more(kind, switched):
     p = next(iter(hand.published.values())).parameters
     if kind.startswith("rough"):
         p = rough(strategies.seeded(0)._replace(parameters=p)).parameters
-    assert operations(Package(described(words(p))).mechanism()) <= 1.3 * operations(hand)
+    assert operations(Package(read_description(words(p))).mechanism()) <= 1.3 * operations(hand)
 
 
 @pytest.mark.slow
@@ -226,7 +226,7 @@ def test_the_fmu_of_a_described_twin_runs_as_that_of_the_hand_written_one(kind, 
     if kind == "slider-crank":
         p = seeded(1).parameters
         p = replace(p, rod_length=2.0 * (p.crank_length + abs(p.guide_offset)), slider_coulomb_friction=0.0)
-    made = Package(described(words(p))).mechanism(tmp_path)
+    made = Package(read_description(words(p))).mechanism(tmp_path)
     start = {"stop_time": 0.5, "step": 5e-3, "tolerance": 1e-13}
     runs = [
         cosimulate(

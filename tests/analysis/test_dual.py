@@ -297,7 +297,7 @@ def test_the_plant_differentiated_through_tracing(seed: int) -> None:
 def test_every_drive_of_the_plant_takes_dual_numbers() -> None:
     case = seeded(3)
     for drive in DRIVES:
-        x = plant_functions().grooved((Dual(case.state[0], 1.0), *case.state[1:]), DRIVES[drive][2], case.p)
+        x = plant_functions().impose_groove((Dual(case.state[0], 1.0), *case.state[1:]), DRIVES[drive][2], case.p)
         rate = plant_functions().derivative(x, case.inputs(drive), case.p)
         h = 1e-6
 

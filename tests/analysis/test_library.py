@@ -16,7 +16,7 @@ import pytest
 
 import analysis.synthesis as syn
 from analysis.export import NATIVE, NATIVE_FMI3, build, build_native
-from analysis.linkages import Package, dead_centres, described, linkage, load_linkage, load_package, reach
+from analysis.linkages import Package, dead_centres, linkage, load_linkage, load_package, reach, read_description
 from analysis.linkages.structure import Pin
 from analysis.mechanisms import mechanism_of
 from analysis.numerics.fourier import FourierSeries
@@ -108,7 +108,7 @@ def test_a_linkage_of_the_library_moves_as_with_multipliers(path):
     p, n = known.parameters.constants(), len(made.freedoms)
     u = tuple(float(v.start) for v in made.variables if v.causality == "input")
     modes = tuple(float(mode.default) for mode in made.modes)
-    i = made.equations.applied(modes, u, p)
+    i = made.equations.apply_inputs(modes, u, p)
     commanded = {made.channels[k].freedom: 0.0 for k in made.commands({mode.name: mode.default for mode in made.modes})}
     for sample in np.linspace(1, len(found) - 1, 4).astype(int):
         x = (
@@ -250,7 +250,7 @@ def test_a_law_that_ends_a_run_next_to_the_limit_of_assembly_is_named_alone():
 def test_a_linkage_of_the_library_runs_as_with_multipliers(path):
     """The oracle's own run, by SciPy in all coordinates of all bodies, at its end; what is driven under constant torques."""
     time = np.linspace(0.0, 0.2, 3)
-    made, oracle = load_linkage(path), Multipliers(described(tables_in(path)))
+    made, oracle = load_linkage(path), Multipliers(read_description(tables_in(path)))
     # light legs turn fast
     torque = 0.01 if path.stem in ("jansen", "klann") else 0.2
     inputs = [v.name for v in made.variables if v.causality == "input" and v.name.endswith("rive.torque")]
@@ -329,7 +329,7 @@ def test_pitch_circles_are_drawn_and_roll_on_each_other(name):
     p = known.parameters.constants()
 
     def place(angle: float) -> dict[str, complex]:
-        x = drawing.positions((angle, *start[1:]), made.idle(p), p)
+        x = drawing.positions((angle, *start[1:]), made.idle_inputs(p), p)
         return {joint.name: complex(*x[3 * n : 3 * n + 2]) for n, joint in enumerate(drawing.joints)}
 
     before, after = place(0.4), place(0.4 + 1e-6)
@@ -401,8 +401,8 @@ class Vibration:
 
     def __init__(self, name: str) -> None:
         self.made, self.oracle = (
-            Package(described(VIBRATING[name])).mechanism(),
-            Multipliers(described(VIBRATING[name])),
+            Package(read_description(VIBRATING[name])).mechanism(),
+            Multipliers(read_description(VIBRATING[name])),
         )
         self.parameters, self.n = self.made.first_set.parameters, len(self.made.freedoms)
 
@@ -470,7 +470,7 @@ def test_the_fmus_of_a_linkage_run_as_in_process(name, tmp_path):
 def test_newtons_method_from_the_start_misses_places():
     """Of Stephenson's second inversion from its crank: the shares of docs/linkages.md, which says why this is refused."""
     made = load_linkage(FOLDER / "stephenson-2.toml")
-    oracle = Multipliers(described(tables_in(FOLDER / "stephenson-2.toml")))
+    oracle = Multipliers(read_description(tables_in(FOLDER / "stephenson-2.toml")))
     found = reach(made)
     wanted = np.array(
         [places(made, oracle, (angle, 0.0)) for angle in np.linspace(found.low + 1e-6, found.high - 1e-6, 400)]
@@ -499,7 +499,7 @@ def test_two_commanded_cranks_are_driven_by_the_torques_of_the_multipliers(ratio
     given |= {"run.revolutions": period * speeds.min() / (2.0 * np.pi), "run.step": period / 12.0}
     turn = run(path.stem, **given)
     assert turn.time[-1] == pytest.approx(period)
-    oracle = Multipliers(described(tables_in(path)))
+    oracle = Multipliers(read_description(tables_in(path)))
     loads = []
     for left, right in zip(turn["left.angle"], turn["right.angle"]):
         q = places(made, oracle, (left, right, *speeds, 0.0, 0.0))
@@ -652,7 +652,7 @@ def test_a_linkage_moves_in_the_studio_and_is_dragged(browser, tmp_path, path):
     """Its bars keep their lengths over the motion, at first and after each joint was dragged; no number is lost."""
     # the studio has inputs that are constant
     case = load_case(path, {"motor.torque": 0.5} if path.stem == "stephenson-2" else {})
-    bars = {n: b.bar for n, b in described(tables_in(path)).bodies.items() if b.bar}
+    bars = {n: b.bar for n, b in read_description(tables_in(path)).bodies.items() if b.bar}
     (tmp_path / "page.html").write_text(make_page(page_state(case)), encoding="utf-8")
     page = _opened(browser, tmp_path / "page.html")
     root = "document.documentElement.dataset"

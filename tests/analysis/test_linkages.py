@@ -17,7 +17,7 @@ import pytest
 
 from analysis.files import entry_names
 from analysis.linear import linearise
-from analysis.linkages import Dyad, Package, Racked, described, laws, linkage, load_linkage
+from analysis.linkages import Dyad, Package, RackStep, laws, linkage, load_linkage, read_description
 from analysis.linkages.builder import Builder
 from analysis.linkages.description import Body, FreedomTable, Gear, Rack, Slide, Slot, Spring
 from analysis.linkages.structure import Pin, Slider
@@ -55,9 +55,9 @@ def assembled(
 ) -> tuple[Package, dict[str, tuple[float, float, float]]]:
     """A random linkage with the signs of assembly that give the places from which it was made; and these."""
     data, places = random_linkage(seed, kinds, dyads)
-    package = Package(described(data))
+    package = Package(read_description(data))
     module = imported(package, folder)
-    names = [dyad.inner.name for dyad in package.structure.dyads if dyad.assembled]
+    names = [dyad.inner.name for dyad in package.structure.dyads if dyad.has_two_assemblies]
     x = module.MECHANISM.state(module.MECHANISM.published["random-linkage"].initial)
     for signs in itertools.product((1, -1), repeat=len(names)):
         chosen = dict(zip(names, signs))
@@ -72,7 +72,7 @@ def assembled(
                 f = getattr(found, f"{body}_frame")
                 errors += [f.origin.x - bx, f.origin.y - by, f.turn.c - math.cos(angle), f.turn.s - math.sin(angle)]
         if np.abs(errors).max() < 1e-9:
-            return Package(described(data | {"assembly": chosen} | changes)), places
+            return Package(read_description(data | {"assembly": chosen} | changes)), places
     raise AssertionError("no assembly gives the places")
 
 
@@ -93,7 +93,7 @@ def compared(
     p, equations = known.parameters.constants(), made.modules[-1]
     for mode in (0.0, 1.0):
         u = rng.uniform(-3, 3, len(made.channels))
-        i = made.equations.applied((mode,) * len(made.modes), tuple(u), p)
+        i = made.equations.apply_inputs((mode,) * len(made.modes), tuple(u), p)
         values = dict(zip(made.input_names, u))
         commanded = {c.freedom: u[k] for k, c in enumerate(made.channels) if c.kind == "rate" and mode}
         loads = np.zeros(n)
@@ -144,7 +144,7 @@ def test_random_racks_move_as_with_multipliers(tmp_path):
     found = set()
     for seed in (4, 9, 10, 25, 30, 42, 57, 66, 69, 70, 71, 84, 91, 102, 121):
         package, _ = assembled(seed, tmp_path, RACKS)
-        steps = [step for step in package.structure.steps if isinstance(step, Racked)]
+        steps = [step for step in package.structure.steps if isinstance(step, RackStep)]
         found |= {(step.turns, step.linear, step.slide.bodies[0] == step.parent) for step in steps}
         compared(seed, tmp_path, RACKS)
     assert found >= {(turns, linear, block) for turns, linear in CASES for block in (True, False)}
@@ -204,7 +204,7 @@ def test_period_of_a_crank_brings_gears_and_racks_back(tmp_path, change, turns):
     if "slides" in change:
         bodies["wheel"]["points"] = {"Q": [0, 0]}
     data = {"name": "period-test", "ground": {"A": [0, 0], "B": [0.5, 0], "O": [0, -0.1]}, "bodies": bodies}
-    made = Package(described(data | {"freedoms": {"crank": "A"}} | change)).mechanism(tmp_path)
+    made = Package(read_description(data | {"freedoms": {"crank": "A"}} | change)).mechanism(tmp_path)
     assert made.freedoms[0].period == pytest.approx(2.0 * math.pi * turns)
 
 
@@ -408,7 +408,7 @@ MISTAKES = [
 @pytest.mark.parametrize(("path", "value", "named"), MISTAKES, ids=[f"{n}-{m[0]}" for n, m in enumerate(MISTAKES)])
 def test_mistakes_are_named(tmp_path, path, value, named):
     with pytest.raises(LinkworkError) as error:
-        Package(described(changed(path, value))).mechanism(tmp_path)
+        Package(read_description(changed(path, value))).mechanism(tmp_path)
     assert named in str(error.value)
     assert "linkage." in str(error.value)
 
@@ -434,7 +434,7 @@ def test_a_free_body_without_mass_is_named(tmp_path):
     data["bodies"]["rocker"]["points"] = {"Cx": [0.05, 0]}
     data["bodies"]["x"]["bar"] = ["Cx", "Q"]
     with pytest.raises(LinkworkError, match=r"a mass or inertia in linkage\.bodies"):
-        Package(described(data)).mechanism(tmp_path)
+        Package(read_description(data)).mechanism(tmp_path)
 
 
 def test_other_freedoms_are_proposed(tmp_path):
@@ -452,10 +452,10 @@ def test_other_freedoms_are_proposed(tmp_path):
         "freedoms": {"lever": "F"},
     }
     with pytest.raises(LinkworkError, match="A or D") as error:
-        Package(described(data)).mechanism(tmp_path)
+        Package(read_description(data)).mechanism(tmp_path)
     assert all(body in str(error.value) for body in ("crank", "coupler", "rocker", "link"))
     # left to itself the linkage takes one that does
-    made = Package(described({k: v for k, v in data.items() if k != "freedoms"})).mechanism(tmp_path)
+    made = Package(read_description({k: v for k, v in data.items() if k != "freedoms"})).mechanism(tmp_path)
     assert made.freedoms[0].coordinate == "crank.angle"
 
 
@@ -499,9 +499,9 @@ stop_time = "0.5 s"
 
 def test_the_clearance_to_the_limit_of_assembly_is_an_output(tmp_path):
     """The sine of the transmission angle of a four-bar; its variables have symbols."""
-    made = Package(described(changed("name", "four-bar-clearance"))).mechanism(tmp_path)
+    made = Package(read_description(changed("name", "four-bar-clearance"))).mechanism(tmp_path)
     known = made.published[made.name]
-    p, idle = known.parameters.constants(), made.idle(known.parameters.constants())
+    p, idle = known.parameters.constants(), made.idle_inputs(known.parameters.constants())
     for angle in (0.0, 1.0, 4.0):
         found = dict(zip(made.output_names, made.equations.outputs((angle, 3.0, 0.0, 0.0), idle, 0.0, p)))
         assert found["assembly.clearance"] == pytest.approx(np.sin(found["C.transmission_angle"]), rel=1e-12)
@@ -540,12 +540,12 @@ def test_pins_and_drives_of_the_builder(tmp_path):
     for body, length in (("crank", "50 mm"), ("coupler", "150 mm"), ("rocker", "120 mm")):
         built.tables["bodies"][body]["cog"] = [f"{0.5 * float(length.split()[0])} mm", 0]
     built.drive("crank", "A", speed="300 rpm").drive("ram", between=("A", "C"))
-    one, other = built.mechanism(), Package(described(FOUR_BAR)).mechanism(tmp_path)
+    one, other = built.mechanism(), Package(read_description(FOUR_BAR)).mechanism(tmp_path)
     assert "ram.force" in one.input_names
     x = (0.7, 20.0, 0.0, 0.0)
     (p, q), i = (m.first_set.parameters.constants() for m in (one, other)), (0.0,) * 4
     found, wanted = (
-        m.equations.derivative(x, m.equations.applied((0.0,), i[: len(m.channels)], c), c)
+        m.equations.derivative(x, m.equations.apply_inputs((0.0,), i[: len(m.channels)], c), c)
         for m, c in ((one, p), (other, q))
     )
     np.testing.assert_allclose(found, wanted, rtol=1e-12)
@@ -566,7 +566,7 @@ def test_the_builder_takes_numbers_and_arrays_of_numpy() -> None:
 
     made = built(np.float32(1.5), np.array([0.0, 0.1])).tables
     assert made == built(1.5, (0.0, 0.1)).tables
-    assert described({**made, "freedoms": {"swing": "A"}}).ground == {"A": (0.0, 0.1)}
+    assert read_description({**made, "freedoms": {"swing": "A"}}).ground == {"A": (0.0, 0.1)}
 
 
 def test_a_name_that_is_no_constant_of_a_law_is_named() -> None:
@@ -590,11 +590,11 @@ def test_a_spring_that_a_wheel_winds_up_leaves_no_periodic_motion() -> None:
     with pytest.raises(InputError, match="wound-law has no freedom that turns without end"):
         find_orbit(wheel("wound-law", law="0.01*x + sin(x)").mechanism().first_set.parameters, speed=10.0)
     made = wheel("latched", law="a*sin(n*x + 0.3)", constants={"a": "0.1 N*m", "n": 2.0}).mechanism()
-    assert made.cyclic == (0,)
+    assert made.cyclic_freedoms == (0,)
     with pytest.raises(InputError, match=r"wind\.n is 2\.5: the period of a latched is that of its description"):
         find_orbit(replace(made.first_set.parameters, wind_n=2.5), speed=10.0)
     # where the law has no value at some angle it is none of them
-    assert not wheel("rooted", law="tanh(x**1.5)").mechanism().cyclic
+    assert not wheel("rooted", law="tanh(x**1.5)").mechanism().cyclic_freedoms
 
 
 def test_constants_of_a_law_keep_their_units() -> None:
@@ -678,7 +678,7 @@ def test_a_cylinder_called_like_a_body_has_its_own_force() -> None:
     known, u = made.first_set, dict.fromkeys(made.input_names, 0.0)
     p, x = known.parameters.constants(), made.state(known.initial)
     still, moved = (
-        made.equations.derivative(x, made.equations.applied((0.0,), tuple(values.values()), p), p)
+        made.equations.derivative(x, made.equations.apply_inputs((0.0,), tuple(values.values()), p), p)
         for values in (u, u | {"drum.force": 3.0})
     )
     rate = len(made.freedoms) + [freedom.coordinate for freedom in made.freedoms].index("cart.position")
@@ -697,7 +697,7 @@ def test_a_slot_may_have_its_pin_at_the_origin_and_a_ring_gear_may_stand_still()
     for made in (planet.mechanism(), slotted.mechanism()):
         known = made.first_set
         p = known.parameters.constants()
-        assert np.isfinite(made.drawing.positions(made.state(known.initial), made.idle(p), p)).all()
+        assert np.isfinite(made.drawing.positions(made.state(known.initial), made.idle_inputs(p), p)).all()
 
 
 def test_a_spring_near_half_a_turn_is_twisted_little() -> None:
@@ -710,5 +710,7 @@ def test_a_spring_near_half_a_turn_is_twisted_little() -> None:
         made = built.freedom("drum", "A", start=start, driven=False).mechanism()
         known = made.first_set
         p = known.parameters.constants()
-        found = dict(zip(made.output_names, made.equations.outputs(made.state(known.initial), made.idle(p), 0.0, p)))
+        found = dict(
+            zip(made.output_names, made.equations.outputs(made.state(known.initial), made.idle_inputs(p), 0.0, p))
+        )
         assert abs(found["tie.turn"]) == pytest.approx(np.deg2rad(4.0))

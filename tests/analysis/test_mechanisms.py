@@ -257,7 +257,7 @@ SPRUNG = replace(OFFSET_CASE[0], shift_stiffness=2e4, shift_spring_free_position
 def differences(mechanism: Mechanism, parameters: Any, state: Any, places: list[int], **modes: float) -> np.ndarray:
     """Derivatives of the plant's derivative by some components of its state, the others left."""
     p, h = parameters.constants(), 1e-6
-    applied = mechanism.equations.applied(tuple(modes.values()), (0.0,) * len(mechanism.channels), p)
+    applied = mechanism.equations.apply_inputs(tuple(modes.values()), (0.0,) * len(mechanism.channels), p)
 
     def rates(step: np.ndarray) -> np.ndarray:
         return np.array(mechanism.equations.derivative(tuple(np.array(state) + step), applied, p))[places]

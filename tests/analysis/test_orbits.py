@@ -134,7 +134,7 @@ def test_work_over_a_period_is_what_is_dissipated(orbit: PeriodicOrbit) -> None:
     turn = orbit.turn(4096)
     p, w = orbit.parameters.constants(), turn["crank.speed"]
     modes = tuple(map(float, orbit.flow.modes))
-    acting = [dynamics.applied(modes, tuple(u), p) for u in turn.inputs.tolist()]
+    acting = [dynamics.apply_inputs(modes, tuple(u), p) for u in turn.inputs.tolist()]
     lost = np.mean([dynamics.derivative(tuple(x), i, p)[4] for x, i in zip(turn.states.tolist(), acting)] / w)
     assert turn["drive.applied_torque"].mean() == pytest.approx(lost, rel=1e-7)
 

@@ -42,7 +42,9 @@ def test_the_python_fmus_are_the_plants(first, tmp_path, monkeypatch):
             monkeypatch.undo()
         loads = {c.name: 2.0 for c in mechanism.channels if c.kind == "force"}
         starts = {v.name: v.start for v in mechanism.variables}
-        expected, times = outputs_of_plant(Plant.of_values(mechanism, starts, tolerance=1e-9, time=START), loads, SIZES)
+        expected, times = outputs_of_plant(
+            Plant.from_values(mechanism, starts, tolerance=1e-9, time=START), loads, SIZES
+        )
         assert len(times) == len(SIZES)
         assert abs(expected[-1]["energy.residual"]) < 1e-7 * (1.0 + expected[-1]["energy.kinetic"])
         wanted.append(expected)

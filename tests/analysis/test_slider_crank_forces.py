@@ -165,7 +165,7 @@ def test_groove_in_the_shaft_is_the_plants() -> None:
     turn = force_turn(mechanism, crank_speed=4.0, crank_acceleration=7.0, shift=law, angles=[0.4, 1.9], load=5.0)
     for i, th in enumerate([0.4, 1.9]):
         inputs = dynamics.Inputs(1.0, 0.0, 1.0, 0.0, 7.0, 0.0, 0.0, 5.0)
-        x = dynamics.grooved((th, 0.0, 4.0, 0.0, 0.0, 0.0), 1.0, p)
+        x = dynamics.impose_groove((th, 0.0, 4.0, 0.0, 0.0, 0.0), 1.0, p)
         q = kinematics.position(th, x[1], p)
         m = dynamics.motion(q, kinematics.coefficients(q, p), x, inputs, p)
         assert turn.torque[i] == pytest.approx(m.torque, rel=1e-12)

@@ -210,7 +210,7 @@ def test_every_number_of_a_run_is_pythons(page: Page, random: Callable[[int], Ca
         _near(columns[name], wanted[name])
     assert mechanism.drawing is not None
     p, modes = case.parameters.constants(), case.inputs.modes(mechanism)
-    acting = mechanism.equations.applied(tuple(map(float, modes.values())), (0.0,) * len(mechanism.channels), p)
+    acting = mechanism.equations.apply_inputs(tuple(map(float, modes.values())), (0.0,) * len(mechanism.channels), p)
     last = [columns[n][-1] for n in range(mechanism.size)]
     places = [columns[f"{joint.name}{axis}"][-1] for joint in mechanism.drawing.joints for axis in "xyz"]
     _near(places, mechanism.drawing.positions(last, acting, p))

@@ -195,7 +195,7 @@ def test_powers_are_those_of_the_equations_and_the_envelope_has_the_greatest_for
     channels = [drive.speed if c.kind == "command" else 0.0 for c in mechanism.channels]
     for row in (0, 100, 500):
         x = [columns[n][row] for n in range(mechanism.size)]
-        rates = equations.derivative(x, equations.applied(modes, channels, p), p)
+        rates = equations.derivative(x, equations.apply_inputs(modes, channels, p), p)
         _near([columns["power.dissipated"][row], columns["power.supplied"][row]], rates[-2:])
     _near(columns["power.supplied"], columns["drive.applied_torque"] * columns["crank.speed"])
     page.click('[id="tab forces"]')

@@ -48,7 +48,7 @@ def test_derivatives_are_exact(kind: Any, seed: int) -> None:
     ours = traced(mechanism)
     of_state = casadi.vertcat(
         *ours.of(mechanism.equations.derivative)(
-            tuple(casadi.vertsplit(state)), mechanism.equations.applied(flags, tuple(u), p), p
+            tuple(casadi.vertsplit(state)), mechanism.equations.apply_inputs(flags, tuple(u), p), p
         )
     )
     exact = np.array(casadi.Function("jacobian", [state], [casadi.densify(casadi.jacobian(of_state, state))])(x))
@@ -57,7 +57,7 @@ def test_derivatives_are_exact(kind: Any, seed: int) -> None:
     for j in range(len(x)):
         shifted = x.astype(complex)
         shifted[j] += 1e-30j
-        at = derivative(tuple(shifted.tolist()), mechanism.equations.applied(flags, tuple(u.tolist()), p), p)
+        at = derivative(tuple(shifted.tolist()), mechanism.equations.apply_inputs(flags, tuple(u.tolist()), p), p)
         stepped[:, j] = np.array([complex(value).imag for value in at]) / 1e-30
     size = np.abs(exact).max(axis=1, keepdims=True)
     assert size.max() > 1.0

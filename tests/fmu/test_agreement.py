@@ -126,7 +126,7 @@ def test_random_mechanisms(fmu: str, fmus: dict[str, Path], natives: dict[str, P
         exchange = interface == "model-exchange"
         assert status == status_fmu, (seed, kind, interface)
         case = drawn(fmu, seed)
-        same = TURNED if case.mechanism.switched(case.parameters.constants()) else SAME
+        same = TURNED if case.mechanism.is_switched_on(case.parameters.constants()) else SAME
         assert relative <= (OTHER if exchange else same), (seed, kind, interface, name, relative)
         # in process the last configuration is recorded, through co-simulation the last communication point
         assert abs(end) <= (1e-9 if exchange else 1e-3 * (status != 0)), (seed, kind, interface, end)

@@ -157,8 +157,8 @@ def test_outputs_that_are_states_or_derivatives_are_those_of_the_equations(mecha
     for modes in modes_of(mechanism):
         plant = started(mechanism, modes, Random(1))
         outputs = dict(zip(mechanism.output_names, plant.outputs()))
-        x = plant._jumped(plant.state, plant._applied(), plant._commanded)
-        rates = mechanism.equations.derivative(x, plant._applied(), plant._p)
+        x = plant._jump_rates(plant.state, plant._applied_inputs(), plant._commanded)
+        rates = mechanism.equations.derivative(x, plant._applied_inputs(), plant._p)
         for references, values in ((states(mechanism), x), (derivatives(mechanism), rates)):
             for reference, value in zip(references, values):
                 name = entries[reference].variable.name
@@ -217,7 +217,7 @@ def changed(mechanism: Mechanism) -> dict[str, set[str]]:
 
         def values(at: list[float], jumped: bool, p: Any = p, m: Any = m) -> list[float]:
             x, u = tuple(at[: mechanism.size]), tuple(at[mechanism.size :])
-            i = e.applied(m, u, p)
+            i = e.apply_inputs(m, u, p)
             x = e.jump(x, i, u, p) if jumped else x
             return [*e.outputs(x, i, 0.3, p), *e.derivative(x, i, p), e.clearance(x, i, p)]
 

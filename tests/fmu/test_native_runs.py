@@ -285,7 +285,7 @@ TOO_ROUGH = {"slider__friction_coefficient": 4.0, "drive__speed": 10.0 * math.pi
 def rough(clearance: float, mode: int) -> dict[str, float]:
     """Start of a five-bar, its slider in motion, with so much friction in the guide that it has this clearance from jamming."""
     initial, p = InitialState(crank_speed=40.0, slider_velocity=0.1), TABLE_3_1.constants()
-    x, acting = FIVE_BAR.state(initial), FIVE_BAR.equations.applied((float(mode),), (0.0,) * 6, p)
+    x, acting = FIVE_BAR.state(initial), FIVE_BAR.equations.apply_inputs((float(mode),), (0.0,) * 6, p)
     low, high = 0.0, 100.0
     for _ in range(60):
         middle = 0.5 * (low + high)
@@ -469,7 +469,7 @@ TUNED = {"slider.stiffness": 5000.0, "slider.damping": 4.0, "slider.coulomb_fric
 @pytest.mark.parametrize("name", TUNED)
 def test_tunable_parameters_change_between_steps(library: Library, name: str) -> None:
     mechanism = FMUS[model(library)]
-    plant = Plant.of_values(mechanism, {v.name: v.start for v in mechanism.variables})
+    plant = Plant.from_values(mechanism, {v.name: v.start for v in mechanism.variables})
     c = library.instance().start()
     for n in range(20):
         if n == 10:
@@ -883,7 +883,7 @@ def test_a_command_that_moves_is_followed_at_the_order_of_the_solver(
     model, values, commands = FOLLOWED[case]
     mechanism = FMUS[model]
     start = values | {name.replace(".", "__"): law(0.0) for name, (law, _, _) in commands.items()}
-    plant = Plant.of_values(
+    plant = Plant.from_values(
         mechanism,
         {v.name: v.start for v in mechanism.variables}
         | {name.replace("__", "."): value for name, value in start.items()},
@@ -892,7 +892,7 @@ def test_a_command_that_moves_is_followed_at_the_order_of_the_solver(
     def motion(t: float, x: Any) -> Any:
         for name, (law, rate, channel) in commands.items():
             plant.inputs |= {name: law(t), channel: rate(t)}
-        return mechanism.equations.derivative(tuple(x), plant._applied(), plant._p)
+        return mechanism.equations.derivative(tuple(x), plant._applied_inputs(), plant._p)
 
     exact = solve_ivp(motion, (0.0, 0.2), plant.state, method="DOP853", rtol=1e-12, atol=1e-13).y[:, -1]
     names = [part for f in mechanism.freedoms for part in (f.coordinate, f.rate)] + ["energy.supplied"]
@@ -1111,11 +1111,11 @@ def test_a_controller_in_intermediate_updates_is_of_second_order(fmi3: Library) 
         return c.get("crank.angle")[0], len(times)
 
     values = {v.name: v.start for v in FIVE_BAR.variables} | {"drive.mode": 0, "initial.crank_speed": begin}
-    plant = Plant.of_values(FIVE_BAR, values)
+    plant = Plant.from_values(FIVE_BAR, values)
 
     def motion(t: float, x: Any) -> list[float]:
         plant.inputs["drive.torque"] = proportional * (wanted - x[2]) + integral * x[-1]
-        return [*FIVE_BAR.equations.derivative(tuple(x[:-1]), plant._applied(), plant._p), wanted - x[2]]
+        return [*FIVE_BAR.equations.derivative(tuple(x[:-1]), plant._applied_inputs(), plant._p), wanted - x[2]]
 
     exact = solve_ivp(motion, (0.0, 0.1), [*plant.state, 0.0], method="DOP853", rtol=1e-11, atol=1e-12).y[0, -1]
     # 4.1e-4 where inputs are held from one update to the next

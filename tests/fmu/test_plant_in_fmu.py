@@ -72,7 +72,7 @@ def outputs_of_plant(plant: Plant, inputs: dict[str, float], sizes: list[float])
 def test_outputs_are_the_plants(fmu: Path, model: Model, tmp_path: Path, seed: int) -> None:
     # six seeds drive in every way
     case = drawn(model.name, seed)
-    plant = Plant.of_values(FMUS[model.name], case.values, tolerance=1e-9, time=START)
+    plant = Plant.from_values(FMUS[model.name], case.values, tolerance=1e-9, time=START)
     expected, times = outputs_of_plant(plant, case.inputs, SIZES)
     found = run_in_process(outputs_of_fmus, [(str(fmu), str(tmp_path), case.values, case.inputs, times, SIZES)])
     assert found == [expected]

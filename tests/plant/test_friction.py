@@ -219,5 +219,5 @@ def test_up_to_its_limit_friction_is_solved_for(seed: int, drive: str) -> None:
 def test_friction_is_what_the_switch_is_for() -> None:
     for name in (field.name for field in fields(FiveBarParameters) if "friction" in field.name):
         p = replace(TABLE_3_1, **{name: 0.01}).constants()
-        assert FIVE_BAR.switched(p) == (name in FRICTION)
-    assert not FIVE_BAR.switched(TABLE_3_1.constants())
+        assert FIVE_BAR.is_switched_on(p) == (name in FRICTION)
+    assert not FIVE_BAR.is_switched_on(TABLE_3_1.constants())

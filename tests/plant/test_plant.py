@@ -451,7 +451,7 @@ def test_a_millionth_of_the_step_or_a_nanosecond_counts_as_rounding(
     ids=["five-bar", "slider-crank"],
 )
 def test_a_configuration_in_words(kind: Kind, words: str) -> None:
-    assert running(kind).mechanism.where((1.0, -0.02, 3.0, 4.0, 5.0, 6.0)) == words
+    assert running(kind).mechanism.describe_state((1.0, -0.02, 3.0, 4.0, 5.0, 6.0)) == words
 
 
 @pytest.mark.parametrize("value", [nan, inf, -inf])

@@ -103,7 +103,7 @@ def test_groove_takes_the_place_of_the_shift_of_the_state(seed: int) -> None:
     p, (th, _, w, *_) = case.p, case.state
     carried, law = (th, 9.0, w, 9.0, 0.0, 0.0), K.groove(th, p)
     for drive, (_, _, groove) in DRIVES.items():
-        x = D.grooved(carried, groove, p)
+        x = D.impose_groove(carried, groove, p)
         assert x == ((th, law.shift, w, pytest.approx(law.pitch * w, rel=1e-13), 0.0, 0.0) if groove else carried)
         if groove:
             i = case.inputs(drive)

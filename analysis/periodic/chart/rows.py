@@ -49,8 +49,8 @@ class PointRow:
 
     @property
     def switched(self) -> bool:
-        """Whether the mechanism's switch is on at any point: see `Mechanism.switched`."""
-        place = self.first.mechanism.switch_place
+        """Whether the mechanism's switch is on at any point: see `Mechanism.is_switched_on`."""
+        place = self.first.mechanism.switch_index
         return place >= 0 and bool(self.constants[:, place].any())
 
     def points(self) -> Points:

@@ -160,7 +160,7 @@ class OperatingPoint:
         """
         d_drive, d_p = direction or (np.zeros_like(self.vector), np.zeros_like(self.constants))
         # a change of lambda may set the switch
-        switched = switched or any(map(self.mechanism.switched, (self.constants.tolist(), d_p.tolist())))
+        switched = switched or any(map(self.mechanism.is_switched_on, (self.constants.tolist(), d_p.tolist())))
         return Section(
             self.flow.addresses(GAP, *functions, switched=switched),
             np.array(self.flow.modes, dtype=float),

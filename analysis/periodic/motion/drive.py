@@ -349,7 +349,7 @@ def _arguments(
 @cache
 def force_inputs(mechanism: Mechanism) -> dict[str, Channel]:
     """Return the force inputs of a mechanism, without the torque on its crank if it has only one crank, by FMI name."""
-    crank = mechanism.cyclic[0] if len(mechanism.cyclic) == 1 else -1
+    crank = mechanism.cyclic_freedoms[0] if len(mechanism.cyclic_freedoms) == 1 else -1
     return {c.name: c for c in mechanism.channels if c.kind == "force" and (c.freedom != crank or crank < 0)}
 
 
@@ -419,7 +419,7 @@ def steady_drive(
                 raise VaryingInputError(channel.argument, part)
     named = [None if n is None else mechanism.channels[n].name for n in (crank.command, crank.torque)]
     for channel in mechanism.channels:
-        turns = channel.freedom in mechanism.cyclic
+        turns = channel.freedom in mechanism.cyclic_freedoms
         if channel.kind == "command" and not turns and constant.get(channel.name, 0.0) != 0.0:
             raise InputError(
                 f"{channel.argument} is {constant[channel.name]}: a motion that goes on so is not periodic"
@@ -432,7 +432,7 @@ def steady_drive(
     other = {n: f for n, f in enumerate(mechanism.freedoms) if n not in (crank.freedom, *free)}
     angle = float(getattr(initial, mechanism.freedoms[crank.freedom].initial[0]))
     coordinate = {n: f.coordinate for n, f in enumerate(mechanism.freedoms)}
-    several = len(mechanism.cyclic) > 1
+    several = len(mechanism.cyclic_freedoms) > 1
     return Drive(
         speed=constant.get(named[0] or "") if speed is None else speed,
         torque=constant.get(named[1] or "", 0.0) + sum(float(p) for p in parts if not isinstance(p, InductionMotor)),
@@ -454,16 +454,18 @@ def _choose_crank(
     It is the first crank that is commanded to turn forward, or else the first crank. The ratios, by the numbers of freedoms,
     are those of commanded speeds; a free crank has the ratio of the speeds at the start, to the nearest whole number.
     """
-    if len(mechanism.cyclic) < 2:
+    if len(mechanism.cyclic_freedoms) < 2:
         return find_crank(mechanism), {}
     commanded = {mechanism.channels[n].freedom: mechanism.channels[n] for n in mechanism.commands(modes)}
-    speeds = {n: sum(inputs.constants([commanded[n].argument]) or [0.0]) for n in mechanism.cyclic if n in commanded}
-    first = next((n for n, speed in speeds.items() if speed > 0.0), mechanism.cyclic[0])
+    speeds = {
+        n: sum(inputs.constants([commanded[n].argument]) or [0.0]) for n in mechanism.cyclic_freedoms if n in commanded
+    }
+    first = next((n for n, speed in speeds.items() if speed > 0.0), mechanism.cyclic_freedoms[0])
     crank = find_crank(mechanism, mechanism.freedoms[first].coordinate)
-    start = {n: float(getattr(initial, mechanism.freedoms[n].initial[1])) for n in mechanism.cyclic}
+    start = {n: float(getattr(initial, mechanism.freedoms[n].initial[1])) for n in mechanism.cyclic_freedoms}
     speed = speeds.get(first) or start[first]
     ratios = {}
-    for n in mechanism.cyclic:
+    for n in mechanism.cyclic_freedoms:
         if n != first and n in speeds:
             ratios[n] = (
                 speed_ratio(commanded[n].name, speeds[n], commanded[first].name, speed)
@@ -508,7 +510,7 @@ def is_smooth(parameters: Parameters) -> bool:
     """
     mechanism = mechanism_of(parameters)
     rough = mechanism.names("friction")
-    return not any(getattr(parameters, field_name(name)) for name in rough) and not mechanism.switched(
+    return not any(getattr(parameters, field_name(name)) for name in rough) and not mechanism.is_switched_on(
         parameters.constants()
     )
 

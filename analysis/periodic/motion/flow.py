@@ -35,7 +35,10 @@ class Crank(NamedTuple):
 @cache
 def find_cranks(mechanism: Mechanism) -> tuple[Crank, ...]:
     """Return all freedoms of a mechanism that turn."""
-    return tuple(Crank(n, mechanism.channel(n, "command"), mechanism.channel(n, "force")) for n in mechanism.cyclic)
+    return tuple(
+        Crank(n, mechanism.channel_index(n, "command"), mechanism.channel_index(n, "force"))
+        for n in mechanism.cyclic_freedoms
+    )
 
 
 @cache
@@ -275,7 +278,7 @@ class Flow:
         ]
         x, u = self._state(angle, y, drive)
         functions = traced(m)
-        applied = functions.of(m.equations.applied)(
+        applied = functions.of(m.equations.apply_inputs)(
             tuple(casadi.vertsplit(modes)) if m.modes else (), tuple(casadi.vertsplit(u)) if self.inputs else (), k
         )
         if which == GAP:

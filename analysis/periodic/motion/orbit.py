@@ -355,7 +355,7 @@ class PeriodicOrbit(Shown):
         equations, p = self.point.mechanism.equations, self.parameters.constants()
         modes, turn = tuple(float(value) for value in self.flow.modes), self.turn(samples)
         return min(
-            abs(equations.clearance(x, equations.applied(modes, u, p), p))
+            abs(equations.clearance(x, equations.apply_inputs(modes, u, p), p))
             for x, u in zip(turn.states.tolist(), turn.inputs.tolist())
         )
 
@@ -367,7 +367,7 @@ class PeriodicOrbit(Shown):
         """
         flow, turn, p = self.flow, self.turn(samples), self.point.constants
         y = flow.unknowns(turn.states, self.point.vector).T
-        trace = flow.jacobian_trace(self.point.mechanism.switched(p.tolist())).map(samples)
+        trace = flow.jacobian_trace(self.point.mechanism.is_switched_on(p.tolist())).map(samples)
         traces = trace(turn.angle[None, :], y, list(flow.modes), self.point.vector, p)
         return liouville(np.asarray(traces).ravel(), flow.period * self.turns)
 
@@ -616,7 +616,7 @@ def require_turns(turns: int, point: OperatingPoint | None = None, start: FloatA
     if set(point.drive.arguments(mechanism).values()) <= {channel.argument for channel in mechanism.channels}:
         return
     section = point.section(start, PLAIN)
-    plain = flow.function(PLAIN, mechanism.switched(point.constants.tolist()))
+    plain = flow.function(PLAIN, mechanism.is_switched_on(point.constants.tolist()))
     z = np.append(start, np.zeros(flow.size * (flow.size + 1)))
     rates = [
         np.asarray(plain(angle + way, z, section.modes, section.drive, section.p)).ravel()
@@ -633,7 +633,7 @@ def _check_assembly(point: OperatingPoint, start: FloatArray) -> None:
     """Raise OrbitAssemblyError if the links cannot be joined at the start."""
     mechanism, flow, p = point.mechanism, point.flow, point.parameters.constants()
     modes = tuple(float(value) for value in flow.modes)
-    applied = mechanism.equations.applied(modes, tuple(point.vector[: flow.inputs].tolist()), p)
+    applied = mechanism.equations.apply_inputs(modes, tuple(point.vector[: flow.inputs].tolist()), p)
     x = mechanism.equations.start(flow.state(start, point.vector), applied, p)
     try:
         mechanism.check_state(point.parameters, x, applied, p)

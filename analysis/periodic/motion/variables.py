@@ -352,9 +352,9 @@ def gradient_names(parameters: Parameters, drive: Drive) -> tuple[str, ...]:
         except InputError:
             continue
         acting.append(name)
-    if mechanism.switch_place < 0 or mechanism.switched(parameters.constants()):
+    if mechanism.switch_index < 0 or mechanism.is_switched_on(parameters.constants()):
         return tuple(acting)
-    effect = along_parameters(parameters, acting).p[mechanism.switch_place]
+    effect = along_parameters(parameters, acting).p[mechanism.switch_index]
     return tuple(name for name, change in zip(acting, effect) if change == 0.0)
 
 

@@ -146,9 +146,9 @@ def _turn_columns(orbit: PeriodicOrbit, first: Turn) -> dict[str, Callable[[Turn
     }
     for order in (1, 2, 3):
         columns[f"harmonic {order} of {what}"] = lambda turn, order=order: turn.harmonic(swing, order)  # type: ignore[misc]
-    for number in mechanism.cyclic:
+    for number in mechanism.cyclic_freedoms:
         freedom = mechanism.freedoms[number].coordinate
-        what = "crank torque" if len(mechanism.cyclic) == 1 else f"torque on {freedom.partition('.')[0]}"
+        what = "crank torque" if len(mechanism.cyclic_freedoms) == 1 else f"torque on {freedom.partition('.')[0]}"
         for name in mechanism.names("drive", freedom):
             columns[f"mean {what} [N.m]"] = lambda turn, name=name: float(turn[name].mean())  # type: ignore[misc]
             columns[f"greatest {what} [N.m]"] = lambda turn, name=name: float(  # type: ignore[misc]

@@ -57,7 +57,7 @@ LATTICE = 633
 
 def oscillating(mechanism: Mechanism) -> tuple[int, ...]:
     """Return the numbers of the freedoms that are not cranks."""
-    return tuple(number for number in range(len(mechanism.freedoms)) if number not in mechanism.cyclic)
+    return tuple(number for number in range(len(mechanism.freedoms)) if number not in mechanism.cyclic_freedoms)
 
 
 def first_freedom(mechanism: Mechanism) -> int:

@@ -126,8 +126,8 @@ class MotionGradient:
         own = along_parameters(parameters, self.names)
         self.along = stacked(orbit.drive, orbit.flow, self.names, own.p)
         mechanism = mechanism_of(parameters)
-        place = mechanism.switch_place
-        self._switched = mechanism.switched(parameters.constants()) or (place >= 0 and bool(np.any(own.p[place])))
+        place = mechanism.switch_index
+        self._switched = mechanism.is_switched_on(parameters.constants()) or (place >= 0 and bool(np.any(own.p[place])))
 
     @cached_property
     def variations(self) -> Variations:

@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 from math import copysign, degrees, sqrt
 
-from ..limits import LIMIT_SINE, Unjoined
+from ..limits import LIMIT_SINE, UnjoinedMessages
 from ..mechanism import crank_scale
 from . import kinematics
 from .parameters import FiveBarParameters
 
-UNJOINED = Unjoined(
+UNJOINED = UnjoinedMessages(
     "the links cannot be joined",
     "crank pin and slider pin are {:.9g} m apart, coupler and rocker span from {:.9g} m to {:.9g} m",
     "coupler and rocker are collinear to {:.3f} deg",

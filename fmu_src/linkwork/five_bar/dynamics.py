@@ -265,12 +265,12 @@ def unit_friction(
 
 
 def contacts(f: Reactions) -> tuple[tuple[float, float], ...]:
-    """Return the forces in the contacts, in the order of `unit_friction`."""
+    """Return the force in each contact as two components, in the order of `unit_friction`."""
     return (f.ax, f.ay), (f.bx, f.by), (f.cx, f.cy), (f.dx, f.dy), (f.guide, 0.0)
 
 
 def contact_friction(g: Position, k: Coefficients, m: Inertia, x: State, i: Inputs, p: Constants) -> Friction:
-    """Compute the friction in pins and guide, consistent with the contact forces, which depend on it linearly."""
+    """Compute the friction in pins and guide together with the contact forces, which depend linearly on the friction."""
     smooth = p._replace(rough=0.0)
     without = contacts(reactions(g, x, motion(g, k, x, i, smooth), i, smooth))
     units = unit_friction(g, k, m, x[2], x[3], i.speed_drive, p)
@@ -393,14 +393,14 @@ def jump(x: State, i: Inputs, u: tuple[float, ...], p: Constants) -> State:
     return jump_speed(x, (1.0 - i.speed_drive) * x[2] + i.speed_drive * u[1], p)
 
 
-def applied(modes: tuple[float, ...], u: tuple[float, ...], p: Constants) -> Inputs:
-    """Return the inputs of the plant from drive.mode and the channels in the order of the FMI inputs."""
+def apply_inputs(modes: tuple[float, ...], u: tuple[float, ...], p: Constants) -> Inputs:
+    """Return the plant's inputs from drive.mode, in ``modes``, and the channels ``u`` in the order of the FMI inputs."""
     (drive,) = modes
     torque, _, acceleration, force, load_x, load_y = u
     return Inputs(drive, (1.0 - drive) * torque, drive * acceleration, force, load_x, load_y)
 
 
-def started(x: State, i: Inputs, p: Constants) -> State:
+def complete_start(x: State, i: Inputs, p: Constants) -> State:
     """Return the initial state unchanged, because all its components are independent."""
     return x
 

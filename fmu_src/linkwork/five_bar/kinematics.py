@@ -158,7 +158,7 @@ def assembly_margin(th2: float, u: float, p: Constants) -> tuple[float, float]:
 
 
 def closure_residual(th2: float, th3: float, th4: float, u: float, p: Constants) -> float:
-    """Compute the length by which the loop (2.1) fails to close at the given angles (m)."""
+    """Compute the closure error of the loop (2.1) at the given angles and slider position (m)."""
     x = p.l2 * cos(th2) + p.l3 * cos(th3) - p.l4 * cos(th4) - p.l1 - u * p.ca
     y = p.l2 * sin(th2) + p.l3 * sin(th3) - p.l4 * sin(th4) - u * p.sa
     return sqrt(x * x + y * y)

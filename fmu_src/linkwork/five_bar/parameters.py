@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 from math import cos, sin
 from typing import ClassVar, NamedTuple
 
-from ..parameters import CheckedParameters, CheckedState, Least, Rules
+from ..parameters import CheckedParameters, CheckedState, LowerBound, Rules
 
 
 class Constants(NamedTuple):
@@ -81,12 +81,12 @@ _RULES = Rules(
     ),
     signs={"assembly_branch": "the sign of sin(rocker.angle - coupler.angle)"},
     least=(
-        Least(
+        LowerBound(
             "crank_inertia",
             _crank_inertia_of_mass,
             "be at least crank.mass * crank.cog_distance^2 = %g kg.m2: it is taken about the shaft A",
         ),
-        Least("slider_mass", _slider_mass_above_none, "be greater than zero where rocker.mass is zero"),
+        LowerBound("slider_mass", _slider_mass_above_none, "be greater than zero where rocker.mass is zero"),
     ),
 )
 

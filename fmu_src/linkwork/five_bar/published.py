@@ -21,7 +21,7 @@ DYN_PER_NEWTON = 1e5
 DYN_PER_CM_PER_NEWTON_PER_METRE = 1e3
 
 
-def _at(crank_speed_rpm: float, parameters: FiveBarParameters, source: str) -> PublishedSet:
+def _published_set(crank_speed_rpm: float, parameters: FiveBarParameters, source: str) -> PublishedSet:
     """Return a published set that starts as in the thesis: th2 = u = u' = 0 at the running speed."""
     speed = crank_speed_rpm * RAD_S_PER_RPM
     return PublishedSet(parameters, InitialState(crank_speed=speed), {"speed": speed}, source, at_rest=True)
@@ -82,12 +82,20 @@ def _rig_2(stiffness_dyn_cm: float) -> FiveBarParameters:
 
 SETS: Mapping[str, PublishedSet] = MappingProxyType(
     {
-        "table-3.1": _at(420, _table_3_1(1e6, 3e4), "Youssef, Table 3.1, with fig. 3.4's spring"),
-        "appendix-1": _at(450, _table_3_1(1.5e6, 2.8e4), "Youssef, appendix 1"),
-        "rig-1-spring-a": _at(420, _rig_1(3e6), "Youssef, Table 8.1, spring A (speed and crank inertia assumed)"),
-        "rig-1-spring-b": _at(420, _rig_1(11e6), "Youssef, Table 8.1, spring B (speed and crank inertia assumed)"),
-        "rig-2-spring-c": _at(420, _rig_2(4e6), "Youssef, Table 8.2, spring C (speed and crank inertia assumed)"),
-        "rig-2-spring-d": _at(420, _rig_2(8e6), "Youssef, Table 8.2, spring D (speed and crank inertia assumed)"),
+        "table-3.1": _published_set(420, _table_3_1(1e6, 3e4), "Youssef, Table 3.1, with fig. 3.4's spring"),
+        "appendix-1": _published_set(450, _table_3_1(1.5e6, 2.8e4), "Youssef, appendix 1"),
+        "rig-1-spring-a": _published_set(
+            420, _rig_1(3e6), "Youssef, Table 8.1, spring A (speed and crank inertia assumed)"
+        ),
+        "rig-1-spring-b": _published_set(
+            420, _rig_1(11e6), "Youssef, Table 8.1, spring B (speed and crank inertia assumed)"
+        ),
+        "rig-2-spring-c": _published_set(
+            420, _rig_2(4e6), "Youssef, Table 8.2, spring C (speed and crank inertia assumed)"
+        ),
+        "rig-2-spring-d": _published_set(
+            420, _rig_2(8e6), "Youssef, Table 8.2, spring D (speed and crank inertia assumed)"
+        ),
     }
 )
 

@@ -66,12 +66,12 @@ MECHANISM = Mechanism(
     experiment=(0.0, 2.4, 5e-3, 1e-9),  # two revolutions at 50 rpm
     modules=(friction, vectors, kinematics, dynamics),
     equations=Equations(
-        applied=dynamics.applied,
+        apply_inputs=dynamics.apply_inputs,
         derivative=dynamics.derivative,
         outputs=dynamics.outputs,
         clearance=dynamics.clearance,
         jump=dynamics.jump,
-        start=dynamics.started,
+        start=dynamics.complete_start,
         energy=dynamics.mechanical_energy,
     ),
     check_assembly=lambda parameters, x: assembly.check_assembly(parameters, x[0], x[1]),

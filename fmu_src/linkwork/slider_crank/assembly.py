@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 from math import copysign, degrees, sqrt
 
-from ..limits import LIMIT_SINE, Unjoined
+from ..limits import LIMIT_SINE, UnjoinedMessages
 from ..mechanism import crank_scale
 from . import kinematics
 from .parameters import SliderCrankParameters
 
-UNJOINED = Unjoined(
+UNJOINED = UnjoinedMessages(
     "the rod does not reach the guide",
     "the crank pin is {:.9g} m from the guide, the rod is {:.9g} m long, {:.9g} m too short",
     "the rod is within {:.3f} deg of perpendicular to the guide",

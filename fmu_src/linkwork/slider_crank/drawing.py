@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from ..mechanism import Drawing, Joint, Part
-from .dynamics import Inputs, State, grooved
+from .dynamics import Inputs, State, impose_groove
 from .kinematics import crank_pin, position, slider_pin
 from .parameters import Constants
 
 
 def positions(x: State, i: Inputs, p: Constants) -> tuple[float, ...]:
     """Compute the positions of the joints, in the order of `DRAWING`, in the ground frame."""
-    settled = grooved(x, i.groove, p)
+    settled = impose_groove(x, i.groove, p)
     shift = settled[1]
     q = position(settled[0], shift, p)
     b = crank_pin(q, shift, p)

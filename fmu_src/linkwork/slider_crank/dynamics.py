@@ -161,8 +161,8 @@ class Outputs(NamedTuple):
     assembly_margin: float
 
 
-def grooved(x: State, in_groove: float, p: Constants) -> State:
-    """Return the state with the shift and axial velocity that a groove imposes, if there is one."""
+def impose_groove(x: State, in_groove: float, p: Constants) -> State:
+    """Return the state with the shift and axial velocity of the groove if ``in_groove`` is 1, unchanged if it is 0."""
     th, s1, w, v, dissipated, supplied = x
     law = groove(th, p)
     free = 1.0 - in_groove
@@ -258,7 +258,7 @@ def motion(q: Position, k: Coefficients, x: State, i: Inputs, p: Constants) -> M
 
 def derivative(x: State, i: Inputs, p: Constants) -> State:
     """Compute the time derivative of the state under constant inputs."""
-    x = grooved(x, i.groove, p)
+    x = impose_groove(x, i.groove, p)
     q = position(x[0], x[1], p)
     k = coefficients(q, p)
     m = motion(q, k, x, i, p)
@@ -339,7 +339,7 @@ def jump(x: State, i: Inputs, u: tuple[float, ...], p: Constants) -> State:
     conserved, unless a groove couples it to the crank. The work of the impulses is the change of kinetic energy.
     """
     speed, shift_velocity = u[1], u[4]
-    x = grooved(x, i.groove, p)
+    x = impose_groove(x, i.groove, p)
     th, s1, w, v, dissipated, supplied = x
     q = position(th, s1, p)
     m = inertia(q, coefficients(q, p), p)
@@ -353,7 +353,7 @@ def jump(x: State, i: Inputs, u: tuple[float, ...], p: Constants) -> State:
     return (th, s1, w_new, v_new, dissipated, supplied + work)
 
 
-def applied(modes: tuple[float, ...], u: tuple[float, ...], p: Constants) -> Inputs:
+def apply_inputs(modes: tuple[float, ...], u: tuple[float, ...], p: Constants) -> Inputs:
     """Return the inputs of the plant from drive.mode, axial.mode and the channels in the order of the FMI inputs.
 
     ``axial.mode`` is 0 if the axial force is given, 1 if the axial speed is given, 2 if a groove makes the shift.
@@ -376,14 +376,14 @@ def applied(modes: tuple[float, ...], u: tuple[float, ...], p: Constants) -> Inp
     )
 
 
-def started(x: State, i: Inputs, p: Constants) -> State:
-    """Return the initial state of a run, with the shift that a groove imposes, if there is one."""
-    return grooved(x, i.groove, p)
+def complete_start(x: State, i: Inputs, p: Constants) -> State:
+    """Return the initial state of a run, with the shift and axial velocity that a groove imposes, if there is one."""
+    return impose_groove(x, i.groove, p)
 
 
 def clearance(x: State, i: Inputs, p: Constants) -> float:
     """Compute the sine of the transmission angle, which is the cosine of the angle between rod and guide."""
-    s = grooved(x, i.groove, p)
+    s = impose_groove(x, i.groove, p)
     return p.branch * position(s[0], s[1], p).h / p.a2
 
 
@@ -392,7 +392,7 @@ def outputs(x: State, i: Inputs, start_energy: float, p: Constants) -> Outputs:
 
     ``start_energy`` is the mechanical energy at the start of the run (J), from which the energy balance counts.
     """
-    x = grooved(x, i.groove, p)
+    x = impose_groove(x, i.groove, p)
     th, s1, w, v, dissipated, supplied = x
     q = position(th, s1, p)
     k = coefficients(q, p)

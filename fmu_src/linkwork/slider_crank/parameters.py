@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from math import cos, sin
 from typing import ClassVar, NamedTuple
 
-from ..parameters import CheckedParameters, CheckedState, Least, Rules
+from ..parameters import CheckedParameters, CheckedState, LowerBound, Rules
 
 
 class Constants(NamedTuple):
@@ -89,7 +89,7 @@ _RULES = Rules(
     ),
     signs={"assembly_branch": "the side of the crank pin's foot on the guide on which the slider is"},
     least=(
-        Least(
+        LowerBound(
             "crank_inertia",
             _crank_inertia_of_mass,
             "be at least crank.mass * (crank.cog_x^2 + crank.cog_y^2) = %g kg.m2: it is taken about the axis",

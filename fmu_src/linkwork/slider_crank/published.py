@@ -29,7 +29,7 @@ _CRANK_MASS, _ROD_MASS, _SLIDER_MASS = 0.06146594, 0.11382582, 0.01956522
 
 
 def parameters(offset_in: float = 0.0, twist_deg: float = 270.0) -> SliderCrankParameters:
-    """Return the mechanism of section 3.1 with the offset a4 (inches) and the twist alpha4 (degrees) of one of its cases."""
+    """Return the mechanism of section 3.1 with an offset a4 given in inches and a twist alpha4 given in degrees."""
     unit = POUND_S2_PER_INCH * INCH * INCH
     return SliderCrankParameters(
         crank_length=_CRANK * INCH,
@@ -48,7 +48,7 @@ def parameters(offset_in: float = 0.0, twist_deg: float = 270.0) -> SliderCrankP
 
 
 def initial(shift_in: float = 0.0) -> InitialState:
-    """Return the initial state at 50 rpm with the shift S1 (inches) of one of the cases."""
+    """Return the initial state at 50 rpm with a shift S1 given in inches."""
     return InitialState(crank_speed=CRANK_SPEED, shift_position=shift_in * INCH)
 
 

@@ -16,7 +16,7 @@ class Constants(NamedTuple):
     weight: float
 
 
-def applied(modes: tuple[float, ...], u: tuple[float, ...], p: Constants) -> float:
+def apply_inputs(modes: tuple[float, ...], u: tuple[float, ...], p: Constants) -> float:
     """The torque."""
     return u[0]
 

@@ -33,7 +33,7 @@ class Applied(NamedTuple):
     force: float
 
 
-def applied(modes: tuple[float, ...], u: tuple[float, ...], p: Constants) -> Applied:
+def apply_inputs(modes: tuple[float, ...], u: tuple[float, ...], p: Constants) -> Applied:
     """What acts on the plant, from drive.mode and the channels."""
     (drive,) = modes
     torque, _, acceleration, force = u

@@ -32,7 +32,7 @@ class Applied(NamedTuple):
     torque: float
 
 
-def applied(modes: tuple[float, ...], u: tuple[float, ...], p: Constants) -> Applied:
+def apply_inputs(modes: tuple[float, ...], u: tuple[float, ...], p: Constants) -> Applied:
     """What acts on the plant, from the channels."""
     _, acceleration, torque = u
     return Applied(acceleration, torque)

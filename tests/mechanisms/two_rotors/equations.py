@@ -37,7 +37,7 @@ class Applied(NamedTuple):
     force: float
 
 
-def applied(modes: tuple[float, ...], u: tuple[float, ...], p: Constants) -> Applied:
+def apply_inputs(modes: tuple[float, ...], u: tuple[float, ...], p: Constants) -> Applied:
     """Return what acts on the plant, from the modes and the channels."""
     m1, m2 = modes
     t1, _, a1, t2, _, a2, force = u
