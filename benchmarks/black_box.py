@@ -21,7 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import Bounds, NonlinearConstraint, OptimizeResult, differential_evolution, minimize
 
-from analysis.numerics.tracing import rebound
+from analysis.numerics.tracing import rebind_functions
 from analysis.synthesis.linkage.linkage import Linkage
 from analysis.synthesis.search.polish import sum_of_squares
 from analysis.synthesis.search.start import Answer, Start
@@ -47,7 +47,7 @@ PENALTY = 10.0
 #: Greatest number of evaluations of a simplex for each unknown.
 EVALUATIONS = 600
 #: The plant's loop closure over arrays; its square root is zero where the links cannot be joined.
-_close_loop = rebound((kinematics,), {"sqrt": lambda square: np.sqrt(np.maximum(square, 0.0))}).close_loop
+_close_loop = rebind_functions((kinematics,), {"sqrt": lambda square: np.sqrt(np.maximum(square, 0.0))}).close_loop
 
 
 def initial_simplex(first: FloatArray, edge: float) -> FloatArray:

@@ -35,7 +35,7 @@ from analysis.export import (
     source_files,
     this_platform,
 )
-from analysis.run import checked_run
+from analysis.run import check_run
 from analysis.run.fmu import FmuRun
 from linkwork.five_bar import MECHANISM
 from linkwork.plant import Plant
@@ -161,7 +161,7 @@ def compiled_step() -> float:
 def as_component(native: Path, component: Path) -> list[tuple[float, float]]:
     """Compare a WebAssembly component with the native library; return pairs of a step length (s) and the ratio of the times."""
     entry = MECHANISM.published["table-3.1"]
-    inputs, initial = checked_run(MECHANISM, Inputs(speed=entry.crank_speed), entry.initial)
+    inputs, initial = check_run(MECHANISM, Inputs(speed=entry.crank_speed), entry.initial)
     values = dict.fromkeys(MECHANISM.input_names, 0.0) | {"drive.speed": entry.crank_speed}
 
     def step(fmu: Path, length: float) -> float:

@@ -25,7 +25,7 @@ from rich.console import Console
 from rich.table import Table
 
 from analysis import Inputs, Tolerance, force_turn, monte_carlo, simulate_many
-from analysis.numerics.workers import over_workers
+from analysis.numerics.workers import run_in_parallel
 from analysis.periodic import Drive, grid, plane
 from analysis.synthesis import Search, TimedPath, synthesize
 from linkwork.five_bar.published import SETS, TABLE_3_1
@@ -99,7 +99,7 @@ def main() -> None:
     with LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=":0") as cluster, Client(cluster):
         for backend in backends[1:]:
             with joblib.parallel_config(backend, n_jobs=2):
-                list(over_workers(nothing, range(8)))
+                list(run_in_parallel(nothing, range(8)))
         for name, work in WORK.items():
             found = [[timed(work, backend) for backend in backends] for _ in range(repeats + 1)]
             # the first compiles

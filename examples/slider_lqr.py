@@ -161,7 +161,7 @@ def balance(fmu: Path | None) -> None:
 def draw(folder: Path, models: PeriodicModel, designs: list[Design], loop: LoopResult) -> None:
     mean = models.mean()
     system = mean.to_state_space(("slider.position",), ("slider.force",))
-    closed = {f"with {design.method}": design.closed(("slider.position",)) for design in designs}
+    closed = {f"with {design.method}": design.closed_loop(("slider.position",)) for design in designs}
     figures.plot_bode(
         {"slider alone": system, **closed},
         unit="m/N",

@@ -39,7 +39,7 @@ def carry(number: int) -> Path:
 
 def main() -> None:
     """Compile those that are missing, on all cores, and remove the others."""
-    wanted = [kernel.carried for kernel in kernels()]
+    wanted = [kernel.carried_path for kernel in kernels()]
     for path in CARRIED.glob("*"):
         if path not in wanted:
             path.unlink()

@@ -387,7 +387,7 @@ def changes(settings: Sequence[str], read: Callable[[str], Any], example: str) -
 
 def chosen_case(file: str | None, published: str | None, settings: Sequence[str]) -> Any:
     """Return the case of a file or of a published set with the changes of ``--set``, and print its warnings."""
-    from ..run import in_sentences, load_case, published_case, read_case
+    from ..run import describe_masses, load_case, published_case, read_case
 
     if (file is None) == (published is None):
         raise click.UsageError("give either a case file or --published NAME")
@@ -399,7 +399,7 @@ def chosen_case(file: str | None, published: str | None, settings: Sequence[str]
         case = read_case({"published": published}, folder=Path.cwd(), title=str(published), overrides=overrides)
     else:
         case = published_case(str(published))
-    for warning in in_sentences(case.masses)[1]:
+    for warning in describe_masses(case.masses)[1]:
         print_error(f"note: {warning}")
     return case
 

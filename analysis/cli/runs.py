@@ -102,7 +102,7 @@ def run(
     """
     from .. import figures
     from ..files import save_figure
-    from ..run import RunInterrupted, in_sentences, simulate
+    from ..run import RunInterrupted, describe_masses, simulate
 
     changed: dict[str, Any] = {name: value for name, value in given.items() if value is not None}
     for name in ("stop_time", "step"):
@@ -137,7 +137,7 @@ def run(
     if plot and len(result) > 1:
         written.append(save_figure(figures.plot(result, title=chosen.title), f"{stem}.png"))
     _print_extremes(chosen.title, result)
-    say(in_sentences(chosen.masses)[0])
+    say(describe_masses(chosen.masses)[0])
     print_written(written)
     if fmu is not None and interface in (None, "co-simulation") and not chosen.inputs.held_exactly:
         print_error(
@@ -303,14 +303,16 @@ def check(
 
 def _find_fmus(model: str, fmu: str | None, only: str | None) -> list[tuple[Path, str, str]]:
     """Return the FMUs of a model, or the given one, with each interface to check: (path, interface, interface in words)."""
-    from ..run import CHECKED, offered
+    from ..run import CHECKED, list_interfaces
 
     if only is not None and only not in CHECKED:
         raise unknown(only, CHECKED, f"interface {only!r} to check")
     kinds = sorted(DEFAULT_FOLDER.glob(f"{model}-*.fmu")) if fmu is None else []
     first = DEFAULT_FOLDER / f"{model}.fmu" if fmu is None else Path(fmu)
     paths = [path for path in (first, *kinds) if path.is_file()] or [first]
-    found = [(path, name, words) for path in paths for name, words in offered(path).items() if only in (None, name)]
+    found = [
+        (path, name, words) for path in paths for name, words in list_interfaces(path).items() if only in (None, name)
+    ]
     if not found:
         raise InputError(f"{', '.join(map(str, paths))}: there is no {only} in it")
     return found
@@ -410,7 +412,7 @@ def info(what: str | None) -> None:
     from ..files import read_tables
     from ..mechanisms import MECHANISMS
     from ..numerics.cache import cache_root
-    from ..run import in_sentences, load_case, load_parameters
+    from ..run import describe_masses, load_case, load_parameters
 
     if what is None:
         kinds = [(m.name, m.title, f"{m.fmu}.fmu") for m in MECHANISMS.values()]
@@ -432,7 +434,7 @@ def info(what: str | None) -> None:
         else:
             case = load_case(what)
             _print_parameters(case.title, case.parameters)
-            say(in_sentences(case.masses)[0])
+            say(describe_masses(case.masses)[0])
     else:
         raise unknown(what, (*MECHANISMS, *PUBLISHED), f"mechanism, published set, case file or FMU {what!r}")
 

@@ -189,11 +189,11 @@ def _reach(mechanism: Mechanism, x: Any, p: Any) -> Any:
     casadi = symbolic.library()
     if mechanism.unjoined is None or mechanism.unjoined.reach is None:
         return casadi.SX(0.0)
-    reach = symbolic.traced(mechanism.modules).of(mechanism.unjoined.reach)
+    reach = symbolic.symbolic_functions(mechanism.modules).of(mechanism.unjoined.reach)
     return casadi.vertcat(*reach(tuple(casadi.vertsplit(x)), mechanism.constants(*casadi.vertsplit(p)[:-1])))
 
 
-def _state_slope(mechanism: Mechanism, trace: equations.Traced, rates: Any) -> Any:
+def _state_slope(mechanism: Mechanism, trace: equations.TracedEquations, rates: Any) -> Any:
     """Return the derivative x' of a state for which jump(x, u) is the motion, with commands u of unknown accelerations a.
 
     ``rates`` is the derivative F of the motion for any a. The choice does not matter: jump_x x' = F - jump_u a, and a change of
@@ -239,7 +239,7 @@ def _with_solution(
         k = k._replace(**{mechanism.switch: float(switched)})
     modes, channels = (tuple(casadi.vertsplit(v)) if v.numel() else () for v in (s.modes, s.u))
     others = {"sqrt": lambda value: casadi.sqrt(value + TINY)} if smooth else {}
-    functions = symbolic.traced(mechanism.modules, mark_converged=mark_converged, **others)
+    functions = symbolic.symbolic_functions(mechanism.modules, mark_converged=mark_converged, **others)
     x = tuple(casadi.vertsplit(s.x))
 
     def traced(what: str, *further: Any) -> Any:
@@ -263,7 +263,7 @@ def beginning(mechanism: Mechanism, modes: Any, u: Any) -> tuple[Any, ...]:
     These are the constants followed by the start energy, the initial state, its error scale, and lower bounds of parameters.
     """
     casadi = symbolic.library()
-    own, parameters, functions = equations.of_parameters(mechanism)
+    own, parameters, functions = equations.parameter_symbols(mechanism)
     state = casadi.SX.sym("state", 2 * len(mechanism.freedoms))
     k = parameters.constants()
     channels = tuple(casadi.vertsplit(u)) if mechanism.channels else ()

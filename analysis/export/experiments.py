@@ -18,7 +18,7 @@ from linkwork.parameters import fmi_name
 from linkwork.plant import Plant
 
 from ..mechanisms import MECHANISMS
-from ..run import ALLOWED, EXPERIMENTS, MANIFEST, STANDARD, Case, held_inputs, standard_cases
+from ..run import ALLOWED, EXPERIMENTS, MANIFEST, STANDARD, Case, input_sampler, standard_cases
 from .bill import BILL, TYPE
 from .compatibility import table
 from .description import layered_standard, written
@@ -66,7 +66,7 @@ def experiments(mechanism: Mechanism) -> dict[str, bytes]:
         SubElement(notes, "Annotation", {"type": ALLOWED}).text = repr(DIFFERENCE)
 
     for name, case in cases.items():
-        add(name, case.title, _values(mechanism, case), case.stop_time, held_inputs(case, STEPS))
+        add(name, case.title, _values(mechanism, case), case.stop_time, input_sampler(case, STEPS))
     if not cases:
         starts = {v.name: v.start for v in mechanism.variables}
         constant = {name: float(starts[name]) for name in mechanism.input_names}

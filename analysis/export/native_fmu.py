@@ -22,8 +22,8 @@ from linkwork.mechanism import Mechanism
 from ..files import unknown_name
 from ..libraries import require
 from ..mechanisms import check
-from ..numerics.cache import alone, code_folder, hashes_below, keep_hashes, read_hashes
-from ..run import shown
+from ..numerics.cache import code_folder, hashes_below, keep_hashes, lock_folder, read_hashes
+from ..run import show_progress
 from .archive import SOURCES, BuildError, documentation, write
 from .bill import with_bill
 from .component import MANIFEST, MEMORY, component, manifest
@@ -194,7 +194,7 @@ def compile_binaries(
             platform = EVERYWHERE[name]
             place = platform.folder_fmi2 if kind.fmi == 2 else platform.folder_fmi3
             library = f"{identifier}.{platform.suffix}"
-            with shown(False, float(len(platforms)), f"compiling for {name}") as show:
+            with show_progress(False, float(len(platforms)), f"compiling for {name}") as show:
                 show(float(number))
                 options = (*WASM_OPTIONS, *MEMORY) if name == WASM else (*OPTIONS, *platform.options)
                 compile_library(folder, COMPILED, library, platform.target, options)
@@ -220,7 +220,7 @@ def compile_library(
     require("ziglang")
     cache = code_folder(f"zig-{target}")
     known = cache / "hashes"
-    with alone(cache), tempfile.TemporaryDirectory(prefix="linkwork-zig-") as own:
+    with lock_folder(cache), tempfile.TemporaryDirectory(prefix="linkwork-zig-") as own:
         found = hashes_below(cache / "o")
         if any(found.get(name) != digest for name, digest in read_hashes(known).items()):
             sys.stderr.write(f"linkwork: {cache}: a file has changed or is gone: all are compiled again\n")

@@ -14,7 +14,7 @@ from linkwork.mechanism import Mechanism
 
 from ..mechanisms import check
 from ..numerics import symbolic
-from ..run import MOTOR, at_rest, expressions, kloss
+from ..run import MOTOR, expressions, inertia_and_stiffness, kloss
 from .archive import SOURCES
 from .description import NATIVE
 from .equations_c import beginning, generated, write_c_functions
@@ -141,7 +141,9 @@ def _driven(mechanism: Mechanism) -> list[tuple[Any, ...]]:
     accelerations, of = slopes[freedoms : 2 * freedoms], [run.x, run.u, run.p, motor]
     changes = [sx.sym(f"d{n}", *v.shape) for n, v in enumerate(of)]
     angle, k = sx.sym("angle"), sx.sym("k", len(mechanism.constants._fields))
-    resting = at_rest(mechanism, (crank,), other)(angle, k) if min(crank, other) >= 0 else (sx(0.0), sx(0.0))
+    resting = (
+        inertia_and_stiffness(mechanism, (crank,), other)(angle, k) if min(crank, other) >= 0 else (sx(0.0), sx(0.0))
+    )
     d_torque = casadi.jtimes(torque, join(motor, speed), join(d_motor, d_speed))
     return [
         ("motor", [motor, speed], torque),
@@ -157,7 +159,7 @@ def _places(mechanism: Mechanism, x: Any, modes: Any, u: Any, p: Any) -> Any:
     drawing = mechanism.drawing
     if drawing is None:
         return casadi.SX.zeros(1)
-    functions = symbolic.traced((*mechanism.modules, sys.modules[drawing.positions.__module__]))
+    functions = symbolic.symbolic_functions((*mechanism.modules, sys.modules[drawing.positions.__module__]))
     *constants, _ = casadi.vertsplit(p)
     k = mechanism.constants(*constants)
     if mechanism.switch:  # the positions of the joints do not depend on friction

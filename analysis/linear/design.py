@@ -24,7 +24,7 @@ from ..files import unknown_name
 from ..libraries import lazy
 from ..run import Function
 from ..units import Amount, in_si
-from .model import FloatArray, LinearModel, LinearModelError, signal_name, sorted_by_magnitude
+from .model import FloatArray, LinearModel, LinearModelError, signal_name, sort_by_magnitude
 
 if TYPE_CHECKING:
     import control
@@ -108,7 +108,7 @@ class Design:
         """Return the open loop, from the force to the feedback signal."""
         return self.plant.loop(self.gains, self.integral_gain)
 
-    def closed(self, outputs: Sequence[str] | None = None) -> control.StateSpace:
+    def closed_loop(self, outputs: Sequence[str] | None = None) -> control.StateSpace:
         """Return the closed loop, from a disturbing force to outputs by FMI name, by default the controlled coordinate."""
         chosen = (self.coordinate,) if outputs is None else outputs
         a, b, row = self.plant.feedback_matrices(self.gains, self.integral_gain)
@@ -130,9 +130,9 @@ class Design:
         closed[n, n] = 1.0
         # without integral action nothing depends on the integral
         kept = closed if self.integral_gain else closed[:n, :n]
-        return sorted_by_magnitude(np.linalg.eigvals(kept))
+        return sort_by_magnitude(np.linalg.eigvals(kept))
 
-    def continuous(self, reference: float) -> Function:
+    def continuous_law(self, reference: float) -> Function:
         """Return the law without sampling, as a force for `analysis.run.Inputs`.
 
         Raises
@@ -173,7 +173,7 @@ class _Plant:
         self.b: FloatArray = model.B[:, [model.input_names.index(self.channel)]]
         self.place = model.layout.free.index(self.freedom)
 
-    def integrating(self) -> tuple[FloatArray, FloatArray]:
+    def with_integral_state(self) -> tuple[FloatArray, FloatArray]:
         """Return A and B with the integral of the coordinate as the last state."""
         n = len(self.a)
         whole = np.zeros((n + 1, n + 1))
@@ -184,7 +184,7 @@ class _Plant:
     def feedback_matrices(self, gains: FloatArray, integral_gain: float) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Return A, B and the gains as a row, shape (1, states); the integral is the last state if it has a gain."""
         if integral_gain:
-            return *self.integrating(), np.append(gains, integral_gain)[None, :]
+            return *self.with_integral_state(), np.append(gains, integral_gain)[None, :]
         return self.a, self.b, gains[None, :]
 
     def loop(self, gains: FloatArray, integral_gain: float) -> control.StateSpace:
@@ -204,7 +204,7 @@ def _design(method: str, model: LinearModel, channel: str | None, gains: FloatAr
     if not (np.all(np.isfinite(gains)) and isfinite(integral_gain)):
         raise DesignError(f"{method}: the gains {gains} and {integral_gain} are not finite")
     loop = plant.loop(gains, integral_gain)
-    poles = sorted_by_magnitude(np.linalg.eigvals(loop.A - loop.B @ loop.C))
+    poles = sort_by_magnitude(np.linalg.eigvals(loop.A - loop.B @ loop.C))
     if poles.real.max() >= -1e-9 * np.abs(poles).max():
         raise DesignError(
             f"{method}: the closed loop is not stable, its poles are {np.array2string(poles, precision=4)} 1/s"

@@ -24,9 +24,9 @@ from linkwork.parameters import fmi_name
 from ..files import unknown_name
 from ..mechanisms import InitialState, Parameters, mechanism_of, variable_units
 from ..numerics import symbolic
-from ..run import Inputs, checked_run, expressions, takes_published
+from ..run import Inputs, check_run, expressions, takes_published
 from ..units import Amount, in_si
-from .model import FloatArray, Layout, Modes, layout, sampled_channels
+from .model import FloatArray, Layout, Modes, layout, sample_channels
 
 #: Grid points of the search for equilibria: over a turn of a cyclic freedom, and over the reach of any other freedom.
 GRID = (48, 81)
@@ -108,7 +108,7 @@ class Equilibrium:
         mechanism, p = mechanism_of(self.parameters), self.parameters.constants()
         if name not in mechanism.output_names:
             raise unknown_name(name, mechanism.output_names, f"output {name!r}")
-        modes, channels = sampled_channels(mechanism, self.inputs, np.zeros(1), np.array([self.state]))
+        modes, channels = sample_channels(mechanism, self.inputs, np.zeros(1), np.array([self.state]))
         applied = mechanism.equations.apply_inputs(tuple(map(float, modes)), tuple(channels[0].tolist()), p)
         outputs = mechanism.equations.outputs(self.state, applied, 0.0, p)
         return float(outputs[mechanism.output_names.index(name)])
@@ -174,11 +174,11 @@ class _Balance:
     @classmethod
     def build(cls, parameters: Parameters, inputs: Inputs) -> _Balance:
         mechanism = mechanism_of(parameters)
-        checked_run(mechanism, inputs, None)
+        check_run(mechanism, inputs, None)
         if not inputs.held_exactly:
             raise InputError(f"{inputs}: at an equilibrium all of them must be constant")
         still = np.zeros((1, mechanism.size))
-        modes, channels = sampled_channels(mechanism, inputs, np.zeros(1), still)
+        modes, channels = sample_channels(mechanism, inputs, np.zeros(1), still)
         forces = {channel.argument for channel in mechanism.channels if channel.kind == "force"}
         held = layout(mechanism, modes).commanded
         loose = list(modes)
@@ -236,7 +236,7 @@ class _Balance:
             after = self.imbalance(trials)
             # go on as long as a step still reduces the imbalance much
             if before <= BALANCE * size and not np.any(after < 0.1 * before):
-                return self._found(q, forces[:, 0], stiffness, before / size if size else 0.0, iteration)
+                return self._make_equilibrium(q, forces[:, 0], stiffness, before / size if size else 0.0, iteration)
             if not np.any(after < before):
                 break
             first = int(np.argmax(after < before))
@@ -252,7 +252,7 @@ class _Balance:
         elastic = self.scale @ np.abs(stiffness) @ (self.scale + far)
         return float(elastic + self.scale @ np.abs(of_inputs) @ np.abs(self.channels[list(self.its.forces)]))
 
-    def _found(
+    def _make_equilibrium(
         self, q: FloatArray, forces: FloatArray, stiffness: FloatArray, residual: float, iterations: int
     ) -> Equilibrium:
         # `start` sets a freedom that is tied to another
@@ -298,7 +298,7 @@ def _balance_with_held(
 ) -> tuple[_Balance, FloatArray]:
     """Return the equations of rest, and all coordinates, with the given values for held freedoms and zero elsewhere."""
     mechanism = mechanism_of(parameters)
-    inputs, _ = checked_run(mechanism, inputs, None)
+    inputs, _ = check_run(mechanism, inputs, None)
     coordinates = np.zeros(len(mechanism.freedoms))
     commands = {mechanism.freedoms[c.freedom].coordinate: c for c in mechanism.channels if c.kind == "command"}
     for name, value in (held or {}).items():

@@ -25,12 +25,12 @@ from ..run import (
     Inputs,
     Trajectory,
     align,
-    checked_run,
-    driven,
+    check_run,
+    complete_initial_state,
+    complete_inputs,
     encode,
     sample,
     sample_times,
-    started,
     takes_published,
 )
 from ..units import Amount, in_si
@@ -113,7 +113,7 @@ class SampledController:
         wanted = self.holding_force(reference)
         for gain, value, target, slope in zip(self._gains, measured, self._target, self._slope):
             wanted -= gain * (value - target - slope * step)
-        return self._limited(wanted, measured[self._place] - reference)
+        return self._limit_force(wanted, measured[self._place] - reference)
 
     def holding_force(self, reference: float) -> float:
         """Return the force that holds the coordinate at a reference on the linear model."""
@@ -125,9 +125,9 @@ class SampledController:
         ``feedforward`` replaces the holding force; the gains of other freedoms are not used.
         """
         k_u, k_v = self._gains[self._place], self._gains[len(self._gains) // 2 + self._place]
-        return self._limited(feedforward - k_u * position_error - k_v * velocity_error, position_error)
+        return self._limit_force(feedforward - k_u * position_error - k_v * velocity_error, position_error)
 
-    def _limited(self, wanted: float, error: float) -> float:
+    def _limit_force(self, wanted: float, error: float) -> float:
         """Add the integral part, clip the force to the limit, and advance the integral by the error."""
         d = self.design
         wanted -= d.integral_gain * self.integral
@@ -316,7 +316,7 @@ def _run_loop(
     )
 
 
-class _Driven:
+class _DrivenPlant:
     """The nonlinear plant, in this process or as its FMU; all other inputs are sampled and held with the controller."""
 
     def __init__(self, mechanism: Mechanism, inputs: Inputs, channel: str, times: FloatArray) -> None:
@@ -332,7 +332,7 @@ class _Driven:
         return dict(zip(self.mechanism.input_names, sample(self._encoded, time, x, self._laws, ahead=ahead).tolist()))
 
 
-class _InProcess(_Driven):
+class _InProcess(_DrivenPlant):
     """The nonlinear plant in this process."""
 
     plant: Plant
@@ -353,7 +353,7 @@ class _InProcess(_Driven):
         return 0, ""
 
 
-class _Fmu(_Driven):
+class _Fmu(_DrivenPlant):
     """The nonlinear plant as its FMU."""
 
     run: FmuRun
@@ -379,7 +379,7 @@ def _channel(mechanism: Mechanism, name: str) -> Channel:
     raise InputError(f"the controller acts by {name!r}, which is no force on a freedom of the {mechanism.name}")
 
 
-@takes_published(inputs=driven, initial=started)
+@takes_published(inputs=complete_inputs, initial=complete_initial_state)
 @in_si(stop_time="s")
 def control_loop(
     parameters: Parameters,
@@ -427,7 +427,7 @@ def control_loop(
         If the links cannot be joined at the start.
     """
     mechanism = mechanism_of(parameters)
-    inputs, initial = checked_run(mechanism, inputs, initial)
+    inputs, initial = check_run(mechanism, inputs, initial)
     channel = _channel(mechanism, controller.channel)
     if channel.argument in inputs:
         raise InputError(f"{channel.argument} is among the inputs, but it is the controller's")
@@ -474,7 +474,7 @@ class _Linear:
     ) -> None:
         one = model if isinstance(model, LinearModel) else model.mean()
         self.mechanism, self.places = one.mechanism, one.places
-        self.encoded = None if inputs is None else encode(checked_run(self.mechanism, inputs, None)[0], self.mechanism)
+        self.encoded = None if inputs is None else encode(check_run(self.mechanism, inputs, None)[0], self.mechanism)
         n, forces = 2 * len(self.mechanism.freedoms), list(one.layout.forces)
         self.forces, self.own = forces, forces.index(self.mechanism.input_names.index(channel))
         still, acting = one.state[:n], one.channels[forces]
@@ -487,7 +487,7 @@ class _Linear:
             self.a: Callable[[float], FloatArray] = lambda t: a
             self.b: Callable[[float], FloatArray] = lambda t: b
         else:
-            self.a, self.b = model.interpolated(model.A), model.interpolated(model.B)
+            self.a, self.b = model.interpolate(model.A), model.interpolate(model.B)
         self.rate = float(np.abs(np.linalg.eigvals(model.A)).max())
         self.x = deviation
         self.t = 0.0

@@ -27,7 +27,7 @@ from ..files import unknown_name
 from ..libraries import lazy
 from ..mechanisms import Parameters, mechanism_of
 from ..numerics import symbolic
-from ..run import Inputs, checked_run, encode, expressions, sample, takes_published
+from ..run import Inputs, check_run, encode, expressions, sample, takes_published
 
 if TYPE_CHECKING:
     import control
@@ -287,7 +287,7 @@ class LinearModel(Matrices):
     @property
     def poles(self) -> NDArray[np.complex128]:
         """Eigenvalues of A (1/s), by magnitude."""
-        return sorted_by_magnitude(np.linalg.eigvals(self.A))
+        return sort_by_magnitude(np.linalg.eigvals(self.A))
 
     @property
     def natural_frequencies(self) -> FloatArray:
@@ -356,7 +356,7 @@ class LinearModel(Matrices):
         )
 
 
-def sorted_by_magnitude(values: ArrayLike) -> NDArray[np.complex128]:
+def sort_by_magnitude(values: ArrayLike) -> NDArray[np.complex128]:
     """Return complex numbers sorted by magnitude, those of equal magnitude by their imaginary parts."""
     whole = np.asarray(values, dtype=complex)
     return whole[np.lexsort((whole.imag, np.abs(whole)))]
@@ -430,7 +430,7 @@ def full_states(mechanism: Mechanism, states: ArrayLike) -> FloatArray:
     return np.hstack([array, np.zeros((len(array), mechanism.size - array.shape[1]))])
 
 
-def sampled_channels(
+def sample_channels(
     mechanism: Mechanism, inputs: Inputs | None, times: FloatArray, states: FloatArray
 ) -> tuple[Modes, FloatArray]:
     """Return the modes, and the channels at s times and states, shape (s, channels), under inputs.
@@ -438,7 +438,7 @@ def sampled_channels(
     Raises InputError if the inputs belong to another mechanism, a state is not finite, or the inputs command a rate that
     differs from the rate in a state.
     """
-    inputs, _ = checked_run(mechanism, inputs, None)
+    inputs, _ = check_run(mechanism, inputs, None)
     encoded = encode(inputs, mechanism)
     for row in states:
         if not np.all(np.isfinite(row)):
@@ -488,7 +488,7 @@ def linearise(parameters: Parameters, state: ArrayLike, inputs: Inputs | None = 
     states = full_states(mechanism, np.atleast_2d(np.asarray(state, dtype=float)))
     if len(states) != 1:
         raise InputError(f"{len(states)} states: one is linearised about here, many by linearise_along")
-    modes, channels = sampled_channels(mechanism, inputs, np.zeros(1), states)
+    modes, channels = sample_channels(mechanism, inputs, np.zeros(1), states)
     arrays = evaluate(parameters, modes, states, channels)
     return LinearModel(
         parameters=parameters,

@@ -17,7 +17,7 @@ from linkwork.mechanism import Mechanism
 
 from ..mechanisms import InitialState, Parameters, mechanism_of
 from ..numerics.fourier import trigonometric
-from ..run import Inputs, checked_run, driven, simulate, speed_ratio, started, takes_published
+from ..run import Inputs, check_run, complete_initial_state, complete_inputs, simulate, speed_ratio, takes_published
 from ..units import Amount, in_si
 from .model import (
     FloatArray,
@@ -28,7 +28,7 @@ from .model import (
     evaluate,
     full_states,
     layout,
-    sampled_channels,
+    sample_channels,
 )
 
 #: Least number of samples of a period.
@@ -118,18 +118,18 @@ class PeriodicModel(Matrices):
         """
         return self._model(lambda values: np.asarray(values.mean(axis=0)))
 
-    def interpolated(self, values: FloatArray) -> Callable[[float], FloatArray]:
+    def interpolate(self, values: FloatArray) -> Callable[[float], FloatArray]:
         """Return the trigonometric polynomial through values at the samples (s, ...), as a function of time."""
         return trigonometric(values, self.period)
 
     def motion(self) -> Callable[[float], FloatArray]:
         """Return the motion as a function of time: all coordinates, then all rates."""
         n = len(self.mechanism.freedoms)
-        rates = np.append(self._secular(), np.zeros(n))
-        periodic = self.interpolated(self.states[:, : 2 * n] - self.times[:, None] * rates)
+        rates = np.append(self._mean_rates(), np.zeros(n))
+        periodic = self.interpolate(self.states[:, : 2 * n] - self.times[:, None] * rates)
         return lambda t: periodic(t) + t * rates
 
-    def _secular(self) -> FloatArray:
+    def _mean_rates(self) -> FloatArray:
         """Return the mean rates of all freedoms: of a cyclic freedom whole turns per period, of any other zero; shape (f,)."""
         freedoms = self.mechanism.freedoms
         way = self.states[:, len(freedoms) : 2 * len(freedoms)].mean(axis=0) * self.period
@@ -147,7 +147,7 @@ class PeriodicModel(Matrices):
         InputError
             If they are not; the message names the freedom.
         """
-        mechanism, n, secular = self.mechanism, len(self), self._secular()
+        mechanism, n, secular = self.mechanism, len(self), self._mean_rates()
         scale = mechanism.error_scale(self.parameters, tuple(self.states[0].tolist()))
         units = {v.name: v.unit for v in mechanism.variables}
         for k in self.layout.free:
@@ -173,7 +173,7 @@ class PeriodicModel(Matrices):
         LinearModelError
             If SciPy's method fails.
         """
-        a = self.interpolated(self.A)
+        a = self.interpolate(self.A)
         size = self.A.shape[-1]
         result = solve_ivp(
             lambda t, y: (a(t) @ y.reshape(size, size)).ravel(),
@@ -233,7 +233,7 @@ def linearise_along(
         modes, period = turn.modes, turn.period
     else:
         states = full_states(mechanism, motion)
-        inputs, _ = checked_run(mechanism, inputs, None)
+        inputs, _ = check_run(mechanism, inputs, None)
         if period is None:
             period = _turn_time(mechanism, tuple(inputs.modes(mechanism).values()), states)
     if len(states) < LEAST_SAMPLES:
@@ -241,7 +241,7 @@ def linearise_along(
     if not (isfinite(period) and period > 0.0):
         raise InputError(f"period is {period} s: it must be a finite number greater than zero")
     if not isinstance(motion, Orbit):
-        modes, channels = sampled_channels(mechanism, inputs, period * np.arange(len(states)) / len(states), states)
+        modes, channels = sample_channels(mechanism, inputs, period * np.arange(len(states)) / len(states), states)
     arrays = evaluate(parameters, modes, states, channels)
     model = PeriodicModel(parameters=parameters, modes=modes, period=period, states=states, channels=channels, **arrays)
     model.check()
@@ -293,7 +293,7 @@ def _resample(mechanism: Mechanism, turn: Turn) -> tuple[FloatArray, FloatArray]
     return full_states(mechanism, found[:, : 2 * count]), found[:, 2 * count :]
 
 
-@takes_published(inputs=driven, initial=started)
+@takes_published(inputs=complete_inputs, initial=complete_initial_state)
 def settled_motion(
     parameters: Parameters,
     inputs: Inputs,
@@ -331,7 +331,7 @@ def settled_motion(
         If the run ends early, or the last two turns differ by more than 1e-7 of the mechanism's scales.
     """
     mechanism = mechanism_of(parameters)
-    inputs, initial = checked_run(mechanism, inputs, initial)
+    inputs, initial = check_run(mechanism, inputs, initial)
     modes, n = tuple(inputs.modes(mechanism).values()), len(mechanism.freedoms)
     its = layout(mechanism, modes)
     speeds = {c.freedom: (c, getattr(inputs, c.argument)) for c in mechanism.channels if c.kind == "command"}

@@ -141,7 +141,7 @@ def _sample_function(
     return [place for place, _ in found], [value for _, value in found], gaps
 
 
-def lowest(
+def find_minimum(
     function: Callable[[float], float], low: float, high: float, *, samples: int = 40, tolerance: float = 1e-9
 ) -> tuple[float, float]:
     """Find the minimum of a smooth function on an interval; return its place and its value.
@@ -354,7 +354,7 @@ def trace(test: Test, seed: tuple[float, float], box: Box, *, step: float = 0.02
     if (np.abs(found - place) > step * box.size).any() or follower.is_beyond(start):
         raise InputError(f"no boundary within {step:g} of the box of the seed {seed}")
     if start.orientation < 0.0:
-        start = start.turned()
+        start = start.with_opposite_tangent()
     way, *curves = follower.follow_both(start)
     return Boundary(
         points=np.array([[point.y[0], point.parameter] for point in way]),

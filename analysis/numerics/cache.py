@@ -41,7 +41,7 @@ def code_folder(name: str) -> Path:
     return Path(tempfile.mkdtemp(prefix="linkwork-"))
 
 
-def alone(folder: Path) -> FileLock:
+def lock_folder(folder: Path) -> FileLock:
     """Return a lock on a folder of the cache, to use in ``with``: one process at a time holds it."""
     return FileLock(folder.with_suffix(".lock"))
 

@@ -42,7 +42,7 @@ from linkwork.errors import LinkworkError
 
 from . import lanes as vectors
 from . import linking
-from .cache import alone, code_folder, keep, store_file
+from .cache import code_folder, keep, lock_folder, store_file
 
 VECTOR = float64[::1]
 MATRIX = float64[:, ::1]
@@ -102,7 +102,7 @@ class MachineCode:
         machine = binding.Target.from_default_triple().create_target_machine(
             opt=3, jit=True, cpu=cpu, features=features
         )
-        code = _kept(self.fingerprint, lambda: _compile(functions, lanes, rows, shared, triple, machine))
+        code = _load_or_make(self.fingerprint, lambda: _compile(functions, lanes, rows, shared, triple, machine))
         engine = binding.create_mcjit_compiler(binding.parse_assembly(f'target triple = "{triple}"'), machine)
         engine.add_object_file(binding.ObjectFileRef.from_data(code))
         engine.finalize_object()
@@ -130,7 +130,7 @@ def _own_source() -> bytes:
     return Path(__file__).read_bytes() + Path(vectors.__file__).read_bytes()
 
 
-def _kept(key: str, make: Callable[[], bytes]) -> bytes:
+def _load_or_make(key: str, make: Callable[[], bytes]) -> bytes:
     """Return the object file for a key, from disk or newly made; its hash is checked, as LLVM crashes on a damaged file."""
     path = code_folder("llvm") / key
     with suppress(OSError):
@@ -254,14 +254,14 @@ class _Writer:
     def _input(self, which: int, place: int) -> Any:
         """Return a number of an argument in each lane."""
         if which == 0:
-            return self._same(self.arguments[0])
+            return self._repeat(self.arguments[0])
         if which > 1 and self.shared:
-            return self._same(self.build.load(self.build.gep(self.arguments[which], [_index(place)])))
+            return self._repeat(self.build.load(self.build.gep(self.arguments[which], [_index(place)])))
         return self.build.load(self._place(which, place), align=8)
 
-    def _same(self, number: Any) -> Any:
+    def _repeat(self, number: Any) -> Any:
         """Return a number as that of each lane."""
-        return vectors.repeated(self.build, number, self.lanes)
+        return vectors.repeat_number(self.build, number, self.lanes)
 
     def _constant(self, value: float) -> Any:
         return ir.Constant(self.kind, float(value) if self.lanes == 1 else [float(value)] * self.lanes)
@@ -279,7 +279,7 @@ class _Writer:
         if self.lanes > 1:
             return vectors.FUNCTIONS[name](*(vectors.Vector(self.build, value) for value in operands)).value
         name = _INTRINSICS.get(name, name)
-        return self.build.call(vectors.declared(self.module, name, self.kind, len(operands)), operands)
+        return self.build.call(vectors.declare_function(self.module, name, self.kind, len(operands)), operands)
 
     def _quotient(self, a: Any, b: Any) -> Any:
         if self.lanes == 1:
@@ -428,7 +428,7 @@ class Kernel:
                         self._compiled = self._compile(None)
                         return self._compiled
                     # an error of `linking`, or of any kind where a file is too short
-                    with alone(folder):
+                    with lock_folder(folder):
                         if not any(folder.glob("**/*.nb[ic]")):
                             raise
                         warnings.warn(
@@ -447,10 +447,10 @@ class Kernel:
         if folder is not None:
             numba.config.CACHE_DIR = str(folder)
         try:
-            with _announced(self.purpose):
+            with _announce(self.purpose):
                 made = self._dispatcher(linking.KernelCompiler)
                 if folder is not None:
-                    linking.keep(made, self.carried)
+                    linking.keep(made, self.carried_path)
                 made.compile(*self.signature)
                 made.disable_compile()
                 return made
@@ -458,11 +458,11 @@ class Kernel:
             numba.config.CACHE_DIR = before
 
     def carry(self) -> Path:
-        """Compile the kernel for any processor, write the code to `carried`, and return that path."""
-        made, path = self._dispatcher(linking.NotingCompiler), self.carried
+        """Compile the kernel for any processor, write the code to `carried_path`, and return that path."""
+        made, path = self._dispatcher(linking.NotingCompiler), self.carried_path
         made.compile(*self.signature)
         path.parent.mkdir(exist_ok=True)
-        store_file(path, linking.for_any_processor(made))
+        store_file(path, linking.portable_code(made))
         return path
 
     def _dispatcher(self, compiler: type) -> Any:
@@ -472,7 +472,7 @@ class Kernel:
         return fingerprint(self.py_func, self.signature)[:16]
 
     @property
-    def carried(self) -> Path:
+    def carried_path(self) -> Path:
         """Path of the code for any processor; such code is of one build of Python, one LLVM and one operating system."""
         build = sysconfig.get_config_var("SOABI") or sysconfig.get_config_var("EXT_SUFFIX")
         kind = f"{build}-llvm{binding.llvm_version_info[0]}-{binding.get_process_triple()}"
@@ -500,7 +500,7 @@ class _Announcer(event.Listener):
 
 
 @contextmanager
-def _announced(purpose: str) -> Iterator[None]:
+def _announce(purpose: str) -> Iterator[None]:
     with event.install_listener("numba:compile", _Announcer(purpose)):
         yield
 

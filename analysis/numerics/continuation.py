@@ -100,7 +100,7 @@ class Point:
         """Sign of the determinant whose rows are the derivatives and the tangent; it changes where two curves cross."""
         return float(np.linalg.slogdet(np.vstack([self.derivatives, self.tangent]))[0])
 
-    def turned(self) -> Point:
+    def with_opposite_tangent(self) -> Point:
         """Return the same point with the opposite tangent."""
         return replace(self, tangent=-self.tangent)
 
@@ -320,15 +320,15 @@ class Follower:
                     return Curve(tuple(points), tuple(steps), taken.reason, stalled, message)
                 continue
             point, count = taken
-            point, length = self._turn_outside(last, point, length)
+            point, length = self._find_outer_turn(last, point, length)
             end = None
             if self.is_beyond(point):
-                point, length = self._to_bound(last, point, length)
+                point, length = self._find_bound_point(last, point, length)
                 if length <= TOLERANCE:
                     return Curve(tuple(points), tuple(steps), Reason.BOX, Reason.BOX.value)
                 end = Reason.BOX, Reason.BOX.value
             elif len(points) > 3 and self._passes(first, last, point):
-                point, length = first, float((self._scaled(first) - self._scaled(last)) @ last.tangent)
+                point, length = first, float((self._scale_point(first) - self._scale_point(last)) @ last.tangent)
                 end = Reason.CLOSED, "the curve closes"
             points.append(point)
             steps.append(length)
@@ -356,8 +356,8 @@ class Follower:
         forth = self.follow(first, leave=leave)
         if forth.closed:
             return [*forth.points], forth, forth
-        back = self.follow(first.turned(), leave=leave)
-        return [*(point.turned() for point in back.points[:0:-1]), *forth.points], back, forth
+        back = self.follow(first.with_opposite_tangent(), leave=leave)
+        return [*(point.with_opposite_tangent() for point in back.points[:0:-1]), *forth.points], back, forth
 
     def locate(self, point: Point, length: float, beyond: Point, test: Callable[[Point], float]) -> tuple[Point, float]:
         """Find where a test function is zero within a step; return that point and its distance from the step's beginning.
@@ -365,7 +365,7 @@ class Follower:
         The step from ``point`` has this length and ends at ``beyond``; the test function has opposite signs at its ends.
         """
         # the parabola through the end of the step
-        bend = 2.0 * (self._scaled(beyond) - self._scaled(point) - length * point.tangent) / length**2
+        bend = 2.0 * (self._scale_point(beyond) - self._scale_point(point) - length * point.tangent) / length**2
 
         def at(s: float) -> Point:
             if s == 0.0:
@@ -386,7 +386,7 @@ class Follower:
         if isinstance(found, _Failure):
             return found
         point = self._point(found, last.tangent)
-        away = np.linalg.norm(found.z - self._scaled(last) - length * last.tangent)
+        away = np.linalg.norm(found.z - self._scale_point(last) - length * last.tangent)
         if float(point.tangent @ last.tangent) < np.cos(self.settings.greatest_turn):
             return _Failure(Reason.TIP, "the curve turns too sharply")
         if self.settings.oriented and point.orientation != last.orientation:
@@ -399,7 +399,7 @@ class Follower:
         """Take a step along the tangent, or along a parabola if ``bend``, the tangent's change per arc length, is given."""
         aside = np.zeros(len(point.tangent)) if bend is None else 0.5 * length**2 * bend
         aside = aside - (aside @ point.tangent) * point.tangent
-        return self._correct(self._scaled(point) + length * point.tangent, point.tangent, point, aside)
+        return self._correct(self._scale_point(point) + length * point.tangent, point.tangent, point, aside)
 
     def _correct(
         self, plane: Vector, normal: Vector, last: Point | None, aside: Vector | float = 0.0
@@ -434,7 +434,7 @@ class Follower:
                 return _Failure(Reason.TIP, "the tangent is not unique")
         return _Failure(Reason.TIP, "the corrections do not converge")
 
-    def _inside(self, z: Vector) -> tuple[Vector, Vector]:
+    def _clip_to_bounds(self, z: Vector) -> tuple[Vector, Vector]:
         """Return unknowns and parameter, unscaled and clipped to the bounds, and how far they lie beyond the bounds."""
         whole = z * self.scale
         inside = np.clip(whole, self.low, self.high)
@@ -442,13 +442,13 @@ class Follower:
 
     def _evaluate(self, z: Vector) -> Evaluation:
         """Return G with its derivatives, extrapolated linearly beyond the bounds."""
-        inside, beyond = self._inside(z)
+        inside, beyond = self._clip_to_bounds(z)
         found = self.evaluate(inside[:-1], float(inside[-1]))
         further = found.jacobian @ beyond[:-1] + found.slope * beyond[-1]
         return found._replace(residual=found.residual + further)
 
     def _value(self, z: Vector) -> Vector:
-        inside, beyond = self._inside(z)
+        inside, beyond = self._clip_to_bounds(z)
         if self.residual is None or beyond.any():
             value = self._evaluate(z).residual
         else:
@@ -473,25 +473,25 @@ class Follower:
             data=found.evaluation.data,
         )
 
-    def _scaled(self, point: Point) -> Vector:
+    def _scale_point(self, point: Point) -> Vector:
         scaled: Vector = np.append(point.y, point.parameter) / self.scale
         return scaled
 
-    def _turn_outside(self, last: Point, point: Point, length: float) -> tuple[Point, float]:
+    def _find_outer_turn(self, last: Point, point: Point, length: float) -> tuple[Point, float]:
         """Return the turning point and its distance if a step leaves the bounds and comes back; else the end of the step."""
         for axis in np.flatnonzero(last.tangent * point.tangent < 0.0).tolist():
             ahead, behind = abs(last.tangent[axis]), abs(point.tangent[axis])
             bound = (self.high if last.tangent[axis] > 0.0 else self.low)[axis] / self.scale[axis]
             # twice the height of the parabola with these slopes at its ends
-            if abs(bound - self._scaled(last)[axis]) < length * ahead**2 / (ahead + behind):
+            if abs(bound - self._scale_point(last)[axis]) < length * ahead**2 / (ahead + behind):
                 turn, s = self.locate(last, length, point, lambda p, axis=axis: float(p.tangent[axis]))  # type: ignore[misc]
                 if self.is_beyond(turn):
                     return turn, s
         return point, length
 
-    def _to_bound(self, last: Point, beyond: Point, length: float) -> tuple[Point, float]:
+    def _find_bound_point(self, last: Point, beyond: Point, length: float) -> tuple[Point, float]:
         """Return the point at which a step meets a bound, and its distance from the beginning of the step."""
-        here, there = self._scaled(last), self._scaled(beyond)
+        here, there = self._scale_point(last), self._scale_point(beyond)
         low, high = self.low / self.scale, self.high / self.scale
         way = there - here
         with np.errstate(divide="ignore", invalid="ignore"):
@@ -515,7 +515,7 @@ class Follower:
         whole = np.append(point.y, point.parameter)
         whole[axis] = bound
         point = replace(point, y=whole[:-1], parameter=float(whole[-1]))
-        return self._to_bound(last, point, s) if self.is_beyond(point) else (point, s)
+        return self._find_bound_point(last, point, s) if self.is_beyond(point) else (point, s)
 
     def is_beyond(self, point: Point) -> bool:
         """Return whether a point lies outside the bounds."""
@@ -524,7 +524,10 @@ class Follower:
 
     def _passes(self, first: Point, last: Point, point: Point) -> bool:
         """Return whether the step from ``last`` to ``point`` passes the first point of the curve in the same direction."""
-        chord, way = self._scaled(point) - self._scaled(last), self._scaled(first) - self._scaled(last)
+        chord, way = (
+            self._scale_point(point) - self._scale_point(last),
+            self._scale_point(first) - self._scale_point(last),
+        )
         length = float(np.linalg.norm(chord))
         part = float(way @ chord) / length**2
         distance = float(np.linalg.norm(way - part * chord))

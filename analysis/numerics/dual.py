@@ -66,7 +66,7 @@ def _matmul(a: Dual, b: Dual) -> Dual:
         return _matmul(a[None, :], b)[..., 0, :] if b.real.ndim > 1 else _matmul(a, b[:, None])[..., 0]
     if b.real.ndim == 1:
         return _matmul(a, b[:, None])[..., 0]
-    a, b = _aligned(a, b)
+    a, b = _align_axes(a, b)
     return Dual(a.real @ b.real, a.real @ b.dual + a.dual @ b.real)
 
 
@@ -82,7 +82,7 @@ def _hypot(a: Dual, b: Dual) -> Dual:
     return Dual(value, (a.real * a.dual + b.real * b.dual) / value)
 
 
-def _chosen(value: Array, a: Dual, b: Dual) -> Dual:
+def _choose(value: Array, a: Dual, b: Dual) -> Dual:
     """Return the dual number, a or b, whose real part is ``value``; a if both have it."""
     return Dual(value, np.where(value == a.real, a.dual, b.dual))
 
@@ -96,8 +96,8 @@ _BINARY: dict[Any, Callable[[Dual, Dual], Dual]] = {
     np.power: _power,
     np.arctan2: _atan2,
     np.hypot: _hypot,
-    np.minimum: lambda a, b: _chosen(np.minimum(a.real, b.real), a, b),
-    np.maximum: lambda a, b: _chosen(np.maximum(a.real, b.real), a, b),
+    np.minimum: lambda a, b: _choose(np.minimum(a.real, b.real), a, b),
+    np.maximum: lambda a, b: _choose(np.maximum(a.real, b.real), a, b),
 }
 
 
@@ -183,14 +183,14 @@ class Dual(NDArrayOperatorsMixin):
         if ufunc is np.matmul:
             return _matmul(*x)
         if ufunc in _BINARY:
-            return _BINARY[ufunc](*_aligned(*x))
+            return _BINARY[ufunc](*_align_axes(*x))
         if ufunc in _UNARY:
             value = ufunc(x[0].real)
             return Dual(value, _UNARY[ufunc](x[0].real, value) * x[0].dual)
         return NotImplemented
 
 
-def _aligned(*x: Dual) -> tuple[Dual, ...]:
+def _align_axes(*x: Dual) -> tuple[Dual, ...]:
     """Return dual numbers whose real parts have the same number of axes, so that NumPy matches directions with directions."""
     axes = max(part.real.ndim for part in x)
     return tuple(part if part.real.ndim == axes or not part.directions else _with_axes(part, axes) for part in x)
@@ -228,7 +228,7 @@ def variables(*values: Any) -> tuple[Dual, ...]:
 
 def stack(parts: Sequence[Any], axis: int = -1) -> Dual:
     """Join dual numbers along a new axis; ``axis`` is negative, counted from the end."""
-    x = _aligned(*(dual(part) for part in parts))
+    x = _align_axes(*(dual(part) for part in parts))
     real = np.broadcast_arrays(*(part.real for part in x))
     slopes = np.broadcast_arrays(*(part.dual for part in x), np.empty(real[0].shape))[:-1]
     return Dual(np.stack(real, axis), np.stack(slopes, axis))
@@ -247,7 +247,7 @@ def cross(a: Any, b: Any) -> Dual:
     If a is the dual velocity of a body and b is a screw fixed in the body, a x b is the rate of b. If b moves in the body, add
     its rate relative to the body.
     """
-    x, y = _aligned(dual(a), dual(b))
+    x, y = _align_axes(dual(a), dual(b))
     return Dual(np.cross(x.real, y.real), np.cross(x.real, y.dual) + np.cross(x.dual, y.real))
 
 

@@ -75,7 +75,7 @@ def vector(lanes: int, of: Any = DOUBLE) -> Any:
     return ir.VectorType(of, lanes) if lanes > 1 else of
 
 
-def repeated(build: Any, number: Any, lanes: int) -> Any:
+def repeat_number(build: Any, number: Any, lanes: int) -> Any:
     """Return a vector with the same number in each lane; for one lane, the number itself."""
     if lanes == 1:
         return number
@@ -95,7 +95,7 @@ class Vector:
         count: int = self.value.type.count
         return count
 
-    def like(self, other: Any) -> Any:
+    def as_vector(self, other: Any) -> Any:
         """Return an operand as an LLVM vector; a number becomes the same in all lanes."""
         return other.value if isinstance(other, Vector) else ir.Constant(self.value.type, [float(other)] * self.lanes)
 
@@ -103,16 +103,16 @@ class Vector:
         return Vector(self.build, value)
 
     def __add__(self, other: Any) -> Vector:
-        return self._make(self.build.fadd(self.value, self.like(other)))
+        return self._make(self.build.fadd(self.value, self.as_vector(other)))
 
     def __sub__(self, other: Any) -> Vector:
-        return self._make(self.build.fsub(self.value, self.like(other)))
+        return self._make(self.build.fsub(self.value, self.as_vector(other)))
 
     def __mul__(self, other: Any) -> Vector:
-        return self._make(self.build.fmul(self.value, self.like(other)))
+        return self._make(self.build.fmul(self.value, self.as_vector(other)))
 
     def __truediv__(self, other: Any) -> Vector:
-        return self._make(self.build.fdiv(self.value, self.like(other)))
+        return self._make(self.build.fdiv(self.value, self.as_vector(other)))
 
     def __neg__(self) -> Vector:
         return self._make(self.build.fneg(self.value))
@@ -124,29 +124,29 @@ class Vector:
         return self * other
 
     def __rsub__(self, other: float) -> Vector:
-        return self._make(self.like(other)) - self
+        return self._make(self.as_vector(other)) - self
 
     def __rtruediv__(self, other: float) -> Vector:
-        return self._make(self.like(other)) / self
+        return self._make(self.as_vector(other)) / self
 
     def __lt__(self, other: Any) -> Any:
-        return self.build.fcmp_ordered("<", self.value, self.like(other))
+        return self.build.fcmp_ordered("<", self.value, self.as_vector(other))
 
     def equals(self, other: Any) -> Any:
         """Return a mask of the lanes in which two vectors are equal."""
-        return self.build.fcmp_ordered("==", self.value, self.like(other))
+        return self.build.fcmp_ordered("==", self.value, self.as_vector(other))
 
     def where(self, condition: Any, other: Any) -> Vector:
         """Return this vector in the lanes where a condition holds, the other vector elsewhere."""
-        return self._make(self.build.select(condition, self.value, self.like(other)))
+        return self._make(self.build.select(condition, self.value, self.as_vector(other)))
 
     def intrinsic(self, name: str, *others: Any) -> Vector:
         """Call one of LLVM's intrinsic functions with this vector and others as arguments."""
         kind = self.value.type
-        function = declared(self.build.module, f"llvm.{name}.v{kind.count}f64", kind, 1 + len(others))
-        return self._make(self.build.call(function, [self.value, *map(self.like, others)]))
+        function = declare_function(self.build.module, f"llvm.{name}.v{kind.count}f64", kind, 1 + len(others))
+        return self._make(self.build.call(function, [self.value, *map(self.as_vector, others)]))
 
-    def fused(self, factor: Any, summand: Any) -> Vector:
+    def multiply_add(self, factor: Any, summand: Any) -> Vector:
         """Return this vector times a factor plus a summand, rounded once."""
         return self.intrinsic("fma", factor, summand)
 
@@ -156,7 +156,7 @@ class Vector:
     def size(self) -> Vector:
         return self.intrinsic("fabs")
 
-    def signed(self, other: Vector) -> Vector:
+    def with_signs(self, other: Vector) -> Vector:
         """Return the absolute values of this vector with the signs of another."""
         return self.intrinsic("copysign", other)
 
@@ -172,13 +172,13 @@ class Vector:
 
     def polynomial(self, coefficients: tuple[float, ...]) -> Vector:
         """Evaluate a polynomial in this vector; the constant is the first coefficient."""
-        result = self._make(self.like(coefficients[-1]))
+        result = self._make(self.as_vector(coefficients[-1]))
         for c in coefficients[-2::-1]:
-            result = result.fused(self, c)
+            result = result.multiply_add(self, c)
         return result
 
 
-def declared(module: Any, name: str, kind: Any, arguments: int) -> Any:
+def declare_function(module: Any, name: str, kind: Any, arguments: int) -> Any:
     """Return an external function of so many arguments, all of one type; declare it in the module if that is not done yet."""
     if (found := module.globals.get(name)) is None:
         found = ir.Function(module, ir.FunctionType(kind, [kind] * arguments), name)
@@ -189,7 +189,7 @@ def declared(module: Any, name: str, kind: Any, arguments: int) -> Any:
 def lane_by_lane(name: str, *arguments: Vector) -> Vector:
     """Call a function of the C library for each lane; return the vector of its values."""
     build = arguments[0].build
-    function = declared(build.module, name, DOUBLE, len(arguments))
+    function = declare_function(build.module, name, DOUBLE, len(arguments))
     result = ir.Constant(arguments[0].value.type, ir.Undefined)
     for place in range(arguments[0].lanes):
         lane = ir.Constant(ir.IntType(32), place)
@@ -217,21 +217,21 @@ def _with_fallback(great: Any, result: Vector, name: str, x: Vector) -> Vector:
 
 def _split_quarter_turns(x: Vector, quarters: int) -> tuple[Any, Vector, Vector]:
     """Split x into quarter turns and a rest; return their number plus ``quarters``, and sine and cosine of the rest."""
-    shifted = x.fused(2.0 / pi, _ROUNDER)
+    shifted = x.multiply_add(2.0 / pi, _ROUNDER)
     k = shifted - _ROUNDER
     # exact, as the difference has no more bits than x
-    first = k.fused(-_HALF_PI[0], x)
+    first = k.multiply_add(-_HALF_PI[0], x)
     second = k * _HALF_PI[1]
     r = first - second
     back = r - first
     # rounding errors of the product and the difference (Knuth)
     lost = (first - (r - back)) - (second + back)
-    rest = k.fused(-_HALF_PI[2], lost - k.fused(_HALF_PI[1], -second))
+    rest = k.multiply_add(-_HALF_PI[2], lost - k.multiply_add(_HALF_PI[1], -second))
     z = r * r
-    sine = r + (r * z).fused(z.polynomial(_SINE), (rest * z).fused(-0.5, rest))
+    sine = r + (r * z).multiply_add(z.polynomial(_SINE), (rest * z).multiply_add(-0.5, rest))
     half = 0.5 * z
     w = 1.0 - half
-    cosine = w + (((1.0 - w) - half) + (z * z).fused(z.polynomial(_COSINE), -(r * rest)))
+    cosine = w + (((1.0 - w) - half) + (z * z).multiply_add(z.polynomial(_COSINE), -(r * rest)))
     return x.build.add(shifted.bits(), x.longs(quarters)), sine, cosine
 
 
@@ -264,23 +264,23 @@ def _power_of_two(x: Vector, number: Any) -> Vector:
 
 def _reduce_exponent(x: Vector) -> tuple[Any, Vector]:
     """Split x = n log 2 + r; return the integer n and exp(r) - 1."""
-    shifted = x.fused(1.0 / log(2.0), _ROUNDER)
+    shifted = x.multiply_add(1.0 / log(2.0), _ROUNDER)
     k = shifted - _ROUNDER
-    high = k.fused(-_LOG_2[0], x)
-    r = k.fused(-_LOG_2[1], high)
-    rest = k.fused(-_LOG_2[1], high - r)
+    high = k.multiply_add(-_LOG_2[0], x)
+    r = k.multiply_add(-_LOG_2[1], high)
+    rest = k.multiply_add(-_LOG_2[1], high - r)
     factorials = [0.5]
     for n in range(3, 15):
         factorials.append(factorials[-1] / n)
-    return x.build.sub(shifted.bits(), x.longs(_ROUNDER_BITS)), r + (r * r).fused(
-        r.polynomial(tuple(factorials)), r.fused(rest, rest)
+    return x.build.sub(shifted.bits(), x.longs(_ROUNDER_BITS)), r + (r * r).multiply_add(
+        r.polynomial(tuple(factorials)), r.multiply_add(rest, rest)
     )
 
 
 def _exp(x: Vector) -> Vector:
     build = x.build
-    low = x._make(x.like(-746.0)).where(x < -746.0, x)
-    number, less = _reduce_exponent(low._make(low.like(710.0)).where(Vector.__lt__(-low, -710.0), low))
+    low = x._make(x.as_vector(-746.0)).where(x < -746.0, x)
+    number, less = _reduce_exponent(low._make(low.as_vector(710.0)).where(Vector.__lt__(-low, -710.0), low))
     half = build.ashr(number, x.longs(1))
     return (1.0 + less) * _power_of_two(x, half) * _power_of_two(x, build.sub(number, half))
 
@@ -289,23 +289,23 @@ def _exp_minus_one(x: Vector) -> Vector:
     """Return exp(x) - 1 for x between 0 and 44."""
     number, less = _reduce_exponent(x)
     scale = _power_of_two(x, number)
-    return scale.fused(less, scale - 1.0)
+    return scale.multiply_add(less, scale - 1.0)
 
 
-def _at_most(a: Vector, limit: float) -> Vector:
-    return a._make(a.like(limit)).where(Vector.__lt__(-a, -limit), a)
+def _limit_above(a: Vector, limit: float) -> Vector:
+    return a._make(a.as_vector(limit)).where(Vector.__lt__(-a, -limit), a)
 
 
 def _tanh(x: Vector) -> Vector:
-    e = _exp_minus_one(2.0 * _at_most(x.size(), 22.0))
-    return (e / (e + 2.0)).signed(x)
+    e = _exp_minus_one(2.0 * _limit_above(x.size(), 22.0))
+    return (e / (e + 2.0)).with_signs(x)
 
 
 def _sinh(x: Vector) -> Vector:
     a = x.size()
-    small = _exp_minus_one(_at_most(a, 22.0))
+    small = _exp_minus_one(_limit_above(a, 22.0))
     root = _exp(0.5 * a)
-    return (0.5 * (small + small / (small + 1.0))).where(a < 22.0, 0.5 * root * root).signed(x)
+    return (0.5 * (small + small / (small + 1.0))).where(a < 22.0, 0.5 * root * root).with_signs(x)
 
 
 def _cosh(x: Vector) -> Vector:
@@ -326,9 +326,9 @@ def _log(x: Vector) -> Vector:
     s = f / (2.0 + f)
     z = s * s
     half = 0.5 * f * f
-    result = k * _LOG_2[0] - ((half - s.fused(half + z * z.polynomial(_LOGARITHM), k * _LOG_2[1])) - f)
-    result = x._make(x.like(-inf)).where(x.equals(0.0), result)
-    result = x._make(x.like(nan)).where(x < 0.0, result)
+    result = k * _LOG_2[0] - ((half - s.multiply_add(half + z * z.polynomial(_LOGARITHM), k * _LOG_2[1])) - f)
+    result = x._make(x.as_vector(-inf)).where(x.equals(0.0), result)
+    result = x._make(x.as_vector(nan)).where(x < 0.0, result)
     return result.where(x < inf, x + x).where(build.or_(x < inf, x.equals(inf)), x)
 
 
@@ -338,12 +338,12 @@ def _log(x: Vector) -> Vector:
 def _angle(y: Vector, x: Vector) -> Vector:
     """Return the arctangent of y / x for y and x that are not negative."""
     numerator, denominator = -x, y
-    high, low = (y._make(y.like(part)) for part in _ARCTANGENTS[3])
+    high, low = (y._make(y.as_vector(part)) for part in _ARCTANGENTS[3])
     for above, center, (a, b) in zip((39 / 16, 19 / 16, 11 / 16), (1.5, 1.0, 0.5), reversed(_ARCTANGENTS[:3])):
         inside = y < above * x
-        numerator = x.fused(-center, y).where(inside, numerator)
-        denominator = y.fused(center, x).where(inside, denominator)
-        high, low = high._make(high.like(a)).where(inside, high), low._make(low.like(b)).where(inside, low)
+        numerator = x.multiply_add(-center, y).where(inside, numerator)
+        denominator = y.multiply_add(center, x).where(inside, denominator)
+        high, low = high._make(high.as_vector(a)).where(inside, high), low._make(low.as_vector(b)).where(inside, low)
     inside = y < 7 / 16 * x
     t = y.where(inside, numerator) / x.where(inside, denominator)
     z = t * t
@@ -359,11 +359,11 @@ def _supplement_of_negative(angle: Vector, x: Vector) -> Vector:
 
 
 def _atan2(y: Vector, x: Vector) -> Vector:
-    return _supplement_of_negative(_angle(y.size(), x.size()), x).signed(y)
+    return _supplement_of_negative(_angle(y.size(), x.size()), x).with_signs(y)
 
 
 def _atan(x: Vector) -> Vector:
-    return _angle(x.size(), x._make(x.like(1.0))).signed(x)
+    return _angle(x.size(), x._make(x.as_vector(1.0))).with_signs(x)
 
 
 def _leg(x: Vector) -> Vector:
@@ -374,7 +374,7 @@ def _hypot(x: Vector, y: Vector) -> Vector:
     a, b = x.size(), y.size()
     great, small = b.where(a < b, a), a.where(a < b, b)
     ratio = small / great
-    return great.where(great.equals(0.0), great * ratio.fused(ratio, 1.0).root())
+    return great.where(great.equals(0.0), great * ratio.multiply_add(ratio, 1.0).root())
 
 
 #: The functions by their names in `math`.
@@ -382,7 +382,7 @@ FUNCTIONS: dict[str, Callable[..., Vector]] = {
     "sin": _sin,
     "cos": _cos,
     "tan": lambda x: _sin(x) / _cos(x),
-    "asin": lambda x: _angle(x.size(), _leg(x)).signed(x),
+    "asin": lambda x: _angle(x.size(), _leg(x)).with_signs(x),
     "acos": lambda x: _supplement_of_negative(_angle(_leg(x), x.size()), x),
     "atan": _atan,
     "atan2": _atan2,

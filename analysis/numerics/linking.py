@@ -97,7 +97,7 @@ class NotingCompiler(KernelCompiler):
         super().__init__(typing_context, context, library, *rest)
 
 
-def for_any_processor(dispatcher: Any) -> bytes:
+def portable_code(dispatcher: Any) -> bytes:
     """Return the code for any processor of a kernel that `NotingCompiler` has compiled."""
     (result,) = dispatcher.overloads.values()
     (name, *_), *rest = result._reduce()
@@ -105,7 +105,7 @@ def for_any_processor(dispatcher: Any) -> bytes:
     return _with_hash(zlib.compress(dumps((name, result.library.noted, *rest))))
 
 
-def _for_this_processor(content: bytes) -> tuple[Any, ...]:
+def _read_portable_code(content: bytes) -> tuple[Any, ...]:
     """Return what Numba keeps of a kernel, from its code for any processor."""
     name, noted, *rest = pickle.loads(zlib.decompress(content))
     library = cpu_target.target_context.codegen().create_library(name)
@@ -126,7 +126,7 @@ class _Files(IndexDataCacheFile):
         found = super().load(key)
         if found is None and os.path.exists(self.source):
             try:
-                found = _for_this_processor(_read_checked(self.source))
+                found = _read_portable_code(_read_checked(self.source))
             except Exception as error:  # of the file, of pickle, zlib or LLVM
                 warnings.warn(
                     f"{self.source} is not used ({error!r}): the kernel is compiled", RuntimeWarning, stacklevel=2

@@ -40,7 +40,7 @@ def _segments(curve, target):
 
 
 @part
-def _banded(box, floor, scale):
+def _sort_into_bands(box, floor, scale):
     """Sort segments into horizontal bands; return first and last band of each segment, and the segments of each band.
 
     The segments of band b are ``members[begin[b] : begin[b + 1]]``; the return value is (first, last, begin, members).
@@ -121,7 +121,7 @@ def symmetric_difference(curve, target, gradient):
     if not np.isfinite(height):
         return np.nan
     scale, near = BANDS / max(height, 1e-300), PARALLEL * (height + box[1].max() - box[0].min())
-    bands = _banded(box, floor, scale)
+    bands = _sort_into_bands(box, floor, scale)
     _, _, begin, members = bands
     area = 0.0
     cuts, twins, spans = np.empty(CROSSINGS + 2), np.empty(CROSSINGS, np.int64), np.empty((2, CROSSINGS))

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from .tracing import Rebound, rebound
+from .tracing import ReboundFunctions, rebind_functions
 
 #: Functions of `math` that equations may use.
 ELEMENTARY = (
@@ -29,11 +29,11 @@ def library() -> Any:
     return casadi
 
 
-def traced(modules: tuple[ModuleType, ...], **others: Any) -> Rebound:
+def symbolic_functions(modules: tuple[ModuleType, ...], **others: Any) -> ReboundFunctions:
     """Return the functions of ``modules`` for CasADi symbols; ``others`` replace further functions by their names."""
     casadi = library()
     functions = {name: getattr(casadi, {"pow": "power"}.get(name, name)) for name in ELEMENTARY}
-    return rebound(modules, functions | others)
+    return rebind_functions(modules, functions | others)
 
 
 def evaluate_arrays(function: Any, *arguments: Any) -> tuple[NDArray[np.float64], ...]:
@@ -60,7 +60,7 @@ def evaluate_arrays(function: Any, *arguments: Any) -> tuple[NDArray[np.float64]
     return tuple(np.asarray(out).reshape(shape) for out in function.map(size).call(rows))
 
 
-def external(name: str, inputs: int, outputs: int, evaluate: Callable[..., tuple[Any, Any]]) -> Any:
+def wrap_function(name: str, inputs: int, outputs: int, evaluate: Callable[..., tuple[Any, Any]]) -> Any:
     """Wrap a Python function that cannot be traced as a CasADi function, which calls it.
 
     Parameters

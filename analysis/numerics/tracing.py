@@ -15,7 +15,7 @@ from typing import Any
 from linkwork.errors import LinkworkError
 
 
-class Rebound(SimpleNamespace):
+class ReboundFunctions(SimpleNamespace):
     """Functions as attributes by name, the later module's if two share a name; methods are found by `of` only."""
 
     def __init__(self, functions: Mapping[Callable[..., Any], FunctionType]) -> None:
@@ -36,7 +36,7 @@ class Rebound(SimpleNamespace):
         return self._functions[function]
 
 
-def rebound(modules: tuple[ModuleType, ...], elementary: Mapping[str, Any]) -> Rebound:
+def rebind_functions(modules: tuple[ModuleType, ...], elementary: Mapping[str, Any]) -> ReboundFunctions:
     """Return copies of the functions of ``modules`` that calculate with another kind of number.
 
     Parameters
@@ -65,4 +65,4 @@ def rebound(modules: tuple[ModuleType, ...], elementary: Mapping[str, Any]) -> R
                 space[name] = elementary[name]
             elif isinstance(value, FunctionType) and value in functions:
                 space[name] = functions[value]
-    return Rebound(functions)
+    return ReboundFunctions(functions)

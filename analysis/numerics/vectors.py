@@ -16,7 +16,7 @@ from numba.core.datamodel.registry import register_default
 from numba.core.typing.templates import ConcreteTemplate, infer_global, signature
 from numba.extending import intrinsic, lower_builtin
 
-from .lanes import declared, repeated, vector, width
+from .lanes import declare_function, repeat_number, vector, width
 
 #: Number of doubles in a vector of the processor.
 LANES = width()
@@ -41,7 +41,7 @@ class _Model(PrimitiveModel):  # type: ignore[misc]
 
 def _to_vector(builder: Any, kind: Any, value: Any) -> Any:
     """Return a value of the Numba type ``kind`` as a vector; a number becomes the same in all lanes."""
-    return value if isinstance(kind, Lanes) else repeated(builder, value, LANES)
+    return value if isinstance(kind, Lanes) else repeat_number(builder, value, LANES)
 
 
 def _operator(function: Any, instruction: str) -> None:
@@ -120,25 +120,25 @@ def _call_intrinsic(name: str) -> Any:
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
         values = [_to_vector(builder, *one) for one in zip(signature.args, arguments)]
         full = f"llvm.{name}.v{LANES}f64" if LANES > 1 else f"llvm.{name}.f64"
-        return builder.call(declared(builder.module, full, _KIND, len(values)), values)
+        return builder.call(declare_function(builder.module, full, _KIND, len(values)), values)
 
     return generate
 
 
 @intrinsic
-def fused(typing_context, a, b, c):
+def multiply_add(typing_context, a, b, c):
     """Return a * b + c for vectors or numbers, rounded once."""
     return LANE(a, b, c), _call_intrinsic("fma")
 
 
 @intrinsic
-def size(typing_context, a):
+def absolute(typing_context, a):
     """Return the absolute value in each lane."""
     return LANE(LANE), _call_intrinsic("fabs")
 
 
 @intrinsic
-def root(typing_context, a):
+def square_root(typing_context, a):
     """Return the square root in each lane."""
     return LANE(LANE), _call_intrinsic("sqrt")
 

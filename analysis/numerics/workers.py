@@ -44,31 +44,31 @@ class WorkersLost(LinkworkError):
     """The workers failed: they were killed again and again, or the scheduler of a cluster is gone."""
 
 
-class Heard(list[bool]):
+class Interrupts(list[bool]):
     """A list with an entry for each Ctrl-C; while ``waiting`` for other processes, Ctrl-C also raises KeyboardInterrupt."""
 
     waiting = False
 
 
 @contextmanager
-def interruptible() -> Iterator[Heard]:
+def record_interrupts() -> Iterator[Interrupts]:
     """Record each Ctrl-C in a list, which the caller checks between two steps.
 
     An exception instead could be raised inside an FMU that runs in this interpreter, or inside Numba, which may drop it.
     """
-    heard = Heard()
+    interrupts = Interrupts()
     if threading.current_thread() is not threading.main_thread():
-        yield heard
+        yield interrupts
         return
 
     def hear(*_: object) -> None:
-        heard.append(True)
-        if heard.waiting:
+        interrupts.append(True)
+        if interrupts.waiting:
             raise KeyboardInterrupt
 
     before = signal.signal(signal.SIGINT, hear)
     try:
-        yield heard
+        yield interrupts
     finally:
         # None is a handler that was not set from Python
         signal.signal(signal.SIGINT, signal.SIG_DFL if before is None else before)
@@ -87,12 +87,12 @@ def check_jobs(n_jobs: int | None) -> None:
 
 
 def worker_count(n_jobs: int | None, *, threads: bool = False) -> int:
-    """Return how many workers `over_workers` uses, as `joblib.Parallel` counts them; on a cluster, all of its cores."""
+    """Return how many workers `run_in_parallel` uses, as `joblib.Parallel` counts them; on a cluster, all of its cores."""
     return _workers(n_jobs, threads)[0]
 
 
 def share_memory(n_jobs: int | None, *, threads: bool = False) -> bool:
-    """Return whether `over_workers` works in this process and its threads."""
+    """Return whether `run_in_parallel` works in this process and its threads."""
     return not _workers(n_jobs, threads)[1]
 
 
@@ -111,10 +111,10 @@ def _workers(n_jobs: int | None, threads: bool) -> tuple[int, bool, Any]:
     return count, count > 1 and not getattr(backend, "supports_sharedmem", False), backend
 
 
-def over_workers(
+def run_in_parallel(
     work: Callable[[Item], Made],
     items: Sequence[Item],
-    heard: Heard | None = None,
+    interrupts: Interrupts | None = None,
     *,
     n_jobs: int | None = None,
     threads: bool = False,
@@ -130,8 +130,8 @@ def over_workers(
     work : callable
         Function of an item; its exceptions are raised here.
     items : sequence
-    heard : Heard, optional
-        From `interruptible`. With it, Ctrl-C ends the iteration; without it, Ctrl-C raises KeyboardInterrupt.
+    interrupts : Interrupts, optional
+        From `record_interrupts`. With it, Ctrl-C ends the iteration; without it, Ctrl-C raises KeyboardInterrupt.
 
     Raises
     ------
@@ -145,7 +145,7 @@ def over_workers(
     ever for the rest of it.
     """
     count, elsewhere, backend = _workers(n_jobs, threads)
-    listening = Heard() if heard is None else heard
+    listening = Interrupts() if interrupts is None else interrupts
     todo = dict(enumerate(items))
     with (
         tempfile.TemporaryDirectory(prefix="linkwork-", ignore_cleanup_errors=True) if elsewhere else nullcontext("")
@@ -153,11 +153,11 @@ def over_workers(
         for attempt in range(RETRIES + 1):
             tasks = [(work, number, item, os.getpid(), folder) for number, item in todo.items()]
             if not elsewhere:
-                results = _in_this_process(tasks, count)
+                results = _run_in_this_process(tasks, count)
             elif hasattr(backend, "client"):
-                results = _in_cluster(tasks, backend)
+                results = _run_in_cluster(tasks, backend)
             else:
-                results = _in_processes(tasks, n_jobs)
+                results = _run_in_processes(tasks, n_jobs)
             try:
                 while todo:
                     listening.waiting = elsewhere
@@ -171,10 +171,10 @@ def over_workers(
                     yield number, made
                 return
             except KeyboardInterrupt:  # in this process, or in a worker
-                if heard is None:
+                if interrupts is None:
                     raise
-                if not heard:
-                    heard.append(True)
+                if not interrupts:
+                    interrupts.append(True)
                 return
             except _WorkError as caught:
                 raise caught.error from None
@@ -201,7 +201,7 @@ def over_workers(
                     results.close()
 
 
-def _in_processes(tasks: Sequence[_Task], n_jobs: int | None) -> Generator[Any, None, None]:
+def _run_in_processes(tasks: Sequence[_Task], n_jobs: int | None) -> Generator[Any, None, None]:
     """Yield the results of processes of this machine in the order in which they arrive."""
     import joblib
 
@@ -210,7 +210,7 @@ def _in_processes(tasks: Sequence[_Task], n_jobs: int | None) -> Generator[Any, 
     yield from parallel(joblib.delayed(_do_task)(task) for task in tasks)
 
 
-def _in_cluster(tasks: Sequence[_Task], backend: Any) -> Generator[Any, None, None]:
+def _run_in_cluster(tasks: Sequence[_Task], backend: Any) -> Generator[Any, None, None]:
     """Yield the results of the workers of a Dask cluster in the order in which they arrive.
 
     Raises WorkersLost for tasks that kill their workers, when all others are done, and if the scheduler does not answer or has
@@ -271,7 +271,7 @@ def _wait_for_cluster(client: Any, wait: Callable[[], Any]) -> Any:
                 raise WorkersLost(f"the cluster has had no worker for {_PATIENCE:g} s") from None
 
 
-def _in_this_process(tasks: Sequence[_Task], count: int) -> Generator[Any, None, None]:
+def _run_in_this_process(tasks: Sequence[_Task], count: int) -> Generator[Any, None, None]:
     """Do tasks in this process or its threads and yield the results; joblib would check for them every 10 ms only."""
     if count == 1:
         yield from map(_do_task, tasks)

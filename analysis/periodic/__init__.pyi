@@ -12,7 +12,7 @@ from .chart.chart import TRUE_ORBIT as TRUE_ORBIT
 from .chart.chart import Axis as Axis
 from .chart.chart import Run as Run
 from .chart.chart import StabilityChart as StabilityChart
-from .chart.chart import Traced as Traced
+from .chart.chart import TracedBoundary as TracedBoundary
 from .chart.chart import damping_name as damping_name
 from .chart.chart import default_range as default_range
 from .chart.chart import stability_chart as stability_chart
@@ -62,7 +62,7 @@ from .motion.search import find_orbits as find_orbits
 from .motion.search import join_orbits as join_orbits
 from .motion.search import search_orbits as search_orbits
 from .motion.search import sweep as sweep
-from .motion.search import unsought as unsought
+from .motion.search import unsought_hint as unsought_hint
 from .motion.variables import Family as Family
 from .motion.variables import Operation as Operation
 from .motion.variables import Plane as Plane
@@ -70,7 +70,7 @@ from .motion.variables import default_variable as default_variable
 from .motion.variables import driving_names as driving_names
 from .motion.variables import format_value as format_value
 from .motion.variables import gradient_names as gradient_names
-from .motion.variables import of_the_motor as of_the_motor
+from .motion.variables import motor_parameters as motor_parameters
 from .motion.variables import parameter_unit as parameter_unit
 from .motion.variables import parameter_value as parameter_value
 from .motion.variables import plane as plane
@@ -98,7 +98,7 @@ from .response.branch import passes as passes
 from .response.branch import switch as switch
 from .response.frequency import Response as Response
 from .response.frequency import ResponseInterrupted as ResponseInterrupted
-from .response.frequency import ending as ending
+from .response.frequency import describe_end as describe_end
 from .response.frequency import frequency_response as frequency_response
 from .response.frequency import mean_effective_mass as mean_effective_mass
 from .response.frequency import natural_frequency as natural_frequency

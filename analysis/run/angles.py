@@ -45,7 +45,7 @@ class WholeTurns:
         ``u`` are the channels, ``laws`` the torque laws of the inputs, ``first`` the number of the next sample, and ``watch``
         has the table of events, whose levels are reduced too.
         """
-        if not self.too_many(x) or laws[:, 2].any():
+        if not self.has_many_turns(x) or laws[:, 2].any():
             return
         period = np.zeros(len(x))
         period[: len(self._periods)] = self._periods
@@ -71,7 +71,7 @@ class WholeTurns:
             values[first:, self._columns] += off[: len(self._columns)]
         return values
 
-    def too_many(self, x: NDArray[np.float64]) -> bool:
+    def has_many_turns(self, x: NDArray[np.float64]) -> bool:
         """Return whether the angles of the state x are large enough to subtract turns."""
         return not self._never and any(0.0 < TURNS * way < abs(angle) for way, angle in zip(self._periods, x.tolist()))
 

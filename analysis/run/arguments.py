@@ -43,7 +43,7 @@ def takes_published(**fills: Fill) -> Callable[[_Function], _Function]:
     Parameters
     ----------
     **fills : function
-        For other arguments, such as ``initial=started``: a function that returns the argument's value for a published set.
+        For other arguments, such as ``initial=complete_initial_state``: a function that returns the value for a published set.
     """
 
     def decorate(function: _Function) -> _Function:
@@ -100,7 +100,7 @@ def takes_options(kind: type) -> Callable[[_Function], _Function]:
     return decorate
 
 
-def driven(known: PublishedSet, inputs: Any) -> Any:
+def complete_inputs(known: PublishedSet, inputs: Any) -> Any:
     """Return inputs completed with the drives of the published set, for freedoms that they do not drive themselves."""
     inputs = Inputs() if inputs is None else inputs
     if not isinstance(inputs, Inputs):
@@ -118,14 +118,14 @@ def _without_drives(known: PublishedSet, names: Iterable[str]) -> PublishedSet:
     return known._replace(drive={name: value for name, value in known.drive.items() if not given & {*rivals[name]}})
 
 
-def started(known: PublishedSet, initial: Any) -> Any:
+def complete_initial_state(known: PublishedSet, initial: Any) -> Any:
     """Return the initial state: as given, a mapping completed from the published set, or that of the set if it is None."""
     if isinstance(initial, Mapping):
         return read_start(mechanism_of(known.parameters), initial, known.initial)
     return known.initial if initial is None else initial
 
 
-def at_its_speed(known: PublishedSet, speed: Any) -> Any:
+def complete_speed(known: PublishedSet, speed: Any) -> Any:
     """Return the given crank speed, or the speed of the published set (rad/s) if it is None."""
     return known.crank_speed if speed is None else speed
 

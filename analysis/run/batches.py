@@ -21,11 +21,11 @@ from linkwork.mechanism import Mechanism
 
 from ..files import load_array, save_array
 from ..mechanisms import MECHANISMS, InitialState, Parameters
-from .cautions import MANY_STEPS, too_slow
+from .cautions import MANY_STEPS, is_too_slow
 from .inputs import Encoded, Inputs, align, compiled_source, encode
 from .prepared import STEPS_PER_CALL, Run, Settings, compute_outputs, make_problem, verdict
-from .sampling import of_functions
-from .varied import Varied, distinct, over_arrays, varied_constants
+from .sampling import function_values
+from .varied import VariedSequence, array_functions, distinct_objects, varied_constants
 
 #: solver.status of a run that was not begun, or was interrupted.
 NOT_RUN = -1
@@ -35,7 +35,7 @@ _STATUS = {AssemblyError: 3, InputError: 2}
 _NO_START = -2
 #: Status of a run that was interrupted.
 _PAUSED = -3
-#: Status of a stiff run that was given up, see `cautions.too_slow`.
+#: Status of a stiff run that was given up, see `cautions.is_too_slow`.
 _GIVEN_UP = -4
 
 
@@ -95,7 +95,7 @@ class Result:
     messages: list[str]
 
 
-class Prepared(NamedTuple):
+class PreparedBatch(NamedTuple):
     """A batch ready for the compiled solver; ``x`` are the states at the start, ``failures`` the errors of runs without one."""
 
     encoded: Encoded
@@ -115,23 +115,23 @@ class Prepared(NamedTuple):
         return digest.hexdigest()[:32]
 
 
-def solve(task: Task, heard: Sequence[bool], into: Sequence[NDArray[np.float64]] | None = None) -> Result | None:
+def solve(task: Task, interrupts: Sequence[bool], into: Sequence[NDArray[np.float64]] | None = None) -> Result | None:
     """Solve a batch, or read its result from its file; return None if the ensemble was interrupted before.
 
-    ``heard`` is checked between compiled calls: if it is not empty, the runs are interrupted. ``into`` are the sample arrays of
-    the whole ensemble, if this process has them and the task has no folder: samples are written there directly.
+    ``interrupts`` is checked between compiled calls: if it is not empty, the runs are interrupted. ``into`` are the sample
+    arrays of the whole ensemble, if this process has them and the task has no folder: samples are written there directly.
     """
-    if heard:
+    if interrupts:
         return None
     # a worker does not know a mechanism that the caller has registered
     MECHANISMS.setdefault(task.mechanism.name, task.mechanism)
     prepared = prepare(task)
     samples: list[NDArray[np.float64]] = []
     if into is None:
-        ends, *samples = task.parts(_load_or_solve(task, prepared, heard))
+        ends, *samples = task.parts(_load_or_solve(task, prepared, interrupts))
     else:
         ends, rows = np.empty(task.shapes[0]), slice(task.first, task.first + len(prepared.x))
-        _integrate(task, prepared, heard, ends, [array[rows] for array in into])
+        _integrate(task, prepared, interrupts, ends, [array[rows] for array in into])
     status, messages = _verdicts(task, prepared, ends)
     return Result(
         first=task.first,
@@ -143,14 +143,14 @@ def solve(task: Task, heard: Sequence[bool], into: Sequence[NDArray[np.float64]]
     )
 
 
-def _load_or_solve(task: Task, prepared: Prepared, heard: Sequence[bool]) -> NDArray[np.float64]:
+def _load_or_solve(task: Task, prepared: PreparedBatch, interrupts: Sequence[bool]) -> NDArray[np.float64]:
     """Return the arrays of `Task.shapes` as one flat array, read from the batch's file or computed and saved there."""
     path = None if task.folder is None else task.folder / f"{prepared.digest(task)}.runs"
     kept = None if path is None else load_array(path)
     if kept is None or kept.shape != (sum(map(prod, task.shapes)),):
         kept = np.empty(sum(map(prod, task.shapes)))
         ends, *samples = task.parts(kept)
-        whole = _integrate(task, prepared, heard, ends, samples)
+        whole = _integrate(task, prepared, interrupts, ends, samples)
         if path is not None and whole:
             try:
                 save_array(path, kept)
@@ -161,7 +161,7 @@ def _load_or_solve(task: Task, prepared: Prepared, heard: Sequence[bool]) -> NDA
     return kept
 
 
-def _verdicts(task: Task, prepared: Prepared, ends: NDArray[np.float64]) -> tuple[list[int], list[str]]:
+def _verdicts(task: Task, prepared: PreparedBatch, ends: NDArray[np.float64]) -> tuple[list[int], list[str]]:
     """Return the solver.status and solver.message of each run."""
     from . import records as k
 
@@ -176,7 +176,7 @@ def _verdicts(task: Task, prepared: Prepared, ends: NDArray[np.float64]) -> tupl
         elif code == _PAUSED:
             status[i], messages[i] = NOT_RUN, f"interrupted at t = {t:.6g} s" if samples else "not run: interrupted"
         elif code == k.BAD_INPUT:
-            status[i], messages[i] = code, str(run().lost(lost, t, x))
+            status[i], messages[i] = code, str(run().not_finite_error(lost, t, x))
         else:
             switched = task.mechanism.is_switched_on(prepared.batch.p[i])
             limit = run().limit if switched else None
@@ -185,16 +185,16 @@ def _verdicts(task: Task, prepared: Prepared, ends: NDArray[np.float64]) -> tupl
                 code, needed = k.RUNNING, steps * float(np.ptp(task.settings.times)) / passed
             status[i], message = verdict(task.mechanism, task.settings, code, t, x, limit, needed)
             if code == k.NO_STEP:
-                message += run().undefined(x)
-            stiff = run().stiff(x, ends[i, 5 + size :], steps, passed) if steps >= MANY_STEPS else ""
+                message += run().describe_undefined_forces(x)
+            stiff = run().stiffness_caution(x, ends[i, 5 + size :], steps, passed) if steps >= MANY_STEPS else ""
             messages[i] = "; ".join(filter(None, (message, stiff)))
     return status, messages
 
 
 def _integrate(
     task: Task,
-    prepared: Prepared,
-    heard: Sequence[bool],
+    prepared: PreparedBatch,
+    interrupts: Sequence[bool],
     ends: NDArray[np.float64],
     samples: Sequence[NDArray[np.float64]],
 ) -> bool:
@@ -230,7 +230,7 @@ def _integrate(
     todo, steps, span = status == k.RUNNING, carries["steps"], np.ptp(settings.times)
     fits = _fits(batch, settings)
     code = machine(mechanism, switched, LANES).addresses
-    while todo.any() and not heard:
+    while todo.any() and not interrupts:
         arguments = problem, source, own, watch, state, recorded, status, settings.max_steps, STEPS_PER_CALL
         if (todo & fits).any():
             lanes.run_in_lanes(code, fits, *arguments)
@@ -238,8 +238,8 @@ def _integrate(
             compiled.run(*arguments)
         todo = (status == k.RUNNING) & (steps < settings.max_steps)
         passed = carries["begin"] + carries["elapsed"] - settings.times[0]
-        for i in np.flatnonzero(todo & too_slow(steps, passed, span, settings.max_steps)).tolist():
-            if task.run(i).stiff(state.x[i], state.u[i], float(steps[i]), float(passed[i])):
+        for i in np.flatnonzero(todo & is_too_slow(steps, passed, span, settings.max_steps)).tolist():
+            if task.run(i).stiffness_caution(state.x[i], state.u[i], float(steps[i]), float(passed[i])):
                 status[i], todo[i] = _GIVEN_UP, False
     status[todo] = _PAUSED
     counts = carries["sample"]
@@ -270,7 +270,7 @@ def _fits(batch: Any, settings: Settings) -> NDArray[np.bool_]:
 # Start of a run
 
 
-def prepare(task: Task) -> Prepared:
+def prepare(task: Task) -> PreparedBatch:
     """Prepare the runs of a batch with array operations; the numbers are those of `Run` and `Run.start` to the last bit.
 
     Runs near the limit of assembly or with a number that is not finite are prepared by `Run.start`, whose error says why a run
@@ -291,12 +291,12 @@ def prepare(task: Task) -> Prepared:
     if any(chain.from_iterable(encoded.functions)):
         for i in range(len(x)):
             try:
-                u[i] += of_functions(encoded, t, x[i])
+                u[i] += function_values(encoded, t, x[i])
             except InputError:
                 doubtful.add(i)
     x[:, encoded.commands[:, 1]] = u[:, encoded.commands[:, 0]]
     scales = np.zeros_like(x)
-    functions, equations = over_arrays(mechanism)[0], mechanism.equations
+    functions, equations = array_functions(mechanism)[0], mechanism.equations
     try:
         with np.errstate(all="ignore"):
             parameters, columns = varied_constants(mechanism, task.parameters)
@@ -329,7 +329,7 @@ def prepare(task: Task) -> Prepared:
             x[i], p[i, -1], scales[i] = 0.0, np.nan, 0.0
         else:
             x[i], p[i, -1], scales[i] = start.x, start.energy, start.scale
-    return Prepared(encoded, batch._replace(p=p, scales=scales), x, failures)
+    return PreparedBatch(encoded, batch._replace(p=p, scales=scales), x, failures)
 
 
 def _switched(mechanism: Mechanism, p: NDArray[np.float64]) -> bool:
@@ -372,8 +372,8 @@ def _encode_inputs(task: Task) -> tuple[Encoded, Any]:
         constant = len(kinds) - 1 if constant < 0 else constant
         return constant, values
 
-    varied = task.inputs.columns if isinstance(task.inputs, Varied) else {}
-    found = _map_distinct(encode_kind, distinct(task.inputs) * len(task.inputs) if varied else task.inputs)
+    varied = task.inputs.columns if isinstance(task.inputs, VariedSequence) else {}
+    found = _map_distinct(encode_kind, distinct_objects(task.inputs) * len(task.inputs) if varied else task.inputs)
     which = np.array([kind for kind, _ in found])
     sources = [e.source for e in kinds]
     sizes = np.array([(len(e.coefficients), len(e.harmonics)) for e in sources])

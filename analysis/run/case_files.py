@@ -22,7 +22,7 @@ from ..files import Choice, Kinds, Many, Quantity, Reader, Table, entry
 from ..linkages import with_linkage
 from ..mechanisms import MECHANISMS, PUBLISHED, Parameters, mechanism_of, name_in_files
 from ..units import with_unit
-from .arguments import driven, turn_durations
+from .arguments import complete_inputs, turn_durations
 from .case import Case
 from .inputs import Inputs, parameter_readers, read_start
 from .masses import mass_origins, resolve_sections
@@ -130,14 +130,14 @@ def case_mechanism(data: Mapping[str, Any]) -> Mechanism:
 COMMON = ("mechanism", "title", "published", "initial", "run")
 
 
-class Acting(NamedTuple):
+class ActingInput(NamedTuple):
     """An input of a mechanism: its name in `Inputs`, and its unit, empty for a flag."""
 
     argument: str
     unit: str
 
 
-def case_inputs(mechanism: Mechanism) -> dict[str, Acting]:
+def case_inputs(mechanism: Mechanism) -> dict[str, ActingInput]:
     """Return the inputs of a mechanism by their names in case files.
 
     The name of a channel follows from `name_in_files`: ``slider.force`` is ``force``. A flag that drives a freedom is an entry
@@ -147,12 +147,12 @@ def case_inputs(mechanism: Mechanism) -> dict[str, Acting]:
     found = {}
     for channel in mechanism.channels:
         if channel.kind != "rate":
-            found[name_in_files(mechanism, channel)] = Acting(channel.argument, units[channel.name])
+            found[name_in_files(mechanism, channel)] = ActingInput(channel.argument, units[channel.name])
     channels = {channel.argument for channel in mechanism.channels}
     for mode in mechanism.modes:
         for flag in mode.arguments:
             if flag not in channels:
-                found[f"{mode.name.rpartition('.')[0]}.{flag}"] = Acting(flag, "")
+                found[f"{mode.name.rpartition('.')[0]}.{flag}"] = ActingInput(flag, "")
     return found
 
 
@@ -209,7 +209,7 @@ def read_case(
     data = with_linkage(data, folder)
     named = {**data, **(overrides or {})}
     mechanism = case_mechanism(named)
-    data = with_names_of_files(data, mechanism)
+    data = with_case_file_names(data, mechanism)
     overrides = {_case_file_name(name, mechanism): value for name, value in (overrides or {}).items()}
     published = PUBLISHED[named["published"]] if "published" in named else None
     if named.get("mechanism", mechanism.name) != mechanism.name:
@@ -229,7 +229,7 @@ def read_case(
     initial = read_start(mechanism, data.get("initial", {}), base)
     inputs = Inputs(**found)
     if published is not None:
-        inputs = driven(published, inputs)
+        inputs = complete_inputs(published, inputs)
     _check_drives(mechanism, inputs, parameters, initial, acting)
     run: RunTable = files.read(RunTable, data.get("run", {}), "run")
     stop_time, step = run.times(inputs, mechanism)
@@ -245,7 +245,7 @@ def read_case(
     )
 
 
-def with_names_of_files(data: Mapping[str, Any], mechanism: Mechanism) -> dict[str, Any]:
+def with_case_file_names(data: Mapping[str, Any], mechanism: Mechanism) -> dict[str, Any]:
     """Return the tables of a case with inputs under their names in case files instead of their FMI names."""
     result = dict(data)
     for channel in mechanism.channels:
@@ -268,7 +268,7 @@ def _case_file_name(name: str, mechanism: Mechanism) -> str:
 
 
 def _without_rivals(
-    data: Mapping[str, Any], overrides: Mapping[str, Any], mechanism: Mechanism, acting: Mapping[str, Acting]
+    data: Mapping[str, Any], overrides: Mapping[str, Any], mechanism: Mechanism, acting: Mapping[str, ActingInput]
 ) -> dict[str, Any]:
     """Return the tables without the entries that an override replaces: other drives of the same freedom, or end of the run."""
     result = dict(data)
@@ -288,7 +288,7 @@ def _without_rivals(
 
 
 def _split_tables(
-    data: Mapping[str, Any], mechanism: Mechanism, acting: Mapping[str, Acting], folder: Path
+    data: Mapping[str, Any], mechanism: Mechanism, acting: Mapping[str, ActingInput], folder: Path
 ) -> tuple[dict[str, Any], dict[str, Any]]:
     """Split the tables of a case into those of the parameters and the inputs, read and by their names in `Inputs`.
 
@@ -317,7 +317,7 @@ def _split_tables(
 
 
 def _check_drives(
-    mechanism: Mechanism, inputs: Inputs, parameters: Any, initial: Any, acting: Mapping[str, Acting]
+    mechanism: Mechanism, inputs: Inputs, parameters: Any, initial: Any, acting: Mapping[str, ActingInput]
 ) -> None:
     """Raise ParameterError if a groove without amplitude drives, or an initial rate of a held freedom is given."""
     if inputs.parts("groove") and getattr(parameters, "groove_amplitude", None) == 0.0:
@@ -372,7 +372,7 @@ def signal_kinds(unit: str, folder: Path) -> dict[str, Table]:
     kinds: dict[str, Table] = {
         "ramp": Table(ramp, {"start": value, "end": value, "from_time": Quantity("s"), "to_time": Quantity("s")}),
         "table": Table(
-            partial(_tabulated, folder, unit),
+            partial(_make_table, folder, unit),
             {"times": Many(Quantity("s")), "values": values, "file": files.text, "interpolation": Choice(SHAPES)},
         ),
         "harmonics": Table(
@@ -399,7 +399,7 @@ def _harmonics(
     return Harmonics(mean, list(amplitudes), list(frequencies), list(phases))
 
 
-def _tabulated(
+def _make_table(
     folder: Path,
     unit: str,
     times: Sequence[float] = (),

@@ -58,7 +58,7 @@ def stiffness(rates: NDArray[np.complex128], steps: float, duration: float, usua
     return ""
 
 
-def too_slow(steps: Any, passed: Any, span: float, most: int) -> Any:
+def is_too_slow(steps: Any, passed: Any, span: float, most: int) -> Any:
     """Return whether a stiff run is to end now, since it would need too many steps for its duration ``span`` (s).
 
     ``steps`` is the number of steps so far, ``passed`` the time that they covered (s), both of one run or arrays of several;

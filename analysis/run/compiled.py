@@ -37,12 +37,12 @@ from .records import (
     Room,
     Samples,
     equation,
-    released,
+    is_bar_released,
     renew,
     state_clearance,
 )
-from .sources import SOURCE, Source, find, hold, unwound, wound, write_channels
-from .stepping import EXPONENT, STAGES, Flow, attempt, following, interpolate, shorter
+from .sources import SOURCE, Source, find, hold, is_bar_unwound, is_bar_wound, write_channels
+from .stepping import EXPONENT, STAGES, Flow, attempt, interpolate, next_step_size, shorter_step_size
 
 #: Largest residual of the energy balance, as a fraction of the kinetic energy, that is corrected: near rest it may be larger.
 GREATEST_SHARE = 1e-3
@@ -59,10 +59,10 @@ def begin_interval(motion):
     piece = find(t, source.breaks)
     carry.stop = _end_of_interval(piece, motion)
     for n in range(source.laws.shape[0]):
-        if unwound(n, x, source):
+        if is_bar_unwound(n, x, source):
             source.laws[n, 2] = 0.0
     write_channels(t, 0.0, piece, x, source, u)
-    carry.piece = -1 if problem.hold > 0.0 or (motion.steady and not wound(source.laws)) else piece
+    carry.piece = -1 if problem.hold > 0.0 or (motion.steady and not is_bar_wound(source.laws)) else piece
     lost = _not_finite(u)
     if problem.hold > 0.0 and lost < 0:
         ahead = carry.stop if t < problem.end else t + problem.hold
@@ -113,11 +113,11 @@ def _first_step(motion):
     carry = motion.carry
     equation(DERIVATIVE, carry.begin + carry.elapsed, motion.x, motion.u, motion.room.k[0], motion)
     carry.evaluations += 1
-    choose_first(motion)
+    choose_first_size(motion)
 
 
 @inner
-def choose_first(motion):
+def choose_first_size(motion):
     """Compute the first step size of a run from the rates at its beginning."""
     carry, x, k = motion.carry, motion.x, motion.room.k
     if not carry.step > 0.0:
@@ -159,7 +159,7 @@ def _accept(h, last, t_new, motion):
     clearance = state_clearance(y, u, motion)
     inside = (
         clearance < LIMIT_SINE
-        or released(y, motion)
+        or is_bar_released(y, motion)
         or (carry.sample < samples.times.shape[0] and samples.times[carry.sample] < t_new)
         or watch.table.shape[0] > 0
     )
@@ -186,7 +186,7 @@ def _keep_balance(motion):
 
 
 @inner
-def refused(h, motion):
+def short_step_status(h, motion):
     """Return the status of a run whose step size h has become too short: LIMIT, BAD_INPUT or NO_STEP."""
     carry, room, x, u = motion.carry, motion.room, motion.x, motion.u
     status = LIMIT if abs(state_clearance(x, u, motion)) < NEAR_LIMIT else NO_STEP
@@ -258,11 +258,11 @@ def _cross_interval(motion, most):
             good, inside, clearance = _accept(h, last, t_new, motion)
         if not good:
             carry.rejected += 1
-            carry.step = shorter(h, error)
+            carry.step = shorter_step_size(h, error)
             if not carry.step >= least:
-                return refused(h, motion)
+                return short_step_status(h, motion)
             continue
-        carry.step = following(h, carry.step, error)
+        carry.step = next_step_size(h, carry.step, error)
         carry.known = carry.found
         if inside:
             what, cut = locate_events(clearance, h, motion)
@@ -341,7 +341,7 @@ def single_batch(source: Source, p: NDArray[np.float64], scale: NDArray[np.float
 
 
 @part
-def _own(i, source, batch):
+def _run_source(i, source, batch):
     """Return the inputs of run i of a batch; ``source`` has the data common to all runs."""
     pieces, waves = batch.sizes[i]
     return Source(
@@ -359,7 +359,7 @@ def _own(i, source, batch):
 def lane_motion(i, problem, source, batch, watch, samples, room, state):
     """Return a reference to run i of a batch as a `Motion`."""
     return refer(Motion(
-        problem, batch.p[i], batch.scales[i], batch.steady[i], _own(i, source, batch), watch,
+        problem, batch.p[i], batch.scales[i], batch.steady[i], _run_source(i, source, batch), watch,
         Samples(samples.times, samples.states[i], samples.forces[i]), room, state.carries[i], state.x[i], state.u[i],
     ))  # fmt: skip
 
@@ -368,7 +368,7 @@ def lane_motion(i, problem, source, batch, watch, samples, room, state):
 def channels_of_many(t, source, batch, x, u):
     """Write the channels of each run of a batch, at time t and its state in x, into its row of u."""
     for i in range(x.shape[0]):
-        own = _own(i, source, batch)
+        own = _run_source(i, source, batch)
         write_channels(t, 0.0, find(t, own.breaks), x[i], own, u[i])
 
 

@@ -17,15 +17,15 @@ from linkwork.errors import InputError
 
 from ..files import unknown_name
 from ..mechanisms import InitialState, Parameters, output_units, residual_outputs, wrapping_outputs
-from ..numerics.workers import interruptible
+from ..numerics.workers import record_interrupts
 from ..units import Amount, in_si
-from .arguments import driven, started, takes_published, usual_times
+from .arguments import complete_initial_state, complete_inputs, takes_published, usual_times
 from .case import Case
-from .events import RunInterrupted, shown
+from .events import RunInterrupted, show_progress
 from .fmu import CosimulationError, FmuModel, FmuRun
 from .inputs import Inputs
 from .prepared import Run, Settings
-from .sampling import named, release, sample
+from .sampling import name_channels, release, sample
 from .simulation import sample_times
 from .trajectory import Trajectory
 
@@ -34,7 +34,7 @@ from .trajectory import Trajectory
 INTERFACES = ("co-simulation", "linear-co-simulation", "model-exchange")
 
 
-@takes_published(inputs=driven, initial=started)
+@takes_published(inputs=complete_inputs, initial=complete_initial_state)
 @in_si(stop_time="s", step="s", start_time="s")
 def cosimulate(
     fmu: str | Path,
@@ -107,7 +107,11 @@ def cosimulate(
         start_time=float(times[0]),
         inputs=march.first(),
     )
-    with instance, interruptible() as interrupted, shown(progress, times[-1] - times[0], "running the FMU") as show:
+    with (
+        instance,
+        record_interrupts() as interrupted,
+        show_progress(progress, times[-1] - times[0], "running the FMU") as show,
+    ):
         for t, row in march.rows(instance):
             recorded.append((t, row))
             show(t - float(times[0]))
@@ -128,7 +132,7 @@ def cosimulate(
     return trajectory
 
 
-def held_inputs(case: Case, steps: int) -> Callable[[int, Sequence[float] | None], dict[str, float]]:
+def input_sampler(case: Case, steps: int) -> Callable[[int, Sequence[float] | None], dict[str, float]]:
     """Return a function that samples the inputs of a case, over ``case.stop_time`` in equal steps, for co-simulation.
 
     The function takes the number of a step and the outputs at its start, None at the start of the run; it must be called for
@@ -175,7 +179,7 @@ class _Stepwise:
             ahead = -np.inf
         else:
             ahead = float(times[number + 1] if number + 1 < len(times) else t + times[1] - times[0])
-        return named(self.encoded, sample(self.encoded, t, x, self.laws, ahead=ahead))
+        return name_channels(self.encoded, sample(self.encoded, t, x, self.laws, ahead=ahead))
 
     def slopes(self, number: int, row: list[float]) -> dict[str, float]:
         """Return the slopes of the inputs over the next step; the state at its end is predicted from the outputs ``row``."""
@@ -189,7 +193,7 @@ class _Stepwise:
         release(self.encoded, there, laws)
         change = sample(self.encoded, ahead, there, laws, left=True) - sample(self.encoded, t, x, self.laws)
         change[self.encoded.commands[:, 0]] = 0.0
-        return named(self.encoded, change / h)
+        return name_channels(self.encoded, change / h)
 
     def state(self, row: list[float]) -> NDArray[np.float64]:
         """Return the state from a row of outputs; dissipated and supplied work are set to zero."""
@@ -230,7 +234,7 @@ class _Continuous:
         prepared = self.prepared
         x, laws = np.array(prepared.mechanism.state(prepared.initial)), prepared.encoded.source.laws.copy()
         release(prepared.encoded, x, laws)
-        return named(prepared.encoded, sample(prepared.encoded, float(prepared.settings.times[0]), x, laws))
+        return name_channels(prepared.encoded, sample(prepared.encoded, float(prepared.settings.times[0]), x, laws))
 
     def rows(self, model: Any) -> Iterator[tuple[float, list[float]]]:
         """Run the FMU and yield times and outputs until the end or the limit of assembly, the outputs at the limit included."""

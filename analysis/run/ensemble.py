@@ -24,18 +24,18 @@ from linkwork.mechanism import Mechanism
 from ..display import format_count
 from ..files import unknown_name
 from ..mechanisms import InitialState, Parameters, mechanism_of
-from ..numerics.workers import WorkersLost, check_jobs, interruptible, over_workers, share_memory
+from ..numerics.workers import WorkersLost, check_jobs, record_interrupts, run_in_parallel, share_memory
 from ..units import Amount, in_si
-from .arguments import driven, started, takes_options, takes_published
+from .arguments import complete_initial_state, complete_inputs, takes_options, takes_published
 from .batches import NOT_RUN, Result, Task, solve
 from .equations import machine
-from .events import shown
-from .inputs import Inputs, checked_run, compiled_source, encode
+from .events import show_progress
+from .inputs import Inputs, check_run, compiled_source, encode
 from .prepared import compute_outputs
 from .signals import Function
 from .simulation import MOST_STEPS, RunOptions, check_settings, sample_times
 from .trajectory import Trajectory
-from .varied import Varied, distinct, varied_constants
+from .varied import VariedSequence, distinct_objects, varied_constants
 from .varied import vary as varied_sets
 
 #: Largest number of samples in a batch, if the caller does not choose the size of batches.
@@ -159,7 +159,7 @@ class EnsembleOptions(RunOptions, total=False):
     batch: int | None
 
 
-@takes_published(inputs=driven, initial=started)
+@takes_published(inputs=complete_inputs, initial=complete_initial_state)
 @takes_options(EnsembleOptions)
 @in_si(stop_time="s", step="s", start_time="s", hold="s")
 def simulate_many(
@@ -242,7 +242,7 @@ def simulate_many(
         raise InputError(f"batch is {batch}: it must be at least 1")
     check_jobs(n_jobs)
     mechanism = mechanism_of(parameters[0])
-    if any(mechanism_of(p) is not mechanism for p in distinct(parameters)):
+    if any(mechanism_of(p) is not mechanism for p in distinct_objects(parameters)):
         raise InputError("an ensemble's parameters must all be of one mechanism")
     if isinstance(outputs, str):
         raise InputError(f"outputs is {outputs!r}: it must be a list of names, such as [{outputs!r}]")
@@ -273,24 +273,27 @@ def simulate_many(
         )
         for k in range(0, len(parameters), batch)
     ]
-    gathered = _Gathered(parameters, mechanism, settings.times, names, outputs is not None, where)
+    gathered = _EnsembleArrays(parameters, mechanism, settings.times, names, outputs is not None, where)
     gathered.modes[:] = list(encoded.modes.values())
     into = gathered.samples() if where is None and share_memory(n_jobs, threads=True) else None
-    with interruptible() as heard, shown(options.get("progress", False), float(len(parameters))) as show:
+    with (
+        record_interrupts() as interrupts,
+        show_progress(options.get("progress", False), float(len(parameters))) as show,
+    ):
         try:
-            work = partial(solve, heard=heard, into=into)
-            for _, result in over_workers(work, tasks, heard, n_jobs=n_jobs, threads=True):
+            work = partial(solve, interrupts=interrupts, into=into)
+            for _, result in run_in_parallel(work, tasks, interrupts, n_jobs=n_jobs, threads=True):
                 if result is not None:
                     gathered.add(result)
                     show(float(np.count_nonzero(gathered.status != NOT_RUN)))
         except WorkersLost as error:
             raise EnsembleBroken(gathered.ensemble(), where, error) from error
-    if heard and np.any(gathered.status == NOT_RUN):
+    if interrupts and np.any(gathered.status == NOT_RUN):
         raise EnsembleInterrupted(gathered.ensemble(), where)
     return gathered.ensemble()
 
 
-class _Gathered:
+class _EnsembleArrays:
     """The arrays of an ensemble, allocated once and filled with the results of batches as these arrive."""
 
     def __init__(
@@ -303,7 +306,7 @@ class _Gathered:
         folder: Path | None,
     ) -> None:
         m, n = len(parameters), len(times)
-        self.parameters = parameters if isinstance(parameters, Varied) else tuple(parameters)
+        self.parameters = parameters if isinstance(parameters, VariedSequence) else tuple(parameters)
         self.times, self.names, self.chosen = times, names, chosen
         samples = 0 if chosen else n
         self.maps: list[mmap.mmap] = []
@@ -392,27 +395,27 @@ def _check_runs(
 ) -> tuple[Sequence[Inputs], list[InitialState]]:
     """Check the inputs and initial states and return those of each run; see `simulate_many` for what inputs must share."""
     all_inputs, starts = _one_per_run(inputs, count, "inputs"), _one_per_run(initial, count, "initial states")
-    nothing, rest = checked_run(mechanism, None, None)
-    if not isinstance(all_inputs, Varied):
+    nothing, rest = check_run(mechanism, None, None)
+    if not isinstance(all_inputs, VariedSequence):
         all_inputs = [nothing if i is None else i for i in all_inputs]
     read = {
-        id(s): rest if s is None else s if isinstance(s, mechanism.initial) else checked_run(mechanism, None, s)[1]
-        for s in distinct(starts)
+        id(s): rest if s is None else s if isinstance(s, mechanism.initial) else check_run(mechanism, None, s)[1]
+        for s in distinct_objects(starts)
     }
     starts = [read[id(s)] for s in starts]
     accepted: set[tuple[str, ...]] = set()
     ways: set[Any] = set()
-    for one in distinct(all_inputs):
+    for one in distinct_objects(all_inputs):
         names = tuple(one) if isinstance(one, Inputs) else ()
         if not names or names not in accepted:
-            checked_run(mechanism, one, None)
+            check_run(mechanism, one, None)
             accepted.add(names)
             ways.add(tuple(one.modes(mechanism).values()))
     if len(ways) > 1:
         raise InputError("an ensemble's inputs must all drive the mechanism in the same way")
     functions = {
         tuple((name, id(f.function), id(f.rate)) for name in i for f in i.parts(name) if isinstance(f, Function))
-        for i in distinct(all_inputs)
+        for i in distinct_objects(all_inputs)
     }
     if len(functions) > 1:
         raise InputError("an ensemble's inputs must share their Python functions")
@@ -437,4 +440,4 @@ def _one_per_run(value: Any, count: int, what: str) -> Any:
         return [value] * count
     if len(value) != count:
         raise InputError(f"{len(value)} {what} for {count} sets of parameters: give one, or as many")
-    return value if isinstance(value, Varied) else list(value)
+    return value if isinstance(value, VariedSequence) else list(value)

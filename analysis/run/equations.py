@@ -16,7 +16,7 @@ from linkwork.errors import LinkworkError
 from linkwork.mechanism import Mechanism
 
 from ..numerics import symbolic
-from ..numerics.tracing import Rebound
+from ..numerics.tracing import ReboundFunctions
 
 if TYPE_CHECKING:
     from ..numerics.codegen import MachineCode
@@ -33,9 +33,9 @@ _ALLOWED = (
 
 
 @cache
-def traced(mechanism: Mechanism) -> Rebound:
+def symbolic_equations(mechanism: Mechanism) -> ReboundFunctions:
     """Return the functions of the mechanism's modules for CasADi symbols instead of floats."""
-    return symbolic.traced(mechanism.modules)
+    return symbolic.symbolic_functions(mechanism.modules)
 
 
 def constants(mechanism: Mechanism, switched: bool = False) -> tuple[Any, Any]:
@@ -49,7 +49,7 @@ def constants(mechanism: Mechanism, switched: bool = False) -> tuple[Any, Any]:
 
 
 @cache
-def at_rest(mechanism: Mechanism, cranks: tuple[int, ...], freedom: int) -> Any:
+def inertia_and_stiffness(mechanism: Mechanism, cranks: tuple[int, ...], freedom: int) -> Any:
     """Return a CasADi function of inertia and stiffness of a freedom, with the mechanism at rest and its coordinate 0.
 
     They are the second derivatives of the energy with respect to the rate and to the coordinate of the freedom. The arguments
@@ -62,33 +62,33 @@ def at_rest(mechanism: Mechanism, cranks: tuple[int, ...], freedom: int) -> Any:
     x[freedom], x[len(mechanism.freedoms) + freedom] = s, v
     for crank, angle in zip(cranks, angles):
         x[crank] = angle
-    energy = traced(mechanism).of(mechanism.equations.energy)(tuple(x), k)
+    energy = symbolic_equations(mechanism).of(mechanism.equations.energy)(tuple(x), k)
     seconds = [casadi.densify(casadi.jacobian(casadi.jacobian(energy, z), z)) for z in (v, s)]
     resting = casadi.substitute(seconds, [s, v], [casadi.SX(0.0)] * 2)
     return casadi.Function("at_rest", [*angles, p], resting)
 
 
-class OfParameters(NamedTuple):
+class ParameterSymbols(NamedTuple):
     """Symbols for the parameters of a mechanism: as a column, as an object with the fields, and the functions that take it."""
 
     own: Any
     parameters: Any
-    functions: Rebound
+    functions: ReboundFunctions
 
 
-def of_parameters(mechanism: Mechanism) -> OfParameters:
+def parameter_symbols(mechanism: Mechanism) -> ParameterSymbols:
     """Return symbols for the parameters, so that their ``constants`` and ``error_scale`` can be traced."""
     casadi = symbolic.library()
-    functions = symbolic.traced(
+    functions = symbolic.symbolic_functions(
         equation_modules(mechanism), max=casadi.fmax, min=casadi.fmin, float=lambda value: value
     )
     names = [field.name for field in fields(mechanism.parameters)]
     own = casadi.SX.sym("own", len(names))
-    parameters = like_parameters(mechanism, functions)(**dict(zip(names, casadi.vertsplit(own))))
-    return OfParameters(own, parameters, functions)
+    parameters = parameters_class(mechanism, functions)(**dict(zip(names, casadi.vertsplit(own))))
+    return ParameterSymbols(own, parameters, functions)
 
 
-def like_parameters(mechanism: Mechanism, functions: Rebound) -> type[SimpleNamespace]:
+def parameters_class(mechanism: Mechanism, functions: ReboundFunctions) -> type[SimpleNamespace]:
     """Return a class like a mechanism's parameters whose fields may be symbols or arrays; ``functions`` has its methods."""
     own = vars(mechanism.parameters).items()
     methods = {name: functions.of(f) for name, f in own if isinstance(f, FunctionType) and name[:2] != "__"}
@@ -111,7 +111,7 @@ class Symbols(NamedTuple):
     p: Any
 
 
-class Traced(NamedTuple):
+class TracedEquations(NamedTuple):
     """The equations as CasADi expressions in `Symbols`, each a column."""
 
     symbols: Symbols
@@ -123,7 +123,7 @@ class Traced(NamedTuple):
 
 
 @cache
-def expressions(mechanism: Mechanism, switched: bool = False) -> Traced:
+def expressions(mechanism: Mechanism, switched: bool = False) -> TracedEquations:
     """Return the equations as expressions in the channels and modes of a run, with the mechanism's switch on or off.
 
     Raises
@@ -132,7 +132,7 @@ def expressions(mechanism: Mechanism, switched: bool = False) -> Traced:
         If they contain more than arithmetic without branches and the functions `symbolic.ELEMENTARY`.
     """
     casadi = symbolic.library()
-    functions = traced(mechanism)
+    functions = symbolic_equations(mechanism)
     x = casadi.SX.sym("x", mechanism.size)
     modes = casadi.SX.sym("modes", len(mechanism.modes))
     u = casadi.SX.sym("u", len(mechanism.channels))
@@ -164,7 +164,7 @@ def expressions(mechanism: Mechanism, switched: bool = False) -> Traced:
             ) from error
 
     applied = call("apply_inputs", tuple(casadi.vertsplit(modes)) if mechanism.modes else (), channels, k)
-    return Traced(
+    return TracedEquations(
         Symbols(x, modes, u, casadi.vertcat(p, energy)),
         of("derivative", values, applied, k),
         of("outputs", values, applied, energy, k),
@@ -174,7 +174,7 @@ def expressions(mechanism: Mechanism, switched: bool = False) -> Traced:
     )
 
 
-def _compiled(traces: Traced, functions: Mapping[str, Any], lanes: int = 1) -> MachineCode:
+def _compiled(traces: TracedEquations, functions: Mapping[str, Any], lanes: int = 1) -> MachineCode:
     """Compile expressions in the symbols of ``traces``, by name; with several lanes, outputs are written row by row."""
     from ..numerics.codegen import MachineCode
 
@@ -219,7 +219,7 @@ def machine(mechanism: Mechanism, switched: bool = False, lanes: int = 1) -> Mac
 
 
 @cache
-def chosen_outputs(mechanism: Mechanism, switched: bool, columns: tuple[int, ...], lanes: int) -> MachineCode:
+def compile_outputs(mechanism: Mechanism, switched: bool, columns: tuple[int, ...], lanes: int) -> MachineCode:
     """Compile a function ``chosen`` of the outputs with these indices only, which takes less time than all outputs."""
     from ..numerics.codegen import MAKING
 

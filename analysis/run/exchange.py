@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from .fmu import FmuModel
 from .inputs import Encoded
-from .sampling import named, release, sample
+from .sampling import name_channels, release, sample
 
 #: Largest number of CVode's steps between two samples.
 MOST_STEPS = 100_000
@@ -88,7 +88,7 @@ class Exchange(CVodeSolver):  # type: ignore[misc]
 
     def inputs(self, t: float, x: NDArray[np.float64], left: bool = False) -> dict[str, float]:
         """Return all inputs by name, at a time and a state; ``left`` for the limit from the left where an input jumps."""
-        return named(self.encoded, sample(self.encoded, t, x, self.laws, left=left))
+        return name_channels(self.encoded, sample(self.encoded, t, x, self.laws, left=left))
 
     def begin(self, released: Any = ()) -> bool:
         """Begin an interval of smooth inputs; return whether the FMU requests the end of the run.

@@ -91,7 +91,7 @@ def read_description(fmu: str | Path, *, validate: bool = False) -> Any:
     return description
 
 
-def offered(fmu: str | Path) -> dict[str, str]:
+def list_interfaces(fmu: str | Path) -> dict[str, str]:
     """Return the interfaces that an FMU has: their descriptions by their names in `cosimulate`.
 
     Raises

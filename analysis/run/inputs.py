@@ -244,7 +244,7 @@ def read_start(mechanism: Mechanism, data: Any, base: InitialState | None = None
 
 
 @lru_cache(maxsize=64)
-def _at_rest(mechanism: Mechanism) -> InitialState:
+def _rest_state(mechanism: Mechanism) -> InitialState:
     """Return the default initial state."""
     return read_start(mechanism, {})
 
@@ -267,7 +267,7 @@ def speed_ratio(name: str, value: float, reference: str, speed: float) -> Fracti
     return ratio
 
 
-def checked_run(mechanism: Mechanism, inputs: Inputs | None, initial: InitialState | None) -> tuple[Inputs, Any]:
+def check_run(mechanism: Mechanism, inputs: Inputs | None, initial: InitialState | None) -> tuple[Inputs, Any]:
     """Check the inputs and the initial state of a run and return them; the defaults are no inputs and the state of rest.
 
     The state may be a mapping, as for `read_start`.
@@ -289,7 +289,7 @@ def checked_run(mechanism: Mechanism, inputs: Inputs | None, initial: InitialSta
         if unit != (right := input_units(mechanism).get(name, unit)):
             raise InputError(f"{name} of a {mechanism.name} is given in {unit}: it must be in {right}")
     if initial is None:
-        initial = _at_rest(mechanism)
+        initial = _rest_state(mechanism)
     elif isinstance(initial, Mapping):
         initial = read_start(mechanism, initial)
     if not isinstance(initial, mechanism.initial):

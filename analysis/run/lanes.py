@@ -27,20 +27,20 @@ from .compiled import (
     BATCH,
     Batch,
     begin_interval,
-    choose_first,
+    choose_first_size,
     lane_motion,
     make_room,
     next_size,
     read_lane,
-    refused,
     sample_step,
+    short_step_status,
     write_lane,
 )
 from .equations import CLEARANCE, DERIVATIVE
 from .locating import end_step, locate_events
 from .records import PROBLEM, RUNNING, SAMPLES, STATE, WATCH, Problem, Room, Samples, State, Watch
 from .sources import ADDRESSES, SOURCE, Source
-from .stepping import STAGES, following, shorter
+from .stepping import STAGES, next_step_size, shorter_step_size
 from .stepping_in_lanes import errors_in_lanes, interpolants_in_lanes, interpolate_in_lanes, stage_in_lanes
 
 
@@ -259,7 +259,7 @@ def _choose_sizes(v, w):
                 v.phase[lane] = _INSIDE
                 read_lane(lane, LANES, v.z, w.room.k[0])
                 write_lane(lane, LANES, w.room.k[0], v.k[0])
-                choose_first(_motion(i, w))
+                choose_first_size(_motion(i, w))
             v.h[lane], v.last[lane] = next_size(carry)
             carry.steps += 1
 
@@ -288,15 +288,15 @@ def _decide(lane, least, v, w):
     error = v.error[lane] / w.problem.tolerance
     v.outcome[lane] = _judge(lane, error, carry, w.samples, v)
     if v.outcome[lane] != _REJECTED:
-        carry.step = following(h, carry.step, error)
+        carry.step = next_step_size(h, carry.step, error)
         if v.clearance[lane] < LIMIT_SINE:
             _end_at_limit(lane, v, w)
         return
     carry.rejected += 1
-    carry.step = shorter(h, error)
+    carry.step = shorter_step_size(h, error)
     if not carry.step >= least:
         read_lane(lane, LANES, v.x, w.state.x[i])
-        w.status[i] = refused(h, _motion(i, w))
+        w.status[i] = short_step_status(h, _motion(i, w))
         v.run[lane] = -1
 
 

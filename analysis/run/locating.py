@@ -17,13 +17,13 @@ from .records import (
     RUNNING,
     STOPS,
     equation,
+    is_bar_released,
     look_inside,
-    released,
     renew,
     state_clearance,
     step_time,
 )
-from .sources import unwound
+from .sources import is_bar_unwound
 from .stepping import NODES, interpolant, interpolate, stage
 
 #: Largest number of events of one kind in a step, each in its own part of the step; the begin of an interval may add one.
@@ -152,9 +152,9 @@ def locate_events(clearance, h, motion):
     if clearance < LIMIT_SINE:
         what = ASSEMBLY
         cut = _locate(ASSEMBLY, 0.0, 1.0, h, motion)
-    if released(motion.room.y, motion):
+    if is_bar_released(motion.room.y, motion):
         for n in range(motion.source.laws.shape[0]):
-            if unwound(n, motion.room.y, motion.source):
+            if is_bar_unwound(n, motion.room.y, motion.source):
                 s = _locate(RELEASE - n, 0.0, 1.0, h, motion)
                 if s < cut:
                     what, cut = RELEASE - n, s

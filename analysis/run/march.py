@@ -15,7 +15,7 @@ from linkwork.limits import LIMIT_SINE, NEAR_LIMIT
 
 from . import records as k
 from .cautions import energy_balance
-from .events import Event, RunInterrupted, shown
+from .events import Event, RunInterrupted, show_progress
 from .locating import SAME
 from .prepared import Run, verdict
 from .sampling import NotFiniteError, release, sample
@@ -34,7 +34,7 @@ def solve(run: Run, method: str | type[OdeSolver], options: dict[str, Any], prog
     begun = clock.perf_counter()
     march = March(run)
     interrupted = False
-    with shown(progress, run.settings.times[-1] - run.settings.times[0]) as show:
+    with show_progress(progress, run.settings.times[-1] - run.settings.times[0]) as show:
         try:
             march.run(method, options, show if progress else None)
         except KeyboardInterrupt:
@@ -46,7 +46,7 @@ def solve(run: Run, method: str | type[OdeSolver], options: dict[str, Any], prog
     values = [march.outputs(x, held) for _, x, held in rows]
     code, message = verdict(run.mechanism, run.settings, march.status, march.t, march.x, run.limit)
     if march.status == k.NO_STEP:
-        message += run.undefined(march.good[1])
+        message += run.describe_undefined_forces(march.good[1])
     table = np.array(values).reshape(-1, len(names))
     if not code:
         message = energy_balance(names, table, run.settings.tolerance)
@@ -116,7 +116,7 @@ class March:
             u = sample(e, t, self.x, self.laws, ahead=ahead)
         else:
             u = sample(e, t, self.x, self.laws)
-        self.held = self.of.applied(u)
+        self.held = self.of.apply_inputs(u)
         return u
 
     def run(self, method: str | type[OdeSolver], options: dict[str, Any], show: Callable[[float], None] | None) -> None:
@@ -165,7 +165,7 @@ class March:
     def _inputs(self, t: float, x: NDArray[np.float64], stop: float) -> Any:
         if self.settings.hold or (self.of.encoded.steady and not self.laws[:, 2].any()):
             return self.held
-        return self.of.applied(sample(self.of.encoded, t, x, self.laws, left=t >= stop))
+        return self.of.apply_inputs(sample(self.of.encoded, t, x, self.laws, left=t >= stop))
 
     def _derivative(self, t: float, x: NDArray[np.float64], stop: float) -> NDArray[np.float64]:
         # without a configuration or an input, such a derivative makes the method repeat the step with a shorter length

@@ -196,7 +196,7 @@ def trace_masses(parameters: Parameters) -> tuple[Mass, ...]:
     return mass_origins(parameters, changed, known, source)
 
 
-def in_sentences(masses: tuple[Mass, ...]) -> tuple[str, list[str]]:
+def describe_masses(masses: tuple[Mass, ...]) -> tuple[str, list[str]]:
     """Return a sentence with all masses and their origins, and a warning for each mass that is ``stale``.
 
     >>> in_sentences((Mass("crank.mass", 0.1, "as given"), Mass("slider.mass", 0.6, "as given")))[0]

@@ -16,12 +16,12 @@ from linkwork.limits import ASSEMBLY
 from linkwork.mechanism import Mechanism
 
 from ..mechanisms import InitialState, Parameters, mechanism_of
-from ..numerics.workers import interruptible
+from ..numerics.workers import record_interrupts
 from .angles import WholeTurns
-from .cautions import MANY_STEPS, disturbance_rates, energy_balance, stiffness, too_slow
-from .equations import OUTPUTS, chosen_outputs, machine
-from .events import Event, RunInterrupted, shown
-from .inputs import Encoded, Inputs, align, checked_run, compile_function, compiled_source, encode
+from .cautions import MANY_STEPS, disturbance_rates, energy_balance, is_too_slow, stiffness
+from .equations import OUTPUTS, compile_outputs, machine
+from .events import Event, RunInterrupted, show_progress
+from .inputs import Encoded, Inputs, align, check_run, compile_function, compiled_source, encode
 from .sampling import NotFiniteError, sample
 from .trajectory import Occurrence, Trajectory
 
@@ -76,7 +76,7 @@ class Run:
 
     def __post_init__(self) -> None:
         self.mechanism = mechanism_of(self.parameters)
-        self.inputs, self.initial = checked_run(self.mechanism, self.inputs, self.initial)
+        self.inputs, self.initial = check_run(self.mechanism, self.inputs, self.initial)
         self.encoded = align(encode(self.inputs, self.mechanism), self.settings.times)
         self.p = self.parameters.constants()
         self.modes = tuple(float(value) for value in self.encoded.modes.values())
@@ -95,15 +95,17 @@ class Run:
         u = sample(self.encoded, float(self.settings.times[0]), x, self.encoded.source.laws)
         for channel, place, _ in self.encoded.commands:
             x[place] = u[channel]
-        state = self.mechanism.equations.start(tuple(x.tolist()), self.applied(u), self.p)
-        self.mechanism.check_state(self.parameters, state, self.applied(u), self.p)
+        state = self.mechanism.equations.start(tuple(x.tolist()), self.apply_inputs(u), self.p)
+        self.mechanism.check_state(self.parameters, state, self.apply_inputs(u), self.p)
         scale = np.array(self.mechanism.error_scale(self.parameters, state))
         energy = self.mechanism.equations.energy(state, self.p)
         # only such large values may overflow
         great = not (abs(energy) < _GREAT and np.abs(u).max(initial=0.0) < _GREAT)
         if (
             great
-            and not np.isfinite([energy, *self.mechanism.equations.derivative(state, self.applied(u), self.p)]).all()
+            and not np.isfinite(
+                [energy, *self.mechanism.equations.derivative(state, self.apply_inputs(u), self.p)]
+            ).all()
         ):
             names = [name for freedom in self.mechanism.freedoms for name in (freedom.coordinate, freedom.rate)]
             values = dict(zip([*names[::2], *names[1::2]], state))
@@ -114,16 +116,16 @@ class Run:
             )
         return Start(np.array(state), energy, scale)
 
-    def applied(self, u: NDArray[np.float64]) -> Any:
+    def apply_inputs(self, u: NDArray[np.float64]) -> Any:
         """Return the inputs in the form that the equations take."""
         return self.mechanism.equations.apply_inputs(self.modes, tuple(u.tolist()), self.p)
 
     def limit(self, x: NDArray[np.float64]) -> str:
         """Return the message for a run that ended at a limit of the motion, at the state x."""
         idle = np.zeros(len(self.mechanism.channels))
-        return self.mechanism.describe_limit(x.tolist(), self.applied(idle), self.p)
+        return self.mechanism.describe_limit(x.tolist(), self.apply_inputs(idle), self.p)
 
-    def stiff(self, x: NDArray[np.float64], u: NDArray[np.float64], steps: float, passed: float) -> str:
+    def stiffness_caution(self, x: NDArray[np.float64], u: NDArray[np.float64], steps: float, passed: float) -> str:
         """Return a caution that the run is stiff or vibrates fast, or an empty text.
 
         ``x`` and ``u`` are state and channels after ``steps`` steps, which covered the time ``passed`` (s).
@@ -133,9 +135,9 @@ class Run:
         times, mechanism = self.settings.times, self.mechanism
         turning = [abs(x[len(mechanism.freedoms) + i]) for i in mechanism.cyclic_freedoms]
         usual = max([pi * (len(times) - 1) / float(np.ptp(times)), *(_HARMONICS * speed for speed in turning)])
-        return stiffness(disturbance_rates(mechanism, x, self.applied(u), self.p), steps, passed, usual)
+        return stiffness(disturbance_rates(mechanism, x, self.apply_inputs(u), self.p), steps, passed, usual)
 
-    def lost(self, channel: int, t: float, x: NDArray[np.float64]) -> NotFiniteError:
+    def not_finite_error(self, channel: int, t: float, x: NDArray[np.float64]) -> NotFiniteError:
         """Return the error for an input, by the number of its channel, that is not finite at the time t and the state x."""
         return NotFiniteError(self.encoded, channel, t, x)
 
@@ -149,7 +151,7 @@ class Run:
         state.carries["begin"] = times[0]
         return samples, state
 
-    def compiled(self, progress: bool, balanced: bool = False) -> Trajectory:
+    def solve_compiled(self, progress: bool, balanced: bool = False) -> Trajectory:
         """Solve the run with the compiled solver; ``balanced`` restores the energy balance after each step.
 
         Raises
@@ -163,7 +165,7 @@ class Run:
         begun = clock.perf_counter()
         turns = WholeTurns(self.mechanism, self.p, self.modes, self.encoded, self.events)
         start, laws = self.start(), self.encoded.source.laws
-        if turns.too_many(start.x):
+        if turns.has_many_turns(start.x):
             turns.take(start.x, sample(self.encoded, float(self.settings.times[0]), start.x, laws), laws, 0)
             # the energy at the start must be that of the reduced angles
             start = replace(start, energy=self.mechanism.equations.energy(tuple(start.x.tolist()), self.p))
@@ -178,7 +180,7 @@ class Run:
         status, integrating = np.full(1, k.RUNNING), 0.0
         occurrences: list[list[float]] = []
         stiff, needed, span = "", 0.0, times[-1] - times[0]
-        with interruptible() as interrupted, shown(progress, span) as show:
+        with record_interrupts() as interrupted, show_progress(progress, span) as show:
             try:
                 while status[0] == k.RUNNING and carry["steps"] < most and not needed and not interrupted:
                     entered = clock.perf_counter()
@@ -190,15 +192,15 @@ class Run:
                     carry["found"] = 0
                     passed, steps = float(carry["begin"] + carry["elapsed"] - times[0]), float(carry["steps"])
                     show(passed)
-                    stiff = self.stiff(x, u, steps, passed)
-                    needed = steps * span / passed if stiff and too_slow(steps, passed, span, most) else 0.0
+                    stiff = self.stiffness_caution(x, u, steps, passed)
+                    needed = steps * span / passed if stiff and is_too_slow(steps, passed, span, most) else 0.0
                     if status[0] == k.RUNNING:
                         turns.take(x, u, source.laws, int(carry["sample"]), watch)
             except KeyboardInterrupt:  # raised by the caller's code
                 interrupted.append(True)
         t = float(carry["begin"] + carry["elapsed"])
         if status[0] == k.BAD_INPUT:
-            raise self.lost(int(carry["lost"]), t, x + turns.taken)
+            raise self.not_finite_error(int(carry["lost"]), t, x + turns.taken)
         done = int(carry["sample"])
         times, states, forces = times[:done], samples.states[0, :done], samples.forces[0, :done]
         if carry["started"] and times[-1] < t:
@@ -206,7 +208,7 @@ class Run:
             times, states, forces = np.append(times, t), np.vstack([states, x]), np.vstack([forces, u])
         code, message = verdict(self.mechanism, self.settings, int(status[0]), t, x + turns.taken, self.limit, needed)
         if status[0] == k.NO_STEP:
-            message += self.undefined(x)
+            message += self.describe_undefined_forces(x)
         values = turns.put_back(compute_outputs(self.mechanism, problem.modes, batch.p[0], states, forces))
         balance = "" if code else energy_balance(self.mechanism.output_names, values, self.settings.tolerance)
         message = "; ".join(filter(None, (message, stiff, balance)))
@@ -234,7 +236,7 @@ class Run:
             raise RunInterrupted(trajectory)
         return trajectory
 
-    def undefined(self, x: NDArray[np.float64]) -> str:
+    def describe_undefined_forces(self, x: NDArray[np.float64]) -> str:
         """Return a text that names springs without a finite force 1 us or 1 ms after the state x; empty if there are none."""
         springs = {v.name: v.of for v in self.mechanism.variables if v.role == "spring force"}
         if not springs:
@@ -355,7 +357,7 @@ def compute_outputs(
     if columns is None:
         outputs, count = machine(mechanism, switched, width()).addresses[OUTPUTS], len(mechanism.output_names)
     else:
-        outputs, count = chosen_outputs(mechanism, switched, columns, width()).addresses["chosen"], len(columns)
+        outputs, count = compile_outputs(mechanism, switched, columns, width()).addresses["chosen"], len(columns)
     values = np.empty((len(states), count))
     rows(outputs, width(), modes, p, np.ascontiguousarray(states), np.ascontiguousarray(inputs), values)
     return values

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from ..numerics.codegen import CUBE, MATRIX, VECTOR, copy, evaluate, inner
 from .equations import CLEARANCE
-from .sources import ADDRESSES, PLACES, Source, unwound, write_channels
+from .sources import ADDRESSES, PLACES, Source, is_bar_unwound, write_channels
 from .stepping import interpolate
 
 # Status of a run, as the kernels return it; from BAD_INPUT to NO_STEP the same as solver.status of the FMI contract
@@ -183,10 +183,10 @@ def look_inside(s, h, motion):
 
 
 @inner
-def released(y, motion):
+def is_bar_released(y, motion):
     """Return whether a torsion bar is released in a step that ends at the state y; False if inputs are held."""
     if motion.problem.hold == 0.0:
         for n in range(motion.source.laws.shape[0]):
-            if unwound(n, y, motion.source):
+            if is_bar_unwound(n, y, motion.source):
                 return True
     return False

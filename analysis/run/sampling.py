@@ -58,10 +58,10 @@ def sample(
     channels(t, ahead, left, x, source, encoded.commands, u, np.empty_like(u))
     here = np.zeros_like(u)
     if any(chain.from_iterable(encoded.functions)):
-        here = of_functions(encoded, t, x)
+        here = function_values(encoded, t, x)
         u += here
         if ahead > t and len(encoded.commands) and np.isfinite(here).all():
-            there = of_functions(encoded, ahead, x)
+            there = function_values(encoded, ahead, x)
             for value, _, rate in encoded.commands:
                 u[rate] += (there[value] - here[value]) / (ahead - t) - here[rate]
     for lost in np.flatnonzero(~np.isfinite(u)):
@@ -72,7 +72,7 @@ def sample(
     return u
 
 
-def named(encoded: Encoded, u: NDArray[np.float64]) -> dict[str, float]:
+def name_channels(encoded: Encoded, u: NDArray[np.float64]) -> dict[str, float]:
     """Return the values u of the channels by their names in the FMI contract."""
     return dict(zip(encoded.mechanism.input_names, u.tolist()))
 
@@ -82,7 +82,7 @@ def release(encoded: Encoded, x: NDArray[np.float64], laws: NDArray[np.float64])
     laws[x[encoded.source.law_places[:, 1]] >= laws[:, 1], 2] = 0.0
 
 
-def of_functions(encoded: Encoded, t: float, x: NDArray[np.float64]) -> NDArray[np.float64]:
+def function_values(encoded: Encoded, t: float, x: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return what the user's functions add to the channels at time t and state x, shape (channels,)."""
     added = np.zeros(len(encoded.mechanism.channels))
     state = x[: 2 * len(encoded.mechanism.freedoms)].tolist()

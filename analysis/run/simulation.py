@@ -15,7 +15,7 @@ from linkwork.plant import check_tolerance
 from ..files import limit, unknown_name
 from ..mechanisms import InitialState, Parameters
 from ..units import Amount, in_si
-from .arguments import driven, started, takes_options, takes_published, usual_times
+from .arguments import complete_initial_state, complete_inputs, takes_options, takes_published, usual_times
 from .events import Event
 from .inputs import Inputs
 from .prepared import Run, Settings
@@ -87,7 +87,7 @@ class SolverOptions(RunOptions, total=False):
     vectorized: bool
 
 
-@takes_published(inputs=driven, initial=started)
+@takes_published(inputs=complete_inputs, initial=complete_initial_state)
 @takes_options(SolverOptions)
 @in_si(stop_time="s", step="s", start_time="s", samples="s", hold="s")
 def simulate(
@@ -182,7 +182,7 @@ def simulate(
     if method in ("compiled", "balanced"):
         if options:
             raise InputError(f"the {method} method takes no options, but was given {', '.join(options)}")
-        return run.compiled(progress, method == "balanced")
+        return run.solve_compiled(progress, method == "balanced")
     from .march import solve
 
     return solve(run, _solver(method), dict(options), progress)

@@ -76,7 +76,7 @@ def write_channels(begin, elapsed, piece, x, source, u):
 
 
 @inner
-def wound(laws):
+def is_bar_wound(laws):
     """Return whether any torsion bar acts."""
     for n in range(laws.shape[0]):  # noqa: SIM110 - Numba compiles no generators  # noqa: SIM110 - Numba compiles no generators
         if laws[n, 2] != 0.0:
@@ -85,7 +85,7 @@ def wound(laws):
 
 
 @inner
-def unwound(n, x, source):
+def is_bar_unwound(n, x, source):
     """Return whether torsion bar n acts and has fully unwound at state x."""
     return source.laws[n, 2] != 0.0 and x[source.law_places[n, 1]] >= source.laws[n, 1]
 

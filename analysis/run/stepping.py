@@ -103,13 +103,13 @@ def _local_error(x, y, k, h, scale):
 
 
 @inner
-def shorter(h, error):
+def shorter_step_size(h, error):
     """Return the step size to try after a step of size h was rejected; ``error`` is relative to the tolerance."""
     return h * (max(LEAST_FACTOR, SAFETY * error**EXPONENT) if 1.0 < error < 1e30 else 0.25)
 
 
 @inner
-def following(h, proposed, error):
+def next_step_size(h, proposed, error):
     """Return the next step size after an accepted step of size h, from its error relative to the tolerance.
 
     If h was cut shorter than ``proposed``, as at the end of an interval, the next step is not shorter than ``proposed``.

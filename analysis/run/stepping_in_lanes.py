@@ -12,7 +12,7 @@ import numpy as np
 from linkwork import tableau
 
 from ..numerics.codegen import inner
-from ..numerics.vectors import LANES, fused, greater, load, root, size, spread, store
+from ..numerics.vectors import LANES, absolute, greater, load, multiply_add, spread, square_root, store
 from .stepping import E3, E5, FROM, ROW, STAGES, WEIGHT
 
 #: Replaces a sum of squares that is zero.
@@ -31,8 +31,8 @@ def stage_in_lanes(s, x, k, h, y):
     for i in range(x.shape[0] // LANES):
         total = 0.0 * step
         for j in range(ROW[s], ROW[s + 1]):
-            total = fused(WEIGHT[j], load(k[FROM[j]], i), total)
-        store(y, i, fused(step, total, load(x, i)))
+            total = multiply_add(WEIGHT[j], load(k[FROM[j]], i), total)
+        store(y, i, multiply_add(step, total, load(x, i)))
 
 
 @inner
@@ -45,12 +45,12 @@ def errors_in_lanes(x, y, k, h, scale, errors):
         e3, e5, end = 0.0 * step, 0.0 * step, load(y, i)
         for j in range(_OF_ERROR.shape[0]):
             rate = load(k[_OF_ERROR[j]], i)
-            e3, e5 = fused(_E3[j], rate, e3), fused(_E5[j], rate, e5)
-        weight = 1.0 / (load(scale, i) + greater(size(load(x, i)), size(end)))
-        e3, e5, valid = e3 * weight, e5 * weight, fused(0.0, end, valid)
-        sum3, sum5 = fused(e3, e3, sum3), fused(e5, e5, sum5)
+            e3, e5 = multiply_add(_E3[j], rate, e3), multiply_add(_E5[j], rate, e5)
+        weight = 1.0 / (load(scale, i) + greater(absolute(load(x, i)), absolute(end)))
+        e3, e5, valid = e3 * weight, e5 * weight, multiply_add(0.0, end, valid)
+        sum3, sum5 = multiply_add(e3, e3, sum3), multiply_add(e5, e5, sum5)
     bottom = greater(float(n) * (sum5 + 0.01 * sum3), 0.0 * step + _LEAST)
-    store(errors, 0, step * sum5 / root(bottom) + valid)
+    store(errors, 0, step * sum5 / square_root(bottom) + valid)
 
 
 @inner
@@ -65,7 +65,12 @@ def interpolants_in_lanes(x, y, k, h, f):
         a = b = c = d = 0.0 * step
         for j in range(_OF_CURVE.shape[0]):
             rate = load(k[_OF_CURVE[j]], i)
-            a, b, c, d = fused(_D0[j], rate, a), fused(_D1[j], rate, b), fused(_D2[j], rate, c), fused(_D3[j], rate, d)
+            a, b, c, d = (
+                multiply_add(_D0[j], rate, a),
+                multiply_add(_D1[j], rate, b),
+                multiply_add(_D2[j], rate, c),
+                multiply_add(_D3[j], rate, d),
+            )
         store(f[3], i, step * a)
         store(f[4], i, step * b)
         store(f[5], i, step * c)
@@ -81,4 +86,4 @@ def interpolate_in_lanes(fractions, x, f, out):
         total = (load(f[6], i) * after + load(f[5], i)) * before
         total = ((total + load(f[4], i)) * after + load(f[3], i)) * before
         total = ((total + load(f[2], i)) * after + load(f[1], i)) * before
-        spread(out, i, fused(total + load(f[0], i), after, load(x, i)))
+        spread(out, i, multiply_add(total + load(f[0], i), after, load(x, i)))

@@ -17,7 +17,7 @@ from ..display import Shown, format_count, format_range
 from ..files import unknown_name
 from ..libraries import require
 from ..mechanisms import MECHANISMS, Parameters, output_units
-from .masses import in_sentences, trace_masses
+from .masses import describe_masses, trace_masses
 
 if TYPE_CHECKING:
     import pandas
@@ -114,7 +114,7 @@ class Trajectory(Shown):
         if self.parameters is None:
             return ""
         masses = trace_masses(self.parameters)
-        return "; ".join((in_sentences(masses)[0], *(mass.stale for mass in masses if mass.stale)))
+        return "; ".join((describe_masses(masses)[0], *(mass.stale for mass in masses if mass.stale)))
 
     def column(self, name: str) -> int:
         """Return the column number of an output.

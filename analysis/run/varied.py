@@ -20,13 +20,13 @@ from linkwork.parameters import Rules, field_name, fmi_name
 from .. import files
 from ..mechanisms import Parameters, mechanism_of
 from ..numerics.symbolic import ELEMENTARY
-from ..numerics.tracing import Rebound, rebound
+from ..numerics.tracing import ReboundFunctions, rebind_functions
 from .arguments import variant
-from .equations import equation_modules, like_parameters
+from .equations import equation_modules, parameters_class
 from .inputs import Inputs
 
 
-class Varied(Sequence[Any]):
+class VariedSequence(Sequence[Any]):
     """A sequence of objects that differ in some fields; an object is made only when its index is used.
 
     Attributes
@@ -49,13 +49,13 @@ class Varied(Sequence[Any]):
 
     def __getitem__(self, index: Any) -> Any:
         if isinstance(index, slice):
-            return Varied(self.base, {name: values[index] for name, values in self.columns.items()}, self.make)
+            return VariedSequence(self.base, {name: values[index] for name, values in self.columns.items()}, self.make)
         return self.make(self.base, **{name: values[index].item() for name, values in self.columns.items()})
 
 
-def distinct(items: Sequence[Any]) -> list[Any]:
-    """Return the objects of a sequence without repetitions; of a `Varied` sequence only the first, which represents all."""
-    return [items[0]] if isinstance(items, Varied) else list({id(item): item for item in items}.values())
+def distinct_objects(items: Sequence[Any]) -> list[Any]:
+    """Return the objects of a sequence without repetitions; of a `VariedSequence` only the first, which represents all."""
+    return [items[0]] if isinstance(items, VariedSequence) else list({id(item): item for item in items}.values())
 
 
 def vary(parameters: Parameters, inputs: Any, values: Mapping[str, Any]) -> tuple[Sequence[Any], Any]:
@@ -98,14 +98,14 @@ def vary(parameters: Parameters, inputs: Any, values: Mapping[str, Any]) -> tupl
     count = next(iter(lengths.values()))
     sets: Sequence[Any] = [parameters] * count
     if of_sets:
-        sets = Varied(parameters, of_sets, replace)
+        sets = VariedSequence(parameters, of_sets, replace)
         check_sets(mechanism, sets)
     for name, column in of_inputs.items():
         for i in np.flatnonzero(~np.isfinite(column))[:1].tolist():
             raise InputError(f"set {i} of {count}: {name} is {column[i]}: it must be a finite number")
     if not of_inputs:
         return sets, inputs
-    return sets, Varied(Inputs() if inputs is None else inputs, of_inputs, Inputs.replace)
+    return sets, VariedSequence(Inputs() if inputs is None else inputs, of_inputs, Inputs.replace)
 
 
 def _read_parameter(parameters: Parameters, field: str, text: str) -> float:
@@ -128,7 +128,7 @@ def _column(name: str, given: Any, read: Callable[[str], float]) -> NDArray[np.f
     return column.astype(float)
 
 
-def check_sets(mechanism: Mechanism, sets: Varied) -> None:
+def check_sets(mechanism: Mechanism, sets: VariedSequence) -> None:
     """Check all sets against the rules of the parameters at once; raise ParameterError for the first that breaks a rule."""
     rules: Rules = mechanism.parameters.RULES  # type: ignore[attr-defined]
     wrong = np.zeros(len(sets), dtype=bool)
@@ -161,11 +161,11 @@ def check_sets(mechanism: Mechanism, sets: Varied) -> None:
 def varied_constants(mechanism: Mechanism, sets: Sequence[Parameters]) -> tuple[SimpleNamespace, Any]:
     """Return the parameters of all sets as one object with arrays, and the constants of the equations computed from it.
 
-    With `Varied` sets, parameters that do not vary are numbers.
+    With `VariedSequence` sets, parameters that do not vary are numbers.
     """
-    _, like = over_arrays(mechanism)
+    _, like = array_functions(mechanism)
     names = [field.name for field in fields(mechanism.parameters)]
-    if isinstance(sets, Varied):
+    if isinstance(sets, VariedSequence):
         columns = {name: sets.columns.get(name, float(getattr(sets.base, name))) for name in names}
     else:
         columns = dict(zip(names, np.array(list(map(attrgetter(*names), sets)), float).reshape(len(sets), -1).T))
@@ -174,15 +174,15 @@ def varied_constants(mechanism: Mechanism, sets: Sequence[Parameters]) -> tuple[
 
 
 @cache
-def over_arrays(mechanism: Mechanism) -> tuple[Rebound, type[SimpleNamespace]]:
+def array_functions(mechanism: Mechanism) -> tuple[ReboundFunctions, type[SimpleNamespace]]:
     """Return the equations as functions of arrays, and the class of parameters with arrays as fields.
 
     They apply the functions of `math` to each element, as NumPy's functions differ in the last bits.
     """
     elementwise = {name: _elementwise(getattr(math, name)) for name in ELEMENTARY}
     ours = {"sqrt": np.sqrt, "fabs": np.abs, "max": np.maximum, "min": np.minimum, "float": lambda value: value}
-    functions = rebound(equation_modules(mechanism), elementwise | ours)
-    return functions, like_parameters(mechanism, functions)
+    functions = rebind_functions(equation_modules(mechanism), elementwise | ours)
+    return functions, parameters_class(mechanism, functions)
 
 
 def _elementwise(function: Callable[..., float]) -> Callable[..., Any]:

@@ -16,7 +16,7 @@ from linkwork.errors import InputError
 from ..export import KINDS, NATIVE, PLATFORMS, PYTHON, build, build_native, kinds_here, this_platform, with_starts
 from ..files import Choice, Many, Quantity, Whole, entry, flag, read, text
 from ..mechanisms import mechanism_of
-from ..periodic import of_the_motor, steady_drive
+from ..periodic import motor_parameters, steady_drive
 from ..run import Case, cosimulate
 from ..studio import given_values, page_case, page_state, shown_unit
 from ..tuning import Wish, tune
@@ -134,7 +134,7 @@ def _exported(case: Case, wanted: _Export) -> Answer:
     """Build a native FMU with the values of the page as start values."""
     mechanism = mechanism_of(case.parameters)
     values = given_values(mechanism, page_state(case)["values"])
-    motor = of_the_motor(mechanism)
+    motor = motor_parameters(mechanism)
     if any(values[name] != 0.0 for name, (field, _) in motor.items() if field == "breakdown_torque"):
         raise InputError(
             "an FMU has no motor: take it out here, and connect one to the FMU's torque in the system that it goes into"

@@ -27,7 +27,7 @@ from linkwork.five_bar.variables import OUTPUT_NAMES
 from ..files import unknown_name
 from ..mechanisms import FIVE_BAR, output_units
 from ..numerics.fourier import FourierSeries
-from ..run import at_its_speed, compute_outputs, takes_published
+from ..run import complete_speed, compute_outputs, takes_published
 from ..units import Amount, in_si
 from ..youssef import require_no_contact_friction
 
@@ -217,7 +217,7 @@ def slider_force(
     return dynamics.inertia(g, k, p).m22 * acceleration + b2 - q2
 
 
-@takes_published(crank_speed=at_its_speed)
+@takes_published(crank_speed=complete_speed)
 @in_si(crank_speed="rad/s")
 def inverse_dynamics(
     parameters: FiveBarParameters,
@@ -339,7 +339,7 @@ class BestSpring:
     rms_force_without: float
 
 
-@takes_published(crank_speed=at_its_speed)
+@takes_published(crank_speed=complete_speed)
 @in_si(crank_speed="rad/s", free_position="m")
 def best_spring(
     parameters: FiveBarParameters,

@@ -32,7 +32,7 @@ from linkwork.slider_crank.kinematics import Position
 from linkwork.slider_crank.parameters import Constants, SliderCrankParameters
 from linkwork.slider_crank.vectors import Vector
 
-from ..run import at_its_speed, takes_published
+from ..run import complete_speed, takes_published
 from ..units import Amount, in_si
 from . import mobility
 from .mobility import DeadCentre
@@ -342,7 +342,7 @@ class ForceTurn:
 
 
 @takes_published(
-    crank_speed=at_its_speed,
+    crank_speed=complete_speed,
     shift=lambda known, shift: ConstantShift(known.initial.shift_position) if shift is None else shift,
 )
 @in_si(crank_speed="rad/s", crank_acceleration="rad/s2", angles="rad", load="N", torque="N.m")

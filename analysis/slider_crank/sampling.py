@@ -17,7 +17,7 @@ from linkwork.limits import LIMIT_SINE
 from linkwork.parameters import POSITIVE, field_name
 from linkwork.slider_crank.parameters import SliderCrankParameters
 
-from ..numerics.workers import check_jobs, over_workers, worker_count
+from ..numerics.workers import check_jobs, run_in_parallel, worker_count
 from .forces import NO_LEVER, SLIDER_FORCE, ForceTurn
 from .quantities import DEAD_CENTRE, FloatArray, MaskedArray, masked_array, shown_units
 from .tolerances import (
@@ -272,7 +272,7 @@ def monte_carlo(
     size = len(turn) if cores == 1 else -(-len(turn) // (_PARTS * cores))
     parts = [range(k, min(k + size, len(turn))) for k in range(0, len(turn), max(1, size))]
     work = partial(_sample_angles, turn, tuple(tolerances), tuple(quantities), samples, seed)
-    found = dict(over_workers(work, parts, n_jobs=n_jobs))
+    found = dict(run_in_parallel(work, parts, n_jobs=n_jobs))
     drawn = [x for number in sorted(found) for x in found[number]]
     poles = {name: np.array([x.across and name not in FREE_OF_LOAD for x in drawn]) for name in quantities}
     return MonteCarlo(

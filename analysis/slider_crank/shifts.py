@@ -21,7 +21,7 @@ from linkwork.limits import LIMIT_SINE
 from linkwork.slider_crank import dynamics, kinematics, vectors
 from linkwork.slider_crank.parameters import Constants, SliderCrankParameters
 
-from ..numerics.tracing import Rebound, rebound
+from ..numerics.tracing import ReboundFunctions, rebind_functions
 from ..units import Amount, in_si
 from . import mobility
 from .mobility import DeadCentre
@@ -29,10 +29,10 @@ from .quantities import FloatArray
 
 
 @cache
-def plant_functions() -> Rebound:
+def plant_functions() -> ReboundFunctions:
     """Return the plant's functions by name, for NumPy arrays and for dual numbers (`analysis.numerics.dual`)."""
     elementary = {"sin": np.sin, "cos": np.cos, "sqrt": np.sqrt, "atan2": np.arctan2, "tanh": np.tanh}
-    return rebound((friction, vectors, kinematics, dynamics), elementary)
+    return rebind_functions((friction, vectors, kinematics, dynamics), elementary)
 
 
 class ShiftMotion(NamedTuple):

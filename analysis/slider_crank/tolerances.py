@@ -29,7 +29,7 @@ from linkwork.slider_crank.parameters import Constants, SliderCrankParameters
 from ..files import unknown_name
 from ..numerics.dual import Dual, dual
 from ..numerics.dual import variables as independent
-from ..numerics.tracing import rebound
+from ..numerics.tracing import rebind_functions
 from ..units import Amount, si
 from .forces import SLIDER_FORCE, ForceTurn, solve
 from .quantities import JOINTS, FloatArray, MaskedArray, masked_array
@@ -75,7 +75,7 @@ QUANTITIES: Mapping[str, str] = MappingProxyType(
 FREE_OF_LOAD = (*KINEMATIC, "drive.applied_torque", "guide.mx", "guide.my", "guide.mz")
 
 #: `SliderCrankParameters.constants` for parameters that are arrays or dual numbers.
-_CONSTANTS: Callable[[Any], Constants] = rebound((parameters,), {"cos": np.cos, "sin": np.sin}).of(
+_CONSTANTS: Callable[[Any], Constants] = rebind_functions((parameters,), {"cos": np.cos, "sin": np.sin}).of(
     SliderCrankParameters.constants
 )
 

@@ -14,7 +14,7 @@ from linkwork.parameters import field_name
 
 from ..files import unknown_name
 from ..mechanisms import FIVE_BAR, MECHANISMS, mechanism_of
-from ..periodic import of_the_motor
+from ..periodic import motor_parameters
 from ..run import Case, InductionMotor, Inputs
 from .tables import NO_MOTOR, fmi_starts, given_entries, published_values
 
@@ -55,7 +55,7 @@ def page_state(case: Case) -> dict[str, Any]:
                 )
         values[channel.name] = float(sum(others))
         if motors:
-            values |= {name: getattr(motors[0], field) for name, (field, _) in of_the_motor(mechanism).items()}
+            values |= {name: getattr(motors[0], field) for name, (field, _) in motor_parameters(mechanism).items()}
     return {"mechanism": mechanism.name, "title": case.title, "values": values, "duration": case.stop_time}
 
 
@@ -79,7 +79,7 @@ def page_case(state: Mapping[str, Any]) -> Case:
     channels: dict[str, Any] = {
         c.argument: of[c.name] for c in mechanism.channels if c.kind != "rate" and c.argument not in others
     }
-    motor = {field: values[name] for name, (field, _) in of_the_motor(mechanism).items()}
+    motor = {field: values[name] for name, (field, _) in motor_parameters(mechanism).items()}
     torque = next((c.argument for c in mechanism.channels if f"{c.name}.breakdown_torque" in values), None)
     if torque in channels and motor["breakdown_torque"] != 0.0:
         channels[torque] = (channels[torque], InductionMotor(**motor))
@@ -112,7 +112,7 @@ def given_values(mechanism: Mechanism, values: Any) -> dict[str, float]:
 def _start_values(mechanism: Mechanism) -> dict[str, float]:
     """Return the start values of all variables that the page can set, a motor's included, by FMI name."""
     given = (entry.variable for entry in given_entries(mechanism))
-    motor = {name: NO_MOTOR[field] for name, (field, _) in of_the_motor(mechanism).items()}
+    motor = {name: NO_MOTOR[field] for name, (field, _) in motor_parameters(mechanism).items()}
     return {v.name: float(v.start) for v in given} | motor
 
 

@@ -13,7 +13,7 @@ from linkwork.variables import UNITS, Variable
 
 from ..export import Entry, build_web, crank_number, interface
 from ..mechanisms import name_in_files
-from ..periodic import damping_name, find_crank, of_the_motor, stiffness_name
+from ..periodic import damping_name, find_crank, motor_parameters, stiffness_name
 
 #: Sections of parameters by role, and by unit; all others are dimensions.
 _SECTIONS = {
@@ -140,7 +140,7 @@ def _motor(mechanism: Mechanism, crank: int) -> list[dict[str, Any]]:
     if torque is None:
         return []
     own = mechanism.channels[torque].name
-    numbers = {name: what for name, what in of_the_motor(mechanism).items() if name.startswith(f"{own}.")}
+    numbers = {name: what for name, what in motor_parameters(mechanism).items() if name.startswith(f"{own}.")}
     return [
         {
             "name": name,

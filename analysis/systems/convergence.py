@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from linkwork.errors import InputError
 
 from ..files import unknown_name
-from ..run import shown
+from ..run import show_progress
 from .description import System
 from .joined import Joined
 from .master import SystemRun, run_system
@@ -133,7 +133,7 @@ def convergence(
     powers = {way: np.full(len(steps), np.nan) for way in ways}
     messages = {}
     whole = len(ways) * sum(1.0 / step for step in steps)
-    with shown(progress, whole, "couplings and steps") as show:
+    with show_progress(progress, whole, "couplings and steps") as show:
         done = 0.0
         for way in ways:
             for number, step in enumerate(steps):

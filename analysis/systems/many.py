@@ -17,8 +17,8 @@ from numpy.typing import ArrayLike, NDArray
 from linkwork.errors import InputError, LinkworkError
 
 from ..files import unknown_name
-from ..numerics.workers import WorkersLost, interruptible, over_workers
-from ..run import CosimulationError, shown
+from ..numerics.workers import WorkersLost, record_interrupts, run_in_parallel
+from ..run import CosimulationError, show_progress
 from .master import run_system
 from .wiring import End, Part, Wiring
 
@@ -111,7 +111,7 @@ def run_many(
     folder : path, optional
         Folder in which the runs are kept; runs that it already has are not repeated.
     n_jobs : int, optional
-        Number of processes; the default, also within `joblib.parallel_config`, is that of `over_workers`.
+        Number of processes; the default, also within `joblib.parallel_config`, is that of `run_in_parallel`.
     progress : bool
 
     Raises
@@ -139,14 +139,14 @@ def run_many(
     todo = [n for n in range(len(sets)) if kept.lengths[n] == 0 and n not in kept.messages]
     batches = [todo[k : k + _BATCH] for k in range(0, len(todo), _BATCH)]
     tasks = [task._replace(sets=sets[batch]) for batch in batches]
-    with interruptible() as heard, shown(progress, len(sets), "running the system") as show:
+    with record_interrupts() as interrupts, show_progress(progress, len(sets), "running the system") as show:
         try:
-            for number, found in over_workers(_batch, tasks, heard, n_jobs=n_jobs):
+            for number, found in run_in_parallel(_batch, tasks, interrupts, n_jobs=n_jobs):
                 kept.add(batches[number], found)
                 show(float(np.count_nonzero(kept.lengths)))
         except WorkersLost as error:
             raise SystemRunsEnded(str(error), runs, kept.folder) from error
-    if heard:
+    if interrupts:
         raise SystemRunsEnded("stopped", runs, kept.folder)
     return runs
 

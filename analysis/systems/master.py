@@ -19,8 +19,8 @@ from numpy.typing import NDArray
 from linkwork.errors import InputError
 
 from ..files import unknown_name
-from ..numerics.workers import interruptible
-from ..run import CosimulationError, RunInterrupted, shown
+from ..numerics.workers import record_interrupts
+from ..run import CosimulationError, RunInterrupted, show_progress
 from .instances import Floats, make_instance
 from .wiring import Bond, End, Wiring
 
@@ -346,7 +346,7 @@ def run_system(
             raise InputError(
                 f"{stuck[0]} cannot go back to the start of a step: the coupling must be another than rollback"
             )
-        with interruptible() as interrupted, shown(progress, stop_time, "running the system") as show:
+        with record_interrupts() as interrupted, show_progress(progress, stop_time, "running the system") as show:
             while times[-1] < stop_time * (1.0 - 1e-12) and not interrupted:
                 if share is None and stepper.number == stepper.count:
                     break

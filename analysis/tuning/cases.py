@@ -14,7 +14,7 @@ from ..files import Many, Quantity, Table, Whole, as_table, entry, flag, overrid
 from ..linkages import with_linkage
 from ..mechanisms import mechanism_of, name_in_files
 from ..periodic import default_variable, parameter_unit, rest_guess, steady_drive
-from ..run import case_mechanism, read_case, with_names_of_files
+from ..run import case_mechanism, read_case, with_case_file_names
 from ..units import with_unit
 from .result import Tuned
 from .wishes import Limit, Wish
@@ -88,7 +88,7 @@ class TuningCase:
         changes = {inputs.get(name, name): with_unit(value, parameter_unit(mechanism, name)) for name, value in values}
         if isinstance(own := self.tables.get("linkage"), str):
             changes["linkage"] = Path(os.path.relpath(self.folder / own, folder)).as_posix()
-        return overridden(with_names_of_files(self.tables, mechanism), changes)
+        return overridden(with_case_file_names(self.tables, mechanism), changes)
 
 
 def load_tuning_case(path: str | Path, overrides: Mapping[str, Any] | None = None) -> TuningCase:

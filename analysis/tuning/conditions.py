@@ -111,7 +111,7 @@ def motion(wish: Wish, spot: Spot) -> PeriodicOrbit:
     return orbit
 
 
-def sampled(orbit: PeriodicOrbit) -> Turn:
+def sample_turn(orbit: PeriodicOrbit) -> Turn:
     """Return the outputs over the period, with `_SAMPLES` samples for each common period."""
     return orbit.turn(_SAMPLES * orbit.periods)
 
@@ -122,13 +122,13 @@ def expansion(wish: Wish, spot: Spot) -> Expansion:
     v, n = along.variations, len(spot.y)
     unit = np.append(1.0, wish.tolerance)
     forcing, constants = v.forcing * unit, along.along * unit
-    gaps = np.column_stack([v.monodromy - np.eye(n), v.after(forcing)])
-    ways = np.concatenate([v.fundamental, v.from_start(np.zeros((n, len(unit))), forcing)], axis=-1)
+    gaps = np.column_stack([v.monodromy - np.eye(n), v.final_deviation(forcing)])
+    ways = np.concatenate([v.fundamental, v.solve_from_start(np.zeros((n, len(unit))), forcing)], axis=-1)
     constants = np.column_stack([np.zeros((len(constants), n)), constants])
     monodromies = np.empty((n + len(unit), n, n))
     for column in range(n):
-        by_y, by_constant = v.second(v.fundamental[..., column])
-        monodromies[:, :, column] = v.after(by_y @ ways + by_constant @ constants).T
+        by_y, by_constant = v.second_derivatives(v.fundamental[..., column])
+        monodromies[:, :, column] = v.final_deviation(by_y @ ways + by_constant @ constants).T
     return Expansion(gaps, v.monodromy, monodromies, v, ways, constants)
 
 
@@ -166,19 +166,19 @@ class Row(Protocol):
     def slopes(self, found: Expansion) -> FloatArray:
         """Return the derivatives of the residual by y, the level and the changes, shape (n + 1 + k,)."""
 
-    def across(self, found: Callable[[], Expansion]) -> FloatArray:
+    def motion_slopes(self, found: Callable[[], Expansion]) -> FloatArray:
         """Return the derivatives of the residual by y and the level alone, shape (n + 1,)."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Across:
+class CrossPlane:
     """A plane across the branch, normal . (y, level) = offset; it fixes the level if the normal has no other component."""
 
     normal: FloatArray
     offset: float
 
     @classmethod
-    def level_plane(cls, wish: Wish, spot: Spot, level: float) -> Across:
+    def level_plane(cls, wish: Wish, spot: Spot, level: float) -> CrossPlane:
         """Return the plane of a fixed level, for motions with as many components of y as the spot."""
         return cls(np.append(np.zeros(len(spot.y)), 1.0 / wish.size), level / wish.size)
 
@@ -188,12 +188,12 @@ class Across:
     def slopes(self, found: Expansion) -> FloatArray:
         return np.append(self.normal, np.zeros(len(found.monodromies) - len(self.normal)))
 
-    def across(self, found: Callable[[], Expansion]) -> FloatArray:
+    def motion_slopes(self, found: Callable[[], Expansion]) -> FloatArray:
         return self.normal
 
 
 @dataclass(frozen=True, slots=True)
-class Lost:
+class StabilityLoss:
     """The equation of lost stability: a multiplier is on the unit circle."""
 
     kind: Crossing
@@ -204,12 +204,12 @@ class Lost:
     def slopes(self, found: Expansion) -> FloatArray:
         return margin_slopes(found, self.kind)
 
-    def across(self, found: Callable[[], Expansion]) -> FloatArray:
+    def motion_slopes(self, found: Callable[[], Expansion]) -> FloatArray:
         there = found()
         return self.slopes(there)[: len(there.monodromy) + 1]
 
 
-class Found:
+class PickedMotion:
     """A motion that was picked from its branch with some changes, and its derivatives by the changes."""
 
     def __init__(self, wish: Wish, row: Row, spot: Spot) -> None:
@@ -256,7 +256,7 @@ class Found:
         return weights @ nodes
 
 
-class Place:
+class TrackedMotion:
     """A motion that one equation picks from its branch, found again as the parameters change.
 
     Parameters
@@ -272,7 +272,7 @@ class Place:
         self._last = spot
         self._scale = np.append(motion_scales(*wish.operation(spot.x, spot.level), spot.y), wish.size)
 
-    def at(self, x: FloatArray) -> Found:
+    def at(self, x: FloatArray) -> PickedMotion:
         """Find the motion for changes x in units of the tolerances; raises LostError if it is not found again."""
         last = self._last
         moved = np.abs(x - last.x) * self.wish.tolerance
@@ -293,7 +293,7 @@ class Place:
             slope = np.append(there.y - spot.y, there.level - spot.level) / (share - done)
             spot, done = there, share
         self._last = spot
-        return Found(self.wish, self.row, spot)
+        return PickedMotion(self.wish, self.row, spot)
 
     def _newton(self, x: FloatArray, begin: Spot, slope: FloatArray | None, ahead: float) -> Spot:
         z = np.append(begin.y, begin.level)
@@ -304,7 +304,9 @@ class Place:
         for count in range(ITERATIONS):
             here = evaluate(z[:n], float(z[n]))
             top = np.column_stack([here.jacobian, here.slope])
-            below = self.row.across(partial(expansion, self.wish, begin._replace(x=x, y=z[:n], level=float(z[n]))))
+            below = self.row.motion_slopes(
+                partial(expansion, self.wish, begin._replace(x=x, y=z[:n], level=float(z[n])))
+            )
             value = self.row.value(z[:n], float(z[n]), here.jacobian + np.eye(n))
             try:
                 step = np.linalg.solve(np.vstack([top, below]), np.append(here.residual, value))
@@ -340,13 +342,13 @@ def curve(turn: Turn, limit: Limit) -> Callable[[Any], Any]:
     return lambda angle: reduce(np.hypot, (part(angle) for part in parts))
 
 
-def reading(turn: Turn, limit: Limit, angles: Sequence[float]) -> float:
+def value_at_angles(turn: Turn, limit: Limit, angles: Sequence[float]) -> float:
     """Return the value that the limit bounds: the magnitude at one crank angle, or half the difference between two."""
     values = curve(turn, limit)(np.array(angles))
     return float(abs(values[0])) if len(angles) == 1 else 0.5 * float(values[0] - values[1])
 
 
-def greatest(turn: Turn, limit: Limit) -> tuple[float, tuple[float, ...]]:
+def limited_value(turn: Turn, limit: Limit) -> tuple[float, tuple[float, ...]]:
     """Return the value that the limit bounds over a period, and its crank angles.
 
     There is one angle, of the greatest magnitude; for an amplitude there are two, of the greatest and of the least value.
@@ -356,7 +358,7 @@ def greatest(turn: Turn, limit: Limit) -> tuple[float, tuple[float, ...]]:
     if limit.output.startswith(AMPLITUDE):
         places = [samples.argmax(), samples.argmin()]
     angles = peak_angles(turn, limit, [float(turn.angle[place]) for place in places])
-    return reading(turn, limit, angles), angles
+    return value_at_angles(turn, limit, angles), angles
 
 
 def peak_angles(turn: Turn, limit: Limit, angles: Sequence[float]) -> tuple[float, ...]:
@@ -404,12 +406,12 @@ class Condition(Protocol):
         """Return the derivatives of the function by the changes, shape (k,)."""
 
 
-class Inside:
+class MultipliersInside:
     """Condition that no multiplier has crossed a circle in a given way: `crossing_margin` is not negative."""
 
     slack = 1e-9
 
-    def __init__(self, group: str, place: Place, kind: Crossing, radius: float) -> None:
+    def __init__(self, group: str, place: TrackedMotion, kind: Crossing, radius: float) -> None:
         self.group, self.place, self.kind, self.radius = group, place, kind, radius
 
     def value(self, x: FloatArray) -> float:
@@ -420,12 +422,12 @@ class Inside:
         return found.total_derivatives(margin_slopes(found.expansion, self.kind, self.radius))
 
 
-class Beyond:
+class StabilityLossBeyond:
     """Condition that a point of lost stability is above a level (side +1) or below it (-1)."""
 
     slack = 1e-9
 
-    def __init__(self, group: str, place: Place, level: float, side: int) -> None:
+    def __init__(self, group: str, place: TrackedMotion, level: float, side: int) -> None:
         self.group, self.place, self.level, self._share = group, place, level, side / place.wish.size
 
     def value(self, x: FloatArray) -> float:
@@ -462,12 +464,12 @@ def find_resonance(wish: Wish, x: FloatArray, near: Spot) -> tuple[Gradient, Spo
 
     Raises LinkworkError if there is no resonance near the motion.
     """
-    orbit = Place(wish, Across.level_plane(wish, near, near.level), near).at(x).orbit
+    orbit = TrackedMotion(wish, CrossPlane.level_plane(wish, near, near.level), near).at(x).orbit
     found = extremum_gradient(orbit, wish.over, wish.names)
     return found.place, known_spot(wish, x, found.orbit)
 
 
-class Below:
+class OutputBelow:
     """Condition that an output is below its limit at its maximum over the range and the crank angle."""
 
     slack = 1e-7
@@ -475,9 +477,9 @@ class Below:
     def __init__(self, group: str, wish: Wish, spot: Spot, limit: Limit, angles: Sequence[float]) -> None:
         self.group, self.limit, self.angles = group, limit, tuple(angles)
         self._wish, self._last = wish, spot
-        self._known: tuple[bytes, Found, Turn] | None = None
+        self._known: tuple[bytes, PickedMotion, Turn] | None = None
 
-    def _at(self, x: FloatArray) -> tuple[Found, Turn]:
+    def _at(self, x: FloatArray) -> tuple[PickedMotion, Turn]:
         """Find the motion with the greatest output by parabolas through the output at three levels."""
         if self._known is not None and self._known[0] == x.tobytes():
             return self._known[1:]
@@ -485,12 +487,12 @@ class Below:
         # the error of the top of a parabola is proportional to the square of its width
         for step in (_STEP, 0.1 * _STEP):
             found, value = self._uphill(x, found, value, step * self._wish.size)
-        turn = sampled(found.orbit)
+        turn = sample_turn(found.orbit)
         self._last, self.angles = found.spot, peak_angles(turn, self.limit, self.angles)
         self._known = x.tobytes(), found, turn
         return found, turn
 
-    def _uphill(self, x: FloatArray, found: Found, value: float, step: float) -> tuple[Found, float]:
+    def _uphill(self, x: FloatArray, found: PickedMotion, value: float, step: float) -> tuple[PickedMotion, float]:
         """Climb by parabolas over the level until the output does not increase; return the motion there and its output."""
         for _ in range(_CLIMB):
             level = found.spot.level
@@ -509,13 +511,13 @@ class Below:
             found, value = there, higher
         return found, value
 
-    def _reading(self, x: FloatArray, level: float) -> tuple[Found, float]:
-        found = Place(self._wish, Across.level_plane(self._wish, self._last, level), self._last).at(x)
-        turn = sampled(found.orbit)
-        return found, reading(turn, self.limit, peak_angles(turn, self.limit, self.angles))
+    def _reading(self, x: FloatArray, level: float) -> tuple[PickedMotion, float]:
+        found = TrackedMotion(self._wish, CrossPlane.level_plane(self._wish, self._last, level), self._last).at(x)
+        turn = sample_turn(found.orbit)
+        return found, value_at_angles(turn, self.limit, peak_angles(turn, self.limit, self.angles))
 
     def value(self, x: FloatArray) -> float:
-        return 1.0 - reading(self._at(x)[1], self.limit, self.angles) / float(self.limit.below)
+        return 1.0 - value_at_angles(self._at(x)[1], self.limit, self.angles) / float(self.limit.below)
 
     def slopes(self, x: FloatArray) -> FloatArray:
         (found, turn), names = self._at(x), self._wish.mechanism.output_names

@@ -14,24 +14,24 @@ from scipy.stats import qmc
 from linkwork.errors import LinkworkError
 
 from ..numerics import symbolic
-from ..periodic import Crossing, SpecialPoint, ending
-from ..run import shown
+from ..periodic import Crossing, SpecialPoint, describe_end
+from ..run import show_progress
 from .conditions import (
-    Across,
-    Below,
-    Beyond,
     Condition,
+    CrossPlane,
     FloatArray,
-    Inside,
-    Lost,
     LostError,
+    MultipliersInside,
+    OutputBelow,
     PeakBeyond,
-    Place,
     Spot,
+    StabilityLoss,
+    StabilityLossBeyond,
+    TrackedMotion,
     known_spot,
 )
 from .result import JUMP, RESONANCE, STABLE, Tuned, Verification, readings, requirements
-from .survey import MARGINAL, SOUGHT, Region, Survey, charted, other_motions, survey
+from .survey import MARGINAL, SOUGHT, Region, Survey, chart_range, other_motions, survey
 from .wishes import Wish
 
 #: IPOPT's tolerance, iterations at most, and the greatest violation of the conditions that is accepted.
@@ -45,7 +45,7 @@ _REST = 1e-6
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Answer:
-    """Solution of a nonlinear program.
+    """Solution.from_linkage a nonlinear program.
 
     Attributes
     ----------
@@ -80,7 +80,7 @@ def objective(wish: Wish, x: Any) -> Any:
     return x[k] + _REST * (squares - x[k] ** 2)
 
 
-def nearest(wish: Wish, conditions: Sequence[Condition], x: FloatArray) -> Answer:
+def find_least_change(wish: Wish, conditions: Sequence[Condition], x: FloatArray) -> Answer:
     """Find the least change that satisfies the conditions; if there is none, the change with the least sum of violations.
 
     ``x`` is the change from which IPOPT starts.
@@ -98,7 +98,7 @@ def nearest(wish: Wish, conditions: Sequence[Condition], x: FloatArray) -> Answe
 def _solve(wish: Wish, conditions: Sequence[Condition], x: FloatArray, *, elastic: bool) -> Answer:
     casadi = symbolic.library()
     count, groups = len(x), list(dict.fromkeys(condition.group for condition in conditions))
-    low, high = wish.scaled(wish.low), wish.scaled(wish.high)
+    low, high = wish.scale_changes(wish.low), wish.scale_changes(wish.high)
     z = casadi.MX.sym("z", count + len(groups) * elastic)
     f, lows, highs, start = objective(wish, z[:count]), low, high, np.clip(x, low, high)
     values = _Values(conditions)
@@ -167,7 +167,9 @@ class _Values:
 
     def function(self, count: int) -> Callable[[Any], Any]:
         """Return the values as a CasADi function of ``count`` changes."""
-        function: Callable[[Any], Any] = symbolic.external("conditions", count, len(self.conditions), self.__call__)
+        function: Callable[[Any], Any] = symbolic.wrap_function(
+            "conditions", count, len(self.conditions), self.__call__
+        )
         return function
 
 
@@ -203,11 +205,11 @@ class _Search:
     #: The best so far: rank (whether requirements are missed, excess, objective), survey, and levels with two stable motions.
     best: tuple[tuple[bool, float, float], Survey, tuple[float, ...]] | None = None
 
-    def look(self, x: FloatArray) -> Survey:
+    def survey_changes(self, x: FloatArray) -> Survey:
         """Survey the range with some changes."""
         own = []
         for spot in self.more:
-            place = Place(self.wish, Across.level_plane(self.wish, spot, spot.level), spot)
+            place = TrackedMotion(self.wish, CrossPlane.level_plane(self.wish, spot, spot.level), spot)
             try:
                 own.append(place.at(x).orbit)
             except LostError:
@@ -273,12 +275,12 @@ def tune(wish: Wish, *, progress: bool = False) -> Tuned:
     """
     search = _Search(wish)
     zero = np.zeros(len(wish.names))
-    start = np.clip(zero, wish.scaled(wish.low), wish.scaled(wish.high))
-    before = search.look(zero)
-    first = before if (start == zero).all() else search.look(start)
+    start = np.clip(zero, wish.scale_changes(wish.low), wish.scale_changes(wish.high))
+    before = search.survey_changes(zero)
+    first = before if (start == zero).all() else search.survey_changes(start)
     if search.search_others(first)[0]:
-        first = search.look(start)
-        before = first if (start == zero).all() else search.look(zero)
+        first = search.survey_changes(start)
+        before = first if (start == zero).all() else search.survey_changes(zero)
     _try_ways(search, first, progress)
     if search.least == np.inf:
         nearer = _survey_near_solution(search, first)
@@ -286,13 +288,13 @@ def tune(wish: Wish, *, progress: bool = False) -> Tuned:
             _try_ways(search, nearer, progress)
     if search.best is None:
         raise LinkworkError("the motions of the range could not be followed while the parameters were changed")
-    return _tuned(search, before, *search.best[1:])
+    return _make_result(search, before, *search.best[1:])
 
 
 def _try_ways(search: _Search, first: Survey, progress: bool) -> None:
     """Try the combinations of ways, starting from the changes of a survey, and keep the best result."""
     ways = _ways(first)
-    with shown(progress, len(ways), "trying changes") as show:
+    with show_progress(progress, len(ways), "trying changes") as show:
         for number, way in enumerate(ways):
             found = _exchange(search, first, list(way))
             show(number + 1)
@@ -307,8 +309,8 @@ def _survey_near_solution(search: _Search, first: Survey) -> Survey | None:
     if no changes of a sample spread over the bounds meet the requirements.
     """
     wish = search.wish
-    low, high = wish.scaled(wish.low), wish.scaled(wish.high)
-    spread = wish.scaled(_spread(wish.low, wish.high))
+    low, high = wish.scale_changes(wish.low), wish.scale_changes(wish.high)
+    spread = wish.scale_changes(_spread_values(wish.low, wish.high))
     for x in sorted([low, high, *spread], key=lambda x: float(objective(wish, x))):
         if _try_changes(search, x)[0]:
             break
@@ -325,7 +327,7 @@ def _survey_near_solution(search: _Search, first: Survey) -> Survey | None:
     return found
 
 
-def _spread(low: FloatArray, high: FloatArray) -> FloatArray:
+def _spread_values(low: FloatArray, high: FloatArray) -> FloatArray:
     """Return values spread over their bounds, shape (m, k)."""
     share = qmc.Sobol(len(low), rng=0).random(_SPREAD)
     wide = (low > 0.0) & (high > _WIDE * low)
@@ -337,10 +339,10 @@ def _try_changes(search: _Search, x: FloatArray) -> tuple[bool, Survey | None]:
     """Return whether the changes x meet all requirements, and the survey, None if the motions cannot be followed."""
     several: tuple[float, ...] = ()
     try:
-        found = search.look(x)
+        found = search.survey_changes(x)
         if search.excess(found, several) == 0.0:
             new, several = search.search_others(found)
-            found = search.look(x) if new else found
+            found = search.survey_changes(x) if new else found
     except LinkworkError:
         return False, None
     if search.excess(found, several) > 0.0:
@@ -349,14 +351,20 @@ def _try_changes(search: _Search, x: FloatArray) -> tuple[bool, Survey | None]:
     return True, found
 
 
-def _tuned(search: _Search, before: Survey, after: Survey, several: tuple[float, ...]) -> Tuned:
+def _make_result(search: _Search, before: Survey, after: Survey, several: tuple[float, ...]) -> Tuned:
     wish = search.wish
-    largest, level, count = charted(after)
-    low, high = (f(*ends) for f, ends in zip((min, max), zip(wish.span, wish.without_resonance)))
+    largest, level, count = chart_range(after)
+    low, high = (f(*ends) for f, ends in zip((min, max), zip(wish.span, wish.range_with_margin)))
     # a branch that is lost outside the range does not matter
-    beside = {ending(b) for b in after.response.branches if not any(low <= b.parameter[end] <= high for end in (0, -1))}
+    beside = {
+        describe_end(b) for b in after.response.branches if not any(low <= b.parameter[end] <= high for end in (0, -1))
+    }
     problems = [sentence for sentence in after.response.problems if sentence not in beside]
-    if wish.judged and not largest <= wish.radius + MARGINAL and all(r.excess == 0.0 for r in readings(after).values()):
+    if (
+        wish.judges_stability
+        and not largest <= wish.radius + MARGINAL
+        and all(r.excess == 0.0 for r in readings(after).values())
+    ):
         problems.append(f"a chart has a multiplier of {largest:.6g}, which the response does not have")
     return Tuned(
         wish=wish,
@@ -391,13 +399,13 @@ def _ways(found: Survey) -> list[tuple[_Way, ...]]:
     wish = found.wish
     low, high = wish.span
     choices: list[list[tuple[float, _Way]]] = []
-    for region in _unwanted(found):
+    for region in _unwanted_regions(found):
         middle, sides = 0.5 * (region.low + region.high), [(0.5 * (region.high - region.low), _REMOVED)]
         sides += [
             (d, s) for d, s in ((region.high - low, _BELOW), (high - region.low, _ABOVE)) if _end(region, s) is not None
         ]
         choices.append([(d, _Way(kind=region.kind, level=middle, side=s)) for d, s in sides])
-    low, high = wish.without_resonance
+    low, high = wish.range_with_margin
     for spot in found.peaks:
         sides = [(spot.level - low, _BELOW), (high - spot.level, _ABOVE)]
         choices.append([(d, _Way(kind=None, level=spot.level, side=s)) for d, s in sides])
@@ -405,10 +413,10 @@ def _ways(found: Survey) -> list[tuple[_Way, ...]]:
     return [tuple(w for _, w in way) for way in combined[:_WAYS]]
 
 
-def _unwanted(found: Survey) -> list[Region]:
+def _unwanted_regions(found: Survey) -> list[Region]:
     """Return the regions of lost stability that the wish excludes from the range."""
     wish = found.wish
-    if wish.judged:
+    if wish.judges_stability:
         return list(found.regions)
     jumps = [r for r in found.regions if wish.no_jump and r.kind is Crossing.FOLD]
     return jumps + [
@@ -443,11 +451,11 @@ def _exchange(search: _Search, first: Survey, ways: list[_Way]) -> tuple[Survey,
                     return found, several
             # conditions that are far from active are dropped; they are found again if they matter
             conditions = [c for c in conditions if _value(c, answer) < _FAR] + new
-            answer = nearest(wish, conditions, answer.x)
+            answer = find_least_change(wish, conditions, answer.x)
             search.rounds += 1
             if not isfinite(answer.total) or (answer.met and answer.objective >= search.least):
                 return None
-            found = search.look(answer.x)
+            found = search.survey_changes(answer.x)
         except LinkworkError:
             return None
     return found, several
@@ -471,7 +479,7 @@ def _conditions(found: Survey, ways: list[_Way]) -> Iterator[Condition]:
     wish, x = found.wish, found.x
     low, high = wish.span
     gone: list[Region] = []
-    for region in _unwanted(found):
+    for region in _unwanted_regions(found):
         side = _side(ways, region.kind, 0.5 * (region.low + region.high))
         if side is None:
             nearer = _BELOW if region.high - low < high - region.low else _ABOVE
@@ -481,17 +489,17 @@ def _conditions(found: Survey, ways: list[_Way]) -> Iterator[Condition]:
         group = JUMP if wish.no_jump and region.kind is Crossing.FOLD else STABLE
         if end is not None:
             gone.append(region)
-            place = Place(wish, Lost(end.kind), known_spot(wish, x, end.orbit))
-            yield Beyond(group, place, high if side == _ABOVE else low, side)
+            place = TrackedMotion(wish, StabilityLoss(end.kind), known_spot(wish, x, end.orbit))
+            yield StabilityLossBeyond(group, place, high if side == _ABOVE else low, side)
         elif region.kind is Crossing.FOLD:
-            yield Inside(group, Place(wish, region.across, region.worst), region.kind, 1.0)
+            yield MultipliersInside(group, TrackedMotion(wish, region.across, region.worst), region.kind, 1.0)
     for lost in found.least:
         if not any(r.kind is lost.kind and r.low <= lost.spot.level <= r.high for r in gone):
-            place = Place(wish, Across.level_plane(wish, lost.spot, lost.spot.level), lost.spot)
-            yield Inside(STABLE, place, lost.kind, wish.radius)
-    low, high = wish.without_resonance
+            place = TrackedMotion(wish, CrossPlane.level_plane(wish, lost.spot, lost.spot.level), lost.spot)
+            yield MultipliersInside(STABLE, place, lost.kind, wish.radius)
+    low, high = wish.range_with_margin
     for spot in found.peaks:
         side = _side(ways, None, spot.level) or (_BELOW if spot.level - low < high - spot.level else _ABOVE)
         yield PeakBeyond(RESONANCE, wish, spot, high if side == _ABOVE else low, side)
     for top in found.greatest:
-        yield Below(str(top.limit), wish, top.spot, top.limit, top.angles)
+        yield OutputBelow(str(top.limit), wish, top.spot, top.limit, top.angles)

@@ -56,17 +56,17 @@ class Requirement:
         return self.after.excess == 0.0
 
 
-def wished(wish: Wish) -> dict[str, str]:
+def describe_wish(wish: Wish) -> dict[str, str]:
     """Return a description of each requirement of a wish, by its name."""
     found: dict[str, str] = {}
     if wish.no_resonance:
-        found[RESONANCE] = f"none from {wish.say(*wish.without_resonance, joint=' to ')}"
+        found[RESONANCE] = f"none from {wish.say(*wish.range_with_margin, joint=' to ')}"
     if wish.no_jump:
         found[JUMP] = "none"
-    if wish.judged:
+    if wish.judges_stability:
         found[STABLE] = f"largest multiplier at most {wish.radius:.6g}"
     found |= {str(limit): f"below {displayed(limit.below, limit.unit)}" for limit in wish.limits}
-    return found if wish.judged else found | {STABLE: "one at each place of the range"}
+    return found if wish.judges_stability else found | {STABLE: "one at each place of the range"}
 
 
 def readings(found: Survey, several: Sequence[float] = ()) -> dict[str, Reading]:
@@ -74,7 +74,7 @@ def readings(found: Survey, several: Sequence[float] = ()) -> dict[str, Reading]
     wish, result = found.wish, {}
     if wish.no_resonance:
         peaks = [(spot.level, spot.level) for spot in found.peaks]
-        result[RESONANCE] = _interval_reading(wish, peaks, "at {}", wish.without_resonance)
+        result[RESONANCE] = _interval_reading(wish, peaks, "at {}", wish.range_with_margin)
     if wish.no_jump:
         jumps = [(region.low, region.high) for region in found.folds]
         text = _interval_reading(wish, jumps, "between {}", wish.span)
@@ -85,7 +85,7 @@ def readings(found: Survey, several: Sequence[float] = ()) -> dict[str, Reading]
                 missed=f"at {wish.say(*several)} there is a second stable motion",
             )
         result[JUMP] = text
-    if wish.judged:
+    if wish.judges_stability:
         value, level = found.largest
         over = value - wish.radius if value > wish.radius + MARGINAL else 0.0
         text_of = f"largest multiplier {value:.7g} at {wish.say(level)}"
@@ -97,12 +97,12 @@ def readings(found: Survey, several: Sequence[float] = ()) -> dict[str, Reading]
         text_of = f"{displayed(greatest.value, limit.unit)} at {wish.say(greatest.spot.level)}"
         missed = f"{text_of}, {displayed(greatest.value - limit.below, limit.unit, 3)} too much" if over else ""
         result[str(limit)] = Reading(text=text_of, excess=over, missed=missed)
-    if not wish.judged:
-        result[STABLE] = _stable_everywhere(found)
+    if not wish.judges_stability:
+        result[STABLE] = _stability_reading(found)
     return result
 
 
-def _stable_everywhere(found: Survey) -> Reading:
+def _stability_reading(found: Survey) -> Reading:
     """Return the state of the requirement that there is a stable motion everywhere in the range."""
     if not found.unstable:
         return Reading(text="everywhere")
@@ -129,7 +129,7 @@ def requirements(before: Survey, after: Survey, several: Sequence[float]) -> tup
     first, last = readings(before), readings(after, several)
     return tuple(
         Requirement(name=name, wished=text, before=first[name], after=last[name])
-        for name, text in wished(before.wish).items()
+        for name, text in describe_wish(before.wish).items()
     )
 
 

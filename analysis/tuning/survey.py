@@ -31,16 +31,16 @@ from ..periodic import (
     speed_names,
 )
 from .conditions import (
-    Across,
+    CrossPlane,
     FloatArray,
     LostError,
-    Place,
     Spot,
+    TrackedMotion,
     crossing_margin,
-    greatest,
     known_spot,
+    limited_value,
     motion,
-    sampled,
+    sample_turn,
 )
 from .wishes import Limit, Wish
 
@@ -77,7 +77,7 @@ class Region:
         Special points at the ends of the region, if they were met.
     worst : Spot
         Motion with the least value of the test function.
-    across : Across
+    across : CrossPlane
         Equation that picks this motion from the branch.
     value : float
         Value of the test function at this motion.
@@ -89,12 +89,12 @@ class Region:
     first: SpecialPoint | None
     last: SpecialPoint | None
     worst: Spot
-    across: Across
+    across: CrossPlane
     value: float
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Least:
+class TestMinimum:
     """A minimum of a test function along a branch inside the range."""
 
     kind: Crossing
@@ -103,13 +103,13 @@ class Least:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Greatest:
+class OutputMaximum:
     """A maximum over the range of an output that has a limit."""
 
     limit: Limit
     value: float  # the maximum (SI)
     spot: Spot  # the motion with the maximum
-    angles: tuple[float, ...]  # crank angles of the maximum (rad), see `conditions.greatest`
+    angles: tuple[float, ...]  # crank angles of the maximum (rad), see `conditions.limited_value`
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -127,9 +127,9 @@ class Survey:
         Regions of lost stability that reach into the range.
     peaks : tuple of Spot
         Resonances in the range or the margin beside it.
-    least : tuple of Least
+    least : tuple of TestMinimum
         Minima of the test functions, as far as the wish is concerned with them.
-    greatest : tuple of Greatest
+    greatest : tuple of OutputMaximum
         Maxima of each limited output.
     largest : (float, float)
         Modulus of the largest Floquet multiplier in the range, and the level of this multiplier.
@@ -142,8 +142,8 @@ class Survey:
     response: Response
     regions: tuple[Region, ...]
     peaks: tuple[Spot, ...]
-    least: tuple[Least, ...]
-    greatest: tuple[Greatest, ...]
+    least: tuple[TestMinimum, ...]
+    greatest: tuple[OutputMaximum, ...]
     largest: tuple[float, float]
     unstable: tuple[tuple[float, float], ...]
 
@@ -172,7 +172,7 @@ def survey(wish: Wish, x: FloatArray, more: Sequence[PeriodicOrbit] = ()) -> Sur
     parameters, drive = wish.operation(x, wish.span[0])
     low, high = _ends(wish, BESIDE)
     if wish.no_resonance:
-        low, high = min(low, wish.without_resonance[0]), max(high, wish.without_resonance[1])
+        low, high = min(low, wish.range_with_margin[0]), max(high, wish.range_with_margin[1])
     response = frequency_response(
         parameters,
         low,
@@ -187,13 +187,13 @@ def survey(wish: Wish, x: FloatArray, more: Sequence[PeriodicOrbit] = ()) -> Sur
         response = _add_branch(wish, response, orbit)
     branches = response.branches
     regions = [region for branch in branches for region in _regions(wish, x, branch, response)]
-    inside = [(branch, np.flatnonzero(_inside(wish, branch.parameter))) for branch in branches]
+    inside = [(branch, np.flatnonzero(_is_inside(wish, branch.parameter))) for branch in branches]
     motions = [[(float(b.parameter[i]), b.orbits[i]) for i in places] for b, places in inside]
-    unstable = tuple(_without_stable_motion(wish, branches))
-    least: tuple[Least, ...] = ()
-    if wish.judged or unstable:
-        least = tuple(found for branch in branches for found in _least(wish, x, branch))
-    if not wish.judged:
+    unstable = tuple(_parts_without_stable_motion(wish, branches))
+    least: tuple[TestMinimum, ...] = ()
+    if wish.judges_stability or unstable:
+        least = tuple(found for branch in branches for found in _test_minima(wish, x, branch))
+    if not wish.judges_stability:
         # if the wish allows it, unstable motions may lie beside stable ones
         without = [found for found in least if any(low <= found.spot.level <= high for low, high in unstable)]
         least = tuple(found for found in without if found.value < 0.0)
@@ -207,13 +207,13 @@ def survey(wish: Wish, x: FloatArray, more: Sequence[PeriodicOrbit] = ()) -> Sur
         regions=tuple(region for region in regions if reaches(wish, region.low, region.high)),
         peaks=tuple(_peaks(wish, x, response)) if wish.no_resonance else (),
         least=least,
-        greatest=tuple(top for limit in wish.limits for top in _greatest(wish, x, limit, motions)),
+        greatest=tuple(top for limit in wish.limits for top in _output_maxima(wish, x, limit, motions)),
         largest=largest,
         unstable=unstable,
     )
 
 
-def _without_stable_motion(wish: Wish, branches: Sequence[Branch]) -> Iterator[tuple[float, float]]:
+def _parts_without_stable_motion(wish: Wish, branches: Sequence[Branch]) -> Iterator[tuple[float, float]]:
     """Yield the parts of the range that no stable stretch of a branch covers."""
     covered = sorted(stretch for branch in branches for stretch in _stable_stretches(branch))
     low, end = wish.span
@@ -236,7 +236,7 @@ def _stable_stretches(branch: Branch) -> Iterator[tuple[float, float]]:
         yield min(ends), max(ends)
 
 
-def _inside(wish: Wish, level: Any) -> Any:
+def _is_inside(wish: Wish, level: Any) -> Any:
     low, high = wish.span
     return (level >= low) & (level <= high)
 
@@ -309,7 +309,7 @@ def _parts(
     points: list[SpecialPoint | None] = [None, *special, None]
     if kind is Crossing.FOLD and branch.periods > 1:
         # such a branch begins, and may end, where a motion of half the period has the multiplier -1
-        points[0], points[-1] = (_doubling(wish, branch.orbits[i], response) for i in (0, -1))
+        points[0], points[-1] = (_find_doubling(wish, branch.orbits[i], response) for i in (0, -1))
     parts = [np.arange(begin + 1, end + 1) for begin, end in pairwise(ends)]
     if branch.closed and special:
         # the last point of a closed branch is its first
@@ -319,7 +319,7 @@ def _parts(
         yield points[number], part, points[number + 1]
 
 
-def _doubling(wish: Wish, orbit: PeriodicOrbit, response: Response) -> SpecialPoint | None:
+def _find_doubling(wish: Wish, orbit: PeriodicOrbit, response: Response) -> SpecialPoint | None:
     """Return the period doubling near a motion, from which its branch begins; None if there is none."""
     for branch in response.branches:
         for point in branch.special if 2 * branch.turns == orbit.turns else ():
@@ -341,7 +341,7 @@ def _regions(wish: Wish, x: FloatArray, branch: Branch, response: Response) -> I
                 continue
             levels = [*branch.parameter[part], *(s.parameter for s in (first, last) if s is not None)]
             place, at_level = int(part[tests[part].argmin()]), kind is not Crossing.FOLD
-            worst, across, value = _lowest(wish, x, branch, kind, place, 1.0, at_level=at_level)
+            worst, across, value = _find_minimum(wish, x, branch, kind, place, 1.0, at_level=at_level)
             yield Region(
                 kind=kind,
                 low=min(levels),
@@ -354,9 +354,9 @@ def _regions(wish: Wish, x: FloatArray, branch: Branch, response: Response) -> I
             )
 
 
-def _lowest(
+def _find_minimum(
     wish: Wish, x: FloatArray, branch: Branch, kind: Crossing, i: int, radius: float, *, at_level: bool
-) -> tuple[Spot, Across, float]:
+) -> tuple[Spot, CrossPlane, float]:
     """Find the minimum of a test function near point ``i`` of a branch.
 
     Motions are picked by levels in the range if ``at_level``, otherwise by planes across the branch. Return the motion, the
@@ -374,11 +374,11 @@ def _lowest(
         low, high = max(low, wish.span[0] / wish.size), min(high, wish.span[1] / wish.size)
     normal = normal / scale
 
-    def across(offset: float) -> Across:
-        return Across(normal, offset)
+    def across(offset: float) -> CrossPlane:
+        return CrossPlane(normal, offset)
 
     def test(offset: float) -> float:
-        place = Place(wish, across(offset), spot)
+        place = TrackedMotion(wish, across(offset), spot)
         return crossing_margin(place.at(x).orbit.monodromy, kind, radius)
 
     offset = float(normal @ np.append(spot.y, spot.level))
@@ -391,12 +391,12 @@ def _lowest(
         except LinkworkError:
             pass  # next to the limit of assembly a neighbour may not be found: keep the point itself
     row = across(offset)
-    return Place(wish, row, spot).at(x).spot, row, value
+    return TrackedMotion(wish, row, spot).at(x).spot, row, value
 
 
-def _least(wish: Wish, x: FloatArray, branch: Branch) -> Iterator[Least]:
+def _test_minima(wish: Wish, x: FloatArray, branch: Branch) -> Iterator[TestMinimum]:
     """Yield the minima of the test functions along a branch in the range, at fixed levels."""
-    inside = np.flatnonzero(_inside(wish, branch.parameter))
+    inside = np.flatnonzero(_is_inside(wish, branch.parameter))
     if not len(inside):
         return
     for kind in _kinds(branch):
@@ -405,7 +405,7 @@ def _least(wish: Wish, x: FloatArray, branch: Branch) -> Iterator[Least]:
             # the part between two folds is a region: see `_regions`
             tests = np.where(_tests(branch, kind) < 0.0, np.inf, tests)
         found = []
-        within = np.where(_inside(wish, branch.parameter), tests, np.inf)
+        within = np.where(_is_inside(wish, branch.parameter), tests, np.inf)
         for i in inside.tolist():
             around = slice(max(i - 1, 0), i + 2)
             if tests[i] < _NEAR and tests[i] <= within[around].min():
@@ -413,8 +413,8 @@ def _least(wish: Wish, x: FloatArray, branch: Branch) -> Iterator[Least]:
         for value, smooth, i in sorted(found)[:_LEAST]:
             spot = known_spot(wish, x, branch.orbits[i])
             if smooth:
-                spot, _, value = _lowest(wish, x, branch, kind, i, wish.radius, at_level=True)
-            yield Least(kind=kind, spot=spot, value=value)
+                spot, _, value = _find_minimum(wish, x, branch, kind, i, wish.radius, at_level=True)
+            yield TestMinimum(kind=kind, spot=spot, value=value)
 
 
 # Resonances and outputs
@@ -423,17 +423,17 @@ def _least(wish: Wish, x: FloatArray, branch: Branch) -> Iterator[Least]:
 def _peaks(wish: Wish, x: FloatArray, response: Response) -> Iterator[Spot]:
     """Yield the resonances in the range and within the margin beside it."""
     for top in response.maxima():
-        if _overlap(wish, top.parameter, top.parameter, wish.without_resonance):
+        if _overlap(wish, top.parameter, top.parameter, wish.range_with_margin):
             yield known_spot(wish, x, top.orbit)
 
 
-def _greatest(
+def _output_maxima(
     wish: Wish, x: FloatArray, limit: Limit, motions: Sequence[Sequence[tuple[float, PeriodicOrbit]]]
-) -> Iterator[Greatest]:
+) -> Iterator[OutputMaximum]:
     """Yield the local maxima of an output in the range, refined over the level."""
     found = []
     for branch in motions:
-        values = [greatest(sampled(orbit), limit)[0] for _, orbit in branch]
+        values = [limited_value(sample_turn(orbit), limit)[0] for _, orbit in branch]
         for i, value in enumerate(values):
             if value >= max(values[max(i - 1, 0) : i + 2]):
                 found.append((value, branch[i][1]))
@@ -442,19 +442,19 @@ def _greatest(
         yield _refine_maximum(wish, limit, known_spot(wish, x, orbit))
 
 
-def _refine_maximum(wish: Wish, limit: Limit, near: Spot) -> Greatest:
+def _refine_maximum(wish: Wish, limit: Limit, near: Spot) -> OutputMaximum:
     """Find the maximum of an output over the level near a motion."""
     step = 2.0 * STEP * (wish.span[1] - wish.span[0])
     low, high = max(wish.span[0], near.level - step), min(wish.span[1], near.level + step)
-    found: list[Greatest] = []
+    found: list[OutputMaximum] = []
 
     def value(level: float) -> float:
         try:
-            there = Place(wish, Across.level_plane(wish, near, level), near).at(near.x)
+            there = TrackedMotion(wish, CrossPlane.level_plane(wish, near, level), near).at(near.x)
         except LostError:
             return 0.0  # beyond a fold
-        size, angles = greatest(sampled(there.orbit), limit)
-        found.append(Greatest(limit=limit, value=size, spot=there.spot, angles=angles))
+        size, angles = limited_value(sample_turn(there.orbit), limit)
+        found.append(OutputMaximum(limit=limit, value=size, spot=there.spot, angles=angles))
         return -size
 
     for level in (near.level, low, high):
@@ -473,7 +473,7 @@ def other_motions(found: Survey) -> tuple[tuple[PeriodicOrbit, ...], tuple[float
     several: list[float] = []
     for level in np.linspace(*wish.span, SOUGHT).tolist():
         parameters, drive = wish.operation(found.x, level)
-        start = None if wish.over in speed_names(wish.mechanism) else _nearest(wish, found.response, level).start
+        start = None if wish.over in speed_names(wish.mechanism) else _nearest_motion(wish, found.response, level).start
         stable = 0
         for turns in range(1, wish.turns + 1):
             there: Orbits = search_orbits(parameters, drive, turns=turns, start=start)
@@ -485,13 +485,13 @@ def other_motions(found: Survey) -> tuple[tuple[PeriodicOrbit, ...], tuple[float
     return tuple(new), tuple(several)
 
 
-def _nearest(wish: Wish, response: Response, level: float) -> PeriodicOrbit:
+def _nearest_motion(wish: Wish, response: Response, level: float) -> PeriodicOrbit:
     """Return the motion of one common period that is nearest to a level."""
     known = [orbit for branch in response.branches if branch.periods == 1 for orbit in branch.orbits]
     return min(known, key=lambda orbit: abs(wish.level(orbit) - level))
 
 
-def charted(found: Survey) -> tuple[float, float, int]:
+def chart_range(found: Survey) -> tuple[float, float, int]:
     """Compute a row of a chart over the range; return its largest multiplier, the level of this multiplier, number of points.
 
     The multiplier is infinite if no motion was found at some point.
@@ -500,7 +500,7 @@ def charted(found: Survey) -> tuple[float, float, int]:
     levels = np.linspace(*wish.span, _CHARTED)
     rows: list[Any] = []
     drives: list[Drive] = []
-    near = _nearest(wish, found.response, wish.span[0])
+    near = _nearest_motion(wish, found.response, wish.span[0])
     for level in levels.tolist():
         parameters, drive = wish.operation(found.x, level)
         rows.append(parameters)

@@ -181,16 +181,16 @@ class Wish:
         if not (isinstance(self.turns, int) and self.turns >= 1):
             raise ParameterError("turns", self.turns, "be a whole number, at least one")
         put("change", _changes((self.parameters, drive), self.over, self.change))
-        put("limits", tuple(_checked(mechanism, limit) for limit in self.limits))
+        put("limits", tuple(_check_limit(mechanism, limit) for limit in self.limits))
         for name in ("least_margin", "resonance_margin"):
             if not 0.0 <= getattr(self, name) < 1.0:
                 raise ParameterError(name, getattr(self, name), "be at least zero and less than one")
-        if not (self.no_resonance or self.no_jump or self.judged or self.limits):
+        if not (self.no_resonance or self.no_jump or self.judges_stability or self.limits):
             raise InputError(
                 "nothing is wished: say no_resonance, no_jump, no_unstable or least_margin, or give a limit of an output"
             )
         if self.least:
-            put("least", _changeable(mechanism, self.least))
+            put("least", _find_changeable_name(mechanism, self.least))
             if self.least not in self.names:
                 raise InputError(f"{self.least} is to be least, but may not be changed: name it in change")
         self._check_bounds()
@@ -212,7 +212,7 @@ class Wish:
                         f"be a smaller tolerance or a range [least, greatest]: it allows {value:.6g} {unit}, and "
                         f"{error.name} must {error.requirement}",
                     ) from None
-        for x in (self.scaled(self.low), self.scaled(self.high)):
+        for x in (self.scale_changes(self.low), self.scale_changes(self.high)):
             self.operation(x, self.span[0])
 
     def _check_range(self) -> str:
@@ -262,7 +262,7 @@ class Wish:
         return mechanism_of(self.parameters)
 
     @property
-    def judged(self) -> bool:
+    def judges_stability(self) -> bool:
         """Whether the stability of all motions is part of the wish."""
         return self.no_unstable or self.least_margin > 0.0
 
@@ -272,7 +272,7 @@ class Wish:
         return 1.0 - self.least_margin
 
     @property
-    def without_resonance(self) -> tuple[float, float]:
+    def range_with_margin(self) -> tuple[float, float]:
         """The range with the margin of a resonance on either side, in SI."""
         (low, high), margin = self.span, self.resonance_margin
         return low - margin * abs(low), high + margin * abs(high)
@@ -309,7 +309,7 @@ class Wish:
         """Tolerances of the changes, shape (k,)."""
         return np.array([change.tolerance for change in self.change])
 
-    def scaled(self, values: FloatArray) -> FloatArray:
+    def scale_changes(self, values: FloatArray) -> FloatArray:
         """Return the changes from the present to given values, in units of the tolerances."""
         return (values - self.present) / self.tolerance
 
@@ -331,7 +331,7 @@ def _span(mechanism: Mechanism, over: str, given: Any) -> tuple[float, float]:
     return low, high
 
 
-def _changeable(mechanism: Mechanism, name: str) -> str:
+def _find_changeable_name(mechanism: Mechanism, name: str) -> str:
     """Return the FMI name of a parameter or drive quantity, given by its FMI name or its field."""
     known = {field_name(n): n for n in variable_names(mechanism)}
     found = known.get(field_name(name))
@@ -344,7 +344,9 @@ def _changes(operation: Operation, over: str, given: Any) -> tuple[Change, ...]:
     if not isinstance(given, Mapping):
         changes = tuple(given)
     else:
-        changes = tuple(_change(operation, n, value) for n, value in _named(given, mechanism_of(operation[0])).items())
+        changes = tuple(
+            _change(operation, n, value) for n, value in _flatten_names(given, mechanism_of(operation[0])).items()
+        )
     if not changes:
         raise InputError("nothing may be changed: name at least one parameter in change")
     for change in changes:
@@ -354,16 +356,16 @@ def _changes(operation: Operation, over: str, given: Any) -> tuple[Change, ...]:
     return changes
 
 
-def _named(given: Mapping[str, Any], mechanism: Mechanism, prefix: str = "") -> dict[str, Any]:
+def _flatten_names(given: Mapping[str, Any], mechanism: Mechanism, prefix: str = "") -> dict[str, Any]:
     """Flatten a mapping of parameters, with nested tables or dotted names, into a mapping by FMI name."""
     parts = [name.split(".") for name in variable_names(mechanism)]
     groups = {".".join(part[:n]) for part in parts for n in range(1, len(part))}
     found: dict[str, Any] = {}
     for name, value in given.items():
         if prefix + name in groups and isinstance(value, Mapping) and not {"tolerance", "between"} & set(value):
-            found |= _named(value, mechanism, f"{prefix}{name}.")
+            found |= _flatten_names(value, mechanism, f"{prefix}{name}.")
         else:
-            found[_changeable(mechanism, prefix + name)] = value
+            found[_find_changeable_name(mechanism, prefix + name)] = value
     return found
 
 
@@ -401,7 +403,7 @@ def _tolerance(value: Any, unit: str, now: float, name: str) -> float:
     return found
 
 
-def _checked(mechanism: Mechanism, limit: Limit) -> Limit:
+def _check_limit(mechanism: Mechanism, limit: Limit) -> Limit:
     """Check a limit; return it in SI, with its unit and its outputs filled in."""
     name = limit.output.removeprefix(AMPLITUDE)
     units = {v.name: v.unit for v in mechanism.variables if v.name in mechanism.output_names}

@@ -30,7 +30,7 @@ from linkwork.limits import LIMIT_SINE
 from ..mechanisms import FIVE_BAR
 from ..numerics import symbolic
 from ..numerics.fourier import FourierSeries
-from ..run import constants, takes_published, traced
+from ..run import constants, symbolic_equations, takes_published
 from ..units import Amount, in_si
 from . import printed_coefficients
 from .hill import PeriodicEquation
@@ -121,7 +121,7 @@ def _compiled() -> dict[str, Callable[..., tuple[NDArray[np.float64], ...]]]:
     followed by their first and halved second derivatives with respect to the crank's length.
     """
     casadi = symbolic.library()
-    f = traced(FIVE_BAR)
+    f = symbolic_equations(FIVE_BAR)
     angle, u, v, a, w = (casadi.SX.sym(name) for name in ("angle", "u", "v", "a", "w"))
     columns, p = constants(FIVE_BAR)
     load = casadi.SX.sym("load", 3)

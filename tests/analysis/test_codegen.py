@@ -297,7 +297,7 @@ def carried(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     monkeypatch.setattr(codegen, "CARRIED", tmp_path / "carried")
     monkeypatch.setattr(codegen._Announcer, "said", set())
     path = _made().carry()
-    assert path == _made().carried
+    assert path == _made().carried_path
     return path
 
 

@@ -109,7 +109,7 @@ def test_a_curve_ends_exactly_on_a_bound_beyond_which_nothing_is_evaluated(secan
     settings = Settings(low=-2.0, high=2.0, bounds={0: (-0.5, 1.5)}, greatest=0.05)
     f = Follower(evaluate, [1.0], settings, (lambda y, b: evaluate(y, b).residual) if secant else None)
     first = f.start([1.0], 0.0, 1)
-    for begin, side in ((first, 1.0), (first.turned(), -1.0)):
+    for begin, side in ((first, 1.0), (first.with_opposite_tangent(), -1.0)):
         result = f.follow(begin)
         assert result.end is Reason.BOX
         assert result.points[-1].y[0] == -0.5

@@ -25,7 +25,7 @@ from analysis.numerics.dual import (
     stack,
     variables,
 )
-from analysis.numerics.tracing import rebound
+from analysis.numerics.tracing import rebind_functions
 from analysis.slider_crank.shifts import plant_functions
 from linkwork import friction
 from linkwork.slider_crank import dynamics, kinematics, vectors
@@ -285,7 +285,7 @@ def test_the_plant_differentiated_through_tracing(seed: int) -> None:
             for i in range(len(x))
         ]
     )
-    values = outputs(rebound((friction, vectors, kinematics, dynamics), {}), x)
+    values = outputs(rebind_functions((friction, vectors, kinematics, dynamics), {}), x)
     for y, value, by_step in zip(exact, values, complex_step.T):
         result = y if isinstance(y, Dual) else Dual(y, np.zeros(len(x)))
         assert result.real == pytest.approx(value, rel=1e-13, abs=1e-13)

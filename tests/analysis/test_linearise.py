@@ -29,7 +29,7 @@ from analysis.linear import (
     settled_motion,
 )
 from analysis.mechanisms import FIVE_BAR
-from analysis.numerics.tracing import rebound
+from analysis.numerics.tracing import rebind_functions
 from analysis.periodic import find_orbit
 from linkwork import friction
 from linkwork.errors import AssemblyError, InputError, UnknownNameError
@@ -64,7 +64,7 @@ def plain() -> SimpleNamespace:
         "atan2": lambda y, x: complex_atan2(complex(y), complex(x))
     }
 
-    return rebound((friction, kinematics, dynamics), elementary)
+    return rebind_functions((friction, kinematics, dynamics), elementary)
 
 
 def complex_step(f: Any, x: Any) -> np.ndarray:
@@ -370,7 +370,7 @@ def test_multipliers_of_a_motor_drive() -> None:
     assert along.channels[:, 0] == pytest.approx(torque(w2), rel=1e-9)
     closed = along.A.copy()
     closed[:, :, 2] += along.B[:, :, 0] * np.imag(torque(w2 + 1e-30j) / 1e-30)[:, None]
-    a = along.interpolated(closed)
+    a = along.interpolate(closed)
     end = solve_ivp(
         lambda t, y: (a(t) @ y.reshape(4, 4)).ravel(),
         (0.0, along.period),

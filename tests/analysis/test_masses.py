@@ -11,7 +11,7 @@ import pytest
 
 from analysis import Inputs, linkages, simulate, variant
 from analysis.mechanisms import PUBLISHED
-from analysis.run import in_sentences, load_case, read_case, read_parameters, with_sections
+from analysis.run import describe_masses, load_case, read_case, read_parameters, with_sections
 from analysis.sections import Bar, Rod
 from linkwork.errors import LinkworkError, ParameterError
 
@@ -97,7 +97,7 @@ def test_origins_of_masses_and_lengths_that_leave_them():
     assert masses["slider.mass"].origin == "as given"
     assert "20 x 5 mm" in masses["rocker.mass"].origin
     assert [name for name, mass in masses.items() if mass.stale] == ["coupler.mass"]
-    sentence, (warning,) = in_sentences(tuple(masses.values()))
+    sentence, (warning,) = describe_masses(tuple(masses.values()))
     assert "slider.mass 1 kg (as given)" in sentence
     assert "coupler.length is 180 mm where table-3.1 has 150 mm" in warning
     given = {"length": "180 mm", "mass": 0.2, "inertia": 1e-3, "cog_distance": "90 mm"}

@@ -49,7 +49,7 @@ def test_multilinear_forms_of_a_cubic_map() -> None:
     def cubic(x: np.ndarray) -> np.ndarray:
         return a @ x + np.einsum("ijk,j,k", b, x, x) / 2.0 + np.einsum("ijkl,j,k,l", c, x, x, x) / 6.0
 
-    second, third = Forms(cubic, a).complex(0.1)
+    second, third = Forms(cubic, a).complex_forms(0.1)
     u, v, w = g.normal(size=(3, 3)) + 1j * g.normal(size=(3, 3))
     assert second(u, v) == pytest.approx(np.einsum("ijk,j,k", b, u, v), rel=1e-9)
     assert third(u, v, w) == pytest.approx(np.einsum("ijkl,j,k,l", c, u, v, w), rel=1e-9)

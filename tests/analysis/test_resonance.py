@@ -213,7 +213,7 @@ def test_an_interrupt_keeps_what_was_followed(monkeypatch: pytest.MonkeyPatch) -
 
         yield show
 
-    monkeypatch.setattr(resonance, "shown", counting)
+    monkeypatch.setattr(resonance, "show_progress", counting)
     with pytest.raises(ResponseInterrupted, match="1 branches followed") as stopped:
         frequency_response(RIG["a"], 100.0 * RPM, 1300.0 * RPM)
     (branch,) = stopped.value.response.branches

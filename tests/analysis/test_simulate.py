@@ -537,7 +537,7 @@ def test_a_run_of_an_ensemble_is_prepared_once_for_its_verdict(monkeypatch: pyte
         made.append(i)
         return run(task, i)
 
-    def given_up(task: batches.Task, ready: batches.Prepared, ends: Any) -> Any:
+    def given_up(task: batches.Task, ready: batches.PreparedBatch, ends: Any) -> Any:
         made.clear()
         ends[:, [0, 4]] = NO_STEP, cautions.MANY_STEPS
         return verdicts(task, ready, ends)
@@ -772,7 +772,7 @@ def test_progress_is_the_time_since_the_start(monkeypatch: pytest.MonkeyPatch) -
         told.append(duration)
         yield told.append
 
-    monkeypatch.setattr(prepared, "shown", shown)
+    monkeypatch.setattr(prepared, "show_progress", shown)
     simulate(TABLE_3_1, Inputs(speed=20.0), start_time=5.0, stop_time=5.2, step=0.05, progress=True)
     assert told == pytest.approx([0.2, 0.2])
 

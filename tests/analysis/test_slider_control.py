@@ -121,11 +121,11 @@ def test_pi_has_the_crossover_and_phase_asked_for(held) -> None:
 
 def test_the_closed_loop_has_the_poles_and_no_static_error(held) -> None:
     design = design_pid(held, bandwidth=80.0)
-    closed = design.closed(("slider.position", "slider.acceleration"))
+    closed = design.closed_loop(("slider.position", "slider.acceleration"))
     assert np.sort_complex(closed.poles()) == pytest.approx(np.sort_complex(design.poles), rel=1e-8)
     assert abs(complex(closed[0, 0](0.0))) < 1e-12
     lqr = design_lqr(held, WEIGHTS)
-    assert complex(lqr.closed()(0.0)).real == pytest.approx(1.0 / (held.K[0, 0] + lqr.gains[0]), rel=1e-10)
+    assert complex(lqr.closed_loop()(0.0)).real == pytest.approx(1.0 / (held.K[0, 0] + lqr.gains[0]), rel=1e-10)
 
 
 def test_designs_that_cannot_be(held, hanging) -> None:
@@ -233,7 +233,7 @@ def test_the_loop_is_the_predicted_one_to_first_order(which, request) -> None:
 def test_sampling_tends_to_the_continuous_law(held) -> None:
     design = design_lqr(held, WEIGHTS)
     target = float(held.state[1]) + 3e-3
-    inputs = Inputs(speed=0.0, force=design.continuous(target))
+    inputs = Inputs(speed=0.0, force=design.continuous_law(target))
     exact = simulate(TABLE_3_1, inputs, initial=start(held), stop_time=0.2, step=1e-2, tolerance=1e-12)
     errors = []
     for every in (10, 20, 40):
@@ -246,7 +246,7 @@ def test_sampling_tends_to_the_continuous_law(held) -> None:
     # the reference is held on the linear model, whose stiffness is nearly the plant's
     assert exact["slider.position"][-1] == pytest.approx(target, abs=1e-4)
     with pytest.raises(DesignError, match="integral action"):
-        design_pid(held, bandwidth=50.0).continuous(target)
+        design_pid(held, bandwidth=50.0).continuous_law(target)
 
 
 def test_the_integral_takes_a_load_away(held) -> None:

@@ -15,7 +15,7 @@ from scipy.special import mathieu_a, mathieu_b
 
 from analysis.figures import Curve, HeatMap, Panel, plot_charts
 from analysis.files import WritingError
-from analysis.numerics.boundaries import Box, Reason, chart, lowest, scan, trace
+from analysis.numerics.boundaries import Box, Reason, chart, find_minimum, scan, trace
 from analysis.periodic import (
     Drive,
     GridInterrupted,
@@ -168,10 +168,10 @@ def test_scan_tells_where_there_is_no_value() -> None:
 
 
 def test_lowest() -> None:
-    assert lowest(lambda x: (x - 0.3) ** 2 - 1.0, 0.0, 1.0) == pytest.approx((0.3, -1.0), abs=1e-8)
-    assert lowest(lambda x: x, 0.0, 1.0) == (0.0, 0.0)
+    assert find_minimum(lambda x: (x - 0.3) ** 2 - 1.0, 0.0, 1.0) == pytest.approx((0.3, -1.0), abs=1e-8)
+    assert find_minimum(lambda x: x, 0.0, 1.0) == (0.0, 0.0)
     with pytest.raises(InputError, match="needs a length"):
-        lowest(lambda x: x, 1.0, 0.0)
+        find_minimum(lambda x: x, 1.0, 0.0)
     with pytest.raises(InputError, match="needs a length"):
         scan(lambda x: x, 0.0, 1.0, samples=2)
 

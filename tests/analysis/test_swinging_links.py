@@ -21,14 +21,14 @@ from analysis.periodic import (
     Drive,
     Stability,
     basins,
-    ending,
+    describe_end,
     find_orbit,
     find_orbits,
     frequency_response,
     newton_orbit,
     sweep,
     turns_sought,
-    unsought,
+    unsought_hint,
     with_isolas,
 )
 from analysis.run import load_case, load_parameters
@@ -241,8 +241,8 @@ def test_an_arm_that_hangs_on_a_crank_turns_back_in_its_pin() -> None:
 
 
 def test_what_is_not_sought_of_links_that_go_round_is_said() -> None:
-    assert "swing.angle" in unsought(yoke("yoke-unsought").parameters, Drive(speed=10.0))
-    assert unsought(PUBLISHED["table-3.1"].parameters, Drive(speed=10.0)) == ""
+    assert "swing.angle" in unsought_hint(yoke("yoke-unsought").parameters, Drive(speed=10.0))
+    assert unsought_hint(PUBLISHED["table-3.1"].parameters, Drive(speed=10.0)) == ""
 
 
 def test_turns_in_a_period_are_those_of_the_crank() -> None:
@@ -270,7 +270,7 @@ def test_turns_in_a_period_are_those_of_the_crank() -> None:
     twice = 2.0 * abs(np.fft.rfft(turn["bob.angle"])[1:3]) / len(turn.angle)
     assert [turn.harmonic("bob.angle", order) for order in (0.5, 1)] == pytest.approx(twice)
     part = replace(response.branches[0], reason="it ends")
-    assert ending(replace(part, turns=2, orbits=tuple(replace(o, turns=2) for o in part.orbits))).startswith(
+    assert describe_end(replace(part, turns=2, orbits=tuple(replace(o, turns=2) for o in part.orbits))).startswith(
         "the branch with a period of 4 turns"
     )
     assert turns_sought(orbit.flow, 1) == "2 turns"

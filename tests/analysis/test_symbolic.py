@@ -11,8 +11,8 @@ import pytest
 
 from analysis.mechanisms import FIVE_BAR, mechanism_of
 from analysis.numerics.symbolic import ELEMENTARY
-from analysis.numerics.tracing import rebound
-from analysis.run import traced
+from analysis.numerics.tracing import rebind_functions
+from analysis.run import symbolic_equations
 from linkwork import friction
 from linkwork.five_bar import dynamics, kinematics
 from tests import slider_cranks, strategies
@@ -45,14 +45,14 @@ def test_derivatives_are_exact(kind: Any, seed: int) -> None:
     u = np.random.default_rng(seed).normal(size=len(mechanism.channels))
     flags = (0.0,) * len(mechanism.modes)
     state = casadi.SX.sym("x", len(x))
-    ours = traced(mechanism)
+    ours = symbolic_equations(mechanism)
     of_state = casadi.vertcat(
         *ours.of(mechanism.equations.derivative)(
             tuple(casadi.vertsplit(state)), mechanism.equations.apply_inputs(flags, tuple(u), p), p
         )
     )
     exact = np.array(casadi.Function("jacobian", [state], [casadi.densify(casadi.jacobian(of_state, state))])(x))
-    derivative = rebound(mechanism.modules, COMPLEX).of(mechanism.equations.derivative)
+    derivative = rebind_functions(mechanism.modules, COMPLEX).of(mechanism.equations.derivative)
     stepped = np.empty((len(x), len(x)))
     for j in range(len(x)):
         shifted = x.astype(complex)
@@ -65,6 +65,6 @@ def test_derivatives_are_exact(kind: Any, seed: int) -> None:
 
 
 def test_nothing_of_the_plain_modules_is_changed() -> None:
-    traced(FIVE_BAR)
+    symbolic_equations(FIVE_BAR)
     assert kinematics.sin.__module__ == friction.tanh.__module__ == "math"
     assert dynamics.position is kinematics.position

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from analysis.mechanisms import FIVE_BAR
 from analysis.numerics import symbolic
-from analysis.run import traced
+from analysis.run import symbolic_equations
 from analysis.synthesis.linkage.kernels import (
     COLUMNS,
     PLACES,
@@ -58,7 +58,7 @@ def function() -> Any:
     The slider's displacement is (dx, dy) with u = 1 and the guide's direction (dx, dy).
     """
     casadi = symbolic.library()
-    plant = traced(FIVE_BAR)
+    plant = symbolic_equations(FIVE_BAR)
     z = casadi.SX.sym("z", len(COLUMNS))
     phi, branch = casadi.SX.sym("phi"), casadi.SX.sym("branch")
     v = dict(zip(COLUMNS, casadi.vertsplit(z)))

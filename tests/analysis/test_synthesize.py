@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 import analysis.synthesis as syn
 from analysis.numerics.fourier import FourierSeries
-from analysis.numerics.workers import over_workers
+from analysis.numerics.workers import run_in_parallel
 from analysis.synthesis.search.polish import Polished, polish
 from analysis.synthesis.task.limits import make_limits
 from linkwork.errors import InputError, ParameterError
@@ -82,13 +82,13 @@ class TestResult:
             return polish(normal, limits, list(starts) * 200, **more)
 
         def interrupted(*arguments: Any, **more: Any) -> Iterator[Any]:
-            for found in over_workers(*arguments, **more):
+            for found in run_in_parallel(*arguments, **more):
                 if not timer.ident:
                     timer.start()
                 yield found
 
         monkeypatch.setattr("analysis.synthesis.search.solve.polish", long)
-        monkeypatch.setattr("analysis.synthesis.search.start.over_workers", interrupted)
+        monkeypatch.setattr("analysis.synthesis.search.start.run_in_parallel", interrupted)
         with pytest.raises(syn.SynthesisInterrupted, match=r"stopped after \d+ of \d+ searches") as caught:
             syn.synthesize(TASK, search=replace(QUICK, n_jobs=n_jobs))
         timer.join()
@@ -125,11 +125,15 @@ def judged(kind: str) -> syn.Solution:
     if kind == "slider":
         a = 0.05 * linkage.crank_length
         pivot = syn.SliderMotion(FourierSeries(np.array([a, 2.0 * a]), np.array([0.0, a])), 0.4)
-        return syn.Solution.of(syn.TimedPath(points=points, rotation=phi, weights=weights), linkage.with_pivot(pivot))
+        return syn.Solution.from_linkage(
+            syn.TimedPath(points=points, rotation=phi, weights=weights), linkage.with_pivot(pivot)
+        )
     if kind == "five-bar":
         series = FourierSeries(np.array([0.0, 0.2, -0.1]), np.array([0.0, 0.3, 0.1]))
         arm = syn.SecondCrank(0.1 * linkage.crank_length, ratio=2, phase=0.7, series=series)
-        return syn.Solution.of(syn.TimedPath(points=points, rotation=phi, weights=weights), linkage.with_pivot(arm))
+        return syn.Solution.from_linkage(
+            syn.TimedPath(points=points, rotation=phi, weights=weights), linkage.with_pivot(arm)
+        )
     task: Any = {
         "timed": lambda: syn.TimedPath(points=points, rotation=phi, weights=weights),
         "rocker": lambda: syn.RockerFunction(
@@ -155,7 +159,7 @@ def judged(kind: str) -> syn.Solution:
 
         normal = syn.normal_form(task)
         rotation = nearest_rotations(linkage, normal.origin + normal.unit * normal.points)
-    return syn.Solution.of(task, linkage, rotation)
+    return syn.Solution.from_linkage(task, linkage, rotation)
 
 
 #: Kinds whose quality is a sum over stations of given rotations.
@@ -219,7 +223,7 @@ class TestSensitivity:
 
 class TestRounding:
     def test_dimensions_are_whole_steps(self) -> None:
-        rounding = syn.rounded(judged("timed"), length=1e-3, angle=radians(0.5))
+        rounding = syn.round_dimensions(judged("timed"), length=1e-3, angle=radians(0.5))
         for name, value in rounding.linkage.values().items():
             step = radians(0.5) if "angle" in name or "phase" in name else 1e-3
             if name != "branch":
@@ -247,7 +251,7 @@ class TestRounding:
                 break
         # the sample's own uncertainty, and what the second derivatives of the residuals add
         spread = np.std(errors) / np.sqrt(len(errors))
-        expected = syn.rounded(solution, length=length, angle=angle).expected
+        expected = syn.round_dimensions(solution, length=length, angle=angle).expected
         assert expected == pytest.approx(np.mean(errors), abs=4.0 * spread + 0.05 * (np.mean(errors) - solution.error))
 
     def test_expected_of_an_area_that_is_as_small_as_it_can_be(self) -> None:
@@ -262,7 +266,7 @@ class TestRounding:
             errors.append(syn.evaluate(task, replace(solution.linkage, **changed)).error)
         grown = float(np.mean(errors)) - solution.error
         spread = float(np.std(errors)) / np.sqrt(len(errors))
-        expected = syn.rounded(solution, length=1e-4, angle=radians(0.1)).expected - solution.error
+        expected = syn.round_dimensions(solution, length=1e-4, angle=radians(0.1)).expected - solution.error
         assert expected == pytest.approx(grown, abs=3.0 * spread)
         assert spread < 0.06 * grown
 
@@ -270,7 +274,7 @@ class TestRounding:
         """One dimension off, and a large error: by Simpson's rule, which integrates the cubic of it exactly."""
         solution = judged("rocker")
         task = replace(solution.task, angle=solution.linkage.rocker_angle(solution.task.rotation) + 0.5)
-        solution = syn.Solution.of(task, solution.linkage)
+        solution = syn.Solution.from_linkage(task, solution.linkage)
         angle = radians(2.0)
 
         def mean(name: str) -> float:
@@ -282,38 +286,38 @@ class TestRounding:
 
         # of the angles, only these two turn the rocker
         grown = sum(mean(name) - solution.error for name in ("crank_phase", "output_angle"))
-        assert syn.rounded(solution, length=1e-9, angle=angle).expected - solution.error == pytest.approx(
+        assert syn.round_dimensions(solution, length=1e-9, angle=angle).expected - solution.error == pytest.approx(
             grown, rel=1e-3
         )
 
     def test_output_angle_and_moved_pivot_are_rounded_the_commanded_motion_is_not(self) -> None:
         motion = judged("motion")
         mounted = replace(motion, linkage=replace(motion.linkage, output_angle=0.1234))
-        assert syn.rounded(mounted, angle=0.05).linkage.output_angle == pytest.approx(0.1)
+        assert syn.round_dimensions(mounted, angle=0.05).linkage.output_angle == pytest.approx(0.1)
         sliding, geared = judged("slider"), judged("five-bar")
-        assert syn.rounded(sliding, angle=0.25).linkage.pivot.guide_angle == pytest.approx(0.5)
-        assert syn.rounded(sliding, length=0.01).linkage.pivot.series is sliding.linkage.pivot.series
-        pivot = syn.rounded(geared, length=1.0, angle=0.5).linkage.pivot
+        assert syn.round_dimensions(sliding, angle=0.25).linkage.pivot.guide_angle == pytest.approx(0.5)
+        assert syn.round_dimensions(sliding, length=0.01).linkage.pivot.series is sliding.linkage.pivot.series
+        pivot = syn.round_dimensions(geared, length=1.0, angle=0.5).linkage.pivot
         assert (pivot.length, pivot.phase) == (1.0, 0.5)
 
     @pytest.mark.parametrize("factor", [1.0, 1e-3, 1e-5])
     def test_small_linkages_by_themselves_are_rounded_to_finer_steps(self, factor: float) -> None:
         """A link is not rounded away, and the error stays in proportion to the linkage."""
-        linkage = known().scaled(factor)
-        solution = syn.Solution.of(syn.TimedPath(points=off(known().path(syn.turn(9))) * factor), linkage)
-        rounding = syn.rounded(solution)
+        linkage = known().scale(factor)
+        solution = syn.Solution.from_linkage(syn.TimedPath(points=off(known().path(syn.turn(9))) * factor), linkage)
+        rounding = syn.round_dimensions(solution)
         assert rounding.error == pytest.approx(solution.error, rel=0.3)
         assert (
-            syn.rounded(solution, length=10.0 * linkage.largest_link).linkage.crank_length
+            syn.round_dimensions(solution, length=10.0 * linkage.largest_link).linkage.crank_length
             == 10.0 * linkage.largest_link
         )
 
     @pytest.mark.parametrize("step", [0.0, -1.0, np.nan])
     def test_steps_are_above_zero(self, step: float) -> None:
         with pytest.raises(InputError, match="step of length"):
-            syn.rounded(judged("timed"), length=step)
+            syn.round_dimensions(judged("timed"), length=step)
         with pytest.raises(InputError, match="step of angle"):
-            syn.rounded(judged("timed"), angle=step)
+            syn.round_dimensions(judged("timed"), angle=step)
 
 
 class TestTradeOff:
@@ -339,7 +343,7 @@ class TestTradeOff:
 
     def test_on_the_way_back_the_tighter_solution_is_kept(self, monkeypatch: pytest.MonkeyPatch) -> None:
         """Where every search but that of the tightest limit comes to something poor, its solution serves them all."""
-        poor = syn.Solution.of(TASK, known())
+        poor = syn.Solution.from_linkage(TASK, known())
         calls = []
 
         def search(*arguments: Any, **more: Any) -> Any:
@@ -669,7 +673,7 @@ class TestBadInput:
         assert syn.evaluate(TASK, linkage).error == np.inf
         assert syn.evaluate(syn.UntimedPath(path=syn.TargetPath(points=ELLIPSE, closed=True)), linkage).error == np.inf
         assert syn.evaluate(syn.RockerFunction(angle=syn.turn(8)), linkage).error == np.inf
-        assert not syn.Solution.of(TASK, linkage).verdicts.sound
+        assert not syn.Solution.from_linkage(TASK, linkage).verdicts.sound
 
 
 def test_a_crank_that_need_not_turn_fully_does_not() -> None:
@@ -773,7 +777,7 @@ class TestLimits:
             ground_length=1.0, crank_length=0.91687, coupler_length=1.00396, rocker_length=1.25461, crank_phase=0.51262
         )
         assert not linkage.turns_fully
-        solution = syn.Solution.of(syn.TimedPath(points=linkage.path(syn.turn(8))), linkage)
+        solution = syn.Solution.from_linkage(syn.TimedPath(points=linkage.path(syn.turn(8))), linkage)
         assert not solution.verdicts.sound
 
     def test_weights_of_an_area_are_in_its_error(self) -> None:
@@ -781,17 +785,19 @@ class TestLimits:
         linkage = syn.synthesize(syn.UntimedPath(path=path, samples=24), search=QUICK).best.linkage
         shifted = replace(linkage, pivot_x=linkage.pivot_x + 1e-3)
         plain, twice = (
-            syn.Solution.of(syn.UntimedPath(path=path, weights=np.full(len(ELLIPSE), w)), shifted).error
+            syn.Solution.from_linkage(syn.UntimedPath(path=path, weights=np.full(len(ELLIPSE), w)), shifted).error
             for w in (1.0, 2.0)
         )
         assert twice == pytest.approx(2.0 * plain, rel=1e-12)
         # all but even weights take the other way to nearly the same area
         weights = np.ones(len(ELLIPSE))
         weights[0] = 1.0 + 1e-9
-        assert syn.Solution.of(syn.UntimedPath(path=path, weights=weights), shifted).error == pytest.approx(
+        assert syn.Solution.from_linkage(syn.UntimedPath(path=path, weights=weights), shifted).error == pytest.approx(
             plain, rel=0.03
         )
         right = np.where(ELLIPSE[:, 0] > ELLIPSE[:, 0].mean(), 1.0, 0.0)
         left = 1.0 - right
-        halves = [syn.Solution.of(syn.UntimedPath(path=path, weights=w), shifted).error for w in (left, right)]
+        halves = [
+            syn.Solution.from_linkage(syn.UntimedPath(path=path, weights=w), shifted).error for w in (left, right)
+        ]
         assert sum(halves) == pytest.approx(plain, rel=0.05)

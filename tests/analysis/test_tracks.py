@@ -12,7 +12,7 @@ from numba import float64, int64, types
 
 from analysis import InductionMotor
 from analysis.numerics.codegen import MATRIX, VECTOR, kernel
-from analysis.numerics.vectors import LANES, fused, greater, load, size, store
+from analysis.numerics.vectors import LANES, absolute, greater, load, multiply_add, store
 from analysis.periodic import Drive, coexistence, plane
 from analysis.periodic.motion import kernels
 from analysis.periodic.motion.discretisation import operating_point
@@ -89,7 +89,7 @@ def deflate(section: Any, known: Any, start: Any, z: Any, correction: Any) -> in
     """Return what follows one integration from a start to z, and write the correction."""
     hunt = kernels.make_hunt(start.shape[0])
     kernels.begin_hunt(start, hunt)
-    what = kernels.deflated_next(section, 9, 1e9, DONE, known, z, hunt)
+    what = kernels.continue_deflated_newton(section, 9, 1e9, DONE, known, z, hunt)
     for i in range(start.shape[0]):
         correction[i] = hunt.correction[i]
     return what
@@ -135,8 +135,8 @@ def combine(a: Any, b: Any, out: Any) -> None:
     store(out, 3, x / y)
     store(out, 4, 2.0 - x)
     store(out, 5, x / 3.0)
-    store(out, 6, fused(x, y, 1.0))
-    store(out, 7, size(x))
+    store(out, 6, multiply_add(x, y, 1.0))
+    store(out, 7, absolute(x))
     store(out, 8, greater(x, y))
     store(out, 9, 7.0)
 

@@ -30,8 +30,8 @@ from analysis.periodic import (
 from analysis.run import load_case, read_case
 from analysis.tuning import load_tuning_case
 from analysis.tuning.cases import read_tuning_case
-from analysis.tuning.optimisation import _conditions, _unwanted, _ways
-from analysis.tuning.result import STABLE, readings, wished
+from analysis.tuning.optimisation import _conditions, _unwanted_regions, _ways
+from analysis.tuning.result import STABLE, describe_wish, readings
 from analysis.tuning.survey import other_motions, survey
 from analysis.units import RAD_S_PER_RPM
 from linkwork.errors import InputError, LinkworkError, ParameterError, UnknownNameError
@@ -255,7 +255,7 @@ def test_least_change_for_a_pin_force_is_that_of_slsqp():
         return 1.0 - float(CubicSpline(speeds, force)(np.linspace(*asked.span, 5000)).max()) / 14.0
 
     tuned = tune(asked)
-    box = list(zip(asked.scaled(asked.low), asked.scaled(asked.high)))
+    box = list(zip(asked.scale_changes(asked.low), asked.scale_changes(asked.high)))
     found = minimize(
         lambda x: float(x @ x),
         tuned.x + np.array([-0.2, 0.2]),
@@ -300,7 +300,7 @@ def test_nothing_is_met_where_the_motion_is_unstable():
     assert readings(found)[STABLE].excess == pytest.approx((high - low) / (200 * RPM))
     for speed, there in ((0.98 * low, True), (1.02 * low, False), (0.98 * high, False), (1.02 * high, True)):
         assert bool(find_orbits(soft, speed=speed).stable) == there
-    assert any(region.low < high and low < region.high for region in _unwanted(found))
+    assert any(region.low < high and low < region.high for region in _unwanted_regions(found))
 
 
 @pytest.mark.slow
@@ -385,7 +385,7 @@ def test_errors_in_words(of, kind, words):
 
 
 def test_limits_are_in_the_units_of_tables():
-    assert wished(wish(limits=[AMPLITUDE, PIN]))[str(AMPLITUDE)] == "below 16 mm"
+    assert describe_wish(wish(limits=[AMPLITUDE, PIN]))[str(AMPLITUDE)] == "below 16 mm"
 
 
 def test_what_may_be_changed_is_measured_in_its_tolerance():
@@ -421,7 +421,7 @@ def test_numbers_of_the_drive_are_changed_in_the_case_too(force):
         ("slider.force", -1.0, 3.0),
     ]
     values = np.array([1.9, 2.5])
-    _, drive = case.wish.operation(case.wish.scaled(values), 55.0)
+    _, drive = case.wish.operation(case.wish.scale_changes(values), 55.0)
     assert (drive.motor.breakdown_torque, drive.motor.synchronous_speed) == (pytest.approx(1.9), 55.0)
     assert drive.forces["slider.force"] == pytest.approx(2.5)
     written = read_case(

@@ -24,7 +24,7 @@ import pytest
 
 from analysis import Inputs, simulate_many
 from analysis.numerics import workers as workers_module
-from analysis.numerics.workers import WorkersLost, _store_if_large, interruptible, over_workers, worker_count
+from analysis.numerics.workers import WorkersLost, _store_if_large, record_interrupts, run_in_parallel, worker_count
 from analysis.periodic import Drive, grid, plane
 from analysis.slider_crank import Tolerance, force_turn, monte_carlo
 from analysis.synthesis import Search, TargetPath, TimedPath, UntimedPath, synthesize
@@ -78,7 +78,7 @@ def dawdle(value: int, folder: Path) -> int:
 @pytest.mark.parametrize("n_jobs", [None, 2])
 def test_every_item_is_done_once(backend: str | None, n_jobs: int | None) -> None:
     with joblib.parallel_config(backend) if backend else warnings.catch_warnings():
-        found = list(over_workers(square, range(7), n_jobs=n_jobs))
+        found = list(run_in_parallel(square, range(7), n_jobs=n_jobs))
     assert sorted(found) == [(n, n * n) for n in range(7)]
 
 
@@ -90,11 +90,11 @@ def test_the_backend_and_its_number_of_workers_are_those_of_joblib() -> None:
     here = os.getpid()
     for backend, alike in (("threading", True), ("loky", False)):
         with joblib.parallel_config(backend, n_jobs=2):
-            assert (dict(over_workers(process_of, [0, 1]))[0] == here) is alike
+            assert (dict(run_in_parallel(process_of, [0, 1]))[0] == here) is alike
     # threads where nobody says otherwise
-    assert dict(over_workers(process_of, [0, 1], n_jobs=2, threads=True))[0] == here
+    assert dict(run_in_parallel(process_of, [0, 1], n_jobs=2, threads=True))[0] == here
     with pytest.raises(InputError, match="0 cores"):
-        list(over_workers(square, range(2), n_jobs=0))
+        list(run_in_parallel(square, range(2), n_jobs=0))
 
 
 def process_of(_: int) -> int:
@@ -104,14 +104,14 @@ def process_of(_: int) -> int:
 @pytest.mark.parametrize("n_jobs", [1, 2])
 def test_an_error_of_the_work_is_raised_as_it_is(n_jobs: int) -> None:
     with pytest.raises(LinkworkError, match=r"^two is no good$") as caught:
-        list(over_workers(fail, range(5), n_jobs=n_jobs))
+        list(run_in_parallel(fail, range(5), n_jobs=n_jobs))
     assert type(caught.value) is LinkworkError
 
 
 def test_what_a_killed_worker_had_is_done_again(tmp_path: Path) -> None:
     work = partial(kill_once, caller=os.getpid(), mark=tmp_path / "killed")
     with pytest.warns(RuntimeWarning, match=r"a worker was killed: \d of 8 parts are given out again"):
-        found = dict(over_workers(work, range(8), n_jobs=2))
+        found = dict(run_in_parallel(work, range(8), n_jobs=2))
     assert found == {n: n * n for n in range(8)}
 
 
@@ -135,7 +135,7 @@ def large_in_pieces(value: int, caller: int, mark: Path) -> np.ndarray[Any, Any]
 @pytest.mark.skipif(sys.platform == "win32", reason="pipes there send otherwise")
 def test_large_results_do_not_go_through_a_pipe_that_a_killed_worker_stops(tmp_path: Path) -> None:
     work = partial(large_in_pieces, caller=os.getpid(), mark=tmp_path / "killed")
-    found = dict(over_workers(work, range(4), n_jobs=2))
+    found = dict(run_in_parallel(work, range(4), n_jobs=2))
     assert {n: (made.size, made[0], made[-1]) for n, made in found.items()} == {n: (200_000, n, n) for n in range(4)}
     assert not (tmp_path / "killed").exists()
     # joblib's processes go on to other tests
@@ -162,7 +162,7 @@ def hand_over(_: int, caller: int, mark: Path) -> KilledOnce:
 def test_a_worker_killed_as_it_hands_over_is_noticed(tmp_path: Path) -> None:
     work = partial(hand_over, caller=os.getpid(), mark=tmp_path / "killed")
     with pytest.warns(RuntimeWarning, match=r"a worker was killed: \d of 3 parts are given out again"):
-        found = dict(over_workers(work, range(3), n_jobs=2))
+        found = dict(run_in_parallel(work, range(3), n_jobs=2))
     assert sorted(found) == [0, 1, 2]
 
 
@@ -180,7 +180,7 @@ def test_workers_that_are_killed_again_and_again_are_given_up() -> None:
         pytest.warns(RuntimeWarning, match="5 of 5 parts"),
         pytest.raises(WorkersLost, match=r"workers were killed 4 times, .* 5 of 5 parts are not done, 1, 2, 3, 4, 5"),
     ):
-        list(over_workers(work, range(5), n_jobs=2))
+        list(run_in_parallel(work, range(5), n_jobs=2))
 
 
 def running(number: int) -> bool:
@@ -206,13 +206,13 @@ def test_ctrl_c_is_heard_at_once_and_leaves_no_worker_at_work(tmp_path: Path) ->
 
     begun: list[float] = []
     thread = threading.Thread(target=interrupt)
-    with interruptible() as heard:
+    with record_interrupts() as interrupts:
         thread.start()
-        found = list(over_workers(partial(dawdle, folder=tmp_path), range(4), heard, n_jobs=2))
+        found = list(run_in_parallel(partial(dawdle, folder=tmp_path), range(4), interrupts, n_jobs=2))
     assert time.monotonic() - begun[0] < 10.0
     thread.join()
     assert found == [(0, 0)]
-    assert heard == [True]
+    assert interrupts == [True]
     workers = [int(path.name) for path in tmp_path.iterdir()]
     assert until(lambda: not any(map(running, workers)), 10.0)
 
@@ -406,7 +406,7 @@ def test_a_part_that_kills_every_worker_of_a_cluster_is_named() -> None:
         joblib.parallel_config("dask"),
         pytest.raises(WorkersLost, match="part 3 of 5 was killed"),
     ):
-        found.extend(over_workers(kill_on_two, range(5)))
+        found.extend(run_in_parallel(kill_on_two, range(5)))
     assert sorted(found) == [(n, n * n) for n in (0, 1, 3, 4)]
 
 
@@ -446,7 +446,7 @@ def test_a_cluster_that_does_not_answer_is_given_up(
     backend = SimpleNamespace(client=client, submit_kwargs={}, effective_n_jobs=lambda _: 2)
     monkeypatch.setattr(joblib.parallel, "get_active_backend", lambda **_: (backend, None))
     with pytest.raises(WorkersLost, match=said):
-        list(over_workers(square, range(3)))
+        list(run_in_parallel(square, range(3)))
     # a scheduler that is silent from the beginning has no tasks
     assert client.cancelled == (3 if workers is not None else 0)
 

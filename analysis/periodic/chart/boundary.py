@@ -22,7 +22,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from linkwork.errors import LinkworkError
 
-from ...numerics.boundaries import Test, lowest
+from ...numerics.boundaries import Test, find_minimum
 from ...numerics.continuation import ContinuationError, End, Evaluate, Evaluation, Follower, Settings
 from ..motion.discretisation import Discretisation, OrbitError, collocation_serves, operating_point
 from ..motion.floquet import Crossing, crossing_test
@@ -323,7 +323,7 @@ def removing_damping(
     """
 
     def least(d: float) -> float:
-        return lowest(lambda s: test(s, d), *x, samples=samples)[1]
+        return find_minimum(lambda s: test(s, d), *x, samples=samples)[1]
 
     low, high = (least(d) for d in damping)
     if not low < 0.0:
@@ -331,5 +331,5 @@ def removing_damping(
     if not high > 0.0:
         raise RemovalError(f"the region between {x[0]:g} and {x[1]:g} is still there at the damping {damping[1]:g}")
     found = float(scipy.optimize.brentq(least, *damping, xtol=0.1 * tolerance * damping[1], rtol=1e-14))
-    place, value = lowest(lambda s: test(s, found), *x, samples=samples)
+    place, value = find_minimum(lambda s: test(s, found), *x, samples=samples)
     return RemovingDamping(damping=found, x=place, residual=value)

@@ -23,7 +23,7 @@ from ...files import Whole, write_csv
 from ...mechanisms import Parameters, mechanism_of
 from ...numerics.boundaries import Box, chart
 from ...numerics.continuation import ContinuationError, End, Reason
-from ...run import shown, takes_published
+from ...run import show_progress, takes_published
 from ...units import RAD_S_PER_RPM, Amount, pair
 from ..motion import (
     Crossing,
@@ -40,7 +40,7 @@ from ..motion import (
     require_variable,
     speed_names,
 )
-from ..response import distance, natural_frequency, oscillating
+from ..response import distance, natural_frequency, oscillating_freedoms
 from ..stability import Confirmation, SpecialPoint, confirm
 from .boundary import (
     BRANCH_POINTS,
@@ -103,7 +103,7 @@ class Axis:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Traced:
+class TracedBoundary:
     """A boundary of instability.
 
     Attributes
@@ -148,7 +148,7 @@ class StabilityChart(Shown):
         In SI.
     grid : Grid
         Largest Floquet multiplier of the true orbit.
-    boundaries : tuple of Traced
+    boundaries : tuple of TracedBoundary
         Boundaries of the true orbit, of other motions, and of the motions given in ``beside``.
     removals : tuple of str
         For each region the damping that removes it, in words; empty unless damping is an axis.
@@ -165,7 +165,7 @@ class StabilityChart(Shown):
     axes: tuple[Axis, Axis]
     box: Box
     grid: Grid
-    boundaries: tuple[Traced, ...]
+    boundaries: tuple[TracedBoundary, ...]
     removals: tuple[str, ...]
     runs: tuple[Run, ...]
     most: int
@@ -321,7 +321,7 @@ class _Survey:
     grid: Grid
     start: ArrayLike | None
     damping: str
-    traced: list[Traced] = field(default_factory=list)
+    traced: list[TracedBoundary] = field(default_factory=list)
     runs: list[Run] = field(default_factory=list)
     most: int = 0
     #: Lines y = const that were searched.
@@ -336,7 +336,7 @@ class _Survey:
         # at a fold the true orbit ends, and its test function with it: folds are found on branches
         tests = [(TRUE_ORBIT, true, Crossing.PERIOD_DOUBLING)]
         tests += [(name, m, kind) for name, m in beside.items() for kind in (Crossing.PERIOD_DOUBLING, Crossing.FOLD)]
-        with shown(progress, float(len(tests)), next(steps)) as show:
+        with show_progress(progress, float(len(tests)), next(steps)) as show:
             for number, test in enumerate(tests, start=1):
                 self.trace(*test)
                 show(float(number))
@@ -346,7 +346,7 @@ class _Survey:
             true_ones = [traced.points for traced in self.traced if traced.motion in _MOTION]
             self.follow_lines(unmet_lines(around, self.lines, true_ones), progress, step)
             self.most = max(self.most, int(around.stable.max()))
-        with shown(progress, 1.0, next(steps)):
+        with show_progress(progress, 1.0, next(steps)):
             self.run_three_points()
             removals = self.removals(true)
         return self.result(around, removals)
@@ -382,7 +382,9 @@ class _Survey:
     def trace(self, motion: str, matrix: Monodromy, kind: Crossing) -> None:
         """Find and trace the boundaries of one kind by their test function."""
         result = chart(plane_test(matrix, kind), self.box, lines=LINES, samples=SAMPLES)
-        self.traced += [Traced(points=b.points, motion=motion, kind=kind, ends=b.ends) for b in result.boundaries]
+        self.traced += [
+            TracedBoundary(points=b.points, motion=motion, kind=kind, ends=b.ends) for b in result.boundaries
+        ]
         if result.gaps:
             first = result.gaps[0]
             self.problems.append(
@@ -393,7 +395,7 @@ class _Survey:
     def follow_lines(self, ys: Sequence[float], progress: bool, what: str) -> None:
         """Follow the branches of all motions on the lines y = const, and the boundaries from their special points."""
         lost: list[str] = []
-        with shown(progress and bool(ys), float(len(ys)), what) as show:
+        with show_progress(progress and bool(ys), float(len(ys)), what) as show:
             for number, y in enumerate(ys):
                 # the branches count as one half of the progress on a line, the boundaries as the other
                 branches, found, failed = line_branches(
@@ -443,7 +445,7 @@ class _Survey:
         # coarse grid may have the other motion
         true = own > 0.0 if curve.kind is Crossing.FOLD else own > 0.5
         self.traced.append(
-            Traced(
+            TracedBoundary(
                 points=curve.points,
                 motion=TRUE_ORBIT if true else OTHER_ORBIT,
                 kind=curve.kind,
@@ -494,7 +496,7 @@ class _Survey:
             if boundary.motion in _MOTION and boundary.kind is not Crossing.TORUS and len(boundary.points) > 1
         )
 
-    def _removal(self, matrix: Monodromy, boundary: Traced, which: int) -> str:
+    def _removal(self, matrix: Monodromy, boundary: TracedBoundary, which: int) -> str:
         """Return a sentence on the damping, along axis ``which``, that removes the region of a boundary."""
         other, up = self.axes[1 - which], self.axes[which]
         spans = (self.box.x, self.box.y)
@@ -589,7 +591,7 @@ def damping_name(mechanism: Mechanism) -> str:
     InputError
         If the mechanism has no damping.
     """
-    first = [mechanism.freedoms[number].coordinate for number in oscillating(mechanism)[:1]]
+    first = [mechanism.freedoms[number].coordinate for number in oscillating_freedoms(mechanism)[:1]]
     own = [name for coordinate in first for name in mechanism.names("damping", coordinate)]
     for name in (*own, *mechanism.names("damping")):
         return name

@@ -23,10 +23,10 @@ from ..motion.drive import Drive, coordinate_ranges
 from ..motion.floquet import TOLERANCE, multipliers
 from ..motion.flow import GAP, IN_LANES, PLAIN, VARIATIONAL, Flow
 from ..motion.orbit import PeriodicOrbit, require_turns
-from ..motion.search import Orbits, search_orbits, unsought
+from ..motion.search import Orbits, search_orbits, unsought_hint
 from ..motion.variables import Plane
 from . import kernels
-from .grid import Keeping, grid_points, row_code, row_name
+from .grid import RowComputation, grid_points, row_code, row_name
 from .kernels import LOST, MOST_ORBITS, UNSETTLED, Motions
 from .rows import PointRow, point_row
 
@@ -152,7 +152,7 @@ def coexistence(
     """
     xs, ys, rows, guesses = grid_points(operation, x, y, start, STARTS)
     code = row_code(kernels.solve_all)
-    data, computed = Keeping(folder, n_jobs, progress, what, kernels.solve_all).rows(
+    data, computed = RowComputation(folder, n_jobs, progress, what, kernels.solve_all).rows(
         partial(_compute_motions, guesses),
         rows,
         [row_name(row, guesses, (*_SEARCHED, GAP), code) for row in rows],
@@ -316,7 +316,7 @@ def basins(
         found = search_orbits(parameters, drive, turns=range(1, turns + 1), start=start)
     motions = found.stable
     if not motions:
-        of, also = turns_sought(drive.flow(mechanism_of(parameters)), turns), unsought(parameters, drive)
+        of, also = turns_sought(drive.flow(mechanism_of(parameters)), turns), unsought_hint(parameters, drive)
         raise InputError(f"there is no stable motion of {of} here: no start ends in one{also}")
     first = motions[0].start
     low, high = (side[0] for side in coordinate_ranges(parameters, drive, first))
@@ -335,7 +335,7 @@ def basins(
     known, owner = np.vstack(passed), np.repeat(np.arange(len(motions)), [len(starts) for starts in passed])
     point, code = operating_point(parameters, drive), row_code(kernels.settle_starts)
     row = point_row([point], known[0])
-    ends, computed = Keeping(folder, n_jobs, progress, "starts", kernels.settle_starts).rows(
+    ends, computed = RowComputation(folder, n_jobs, progress, "starts", kernels.settle_starts).rows(
         partial(_ends, point, known, across),
         up.tolist(),
         [row_name(row, known, (*_FOLLOWED, GAP), code, *across, value) for value in up.tolist()],

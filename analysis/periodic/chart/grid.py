@@ -20,8 +20,8 @@ from ...files import load_array, save_array
 from ...mechanisms import Parameters, mechanism_of
 from ...numerics.cache import cache_root
 from ...numerics.codegen import fingerprint
-from ...numerics.workers import check_jobs, interruptible, over_workers
-from ...run import shown
+from ...numerics.workers import check_jobs, record_interrupts, run_in_parallel
+from ...run import show_progress
 from ...units import si
 from ..motion import TOLERANCE, Drive, Plane, Stability, multipliers, spread_starts
 from ..motion.discretisation import INTEGRATOR_TOLERANCE, operating_point
@@ -207,7 +207,7 @@ def grid(
     """
     xs, ys, rows, guesses = grid_points(operation, x, y, start, STARTS)
     code = row_code(kernels.solve_row, multipliers)
-    data, computed = Keeping(folder, n_jobs, progress, what, kernels.solve_row).rows(
+    data, computed = RowComputation(folder, n_jobs, progress, what, kernels.solve_row).rows(
         partial(_compute_row, guesses, tolerance),
         rows,
         [row_name(row, guesses, (*_USED, GAP), code, tolerance) for row in rows],
@@ -294,7 +294,7 @@ def row_name(
 
 
 @dataclass(frozen=True, slots=True)
-class Keeping:
+class RowComputation:
     """Settings for the computation of rows on several workers, and for their storage on disk.
 
     Attributes
@@ -360,10 +360,10 @@ class Keeping:
         if missing:
             _ = self.kernel.compiled
         unkept = 0
-        with interruptible() as interrupted, shown(self.progress, float(len(paths)), self.what) as show:
+        with record_interrupts() as interrupted, show_progress(self.progress, float(len(paths)), self.what) as show:
             show(float(len(rows)))
             places = list(missing)
-            for number, made in over_workers(work, list(missing.values()), interrupted, n_jobs=self.n_jobs):
+            for number, made in run_in_parallel(work, list(missing.values()), interrupted, n_jobs=self.n_jobs):
                 path = places[number]
                 rows[path] = made
                 try:

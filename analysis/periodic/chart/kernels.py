@@ -17,7 +17,7 @@ from ...numerics.codegen import CUBE, MATRIX, VECTOR, copy, inline, inner, kerne
 from ...numerics.references import refer
 from ...numerics.vectors import LANES
 from ...run.compiled import read_lane
-from ..motion.collocation import NODES, close, lay_elements, make_desk, repeat_last, row_count, spread
+from ..motion.collocation import NODES, close, integrate_elements, lay_elements, make_desk, repeat_last, row_count
 from ..motion.drive import SAME
 from ..motion.kernels import (
     DIVERGED,
@@ -28,13 +28,13 @@ from ..motion.kernels import (
     Hunt,
     advance,
     begin_hunt,
-    deflated,
-    deflated_next,
+    continue_deflated_newton,
+    continue_newton,
+    deflated_newton,
     magnitude,
     make_room,
     newton,
-    newton_next,
-    numbered,
+    replace_numbers,
     subtract_modulo_turns,
 )
 from ..motion.tracks import IDLE, RUNNING, advance_tracks, begin, make_tracks, set_scale
@@ -97,7 +97,7 @@ MOTIONS = types.NamedTuple((CUBE, CUBE, CUBE, int64[::1]), Motions)
 @part
 def point_section(section, points, row, tolerance):
     """Return the section of one mechanism of a row."""
-    return numbered(section, points.drives[row], points.constants[row], points.scales[row], tolerance)
+    return replace_numbers(section, points.drives[row], points.constants[row], points.scales[row], tolerance)
 
 
 @part
@@ -112,7 +112,7 @@ def divide(section, search, level, start, path, desk, room):
         angles = np.linspace(0.0, search.end, m + 1)
         lay_elements(angles, desk)
         rows = row_count(m)
-        if spread(section, angles, 0, start.copy(), y[:rows], w[:rows], room) != DONE:
+        if integrate_elements(section, angles, 0, start.copy(), y[:rows], w[:rows], room) != DONE:
             break
         repeat_last(m, y[:rows])
         repeat_last(m, w[:rows])
@@ -259,7 +259,7 @@ def solve_from_guesses(section, points, search, guesses, found):
         for guess in range(0 if row > 0 and status[row - 1] == DONE else 1, guesses.shape[0]):
             start = guesses[guess].copy() if guess else starts[row - 1].copy()
             if (
-                deflated(wide, search.end, search.most, 1.0, start, none, z, room, carry) == DONE
+                deflated_newton(wide, search.end, search.most, 1.0, start, none, z, room, carry) == DONE
                 and newton(own, search.end, search.most, start, z, room, carry, report) == DONE
             ):
                 status[row] = DONE
@@ -382,9 +382,9 @@ def _continue_search(lane, point, seekers, v, room, carry):
     hunt, most, status = _hunt(lane, seekers.hunts), point.search.most, v.status[lane]
     read_lane(lane, LANES, v.x, v.z)
     if seekers.polishing[lane]:
-        what = newton_next(point.own, most, status, v.z, hunt)
+        what = continue_newton(point.own, most, status, v.z, hunt)
     else:
-        what = deflated_next(point.wide, most, 1.0, status, point.starts[: point.count[0]], v.z, hunt)
+        what = continue_deflated_newton(point.wide, most, 1.0, status, point.starts[: point.count[0]], v.z, hunt)
     if what == GOING:
         return
     if what != DONE:
@@ -463,7 +463,7 @@ LOST, UNSETTLED = -1, -2
 
 
 @inner
-def _arrived(z, known, near, section, away):
+def _find_known(z, known, near, section, away):
     """Return the number of the known motion that a state is near to, up to whole turns; UNSETTLED if there is none."""
     end = UNSETTLED
     for k in range(known.shape[0]):
@@ -493,7 +493,7 @@ def _settle(section, turn, near, most, starts, known, ends, tables):
                 else:
                     break
                 row = rows[lane]
-                ends[row] = _arrived(v.z, known, near, section, away) if v.status[lane] == DONE else LOST
+                ends[row] = _find_known(v.z, known, near, section, away) if v.status[lane] == DONE else LOST
                 if ends[row] != UNSETTLED or turns[lane] == most:
                     rows[lane], v.status[lane] = -1, IDLE
                 else:

@@ -12,7 +12,7 @@ from linkwork.errors import InputError
 from linkwork.parameters import field_name
 
 from ...mechanisms import Parameters
-from ...run.varied import Varied, check_sets, over_arrays, varied_constants
+from ...run.varied import VariedSequence, array_functions, check_sets, varied_constants
 from ..motion.discretisation import OperatingPoint, collocation_serves, operating_point
 from ..motion.flow import Flow
 from ..motion.orbit import MOST_ITERATIONS, SEARCH_TOLERANCE
@@ -100,14 +100,14 @@ def _named_row(operation: NamedPlane, xs: FloatArray, y: float, start: FloatArra
     ends = [operating_point(*operation(x, y)) for x in (float(xs.min()), float(xs.max()))]
     factors = parameter_places(flow, first.drive, operation.x)
     if factors is None:
-        sets = Varied(first.parameters, {field_name(operation.x): xs}, replace)
+        sets = VariedSequence(first.parameters, {field_name(operation.x): xs}, replace)
         check_sets(mechanism, sets)
     else:
         for place, factor in factors.items():
             vectors[:, place] = factor * xs
     parameters, columns = varied_constants(mechanism, sets)
     states = flow.state(start, vectors.T)
-    scale = over_arrays(mechanism)[0].of(mechanism.error_scale)(parameters, states)
+    scale = array_functions(mechanism)[0].of(mechanism.error_scale)(parameters, states)
     constants, scales = np.empty((len(xs), len(columns))), np.empty((len(xs), flow.size))
     for n, column in enumerate(columns):
         constants[:, n] = column

@@ -26,7 +26,7 @@ from linkwork.limits import LIMIT_SINE
 from ...numerics.codegen import MATRIX, VECTOR, copy, evaluate, inner, kernel, part
 from ...numerics.gauss import gauss
 from ...numerics.references import refer
-from ...numerics.vectors import LANES, fused, greater, load, size, store
+from ...numerics.vectors import LANES, absolute, greater, load, multiply_add, store
 from .flow import DIRECTIONAL, GAP, IN_LANES, PLAIN, VARIATIONAL
 from .kernels import DIVERGED, DONE, LIMIT, NO_STEP, SECTION, advance, eliminate, make_room
 
@@ -142,7 +142,7 @@ def _pace(section, y, desk):
 
 
 @inner
-def _at_node(s, row, unit, y, w, desk):
+def _evaluate_node(s, row, unit, y, w, desk):
     """Write y and the angle at a node of a row of elements into ``desk.z``."""
     n = desk.shift.shape[0]
     f = n // 2
@@ -152,7 +152,7 @@ def _at_node(s, row, unit, y, w, desk):
         twice, once = 0.0 * rate, 0.0 * rate
         for j in range(NODES):
             slope = load(w[row], j * f + i)
-            twice, once = fused(AA[s, j], slope, twice), fused(A[s, j], slope, once)
+            twice, once = multiply_add(AA[s, j], slope, twice), multiply_add(A[s, j], slope, once)
         store(desk.z, i, load(y[row], i) + h * unit * (C[s] * rate + h * twice))
         store(desk.z, f + i, rate + h * once)
     store(desk.z, n, load(desk.angles[row], 0) + C[s] * h)
@@ -168,7 +168,7 @@ def _linearise_row(section, row, unit, y, w, desk):
     directional = width > unknowns + 1 + n
     h = load(desk.lengths[row], 0)
     for s in range(NODES):
-        _at_node(s, row, unit, y, w, desk)
+        _evaluate_node(s, row, unit, y, w, desk)
         evaluate(_equation(section, desk), 0.0, desk.z, section.modes, section.drive, section.p, desk.out[s])
         if directional:
             for i in range(f):
@@ -186,11 +186,11 @@ def _linearise_row(section, row, unit, y, w, desk):
                 store(system, line + unknowns + 1 + f + j, by_rate + C[s] * (h * unit * by_coordinate))
                 once, twice = -1.0 * h * by_rate, -1.0 * h * h * unit * by_coordinate
                 for t in range(NODES):
-                    store(system, line + t * f + j, fused(A[s, t], once, AA[s, t] * twice))
+                    store(system, line + t * f + j, multiply_add(A[s, t], once, AA[s, t] * twice))
                 if directional:
                     total = load(system, line + unknowns + 1 + n)
                     for t in range(NODES):
-                        total = fused(A[s, t] * h, by_coordinate * load(desk.along, t * f + j), total)
+                        total = multiply_add(A[s, t] * h, by_coordinate * load(desk.along, t * f + j), total)
                     store(system, line + unknowns + 1 + n, total)
             store(system, line + s * f + i, 1.0 + load(system, line + s * f + i))
     _eliminate(system, unknowns, width)
@@ -239,7 +239,7 @@ def _close_row(row, unit, y, w, desk):
                 value = load(moves, (s * f + i) * columns + j)
                 if j == 0:
                     value = value + load(w[row], s * f + i)
-                twice, once = fused(BA[s], value, twice), fused(B[s], value, once)
+                twice, once = multiply_add(BA[s], value, twice), multiply_add(B[s], value, once)
             coordinate, rate = h * h * unit * twice, h * once
             if j == 0:
                 start = load(y[row], f + i)
@@ -254,7 +254,7 @@ def _close_row(row, unit, y, w, desk):
                 store(desk.matrices[row], (f + i) * n + k, rate + (1.0 if k == f + i else 0.0))
             else:
                 for s in range(NODES):
-                    coordinate = fused(B[s] * h, load(desk.along, s * f + i), coordinate)
+                    coordinate = multiply_add(B[s] * h, load(desk.along, s * f + i), coordinate)
                 store(desk.slopes[row], i, coordinate)
                 store(desk.slopes[row], f + i, rate)
 
@@ -324,14 +324,14 @@ def _move(section, y, w, desk):
                 line = s * f + i
                 change = load(moves, line * columns)
                 for j in range(n):
-                    change = fused(load(moves, line * columns + 1 + j), load(shifts, j), change)
+                    change = multiply_add(load(moves, line * columns + 1 + j), load(shifts, j), change)
                 store(w[row], line, load(w[row], line) + change)
-                worst = greater(worst, size(h * change) * (1.0 / section.scale[f + i]))
-                valid = fused(0.0, change, valid)
+                worst = greater(worst, absolute(h * change) * (1.0 / section.scale[f + i]))
+                valid = multiply_add(0.0, change, valid)
         for i in range(n):
             change = load(shifts, i)
             store(y[row], i, load(y[row], i) + change)
-            worst = greater(worst, size(change) * (1.0 / section.scale[i]))
+            worst = greater(worst, absolute(change) * (1.0 / section.scale[i]))
         # a NaN is lost in comparisons, but not here
         store(desk.single, 0, worst + valid)
         result = _greatest(desk.single, result)
@@ -385,9 +385,9 @@ def _tails(section, row, w, desk):
             for s in range(NODES):
                 line = s * f + i
                 value = h * (load(w[row], line) if j == 0 else load(moves, line * columns + j))
-                before, last = fused(TAIL[0, s], value, before), fused(TAIL[1, s], value, last)
-                most, valid = greater(most, size(value)), fused(0.0, value, valid)
-            worst = greater(worst, greater(size(before), size(last)) / (weight + most))
+                before, last = multiply_add(TAIL[0, s], value, before), multiply_add(TAIL[1, s], value, last)
+                most, valid = greater(most, absolute(value)), multiply_add(0.0, value, valid)
+            worst = greater(worst, greater(absolute(before), absolute(last)) / (weight + most))
     store(desk.single, 0, worst + valid)
 
 
@@ -398,7 +398,7 @@ def _least_gap(section, y, w, desk):
     unit = _pace(section, y, desk)
     for row in range(y.shape[0]):
         for s in range(NODES):
-            _at_node(s, row, unit, y, w, desk)
+            _evaluate_node(s, row, unit, y, w, desk)
             evaluate(
                 section.equations[IN_LANES + GAP], 0.0, desk.z, section.modes, section.drive, section.p, desk.single
             )
@@ -432,7 +432,7 @@ def close(section, m, y, w, desk):
 
 
 @part
-def spread(section, angles, first, start, y, w, room):
+def integrate_elements(section, angles, first, start, y, w, room):
     """Compute y and w of elements, from number ``first`` on, by the integrator; return a `Status`.
 
     ``start``, y at the beginning of the first element, becomes y at the end of the last. ``angles`` are the beginnings of these
@@ -482,8 +482,8 @@ def neighbour(m: int, n: int) -> Neighbour:
     return Neighbour(*(np.zeros((-(-m // LANES), size)) for size in sizes))
 
 
-class Walked(NamedTuple):
-    """The result of `walk`."""
+class PieceSolution(NamedTuple):
+    """The result of `solve_pieces`."""
 
     rows: NDArray[np.float64]  # ends of the pieces, as `kernels.segments` writes them
     tails: NDArray[np.float64]  # decay of the Legendre coefficients, shape (m,)
@@ -553,8 +553,8 @@ def _write_derivatives(firsts, rows, desk):
 
 
 @part
-def _walk(section, angles, firsts, starts, change, known, neighbour, found, tables):
-    """Do the work of `walk`, which keeps the arrays of the desk ``tables`` alive while they are used here."""
+def _solve_pieces(section, angles, firsts, starts, change, known, neighbour, found, tables):
+    """Do the work of `solve_pieces`, which keeps the arrays of the desk ``tables`` alive while they are used here."""
     y, w, moves = neighbour
     m, desk, room = angles.shape[0] - 1, refer(tables), make_room(section, 0)
     lay_elements(angles, desk)
@@ -563,7 +563,7 @@ def _walk(section, angles, firsts, starts, change, known, neighbour, found, tabl
     else:
         for piece in range(starts.shape[0]):
             first, last = firsts[piece], firsts[piece + 1]
-            status = spread(section, angles[first : last + 1], first, starts[piece].copy(), y, w, room)
+            status = integrate_elements(section, angles[first : last + 1], first, starts[piece].copy(), y, w, room)
             if status != DONE:
                 # shorter elements would not help the integrator to find a step
                 return LIMIT if status == LIMIT else DIVERGED
@@ -601,11 +601,11 @@ def _walk(section, angles, firsts, starts, change, known, neighbour, found, tabl
         float64,
         boolean,
         types.NamedUniTuple(MATRIX, 3, Neighbour),
-        types.NamedTuple((MATRIX, VECTOR, VECTOR), Walked),
+        types.NamedTuple((MATRIX, VECTOR, VECTOR), PieceSolution),
     ),
     purpose="the collocation of periodic motions",
 )
-def walk(section, angles, firsts, starts, change, known, neighbour, found):
+def solve_pieces(section, angles, firsts, starts, change, known, neighbour, found):
     """Solve y with its derivatives over each piece of a period, starting from a neighbouring motion.
 
     Parameters
@@ -622,7 +622,7 @@ def walk(section, angles, firsts, starts, change, known, neighbour, found):
         Whether there is a neighbour; if not, the integrator gives the first guess.
     neighbour : Neighbour
         Overwritten with this motion.
-    found : Walked
+    found : PieceSolution
         Written.
 
     Returns
@@ -631,4 +631,4 @@ def walk(section, angles, firsts, starts, change, known, neighbour, found):
         A `Status`; NO_STEP if elements are too long, DIVERGED if the slopes were not found.
     """
     m, n = angles.shape[0] - 1, starts.shape[1]
-    return _walk(section, angles, firsts, starts, change, known, neighbour, found, make_desk(n, m, True))
+    return _solve_pieces(section, angles, firsts, starts, change, known, neighbour, found, make_desk(n, m, True))

@@ -292,7 +292,7 @@ def collocation_serves(drives: Iterable[Drive], mechanisms: Iterable[Parameters]
         if not (drive.speed_drive and drive.ratios):
             return drive.speed_drive
         mechanism = mechanism_of(mechanisms[0])
-        return not {*drive.flow(mechanism).free} & {*drive.turning(mechanism)}
+        return not {*drive.flow(mechanism).free} & {*drive.ratios_by_freedom(mechanism)}
 
     return all(map(follows, drives)) and all(map(is_smooth, mechanisms))
 
@@ -396,9 +396,9 @@ class Discretisation:
         most = _MOST * len(self.angles) + 8 * _ELEMENTS * (self.angles[-1] / flow.period)
         while len(self._mesh) <= most:
             known = self._value is not None
-            found = collocation.Walked(np.zeros((k, n * (2 + n))), np.zeros(len(self._mesh) - 1), np.zeros(1))
+            found = collocation.PieceSolution(np.zeros((k, n * (2 + n))), np.zeros(len(self._mesh) - 1), np.zeros(1))
             change = 0.0 if self._value is None else value - self._value
-            status = collocation.walk(
+            status = collocation.solve_pieces(
                 section, self._mesh, self._firsts, np.ascontiguousarray(starts), change, known, self._known, found
             )
             self._value = None

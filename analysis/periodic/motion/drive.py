@@ -18,7 +18,15 @@ from linkwork.parameters import field_name
 
 from ...files import unknown_name
 from ...mechanisms import InitialState, Parameters, mechanism_of, variable_units
-from ...run import InductionMotor, Inputs, checked_run, driven, speed_ratio, started, takes_published
+from ...run import (
+    InductionMotor,
+    Inputs,
+    check_run,
+    complete_initial_state,
+    complete_inputs,
+    speed_ratio,
+    takes_published,
+)
 from ...units import Amount, in_si
 from .flow import Crank, Flow, find_crank, find_turning_freedom, flow
 
@@ -153,7 +161,7 @@ class Drive:
         """
         return find_crank(mechanism, self.crank)
 
-    def turning(self, mechanism: Mechanism) -> dict[int, Fraction]:
+    def ratios_by_freedom(self, mechanism: Mechanism) -> dict[int, Fraction]:
         """Return the ratios of the other cranks, and of links that go round, by the numbers of their freedoms."""
         return {find_turning_freedom(mechanism, name): ratio for name, ratio in self.ratios.items()}
 
@@ -170,7 +178,7 @@ class Drive:
             self.reference(mechanism).freedom,
             self.speed_drive,
             (*self.forces, *self.motors),
-            tuple(self.turning(mechanism)),
+            tuple(self.ratios_by_freedom(mechanism)),
             tuple(self.modes.items()),
         )
 
@@ -182,7 +190,7 @@ class Drive:
         InputError
             If the mechanism cannot be driven in this way, or no freedom is free.
         """
-        crank, ratios = self.reference(mechanism), self.turning(mechanism)
+        crank, ratios = self.reference(mechanism), self.ratios_by_freedom(mechanism)
         if (crank.command if self.speed_drive else crank.torque) is None:
             what = "speed of" if self.speed_drive else "torque on"
             raise InputError(f"a {mechanism.name} has no input for the {what} its crank: drive it otherwise")
@@ -243,7 +251,7 @@ class Drive:
         InputError
             If a force does not act, or if ``held`` names a coordinate that is not held.
         """
-        made, crank, ratios = self.flow(mechanism), self.reference(mechanism), self.turning(mechanism)
+        made, crank, ratios = self.flow(mechanism), self.reference(mechanism), self.ratios_by_freedom(mechanism)
         numbers = {c.name: n for n, c in enumerate(mechanism.channels)}
         u = np.zeros(len(numbers))
         if self.speed is not None and crank.command is not None:
@@ -280,7 +288,7 @@ class Drive:
 
     def inputs(self, mechanism: Mechanism) -> Inputs:
         """Return the inputs of a run that drive the mechanism in this way."""
-        made, crank, ratios = self.flow(mechanism), self.reference(mechanism), self.turning(mechanism)
+        made, crank, ratios = self.flow(mechanism), self.reference(mechanism), self.ratios_by_freedom(mechanism)
         names = [c.argument for c in mechanism.channels]
         acting: dict[str, Any] = {c.argument: self.forces[c.name] for c in mechanism.channels if c.name in self.forces}
         for channel in mechanism.channels:
@@ -367,10 +375,10 @@ def _value(mode: Mode, argument: str) -> str:
 
 def published_drive(known: PublishedSet, drive: Drive | None) -> Drive:
     """Return ``drive``; if it is None, the drive of a published set, with held freedoms at their initial values."""
-    return drive or steady_drive(known.parameters, driven(known, None), known.initial)
+    return drive or steady_drive(known.parameters, complete_inputs(known, None), known.initial)
 
 
-@takes_published(inputs=driven, initial=started)
+@takes_published(inputs=complete_inputs, initial=complete_initial_state)
 @in_si(speed="rad/s", torque="N.m")
 def steady_drive(
     parameters: Parameters,
@@ -399,7 +407,7 @@ def steady_drive(
         If nothing drives the crank, or another freedom is commanded to move without end.
     """
     mechanism = mechanism_of(parameters)
-    inputs, initial = checked_run(mechanism, inputs, initial)
+    inputs, initial = check_run(mechanism, inputs, initial)
     modes = inputs.modes(mechanism)
     crank, ratios = _choose_crank(mechanism, inputs, initial, modes)
     constant: dict[str, float] = {}
@@ -541,7 +549,7 @@ def coordinate_ranges(
 
 def even_rates(drive: Drive, flow: Flow, guess: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return the mean rate of each free coordinate: 0, or the rate of a uniform rotation if it goes round; shape (free,)."""
-    turning, pace = drive.turning(flow.mechanism), drive.speed or guess[-1]
+    turning, pace = drive.ratios_by_freedom(flow.mechanism), drive.speed or guess[-1]
     return np.array([pace * turning.get(n, 0) for n in flow.free], dtype=float)
 
 

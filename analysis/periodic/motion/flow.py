@@ -16,7 +16,7 @@ from linkwork.variables import Variable
 from ...numerics import symbolic
 from ...numerics.codegen import MAKING, MachineCode
 from ...numerics.vectors import LANES
-from ...run import MOTOR, constants, kloss, traced
+from ...run import MOTOR, constants, kloss, symbolic_equations
 
 # Indices of the functions of a flow in its addresses; the functions in lanes begin at IN_LANES, in the same order
 PLAIN, VARIATIONAL, DIRECTIONAL, GAP, STATE = range(5)
@@ -277,7 +277,7 @@ class Flow:
             casadi.vertcat(p, d_p),
         ]
         x, u = self._state(angle, y, drive)
-        functions = traced(m)
+        functions = symbolic_equations(m)
         applied = functions.of(m.equations.apply_inputs)(
             tuple(casadi.vertsplit(modes)) if m.modes else (), tuple(casadi.vertsplit(u)) if self.inputs else (), k
         )

@@ -20,7 +20,17 @@ from numpy.typing import NDArray
 from linkwork.limits import LIMIT_SINE, NEAR_LIMIT
 
 from ...numerics.codegen import MATRIX, VECTOR, copy, evaluate, inner, kernel, part
-from ...run.stepping import NODES, STAGES, Flow, attempt, following, interpolant, interpolate, shorter, stage
+from ...run.stepping import (
+    NODES,
+    STAGES,
+    Flow,
+    attempt,
+    interpolant,
+    interpolate,
+    next_step_size,
+    shorter_step_size,
+    stage,
+)
 from .flow import DIRECTIONAL, GAP, PLAIN, STATE, VARIATIONAL
 
 
@@ -69,7 +79,7 @@ SECTION = types.NamedTuple((int64[::1], VECTOR, VECTOR, VECTOR, VECTOR, VECTOR, 
 
 
 @part
-def numbered(section, drive, p, scale, tolerance):
+def replace_numbers(section, drive, p, scale, tolerance):
     """Return the section with new numbers of the drive, constants, scale and tolerance, and 1 for the magnitude of lambda."""
     return Section(section.equations, section.modes, drive, p, scale, section.ways, 1.0, tolerance, section.torque)
 
@@ -119,10 +129,10 @@ def _take(section, equation, angle, end, slowest, z, room, carry):
         if error <= 1.0:
             break
         # beyond the limit of assembly the error is NaN
-        proposed = shorter(h, error)
+        proposed = shorter_step_size(h, error)
         if proposed < LEAST_STEP:
             return (LIMIT if _clearance(section, angle, z, room) < NEAR_LIMIT else NO_STEP), angle
-    carry[0] = following(h, proposed, error)
+    carry[0] = next_step_size(h, proposed, error)
     angle = end if last else angle + h
     if not _clearance(section, angle, room.y, room) > LIMIT_SINE:
         return LIMIT, angle
@@ -263,7 +273,7 @@ def correct_start(start, end, z, system, correction):
     return solved
 
 
-#: Result of `newton_next` and `deflated_next` if another integration is needed.
+#: Result of `continue_newton` and `continue_deflated_newton` if another integration is needed.
 GOING = -1
 # Indices into `Hunt.numbers`: iterations, fraction of the correction that is tried, size of the correction, residual
 _ITERATION, _FRACTION, _SIZE, _RESIDUAL = range(4)
@@ -299,7 +309,7 @@ def begin_hunt(start, hunt):
 
 
 @inner
-def newton_next(section, most, status, z, hunt):
+def continue_newton(section, most, status, z, hunt):
     """Continue Newton's method after an integration from ``hunt.trial`` to z; return GOING or a `Status`.
 
     A correction is taken in part if the next one, found with the same matrix, would not be smaller (Deuflhard's natural
@@ -342,8 +352,8 @@ def newton_next(section, most, status, z, hunt):
 
 
 @inner
-def deflated_next(section, most, reach, status, known, z, hunt):
-    """Continue as `newton_next` does, with the known orbits divided out; return GOING or a `Status`; see `search`."""
+def continue_deflated_newton(section, most, reach, status, known, z, hunt):
+    """Continue as `continue_newton` does, with the known orbits divided out; return GOING or a `Status`; see `search`."""
     scale, n = section.scale, section.scale.shape[0]
     start, trial, correction, _, system, _, numbers = hunt
     if status != DONE:
@@ -396,7 +406,7 @@ def newton(section, end, most, start, z, room, carry, report):
     what = GOING
     while what == GOING:
         start_piece(n, hunt.trial, z)
-        what = newton_next(section, most, advance(section, 0.0, end, z, room, carry), z, hunt)
+        what = continue_newton(section, most, advance(section, 0.0, end, z, room, carry), z, hunt)
     copy(hunt.start, start)
     report[0], report[1] = hunt.numbers[_RESIDUAL], hunt.numbers[_ITERATION]
     return what
@@ -433,7 +443,7 @@ def solve(section, end, most, start, z, report):
 
 
 @part
-def deflated(section, end, most, reach, start, known, z, room, carry):
+def deflated_newton(section, end, most, reach, start, known, z, room, carry):
     """Run Newton's method with the known orbits divided out; see `search`."""
     n = section.scale.shape[0]
     hunt = make_hunt(n)
@@ -442,7 +452,7 @@ def deflated(section, end, most, reach, start, known, z, room, carry):
     while what == GOING:
         start_piece(n, hunt.trial, z)
         status = advance(section, 0.0, end, z, room, carry)
-        what = deflated_next(section, most, reach, status, known, z, hunt)
+        what = continue_deflated_newton(section, most, reach, status, known, z, hunt)
     copy(hunt.start, start)
     return what
 
@@ -472,7 +482,7 @@ def search(section, end, most, reach, start, known, z):
     The other parameters and the result are those of `solve`.
     """
     room = make_room(section, section.scale.shape[0])
-    return deflated(section, end, most, reach, start, known, z, room, np.array([0.1, 0.0]))
+    return deflated_newton(section, end, most, reach, start, known, z, room, np.array([0.1, 0.0]))
 
 
 @kernel(int64(SECTION, float64, float64, int64, VECTOR), purpose="the settling of motions")

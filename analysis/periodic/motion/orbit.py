@@ -519,7 +519,7 @@ def approach_orbit(
     return start if status == Status.DONE else None
 
 
-def approach_even(point: OperatingPoint, turns: int, place: FloatArray) -> FloatArray | None:
+def approach_uniform_rotation(point: OperatingPoint, turns: int, place: FloatArray) -> FloatArray | None:
     """Search for a motion near a uniform rotation, however unstable, by multiple shooting; return its start, or None.
 
     Parameters
@@ -589,7 +589,7 @@ def rest_guess(
     Raises InputError if there is none of these speeds; ``other`` is appended to the message: where else one can be given.
     """
     mechanism = mechanism_of(parameters)
-    flow, ratios, state = drive.flow(mechanism), drive.turning(mechanism), mechanism.state(initial)
+    flow, ratios, state = drive.flow(mechanism), drive.ratios_by_freedom(mechanism), mechanism.state(initial)
     if flow.torque and speed is None:
         begins = state[flow.places[-1]]
         speed = begins if begins > 0.0 else None

@@ -23,7 +23,7 @@ from linkwork.errors import InputError
 
 from ...display import Shown, format_count
 from ...mechanisms import InitialState, Parameters, mechanism_of
-from ...run import Inputs, driven, started, takes_published
+from ...run import Inputs, complete_initial_state, complete_inputs, takes_published
 from ...units import Amount, in_si
 from .discretisation import OperatingPoint, OrbitError, operating_point, orbit_error
 from .drive import SAME, Drive, Torque, even_rates, spread_starts, steady_drive
@@ -32,8 +32,8 @@ from .kernels import Status
 from .orbit import (
     SEARCH_TOLERANCE,
     PeriodicOrbit,
-    approach_even,
     approach_orbit,
+    approach_uniform_rotation,
     first_guess,
     newton_orbit,
     require_turns,
@@ -256,7 +256,7 @@ MANY, DEFLATED, ROUNDS = 64, 16, 2
 _NEAR = 1e-4
 #: Speeds of a slow run up from rest: the first relative to the last, and their number.
 _FIRST_SPEED, _SPEEDS = 0.2, 80
-#: Distance between two motions, relative to the scale, above which they are different: see `_reached`.
+#: Distance between two motions, relative to the scale, above which they are different: see `_reached_motion`.
 _ARRIVED = 1e-2
 
 
@@ -301,7 +301,7 @@ class Orbits(Shown):
 
 
 @takes_published()
-def unsought(parameters: Parameters, drive: Drive) -> str:
+def unsought_hint(parameters: Parameters, drive: Drive) -> str:
     """Return what an error message adds about motions that are not sought, in which swinging links go round; may be empty."""
     names = list(drive.flow(mechanism_of(parameters)).swinging)
     if not names:
@@ -310,7 +310,7 @@ def unsought(parameters: Parameters, drive: Drive) -> str:
     return f"; motions in which {' or '.join(names)} goes round more than once in a turn{also} were not sought"
 
 
-@takes_published(inputs=driven, initial=started)
+@takes_published(inputs=complete_inputs, initial=complete_initial_state)
 @in_si(speed="rad/s", torque="N.m")
 def find_orbit(
     parameters: Parameters,
@@ -383,11 +383,11 @@ def find_orbit(
             raise failure
         # the motion repeats itself after fewer turns than were asked for
         return replace(first, others=0)
-    met = _reached(found, drive, turns, first, start)
+    met = _reached_motion(found, drive, turns, first, start)
     return replace(met, others=sum(orbit is not met for orbit in found.orbits))
 
 
-@takes_published(inputs=driven, initial=started)
+@takes_published(inputs=complete_inputs, initial=complete_initial_state)
 @in_si(speed="rad/s", torque="N.m")
 def find_orbits(
     parameters: Parameters,
@@ -481,7 +481,7 @@ def _search_rounds(
     """Find the periodic motions in which links go round as often as the drive says."""
     guess = first_guess(point.flow, point.drive, start)
     require_turns(turns, point, guess)
-    many, deflated = (_Found(point, turns, guess) for _ in range(2))
+    many, deflated = (_FoundMotions(point, turns, guess) for _ in range(2))
     whole = 0 if point.flow.ways.any() else 1
     for orbit in known:
         many.add(orbit)
@@ -490,7 +490,9 @@ def _search_rounds(
         # motions near a uniform rotation may begin at other angles of the link
         even, free = guess.copy(), len(point.flow.free)
         even[free : 2 * free] = even_rates(point.drive, point.flow, guess)
-        near = (approach_even(point, turns, even + share * point.flow.ways) for share in (0.0, 0.25, 0.5, 0.75))
+        near = (
+            approach_uniform_rotation(point, turns, even + share * point.flow.ways) for share in (0.0, 0.25, 0.5, 0.75)
+        )
         places += [place for place in near if place is not None]
     settled = settle_motion(point, guess, tolerance=SEARCH_TOLERANCE, change=1e-4, turns=50)
     if settled[0] is Status.DONE:
@@ -499,16 +501,16 @@ def _search_rounds(
         for place in places:
             many.seek(place, divide=False)
         # starts that the first method does not use
-        for place in (guess, *many.places(DEFLATED, ROUNDS + number), *deflated.between()):
+        for place in (guess, *many.places(DEFLATED, ROUNDS + number), *deflated.intermediate_starts()):
             while deflated.seek(place, divide=True):
                 pass
-        agreed = many.same_as(deflated)
+        agreed = many.has_same_motions(deflated)
         if agreed and many.index == whole:
             break
         for orbit in (*deflated.orbits, *many.orbits):
             many.add(orbit)
             deflated.add(orbit)
-        places = [*many.places(MANY, number + 1), *many.between()]
+        places = [*many.places(MANY, number + 1), *many.intermediate_starts()]
     orbits = sorted(many.orbits, key=lambda orbit: orbit.amplitude)
     return Orbits(orbits=tuple(orbits), agreed=agreed and many.index == whole, index=many.index, index_of_all=whole)
 
@@ -524,7 +526,7 @@ def join_orbits(parts: Sequence[Orbits]) -> Orbits:
     )
 
 
-class _Found:
+class _FoundMotions:
     """The motions that one method has found at a point."""
 
     def __init__(self, point: OperatingPoint, turns: int, guess: FloatArray) -> None:
@@ -568,13 +570,13 @@ class _Found:
             self.orbits.append(orbit)
         return True
 
-    def same_as(self, other: _Found) -> bool:
+    def has_same_motions(self, other: _FoundMotions) -> bool:
         """Return whether this method and another one have found the same motions."""
         if len(self.orbits) != len(other.orbits):
             return False
         return all(other.knows(orbit.start) for orbit in self.orbits)
 
-    def between(self) -> list[FloatArray]:
+    def intermediate_starts(self) -> list[FloatArray]:
         """Return starts between the motions of each pair, where a third motion often lies, and around each motion."""
         places = [
             a + share * (b - a) for n, a in enumerate(self.known) for b in self.known[:n] for share in (0.25, 0.5, 0.75)
@@ -583,7 +585,7 @@ class _Found:
         return places + [a + share * (b - a) for a in self.known for b in around for share in (0.1, 0.3)]
 
 
-def _reached(
+def _reached_motion(
     found: Orbits, drive: Drive, turns: int, first: PeriodicOrbit | None, start: ArrayLike | None
 ) -> PeriodicOrbit:
     """Return the stable motion that a machine reaches; if none is stable, ``first``, or the smallest motion if that is None.

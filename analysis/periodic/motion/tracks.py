@@ -14,9 +14,9 @@ from numpy.typing import NDArray
 from linkwork.limits import LIMIT_SINE, NEAR_LIMIT
 
 from ...numerics.codegen import evaluate, inner, part
-from ...numerics.vectors import LANES, fused, load, store
+from ...numerics.vectors import LANES, load, multiply_add, store
 from ...run.compiled import read_lane, write_lane
-from ...run.stepping import NODES, STAGES, following, shorter
+from ...run.stepping import NODES, STAGES, next_step_size, shorter_step_size
 from ...run.stepping_in_lanes import errors_in_lanes, stage_in_lanes
 from .flow import GAP, IN_LANES, PLAIN, VARIATIONAL
 from .kernels import DONE, LEAST_STEP, LIMIT, NO_STEP, STALL, STALLED, start_piece
@@ -110,7 +110,7 @@ def _rates(section, s, z, v):
         for j in range(columns):
             total = load(v.out, n + i) * load(z, n + j * n)
             for q in range(1, n):
-                total = fused(load(v.out, n + q * n + i), load(z, n + j * n + q), total)
+                total = multiply_add(load(v.out, n + q * n + i), load(z, n + j * n + q), total)
             store(v.k[s], n + j * n + i, total)
 
 
@@ -134,13 +134,13 @@ def _judge(lane, section, last, v):
     error = v.error[lane] / v.tolerance[lane]
     if not error <= 1.0:
         # beyond the limit of assembly the error is NaN
-        v.step[lane] = shorter(h, error)
+        v.step[lane] = shorter_step_size(h, error)
         if v.step[lane] < LEAST_STEP:
             read_lane(lane, LANES, v.x, v.z)
             near = _clearance(section, v.z, v.angle[lane], v) < NEAR_LIMIT
             v.status[lane] = LIMIT if near else NO_STEP
         return v.status[lane] != RUNNING
-    v.step[lane] = following(h, v.step[lane], error)
+    v.step[lane] = next_step_size(h, v.step[lane], error)
     v.angle[lane] = v.end[lane] if last else v.angle[lane] + h
     for i in range(lane, v.x.shape[0], LANES):
         v.x[i] = v.y[i]

@@ -17,7 +17,7 @@ from linkwork.parameters import field_name, fmi_name
 from ...files import unknown_name
 from ...mechanisms import Parameters, mechanism_of
 from ...numerics import symbolic
-from ...run import InductionMotor, of_parameters, takes_published
+from ...run import InductionMotor, parameter_symbols, takes_published
 from ...units import RAD_S_PER_RPM
 from .drive import Direction, Drive, force_inputs, require_acting, require_drive
 from .flow import Flow, find_crank, find_cranks
@@ -40,7 +40,7 @@ def _crank_inputs(mechanism: Mechanism) -> dict[str, tuple[str, int]]:
 
 
 @cache
-def of_the_motor(mechanism: Mechanism) -> dict[str, tuple[str, str]]:
+def motor_parameters(mechanism: Mechanism) -> dict[str, tuple[str, str]]:
     """Return the field of `InductionMotor` and the unit of each motor parameter by FMI name, in the order of `Drive.vector`."""
     units = {"breakdown_torque": "N.m", "breakdown_slip": "1", "synchronous_speed": "rad/s"}
     torques = [mechanism.channels[n].name for n in mechanism.torques]
@@ -49,7 +49,7 @@ def of_the_motor(mechanism: Mechanism) -> dict[str, tuple[str, str]]:
 
 def driving_names(mechanism: Mechanism) -> tuple[str, ...]:
     """Return the names of the parameters of a drive: speeds of cranks, torques on them, parameters of motors, and forces."""
-    return tuple(dict.fromkeys((*_crank_inputs(mechanism), *of_the_motor(mechanism), *force_inputs(mechanism))))
+    return tuple(dict.fromkeys((*_crank_inputs(mechanism), *motor_parameters(mechanism), *force_inputs(mechanism))))
 
 
 def speed_names(mechanism: Mechanism) -> tuple[str, ...]:
@@ -106,7 +106,7 @@ def require_variable(parameters: Parameters, drive: Drive, name: str) -> None:
             raise InputError(f"{name} cannot vary: this crank is not commanded to turn")
     elif name in force_inputs(mechanism):
         require_acting(drive, mechanism, force_inputs(mechanism)[name])
-    if name in of_the_motor(mechanism) and _find_motor(mechanism, drive, name) is None:
+    if name in motor_parameters(mechanism) and _find_motor(mechanism, drive, name) is None:
         raise InputError(f"{name} cannot vary: no motor drives the crank")
 
 
@@ -115,7 +115,7 @@ def _crank_ratio(mechanism: Mechanism, drive: Drive, freedom: int) -> float:
     if freedom == drive.reference(mechanism).freedom:
         return 1.0
     commanded = freedom in drive.flow(mechanism).commanded
-    return float(drive.turning(mechanism).get(freedom, 0)) if commanded else 0.0
+    return float(drive.ratios_by_freedom(mechanism).get(freedom, 0)) if commanded else 0.0
 
 
 def _find_motor(mechanism: Mechanism, drive: Drive, name: str) -> InductionMotor | None:
@@ -142,8 +142,8 @@ def parameter_unit(mechanism: Mechanism, name: str) -> str:
     names = variable_names(mechanism)
     if name not in names:
         raise unknown_name(name, names)
-    if name in of_the_motor(mechanism):
-        return of_the_motor(mechanism)[name][1]
+    if name in motor_parameters(mechanism):
+        return motor_parameters(mechanism)[name][1]
     return next(v.unit for v in mechanism.variables if v.name == name)
 
 
@@ -156,8 +156,8 @@ def parameter_value(parameters: Parameters, drive: Drive, name: str) -> float:
         return float("nan") if drive.speed is None else float(drive.speed) * _crank_ratio(mechanism, drive, freedom)
     if what == "torque" and freedom == drive.reference(mechanism).freedom:
         return float(drive.torque)
-    if name in of_the_motor(mechanism):
-        return float(getattr(_find_motor(mechanism, drive, name), of_the_motor(mechanism)[name][0], np.nan))
+    if name in motor_parameters(mechanism):
+        return float(getattr(_find_motor(mechanism, drive, name), motor_parameters(mechanism)[name][0], np.nan))
     if name in force_inputs(mechanism):
         return float(drive.forces.get(name, 0.0))
     return float(getattr(parameters, field_name(name)))
@@ -170,7 +170,7 @@ def format_value(name: str, value: float, unit: str) -> str:
 
 
 @lru_cache(maxsize=64)
-def _replaced(parameters: Parameters, *values: tuple[str, float]) -> Parameters:
+def _replace_parameters(parameters: Parameters, *values: tuple[str, float]) -> Parameters:
     """Return parameters with new values; cached, since all points in a row of a chart over the speed share one mechanism."""
     return replace(parameters, **dict(values))
 
@@ -179,7 +179,7 @@ def _replaced(parameters: Parameters, *values: tuple[str, float]) -> Parameters:
 def with_values(parameters: Parameters, drive: Drive, values: Mapping[str, float]) -> Operation:
     """Return the mechanism and drive with new values of parameters, by FMI name."""
     mechanism = mechanism_of(parameters)
-    of_cranks, of_motor, forces = _crank_inputs(mechanism), of_the_motor(mechanism), force_inputs(mechanism)
+    of_cranks, of_motor, forces = _crank_inputs(mechanism), motor_parameters(mechanism), force_inputs(mechanism)
     own = drive.reference(mechanism).freedom
     of_drive: dict[str, Any] = {}
     acting: dict[str, float] = {}
@@ -209,7 +209,7 @@ def with_values(parameters: Parameters, drive: Drive, values: Mapping[str, float
         else:
             of_drive["motor"] = motor
     return (
-        _replaced(parameters, *of_mechanism.items()) if of_mechanism else parameters,
+        _replace_parameters(parameters, *of_mechanism.items()) if of_mechanism else parameters,
         replace(drive, **of_drive) if of_drive else drive,
     )
 
@@ -354,18 +354,18 @@ def gradient_names(parameters: Parameters, drive: Drive) -> tuple[str, ...]:
         acting.append(name)
     if mechanism.switch_index < 0 or mechanism.is_switched_on(parameters.constants()):
         return tuple(acting)
-    effect = along_parameters(parameters, acting).p[mechanism.switch_index]
+    effect = differentiate_constants(parameters, acting).p[mechanism.switch_index]
     return tuple(name for name, change in zip(acting, effect) if change == 0.0)
 
 
-class Along(NamedTuple):
+class ConstantDerivatives(NamedTuple):
     """Derivatives of the P constants with respect to m parameters."""
 
     p: FloatArray  # first derivatives, shape (P, m)
     p_along: FloatArray  # derivatives of ``p`` with respect to one further parameter, (P, m)
 
 
-def along_parameters(parameters: Parameters, names: Sequence[str], along: str = "") -> Along:
+def differentiate_constants(parameters: Parameters, names: Sequence[str], along: str = "") -> ConstantDerivatives:
     """Compute the derivatives of the constants by parameters given by FMI name; zero for parameters of the drive.
 
     ``along`` is the FMI name of the further parameter for the second derivatives.
@@ -382,7 +382,7 @@ def along_parameters(parameters: Parameters, names: Sequence[str], along: str = 
         for column, name in enumerate(names):
             if name in known:
                 columns[:, column] = part[:, known[name]]
-    return Along(*chosen)
+    return ConstantDerivatives(*chosen)
 
 
 def parameter_places(flow: Flow, drive: Drive, name: str) -> dict[int, float] | None:
@@ -391,7 +391,7 @@ def parameter_places(flow: Flow, drive: Drive, name: str) -> dict[int, float] | 
     For a parameter of the mechanism the result is None.
     """
     mechanism = flow.mechanism
-    places = (*mechanism.input_names, *of_the_motor(mechanism))
+    places = (*mechanism.input_names, *motor_parameters(mechanism))
     what, freedom = _crank_inputs(mechanism).get(name, ("", -1))
     if what == "speed":
         own = _crank_ratio(mechanism, drive, freedom)
@@ -400,7 +400,7 @@ def parameter_places(flow: Flow, drive: Drive, name: str) -> dict[int, float] | 
     return {places.index(name): 1.0} if name in places else None
 
 
-def stacked(drive: Drive, flow: Flow, names: Sequence[str], p: FloatArray) -> FloatArray:
+def stack_derivatives(drive: Drive, flow: Flow, names: Sequence[str], p: FloatArray) -> FloatArray:
     """Return the derivatives of the numbers of the drive by parameters, with those of the constants, ``p``, below them.
 
     The shape is (numbers of the drive + constants, m).
@@ -419,7 +419,7 @@ def _constants(mechanism: Mechanism) -> Any:
     Its values are the Jacobian of the constants by the parameters, and the derivative of this Jacobian along the direction.
     """
     casadi = symbolic.library()
-    traced = of_parameters(mechanism)
+    traced = parameter_symbols(mechanism)
     k = casadi.vertcat(*traced.parameters.constants())
     direction = casadi.SX.sym("direction", *traced.own.shape)
     jacobian = casadi.jacobian(k, traced.own)

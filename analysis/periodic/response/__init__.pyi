@@ -6,4 +6,4 @@ from .branch import switch as switch
 from .frequency import Response as Response
 from .frequency import frequency_response as frequency_response
 from .frequency import natural_frequency as natural_frequency
-from .frequency import oscillating as oscillating
+from .frequency import oscillating_freedoms as oscillating_freedoms

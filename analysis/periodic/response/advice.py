@@ -110,7 +110,7 @@ class Arc:
         """The least and the greatest value of the parameter."""
         return float(self.parameter[0]), float(self.parameter[-1])
 
-    def same_as(self, other: Arc) -> bool:
+    def is_same_curve(self, other: Arc) -> bool:
         """Return whether two arcs are the same curve where they overlap, because a branch was followed from both ends."""
         low, high = _overlap(self, other)
         if self.turns != other.turns or low >= high:
@@ -183,7 +183,7 @@ def fold_jumps(branches: Sequence[Branch]) -> tuple[FoldJump, ...]:
             beyond: list[Arc] = []
             for other in (o for o in stable if o.span[0] < value < o.span[1]):
                 # a motion that was followed twice counts once
-                if not any(other.same_as(known) for known in (arc, *beyond)):
+                if not any(other.is_same_curve(known) for known in (arc, *beyond)):
                     beyond.append(other)
             after = sorted(float(np.interp(value, other.parameter, other.amplitude)) for other in beyond)
             # and so does a fold that was met from both sides
@@ -202,10 +202,10 @@ def ranges_to_avoid(branches: Sequence[Branch], low: float, high: float) -> tupl
     stable = [arc for arc in arcs(branches) if arc.stable]
     without = _gaps(_union((arc.span for arc in stable if arc.turns == 1), least), low, high)
     several = _union((arc.span for arc in stable if arc.turns > 1), least)
-    doubled = [part for gap in without for part in _within(several, *gap)]
+    doubled = [part for gap in without for part in _clip_intervals(several, *gap)]
     found = {
         Risk.RESONANCE: _union((band for arc in stable for band in _resonances(arc)), least),
-        Risk.SEVERAL: _union((_overlap(a, b) for a, b in combinations(stable, 2) if not a.same_as(b)), least),
+        Risk.SEVERAL: _union((_overlap(a, b) for a, b in combinations(stable, 2) if not a.is_same_curve(b)), least),
         Risk.DOUBLED: doubled,
         Risk.UNSTABLE: [part for gap in without for part in _gaps(several, *gap)],
     }
@@ -263,11 +263,11 @@ def _union(intervals: Iterable[Interval], least: float) -> list[Interval]:
 
 def _gaps(intervals: Sequence[Interval], low: float, high: float) -> list[Interval]:
     """Return the parts of the range from ``low`` to ``high`` that sorted intervals do not cover."""
-    ends = [low, *(v for interval in _within(intervals, low, high) for v in interval), high]
+    ends = [low, *(v for interval in _clip_intervals(intervals, low, high) for v in interval), high]
     return [(a, b) for a, b in zip(ends[::2], ends[1::2]) if a < b]
 
 
-def _within(intervals: Iterable[Interval], low: float, high: float) -> list[Interval]:
+def _clip_intervals(intervals: Iterable[Interval], low: float, high: float) -> list[Interval]:
     """Return the parts of intervals that lie in the range from ``low`` to ``high``."""
     return [(max(a, low), min(b, high)) for a, b in intervals if max(a, low) < min(b, high)]
 

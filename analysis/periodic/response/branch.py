@@ -312,7 +312,7 @@ def _growth(orbit: PeriodicOrbit) -> float:
     return orbit.largest if orbit.stations is None else orbit.stations.growth
 
 
-def _divided(family: Family, last: Point, settings: Settings) -> tuple[Follower, Point]:
+def _divide_period(family: Family, last: Point, settings: Settings) -> tuple[Follower, Point]:
     """Divide the period into pieces: return a follower by multiple shooting, and its first point at the last point so far."""
     orbit: PeriodicOrbit = last.data
     places = orbit.flow.unknowns(orbit.turn(PLACES * orbit.periods).states, orbit.point.vector)
@@ -379,7 +379,7 @@ def _branch(
             break
         settings = replace(settings, most_points=left)
         try:
-            follower, first = _divided(family, last, settings)
+            follower, first = _divide_period(family, last, settings)
         except OrbitError:
             break
     special = [s for part, (own, curve) in enumerate(pieces) for s in _special_points(curve, own, pieces[:part])]

@@ -26,8 +26,8 @@ from ...files import write_csv
 from ...mechanisms import Parameters, mechanism_of
 from ...numerics import symbolic
 from ...numerics.continuation import ContinuationError
-from ...numerics.workers import interruptible
-from ...run import at_rest, shown, takes_published
+from ...numerics.workers import record_interrupts
+from ...run import inertia_and_stiffness, show_progress, takes_published
 from ...units import Amount, si
 from ..motion import (
     SAME,
@@ -55,14 +55,14 @@ MASS_SAMPLES = 1024
 LATTICE = 633
 
 
-def oscillating(mechanism: Mechanism) -> tuple[int, ...]:
+def oscillating_freedoms(mechanism: Mechanism) -> tuple[int, ...]:
     """Return the numbers of the freedoms that are not cranks."""
     return tuple(number for number in range(len(mechanism.freedoms)) if number not in mechanism.cyclic_freedoms)
 
 
 def first_freedom(mechanism: Mechanism) -> int:
     """Return the number of the first freedom that is not a crank; raises ParameterError if there is none."""
-    for number in oscillating(mechanism):
+    for number in oscillating_freedoms(mechanism):
         return number
     raise ParameterError("mechanism", mechanism.name, "have a second freedom for a natural frequency")
 
@@ -72,7 +72,7 @@ def stiffness_name(mechanism: Mechanism) -> str:
     return next(iter(mechanism.names("stiffness", mechanism.freedoms[first_freedom(mechanism)].coordinate)), "")
 
 
-def _means(parameters: Parameters) -> tuple[float, float]:
+def _mean_mass_and_stiffness(parameters: Parameters) -> tuple[float, float]:
     """Return the effective mass (kg) and stiffness (N/m) of the first freedom at its zero position, averaged over a turn."""
     mechanism = mechanism_of(parameters)
     cranks, freedom = find_cranks(mechanism), first_freedom(mechanism)
@@ -89,7 +89,7 @@ def _means(parameters: Parameters) -> tuple[float, float]:
         for crank, angle in zip(cranks, at):
             x[crank.freedom] = angle
         mechanism.check_assembly(parameters, x)
-    resting = at_rest(mechanism, tuple(crank.freedom for crank in cranks), freedom)
+    resting = inertia_and_stiffness(mechanism, tuple(crank.freedom for crank in cranks), freedom)
     mass, stiffness = symbolic.evaluate_arrays(resting, *angles, list(parameters.constants()))
     return float(mass.mean()), float(stiffness.mean())
 
@@ -103,7 +103,7 @@ def mean_effective_mass(parameters: Parameters) -> float:
     AssemblyError
         If the links cannot be joined over the whole turn with this freedom at its zero position.
     """
-    return _means(parameters)[0]
+    return _mean_mass_and_stiffness(parameters)[0]
 
 
 @takes_published()
@@ -132,7 +132,7 @@ def natural_frequency(parameters: Parameters) -> float:
     spring = getattr(parameters, field_name(name), None)
     if spring is not None and spring <= 0.0:
         raise ParameterError(name, spring, "be above zero for a natural frequency")
-    mass, stiffness = _means(parameters)
+    mass, stiffness = _mean_mass_and_stiffness(parameters)
     stiffness = stiffness if spring is None else spring
     if stiffness <= 0.0:
         raise ParameterError(name or "stiffness", stiffness, "be above zero for a natural frequency")
@@ -318,7 +318,7 @@ def frequency_response(
     if not (np.isfinite(low) and np.isfinite(high) and low < high):
         raise InputError(f"the range is {low} to {high}: it must be finite and increasing")
     family = Family(parameters=parameters, drive=drive, vary=vary)
-    with interruptible() as interrupted, shown(progress, high - low, "following the response") as show:
+    with record_interrupts() as interrupted, show_progress(progress, high - low, "following the response") as show:
         search = _Search(family, low, high, greatest_step, lambda: bool(interrupted))
         search.follow_from_both_ends(start, most_points, show)
         if not interrupted:
@@ -449,7 +449,7 @@ class _Search:
             self.branches.append(branch)
             strayed = turns > 1 and max(branch.orbits[end].largest for end in (0, -1)) > limit
             if not (branch.reached or strayed):
-                self.problems.append(ending(branch))
+                self.problems.append(describe_end(branch))
 
     def _knows(self, orbit: PeriodicOrbit, value: float) -> bool:
         """Return whether a branch passes through a motion, whichever turn of the motion comes first."""
@@ -461,10 +461,10 @@ class _Search:
         self.branches.append(branch)
         left = largest < GREATEST_MULTIPLIER and branch.orbits[-1].largest > largest
         if not (branch.reached or left):
-            self.problems.append(ending(branch))
+            self.problems.append(describe_end(branch))
 
 
-def ending(branch: Branch) -> str:
+def describe_end(branch: Branch) -> str:
     """Return a sentence that says how far a branch was followed, and why not to its end."""
     first, last = (branch.family.format_value(float(branch.parameter[i])) for i in (0, -1))
     period = "" if branch.periods == 1 else f"with a period of {branch.crank_turns} turns "
@@ -525,7 +525,10 @@ def with_isolas(
         raise InputError(f"places is {places}: motions must be sought at one value of the parameter at least")
     require_turns(turns)
     branches, problems = list(response.branches), list(response.problems)
-    with interruptible() as interrupted, shown(progress, float(places * turns), "seeking closed branches") as show:
+    with (
+        record_interrupts() as interrupted,
+        show_progress(progress, float(places * turns), "seeking closed branches") as show,
+    ):
         values = np.linspace(response.low, response.high, places + 2)[1:-1].tolist()
         search = _Search(
             response.family, response.low, response.high, greatest_step, lambda: bool(interrupted), branches, problems

@@ -104,27 +104,27 @@ class Forms(NamedTuple):
     of: Callable[[FloatArray], FloatArray]
     matrix: FloatArray
 
-    def second(self, x: FloatArray, h: float) -> FloatArray:
+    def second_form(self, x: FloatArray, h: float) -> FloatArray:
         """Return B(x, x) with the step h."""
         return (self.of(h * x) + self.of(-h * x) - 2.0 * self.of(0.0 * x)) / h**2
 
-    def third(self, x: FloatArray, h: float) -> FloatArray:
+    def third_form(self, x: FloatArray, h: float) -> FloatArray:
         """Return C(x, x, x) with the step h."""
         of = self.of
         return (of(2.0 * h * x) - 2.0 * of(h * x) + 2.0 * of(-h * x) - of(-2.0 * h * x)) / (2.0 * h**3)
 
-    def complex(self, h: float) -> tuple[Form, Form]:
+    def complex_forms(self, h: float) -> tuple[Form, Form]:
         """Return the functions B(u, v) and C(u, v, w) of complex vectors, by polarisation of the real forms."""
 
         def b_real(u: FloatArray, v: FloatArray) -> FloatArray:
-            return (self.second(u + v, h) - self.second(u - v, h)) / 4.0
+            return (self.second_form(u + v, h) - self.second_form(u - v, h)) / 4.0
 
         def c_real(u: FloatArray, v: FloatArray, w: FloatArray) -> FloatArray:
             return (
-                self.third(u + v + w, h)
-                - self.third(u + v - w, h)
-                - self.third(u - v + w, h)
-                + self.third(u - v - w, h)
+                self.third_form(u + v + w, h)
+                - self.third_form(u + v - w, h)
+                - self.third_form(u - v + w, h)
+                + self.third_form(u - v - w, h)
             ) / 24.0
 
         return _complex_form(b_real, 2), _complex_form(c_real, 3)
@@ -178,7 +178,7 @@ def normal_form(family: Family, special: SpecialPoint) -> NormalForm:
     crossing = {Crossing.FOLD: 1.0, Crossing.PERIOD_DOUBLING: -1.0}.get(special.kind, multiplier / abs(multiplier))
     if np.abs(special.orbit.multipliers - crossing).min() > _LOCATED:
         return NormalForm(kind=special.kind, coefficient=0.0, uncertainty=np.inf, words=_UNSETTLED)
-    coefficient, uncertainty = _extrapolated(lambda h: form_coefficient(of, special.kind, multiplier, h))
+    coefficient, uncertainty = _extrapolate_coefficient(lambda h: form_coefficient(of, special.kind, multiplier, h))
     if not uncertainty < UNSETTLED * abs(coefficient):
         words = _UNSETTLED
     elif special.kind is Crossing.FOLD:
@@ -189,7 +189,7 @@ def normal_form(family: Family, special: SpecialPoint) -> NormalForm:
     return NormalForm(kind=special.kind, coefficient=coefficient, uncertainty=uncertainty, words=words)
 
 
-def _extrapolated(at: Callable[[float], float]) -> tuple[float, float]:
+def _extrapolate_coefficient(at: Callable[[float], float]) -> tuple[float, float]:
     """Extrapolate a coefficient, a function of the step, to step zero; return the least uncertain value and its uncertainty."""
     found: list[tuple[float, float]] = []
     values: list[float] = []
@@ -229,7 +229,7 @@ def form_coefficient(of: Forms, kind: Crossing, multiplier: complex, h: float) -
     if kind is Crossing.TORUS:
         v, left, found = _eigenvectors(matrix, complex(multiplier.real, abs(multiplier.imag)))
         turn = found / abs(found)
-        b, c = of.complex(h)
+        b, c = of.complex_forms(h)
         inner = (
             c(v, v, v.conj())
             + 2.0 * b(v, np.linalg.solve(unit - matrix, b(v, v.conj())))
@@ -239,14 +239,14 @@ def form_coefficient(of: Forms, kind: Crossing, multiplier: complex, h: float) -
     sign = 1.0 if kind is Crossing.FOLD else -1.0
     right, left, _ = _eigenvectors(matrix, sign)
     q, p = (np.array(vector.real, dtype=float) for vector in (right, left))
-    second = of.second(q, h)
+    second = of.second_form(q, h)
     if kind is Crossing.FOLD:
         return float(0.5 * p @ second)
     # B(q, w) by polarisation, with w scaled to the length of q
     w = np.linalg.solve(unit - matrix, second)
     length = float(np.linalg.norm(w)) or 1.0
-    mixed = length * (of.second(q + w / length, h) - of.second(q - w / length, h)) / 4.0
-    return float(p @ (of.third(q, h) + 3.0 * mixed)) / 6.0
+    mixed = length * (of.second_form(q + w / length, h) - of.second_form(q - w / length, h)) / 4.0
+    return float(p @ (of.third_form(q, h) + 3.0 * mixed)) / 6.0
 
 
 def _slope(family: Family, of: Forms, special: SpecialPoint) -> float:
@@ -441,7 +441,7 @@ def confirm(
         # enough to change the deviation by more than NOTABLE, if possible
         turns = int(min(MOST_TURNS, max(FEWEST_TURNS, 2.0 * log(NOTABLE) / max(abs(verdict.margin), 1e-12))))
     scale = orbit.scale
-    direction, measure = _leading(orbit, scale)
+    direction, measure = _leading_vectors(orbit, scale)
     begin = orbit.start + disturbance * scale * direction
     passed, message = _passages(orbit.point, begin, turns)
     away = (passed - orbit.start) / scale
@@ -489,7 +489,9 @@ def _passages(point: OperatingPoint, start: FloatArray, turns: int) -> tuple[Flo
     return np.array(passed), ""
 
 
-def _leading(orbit: PeriodicOrbit, scale: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.complex128]]:
+def _leading_vectors(
+    orbit: PeriodicOrbit, scale: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], NDArray[np.complex128]]:
     """Return the direction of greatest growth, of unit length, and a vector that measures the growth, both scaled.
 
     The vector is the left eigenvector of the largest multiplier: the product of the deviation with it grows by the same factor

@@ -22,7 +22,14 @@ from ...mechanisms import mechanism_of
 from ..motion.discretisation import operating_point
 from ..motion.floquet import Crossing
 from ..motion.orbit import PeriodicOrbit, newton_orbit, trial_orbit
-from ..motion.variables import along_parameters, gradient_names, parameter_value, require_variable, stacked, with_values
+from ..motion.variables import (
+    differentiate_constants,
+    gradient_names,
+    parameter_value,
+    require_variable,
+    stack_derivatives,
+    with_values,
+)
 from .variations import Place, Variations
 
 FloatArray = NDArray[np.float64]
@@ -123,8 +130,8 @@ class MotionGradient:
         for name in self.names:
             require_variable(parameters, drive, name)
         self.values = np.array([parameter_value(parameters, drive, name) for name in self.names])
-        own = along_parameters(parameters, self.names)
-        self.along = stacked(orbit.drive, orbit.flow, self.names, own.p)
+        own = differentiate_constants(parameters, self.names)
+        self.along = stack_derivatives(orbit.drive, orbit.flow, self.names, own.p)
         mechanism = mechanism_of(parameters)
         place = mechanism.switch_index
         self._switched = mechanism.is_switched_on(parameters.constants()) or (place >= 0 and bool(np.any(own.p[place])))
@@ -141,7 +148,7 @@ class MotionGradient:
 
     @cached_property
     def _solution(self) -> tuple[FloatArray, FloatArray]:
-        return self.variations.periodic(self.forcing)
+        return self.variations.periodic_solution(self.forcing)
 
     def _gradient(self, value: float, by: FloatArray) -> Gradient:
         return Gradient(value=float(value), names=self.names, by=by, at=self.values)
@@ -174,7 +181,7 @@ class MotionGradient:
         """The greatest and the least value of the first component of y, each as (sign +1 or -1, value, place)."""
         found = []
         for sign in (1.0, -1.0):
-            value, place = self.variations.greatest(sign * self.variations.y[..., 0])
+            value, place = self.variations.greatest_value(sign * self.variations.y[..., 0])
             found.append((sign, sign * value, place))
         return tuple(found)
 
@@ -193,14 +200,14 @@ class MotionGradient:
         """Return the gradient of the derivative of the amplitude with respect to the parameter ``along``."""
         v, solution = self.variations, self._solution[0]
         number = self.names.index(along)
-        by_y, by_constant = v.second(solution[..., number], self.along[:, number])
-        twice = along_parameters(self.orbit.parameters, self.names, along).p_along
+        by_y, by_constant = v.second_derivatives(solution[..., number], self.along[:, number])
+        twice = differentiate_constants(self.orbit.parameters, self.names, along).p_along
         forcing = (
             by_y @ solution
             + by_constant @ self.along
-            + v.by_constant @ stacked(self.orbit.drive, self.orbit.flow, (), twice)
+            + v.by_constant @ stack_derivatives(self.orbit.drive, self.orbit.flow, (), twice)
         )
-        second, rates = v.periodic(forcing)[0], v.by_y @ solution + self.forcing
+        second, rates = v.periodic_solution(forcing)[0], v.by_y @ solution + self.forcing
         total = np.zeros(len(self.names))
         for sign, _, place in self._swing:
             # the place of the extremum moves so that the rate there stays zero
@@ -242,7 +249,7 @@ class MotionGradient:
         ``numbers`` are the outputs; for the modulus of a force they are its components.
         """
         values = self._outputs[..., numbers]
-        value, place = self.variations.greatest(sign * values[..., 0] if sign else values)
+        value, place = self.variations.greatest_value(sign * values[..., 0] if sign else values)
         by = np.zeros(len(self.names))
         for column, number in enumerate(numbers):
             by_y, by_constant = self.variations.output_derivatives(place.panel, number)
@@ -260,8 +267,8 @@ class MotionGradient:
         v, solution = self.variations, self._solution[0]
         columns = []
         for column in range(self.orbit.flow.size):
-            by_y, by_constant = v.second(v.fundamental[..., column])
-            columns.append(v.after(by_y @ solution + by_constant @ self.along))
+            by_y, by_constant = v.second_derivatives(v.fundamental[..., column])
+            columns.append(v.final_deviation(by_y @ solution + by_constant @ self.along))
         return np.stack(columns, axis=1)
 
     @cached_property
@@ -288,7 +295,7 @@ class MotionGradient:
 
         The function is smooth even where two multipliers meet, whereas their moduli are not.
         """
-        matrix, by = _singular(self.orbit.monodromy, self.monodromy, kind)
+        matrix, by = _singular_matrix(self.orbit.monodromy, self.monodromy, kind)
         total = np.zeros(len(self.names))
         for column in range(len(matrix)):
             # the determinant is linear in each column
@@ -355,7 +362,7 @@ def extremum_gradient(orbit: PeriodicOrbit, along: str, names: Sequence[str] | N
     LinkworkError
         If there is no extremum near the motion.
     """
-    others = _others(orbit, along, names)
+    others = _other_names(orbit, along, names)
     motion = MotionGradient(extremum_orbit(orbit, along), (*others, along))
     slopes = motion.amplitude_curvature(along).by
     # at the extremum the amplitude does not change with the parameter ``along``
@@ -388,7 +395,7 @@ def crossing_gradient(
         If there is no such point near the motion, or its place has no derivative: the boundary is parallel to the parameter,
         two folds meet, or two branches cross.
     """
-    others = _others(orbit, along, names)
+    others = _other_names(orbit, along, names)
     orbit = _locate_motion(
         orbit, along, _fold_step if kind is Crossing.FOLD else partial(_crossing_step, kind=kind), kind.value
     )
@@ -429,7 +436,7 @@ def boundary_gradient(orbit: PeriodicOrbit, kind: Crossing, names: Sequence[str]
     return Gradient(value=0.0, names=motion.names, by=_test(motion, kind), at=motion.values)
 
 
-def _others(orbit: PeriodicOrbit, along: str, names: Sequence[str] | None) -> tuple[str, ...]:
+def _other_names(orbit: PeriodicOrbit, along: str, names: Sequence[str] | None) -> tuple[str, ...]:
     require_variable(orbit.parameters, orbit.drive, along)
     names = gradient_names(orbit.parameters, orbit.drive) if names is None else names
     return tuple(name for name in names if name != along)
@@ -485,14 +492,14 @@ def _fold_step(motion: MotionGradient) -> tuple[FloatArray, float]:
     """Return Newton's step to the fold, where the map over a period has a fixed point and the matrix M - I is singular."""
     v, n, orbit = motion.variations, len(motion.orbit.start), motion.orbit
     left, right = _null_vectors(v)
-    by_y, by_constant = v.second(v.fundamental @ right)
+    by_y, by_constant = v.second_derivatives(v.fundamental @ right)
     # derivatives of the motion by its start and by the parameter
-    columns = np.concatenate([v.fundamental, v.from_start(np.zeros((n, 1)), v.forcing)], axis=-1)
+    columns = np.concatenate([v.fundamental, v.solve_from_start(np.zeros((n, 1)), v.forcing)], axis=-1)
     along = np.hstack([np.zeros((len(motion.along), n)), motion.along])
     matrix = np.vstack(
         [
-            np.hstack([v.monodromy - np.eye(n), v.after(v.forcing)]),
-            left @ v.after(by_y @ columns + by_constant @ along),
+            np.hstack([v.monodromy - np.eye(n), v.final_deviation(v.forcing)]),
+            left @ v.final_deviation(by_y @ columns + by_constant @ along),
         ]
     )
     shift = orbit.point.period(orbit.start, orbit.turns).shift
@@ -505,11 +512,11 @@ def _test(motion: MotionGradient, kind: Crossing) -> FloatArray:
     """Return the derivatives, shape (m,), of a function that is zero where the multiplier is on the unit circle."""
     if kind is Crossing.FOLD:
         left, _ = _null_vectors(motion.variations)
-        return left @ motion.variations.after(motion.forcing)
+        return left @ motion.variations.final_deviation(motion.forcing)
     return motion.test(kind).by
 
 
-def _singular(matrix: FloatArray, by: FloatArray, kind: Crossing) -> tuple[FloatArray, FloatArray]:
+def _singular_matrix(matrix: FloatArray, by: FloatArray, kind: Crossing) -> tuple[FloatArray, FloatArray]:
     """Return a square matrix that is singular at a crossing, and its derivatives, (..., m), from the monodromy matrix."""
     if kind is not Crossing.TORUS:
         sign = 1.0 if kind is Crossing.FOLD else -1.0
@@ -544,13 +551,13 @@ def _fold_motion(motion: MotionGradient, shift: FloatArray) -> FloatArray:
     matrix = np.block(
         [[v.monodromy - np.eye(n), (left * v.scale**2)[:, None]], [(right / v.scale**2)[None, :], np.zeros((1, 1))]]
     )
-    start = np.linalg.solve(matrix, np.vstack([-v.after(forcing), np.zeros(m)]))[:n]
-    particular = v.from_start(start, forcing)
+    start = np.linalg.solve(matrix, np.vstack([-v.final_deviation(forcing), np.zeros(m)]))[:n]
+    particular = v.solve_from_start(start, forcing)
     free = v.fundamental @ right
-    by_y, by_constant = v.second(free)
-    open_ = left @ v.after(by_y @ free[..., None])
+    by_y, by_constant = v.second_derivatives(free)
+    open_ = left @ v.final_deviation(by_y @ free[..., None])
     if open_[0] == 0.0:
         raise LinkworkError("two folds meet: the motion there has no derivatives")
-    share = -(left @ v.after(by_y @ particular + by_constant @ along)) / open_
+    share = -(left @ v.final_deviation(by_y @ particular + by_constant @ along)) / open_
     found = particular + free[..., None] * share
     return np.concatenate([found, np.zeros_like(free[..., None])], axis=-1)

@@ -111,8 +111,8 @@ class Variations:
         for _ in range(_HALVINGS):
             self.h = np.diff(edges)
             self.angles = edges[:-1, None] + self.h[:, None] * _GAUSS.nodes
-            self.y = self._sampled()
-            self.rates, first = self._first()
+            self.y = self._sample_motion()
+            self.rates, first = self._first_derivatives()
             self.by_y, self.by_constant = first[..., : flow.size], first[..., flow.size :]
             self.forcing = self.by_constant @ along
             # effects are relative to the greatest one of a parameter; in a motion at rest many are only rounding errors
@@ -130,7 +130,7 @@ class Variations:
                 break
             edges = np.sort(np.append(edges, 0.5 * (edges[:-1] + edges[1:])[rough]))
 
-    def _sampled(self) -> FloatArray:
+    def _sample_motion(self) -> FloatArray:
         """Return the motion at the nodes, shape (k, s, n)."""
         found = self.orbit.sample(self.angles.ravel())
         return self.flow.unknowns(found, self._drive).reshape(*self.angles.shape, self.flow.size)
@@ -162,13 +162,15 @@ class Variations:
         """Count of the numbers of the drive and of the constants together."""
         return self.flow.drive_size + len(self._p)
 
-    def _first(self) -> tuple[FloatArray, FloatArray]:
+    def _first_derivatives(self) -> tuple[FloatArray, FloatArray]:
         """Return the rates at the nodes, (k, s, n), and their derivatives by y and by the constants, (k, s, n, n + c)."""
         n, width = self.flow.size, self.flow.size + self.constants
         found = self._call("first", n * (1 + width))
         return found[..., :n], found[..., n:].reshape(*self.angles.shape, width, n).swapaxes(-1, -2)
 
-    def second(self, direction: FloatArray, along: FloatArray | None = None) -> tuple[FloatArray, FloatArray]:
+    def second_derivatives(
+        self, direction: FloatArray, along: FloatArray | None = None
+    ) -> tuple[FloatArray, FloatArray]:
         """Return the derivatives of ``by_y`` and of ``by_constant`` along a direction.
 
         Parameters
@@ -216,12 +218,12 @@ class Variations:
         gains: FloatArray = self._to_end @ forcing.reshape(k, _POINTS * n, -1)
         return gains
 
-    def _at_nodes(self, starts: FloatArray, forcing: FloatArray) -> FloatArray:
+    def _node_values(self, starts: FloatArray, forcing: FloatArray) -> FloatArray:
         k, n = len(self.h), self.flow.size
         found = self._from_start @ starts + self._to_nodes @ forcing.reshape(k, _POINTS * n, -1)
         return np.asarray(found.reshape(k, _POINTS, n, -1))
 
-    def after(self, forcing: FloatArray) -> FloatArray:
+    def final_deviation(self, forcing: FloatArray) -> FloatArray:
         """Return d after the period, shape (n, m), for d' = A d + r from d = 0; r has the shape (k, s, n, m)."""
         gains = self._gains(forcing)
         d = np.zeros_like(gains[0])
@@ -229,7 +231,7 @@ class Variations:
             d = step @ d + gain
         return np.asarray(d)
 
-    def from_start(self, start: FloatArray, forcing: FloatArray) -> FloatArray:
+    def solve_from_start(self, start: FloatArray, forcing: FloatArray) -> FloatArray:
         """Return d at the nodes, shape (k, s, n, m), for d' = A d + r from d = ``start``, (n, m)."""
         gains = self._gains(forcing)
         starts = np.empty((len(self.h), *start.shape))
@@ -237,9 +239,9 @@ class Variations:
         for panel, (step, gain) in enumerate(zip(self.steps, gains)):
             starts[panel] = d
             d = step @ d + gain
-        return self._at_nodes(starts, forcing)
+        return self._node_values(starts, forcing)
 
-    def periodic(self, forcing: FloatArray) -> tuple[FloatArray, FloatArray]:
+    def periodic_solution(self, forcing: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return the periodic solution of d' = A d + r: at the nodes, (k, s, n, m), and at crank angle 0, (n, m).
 
         Raises
@@ -248,7 +250,7 @@ class Variations:
             If there is no such solution: exactly at a fold.
         """
         starts = _solve_cyclic(self.steps, self._gains(forcing))
-        return self._at_nodes(starts, forcing), starts[0]
+        return self._node_values(starts, forcing), starts[0]
 
     # Results
 
@@ -262,7 +264,7 @@ class Variations:
         series = legendre.legder(_GAUSS.coefficients @ values)
         return float(legendre.legval(position, series) * 2.0 / self.h[panel])
 
-    def greatest(self, values: FloatArray) -> tuple[float, Place]:
+    def greatest_value(self, values: FloatArray) -> tuple[float, Place]:
         """Return the greatest value over the period of a quantity with given values at the nodes, shape (k, s), and its place.
 
         For a vector quantity, shape (k, s, c), it is the greatest modulus.

@@ -27,11 +27,11 @@ from linkwork.errors import AssemblyError, ParameterError
 from linkwork.five_bar.parameters import FiveBarParameters
 
 from ...mechanisms import FIVE_BAR
-from ...run import traced
+from ...run import symbolic_equations
 from ...units import in_si
-from .kernels import PLACES, coupler_path, coupler_path_jacobian, guided, link_directions, link_jacobian
+from .kernels import PLACES, close_slider_crank, coupler_path, coupler_path_jacobian, link_directions, link_jacobian
 from .kind import Kind
-from .pivot import SecondCrank, SliderMotion, format_ratio, geared
+from .pivot import SecondCrank, SliderMotion, format_ratio, gear_turns
 
 FloatArray = NDArray[np.float64]
 #: Names of the dimensions: links, which are greater than zero; all lengths; angles.
@@ -46,13 +46,13 @@ BY_SHORTEST = ("drag-link", "crank-rocker", "double-rocker", "rocker-crank")
 TURN = 360
 
 
-def wrapped(angle: FloatArray) -> FloatArray:
+def wrap_angles(angle: FloatArray) -> FloatArray:
     """Wrap angles (rad) to [-pi, pi)."""
     value: FloatArray = (angle + pi) % (2.0 * pi) - pi
     return value
 
 
-def bar(length: Any, line: float, width: float) -> tuple[Any, Any]:
+def bar_mass_properties(length: Any, line: float, width: float) -> tuple[Any, Any]:
     """Return the mass of a rectangular bar (kg) and its moment of inertia about its centre (kg.m2).
 
     ``length`` is the distance between its pins (m), ``line`` the mass per length (kg/m), ``width`` its width (m).
@@ -61,7 +61,9 @@ def bar(length: Any, line: float, width: float) -> tuple[Any, Any]:
     return mass, mass * (length * length + width * width) / 12.0
 
 
-def bodies(l2: Any, l3: Any, l4: Any, r: Any, a2: Any, line: float, width: float, straight: bool) -> dict[str, Any]:
+def link_mass_properties(
+    l2: Any, l3: Any, l4: Any, r: Any, a2: Any, line: float, width: float, straight: bool
+) -> dict[str, Any]:
     """Return masses, moments of inertia and centres of mass of the links, by their names in `FiveBarParameters`.
 
     Crank and rocker are bars between their pins. The coupler consists of two bars, B to C and B to P; if P is on the line of B
@@ -78,15 +80,15 @@ def bodies(l2: Any, l3: Any, l4: Any, r: Any, a2: Any, line: float, width: float
     straight : bool
         Whether P is on the line of B and C.
     """
-    m2, i2 = bar(l2, line, width)
-    m4, i4 = bar(l4, line, width)
+    m2, i2 = bar_mass_properties(l2, line, width)
+    m4, i4 = bar_mass_properties(l4, line, width)
     if straight:
         end = r * cos(a2)
         low, high = min(0.0, end), max(l3, end)
-        m3, i3 = bar(high - low, line, width)
+        m3, i3 = bar_mass_properties(high - low, line, width)
         x, y = 0.5 * (low + high), 0.0
     else:
-        (along, own), (aside, inertia) = bar(l3, line, width), bar(r, line, width)
+        (along, own), (aside, inertia) = bar_mass_properties(l3, line, width), bar_mass_properties(r, line, width)
         bx, px, py = 0.5 * l3, 0.5 * r * cos(a2), 0.5 * r * sin(a2)
         m3 = along + aside
         x, y = (along * bx + aside * px) / m3, aside * py / m3
@@ -105,7 +107,7 @@ def bodies(l2: Any, l3: Any, l4: Any, r: Any, a2: Any, line: float, width: float
     }
 
 
-def on_line(l3: float, r: float, a2: float) -> bool:
+def is_on_line(l3: float, r: float, a2: float) -> bool:
     """Return whether the coupler point, with the polar coordinates r (m) and a2 (rad) from B, is on the line of B and C."""
     return abs(sin(a2)) * r <= 1e-9 * l3
 
@@ -326,14 +328,14 @@ class Linkage:
         made: Callable[..., Linkage] = FiveBar if isinstance(pivot, SecondCrank) else Linkage
         return made(**self.values(), pivot=pivot)
 
-    def moved(self, x: float, y: float) -> Linkage:
+    def translate(self, x: float, y: float) -> Linkage:
         """Return the same linkage shifted by (x, y) in the plane (m)."""
         return replace(self, pivot_x=self.pivot_x + x, pivot_y=self.pivot_y + y)
 
-    def scaled(self, factor: float) -> Linkage:
+    def scale(self, factor: float) -> Linkage:
         """Return the linkage with every length, and the position of A, multiplied by the factor."""
         lengths = {f.name: factor * getattr(self, f.name) for f in fields(self) if f.init and f.name in LENGTHS}
-        return replace(self, **lengths, pivot=None if self.pivot is None else self.pivot.scaled(factor))
+        return replace(self, **lengths, pivot=None if self.pivot is None else self.pivot.scale(factor))
 
     @property
     def grashof(self) -> str:
@@ -370,8 +372,8 @@ class Linkage:
 
     @staticmethod
     def closure() -> Callable[..., Any]:
-        """Return the plant's function that closes the loop, for CasADi symbols; see `kernels.guided`."""
-        joined: Callable[..., Any] = traced(FIVE_BAR).close_loop
+        """Return the plant's function that closes the loop, for CasADi symbols; see `kernels.close_slider_crank`."""
+        joined: Callable[..., Any] = symbolic_equations(FIVE_BAR).close_loop
         return joined
 
     @staticmethod
@@ -446,8 +448,8 @@ class Linkage:
     ) -> FiveBarParameters:
         """Return the parameters of the plant and its FMU, with masses from density and section.
 
-        The links are bars, see `bodies`. The plant's x axis is the ground link, which the ground angle inclines to the
-        horizontal. A fixed rocker pivot becomes a slider: give it a spring, or hold it by a force.
+        The links are bars, see `link_mass_properties`. The plant's x axis is the ground link; its inclination to the
+        horizontal is the ground angle. A fixed rocker pivot becomes a slider: give it a spring, or hold it by a force.
 
         Parameters
         ----------
@@ -473,9 +475,9 @@ class Linkage:
             )
         r, a2 = self.point_distance, self.point_angle
         links: dict[str, float] = {name: getattr(self, name) for name in LINKS}
-        straight = on_line(self.coupler_length, r, a2)
+        straight = is_on_line(self.coupler_length, r, a2)
         l2, l3, l4 = self.crank_length, self.coupler_length, self.rocker_length
-        own = bodies(l2, l3, l4, r, a2, density * width * thickness, width, straight)
+        own = link_mass_properties(l2, l3, l4, r, a2, density * width * thickness, width, straight)
         return FiveBarParameters(
             **links | own,
             slider_mass=density * 32.0 * width * width * thickness if slider_mass is None else slider_mass,
@@ -548,7 +550,7 @@ class SliderCrank(Linkage):
     @staticmethod
     def closure() -> Callable[..., Any]:
         """Return the closure of the loop with C on its guide."""
-        return guided
+        return close_slider_crank
 
     @staticmethod
     def square(along: Any, across: Any) -> Any:
@@ -599,7 +601,7 @@ class FiveBar(Linkage):
     @property
     def turns(self) -> int:
         """Return the turns of the first crank per turn of the input shaft."""
-        return geared(self.pivot.ratio)[0]
+        return gear_turns(self.pivot.ratio)[0]
 
     @property
     def largest_link(self) -> float:

@@ -21,9 +21,9 @@ from linkwork.slider_crank.parameters import SliderCrankParameters
 from ...files import Many, Quantity, entry
 from ...mechanisms import FIVE_BAR
 from ...numerics import symbolic
-from ...run import Inputs, of_parameters, simulate
+from ...run import Inputs, parameter_symbols, simulate
 from . import linkage as geometry
-from .linkage import Linkage, SliderCrank, on_line
+from .linkage import Linkage, SliderCrank, is_on_line
 
 #: Links that have a mass.
 WEIGHED = ("crank", "coupler", "rocker")
@@ -34,7 +34,7 @@ STIFF, STIFF_TURNS = 1000.0, 50.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Make:
+class MachineSpec:
     """Material, speed and load of a linkage; see `Linkage.to_five_bar`.
 
     Attributes
@@ -97,15 +97,18 @@ class Make:
             f", {self.load[0]:g} and {self.load[1]:g} N at P" if any(self.load) else ""
         )
 
-    def masses_in_words(self) -> str:
+    def describe_masses(self) -> str:
         """Return a sentence for the head of a file that says where the masses come from."""
         given = [f"{link}.mass" for link in (*WEIGHED, "slider") if getattr(self, f"{link}_mass") is not None]
         weighed = f"; as given: {', '.join(given)}" if given else ""
         bars = self.describe(forces=False).partition(",")[0]
         return f"masses, centres of mass and moments of inertia: {bars}{weighed}; [make] of the task changes them"
 
-    def weighed(self, made: Mapping[str, Any]) -> dict[str, Any]:
-        """Return masses and moments of inertia of the links: those of `bodies`, in proportion to the masses that are given."""
+    def link_masses(self, made: Mapping[str, Any]) -> dict[str, Any]:
+        """Return masses and moments of inertia of the links, as in ``made`` unless the mass of a link is given.
+
+        The moment of inertia of a link with a given mass changes in proportion.
+        """
         own: dict[str, Any] = {}
         for link in WEIGHED:
             mass, inertia, given = made[f"{link}_mass"], made[f"{link}_inertia"], getattr(self, f"{link}_mass")
@@ -119,7 +122,7 @@ class Make:
         return c * x + s * y, c * y - s * x
 
     @property
-    def block(self) -> float:
+    def block_mass(self) -> float:
         """Return the mass of the slider (kg): as given, or that of a block of four widths by two widths by four thicknesses."""
         return 32.0 * self.density * self.width**2 * self.thickness if self.slider_mass is None else self.slider_mass
 
@@ -128,7 +131,7 @@ class Make:
 
         The plant's rod has its mass on the line of its joints: the arm to a coupler point off that line is projected onto it.
         """
-        made = self.moving(linkage)
+        made = self.sliding_five_bar(linkage)
         a1 = linkage.ground_angle
         return SliderCrankParameters(
             crank_length=linkage.crank_length,
@@ -142,7 +145,7 @@ class Make:
             rod_mass=made.coupler_mass,
             rod_inertia=made.coupler_inertia,
             rod_cog_distance=made.coupler_cog_distance * cos(made.coupler_cog_angle),
-            slider_mass=self.block,
+            slider_mass=self.block_mass,
             slider_stiffness=self.slider_stiffness or 0.0,
             slider_damping=self.slider_damping or 0.0,
             slider_coulomb_friction=self.slider_coulomb_friction,
@@ -151,7 +154,7 @@ class Make:
             assembly_branch=linkage.branch,
         )
 
-    def moving(self, linkage: Linkage) -> FiveBarParameters:
+    def sliding_five_bar(self, linkage: Linkage) -> FiveBarParameters:
         """Return the parameters of the five-bar plant for a linkage, with the slider free to move.
 
         A slider-crank becomes a four-bar whose rocker pivot is `FAR` away; its slider is the mass at the rocker's end.
@@ -163,17 +166,17 @@ class Make:
         made = four_bar.to_five_bar(
             density=self.density,
             section=(self.width, self.thickness),
-            slider_mass=self.block,
+            slider_mass=self.block_mass,
             slider_stiffness=self.slider_stiffness or 0.0,
             slider_damping=self.slider_damping or 0.0,
             slider_coulomb_friction=self.slider_coulomb_friction,
             gravity=self.gravity,
         )
-        return replace(made, **self.weighed(asdict(made)) | (self.sliding(far) if sliding else {}))
+        return replace(made, **self.link_masses(asdict(made)) | (self.slider_as_rocker(far) if sliding else {}))
 
-    def sliding(self, far: Any) -> dict[str, Any]:
+    def slider_as_rocker(self, far: Any) -> dict[str, Any]:
         """Return mass, inertia and centre of the rocker of length ``far`` (m) that represents the slider; see `moving`."""
-        return {"rocker_mass": self.block, "rocker_inertia": 0.0, "rocker_cog_distance": far}
+        return {"rocker_mass": self.block_mass, "rocker_inertia": 0.0, "rocker_cog_distance": far}
 
     def plant(self, linkage: Linkage) -> FiveBarParameters | SliderCrankParameters:
         """Return the parameters of the plant that simulates a linkage: slider-crank, or five-bar with a stiffly held slider."""
@@ -181,7 +184,7 @@ class Make:
 
     def five_bar(self, linkage: Linkage) -> FiveBarParameters:
         """Return the parameters of the five-bar plant for a linkage, with its slider held by spring and damper."""
-        free = self.moving(linkage)
+        free = self.sliding_five_bar(linkage)
         mass = free.slider_mass + free.rocker_mass + free.coupler_mass
         frequency = max(STIFF, STIFF_TURNS * abs(self.speed))
         stiffness = mass * frequency**2 if self.slider_stiffness is None else self.slider_stiffness
@@ -191,7 +194,7 @@ class Make:
 
 
 #: Bars of steel at 60 rpm.
-USUAL_MAKE = Make()
+USUAL_MAKE = MachineSpec()
 
 
 FloatArray = NDArray[np.float64]
@@ -203,7 +206,7 @@ HEAVY = 1e8
 
 
 def pin_functions(
-    d: Any, make: Make, crank_angle: Any, *, straight: bool = False, linkage: type[Linkage] = Linkage
+    d: Any, make: MachineSpec, crank_angle: Any, *, straight: bool = False, linkage: type[Linkage] = Linkage
 ) -> dict[str, tuple[Any, Any]]:
     """Return the components of each pin's force along and across the ground link (N), for CasADi symbols and numbers.
 
@@ -211,11 +214,11 @@ def pin_functions(
     ----------
     d : namespace
         Dimensions by their names in `Linkage`, the branch too.
-    make : Make
+    make : MachineSpec
     crank_angle : column
         th2 (rad).
     straight : bool
-        Whether the coupler point is on the line of B and C, see `bodies`.
+        Whether the coupler point is on the line of B and C, see `link_mass_properties`.
     linkage : type
         Type of the linkage; for a slider-crank the force at D is that of the guide on the slider.
     """
@@ -241,8 +244,8 @@ def pin_functions(
         **_DEFAULTS
         | links
         | made
-        | make.weighed(made)
-        | (make.sliding(far) if sliding else {})
+        | make.link_masses(made)
+        | (make.slider_as_rocker(far) if sliding else {})
         | {
             "slider_mass": 1.0,
             "coupler_point_distance": d.point_distance,
@@ -267,10 +270,10 @@ def pin_functions(
 
 @cache
 def _trace_plant() -> tuple[Any, Any, Any]:
-    """Return the class of the plant's parameters, the plant's functions, and `bodies`, for CasADi symbols."""
+    """Return the class of the plant's parameters, the plant's functions, and `link_mass_properties`, for CasADi symbols."""
     casadi = symbolic.library()
-    plant = of_parameters(FIVE_BAR)
-    law = symbolic.traced((geometry,), min=casadi.fmin, max=casadi.fmax)
+    plant = parameter_symbols(FIVE_BAR)
+    law = symbolic.symbolic_functions((geometry,), min=casadi.fmin, max=casadi.fmax)
     return type(plant.parameters), plant.functions, law.bodies
 
 
@@ -310,17 +313,17 @@ class PinForces:
         return PINS[int(self.force.max(axis=0).argmax())]
 
     @property
-    def at(self) -> float:
+    def rotation_at_greatest(self) -> float:
         """Return the crank's rotation at the greatest force (rad)."""
         return float(self.rotation[int(self.force.max(axis=1).argmax())])
 
-    def of(self, pins: str) -> float:
+    def greatest_force(self, pins: str) -> float:
         """Return the greatest force on the pins with these letters (N)."""
         return float(self.force[:, [PINS.index(pin) for pin in pins]].max())
 
 
 def pin_forces(
-    linkage: Linkage, make: Make, rotation: tuple[float, float] | None = None, *, run: bool = True
+    linkage: Linkage, make: MachineSpec, rotation: tuple[float, float] | None = None, *, run: bool = True
 ) -> PinForces:
     """Compute the forces on the pins of a linkage at constant speed.
 
@@ -331,7 +334,7 @@ def pin_forces(
     ----------
     linkage : Linkage
         A linkage with a fixed pivot, or a slider-crank, for which the force at D is that of the guide on the slider.
-    make : Make
+    make : MachineSpec
     rotation : (float, float), optional
         First and last crank rotation (rad); a turn by default.
     run : bool
@@ -349,7 +352,7 @@ def pin_forces(
     begin, end = (0.0, 2.0 * pi) if rotation is None else rotation
     if not run:
         return _evaluate_forces(linkage, make, np.linspace(begin, end, SAMPLES + 1))
-    made = make.moving(linkage)
+    made = make.sliding_five_bar(linkage)
     heavy = HEAVY * (made.crank_mass + made.coupler_mass + made.rocker_mass)
     parameters = replace(made, slider_mass=heavy, slider_stiffness=0.0, slider_damping=0.0, slider_coulomb_friction=0.0)
     x, y = make.load_components(np.cos(linkage.ground_angle), np.sin(linkage.ground_angle))
@@ -367,10 +370,10 @@ def pin_forces(
     return PinForces(rotation=begin + make.speed * done.time, force=force, moved=moved)
 
 
-def _evaluate_forces(linkage: Linkage, make: Make, rotation: FloatArray) -> PinForces:
+def _evaluate_forces(linkage: Linkage, make: MachineSpec, rotation: FloatArray) -> PinForces:
     """Compute the pin forces at crank rotations from the plant's equations, with its slider held."""
     casadi, d = symbolic.library(), SimpleNamespace(**linkage.values())
-    straight = on_line(linkage.coupler_length, linkage.point_distance, linkage.point_angle)
+    straight = is_on_line(linkage.coupler_length, linkage.point_distance, linkage.point_angle)
     th2 = casadi.DM(linkage.crank_angle(rotation))
     found = pin_functions(d, make, th2, straight=straight, linkage=type(linkage))
     force = np.column_stack([np.hypot(*(np.array(f).ravel() for f in found[pin])) for pin in PINS])

@@ -23,7 +23,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import qmc
 
-from ...run import shown
+from ...run import show_progress
 from ..linkage.kernels import many_directions, match_windows
 from ..linkage.kind import Kind
 from ..linkage.linkage import BY_SHORTEST, Linkage, SliderCrank
@@ -83,7 +83,7 @@ class _FourBarShapes:
         return np.column_stack([np.ones(len(shapes)), shapes[:, :3], np.zeros(len(shapes))])
 
     @staticmethod
-    def turning(shapes: FloatArray, links: FloatArray, limits: Limits, least: float) -> NDArray[np.bool_]:
+    def meet_transmission(shapes: FloatArray, links: FloatArray, limits: Limits, least: float) -> NDArray[np.bool_]:
         """Return which shapes meet the least transmission angle over a turn."""
         l1, l2, l3, l4, _ = links.T
         ends = (l1 - l2) ** 2, (l1 + l2) ** 2
@@ -92,7 +92,7 @@ class _FourBarShapes:
         return kept
 
     @staticmethod
-    def shares(start: Start) -> FloatArray:
+    def ratios(start: Start) -> FloatArray:
         """Return the ratios by which starts are distinguished."""
         ratios: FloatArray = start.q[3:6] / start.q[2]
         return ratios
@@ -110,7 +110,7 @@ class _SliderCrankShapes(_FourBarShapes):
         return np.column_stack([offset, shapes[:, 1], one, none, none])
 
     @staticmethod
-    def shares(start: Start) -> FloatArray:
+    def ratios(start: Start) -> FloatArray:
         return np.array([start.q[3] / start.q[4], 1.0 + start.q[2] / start.q[4]])
 
 
@@ -123,7 +123,7 @@ class _FiveBarShapes(_FourBarShapes):
         return np.column_stack([np.ones(len(shapes)), shapes[:, :3], np.exp(low + (high - low) * shapes[:, 6])])
 
     @staticmethod
-    def turning(shapes: FloatArray, links: FloatArray, limits: Limits, least: float) -> NDArray[np.bool_]:
+    def meet_transmission(shapes: FloatArray, links: FloatArray, limits: Limits, least: float) -> NDArray[np.bool_]:
         """Return which shapes meet the least transmission angle at `AROUND` rotations.
 
         Some rotations are tried first, and the others only for the shapes that are left.
@@ -166,7 +166,7 @@ def scan(normal: Normal, limits: Limits, *, seed: int, candidates: int, starts: 
     """
     found: list[Candidates] = []
     placed = 0
-    with shown(False, float(candidates), f"trying {candidates:,} shapes") as show:
+    with show_progress(False, float(candidates), f"trying {candidates:,} shapes") as show:
         for number, branch in enumerate(limits.branches):
             chunks = _allowed_shapes(limits, seed + 7919 * number, max(1, candidates // len(limits.branches)))
             if normal.outline is not None:
@@ -250,7 +250,7 @@ def _is_allowed(shapes: FloatArray, limits: Limits) -> NDArray[np.bool_]:
     links = sized[:, :4]
     allowed = np.ones(len(shapes), dtype=bool)
     if limits.turn is not None:
-        allowed = _SHAPES[limits.linkage.kind].turning(shapes, sized, limits, limits.turn)
+        allowed = _SHAPES[limits.linkage.kind].meet_transmission(shapes, sized, limits, limits.turn)
     if limits.grashof is not None:
         order = np.sort(links, axis=1)
         excess = order[:, 0] + order[:, 3] - order[:, 1] - order[:, 2]
@@ -587,7 +587,7 @@ def _distinct_starts(found: list[Candidates], starts: int, limits: Limits) -> li
 
     def mark(start: Start) -> FloatArray:
         begin = start.q[8] if start.rotation is None else start.rotation[0]
-        links = _SHAPES[limits.linkage.kind].shares(start)
+        links = _SHAPES[limits.linkage.kind].ratios(start)
         if start.q[6] == 0.0:
             # with the coupler point on the crank pin, the other links do not affect the circle that it traces
             links = np.ones(len(links))

@@ -13,11 +13,11 @@ from numpy.typing import NDArray
 from linkwork.errors import InputError
 
 from ...numerics.fourier import FourierSeries
-from ...numerics.workers import check_jobs, interruptible, over_workers, worker_count
-from ...run import shown
+from ...numerics.workers import check_jobs, record_interrupts, run_in_parallel, worker_count
+from ...run import show_progress
 from ..exact.burmester import guidance
 from ..exact.four_bar import function_generators
-from ..linkage.linkage import FiveBar, Linkage, SliderCrank, wrapped
+from ..linkage.linkage import FiveBar, Linkage, SliderCrank, wrap_angles
 from ..linkage.pivot import CrankUnknown, PivotUnknown, SecondCrank, SliderMotion, SliderUnknown
 from ..result.solution import Solution, nearest_rotations
 from ..task.constraint import UNKNOWNS
@@ -76,7 +76,7 @@ USUAL_SEARCH = Search()
 QUICK_SEARCH = Search(starts=12)
 
 
-def over_cores(
+def run_on_cores(
     work: Callable[[Item], Made], items: Sequence[Item], search: Search, what: str
 ) -> tuple[list[Made], bool]:
     """Apply ``work`` to all items on several cores; return the results in order, and whether Ctrl-C interrupted it.
@@ -84,8 +84,8 @@ def over_cores(
     ``what`` is the text beside the progress bar.
     """
     made: dict[int, Made] = {}
-    with interruptible() as interrupted, shown(search.progress, float(len(items)), what) as show:
-        for number, value in over_workers(work, items, interrupted, n_jobs=search.n_jobs):
+    with record_interrupts() as interrupted, show_progress(search.progress, float(len(items)), what) as show:
+        for number, value in run_in_parallel(work, items, interrupted, n_jobs=search.n_jobs):
             made[number] = value
             show(float(len(made)))
             if interrupted:
@@ -148,7 +148,7 @@ class Answer:
     iterations: int
 
     @classmethod
-    def unjoined(cls, start: Start) -> Answer:
+    def for_unjoined_links(cls, start: Start) -> Answer:
         """Return the answer for a start whose links cannot be joined."""
         return cls(
             start=replace(start, quality=inf),
@@ -202,21 +202,21 @@ def pivot_bounds(pivot: PivotUnknown | None, unit: float) -> tuple[FloatArray, F
     return low, high
 
 
-def inside(q: FloatArray, low: FloatArray, high: FloatArray) -> FloatArray:
+def clip_to_bounds(q: FloatArray, low: FloatArray, high: FloatArray) -> FloatArray:
     """Return the unknowns clipped to their bounds; angles are first shifted by whole turns."""
     q = q.copy()
     angles = slice(UNKNOWNS.index("ground_angle"), len(UNKNOWNS))
     middle = 0.5 * (low[angles] + high[angles])
-    nearest = middle + wrapped(q[angles] - middle)
+    nearest = middle + wrap_angles(q[angles] - middle)
     outside = (q[angles] < low[angles]) | (q[angles] > high[angles])
     q[angles] = np.where(outside, nearest, q[angles])
     return np.clip(q, low, high)
 
 
-def outside(normal: Normal, low: FloatArray, high: FloatArray, start: Start) -> FloatArray:
+def distances_from_bounds(normal: Normal, low: FloatArray, high: FloatArray, start: Start) -> FloatArray:
     """Return the distance of each unknown of a start from its bounds (units, rad); 0 if it does not affect the task."""
-    q = inside(start.q, low[: len(UNKNOWNS)], high[: len(UNKNOWNS)])
-    off = np.abs(wrapped(q - start.q))
+    q = clip_to_bounds(start.q, low[: len(UNKNOWNS)], high[: len(UNKNOWNS)])
+    off = np.abs(wrap_angles(q - start.q))
     off[:7] = np.abs(q - start.q)[:7]
     idle: tuple[str, ...] = () if normal.angle is not None else ("output_angle",)
     if normal.of_rocker:
@@ -234,7 +234,7 @@ def make_linkage(
     q[0] += normal.origin.real
     q[1] += normal.origin.imag
     angles = slice(UNKNOWNS.index("ground_angle"), len(UNKNOWNS))
-    near = wrapped(q[angles])
+    near = wrap_angles(q[angles])
     if limits is not None:
         outside = (near < limits.low[angles]) | (near > limits.high[angles])
         near = np.where(outside, q[angles], near)
@@ -246,7 +246,7 @@ def make_linkage(
         moved = SliderMotion(FourierSeries(normal.unit * cosines, normal.unit * sines), float(v[0]))
     elif isinstance(pivot, CrankUnknown) and len(v):
         series = FourierSeries(np.append(0.0, v[2::2]), np.append(0.0, v[3::2]))
-        moved = SecondCrank(normal.unit * float(v[0]), pivot.ratio, float(wrapped(v[1])), series)
+        moved = SecondCrank(normal.unit * float(v[0]), pivot.ratio, float(wrap_angles(v[1])), series)
     made: type[Linkage] = FiveBar if isinstance(moved, SecondCrank) else start.linkage
     return made.from_vector(q, start.branch, pivot=moved)
 
@@ -277,7 +277,7 @@ def make_start(
     return Start(q=q, branch=linkage.branch, pivot=v, rotation=rotation, given=True, linkage=kind)
 
 
-def as_start(of: Linkage | Solution, normal: Normal, pivot: PivotUnknown | None) -> Start:
+def convert_to_start(of: Linkage | Solution, normal: Normal, pivot: PivotUnknown | None) -> Start:
     """Convert a linkage or solution to a start, with untimed stations at the solution's rotations or the nearest ones.
 
     Raises InputError for an open path if the rotations are not known: the nearest ones are found for closed paths only.
@@ -295,7 +295,7 @@ def as_start(of: Linkage | Solution, normal: Normal, pivot: PivotUnknown | None)
     return make_start(linkage, normal, pivot, rotation)
 
 
-def closed_form(task: Task) -> tuple[Solution, ...]:
+def closed_form_solutions(task: Task) -> tuple[Solution, ...]:
     """Return the sound four-bars that do a task exactly, if a closed form exists: for untimed poses and function points."""
     try:
         if isinstance(task, RockerFunction):
