@@ -27,10 +27,10 @@ from rich.console import Console
 from scipy.optimize import OptimizeResult
 from threadpoolctl import threadpool_limits
 
-from analysis.numerics.overlap import nearest, symmetric_difference
+from analysis.numerics.overlap import find_nearest, symmetric_difference
 from analysis.synthesis import FullTurn, TargetPath, UntimedPath, evaluate, normal_form, synthesize, turn
 from analysis.synthesis.linkage.kernels import coupler_path
-from analysis.synthesis.search.refine import divided
+from analysis.synthesis.search.refine import cut_into_pieces
 from analysis.synthesis.search.start import make_linkage
 from analysis.synthesis.task.constraint import USUAL, Constraint
 from analysis.synthesis.task.limits import make_limits
@@ -88,7 +88,7 @@ class Row(NamedTuple):
 
 # Evolution
 
-_KERNELS: tuple[Any, ...] = (coupler_path, nearest, symmetric_difference)
+_KERNELS: tuple[Any, ...] = (coupler_path, find_nearest, symmetric_difference)
 _path, _nearest, _difference = (njit()(kernel.py_func) for kernel in _KERNELS)
 
 
@@ -122,7 +122,7 @@ class Evolution:
     def __init__(self, task: UntimedPath, normal: Normal, box: BlackBox) -> None:
         self.task, self.normal, self.box = task, normal, box
         assert normal.outline is not None
-        line, _ = divided(normal.outline, normal.outline_weights, normal.closed)
+        line, _ = cut_into_pieces(normal.outline, normal.outline_weights, normal.closed)
         self._target = np.ascontiguousarray([normal.outline.real, normal.outline.imag])
         self._middles = np.ascontiguousarray(0.5 * (line[:, 1:] + line[:, :-1]))
         self._lengths = np.hypot(*np.diff(line, axis=1))

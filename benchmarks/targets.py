@@ -21,7 +21,7 @@ from numpy.typing import ArrayLike, NDArray
 from analysis.studies.youssef.problems import PACKAGING_POINTS_CM, PROBLEMS
 from analysis.synthesis import FullTurn, LargestLink, RockerFunction, TargetPath, Task, TimedPath, UntimedPath, turn
 from analysis.synthesis.task.constraint import USUAL, Constraint
-from analysis.synthesis.task.target import interpolate_polyline, ring
+from analysis.synthesis.task.target import closed_vertices, interpolate_polyline
 
 FloatArray = NDArray[np.float64]
 Points = Sequence[tuple[float, float]]
@@ -83,7 +83,7 @@ def curves(n: int) -> dict[str, FloatArray]:
 
 def outlined(corners: ArrayLike, n: int = CURVE) -> FloatArray:
     """Return n points at equal distances along a closed polygon, shape (n, 2)."""
-    line = ring(np.asarray(corners, dtype=float), True)
+    line = closed_vertices(np.asarray(corners, dtype=float), True)
     length = float(np.hypot(*np.diff(line, axis=0).T).sum())
     return interpolate_polyline(line, np.linspace(0.0, length, n, endpoint=False))
 
@@ -94,7 +94,7 @@ def drawn(seed: int) -> TargetPath:
     t, order = turn(120), np.array([-3, -2, -1, 2, 3])
     wave = random.normal(size=(5, 2)) @ [1.0, 1j] * 0.5 / np.abs(order) ** 1.5
     z = np.exp(1j * t) + wave @ np.exp(1j * np.outer(order, t)) + TREMOR * (random.normal(size=(120, 2)) @ [1.0, 1j])
-    return TargetPath(points=np.column_stack([z.real, z.imag]), closed=True).smoothed(CURVE)
+    return TargetPath(points=np.column_stack([z.real, z.imag]), closed=True).smooth(CURVE)
 
 
 def waves(seed: int) -> RockerFunction:
@@ -161,7 +161,7 @@ def _all() -> list[Target]:
         Target(
             kind="drawn",
             name="example",
-            task=UntimedPath(path=TargetPath.from_file(HAND_DRAWN).smoothed(CURVE)),
+            task=UntimedPath(path=TargetPath.from_file(HAND_DRAWN).smooth(CURVE)),
             constraints=(LargestLink(length=0.3), *USUAL),
         ),
         *usual("drawn", {f"seed {seed}": UntimedPath(path=drawn(seed)) for seed in range(1, 10)}),

@@ -249,15 +249,15 @@ def hand_drawn_pictures() -> Iterator[Picture]:
     yield "hand-drawn-curve", picture("A curve drawn by hand", drawn, smooth), 110
     yield "hand-drawn-linkage", draw.plot(case.solve().best, title="The linkage that was found"), 90
     small = load_slider_case(examples / "hand-drawn-slider.toml")
-    four_bar = small.four_bar()
+    four_bar = small.find_four_bar()
     moved = [four_bar]
     for harmonics in small.slider.harmonics:
-        moved.append(small.move(four_bar, harmonics, tuple(moved[1:]), progress=False).best)
+        moved.append(small.find_motion(four_bar, harmonics, tuple(moved[1:]), progress=False).best)
     wanted = closed(four_bar.task.path.points, label="wanted", width=3.0, colour="0.8")
     still = closed(four_bar.curve(), label="four-bar", line="--")
     moving = closed(moved[-1].curve(), label="slider moved,\n3 harmonics")
     yield "hand-drawn-moved", picture("Links of at most 150 mm", wanted, still, moving), 110
-    yield "hand-drawn-motion", draw.plot(small.driven(moved[-1]), title="The slider's drive at 60 rpm"), 90
+    yield "hand-drawn-motion", draw.plot(small.compute_drive(moved[-1]), title="The slider's drive at 60 rpm"), 90
 
 
 def closed_form_pictures() -> Iterator[Picture]:

@@ -19,11 +19,11 @@ from .common import (
     changes,
     check_kind,
     console,
-    handled,
+    report_errors,
     out_option,
     output_folder,
     plots_option,
-    plotted,
+    save_plot,
     print_error,
     print_written,
     set_option,
@@ -32,7 +32,7 @@ from .common import (
 )
 
 if TYPE_CHECKING:
-    from ..synthesis import Assessment, Make, PinForces, Solution, TradeOff
+    from ..synthesis import Assessment, MachineSpec, PinForces, Solution, TradeOff
 
 #: Number of further positions in a drawing.
 POSES = 6
@@ -136,19 +136,21 @@ def write_described(best: Assessment, folder: Path, title: str, *, curve: str, t
     return written + [save_drawing(folder / f"{drawn}.{ending}", picture) for ending in ("dxf", "svg")]
 
 
-def write_linkages(solutions: Sequence[Solution], folder: Path, title: str, *, make: Make) -> list[Path]:
+def write_linkages(solutions: Sequence[Solution], folder: Path, title: str, *, make: MachineSpec) -> list[Path]:
     """Write the first linkage, and the sound ones of the others, as case files that run; return the paths."""
     from ..files import write_tables
 
     names = [(s, "linkage.toml" if rank == 1 else f"linkage-{rank}.toml") for rank, s in enumerate(solutions, start=1)]
     return [
-        write_tables(folder / name, s.described_case(make, title), head=make.masses_in_words())
+        write_tables(folder / name, s.described_case(make, title), head=make.describe_masses())
         for s, name in names
         if s is solutions[0] or s.verdicts.sound
     ]
 
 
-def write_solution(best: Assessment, folder: Path, title: str, *, make: Make, plots: bool, animate: bool) -> list[Path]:
+def write_solution(
+    best: Assessment, folder: Path, title: str, *, make: MachineSpec, plots: bool, animate: bool
+) -> list[Path]:
     """Write all files of one solution: drawings, plates, curve, report, parameters, a case to run, plots; return the paths."""
     from .. import figures
     from ..files import save_drawing, save_figure, write_tables
@@ -160,14 +162,14 @@ def write_solution(best: Assessment, folder: Path, title: str, *, make: Make, pl
     linkage = solution.linkage
     if linkage.kind == "four-bar":
         written.append(
-            save_parameters(folder / "five-bar-parameters.toml", make.five_bar(linkage), head=make.masses_in_words())
+            save_parameters(folder / "five-bar-parameters.toml", make.five_bar(linkage), head=make.describe_masses())
         )
     if linkage.pivot is None:
         case = folder / ("slider-crank.toml" if linkage.kind == "slider-crank" else "five-bar.toml")
-        written.append(write_tables(case, solution.run_case(make, title), head=make.masses_in_words()))
+        written.append(write_tables(case, solution.run_case(make, title), head=make.describe_masses()))
     cut = plates(solution, width=make.width, thickness=make.thickness, pin=make.hole, title=title)
     written += [save_drawing(folder / f"best-plates.{ending}", cut) for ending in ("dxf", "svg")]
-    written += plotted(plots, solution, folder / "best-linkage.png", title=title)
+    written += save_plot(plots, solution, folder / "best-linkage.png", title=title)
     if plots:
         forces = _forces(solution, make)
         sheet = figures.plot_sheet(best, forces, title=title, made=make.describe(forces=forces is not None))
@@ -178,7 +180,7 @@ def write_solution(best: Assessment, folder: Path, title: str, *, make: Make, pl
     return written
 
 
-def _forces(solution: Solution, make: Make) -> PinForces | None:
+def _forces(solution: Solution, make: MachineSpec) -> PinForces | None:
     """Return the pin forces at constant speed; None if the pivot is moved, or the linkage has a circuit or branch defect."""
     from ..synthesis import pin_forces
 
@@ -192,7 +194,7 @@ def _forces(solution: Solution, make: Make) -> PinForces | None:
 @set_option("constraints.largest_link='300 mm' or task.n=36; lists as in TOML")
 @search_options
 @click.option("--animate", is_flag=True, help="Write also a GIF of the first linkage over a turn.")
-@handled
+@report_errors
 def synthesize(
     case: str,
     settings: Sequence[str],
@@ -240,18 +242,20 @@ def synthesize(
     forces = chosen.forces(result.with_variants)
     title = f"{chosen.title}: {format_count(len(result.solutions), 'linkage')}, {result.seconds:.1f} s"
     print_solutions(title, result.solutions, forces)
-    best = assess(result.best, chosen.violated)
+    best = assess(result.best, chosen.worst_violation)
     print_best(best)
     folder = output_folder(out)
     carried = {"greatest pin force [N]": [force.greatest for force in forces]} if forces else {}
     written = [write_csv(folder / "solutions.csv", result.columns() | carried)]
     if has_cognates(result.best):
         others = alternatives(result.best)
-        print_solutions("the same curve from other pivots: the first one's cognates", others, violated=chosen.violated)
+        print_solutions(
+            "the same curve from other pivots: the first one's cognates", others, violated=chosen.worst_violation
+        )
         written.append(write_csv(folder / "cognates.csv", solution_columns(others)))
     written += write_solution(best, folder, chosen.title, make=chosen.make, plots=plots, animate=animate)
     written += write_linkages(result.solutions, folder, chosen.title, make=chosen.make)
-    written += plotted(plots, result, folder / "alternatives.png", title=chosen.title)
+    written += save_plot(plots, result, folder / "alternatives.png", title=chosen.title)
     print_written(written)
     if best.poor:
         print_error(f"note: {best.poor}")
@@ -282,4 +286,4 @@ def _trade_off(traded: TradeOff, title: str, folder: Path, plots: bool) -> list[
     ]
     show_table(f"{title}: error against the {what}", headings, rows)
     written = [traded.to_csv(folder / "trade-off.csv")]
-    return written + plotted(plots, traded, folder / "trade-off.png", title=title)
+    return written + save_plot(plots, traded, folder / "trade-off.png", title=title)

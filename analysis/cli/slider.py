@@ -18,9 +18,9 @@ from .common import (
     SLIDER_MOTION,
     check_kind,
     console,
-    handled,
+    report_errors,
     output_folder,
-    plotted,
+    save_plot,
     print_error,
     print_written,
     set_option,
@@ -41,7 +41,7 @@ if TYPE_CHECKING:
     "--harmonics", type=click.IntRange(0), help="Number of harmonics of the slider's motion, instead of the case's."
 )
 @search_options
-@handled
+@report_errors
 def slider_motion(
     case: str,
     settings: Sequence[str],
@@ -73,7 +73,7 @@ def slider_motion(
     )
     check_kind(case, SLIDER_MOTION, settings=overrides)
     chosen = load_slider_case(case, overrides)
-    solution, stopped = _moved(chosen) if chosen.strategy is None else _strategy(chosen)
+    solution, stopped = _find_motion(chosen) if chosen.strategy is None else _find_strategy(chosen)
     folder = output_folder(out)
     written = _write_solution(solution, folder, chosen, plots)
     pivot = solution.linkage.pivot
@@ -89,13 +89,13 @@ def slider_motion(
     leave_if_stopped(stopped, "the best so far is kept")
 
 
-def _strategy(chosen: SliderCase) -> tuple[Any, Interrupted | None]:
+def _find_strategy(chosen: SliderCase) -> tuple[Any, Interrupted | None]:
     """Find the simplest mechanism within the tolerance; return its solution, and the interruption of the search or None."""
     from ..slider import StrategyInterrupted
 
     stopped = None
     try:
-        found = chosen.simplest(progress=console.is_terminal)
+        found = chosen.find_simplest(progress=console.is_terminal)
     except StrategyInterrupted as error:
         if error.strategy is None:
             raise
@@ -109,16 +109,16 @@ def _strategy(chosen: SliderCase) -> tuple[Any, Interrupted | None]:
     return found.chosen.solution, stopped
 
 
-def _moved(chosen: SliderCase) -> tuple[Any, Interrupted | None]:
+def _find_motion(chosen: SliderCase) -> tuple[Any, Interrupted | None]:
     """Find the best motion for each number of harmonics; return the best of all, and the interruption of the search or None."""
     from ..synthesis import SynthesisInterrupted
 
     stopped = None
-    four_bar = chosen.four_bar(progress=console.is_terminal)
+    four_bar = chosen.find_four_bar(progress=console.is_terminal)
     found = [four_bar]
     for harmonics in chosen.slider.harmonics:
         try:
-            result = chosen.move(four_bar, harmonics, tuple(found[1:]), progress=console.is_terminal)
+            result = chosen.find_motion(four_bar, harmonics, tuple(found[1:]), progress=console.is_terminal)
         except SynthesisInterrupted as error:
             stopped = error
             if error.synthesis is None:
@@ -174,7 +174,7 @@ def _write_solution(solution: Solution, folder: Path, case: SliderCase, plots: b
         make = replace(make, speed=case.drive.speed)
     written = write_described(assess(solution), folder, title, curve="curve", text="report", drawn="linkage")
     written += write_linkages([solution], folder, title, make=make)
-    return written + plotted(plots, solution, folder / "linkage.png", title=title)
+    return written + save_plot(plots, solution, folder / "linkage.png", title=title)
 
 
 def _motion_columns(series: FourierSeries, rotation: Any) -> dict[str, Any]:
@@ -196,13 +196,13 @@ def _dynamics(chosen: SliderCase, solution: Solution, folder: Path, plots: bool)
     from ..synthesis import SliderMotion
 
     title = chosen.synthesis.title
-    drive = chosen.driven(solution)
+    drive = chosen.compute_drive(solution)
     _print_drive(title, drive)
     own, pivot = {}, solution.linkage.pivot
     if isinstance(pivot, SliderMotion):
         own = _motion_columns(pivot.series, drive.crank_angle - solution.linkage.crank_phase)
     end = {"time [s]": np.append(drive.time, drive.period), "slider.force [N]": np.append(drive.force, drive.force[0])}
-    head = chosen.synthesis.make.masses_in_words()
+    head = chosen.synthesis.make.describe_masses()
     written = [
         write_csv(folder / "motion.csv", own | dict(drive.columns())),
         write_csv(folder / "force.csv", end),
@@ -214,7 +214,7 @@ def _dynamics(chosen: SliderCase, solution: Solution, folder: Path, plots: bool)
             head="a controller lets the slider follow its motion: linkwork system run system.toml",
         ),
     ]
-    written += plotted(plots, drive, folder / "motion.png", title=title)
+    written += save_plot(plots, drive, folder / "motion.png", title=title)
     if chosen.tracking is not None:
         written += _tracking(chosen, drive, folder, plots)
     return written
@@ -250,7 +250,7 @@ def _print_drive(title: str, drive: SliderDrive) -> None:
 def _tracking(chosen: SliderCase, drive: SliderDrive, folder: Path, plots: bool) -> list[Path]:
     from ..files import write_csv
 
-    run = chosen.tracked(drive)
+    run = chosen.run_tracking(drive)
     loop = run.loop
     if loop.status:
         print_error(f"note: the run under control ended early: {loop.message}")
@@ -278,4 +278,4 @@ def _tracking(chosen: SliderCase, drive: SliderDrive, folder: Path, plots: bool)
         "power [W]": run.power,
     }
     written = [write_csv(folder / "tracking.csv", columns)]
-    return written + plotted(plots, run, folder / "tracking.png")
+    return written + save_plot(plots, run, folder / "tracking.png")

@@ -42,7 +42,7 @@ from ..synthesis import (
 from ..units import ROUNDING
 from .animation import check_frames, gif
 from .dispatch import animate, plot
-from .marks import roomiest
+from .marks import roomiest_position
 from .style import (
     BLOCK,
     BOLD,
@@ -62,7 +62,7 @@ from .style import (
     TINY,
     TRACE,
     finish,
-    styled,
+    figure_style,
     write_notes,
     write_title,
 )
@@ -141,8 +141,8 @@ def _draw_curves(axis: Axes, scene: LinkageScene, *, traced: bool = True) -> Non
         for name, colour in (("B", CRANK), ("C", ROCKER)):
             way = MM_PER_METRE * np.array([(np.nan, np.nan) if pins is None else pins[name] for pins in places])
             axis.plot(*way.T, color=colour, alpha=0.35, linewidth=THIN, zorder=2)
-    if traced and scene.traced is not None:
-        axis.plot(*(MM_PER_METRE * scene.traced).T, color=TRACE, linewidth=BOLD, zorder=4)
+    if traced and scene.traced_curve is not None:
+        axis.plot(*(MM_PER_METRE * scene.traced_curve).T, color=TRACE, linewidth=BOLD, zorder=4)
 
 
 def _draw_linkage(
@@ -191,7 +191,7 @@ def _draw_slider(axis: Axes, guide: FloatArray, d: FloatArray, unit: float) -> N
 
 def _write_letters(axis: Axes, scene: LinkageScene, at: Mapping[str, FloatArray], unit: float) -> None:
     """Write each pin's letter where it is farthest from links, supports, curve and other letters."""
-    names = [n for n in scene.lettered if n in at]
+    names = [n for n in scene.pin_letters if n in at]
     lines = [(at["A"], at["B"]), (at["B"], at["C"]), (at["C"], at["D"]), (at["A"], at["E"])]
     if "P" in at:
         lines += [(at["B"], at["P"]), (at["C"], at["P"])]
@@ -204,10 +204,10 @@ def _write_letters(axis: Axes, scene: LinkageScene, at: Mapping[str, FloatArray]
     if scene.second_crank:
         lines.append((at["E"], at["D"]))
     marks = [at[n] for n in names]
-    curves = [MM_PER_METRE * p for p in (*scene.curves, scene.traced, scene.target) if p is not None]
+    curves = [MM_PER_METRE * p for p in (*scene.curves, scene.traced_curve, scene.target) if p is not None]
     drawn = [MultiLineString(lines), *(MultiPoint(curve[np.isfinite(curve).all(axis=1)]) for curve in curves)]
     for name in names:
-        place = roomiest(at[name], 1.5 * unit, drawn, marks)
+        place = roomiest_position(at[name], 1.5 * unit, drawn, marks)
         axis.text(place[0], place[1], name, ha="center", va="center", fontsize=LETTER, zorder=11)
         marks.append(place)
 
@@ -252,8 +252,8 @@ def _plot_magnified_errors(axis: Axes, scene: LinkageScene) -> None:
     strokes = np.stack([wanted[shown], ends[shown], np.full((len(shown), 2), np.nan)], axis=1).reshape(-1, 2)
     times = "" if factor == 1.0 else f" (x {factor:g})"
     _draw_target(axis, scene, size=4.0)
-    if scene.traced is not None:
-        axis.plot(*(MM_PER_METRE * scene.traced).T, color=TRACE, linewidth=LINE, zorder=4, label="path")
+    if scene.traced_curve is not None:
+        axis.plot(*(MM_PER_METRE * scene.traced_curve).T, color=TRACE, linewidth=LINE, zorder=4, label="path")
     if not _is_met(scene):
         axis.plot(*strokes.T, color=CRANK, linewidth=HAIR, zorder=5, label=f"error{times}")
     points = np.vstack([wanted, ends])
@@ -378,7 +378,7 @@ def plot_solution(solution: Solution, *, title: str = "") -> Figure:
         If the links cannot be joined anywhere.
     """
     scene = LinkageScene(solution, title)
-    with styled():
+    with figure_style():
         met = _is_met(scene)
         right = ["task", *([] if met else ["errors"]), "transmission", *([] if scene.motion is None else ["motion"])]
         figure = Figure(figsize=(10.4, 3.1 + 1.3 * max(3, len(right))))
@@ -423,7 +423,7 @@ def plot_sheet(
     assessment = solution if isinstance(solution, Assessment) else assess(solution)
     solution = assessment.solution
     scene = LinkageScene(solution, title)
-    with styled():
+    with figure_style():
         figure = Figure(figsize=A4)
         right = ["task", "transmission", *(["forces"] if forces is not None else [])]
         rows: list[Any] = [*(["linkage", name] for name in right), ["table", "table"]]
@@ -474,7 +474,7 @@ def plot_alternatives(synthesis: Synthesis, *, title: str = "") -> Figure:
         raise InputError("there are no linkages to draw")
     columns = min(3, len(scenes))
     rows = ceil(len(scenes) / columns)
-    with styled():
+    with figure_style():
         figure = Figure(figsize=(3.5 * columns, 3.8 * rows + 0.3 + (0.3 if title else 0.0)))
         axes = figure.subplots(rows, columns, squeeze=False).ravel()
         for axis, scene in zip(axes, scenes):
@@ -516,7 +516,7 @@ def plot_trade_off(traded: TradeOff, *, title: str = "") -> Figure:
     label = f"limit of the {over.name}" if over.small else f"{over.name} asked for"
     limit, limit_label = shown * traded.limit, f"{label} [{unit}]"
     order = np.argsort(limit)
-    with styled():
+    with figure_style():
         figure = Figure(figsize=(6.4, 2.6 * len(errors) + 0.4))
         axes = figure.subplots(len(errors), 1, sharex=True, squeeze=False).ravel()
         for axis, (label, values) in zip(axes, errors.items()):
@@ -560,7 +560,7 @@ def animate_solution(
     frame = _Frame(scene, _framed_rotations(scene))
     width, height = frame.high - frame.low
     tall = float(np.clip(5.0 * height / width, 2.5, 7.0))
-    with styled():
+    with figure_style():
         figure = Figure(figsize=(5.4, tall + 2.1))
         above, below = figure.subplots(2, 1, height_ratios=(tall, 1.6))
         write_title(figure, scene.title)

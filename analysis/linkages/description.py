@@ -90,7 +90,7 @@ class Body:
 
     @property
     def all_points(self) -> dict[str, tuple[float, float]]:
-        """All points, including those of the bar (m)."""
+        """Return all points, including those of the bar (m)."""
         ends = {self.bar[0]: (0, 0), self.bar[1]: (self.length, 0)} if self.bar else {}
         return {**ends, **self.points}
 

@@ -25,7 +25,7 @@ class Output(NamedTuple):
 
     @property
     def variable(self) -> str:
-        """Source text of the variable in the package."""
+        """Return the source of the variable in the package."""
         known = f'"{self.name}", "{self.unit}", {quote(self.text)}, {quote(symbol(self.name, self.unit))}'
         return f"output({known}{self.rest and f', {self.rest}'})"
 

@@ -30,7 +30,7 @@ class Parameter(NamedTuple):
 
     @property
     def field(self) -> str:
-        """Name of the field in the dataclass of the parameters."""
+        """Return the name of the field in the dataclass of the parameters."""
         return field_name(self.name)
 
 
@@ -54,22 +54,22 @@ class Drive(NamedTuple):
 
     @property
     def variable(self) -> str:
-        """Name of the coordinate in the equations."""
+        """Return the name of the coordinate in the equations."""
         return f"q_{self.name}"
 
     @property
     def unit(self) -> str:
-        """Unit of the coordinate."""
+        """Return the unit of the coordinate."""
         return "rad" if self.turns else "m"
 
     @property
     def load(self) -> str:
-        """Name of the torque or force input in the freedom's table."""
+        """Return the name of the torque or force input in the freedom's table."""
         return "torque" if self.turns else "force"
 
     @property
     def load_unit(self) -> str:
-        """Unit of that input."""
+        """Return the unit of the torque or force input."""
         return "N.m" if self.turns else "N"
 
 
@@ -83,7 +83,7 @@ class Load(NamedTuple):
 
     @property
     def field(self) -> str:
-        """Name of the field among the inputs of the equations."""
+        """Return the name of the field among the inputs of the equations."""
         return field_name(self.name)
 
 

@@ -50,7 +50,7 @@ class FreedomStep(NamedTuple):
 
     @property
     def bodies(self) -> tuple[str, ...]:
-        """The body alone."""
+        """Return the body alone."""
         return (self.body,)
 
 
@@ -87,7 +87,7 @@ class RackStep(NamedTuple):
 
     @property
     def turns(self) -> bool:
-        """Whether the gear follows from the rack."""
+        """Return whether the gear follows from the rack, instead of the rack from the gear."""
         return self.joint is self.pin
 
 
@@ -101,7 +101,7 @@ class Side(NamedTuple):
 
     @property
     def bodies(self) -> tuple[str, ...]:
-        """Names of the side's bodies, ``body`` first."""
+        """Return the names of the side's bodies, ``body`` first."""
         return (self.body, *(body for step in self.inside for body in step.bodies))
 
 
@@ -119,12 +119,12 @@ class Dyad(NamedTuple):
 
     @property
     def bodies(self) -> tuple[str, ...]:
-        """The bodies of both sides."""
+        """Return the bodies of both sides."""
         return (*self.sides[0].bodies, *self.sides[1].bodies)
 
     @property
     def inner_dyads(self) -> Iterator[Dyad]:
-        """The dyads inside the sides, in their order, and last this dyad."""
+        """Yield the dyads inside the sides in their order, and this dyad last."""
         for side in self.sides:
             for step in side.inside:
                 if isinstance(step, Dyad):
@@ -133,7 +133,7 @@ class Dyad(NamedTuple):
 
     @property
     def has_two_assemblies(self) -> bool:
-        """Whether there are two assemblies to choose from."""
+        """Return whether there are two assemblies to choose from."""
         return self.kind in ("RRR", "RRP", "RPR")
 
 
@@ -161,7 +161,7 @@ class Structure:
 
     @property
     def dyads(self) -> tuple[Dyad, ...]:
-        """The dyads in the order of the computation, inner dyads before those that contain them."""
+        """Return the dyads in the order of the computation, inner dyads before those that contain them."""
         return tuple(dyad for step in self.steps if isinstance(step, Dyad) for dyad in step.inner_dyads)
 
 

@@ -27,7 +27,7 @@ from ..synthesis import (
     LeastTransmission,
     Linkage,
     LinkageScene,
-    Make,
+    MachineSpec,
     Search,
     SecondCrank,
     SliderCrank,
@@ -150,7 +150,7 @@ def linkages(case: Case, wanted: Linkages) -> Answer:
 
 
 def _state(solution: Solution, title: str) -> Answer:
-    case = read_case(solution.run_case(Make(), title), folder=Path(), title=title)
+    case = read_case(solution.run_case(MachineSpec(), title), folder=Path(), title=title)
     state, speed = page_state(case), default_variable(mechanism_of(case.parameters))
     # the path does not say in which direction the crank turns; the page seeks periodic motions with positive speed
     state["values"][speed] = abs(state["values"][speed])
@@ -185,7 +185,7 @@ def _picture(solution: Solution) -> Answer:
 
 
 def _joined(scene: LinkageScene) -> list[FloatArray]:
-    traced = scene.traced
+    traced = scene.traced_curve
     return [] if traced is None else [traced[np.isfinite(traced).all(axis=1)]]
 
 
@@ -218,7 +218,7 @@ def moved(case: Case, wanted: Moved) -> Answer:
         branch=p.assembly_branch,
     )
     if wanted.closed:
-        still = Solution.of(task, linkage)
+        still = Solution.from_linkage(task, linkage)
     else:
         kept = {name: (value, value) for name, value in linkage.values().items() if name != "branch"}
         still = synthesize(task, kept, [FullTurn()], search=Search(starts=4, candidates=1 << 10, solutions=1)).best

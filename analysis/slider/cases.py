@@ -97,13 +97,13 @@ class SliderTable:
         self.unknown(0)  # checks them
 
     def unknown(self, harmonics: int) -> SliderUnknown:
-        """Return the unknowns of a motion with a number of harmonics, within the bounds of the table."""
+        """Return the unknowns of a motion with this number of harmonics, within the bounds of the table."""
         bounds = {name: getattr(self, name) for name in ("guide_angle", "position", "stroke", "speed", "acceleration")}
         return SliderUnknown(harmonics=harmonics, **bounds)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class StrategyWanted:
+class StrategyTable:
     """The table ``[strategy]``: arguments of `simplest_mechanism`."""
 
     tolerance: float = entry(unchanged)
@@ -115,7 +115,7 @@ class StrategyWanted:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class DriveWanted:
+class DriveTable:
     """The table ``[drive]``: crank speed (rad/s), samples in a crank turn, and whether the best spring is added."""
 
     speed: float = entry(Quantity("rad/s", above=0.0))
@@ -124,7 +124,7 @@ class DriveWanted:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class TrackingWanted:
+class TrackingTable:
     """The table ``[tracking]``: arguments of `track`, and differences between plant and model.
 
     Attributes
@@ -186,10 +186,10 @@ class SliderCase:
     synthesis: SynthesisCase = entry(unchanged)
     linkage: Linkage | None = entry(unchanged, None)
     slider: SliderTable = entry(Table(SliderTable), SliderTable())
-    strategy: StrategyWanted | None = entry(unchanged, None)
-    drive: DriveWanted | None = entry(Table(DriveWanted), None)
+    strategy: StrategyTable | None = entry(unchanged, None)
+    drive: DriveTable | None = entry(Table(DriveTable), None)
     load: Load | None = entry(Table(Load), None)
-    tracking: TrackingWanted | None = entry(Table(TrackingWanted), None)
+    tracking: TrackingTable | None = entry(Table(TrackingTable), None)
 
     def __post_init__(self) -> None:
         if self.linkage is not None and not self.free and self.synthesis.bounds:
@@ -202,7 +202,7 @@ class SliderCase:
 
     @property
     def free(self) -> bool:
-        """Whether the links are optimised together with the motion."""
+        """Return whether the links are optimised together with the motion."""
         return self.slider.links == "free"
 
     @property
@@ -218,21 +218,26 @@ class SliderCase:
             return self.synthesis.bounds
         return _fixed_bounds(self.linkage)
 
-    def four_bar(self, *, progress: bool = False) -> Solution:
+    def find_four_bar(self, *, progress: bool = False) -> Solution:
         """Evaluate the given linkage with a fixed pivot; without a given linkage search for the best one."""
         task = self.synthesis.task
         if self.linkage is None:
             return self.synthesis.solve(progress=progress).best
         if isinstance(task, (TimedPath, RockerFunction)) or (isinstance(task, UntimedPath) and task.path.closed):
-            return Solution.of(task, self.linkage)
+            return Solution.from_linkage(task, self.linkage)
         # the crank rotations along an open path are unknown: a search with all dimensions fixed finds them
         only, seed = (Assembly(branch=self.linkage.branch),), self.synthesis.search.seed
         return synthesize(
             task, _fixed_bounds(self.linkage), only, search=Search(seed=seed, candidates=1 << 10, starts=4, solutions=1)
         ).best
 
-    def move(self, four_bar: Solution, harmonics: int, guesses: tuple[Solution, ...], *, progress: bool) -> Synthesis:
-        """Find the best motion of the pivot with a number of harmonics; see `slider_motion`."""
+    def find_motion(
+        self, four_bar: Solution, harmonics: int, guesses: tuple[Solution, ...], *, progress: bool
+    ) -> Synthesis:
+        """Find the best motion of the pivot with this number of harmonics; see `slider_motion`.
+
+        ``four_bar`` is the linkage with a fixed pivot, ``guesses`` are further starts.
+        """
         search = self.synthesis.search
         bounds = (
             _free_bounds(four_bar.linkage, self.synthesis.task) | dict(self.synthesis.bounds) if self.free else None
@@ -247,7 +252,7 @@ class SliderCase:
             search=search.search(starts=self.slider.starts, progress=progress),
         )
 
-    def simplest(self, *, progress: bool = False) -> Strategy:
+    def find_simplest(self, *, progress: bool = False) -> Strategy:
         """Find the simplest mechanism within the tolerance; see `simplest_mechanism`."""
         wanted, search = self.strategy, self.synthesis.search
         assert wanted is not None
@@ -262,18 +267,18 @@ class SliderCase:
 
     # Dynamics
 
-    def driven(self, solution: Solution) -> SliderDrive:
-        """Compute force, torque and pin forces of the motion; the crank turns in the direction of the task."""
+    def compute_drive(self, solution: Solution) -> SliderDrive:
+        """Compute force, torque and pin forces of a solution's motion; the crank turns in the sense of the task."""
         wanted = self.drive
         assert wanted is not None
         speed = solution.direction * wanted.speed
-        motion, parameters = motion_of_plant(solution.linkage), self.synthesis.make.moving(solution.linkage)
+        motion, parameters = motion_of_plant(solution.linkage), self.synthesis.make.sliding_five_bar(solution.linkage)
         load = (0.0, 0.0) if self.load is None else (self.load.fx, self.load.fy)
         if wanted.best_spring:
             parameters = best_spring(parameters, motion, speed, load=load, samples=wanted.samples).parameters
         return inverse_dynamics(parameters, motion, speed, load=load, samples=wanted.samples)
 
-    def tracked(self, drive: SliderDrive) -> TrackingResult:
+    def run_tracking(self, drive: SliderDrive) -> TrackingResult:
         """Run the plant, which may differ from the model, under the tracking controller."""
         wanted = self.tracking
         assert wanted is not None
@@ -301,8 +306,8 @@ class SliderCase:
             load=drive.load,
         )
 
-    def _design(self, drive: SliderDrive, wanted: TrackingWanted) -> Design | None:
-        """Return the design of the tracking controller's feedback; None if its bandwidth is zero."""
+    def _design(self, drive: SliderDrive, wanted: TrackingTable) -> Design | None:
+        """Design the feedback of the tracking controller; return None if its bandwidth is zero."""
         bandwidth = 10.0 * abs(drive.crank_speed) if wanted.bandwidth is None else wanted.bandwidth
         return (
             design_pid(linearise_along(drive.parameters, drive).mean(), bandwidth=bandwidth)
@@ -314,7 +319,7 @@ class SliderCase:
         """Return the tables of a system in which a controller moves the slider; ``case`` is the case file of the linkage."""
         from ..export.controllers import HARMONICS
 
-        wanted = self.tracking or TrackingWanted()
+        wanted = self.tracking or TrackingTable()
         design = self._design(drive, wanted)
         reference: dict[str, Any] = {"sample_time": with_unit(wanted.period, "s")}
         # samples at equal angles over a turn, from 0, where the crank starts
@@ -395,17 +400,17 @@ def run_case(drive: SliderDrive, title: str, force_file: str) -> dict[str, Any]:
 
 #: Tables of a case that a synthesis case does not have, for `linkwork new`.
 TABLES: Mapping[str, type] = {
-    "slider": SliderTable, "strategy": StrategyWanted, "drive": DriveWanted, "load": Load, "tracking": TrackingWanted,
+    "slider": SliderTable, "strategy": StrategyTable, "drive": DriveTable, "load": Load, "tracking": TrackingTable,
 }  # fmt: skip
 
 
 # Reading
 
 
-def _read_strategy(value: Any, name: str, *, angular: bool) -> StrategyWanted:
+def _read_strategy(value: Any, name: str, *, angular: bool) -> StrategyTable:
     """Read the table ``[strategy]``; the tolerance is in m or rad, and squared if the criterion is the quality function."""
     unit = ("rad" if angular else "m") + "**2" * (as_table(value, name).get("criterion") == "error")
-    return read(StrategyWanted, value, name, readers={"tolerance": Quantity(unit, above=0.0)})
+    return read(StrategyTable, value, name, readers={"tolerance": Quantity(unit, above=0.0)})
 
 
 def _read_linkage(value: Any, name: str, *, folder: Path) -> Linkage:

@@ -60,7 +60,7 @@ class TurnBalance:
 
     @property
     def residual(self) -> float:
-        """Work supplied minus work dissipated (J); zero but for rounding if the samples resolve the motion."""
+        """Return the work supplied minus the work dissipated (J): zero but for rounding if the samples resolve the motion."""
         return self.force + self.torque + self.load - self.dissipated
 
 
@@ -116,67 +116,67 @@ class SliderDrive:
 
     @property
     def modes(self) -> tuple[int, ...]:
-        """Values of the mechanism's modes: 1, as the crank speed is commanded."""
+        """Return the values of the mechanism's modes: 1, as the crank speed is commanded."""
         return (1,)
 
     @property
     def period(self) -> float:
-        """Time of one turn (s)."""
+        """Return the duration of one turn (s)."""
         return 2.0 * pi / abs(self.crank_speed)
 
     @property
     def force(self) -> FloatArray:
-        """Control force on the slider (N), shape (n,)."""
+        """Return the control force on the slider (N), shape (n,)."""
         return self.inputs[:, 3]
 
     @property
     def torque(self) -> FloatArray:
-        """Torque that keeps the crank's speed (N.m), shape (n,)."""
+        """Return the torque that keeps the crank's speed constant (N.m), shape (n,)."""
         return self["drive.applied_torque"]
 
     @property
     def power(self) -> FloatArray:
-        """Power of the control force (W), shape (n,)."""
+        """Return the power of the control force (W), shape (n,)."""
         return self.force * self.states[:, 3]
 
     @property
     def mean_power(self) -> float:
-        """Mean of the power over the turn (W)."""
+        """Return the mean of the power over the turn (W)."""
         return float(self.power.mean())
 
     @property
     def peak_power(self) -> float:
-        """Largest magnitude of the power (W)."""
+        """Return the greatest magnitude of the power (W)."""
         return float(np.abs(self.power).max())
 
     @property
     def positive_work(self) -> float:
-        """Work of the control force over the parts of the turn with positive power (J)."""
+        """Return the work of the control force over the parts of the turn with positive power (J)."""
         return float(np.maximum(self.power, 0.0).mean()) * self.period
 
     @property
     def negative_work(self) -> float:
-        """Work of the control force over the parts of the turn with negative power (J), at most zero."""
+        """Return the work of the control force over the parts of the turn with negative power (J), at most zero."""
         return float(np.minimum(self.power, 0.0).mean()) * self.period
 
     @property
     def rms_force(self) -> float:
-        """Root mean square of the control force over the turn (N)."""
+        """Return the root mean square of the control force over the turn (N)."""
         return float(np.sqrt(np.mean(self.force**2)))
 
     @property
     def peak_force(self) -> float:
-        """Largest magnitude of the control force (N)."""
+        """Return the greatest magnitude of the control force (N)."""
         return float(np.abs(self.force).max())
 
     @property
     def peak_torque(self) -> float:
-        """Largest magnitude of the crank torque (N.m)."""
+        """Return the greatest magnitude of the crank torque (N.m)."""
         return float(np.abs(self.torque).max())
 
     @property
     def balance(self) -> TurnBalance:
-        """Energy over the turn."""
+        """Return the balance of energy over the turn."""
         p = self.parameters.constants()
         dissipated, load = 0.0, 0.0
         for x, i in zip(self.states.tolist(), self.inputs.tolist()):

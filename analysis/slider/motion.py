@@ -110,9 +110,9 @@ def slider_motion(
 
 
 def greatest_derivative(linkage: Linkage, order: int) -> float:
-    """Return the greatest magnitude over a turn of the slider position's derivative by the crank rotation (m/rad^order).
+    """Return the greatest magnitude, over a turn, of a derivative of the slider position by the crank rotation (m/rad^order).
 
-    Order 0 is the position itself; the result is 0 for a pivot that is no slider.
+    Order 0 is the position itself. For a pivot that is no slider the result is 0.
     """
     if not isinstance(linkage.pivot, SliderMotion):
         return 0.0
@@ -123,7 +123,7 @@ def greatest_derivative(linkage: Linkage, order: int) -> float:
 
 
 def motion_of_plant(linkage: Linkage) -> FourierSeries:
-    """Return the slider position (m) as a series of the plant's crank angle th2 = phi + th20, see `inverse_dynamics`.
+    """Return the slider position (m) as a Fourier series of the plant's crank angle th2 = phi + th20, see `inverse_dynamics`.
 
     Raises
     ------

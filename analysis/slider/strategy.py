@@ -81,7 +81,10 @@ class Strategy:
 
     @property
     def chosen(self) -> Step:
-        """The step that meets the tolerance; if none does, the sound step with the least `Step.value`, or the least of all."""
+        """Return the step that meets the tolerance or, if none does, the best one.
+
+        The best one has the least `Step.value` among the steps without defects, or of all if every step has some.
+        """
         if self.met:
             return self.steps[-1]
         return min(self.steps, key=lambda s: (s.solution is None or not s.solution.verdicts.sound, s.value))
@@ -163,7 +166,7 @@ def simplest_mechanism(
         # the worst error is also minimised
         task = replace(task, objective="worst")
     tried = _Trials(task, tolerance, criterion, bounds, constraints, search)
-    four_bar = tried.four_bar()
+    four_bar = tried.find_four_bar()
     if tried.met():
         return tried.result()
     numbers = range(1, int(harmonics) + 1)
@@ -216,7 +219,7 @@ class _Trials:
         """Return whether the last mechanism meets the tolerance without a defect."""
         return self._met
 
-    def four_bar(self) -> Solution:
+    def find_four_bar(self) -> Solution:
         """Find the best four-bar, record it and return it."""
         search = replace(self.search, starts=2 * int(self.search.starts))
         solution = self._record("four-bar", self._run_search("four-bar", search))

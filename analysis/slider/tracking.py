@@ -95,12 +95,12 @@ class TrackingController:
 
     @property
     def method(self) -> str:
-        """Name of the control: feed-forward, the feedback's method, or both."""
+        """Return the name of the control: feed-forward, the feedback's method, or both."""
         parts = ["feed-forward"] if self.feedforward else []
         return " + ".join(parts + ([self.feedback.method] if self.feedback else []))
 
     def reset(self) -> None:
-        """Set the integral to zero."""
+        """Set the integral of the feedback to zero."""
         if self.feedback:
             self.feedback.reset()
 

@@ -92,12 +92,12 @@ class VariationalMotion:
 
     @property
     def squared_error(self) -> float:
-        """Sum of the weighted squared errors (m2 or rad2)."""
+        """Return the sum of the weighted squared errors (m2 or rad2)."""
         return float(self.weights @ self.error**2)
 
     @property
     def stroke(self) -> float:
-        """Distance between the ends of the slider's travel (m)."""
+        """Return the distance between the ends of the slider's travel (m)."""
         return float(np.ptp(self.u))
 
     def to_series(self, order: int) -> FourierSeries:
@@ -120,9 +120,10 @@ class VariationalMotion:
 
 
 class _Minima(NamedTuple):
-    """Candidates for minima, shape (m, n): a row for each kind and assembly, a column for each crank rotation.
+    """Candidates for minima of the error: slider position (m), angles of coupler and rocker (rad), error, and validity.
 
-    Slider position (m), angles of coupler and rocker (rad), error, and whether the candidate is a minimum.
+    Each field has the shape (m, n), with a row for each kind and assembly and a column for each crank rotation. The last one
+    says whether the candidate is a minimum.
     """
 
     u: FloatArray
@@ -156,13 +157,13 @@ class _Problem:
 
     @property
     def labels(self) -> tuple[NDArray[np.str_], NDArray[np.int64]]:
-        """Kind and assembly of each row of `minima`, two arrays of shape (m,)."""
+        """Return the kind and the assembly of each row of `minima`, two arrays of shape (m,)."""
         kinds = ["target"] * 2 + ["perpendicular"] * 4
         kinds += ["limit"] * 2 * len(self._limits()) + ["stroke"] * sum(map(isfinite, self.stroke))
         return np.array(kinds * len(self.assemblies)), np.repeat(self.assemblies, len(kinds))
 
     def _limits(self) -> list[tuple[float, float, float]]:
-        """Return the limits of the distance BD: angle at C (rad), BD (m), and 1 if BD may not be greater, -1 if not smaller."""
+        """Return the limits of the distance BD: angle at C (rad), BD (m), and 1 for an upper limit of BD, -1 for a lower one."""
         l3, l4 = self.linkage.coupler_length, self.linkage.rocker_length
         low = self.least_transmission
         least = sqrt((l3 - l4) ** 2 + 4.0 * l3 * l4 * sin(0.5 * low) ** 2)
@@ -228,11 +229,14 @@ class _Problem:
             slope = branch * inward * np.sin(own_end - wanted) * np.cos(other_end)
             rows.append((end, *ends, there & (slope >= -ROUNDING)))
         u, coupler, rocker, valid = (np.concatenate(parts) for parts in zip(*rows))
-        error = np.abs(arm * np.exp(1j * coupler) - aim) if path else np.abs(_wrapped(rocker - wanted))
+        error = np.abs(arm * np.exp(1j * coupler) - aim) if path else np.abs(_wrap_angles(rocker - wanted))
         return _Minima(u, coupler + self.guide_angle, rocker + self.guide_angle, error, valid)
 
     def _ends(self, b: NDArray[np.complex128]) -> tuple[FloatArray, FloatArray, FloatArray, NDArray[np.bool_]]:
-        """Return the ends of the range of u: position (m), angle at C (rad), direction into the range (1 or -1), existence."""
+        """Return four arrays for the ends of the range of u, for crank pins b.
+
+        They are the position (m), the angle at C (rad), the direction into the range (1 or -1), and whether the end exists.
+        """
         l3, l4 = self.linkage.coupler_length, self.linkage.rocker_length
         low, high = self.stroke
         ends = []
@@ -330,12 +334,12 @@ def variational_motion(
     minima = problem.minima(phi, goal)
     joined = minima.valid.any(axis=0)
     if not joined.all():
-        raise AssemblyError(_out_of_reach(problem, phi[~joined], n))
+        raise AssemblyError(_describe_unreachable(problem, phi[~joined], n))
 
     error = np.where(minima.valid, minima.error, inf)
     # the two sides of the other link have exactly equal errors
     chosen_from = minima.valid if continuous else error == error.min(axis=0)
-    bridged = _connected(problem, phi, goal, minima, chosen_from)
+    bridged = _find_connections(problem, phi, goal, minima, chosen_from)
     travel = minima.u / (linkage.coupler_length + linkage.rocker_length)
     choice = _choose_minima(w * minima.error**2, travel, chosen_from, bridged, closed)
     at = (choice, np.arange(n))
@@ -344,8 +348,8 @@ def variational_motion(
     return VariationalMotion(
         rotation=phi,
         u=minima.u[at],
-        coupler_angle=_wrapped(minima.coupler[at]),
-        rocker_angle=_wrapped(minima.rocker[at]),
+        coupler_angle=_wrap_angles(minima.coupler[at]),
+        rocker_angle=_wrap_angles(minima.rocker[at]),
         branch=branches[choice],
         kind=kinds[choice],
         error=minima.error[at],
@@ -355,14 +359,14 @@ def variational_motion(
     )
 
 
-def _wrapped(angle: FloatArray) -> FloatArray:
+def _wrap_angles(angle: FloatArray) -> FloatArray:
     """Return angles (rad) shifted by whole turns into (-pi, pi]."""
     value: FloatArray = pi - np.mod(pi - angle, 2.0 * pi)
     return value
 
 
-def _out_of_reach(problem: _Problem, phi: FloatArray, n: int) -> str:
-    """Return a sentence about the worst of the rotations ``phi``, at which no slider position lets the links be joined."""
+def _describe_unreachable(problem: _Problem, phi: FloatArray, n: int) -> str:
+    """Describe, in a sentence, the worst of the rotations ``phi`` at which no slider position lets the links be joined."""
     b = problem.pin(phi)
     limits = problem._limits()
     most = limits[0][1]
@@ -387,16 +391,17 @@ def _out_of_reach(problem: _Problem, phi: FloatArray, n: int) -> str:
     )
 
 
-def _connected(
+def _find_connections(
     problem: _Problem,
     phi: FloatArray,
     goal: NDArray[np.complex128] | FloatArray,
     minima: _Minima,
     chosen_from: NDArray[np.bool_],
 ) -> NDArray[np.bool_]:
-    """Return whether a continuous path of minima leads from minimum i at rotation k to minimum j at the next, shape (n, m, m).
+    """Find the minima that continuous paths connect.
 
-    The last rotation is followed by the first, a turn later.
+    The result, shape (n, m, m), says at [k, i, j] whether a path leads from minimum i at rotation k to minimum j at the next
+    rotation. The last rotation is followed by the first, a turn later.
 
     Between two rotations the target moves along a straight line. The step is bisected: in its middle the minimum with the
     smallest gap is taken, then the half with the wider gap is bisected, and so on. The gap of a path vanishes, that of a jump
@@ -411,7 +416,7 @@ def _connected(
     start, step = phi[k], np.append(np.diff(phi), 2.0 * pi - (phi[-1] - phi[0]))[k]
     aim, change = goal[k], goal[following[k]] - goal[k]
     if not np.iscomplexobj(goal):
-        change = _wrapped(change)
+        change = _wrap_angles(change)
     left, right = np.zeros(len(k)), np.ones(len(k))
     u_left, u_right = minima.u[i, k], minima.u[j, following[k]]
     tolerance = GAP * (problem.linkage.coupler_length + problem.linkage.rocker_length)
@@ -439,7 +444,10 @@ def _connected(
 def _choose_minima(
     squares: FloatArray, travel: FloatArray, chosen_from: NDArray[np.bool_], bridged: NDArray[np.bool_], closed: bool
 ) -> NDArray[np.int64]:
-    """Choose a row for each column by dynamic programming: fewest jumps, then least sum of squares, then least travel."""
+    """Choose a minimum (row) at each rotation (column) by dynamic programming.
+
+    The choice has the fewest jumps, then the least sum of squares, then the least travel.
+    """
     m, n = squares.shape
     whole = float(np.where(chosen_from, squares, 0.0).max(axis=0).sum())
     cost = np.where(chosen_from, squares / (whole or 1.0), inf)

@@ -23,7 +23,7 @@ from .linkage.linkage import UNITS as UNITS
 from .linkage.linkage import FiveBar as FiveBar
 from .linkage.linkage import Linkage as Linkage
 from .linkage.linkage import SliderCrank as SliderCrank
-from .linkage.machine import Make as Make
+from .linkage.machine import MachineSpec as MachineSpec
 from .linkage.machine import PinForces as PinForces
 from .linkage.machine import pin_forces as pin_forces
 from .linkage.pivot import CrankUnknown as CrankUnknown
@@ -50,7 +50,7 @@ from .result.report import quality_headings as quality_headings
 from .result.report import quality_name as quality_name
 from .result.report import quality_unit as quality_unit
 from .result.report import report as report
-from .result.report import rounded as rounded
+from .result.report import round_dimensions as round_dimensions
 from .result.report import sensitivities as sensitivities
 from .result.report import solution_columns as solution_columns
 from .result.solution import Evaluation as Evaluation
@@ -58,7 +58,7 @@ from .result.solution import Solution as Solution
 from .result.solution import Verdicts as Verdicts
 from .result.solution import evaluate as evaluate
 from .result.solution import judge as judge
-from .result.solution import ranked as ranked
+from .result.solution import rank_solutions as rank_solutions
 from .search.solve import OVER as OVER
 from .search.solve import SHOWN as SHOWN
 from .search.solve import Synthesis as Synthesis

@@ -206,12 +206,12 @@ class _Search:
     best: tuple[tuple[bool, float, float], Survey, tuple[float, ...]] | None = None
 
     def survey_changes(self, x: FloatArray) -> Survey:
-        """Survey the range with some changes."""
+        """Survey the range with the changes x."""
         own = []
         for spot in self.more:
             place = TrackedMotion(self.wish, CrossPlane.level_plane(self.wish, spot, spot.level), spot)
             try:
-                own.append(place.at(x).orbit)
+                own.append(place.find(x).orbit)
             except LostError:
                 continue  # its branch is gone there
         return survey(self.wish, x, own)
@@ -395,7 +395,7 @@ def _end(region: Region, side: int) -> SpecialPoint | None:
 
 
 def _ways(found: Survey) -> list[tuple[_Way, ...]]:
-    """Return combinations of ways to clear the range of all regions and resonances, those with the shortest moves first."""
+    """Return the combinations of ways to clear the range of all regions and resonances, the shortest moves first."""
     wish = found.wish
     low, high = wish.span
     choices: list[list[tuple[float, _Way]]] = []

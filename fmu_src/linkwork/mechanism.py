@@ -244,7 +244,7 @@ class PublishedSet(NamedTuple):
 
     @property
     def crank_speed(self) -> float:
-        """Speed of a single crank (rad/s): ``drive["speed"]``."""
+        """Return the speed of a single crank (rad/s): ``drive["speed"]``."""
         return self.drive["speed"]
 
 
@@ -334,22 +334,22 @@ class Mechanism:
 
     @cached_property
     def size(self) -> int:
-        """Number of components of the state."""
+        """Return the number of components of the state."""
         return 2 * len(self.freedoms) + 2
 
     @property
     def first_set(self) -> PublishedSet:
-        """The first of the published sets."""
+        """Return the first of the published sets."""
         return next(iter(self.published.values()))
 
     @cached_property
     def constants(self) -> Any:
-        """The type of the equations' constants."""
+        """Return the type of the equations' constants."""
         return type(self.first_set.parameters.constants())
 
     @cached_property
     def switch_index(self) -> int:
-        """Index of the switch among the constants; -1 if there is none."""
+        """Return the index of the switch among the constants; -1 if there is none."""
         return int(self.constants._fields.index(self.switch)) if self.switch else -1
 
     def is_switched_on(self, p: Sequence[float]) -> bool:
@@ -384,12 +384,12 @@ class Mechanism:
 
     @cached_property
     def cyclic_freedoms(self) -> tuple[int, ...]:
-        """Indices of the freedoms that turn as a crank does."""
+        """Return the indices of the freedoms that turn as a crank does."""
         return tuple(n for n, freedom in enumerate(self.freedoms) if freedom.period > 0.0 and not freedom.swings)
 
     @cached_property
     def torques(self) -> tuple[int, ...]:
-        """Indices of the channels that are torques on freedoms that turn."""
+        """Return the indices of the channels that are torques on freedoms that turn."""
         return tuple(n for n, c in enumerate(self.channels) if c.kind == "force" and c.freedom in self.cyclic_freedoms)
 
     def channel_index(self, freedom: int, kind: str) -> int | None:
@@ -403,7 +403,7 @@ class Mechanism:
 
     @cached_property
     def joints(self) -> dict[str, tuple[str, ...]]:
-        """Names of the outputs that are the components of the force in each joint."""
+        """Return, by joint, the names of the outputs that are the components of the force in it."""
         found: dict[str, tuple[str, ...]] = {}
         for v in self.variables:
             if v.role == "joint force":
@@ -412,28 +412,28 @@ class Mechanism:
 
     @cached_property
     def rules(self) -> Rules:
-        """Rules for the values of the parameters."""
+        """Return the rules for the values of the parameters."""
         rules: Rules = self.parameters.RULES  # type: ignore[attr-defined]
         return rules
 
     @cached_property
     def modes(self) -> tuple[Mode, ...]:
-        """The modes of all freedoms that have one."""
+        """Return the modes of all freedoms that have one."""
         return tuple(freedom.mode for freedom in self.freedoms if freedom.mode is not None)
 
     @cached_property
     def input_names(self) -> tuple[str, ...]:
-        """FMI names of the inputs."""
+        """Return the FMI names of the inputs."""
         return tuple(channel.name for channel in self.channels)
 
     @cached_property
     def output_names(self) -> tuple[str, ...]:
-        """FMI names of the real outputs, in the order of ``equations.outputs``."""
+        """Return the FMI names of the real outputs, in the order of ``equations.outputs``."""
         return tuple(v.name for v in self.variables if v.causality == "output" and v.kind == "Real")
 
     @cached_property
     def mechanism_variables(self) -> dict[str, Variable]:
-        """The variables that are fields of the parameters, by FMI name."""
+        """Return, by FMI name, the variables that are fields of the parameters."""
         others = {mode.name for mode in self.modes} | {"solver.tolerance"}
         return {
             v.name: v
@@ -443,7 +443,7 @@ class Mechanism:
 
     @cached_property
     def initial_variables(self) -> dict[str, Variable]:
-        """The variables of the state at the start, by the name of the field."""
+        """Return, by name of the field, the variables of the state at the start."""
         prefix = "initial."
         return {v.name.removeprefix(prefix): v for v in self.variables if v.name.startswith(prefix)}
 

@@ -66,7 +66,7 @@ class TestQuality:
     def test_timed_it_is_that_of_the_exact_kernels(self, kind: str) -> None:
         black = box(self.tasks()[kind])
         # of a rocker function the ground link is given
-        linkage = self.KNOWN.scaled(0.1 / self.KNOWN.ground_length) if kind == "rocker" else self.KNOWN
+        linkage = self.KNOWN.scale(0.1 / self.KNOWN.ground_length) if kind == "rocker" else self.KNOWN
         expected = sum_of_squares(black.normal, make_start(linkage, black.normal))
         x = unknowns(black, linkage)
         assert black.quality(np.vstack([x, x]))[1] == pytest.approx(expected, rel=1e-12)
@@ -77,7 +77,7 @@ class TestQuality:
         black = box(syn.UntimedPath(path=syn.TargetPath(points=points, closed=True)))
         # the crank's phase is where the path starts
         assert black.quality(unknowns(black, self.KNOWN))[0] < 1.5e-4 * black.normal.n
-        assert black.quality(unknowns(black, self.KNOWN.moved(0.05, 0.0)))[0] > 3e-4 * black.normal.n
+        assert black.quality(unknowns(black, self.KNOWN.translate(0.05, 0.0)))[0] > 3e-4 * black.normal.n
 
     @pytest.mark.parametrize("way", [1, -1])
     def test_of_an_open_path_it_vanishes_on_the_piece_itself(self, way: int) -> None:
@@ -92,8 +92,8 @@ class TestQuality:
         """One-sided, a point on the target would be perfect."""
         points = self.KNOWN.path(syn.turn(120))
         black = box(syn.UntimedPath(path=syn.TargetPath(points=points, closed=True)))
-        tiny = self.KNOWN.scaled(1e-3)
-        tiny = tiny.moved(points[3, 0] - tiny.path([0.0])[0, 0], points[3, 1] - tiny.path([0.0])[0, 1])
+        tiny = self.KNOWN.scale(1e-3)
+        tiny = tiny.translate(points[3, 0] - tiny.path([0.0])[0, 0], points[3, 1] - tiny.path([0.0])[0, 1])
         assert black.quality(unknowns(black, tiny))[0] > 0.05 * black.normal.n
 
 

@@ -50,7 +50,7 @@ def good(name: str) -> Linkage:
 @pytest.mark.parametrize("linkage", PUBLISHED)
 @pytest.mark.parametrize("branch", [1, -1])
 def test_pylinkage_and_numpy_trace_our_curve(linkage: Linkage, branch: int) -> None:
-    moved = Linkage.from_vector(linkage.vector, branch).moved(0.3, -0.2)
+    moved = Linkage.from_vector(linkage.vector, branch).translate(0.3, -0.2)
     ours = moved.path(turn(72)) @ [1.0, 1j]
     size = moved.largest_link
     np.testing.assert_allclose(PlacedFourBar.of(moved, 72).track()[:, 4], ours, rtol=0.0, atol=1e-9 * size)
@@ -128,8 +128,8 @@ def test_the_printed_packaging_machine_is_not_flat_enough() -> None:
     assert not packs(printed)
     assert packs(good("packaging"))
     # the same, a third larger, has the travel but not the flatness; smaller, not the travel
-    assert not packs(good("packaging").scaled(1.33))
-    assert not packs(good("packaging").scaled(0.9))
+    assert not packs(good("packaging").scale(1.33))
+    assert not packs(good("packaging").scale(0.9))
 
 
 def test_a_linkage_that_violates_a_constraint_does_not_count() -> None:

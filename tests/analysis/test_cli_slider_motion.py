@@ -166,8 +166,8 @@ def test_a_spring_takes_part_of_the_force(linkwork, tmp_path) -> None:
     case = tables()
     chosen = read(tmp_path, case | {"drive": {"speed": "300 rpm"}})
     with_spring = read(tmp_path, case | {"drive": {"speed": "300 rpm", "best_spring": True}})
-    solution = chosen.move(chosen.four_bar(), 1, (), progress=False).best
-    bare, sprung = chosen.driven(solution), with_spring.driven(solution)
+    solution = chosen.find_motion(chosen.find_four_bar(), 1, (), progress=False).best
+    bare, sprung = chosen.compute_drive(solution), with_spring.compute_drive(solution)
     assert bare.parameters.slider_stiffness == 0.0
     assert sprung.parameters.slider_stiffness > 0.0
     assert sprung.rms_force < bare.rms_force
@@ -180,8 +180,8 @@ def test_tracking_without_feed_forward_is_worse(tmp_path) -> None:
     errors = []
     for options in ({}, {"feedforward": False}, {"bandwidth": 0}, {"coulomb_friction": "5 N", "mass_error": 0.1}):
         chosen = read(tmp_path, tables(drive=drive, tracking={"revolutions": 2} | options))
-        solution = chosen.move(chosen.four_bar(), 1, (), progress=False).best
-        errors.append(chosen.tracked(chosen.driven(solution)).metrics().rms_error)
+        solution = chosen.find_motion(chosen.find_four_bar(), 1, (), progress=False).best
+        errors.append(chosen.run_tracking(chosen.compute_drive(solution)).metrics().rms_error)
     both, feedback, forward, wrong = errors
     assert both < 1e-6
     assert feedback > 20.0 * both
@@ -196,7 +196,7 @@ def test_the_slider_is_made_as_the_case_says(tmp_path) -> None:
         "slider_coulomb_friction": "2 N",
         "slider_mass": "1 kg",
     }
-    made = read(tmp_path, tables(make=make)).synthesis.make.moving(BASE)
+    made = read(tmp_path, tables(make=make)).synthesis.make.sliding_five_bar(BASE)
     assert (made.slider_damping, made.slider_stiffness, made.slider_coulomb_friction, made.slider_mass) == (
         20,
         300,
@@ -204,7 +204,7 @@ def test_the_slider_is_made_as_the_case_says(tmp_path) -> None:
         1,
     )
     # a pivot that is to move is not held, unlike that of a four-bar
-    free = read(tmp_path, tables(make={})).synthesis.make.moving(BASE)
+    free = read(tmp_path, tables(make={})).synthesis.make.sliding_five_bar(BASE)
     assert free.slider_stiffness == free.slider_damping == 0.0
 
 
@@ -249,7 +249,7 @@ def test_the_linkage_is_found_first_or_read_from_what_synthesize_wrote(linkwork,
     case = tables(search=search, constraints={"largest_link": "300 mm"})
     del case["linkage"]
     found = read(tmp_path, case)
-    first = found.four_bar()
+    first = found.find_four_bar()
     result = synthesize(wanted, constraints=found.synthesis.constraints, search=Search(starts=4, candidates=4096))
     assert first.error == pytest.approx(result.best.error, rel=1e-12)
     result.to_csv(tmp_path / "solutions.csv")
@@ -258,7 +258,7 @@ def test_the_linkage_is_found_first_or_read_from_what_synthesize_wrote(linkwork,
             linkage_from_csv(tmp_path / "solutions.csv", rank).values() == result.solutions[rank - 1].linkage.values()
         )
     case["linkage"] = {"file": "solutions.csv"}
-    assert read(tmp_path, case).four_bar().error == pytest.approx(first.error, rel=1e-12)
+    assert read(tmp_path, case).find_four_bar().error == pytest.approx(first.error, rel=1e-12)
     done = linkwork(case, "--no-plots")
     assert done.exit_code == 0, done.output
 
@@ -268,11 +268,11 @@ def test_links_that_are_free_do_better(tmp_path) -> None:
     case = tables(slider={"harmonics": 1, "starts": 4, "stroke": "10 mm"}, constraints={"largest_link": "300 mm"})
     free = case | {"slider": case["slider"] | {"links": "free"}}
     kept, freed = read(tmp_path, case), read(tmp_path, free)
-    errors = [c.move(c.four_bar(), 1, (), progress=False).best for c in (kept, freed)]
+    errors = [c.find_motion(c.find_four_bar(), 1, (), progress=False).best for c in (kept, freed)]
     assert errors[1].error < 0.5 * errors[0].error
     assert errors[1].linkage.largest_link <= 0.3 * (1.0 + 1e-6)
     bounded = read(tmp_path, free | {"bounds": {"crank_length": ["59 mm", "61 mm"]}})
-    crank = bounded.move(bounded.four_bar(), 1, (), progress=False).best.linkage.crank_length
+    crank = bounded.find_motion(bounded.find_four_bar(), 1, (), progress=False).best.linkage.crank_length
     assert 0.059 - 1e-9 <= crank <= 0.061 + 1e-9
 
 
@@ -281,11 +281,11 @@ def test_an_open_path_is_placed_by_itself(tmp_path) -> None:
     points = BASE.path(t).tolist()
     task = {"kind": "untimed-path", "points": points, "closed": False, "measure": "distance"}
     chosen = read(tmp_path, tables(task=task))
-    four_bar = chosen.four_bar()
+    four_bar = chosen.find_four_bar()
     assert four_bar.evaluation.worst < 1e-5
     ends = np.exp(1j * four_bar.evaluation.rotation[[0, -1]])
     assert ends == pytest.approx(np.exp(1j * t[[0, -1]]), abs=1e-3)
-    assert chosen.move(four_bar, 1, (), progress=False).best.error <= four_bar.error + 1e-12
+    assert chosen.find_motion(four_bar, 1, (), progress=False).best.error <= four_bar.error + 1e-12
 
 
 def test_a_path_that_is_traced_clockwise_is_driven_so(tmp_path) -> None:
@@ -295,7 +295,7 @@ def test_a_path_that_is_traced_clockwise_is_driven_so(tmp_path) -> None:
     drive = {"speed": "60 rpm"}
     for turned, sign in ((task, 1.0), (back, -1.0)):
         chosen = read(tmp_path, tables(task=turned, drive=drive))
-        assert chosen.driven(chosen.four_bar()).crank_speed == pytest.approx(sign * 2.0 * pi)
+        assert chosen.compute_drive(chosen.find_four_bar()).crank_speed == pytest.approx(sign * 2.0 * pi)
 
 
 def test_the_options_of_the_command_line_take_the_place_of_the_files(linkwork) -> None:

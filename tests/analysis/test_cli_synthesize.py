@@ -22,7 +22,7 @@ from analysis.run import load_case, load_parameters, read_case, simulate
 from analysis.synthesis.case import case as cases
 from analysis.synthesis.case.tables import KINDS
 from analysis.synthesis.task.constraint import UNKNOWNS
-from analysis.synthesis.task.formula import requirement, traced
+from analysis.synthesis.task.formula import requirement, trace_requirement
 from linkwork.errors import InputError, LinkworkError, ParameterError
 
 ROOT = Path(__file__).parents[2]
@@ -148,9 +148,9 @@ def test_a_crank_that_swings_backwards_is_run_over_its_task_alone(tmp_path) -> N
     )  # fmt: skip
     at = np.linspace(0.4, -0.6, 11)
     task = syn.Motion(points=linkage.path(at) + 1e-3, angle=linkage.coupler_angle(at), rotation=at)
-    solution = syn.Solution.of(task, linkage)
+    solution = syn.Solution.from_linkage(task, linkage)
     assert not solution.verdicts.full_turn
-    ran = read_case(solution.run_case(syn.Make(speed=3.0), "swing"), folder=tmp_path)
+    ran = read_case(solution.run_case(syn.MachineSpec(speed=3.0), "swing"), folder=tmp_path)
     motion = simulate(
         ran.parameters, ran.inputs, initial=ran.initial, stop_time=ran.stop_time, step=ran.stop_time / 10.0
     )
@@ -167,8 +167,8 @@ def test_both_files_of_a_linkage_have_the_same_masses_and_load(own_linkages, tmp
         point_distance=point[0], point_angle=point[1], ground_angle=0.3,
     )  # fmt: skip
     at = np.linspace(0.0, 6.0, 13)
-    solution = syn.Solution.of(syn.TimedPath(points=linkage.path(at) + 1e-3, rotation=at), linkage)
-    make = syn.Make(**{"speed": 15.0, "load": (3.0, -20.0)} | given)
+    solution = syn.Solution.from_linkage(syn.TimedPath(points=linkage.path(at) + 1e-3, rotation=at), linkage)
+    make = syn.MachineSpec(**{"speed": 15.0, "load": (3.0, -20.0)} | given)
     runs = []
     for tables in (solution.described_case(make, "one"), solution.run_case(make, "other")):
         ran = read_case(tables, folder=tmp_path)
@@ -477,7 +477,7 @@ def test_the_examples_and_the_documentation_are_readable() -> None:
         *KINDS.values(),
         cases.Constraints,
         cases.SearchTable,
-        cases.Make,
+        cases.MachineSpec,
         cases.TradeOffTable,
     ):
         for name in entry_names(kind):
@@ -502,7 +502,7 @@ def test_a_requirement_is_the_difference_of_its_sides(text, difference) -> None:
     assert found.equal is ("==" in text)
     casadi = library()
     symbols = {name: casadi.SX.sym(name) for name in UNKNOWNS}
-    function = casadi.Function("f", list(symbols.values()), [traced(found, SimpleNamespace(**symbols))])
+    function = casadi.Function("f", list(symbols.values()), [trace_requirement(found, SimpleNamespace(**symbols))])
     for values in np.random.default_rng(1).uniform(0.1, 3.0, (20, len(UNKNOWNS))).tolist():
         p = SimpleNamespace(**dict(zip(UNKNOWNS, values)))
         assert found.function(p) == pytest.approx(difference(p), abs=1e-12)

@@ -148,7 +148,7 @@ def test_curve_of_four_poses(seed: int) -> None:
 
 @pytest.mark.parametrize("seed", [3, 7, 10])
 def test_map_of_four_poses_is_what_each_linkage_is_judged(seed: int) -> None:
-    from analysis.synthesis.exact.burmester import Dyad, four_bar
+    from analysis.synthesis.exact.burmester import Dyad, build_four_bar
 
     found = syn.guidance(random_poses(seed, 4))
     assert isinstance(found, syn.GuidanceMap)
@@ -160,7 +160,7 @@ def test_map_of_four_poses_is_what_each_linkage_is_judged(seed: int) -> None:
     for i, k in chosen:
         if i == k:
             continue
-        solution = four_bar(found.task, dyads[i], dyads[k])
+        solution = build_four_bar(found.task, dyads[i], dyads[k])
         if solution.linkage.largest_link < 4.9 * np.hypot(*np.ptp(np.asarray(found.task.points), axis=0)):
             assert solution.verdicts.sound == found.sound[i, k]
             v = solution.verdicts
@@ -178,7 +178,7 @@ def test_a_search_does_not_miss_an_exact_linkage(seed: int) -> None:
     assert any(s.verdicts.sound for s in exact.solutions)
     for s in exact.solutions:
         if s.verdicts.branch:
-            assert syn.Solution.of(task, s.linkage, s.evaluation.rotation).verdicts == s.verdicts
+            assert syn.Solution.from_linkage(task, s.linkage, s.evaluation.rotation).verdicts == s.verdicts
     open_way = [syn.LeastTransmission(angle=0.0, over="task")]
     found = syn.synthesize(task, constraints=open_way, search=syn.Search(starts=2, candidates=1 << 10)).best
     assert found.verdicts.sound
@@ -355,7 +355,7 @@ def test_cognates_trace_the_same_curve(linkage: syn.Linkage) -> None:
 def test_alternatives_of_a_timed_path() -> None:
     phi = np.linspace(0.0, 2.0 * pi, 24, endpoint=False)
     task = syn.TimedPath(points=FOUR_BAR.path(phi), rotation=phi)
-    (other,) = syn.alternatives(syn.Solution.of(task, FOUR_BAR))
+    (other,) = syn.alternatives(syn.Solution.from_linkage(task, FOUR_BAR))
     assert other.error < 1e-25
     assert other.verdicts.sound
     assert other.linkage.pivot_x != pytest.approx(FOUR_BAR.pivot_x, abs=1e-3)
@@ -365,7 +365,7 @@ def test_alternatives_of_an_open_path() -> None:
     """Each is judged as it is driven; one that is sound runs through the points in their order."""
     rotation = np.linspace(0.2, 1.4, 15)
     task = syn.UntimedPath(path=syn.TargetPath(points=FOUR_BAR.path(rotation), closed=False))
-    found = syn.alternatives(syn.Solution.of(task, FOUR_BAR, rotation))
+    found = syn.alternatives(syn.Solution.from_linkage(task, FOUR_BAR, rotation))
     assert len(found) == 3
     for one in found:
         if one.verdicts.sound:
@@ -376,7 +376,7 @@ def test_alternatives_of_an_open_path() -> None:
 def test_alternatives_of_a_closed_path_turn_fully() -> None:
     points = FOUR_BAR.path(np.linspace(0.0, 2.0 * pi, 72, endpoint=False))
     task = syn.UntimedPath(path=syn.TargetPath(points=points, closed=True))
-    own = syn.Solution.of(task, FOUR_BAR)
+    own = syn.Solution.from_linkage(task, FOUR_BAR)
     found = syn.alternatives(own)
     assert found
     for one in found:
@@ -387,7 +387,7 @@ def test_alternatives_of_a_closed_path_turn_fully() -> None:
 def test_what_has_no_cognates() -> None:
     task = syn.RockerFunction(angle=[1.0, 1.2, 1.3], rotation=[0.0, 0.2, 0.4])
     with pytest.raises(InputError, match="share the coupler's curve"):
-        syn.alternatives(syn.Solution.of(task, FOUR_BAR))
+        syn.alternatives(syn.Solution.from_linkage(task, FOUR_BAR))
     with pytest.raises(ParameterError, match="point_distance"):
         syn.cognates(syn.Linkage(**FOUR_BAR.values() | {"point_distance": 0.0}))
 

@@ -523,7 +523,7 @@ def test_a_geared_five_bar_that_was_found_becomes_an_fmu_and_a_page(browser, tmp
         **FOUR_BAR, ground_length=0.15, crank_length=0.05, coupler_length=0.16, rocker_length=0.15,
         pivot=syn.SecondCrank(length=0.04, ratio=-2.0, phase=0.7),
     )  # fmt: skip
-    tables = {"linkage": description(found, syn.Make(speed=20.0)), "run": {"revolutions": 1.0}}
+    tables = {"linkage": description(found, syn.MachineSpec(speed=20.0)), "run": {"revolutions": 1.0}}
     case = read_case(tables, folder=FOLDER)
     file = build_native(mechanism_of(case.parameters), NATIVE, tmp_path)
     fmu = cosimulate(
@@ -618,7 +618,7 @@ FOUR_BAR = {
 @pytest.mark.parametrize("direction", [1.0, -1.0])
 def test_a_linkage_that_was_found_is_described_and_runs(found, direction):
     """Its coupler point goes where the synthesis says, over two turns."""
-    make, way = syn.Make(speed=20.0), {"rotation": 0.2, "direction": direction}
+    make, way = syn.MachineSpec(speed=20.0), {"rotation": 0.2, "direction": direction}
     run = {"stop_time": 0.2 * np.pi, "step": 1e-3}
     case = read_case(
         {"linkage": description(found, make, **way), **drives(found, make, **way), "run": run}, folder=FOLDER

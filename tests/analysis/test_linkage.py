@@ -117,9 +117,9 @@ class TestPlaceAndSize:
         if kind == "crank":
             linkage = linkage.with_pivot(SecondCrank(0.05 * linkage.crank_length, ratio=-1.0, phase=0.2))
         phi = turn(12)
-        np.testing.assert_allclose(linkage.scaled(3.0).path(phi), 3.0 * linkage.path(phi), atol=1e-12)
+        np.testing.assert_allclose(linkage.scale(3.0).path(phi), 3.0 * linkage.path(phi), atol=1e-12)
         np.testing.assert_allclose(
-            linkage.moved(1.0, -2.0).path(phi), linkage.path(phi) + np.array([1.0, -2.0]), atol=1e-12
+            linkage.translate(1.0, -2.0).path(phi), linkage.path(phi) + np.array([1.0, -2.0]), atol=1e-12
         )
 
     def test_vectors_and_back(self) -> None:

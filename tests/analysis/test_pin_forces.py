@@ -16,7 +16,7 @@ from analysis.numerics import symbolic
 from analysis.numerics.fourier import FourierSeries
 from analysis.run import read_case, simulate
 from analysis.synthesis.linkage.machine import pin_functions
-from analysis.synthesis.task.constraint import InfeasibleError, Way
+from analysis.synthesis.task.constraint import InfeasibleError, RotationRange
 from linkwork.errors import InputError, ParameterError
 from linkwork.five_bar.parameters import FiveBarParameters
 from tests.oracles import multipliers
@@ -25,7 +25,7 @@ LINKAGE = syn.Linkage(
     pivot_x=0.1, pivot_y=-0.2, ground_length=0.25, crank_length=0.07, coupler_length=0.2, rocker_length=0.18,
     point_distance=0.15, point_angle=0.7, ground_angle=2.1, crank_phase=0.4, branch=-1,
 )  # fmt: skip
-MAKE = syn.Make(
+MAKE = syn.MachineSpec(
     speed="240 rpm", load=("3 N", "-15 N"), width="30 mm", thickness="8 mm", density=2700.0, rocker_mass=0.4
 )
 PHI = syn.turn(24)
@@ -35,7 +35,7 @@ USUAL = (syn.LargestLink(length=0.3), syn.LeastTransmission())
 FEW = syn.Search(starts=3, candidates=1 << 12)
 
 
-def plant(linkage: syn.Linkage, make: syn.Make) -> FiveBarParameters:
+def plant(linkage: syn.Linkage, make: syn.MachineSpec) -> FiveBarParameters:
     """The plant; `test_linkage` sums the masses of its bars."""
     section = (make.width, make.thickness)
     p = linkage.to_five_bar(density=make.density, section=section, slider_mass=1e7, gravity=make.gravity)
@@ -43,7 +43,7 @@ def plant(linkage: syn.Linkage, make: syn.Make) -> FiveBarParameters:
     return replace(p, rocker_mass=m, rocker_inertia=p.rocker_inertia * m / p.rocker_mass)
 
 
-def by_multipliers(linkage: syn.Linkage, make: syn.Make, rotation: float) -> np.ndarray:
+def by_multipliers(linkage: syn.Linkage, make: syn.MachineSpec, rotation: float) -> np.ndarray:
     """Magnitudes of the forces on the pins A to D, the slider so heavy that it stands still."""
     p = plant(linkage, make)
     q = multipliers.assemble(p, rotation + linkage.crank_phase, 0.0)
@@ -56,7 +56,7 @@ def by_multipliers(linkage: syn.Linkage, make: syn.Make, rotation: float) -> np.
     return np.array([hypot(found.forces[f"pin.{pin}.fx"], found.forces[f"pin.{pin}.fy"]) for pin in "ABCD"])
 
 
-def traced(linkage: syn.Linkage, make: syn.Make, rotation: float, **other: Any) -> np.ndarray:
+def traced(linkage: syn.Linkage, make: syn.MachineSpec, rotation: float, **other: Any) -> np.ndarray:
     d = SimpleNamespace(**linkage.values() | other)
     found = pin_functions(d, make, symbolic.library().DM(rotation + linkage.crank_phase))
     return np.array([hypot(float(x), float(y)) for x, y in found.values()])
@@ -71,9 +71,9 @@ def test_the_run_of_the_plant_and_its_trace_have_the_forces_of_multipliers(chang
         wanted = by_multipliers(linkage, MAKE, float(run.rotation[k]))
         assert run.force[k] == pytest.approx(wanted, rel=2e-6)
         assert traced(linkage, MAKE, float(run.rotation[k])) == pytest.approx(run.force[k], rel=1e-6)
-    assert run.greatest == run.force.max() == run.of("ABCD")
-    assert run.force[np.argmin(np.abs(run.rotation - run.at)), "ABCD".index(run.pin)] == run.greatest
-    assert run.of("C") == run.force[:, 2].max()
+    assert run.greatest == run.force.max() == run.greatest_force("ABCD")
+    assert run.force[np.argmin(np.abs(run.rotation - run.rotation_at_greatest)), "ABCD".index(run.pin)] == run.greatest
+    assert run.greatest_force("C") == run.force[:, 2].max()
 
 
 @pytest.mark.parametrize("name", ["ground_length", "crank_length", "coupler_length", "rocker_length", "point_distance"])
@@ -120,11 +120,11 @@ class TestBound:
     def test_of_a_path(self) -> None:
         path = syn.UntimedPath(path=syn.TargetPath(points=ELLIPSE, closed=True))
         free = syn.synthesize(path, constraints=USUAL, search=FEW).best
-        bound = 0.8 * syn.pin_forces(free.linkage, MAKE).of("AD")
+        bound = 0.8 * syn.pin_forces(free.linkage, MAKE).greatest_force("AD")
         asked = syn.MaxPinForce(force=bound, make=MAKE, pins="AD")
         found = syn.synthesize(path, constraints=[*USUAL, asked], search=FEW).best
-        assert syn.pin_forces(found.linkage, MAKE).of("AD") == pytest.approx(bound, rel=1e-3)
-        assert syn.pin_forces(found.linkage, MAKE).of("AD") <= bound * (1.0 + 1e-6)
+        assert syn.pin_forces(found.linkage, MAKE).greatest_force("AD") == pytest.approx(bound, rel=1e-3)
+        assert syn.pin_forces(found.linkage, MAKE).greatest_force("AD") <= bound * (1.0 + 1e-6)
 
     @pytest.mark.slow
     def test_one_that_cannot_be_kept_is_named_with_its_unit(self) -> None:
@@ -193,7 +193,7 @@ class TestRefused:
             (lambda: syn.MaxPinForce(force=0.0), "greatest pin force"),
             (lambda: syn.MaxPinForce(force=1.0, pins="AX"), "letters ABCD"),
             (lambda: syn.MaxPinForce(force="3 mm"), "force"),
-            (lambda: syn.Make(speed="3 mm"), "speed"),
+            (lambda: syn.MachineSpec(speed="3 mm"), "speed"),
             (
                 lambda: syn.pin_forces(replace(LINKAGE, pivot=syn.SliderMotion(FourierSeries.constant(0.0))), MAKE),
                 "pivot",
@@ -233,7 +233,7 @@ class TestRefused:
 
     def test_forces_need_to_know_where_the_crank_goes(self) -> None:
         with pytest.raises(InputError, match="needs crank rotations"):
-            syn.MaxPinForce(force=1.0).requires(Way(False, None))
+            syn.MaxPinForce(force=1.0).requires(RotationRange(False, None))
 
 
 def test_a_case_file_asks_for_all_of_it(tmp_path: Path) -> None:
@@ -263,7 +263,7 @@ def test_a_case_file_asks_for_all_of_it(tmp_path: Path) -> None:
     assert isinstance(most, syn.MaxPinForce)
     assert isinstance(least, syn.LeastPinForce)
     assert (most.force, most.pins, least.error, least.pins) == (40.0, "BC", "2 deg", "BC")
-    assert most.make == least.make == case.make == syn.Make(speed=10.0 * pi, load=(0.0, -20.0), crank_mass=0.2)
+    assert most.make == least.make == case.make == syn.MachineSpec(speed=10.0 * pi, load=(0.0, -20.0), crank_mass=0.2)
     with pytest.raises(ParameterError, match="come with a least or greatest one"):
         syn.read_synthesis_case(tables | {"constraints": {"mechanical_advantage_at": ["30 deg"]}}, folder=tmp_path)
     swing = {"least_transmission_angle": False, "toggle_stretched": "200 deg", "toggle_folded": ["30 deg", "40 deg"]}
@@ -280,4 +280,4 @@ def test_a_case_that_runs_has_the_load(free: syn.Solution, tmp_path: Path) -> No
     run = simulate(case.parameters, case.inputs, initial=case.initial, stop_time=4.0 * pi / made.speed)
     last = run.time > 2.0 * pi / made.speed
     greatest = max(float(np.hypot(run[f"pin.{pin}.fx"], run[f"pin.{pin}.fy"])[last].max()) for pin in "ABC")
-    assert greatest == pytest.approx(syn.pin_forces(free.linkage, made).of("ABC"), rel=5e-3)
+    assert greatest == pytest.approx(syn.pin_forces(free.linkage, made).greatest_force("ABC"), rel=5e-3)

@@ -382,7 +382,7 @@ class TestMovedPivot:
 def violations(program: Program, start: Start, *, first: bool = False) -> dict[str, float]:
     """How far a start is outside the constraints, the worst of each name; ``first``: outside those of a first solution."""
     held: dict[str, Any] = {} if first else {"places": program.extremes(start), "share": 1.0}
-    _, g = program.stated(*program.at(start, **held))
+    _, g = program.evaluate(*program.unknowns_and_parameters(start, **held))
     over = np.maximum(program.g_low - g, g - program.g_high)
     names = [label.name for label in program.labels]
     return {name: max(v for v, own in zip(over, names) if own == name) for name in names}

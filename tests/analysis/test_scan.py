@@ -115,12 +115,12 @@ class TestVariableProjection:
         task = syn.TimedPath(points=points, weights=weights)
         error = syn.evaluate(task, best).error
         assert error == pytest.approx(found.quality[0] * normal.unit**2, rel=1e-8)
-        turned = best.scaled(1.01)
+        turned = best.scale(1.01)
         others = [
-            best.moved(0.01, 0.0),
-            best.moved(0.0, 0.01),
+            best.translate(0.01, 0.0),
+            best.translate(0.0, 0.01),
             turned,
-            best.scaled(0.99),
+            best.scale(0.99),
             replace(best, ground_angle=best.ground_angle + 0.01),
             replace(best, point_distance=best.point_distance + 0.01),
             replace(best, point_angle=best.point_angle + 0.01),
@@ -141,7 +141,7 @@ class TestVariableProjection:
         assert found.quality[0] > 1e-4
         error = syn.evaluate(syn.TimedPath(points=KNOWN.path(rotation), rotation=rotation), linkage).error
         assert error == pytest.approx(found.quality[0] * normal.unit**2, rel=1e-9)
-        moved = [linkage.moved(0.01, 0.0), linkage.moved(0.0, 0.01)]
+        moved = [linkage.translate(0.01, 0.0), linkage.translate(0.0, 0.01)]
         task = syn.TimedPath(points=KNOWN.path(rotation), rotation=rotation)
         assert all(syn.evaluate(task, other).error > syn.evaluate(task, linkage).error for other in moved)
 

@@ -23,7 +23,7 @@ FloatArray = np.ndarray[Any, np.dtype[np.float64]]
 PHI = np.linspace(0.0, 2.0 * pi, 24, endpoint=False)
 TASK = syn.SliderFunction(position=0.04 * np.cos(PHI) + 0.005 * np.cos(2.0 * PHI))
 QUICK = syn.Search(starts=3, candidates=1 << 10, solutions=2)
-MAKE = syn.Make(speed="600 rpm", load=("-20 N", "5 N"), slider_mass="0.4 kg")
+MAKE = syn.MachineSpec(speed="600 rpm", load=("-20 N", "5 N"), slider_mass="0.4 kg")
 CLEAR = syn.LeastTransmission(angle=radians(20.0))
 
 
@@ -182,7 +182,7 @@ def test_a_force_is_kept_and_the_case_runs_with_it(tmp_path: Path) -> None:
     run = simulate(case.parameters, case.inputs, initial=case.initial, stop_time=2.0 * pi / MAKE.speed, step=1e-4)
     # the load along the guide acts in the plant, that across it is carried by the guide alone
     assert np.hypot(run["crank_pin.fx"], run["crank_pin.fy"]).max() == pytest.approx(
-        syn.pin_forces(held.linkage, MAKE).of("B"), rel=1e-3
+        syn.pin_forces(held.linkage, MAKE).greatest_force("B"), rel=1e-3
     )
     text = report(held)
     assert "slider at rest at crank rotations of" in text
@@ -197,7 +197,7 @@ def test_toggles_of_a_geared_five_bar() -> None:
     against = syn.FiveBar(**links, pivot=syn.SecondCrank(0.05, -1.0, pi))
     assert syn.toggles(against) == pytest.approx([pi - acos(0.6), pi + acos(0.6)])
     task = syn.TimedPath(points=against.path(0.5 * PHI[:6]), rotation=0.5 * PHI[:6])
-    assert "toggles at crank rotations of 126.87, 233.13 deg" in report(syn.Solution.of(task, against))
+    assert "toggles at crank rotations of 126.87, 233.13 deg" in report(syn.Solution.from_linkage(task, against))
 
 
 def test_forces_are_those_of_links_that_are_joined() -> None:

@@ -230,8 +230,8 @@ def test_the_program_has_the_gradient_of_the_kernels(
     start = replace(start, pivot=0.1 * random_pivot(unknown, start.q[2], normal.unit, random))
     linkage = make_linkage(start, normal, unknown)
     program = Program(normal, limits, unknown)
-    at = np.concatenate([start.q, start.pivot]), program.at(start)[1]
-    value, gradient = program.stated(*at)[0], program.gradient_and_jacobian(*at)[0]
+    at = np.concatenate([start.q, start.pivot]), program.unknowns_and_parameters(start)[1]
+    value, gradient = program.evaluate(*at)[0], program.gradient_and_jacobian(*at)[0]
     size = normal.unit**2
     assert size * value == pytest.approx(evaluate(task, linkage).error, rel=1e-11)
     units = np.full(len(start.pivot), normal.unit)
@@ -385,7 +385,7 @@ def test_a_linkage_scaled_and_moved_gets_the_same_motion() -> None:
     unknown = SliderUnknown(harmonics=1)
     here = slider_motion(task, linkage, unknown, search=Search(starts=4)).best
     far = replace(task, points=1000.0 * np.asarray(task.points) + [5e4, -2e4])
-    there = slider_motion(far, linkage.scaled(1000.0).moved(5e4, -2e4), unknown, search=Search(starts=4)).best
+    there = slider_motion(far, linkage.scale(1000.0).translate(5e4, -2e4), unknown, search=Search(starts=4)).best
     assert there.error == pytest.approx(1e6 * here.error, rel=1e-5)
 
 

@@ -252,7 +252,7 @@ def test_a_mechanism_with_a_defect_is_not_taken() -> None:
 
 
 def step_of(verdicts: dict[str, bool], error: float) -> Step:
-    solution = Solution.of(TimedPath(points=BASE.path(PHI)), BASE)
+    solution = Solution.from_linkage(TimedPath(points=BASE.path(PHI)), BASE)
     solution = replace(solution, verdicts=replace(solution.verdicts, **verdicts))
     return Step(mechanism="one", solution=solution, value=error, reason="")
 

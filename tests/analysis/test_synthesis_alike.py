@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 import analysis.synthesis as syn
-from analysis.synthesis.result.alike import grouped
-from analysis.synthesis.search.polish import distinct
+from analysis.synthesis.result.alike import group_similar
+from analysis.synthesis.search.polish import distinct_answers
 from analysis.synthesis.search.start import Answer, make_start
 from analysis.synthesis.task.task import normal_form
 
@@ -25,7 +25,7 @@ PHI = syn.turn(12)
 
 
 def solution(linkage: syn.Linkage) -> syn.Solution:
-    return syn.Solution.of(syn.TimedPath(points=FOUR_BAR.path(PHI)), linkage)
+    return syn.Solution.from_linkage(syn.TimedPath(points=FOUR_BAR.path(PHI)), linkage)
 
 
 def mirrored(linkage: syn.Linkage) -> syn.Linkage:
@@ -41,8 +41,8 @@ def mirrored(linkage: syn.Linkage) -> syn.Linkage:
 
 @pytest.mark.parametrize("linkage", [FOUR_BAR, GEARED, SLIDER], ids=lambda x: x.kind)
 def test_mirror_images_and_near_copies_stand_behind_the_first(linkage: syn.Linkage) -> None:
-    copy = replace(linkage.moved(0.2, 0.1), ground_angle=2.0, coupler_length=0.158)
-    one, *others = grouped([solution(x) for x in (linkage, mirrored(linkage), copy)])
+    copy = replace(linkage.translate(0.2, 0.1), ground_angle=2.0, coupler_length=0.158)
+    one, *others = group_similar([solution(x) for x in (linkage, mirrored(linkage), copy)])
     assert not others
     assert one.linkage is linkage
     assert syn.format_variants(one) == "1 mirror image, 1 near copy"
@@ -51,7 +51,7 @@ def test_mirror_images_and_near_copies_stand_behind_the_first(linkage: syn.Linka
         turned = {"ground_length": -0.04, "ground_angle": 0.4 + np.pi, "crank_phase": 1.1 - np.pi, "branch": -1}
         same = replace(linkage, **turned)
         np.testing.assert_allclose(same.path(PHI), linkage.path(PHI), atol=1e-12)
-        assert syn.format_variants(grouped([solution(x) for x in (linkage, same)])[0]) == "1 near copy"
+        assert syn.format_variants(group_similar([solution(x) for x in (linkage, same)])[0]) == "1 near copy"
 
 
 @pytest.mark.parametrize(
@@ -60,7 +60,7 @@ def test_mirror_images_and_near_copies_stand_behind_the_first(linkage: syn.Linka
         (FOUR_BAR, {"branch": -1}),
         (FOUR_BAR, {"point_angle": -0.7}),
         (FOUR_BAR, {"crank_length": 0.057}),
-        (FOUR_BAR.scaled(1.3), {}),
+        (FOUR_BAR.scale(1.3), {}),
         (SLIDER, {"ground_length": -0.04}),
         (SLIDER, {"branch": -1}),
         (GEARED, {"pivot": syn.SecondCrank(0.03, ratio=-2.0, phase=0.9)}),
@@ -69,7 +69,7 @@ def test_mirror_images_and_near_copies_stand_behind_the_first(linkage: syn.Linka
 )
 def test_other_linkages_are_ranked(linkage: syn.Linkage, change: dict[str, object]) -> None:
     first = {x.kind: x for x in (FOUR_BAR, SLIDER, GEARED)}[linkage.kind]
-    assert len(grouped([solution(first), solution(replace(linkage, **change))])) == 2
+    assert len(group_similar([solution(first), solution(replace(linkage, **change))])) == 2
 
 
 def test_the_ellipse_is_traced_by_one_linkage_in_four_places() -> None:
@@ -98,5 +98,5 @@ def test_answers_of_slider_cranks_that_differ_in_one_number_are_two(name: str) -
     turned = replace(slider, ground_angle=0.4 + np.pi, crank_phase=1.1 - np.pi, branch=-1)
     np.testing.assert_allclose(turned.path(PHI), slider.path(PHI), atol=1e-12)
     other = replace(slider, **{name: getattr(slider, name) + 0.02})
-    answers = [Answer.unjoined(make_start(linkage, normal)) for linkage in (slider, turned, other)]
-    assert [id(one) for one in distinct(answers, 3)] == [id(answers[0]), id(answers[2])]
+    answers = [Answer.for_unjoined_links(make_start(linkage, normal)) for linkage in (slider, turned, other)]
+    assert [id(one) for one in distinct_answers(answers, 3)] == [id(answers[0]), id(answers[2])]

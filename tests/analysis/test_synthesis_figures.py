@@ -39,17 +39,19 @@ GEARED = LINKAGE.with_pivot(syn.SecondCrank(0.02, 2.0, 0.3))
 
 
 def timed(linkage: syn.Linkage = LINKAGE) -> syn.Solution:
-    return syn.Solution.of(syn.TimedPath(points=ELLIPSE), linkage)
+    return syn.Solution.from_linkage(syn.TimedPath(points=ELLIPSE), linkage)
 
 
 def untimed(closed: bool = True) -> syn.Solution:
     points = ELLIPSE if closed else ELLIPSE[:9]
     task = syn.UntimedPath(path=syn.TargetPath(points=points, closed=closed))
-    return syn.Solution.of(task, LINKAGE, None if closed else np.linspace(0.1, 2.0, 9))
+    return syn.Solution.from_linkage(task, LINKAGE, None if closed else np.linspace(0.1, 2.0, 9))
 
 
 def rocker() -> syn.Solution:
-    return syn.Solution.of(syn.RockerFunction(angle=2.0 + 0.4 * np.sin(PHI)), replace(LINKAGE, point_distance=0.0))
+    return syn.Solution.from_linkage(
+        syn.RockerFunction(angle=2.0 + 0.4 * np.sin(PHI)), replace(LINKAGE, point_distance=0.0)
+    )
 
 
 def axis_of(figure, label):
@@ -158,7 +160,7 @@ def test_the_block_is_drawn_as_a_rectangle_along_its_guide() -> None:
 
 def test_a_linkage_that_cannot_turn_fully_is_drawn_where_it_is_joined() -> None:
     task = syn.Motion(points=ELLIPSE[:4], angle=np.zeros(4), rotation=[-0.3, -0.1, 0.1, 0.3])
-    solution = syn.Solution.of(task, SWINGING)
+    solution = syn.Solution.from_linkage(task, SWINGING)
     scene = syn.LinkageScene(solution)
     assert not solution.verdicts.full_turn
     assert scene.curves
@@ -257,7 +259,9 @@ def test_the_drawing_is_at_real_size(tmp_path) -> None:
 @pytest.mark.parametrize("point_angle", [-178.0, 0.0, 12.0])
 @pytest.mark.parametrize("rotation", [0.0, 1.0, 3.0])
 def test_numbers_of_dimensions_cover_neither_each_other_nor_other_dimensions(point_angle, rotation) -> None:
-    solution = syn.Solution.of(syn.TimedPath(points=ELLIPSE), replace(LINKAGE, point_angle=radians(point_angle)))
+    solution = syn.Solution.from_linkage(
+        syn.TimedPath(points=ELLIPSE), replace(LINKAGE, point_angle=radians(point_angle))
+    )
     dimensions = syn.drawing(solution, rotation).dimensions
     assert len(dimensions) == 5
     for one in dimensions:
@@ -269,7 +273,7 @@ def test_numbers_of_dimensions_cover_neither_each_other_nor_other_dimensions(poi
 
 def test_targets_that_are_met_have_no_curve_of_rounding() -> None:
     task = syn.Motion(points=LINKAGE.path(PHI[:5]), angle=LINKAGE.coupler_angle(PHI[:5]), rotation=PHI[:5])
-    figure = figures.plot(syn.Solution.of(task, LINKAGE))
+    figure = figures.plot(syn.Solution.from_linkage(task, LINKAGE))
     assert [axis for axis in figure.axes if "error" in axis.get_ylabel()] == []
     assert "rounding" in figure.get_supxlabel()
     assert len(figure.axes) == 3
@@ -296,7 +300,7 @@ def test_the_drawing_of_moved_pivots_and_of_curves() -> None:
     for closed in (True, False):
         target = next(p for p in syn.drawing(untimed(closed)).polylines if p.layer == "target")
         assert target.closed is closed
-    flat = syn.Solution.of(syn.TimedPath(points=ELLIPSE), replace(LINKAGE, point_angle=0.0))
+    flat = syn.Solution.from_linkage(syn.TimedPath(points=ELLIPSE), replace(LINKAGE, point_angle=0.0))
     assert not any(p.layer == "coupler" for p in syn.drawing(flat).polylines)
 
 
@@ -393,7 +397,7 @@ def test_svg_of_plates_has_arcs_and_numbers(tmp_path) -> None:
 
 def test_the_sheet_shows_the_largest_pin_forces(tmp_path) -> None:
     solution = timed()
-    forces = syn.pin_forces(solution.linkage, syn.Make(speed=6.0), run=False)
+    forces = syn.pin_forces(solution.linkage, syn.MachineSpec(speed=6.0), run=False)
     figure = figures.plot_sheet(solution, forces, title="sheet", made="bars")
     assert tuple(figure.get_size_inches() * 25.4) == pytest.approx((297.0, 210.0))
     panel = axis_of(figure, "pin force")
@@ -477,7 +481,7 @@ def test_the_report_tells_dimensions_verdicts_and_errors() -> None:
 def test_the_largest_link_is_what_the_constraint_bounds() -> None:
     """The coupler plate from B to P counts, where the task has points."""
     long = replace(LINKAGE, point_distance=2.0 * LINKAGE.largest_link)
-    found = syn.Solution.of(syn.TimedPath(points=long.path(syn.turn(12))), long)
+    found = syn.Solution.from_linkage(syn.TimedPath(points=long.path(syn.turn(12))), long)
     assert f"largest link {1e3 * long.point_distance:.6g} mm" in syn.report(found)
     angle = syn.RockerFunction(angle=long.rocker_angle(syn.turn(12)))
-    assert syn.Solution.of(angle, long).largest_link == LINKAGE.largest_link
+    assert syn.Solution.from_linkage(angle, long).largest_link == LINKAGE.largest_link

@@ -332,7 +332,7 @@ def test_what_a_kind_cannot_do_is_refused(task: Any, more: dict[str, Any], messa
 
 
 class TestWhatIsMadeOfIt:
-    SOLUTION = syn.Solution.of(syn.TimedPath(points=SLIDER.path(syn.turn(12)) + 1e-3), SLIDER)
+    SOLUTION = syn.Solution.from_linkage(syn.TimedPath(points=SLIDER.path(syn.turn(12)) + 1e-3), SLIDER)
 
     def test_report_names_offset_stroke_and_time_ratio(self) -> None:
         text = report(self.SOLUTION)
@@ -346,7 +346,7 @@ class TestWhatIsMadeOfIt:
         for s in syn.sensitivities(self.SOLUTION):
             h = 1e-6
             ends = [
-                syn.Solution.of(self.SOLUTION.task, replace(SLIDER, **{s.name: s.value + side * h})).error
+                syn.Solution.from_linkage(self.SOLUTION.task, replace(SLIDER, **{s.name: s.value + side * h})).error
                 for side in (1, -1)
             ]
             assert s.slope == pytest.approx((ends[0] - ends[1]) / (2.0 * h), rel=1e-5, abs=1e-9), s.name
@@ -363,7 +363,7 @@ class TestWhatIsMadeOfIt:
             "ground_angle",
             "crank_phase",
         }
-        made = syn.rounded(found).linkage
+        made = syn.round_dimensions(found).linkage
         assert made.point_is_pin
         assert made.coupler_length == pytest.approx(round(1e4 * found.linkage.coupler_length) / 1e4)
 
@@ -490,14 +490,15 @@ class TestGearedFiveBar:
         assert found.best.error > 1e-8
 
     def test_report_and_slopes(self) -> None:
-        made = syn.Solution.of(syn.TimedPath(points=five_bar(0.5).path(syn.turn(12)) + 1e-3), five_bar(0.5))
+        made = syn.Solution.from_linkage(syn.TimedPath(points=five_bar(0.5).path(syn.turn(12)) + 1e-3), five_bar(0.5))
         assert "second crank at D: 1/2 turns for one of the first" in report(made)
         slopes = {s.name: s.slope for s in syn.sensitivities(made)}
         h = 1e-6
         for name in ("crank_phase", "crank_length", "coupler_length"):
             value = getattr(made.linkage, name)
             ends = [
-                syn.Solution.of(made.task, replace(made.linkage, **{name: value + side * h})).error for side in (1, -1)
+                syn.Solution.from_linkage(made.task, replace(made.linkage, **{name: value + side * h})).error
+                for side in (1, -1)
             ]
             assert slopes[name] == pytest.approx((ends[0] - ends[1]) / (2.0 * h), rel=1e-5, abs=1e-9), name
 
@@ -516,7 +517,9 @@ def test_starts_of_the_scan_are_what_their_quality_says(kind: syn.Kind, gears: t
             linkage = make_linkage(start, normal, limits.second_crank(normal.unit))
             assert linkage.kind == kind
             assert linkage.least_transmission > radians(38.0)
-            assert syn.Solution.of(task, linkage).error == pytest.approx(start.quality * normal.unit**2, rel=1e-6)
+            assert syn.Solution.from_linkage(task, linkage).error == pytest.approx(
+                start.quality * normal.unit**2, rel=1e-6
+            )
 
 
 def test_a_poor_answer_says_how_much_of_the_target_is_wrong_and_what_may_do_better() -> None:
@@ -526,16 +529,16 @@ def test_a_poor_answer_says_how_much_of_the_target_is_wrong_and_what_may_do_bett
     links = {"crank_length": 0.1, "coupler_length": 0.3, "ground_length": 0.3, "rocker_length": 0.25}
     places = {"pivot_x": 0.0, "pivot_y": 0.0, "ground_angle": 0.0, "crank_phase": 0.0, "output_angle": 0.0}
     linkage = syn.Linkage(**links, **places, point_distance=0.0, point_angle=0.0)
-    poor = syn.Solution.of(syn.UntimedPath(path=circle), linkage)
+    poor = syn.Solution.from_linkage(syn.UntimedPath(path=circle), linkage)
     assert poor.share == pytest.approx(0.75, rel=1e-3)
     assert "75 % of the target's area" in syn.format_poor(poor)
     assert "geared five-bar" in syn.format_poor(poor)
     assert syn.format_poor(poor) in syn.assess(poor).report
-    good = syn.Solution.of(syn.UntimedPath(path=circle), replace(linkage, crank_length=0.2))
+    good = syn.Solution.from_linkage(syn.UntimedPath(path=circle), replace(linkage, crank_length=0.2))
     assert good.share == pytest.approx(0.0, abs=1e-4)
     assert syn.format_poor(good) == ""
     at = syn.turn(12)
     still = syn.RockerFunction(rotation=at, angle=linkage.rocker_angle(at) + np.where(np.arange(12) % 2, 0.5, -0.5))
-    off = syn.Solution.of(still, linkage)
+    off = syn.Solution.from_linkage(still, linkage)
     assert off.share == pytest.approx(0.5 / np.ptp(still.angle), rel=1e-9)
     assert "swing" in syn.format_poor(off)

@@ -19,7 +19,7 @@ import analysis.synthesis as syn
 from analysis.numerics.fourier import FourierSeries
 from analysis.numerics.overlap import symmetric_difference
 from analysis.slider import slider_motion
-from analysis.synthesis.search.polish import violated
+from analysis.synthesis.search.polish import worst_violation
 from analysis.synthesis.search.program import Program
 from analysis.synthesis.search.refine import Refinement, _Descent
 from analysis.synthesis.search.start import make_start
@@ -99,10 +99,10 @@ def test_areas_and_their_gradients(closed: bool, weights: str | None) -> None:
     program = Program(normal, make_limits(task, normal, None, syn.USUAL), objective="curve")
     refinement = Refinement(program)
     start = make_start(known, normal, rotation=np.linspace(turned[0], turned[-1], normal.n))
-    z, parameters = program.at(start)
+    z, parameters = program.unknowns_and_parameters(start)
     curve, slopes = refinement.traced(z, parameters)
     area, gradient = refinement.area(curve)
-    found = syn.Solution.of(task, known, start.rotation).error / normal.unit**2
+    found = syn.Solution.from_linkage(task, known, start.rotation).error / normal.unit**2
     assert area == pytest.approx(found, rel=2e-3 if weights is None else 3e-2)
     for k in (0, 3, 6, 9):
         step = 1e-6 * np.eye(len(z))[k]
@@ -120,7 +120,9 @@ def test_the_constraints_of_the_greatest_distance_have_exact_slopes() -> None:
     normal = syn.normal_form(task)
     program = Program(normal, make_limits(task, normal, None, syn.USUAL), objective="curve")
     refinement = Refinement(program)
-    z, parameters = program.at(make_start(known, normal, rotation=np.linspace(0.0, 2.0 * pi, normal.n)))
+    z, parameters = program.unknowns_and_parameters(
+        make_start(known, normal, rotation=np.linspace(0.0, 2.0 * pi, normal.n))
+    )
     curve, slopes = refinement.traced(z, parameters)
     some = [np.arange(len(near.distance)) for near in refinement.both_distances(curve)]
     down = _Descent(
@@ -226,7 +228,7 @@ def test_a_guess_that_keeps_the_constraints_is_never_lost(seed: int, timed: bool
         if timed
         else syn.UntimedPath(path=syn.TargetPath(points=points, closed=True), samples=24)
     )
-    guess = syn.Solution.of(task, known)
+    guess = syn.Solution.from_linkage(task, known)
     found = syn.synthesize(task, constraints=(), guesses=[guess], search=syn.Search(candidates=16, starts=1, seed=seed))
     assert found.best.error <= guess.error
 
@@ -270,27 +272,30 @@ def test_a_looser_constraint_is_no_worse(seed: int) -> None:
 def test_what_a_linkage_violates_is_named() -> None:
     known = drawn(np.random.default_rng(3), least=0.75)
     task = syn.TimedPath(points=known.path(syn.turn(24)))
-    solution = syn.Solution.of(task, known)
+    solution = syn.Solution.from_linkage(task, known)
     angle = min(solution.verdicts.least_transmission, pi - solution.verdicts.greatest_transmission)
     longest = solution.largest_link
-    assert violated(solution, None, [syn.LeastTransmission(angle=angle - 1e-6), syn.LargestLink(length=longest)]) == ""
-    named = violated(solution, None, [syn.LeastTransmission(angle=angle + radians(2.0))])
+    assert (
+        worst_violation(solution, None, [syn.LeastTransmission(angle=angle - 1e-6), syn.LargestLink(length=longest)])
+        == ""
+    )
+    named = worst_violation(solution, None, [syn.LeastTransmission(angle=angle + radians(2.0))])
     assert named.startswith("transmission angle by ")
     assert float(named.split()[-2]) == pytest.approx(2.0, rel=0.05)
-    named = violated(solution, None, [syn.LargestLink(length=longest - 1e-3)])
+    named = worst_violation(solution, None, [syn.LargestLink(length=longest - 1e-3)])
     assert named.startswith("bound of ")
     assert named.endswith(" by 1 mm")
     # rounding to whole degrees breaks what the optimum just keeps
     kept = [syn.LargestLink(length=longest)]
-    words = syn.assess(solution, lambda s: violated(s, None, kept)).rounding
-    made = syn.rounded(solution).linkage
+    words = syn.assess(solution, lambda s: worst_violation(s, None, kept)).rounding
+    made = syn.round_dimensions(solution).linkage
     assert ("violates a constraint: bound of" in words) == (made.largest_link > longest + 1e-9)
 
 
 def test_a_circle_as_a_guess_for_the_square_comes_back_or_better() -> None:
     path = syn.TargetPath(points=SQUARE, closed=True)
     task = syn.UntimedPath(path=path)
-    guess = syn.Solution.of(task, circle(0.564, (0.5, 0.5)))
+    guess = syn.Solution.from_linkage(task, circle(0.564, (0.5, 0.5)))
     assert guess.error == pytest.approx(0.181, abs=1e-3)
     found = syn.synthesize(task, guesses=[guess], search=syn.Search(candidates=16, starts=1))
     assert found.best.error <= guess.error

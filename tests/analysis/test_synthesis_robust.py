@@ -123,7 +123,7 @@ class TestShapes:
     def test_a_noisy_curve_drawn_by_hand_is_smoothed_first(self) -> None:
         clean = np.column_stack([1.2 * np.cos(T), 0.7 * np.sin(T) + 0.2 * np.cos(2.0 * T)])
         noisy = clean + 0.02 * np.random.default_rng(0).normal(size=clean.shape)
-        task = syn.UntimedPath(path=syn.TargetPath(points=noisy, closed=True).smoothed(72), samples=48)
+        task = syn.UntimedPath(path=syn.TargetPath(points=noisy, closed=True).smooth(72), samples=48)
         solution = best(task)
         assert solution.error < 0.05
         # nearer to what was meant than what was drawn is

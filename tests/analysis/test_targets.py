@@ -66,12 +66,12 @@ def test_length_and_area_converge_to_those_of_the_ellipse() -> None:
 def test_normals_are_those_of_the_ellipse_to_second_order() -> None:
     errors = []
     for n in (100, 200):
-        path = ellipse(2.0, 1.0, n).resampled(n)
+        path = ellipse(2.0, 1.0, n).resample(n)
         # outward gradient of x^2/4 + y^2
         gradient = path.points * [0.25, 1.0]
         gradient /= np.hypot(*gradient.T)[:, None]
         errors.append(np.abs(path.normals - gradient).max())
-        assert path.reversed().normals == pytest.approx(np.roll(path.normals[::-1], 1, axis=0), abs=1e-12)
+        assert path.reverse().normals == pytest.approx(np.roll(path.normals[::-1], 1, axis=0), abs=1e-12)
         assert path.weights.sum() == pytest.approx(path.length)
     assert errors[0] < 6e-3
     assert errors[1] == pytest.approx(errors[0] / 4, rel=0.4)
@@ -94,7 +94,7 @@ def test_a_cusp_has_a_normal() -> None:
 
 def test_normal_displacement_changes_the_area_by_length() -> None:
     """dA = integral of n . dx ds: what `weights` and `normals` are there for."""
-    path = path_from_formula("3*cos(t) + 0.5*cos(2*t)", "2*sin(t)", n=400).resampled(300)
+    path = path_from_formula("3*cos(t) + 0.5*cos(2*t)", "2*sin(t)", n=400).resample(300)
     h = 1e-4 * (1.0 + path.points[:, 0])
     moved = TargetPath(points=path.points + h[:, None] * path.normals, closed=True)
     assert moved.enclosed_area - path.enclosed_area == pytest.approx(path.weights @ h, rel=1e-3)
@@ -102,7 +102,7 @@ def test_normal_displacement_changes_the_area_by_length() -> None:
 
 @pytest.mark.parametrize("path", [SQUARE, BENT, ellipse(0.1, 0.05, 37)])
 def test_resampled_points_are_equally_far_along_the_polyline(path: TargetPath) -> None:
-    again = path.resampled(840)
+    again = path.resample(840)
     assert again.points[0] == pytest.approx(path.points[0])
     assert distance_to(path.points, again.points, closed=path.closed) == pytest.approx(np.zeros(840), abs=1e-12)
     steps = np.hypot(*np.diff(again.points, axis=0).T)
@@ -115,15 +115,15 @@ def test_resampled_points_are_equally_far_along_the_polyline(path: TargetPath) -
 
 
 def test_reversed_and_transformed() -> None:
-    back = SQUARE.reversed()
+    back = SQUARE.reverse()
     assert back.points[0] == pytest.approx(SQUARE.points[0])
     assert back.signed_area == -SQUARE.signed_area
-    assert BENT.reversed().points == pytest.approx(BENT.points[::-1])
-    path = BENT.transformed(scale=2.0, angle=pi / 2, shift=(1.0, -1.0))
+    assert BENT.reverse().points == pytest.approx(BENT.points[::-1])
+    path = BENT.transform(scale=2.0, angle=pi / 2, shift=(1.0, -1.0))
     assert path.points == pytest.approx(np.array([[1.0, -1.0], [1.0, 5.0], [-7.0, 5.0]]))
     assert path.length == pytest.approx(14.0)
     with pytest.raises(InputError, match="scale"):
-        BENT.transformed(scale=-1.0)
+        BENT.transform(scale=-1.0)
 
 
 def test_points_are_copied_and_locked() -> None:
@@ -196,7 +196,7 @@ def test_bad_points_are_refused(points: list[list[float]], closed: bool, message
 def test_a_straight_open_curve_is_a_target() -> None:
     assert TargetPath(points=np.array([[0.0, 0.0], [1.0, 1.0]]), closed=False).length == pytest.approx(2**0.5)
     with pytest.raises(InputError, match="2 points are asked for"):
-        SQUARE.resampled(2)
+        SQUARE.resample(2)
 
 
 # Smoothing
@@ -213,7 +213,7 @@ OPEN = path_from_formula("t/10", "0.1*sin(t)", n=120, end="2*pi - 0.5")
 @pytest.mark.parametrize("true", [ellipse(0.3, 0.15, 120), OPEN], ids=["closed", "open"])
 def test_smoothing_takes_most_of_the_noise_away(true: TargetPath) -> None:
     sd = 2e-3
-    smooth = noisy(true, sd).smoothed(200)
+    smooth = noisy(true, sd).smooth(200)
     assert smooth.closed == true.closed
     assert len(smooth.points) == 200
     rms = float(np.sqrt(np.mean(distance_to(true.points, smooth.points, closed=true.closed) ** 2)))
@@ -223,11 +223,11 @@ def test_smoothing_takes_most_of_the_noise_away(true: TargetPath) -> None:
 
 def test_smoothing_leaves_a_curve_without_noise() -> None:
     for true in (ellipse(0.3, 0.15, 60), OPEN):
-        smooth = true.smoothed(300)
+        smooth = true.smooth(300)
         assert distance_to(true.points, smooth.points, closed=true.closed).max() < 3e-4 * true.length
 
 
-@pytest.mark.parametrize("path", [ellipse(0.3, 0.15, 9), OPEN.resampled(7)], ids=["closed", "open"])
+@pytest.mark.parametrize("path", [ellipse(0.3, 0.15, 9), OPEN.resample(7)], ids=["closed", "open"])
 def test_without_deviation_smoothing_is_the_interpolating_spline(path: TargetPath) -> None:
     from scipy.interpolate import CubicSpline
 
@@ -235,21 +235,21 @@ def test_without_deviation_smoothing_is_the_interpolating_spline(path: TargetPat
     u = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(points, axis=0).T))])
     spline = CubicSpline(u, points, bc_type="periodic" if path.closed else "natural")
     exact = spline(np.linspace(0.0, u[-1], 500))
-    smooth = path.smoothed(3000, deviation=1e-9)
+    smooth = path.smooth(3000, deviation=1e-9)
     assert distance_to(smooth.points, exact, closed=path.closed).max() < 1e-6
 
 
 def test_smoothing_to_a_known_deviation() -> None:
     """Of points on a circle at equal steps smoothing keeps a circle, smaller by the deviation."""
     circle = ellipse(1.0, 1.0, 90)
-    smooth = circle.smoothed(90, deviation=0.05)
+    smooth = circle.smooth(90, deviation=0.05)
     assert np.hypot(*smooth.points.T) == pytest.approx(np.full(90, 0.95), abs=1e-4)
     straight = TargetPath(points=np.column_stack([np.arange(9.0), [0, 1, 0, 1, 0, 1, 0, 1, 0]]), closed=False)
-    line = straight.smoothed(30, deviation=0.49)
+    line = straight.smooth(30, deviation=0.49)
     assert np.ptp(line.points[:, 1]) < 0.3
     for deviation in (2.0, 0.0, float("nan")):
         with pytest.raises(InputError, match="deviation"):
-            circle.smoothed(90, deviation=deviation)
+            circle.smooth(90, deviation=deviation)
 
 
 def test_natural_smoothing_is_scipys() -> None:
@@ -282,7 +282,7 @@ def test_periodic_bending_is_the_integral_over_the_spline() -> None:
 
 def test_too_few_points_to_smooth() -> None:
     with pytest.raises(InputError, match="at least 6"):
-        SQUARE.smoothed(50)
+        SQUARE.smooth(50)
 
 
 # Formulas

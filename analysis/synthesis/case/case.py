@@ -32,9 +32,9 @@ from ...files import (
 )
 from ...units import quantity
 from ..exact.quick_return import QuickReturn, QuickSwing
-from ..linkage import ANGLES, PINS, Kind, Make, PinForces, pin_forces
+from ..linkage import ANGLES, PINS, Kind, MachineSpec, PinForces, pin_forces
 from ..result.solution import Solution
-from ..search.polish import violated
+from ..search.polish import worst_violation
 from ..search.solve import OVER, Synthesis, TradeOff, synthesize, trade_off
 from ..search.start import Search
 from ..task.constraint import (
@@ -97,7 +97,7 @@ def _transmission(value: Any, name: str) -> float | None:
 
 
 def _error(value: Any, name: str) -> Any:
-    """Read the bound of the greatest error for the least pin force: a length, or for a rocker function an angle."""
+    """Read the bound of the greatest error while pin forces are minimised: a length, or for a rocker function an angle."""
     try:
         quantity(value, "m", name)
     except ParameterError:
@@ -207,7 +207,7 @@ BOUNDS = Table(
 TABLES: Mapping[str, type] = {
     "constraints": Constraints,
     "search": SearchTable,
-    "make": Make,
+    "make": MachineSpec,
     "trade_off": TradeOffTable,
 }
 
@@ -231,7 +231,7 @@ class SynthesisCase:
     bounds: Mapping[str, tuple[float, float]] = entry(BOUNDS, factory=dict)
     constraints: tuple[Constraint | Stroke, ...] = entry(_constraints, USUAL)
     search: SearchTable = entry(Table(SearchTable), SearchTable())
-    make: Make = entry(Table(Make), Make())
+    make: MachineSpec = entry(Table(MachineSpec), MachineSpec())
     trade_off: TradeOffTable | None = entry(_trade_off, None)
 
     def __post_init__(self) -> None:
@@ -248,10 +248,10 @@ class SynthesisCase:
         search, (kinds, gears) = self.search.search(progress=progress), (self.search.kinds, self.search.gears)
         return synthesize(self.task, self.bounds, self.constraints, search=search, kinds=kinds, gears=gears)
 
-    def violated(self, solution: Solution) -> str:
-        """Return, as text, which constraint a linkage violates most and by how much; empty if none, or in closed form."""
+    def worst_violation(self, solution: Solution) -> str:
+        """Return as text which constraint a linkage violates most and by how much; empty if none, or in closed form."""
         closed = isinstance(self.task, QuickReturn | QuickSwing)
-        return "" if closed else violated(solution, self.bounds, self.constraints)
+        return "" if closed else worst_violation(solution, self.bounds, self.constraints)
 
     def forces(self, solutions: Sequence[Solution]) -> list[PinForces] | None:
         """Return the pin forces of solutions from runs of the plant; None if no constraint involves pin forces."""

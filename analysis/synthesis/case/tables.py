@@ -40,7 +40,7 @@ FloatArray = NDArray[np.float64]
 
 
 def read_plane_points(value: Any, name: str, bare: str | None = None) -> FloatArray:
-    """Read points, shape (n, 2) in m; numbers without a unit are in ``bare``, by default m."""
+    """Read points, shape (n, 2) in m; ``bare`` is the unit of numbers without one, by default m."""
     return np.array(Many(Many(Quantity("m", bare=bare), length=2))(value, name)).reshape(-1, 2)
 
 
@@ -78,7 +78,7 @@ class Steps:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Window:
-    """A weight for a range of targets: from one crank rotation, or point number, to another."""
+    """A weight for a range of targets: from one crank rotation, or index of a point, to another."""
 
     begin: float = entry(Quantity("rad"), key="from")
     end: float = entry(Quantity("rad"), key="to")
@@ -87,7 +87,7 @@ class Window:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Smoothing:
-    """Settings for smoothing a path; see `TargetPath.smoothed`."""
+    """Settings for smoothing a path; see `TargetPath.smooth`."""
 
     points: int = entry(Whole(8), 180)
     deviation: float | None = entry(Quantity("m"), None)
@@ -125,7 +125,10 @@ def _rotation(value: Any, n: int) -> FloatArray | None:
 
 
 def _weights(value: Any, rotation: FloatArray | None, n: int = 0) -> FloatArray | None:
-    """Read weights: a list, or windows of crank rotations; for an untimed task windows of point numbers, ends included."""
+    """Read the weights of n targets: a list, or windows of crank rotations; for an untimed task windows of point indices.
+
+    The ends of a window are included.
+    """
     if value is None:
         return None
     name = "task.weights"
@@ -164,8 +167,8 @@ def _refuse_entries(table: Any, names: tuple[str, ...], source: str) -> None:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class _Formula:
-    """Entries for the objective of a task, and for range and number of values of a formula's parameter."""
+class _ObjectiveAndRange:
+    """Entries of several tasks: the objective and, for a target given by a formula, number and range of parameter values."""
 
     objective: Objective = entry(Choice(get_args(Objective)), "error")
     n: int | None = entry(Whole(3), None)
@@ -180,7 +183,7 @@ class _Formula:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class _Curve(_Formula):
+class _Curve(_ObjectiveAndRange):
     """Entries for the points of a target: a list, a file or formulas, which can be scaled, rotated and shifted."""
 
     points: Any = entry(unchanged, None)
@@ -247,7 +250,7 @@ class UntimedPathTable(_Curve):
             if self.straight is not None:
                 requirement = "not come with task.straight, which counts the points given"
                 raise ParameterError("task.smoothing", True, requirement)
-            path = path.smoothed(self.smoothing.points, deviation=self.smoothing.deviation)
+            path = path.smooth(self.smoothing.points, deviation=self.smoothing.deviation)
         weights = _weights(self.weights, None, len(path.points))
         return UntimedPath(
             path=path,
@@ -298,7 +301,7 @@ class MotionTable(PrecisionPointsTable):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class RockerFunctionTable(_Formula):
+class RockerFunctionTable(_ObjectiveAndRange):
     """The table of a `RockerFunction`."""
 
     angle: Any = entry(unchanged, None)
@@ -333,7 +336,7 @@ class RockerFunctionTable(_Formula):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class SliderFunctionTable(_Formula):
+class SliderFunctionTable(_ObjectiveAndRange):
     """The table of a `SliderFunction`."""
 
     position: Any = entry(unchanged)

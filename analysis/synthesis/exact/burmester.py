@@ -25,7 +25,7 @@ from linkwork.errors import InputError
 
 from ...display import Shown, format_count
 from ..linkage.linkage import Linkage
-from ..result.solution import Solution, evaluate, judge, ranked
+from ..result.solution import Solution, evaluate, judge, rank_solutions
 from ..task.task import Motion, PrecisionPoints, Task, normal_form
 
 FloatArray = NDArray[np.float64]
@@ -190,7 +190,7 @@ def guidance(task: Task, count: int = 6) -> Guidance | GuidanceMap:
 
 
 def _read_poses(task: Task) -> tuple[Poses, ComplexArray, FloatArray]:
-    """Return the task, and positions and angles of its four or five poses; raises InputError as `guidance` does."""
+    """Return the task, and the positions and angles of its four or five poses; raise InputError as `guidance` does."""
     if not isinstance(task, PrecisionPoints | Motion) or task.angle is None:
         raise InputError(f"{type(task).__name__}: poses are wanted, points with the body's angle at each")
     if task.rotation is not None:
@@ -248,7 +248,7 @@ def _conditions(p: ComplexArray, angle: FloatArray) -> FloatArray:
 
 
 def _forms() -> tuple[FloatArray, FloatArray]:
-    """Return the matrices of two quadratic forms in (1, zx, zy, mx, my, wx, wy) that are both zero if w = conj(m) z."""
+    """Return the matrices of two quadratic forms in (1, zx, zy, mx, my, wx, wy), both of which are zero if w = conj(m) z."""
     real, imaginary = np.zeros((7, 7)), np.zeros((7, 7))
     real[0, 5], real[3, 1], real[4, 2] = -1.0, 1.0, 1.0
     imaginary[0, 6], imaginary[3, 2], imaginary[4, 1] = -1.0, 1.0, -1.0
@@ -328,7 +328,7 @@ def _guide_five_poses(task: Poses, p: ComplexArray, angle: FloatArray) -> Guidan
     )
     # two dyads with the same pivot, or the same point of the body, guide it no better than one
     made = [
-        four_bar(task, a, b)
+        build_four_bar(task, a, b)
         for a, b in permutations(dyads, 2)
         if min(abs(a.pivot - b.pivot), abs(a.point - b.point), a.length, b.length) > REAL * unit
     ]
@@ -337,18 +337,18 @@ def _guide_five_poses(task: Poses, p: ComplexArray, angle: FloatArray) -> Guidan
         dyads=dyads,
         complex_dyads=int((~real).sum()),
         nearest_complex=float(off[~real].min(initial=np.inf)),
-        solutions=ranked(made),
+        solutions=rank_solutions(made),
     )
 
 
-def four_bar(task: Poses, crank: Dyad, rocker: Dyad) -> Solution:
+def build_four_bar(task: Poses, crank: Dyad, rocker: Dyad) -> Solution:
     """Build the four-bar from two dyads, and check it for defects from the first pose to the last."""
     points, angle = np.asarray(task.points) @ np.array([1.0, 1j]), np.asarray(task.angle)
     turned = np.exp(1j * (angle - angle[0]))
     b, c = (points + turned * (dyad.point - points[0]) for dyad in (crank, rocker))
     ground, arm, coupler = rocker.pivot - crank.pivot, b - crank.pivot, c - b
     sides = np.sign(np.imag(np.conj(rocker.pivot - b) * coupler))
-    rotation = in_order(np.angle(arm * np.conj(arm[0])))
+    rotation = unwrap_in_order(np.angle(arm * np.conj(arm[0])))
     linkage = Linkage(
         pivot_x=crank.pivot.real,
         pivot_y=crank.pivot.imag,
@@ -367,10 +367,10 @@ def four_bar(task: Poses, crank: Dyad, rocker: Dyad) -> Solution:
 
 
 def exact_solution(task: Task, linkage: Linkage, rotation: FloatArray, sides: FloatArray) -> Solution:
-    """Check a linkage that meets all targets for defects; ``sides`` is its assembly at each, +1 with C to the left of B -> D.
+    """Return the solution of a linkage that meets all targets of a task exactly, with its defects.
 
-    If the targets need both assemblies there is a branch defect; there is also a circuit defect if, by Grashof's criterion, the
-    linkage cannot pass from one assembly to the other.
+    ``sides`` has the assembly at each target, +1 with C to the left of B -> D. If the targets need both assemblies there is a
+    branch defect, and also a circuit defect if, by Grashof's criterion, the linkage cannot pass from one to the other.
     """
     verdicts = judge(linkage, rotation, closed=False)
     if (sides != sides[0]).any():
@@ -379,8 +379,8 @@ def exact_solution(task: Task, linkage: Linkage, rotation: FloatArray, sides: Fl
     return Solution(task=task, linkage=linkage, evaluation=evaluate(task, linkage, rotation), verdicts=verdicts)
 
 
-def in_order(turned: FloatArray) -> FloatArray:
-    """Return angles that are known up to whole turns as rotations from the first angle, monotonic if possible (rad)."""
+def unwrap_in_order(turned: FloatArray) -> FloatArray:
+    """Convert angles that are known up to whole turns to rotations from the first angle, monotonic if possible (rad)."""
     forward = turned % (2.0 * pi)
     # the first is 0, even if rounding made it a whole turn
     forward[0] = 0.0
@@ -454,17 +454,21 @@ def _guide_four_poses(task: Poses, p: ComplexArray, angle: FloatArray, count: in
         points=points,
         sound=sound,
         transmission=transmission,
-        solutions=ranked([four_bar(task, dyads[i], dyads[k]) for i, k in chosen]),
+        solutions=rank_solutions([build_four_bar(task, dyads[i], dyads[k]) for i, k in chosen]),
     )
 
 
 def _check_pairs(
     p: ComplexArray, e: ComplexArray, z: ComplexArray, m: ComplexArray
 ) -> tuple[NDArray[np.bool_], FloatArray]:
-    """Check every pair of crank (row) and rocker (column); return ``sound`` and ``transmission`` of `GuidanceMap`."""
+    """Check every pair of a crank (row) and a rocker (column) for defects.
+
+    ``p`` and ``e`` are the poses, ``z`` and ``m`` points and pivots of the dyads; the result is ``sound`` and ``transmission``
+    of `GuidanceMap`.
+    """
     places = p[:, None] + e[:, None] * z
     arms = places - m
-    turned = np.array([in_order(np.angle(column / column[0])) for column in arms.T])
+    turned = np.array([unwrap_in_order(np.angle(column / column[0])) for column in arms.T])
     steps = np.diff(turned, axis=1)
     order: NDArray[np.bool_] = np.asarray((steps > 0.0).all(axis=1) | (steps < 0.0).all(axis=1))
     ground = m[None, :] - m[:, None]

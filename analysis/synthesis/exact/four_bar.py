@@ -24,8 +24,8 @@ from linkwork.errors import InputError, ParameterError
 
 from ...display import format_count
 from ...units import Amount, in_si
-from ..linkage.linkage import Linkage, wrapped
-from ..result.solution import Solution, ranked
+from ..linkage.linkage import Linkage, wrap_angles
+from ..result.solution import Solution, rank_solutions
 from ..task.task import PrecisionPoints, RockerFunction, Task, TimedPath, UntimedPath, turn
 from .burmester import INDEPENDENT, REAL, Exact, dyads_of_five, exact_solution
 
@@ -112,11 +112,11 @@ def function_generators(
     else:
         found = [_links(phi + phase, psi, phase, 0.0)]
     made = [_make_generator(task, float(ground_length), *links) for links in found if links is not None]
-    return Generators(task=task, solutions=ranked(made))
+    return Generators(task=task, solutions=rank_solutions(made))
 
 
 def _count_message(n: int, free: int, mounting: bool, crank_phase: object) -> str:
-    """Return the message for a number of points that differs from the number of unknowns."""
+    """Return the error message for a number n of points that differs from the number of unknowns; ``free`` is that number."""
     unknown = ["three ratios of lengths"]
     unknown += ["the crank's phase"] if crank_phase is None else []
     unknown += ["the output's mounting"] if mounting else []
@@ -132,8 +132,8 @@ def _rows(th2: FloatArray, th4: FloatArray) -> FloatArray:
 def _roots(rows: Callable[[float], FloatArray]) -> list[float]:
     """Return the angles in (-pi/2, pi/2] at which the determinant of four equations is zero.
 
-    The determinant is a trigonometric polynomial of first degree in twice the angle: half a turn further, a link is the same,
-    with a negative length.
+    The determinant is a trigonometric polynomial of first degree in twice the angle: an angle half a turn greater means the
+    same link with a negative length.
     """
     samples = [rows(0.5 * at) for at in turn(3)]
     scale = np.linalg.svd(np.array(samples), compute_uv=False)
@@ -173,7 +173,11 @@ def _links(th2: FloatArray, th4: FloatArray, crank_phase: float, mounting: float
 
 
 def _five_point_links(phi: FloatArray, psi: FloatArray) -> list[Links | None]:
-    """Compute the links for five points: the dyads for the rocker's poses relative to the crank, with pivot B and point C."""
+    """Compute the links of the four-bars, three at most, through five precision points.
+
+    Relative to the crank the rocker takes five poses. Each real dyad that guides it through them, except the ground link, is a
+    coupler, with its pivot at B and its point at C.
+    """
     places = np.exp(-1j * phi)
     try:
         parts = dyads_of_five(places, psi - phi)
@@ -208,8 +212,8 @@ def _make_generator(
         crank_length=ground * crank,
         coupler_length=ground * coupler,
         rocker_length=ground * rocker,
-        crank_phase=float(wrapped(np.asarray(crank_phase))),
-        output_angle=float(wrapped(np.asarray(mounting))),
+        crank_phase=float(wrap_angles(np.asarray(crank_phase))),
+        output_angle=float(wrap_angles(np.asarray(mounting))),
         branch=1 if sides[0] >= 0.0 else -1,
     )
     return exact_solution(task, linkage, np.asarray(task.rotation), sides)
@@ -233,8 +237,8 @@ def cognates(linkage: Linkage, rotation: ArrayLike = 0.0) -> tuple[Linkage, Link
     Returns
     -------
     tuple of Linkage
-        The cognate with the pivots G and D, driven at G; that with A and G, driven at A; the same, driven at G. G is the third
-        fixed pivot.
+        Three cognates, where G is the third fixed pivot: the one with the pivots G and D, driven at G; the one with the pivots
+        A and G, driven at A; and the latter driven at G.
 
     Raises
     ------
@@ -270,8 +274,8 @@ def cognates(linkage: Linkage, rotation: ArrayLike = 0.0) -> tuple[Linkage, Link
 def alternatives(solution: Solution) -> tuple[Solution, ...]:
     """Return the cognates of a solution as solutions of its task: the same curve from other pivots.
 
-    For a task with crank rotations only the cognate whose crank turns with the original's is returned; for a closed path those
-    whose cranks can turn fully.
+    For a task with crank rotations only the cognate whose crank turns with that of the original is returned; for a closed path
+    only those whose cranks can turn fully.
 
     Returns
     -------
@@ -293,16 +297,18 @@ def alternatives(solution: Solution) -> tuple[Solution, ...]:
     same, *others = cognates(linkage, rotation[0])
     stations = solution.evaluation.rotation
     if isinstance(task, TimedPath) or (isinstance(task, PrecisionPoints) and task.rotation is not None):
-        return (Solution.of(task, same),)
+        return (Solution.from_linkage(task, same),)
     if isinstance(task, UntimedPath) and task.path.closed:
-        return ranked([Solution.of(task, cognate) for cognate in (same, *others) if cognate.turns_fully])
+        return rank_solutions(
+            [Solution.from_linkage(task, cognate) for cognate in (same, *others) if cognate.turns_fully]
+        )
     assert stations is not None
-    made = [Solution.of(task, same, stations)]
+    made = [Solution.from_linkage(task, same, stations)]
     way = np.interp(np.arange((len(stations) - 1) * BETWEEN + 1) / BETWEEN, np.arange(len(stations)), stations)
     coupler, rocker = linkage.coupler_angle(way), linkage.rocker_angle(way)
     for cognate, angle, sides in zip(others, (coupler, rocker), _cognate_sides(linkage, way)):
         made.append(exact_solution(task, cognate, (angle - angle[0])[::BETWEEN], sides))
-    return ranked(made)
+    return rank_solutions(made)
 
 
 def _cognate_sides(linkage: Linkage, rotation: FloatArray) -> tuple[FloatArray, FloatArray]:

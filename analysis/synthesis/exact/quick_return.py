@@ -27,7 +27,7 @@ from linkwork.errors import InputError, ParameterError
 
 from ...units import Amount, in_si
 from ..linkage.linkage import LINKS, Linkage, SliderCrank
-from ..result.solution import Solution, ranked
+from ..result.solution import Solution, rank_solutions
 from ..task.constraint import Assembly, FullTurn, InfeasibleError, LargestLink, LeastTransmission
 from ..task.limit_position import dead_centres
 from ..task.limits import GROUND, LARGEST
@@ -121,7 +121,7 @@ def _advance(time_ratio: float) -> float:
 def quick_returns(
     task: QuickReturn | QuickSwing, bounds: Mapping[str, tuple[float, float]] | None, constraints: Sequence[Any]
 ) -> tuple[Solution, ...]:
-    """Find the linkage whose least transmission angle is greatest, in either assembly.
+    """Find the linkage with the greatest least transmission angle, and return it in either assembly.
 
     Raises InputError or ParameterError if a bound or a constraint is not supported here; InfeasibleError if there is no
     linkage, or none with the transmission angle that is asked for: the message names the greatest one.
@@ -157,7 +157,7 @@ def quick_returns(
         _make_slider_crank(task, l3, b) if isinstance(task, QuickReturn) else shape.linkage(l3, b)
         for b in branches or (1, -1)
     ]
-    return ranked([Solution.of(task, linkage) for linkage in made])
+    return rank_solutions([Solution.from_linkage(task, linkage) for linkage in made])
 
 
 def _least_angle(constraints: Sequence[Any]) -> float:
@@ -233,7 +233,7 @@ class _SwingShapes:
         ]
         begun = [replace(made, branch=branch, crank_phase=side * start) for off, start in slow if off < 1e-6]
         begun = [replace(one, output_angle=-float(one.rocker_angle([0.0])[0])) for one in begun]
-        return min(begun, key=lambda one: Solution.of(self.task, one).error)
+        return min(begun, key=lambda one: Solution.from_linkage(self.task, one).error)
 
 
 def _dimension_ranges(task: QuickReturn, bounds: Any, constraints: Sequence[Any]) -> dict[str, tuple[float, float]]:

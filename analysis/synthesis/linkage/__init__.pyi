@@ -2,7 +2,7 @@ from .kind import Kind as Kind
 from .linkage import ANGLES as ANGLES
 from .linkage import Linkage as Linkage
 from .machine import PINS as PINS
-from .machine import Make as Make
+from .machine import MachineSpec as MachineSpec
 from .machine import PinForces as PinForces
 from .machine import pin_forces as pin_forces
 from .pivot import SecondCrank as SecondCrank

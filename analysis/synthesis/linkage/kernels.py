@@ -23,11 +23,11 @@ from linkwork.five_bar import kinematics
 from ...numerics.codegen import CUBE, MATRIX, VECTOR, inner, kernel
 
 
-def guided(c2, s2, dx, dy, l3, l4, branch):
-    """Return the `kinematics.Position` of a slider-crank: C is on a guide at right angles to the ground link, dx from B.
+def close_slider_crank(c2, s2, dx, dy, l3, l4, branch):
+    """Close the loop of a slider-crank and return its `kinematics.Position`.
 
-    The arguments are those of `close_loop`, and may be CasADi symbols. For branch +1, C lies to the left of the perpendicular
-    from B to the guide.
+    C is on a guide at right angles to the ground link, at the distance dx from B. The arguments are those of `close_loop`, and
+    may be CasADi symbols. For branch +1, C lies to the left of the perpendicular from B to the guide.
     """
     c3 = dx / l3
     s3 = branch * (1.0 - c3 * c3) ** 0.5
@@ -35,15 +35,15 @@ def guided(c2, s2, dx, dy, l3, l4, branch):
 
 
 #: The plant's own loop closure, and that of a slider-crank, for use in the kernels.
-close_loop, _guided = inner(kinematics.close_loop), inner(guided)
+close_loop, _close_slider_crank = inner(kinematics.close_loop), inner(close_slider_crank)
 
 
 @inner
-def closed(c2, s2, dx, dy, l3, l4, branch):
-    """Return the `kinematics.Position` of a four-bar, or of a slider-crank if the rocker has length zero."""
+def close_linkage(c2, s2, dx, dy, l3, l4, branch):
+    """Close the loop of a four-bar, or of a slider-crank if the rocker has length zero; return the `kinematics.Position`."""
     if l4 > 0.0:
         return close_loop(c2, s2, dx, dy, l3, l4, branch)
-    return _guided(c2, s2, dx, dy, l3, l4, branch)
+    return _close_slider_crank(c2, s2, dx, dy, l3, l4, branch)
 
 
 #: Components of the vector q: fields of `analysis.synthesis.Linkage`.
@@ -77,14 +77,17 @@ def coupler_path(c, s, dx, dy, q, branch, out):
     for j in range(c.shape[0]):
         c2 = ct * c[j] - st * s[j]
         s2 = st * c[j] + ct * s[j]
-        g = closed(c2, s2, l1 + dx[j] - l2 * c2, dy[j] - l2 * s2, l3, l4, branch)
+        g = close_linkage(c2, s2, l1 + dx[j] - l2 * c2, dy[j] - l2 * s2, l3, l4, branch)
         x[j] = x0 + ax * c2 - ay * s2 + px * g.c3 - py * g.s3
         y[j] = y0 + ay * c2 + ax * s2 + py * g.c3 + px * g.s3
 
 
 @kernel(void(VECTOR, VECTOR, VECTOR, VECTOR, VECTOR, float64, MATRIX, CUBE), purpose="the curves of linkages")
 def coupler_path_jacobian(c, s, dx, dy, q, branch, out, jac):
-    """Compute the coupler point and jac[k, 0] = dx/d(k), jac[k, 1] = dy/d(k) for k in `COLUMNS`, shape (12, 2, n)."""
+    """Compute the coupler point as `coupler_path`, and its derivatives with respect to `COLUMNS`.
+
+    jac[k, 0] = dx/d(k), jac[k, 1] = dy/d(k) for k in `COLUMNS`, shape (12, 2, n).
+    """
     l1, l2, l3, l4 = q[2], q[3], q[4], q[5]
     ct, st = cos(q[8]), sin(q[8])
     ca, sa = cos(q[7]), sin(q[7])
@@ -94,7 +97,7 @@ def coupler_path_jacobian(c, s, dx, dy, q, branch, out, jac):
     for j in range(c.shape[0]):
         c2 = ct * c[j] - st * s[j]
         s2 = st * c[j] + ct * s[j]
-        g = closed(c2, s2, l1 + dx[j] - l2 * c2, dy[j] - l2 * s2, l3, l4, branch)
+        g = close_linkage(c2, s2, l1 + dx[j] - l2 * c2, dy[j] - l2 * s2, l3, l4, branch)
         # directions of crank and BP in the plane
         ex, ey = ca * c2 - sa * s2, sa * c2 + ca * s2
         fx, fy = ux * g.c3 - uy * g.s3, uy * g.c3 + ux * g.s3
@@ -140,7 +143,7 @@ def link_directions(c, s, dx, dy, q, branch, out):
     for j in range(c.shape[0]):
         c2 = ct * c[j] - st * s[j]
         s2 = st * c[j] + ct * s[j]
-        g = closed(c2, s2, l1 + dx[j] - l2 * c2, dy[j] - l2 * s2, l3, l4, branch)
+        g = close_linkage(c2, s2, l1 + dx[j] - l2 * c2, dy[j] - l2 * s2, l3, l4, branch)
         out[0, j] = g.c3
         out[1, j] = g.s3
         out[2, j] = g.c4
@@ -162,7 +165,7 @@ def link_jacobian(c, s, dx, dy, q, branch, out, jac):
     for j in range(c.shape[0]):
         c2 = ct * c[j] - st * s[j]
         s2 = st * c[j] + ct * s[j]
-        g = closed(c2, s2, l1 + dx[j] - l2 * c2, dy[j] - l2 * s2, l3, l4, branch)
+        g = close_linkage(c2, s2, l1 + dx[j] - l2 * c2, dy[j] - l2 * s2, l3, l4, branch)
         out[0, j] = atan2(g.s3, g.c3)
         out[1, j] = atan2(g.s4, g.c4)
         w3 = 1.0 / (l3 * g.s43)
@@ -203,7 +206,7 @@ def many_directions(c, s, cg, sg, shapes, branch, coupler, rocker):
             s2 = st * c[j] + ct * s[j]
             dx = cp * cg[j] - sp * sg[j]
             dy = sp * cg[j] + cp * sg[j]
-            g = closed(c2, s2, l1 + dx - l2 * c2, dy - l2 * s2, l3, l4, branch)
+            g = close_linkage(c2, s2, l1 + dx - l2 * c2, dy - l2 * s2, l3, l4, branch)
             coupler[i, j] = complex(g.c3, g.s3)
             rocker[i, j] = complex(g.c4, g.s4)
 

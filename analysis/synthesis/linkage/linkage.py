@@ -194,7 +194,7 @@ class Linkage:
 
     @property
     def turns(self) -> int:
-        """Return the turns of the crank per turn of the input shaft: more than 1 for gear ratios such as 1/2."""
+        """Return the number of turns of the crank per turn of the input shaft: more than 1 for gear ratios such as 1/2."""
         return 1
 
     def crank_angle(self, rotation: ArrayLike) -> FloatArray:
@@ -329,7 +329,7 @@ class Linkage:
         return made(**self.values(), pivot=pivot)
 
     def translate(self, x: float, y: float) -> Linkage:
-        """Return the same linkage shifted by (x, y) in the plane (m)."""
+        """Return the linkage shifted by (x, y) in the plane (m)."""
         return replace(self, pivot_x=self.pivot_x + x, pivot_y=self.pivot_y + y)
 
     def scale(self, factor: float) -> Linkage:
@@ -372,7 +372,7 @@ class Linkage:
 
     @staticmethod
     def closure() -> Callable[..., Any]:
-        """Return the plant's function that closes the loop, for CasADi symbols; see `kernels.close_slider_crank`."""
+        """Return the function that closes the loop, also for CasADi symbols: for a four-bar the plant's `close_loop`."""
         joined: Callable[..., Any] = symbolic_equations(FIVE_BAR).close_loop
         return joined
 
@@ -398,7 +398,7 @@ class Linkage:
 
     @staticmethod
     def slack(l1: Any, l2: Any, cosine: Any) -> Any:
-        """Return the most by which `square` can change if the crank turns, by an angle with this cosine, from its extreme."""
+        """Return the greatest change of `square` while the crank turns from an extreme of it, by an angle with this cosine."""
         return 2.0 * l1 * l2 * (1.0 - cosine)
 
     def cosine_at_c(self, reach: FloatArray) -> FloatArray:
@@ -432,7 +432,7 @@ class Linkage:
 
     @property
     def turns_fully(self) -> bool:
-        """Return whether the crank can turn fully while a moving pivot makes its motion."""
+        """Return whether the crank can turn fully; a moving pivot makes its motion meanwhile."""
         return self.least_transmission > 0.0
 
     def to_five_bar(
@@ -549,7 +549,7 @@ class SliderCrank(Linkage):
 
     @staticmethod
     def closure() -> Callable[..., Any]:
-        """Return the closure of the loop with C on its guide."""
+        """Return the function that closes the loop with C on its guide, also for CasADi symbols."""
         return close_slider_crank
 
     @staticmethod
@@ -558,7 +558,7 @@ class SliderCrank(Linkage):
 
     @staticmethod
     def transmission_excess(l3: Any, l4: Any, nearest: Any, farthest: Any, cosine: Any) -> tuple[Any, ...]:
-        """Return g of the constraint g <= 0, as for a four-bar; mu is the angle between coupler and normal of the guide."""
+        """Return the value g of the constraint g <= 0, as for a four-bar; mu is the angle between coupler and guide normal."""
         return (farthest - (l3 * cosine) ** 2,)
 
     @staticmethod
@@ -600,7 +600,7 @@ class FiveBar(Linkage):
 
     @property
     def turns(self) -> int:
-        """Return the turns of the first crank per turn of the input shaft."""
+        """Return the number of turns of the first crank per turn of the input shaft."""
         return gear_turns(self.pivot.ratio)[0]
 
     @property

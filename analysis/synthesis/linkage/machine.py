@@ -89,7 +89,7 @@ class MachineSpec:
         return 0.4 * self.width if self.pin is None else self.pin
 
     def describe(self, *, forces: bool = True) -> str:
-        """Return a line that describes the bars and, with ``forces``, speed, gravity and load."""
+        """Describe the bars and, with ``forces``, speed, gravity and load in one line."""
         bars = f"bars {1e3 * self.width:g} x {1e3 * self.thickness:g} mm of {self.density:g} kg/m³, pins {1e3 * self.hole:g} mm"
         if not forces:
             return bars
@@ -98,7 +98,7 @@ class MachineSpec:
         )
 
     def describe_masses(self) -> str:
-        """Return a sentence for the head of a file that says where the masses come from."""
+        """Describe where the masses come from, in a sentence for the head of a file."""
         given = [f"{link}.mass" for link in (*WEIGHED, "slider") if getattr(self, f"{link}_mass") is not None]
         weighed = f"; as given: {', '.join(given)}" if given else ""
         bars = self.describe(forces=False).partition(",")[0]
@@ -155,7 +155,7 @@ class MachineSpec:
         )
 
     def sliding_five_bar(self, linkage: Linkage) -> FiveBarParameters:
-        """Return the parameters of the five-bar plant for a linkage, with the slider free to move.
+        """Return the parameters of the five-bar plant for a linkage, with a slider that is free to move.
 
         A slider-crank becomes a four-bar whose rocker pivot is `FAR` away; its slider is the mass at the rocker's end.
         """
@@ -175,11 +175,14 @@ class MachineSpec:
         return replace(made, **self.link_masses(asdict(made)) | (self.slider_as_rocker(far) if sliding else {}))
 
     def slider_as_rocker(self, far: Any) -> dict[str, Any]:
-        """Return mass, inertia and centre of the rocker of length ``far`` (m) that represents the slider; see `moving`."""
+        """Return mass, moment of inertia and centre of mass of the rocker that represents the slider of a slider-crank.
+
+        ``far`` is the length of that rocker (m); see `sliding_five_bar`.
+        """
         return {"rocker_mass": self.block_mass, "rocker_inertia": 0.0, "rocker_cog_distance": far}
 
     def plant(self, linkage: Linkage) -> FiveBarParameters | SliderCrankParameters:
-        """Return the parameters of the plant that simulates a linkage: slider-crank, or five-bar with a stiffly held slider."""
+        """Return the parameters of the plant that simulates a linkage: `slider_crank` for a slider-crank, else `five_bar`."""
         return self.slider_crank(linkage) if isinstance(linkage, SliderCrank) else self.five_bar(linkage)
 
     def five_bar(self, linkage: Linkage) -> FiveBarParameters:
@@ -270,7 +273,7 @@ def pin_functions(
 
 @cache
 def _trace_plant() -> tuple[Any, Any, Any]:
-    """Return the class of the plant's parameters, the plant's functions, and `link_mass_properties`, for CasADi symbols."""
+    """Return the class of the plant's parameters, its functions, and `link_mass_properties`, all for CasADi symbols."""
     casadi = symbolic.library()
     plant = parameter_symbols(FIVE_BAR)
     law = symbolic.symbolic_functions((geometry,), min=casadi.fmin, max=casadi.fmax)
@@ -318,7 +321,7 @@ class PinForces:
         return float(self.rotation[int(self.force.max(axis=1).argmax())])
 
     def greatest_force(self, pins: str) -> float:
-        """Return the greatest force on the pins with these letters (N)."""
+        """Return the greatest force on any of the pins with the letters ``pins`` (N)."""
         return float(self.force[:, [PINS.index(pin) for pin in pins]].max())
 
 
@@ -327,8 +330,8 @@ def pin_forces(
 ) -> PinForces:
     """Compute the forces on the pins of a linkage at constant speed.
 
-    With ``run`` the compiled plant is run, with a slider so heavy that it hardly moves and whose weight the control force
-    carries. Otherwise the plant's equations are evaluated with the slider held.
+    With ``run`` the compiled plant is run; its slider is so heavy that it hardly moves, and the control force carries the
+    slider's weight. Otherwise the plant's equations are evaluated with the slider held.
 
     Parameters
     ----------

@@ -53,13 +53,15 @@ class SliderMotion:
         """Return the distance between the ends of the slider's travel (m)."""
         return float(np.ptp(self.series(np.linspace(0.0, 2.0 * pi, 1440, endpoint=False))))
 
-    def scaled(self, factor: float) -> SliderMotion:
+    def scale(self, factor: float) -> SliderMotion:
         """Return the motion for the same linkage with all lengths multiplied by the factor."""
         return replace(self, series=self.series * factor)
 
 
-def geared(ratio: float) -> tuple[int, int]:
-    """Return the least whole numbers of turns, k of the first crank and m of the second, in the same time: m/k is the ratio.
+def gear_turns(ratio: float) -> tuple[int, int]:
+    """Return the least whole numbers k and m of turns that the first and the second crank make in the same time.
+
+    Their quotient m/k is the ratio.
 
     Raises ParameterError if the ratio is neither zero nor a quotient of whole numbers up to six.
     """
@@ -107,14 +109,14 @@ class SecondCrank:
     def __post_init__(self) -> None:
         if not (isfinite(self.length) and self.length > 0.0):
             raise ParameterError("second_crank_length", self.length, "be a finite number greater than zero")
-        geared(self.ratio)
+        gear_turns(self.ratio)
         if not isfinite(self.phase):
             raise ParameterError("second_crank_phase", self.phase, "be a finite number")
 
     def angle(self, rotation: ArrayLike) -> FloatArray:
         """Return psi, the angle of the second crank (rad)."""
         phi = np.asarray(rotation, dtype=float)
-        value: FloatArray = geared(self.ratio)[1] * phi + self.phase + self.series(phi)
+        value: FloatArray = gear_turns(self.ratio)[1] * phi + self.phase + self.series(phi)
         return value
 
     def displacement(self, rotation: ArrayLike) -> tuple[FloatArray, FloatArray]:
@@ -122,7 +124,7 @@ class SecondCrank:
         psi = self.angle(rotation)
         return self.length * np.cos(psi), self.length * np.sin(psi)
 
-    def scaled(self, factor: float) -> SecondCrank:
+    def scale(self, factor: float) -> SecondCrank:
         """Return the motion for the same linkage with all lengths multiplied by the factor."""
         return replace(self, length=self.length * factor)
 
@@ -201,7 +203,7 @@ class CrankUnknown:
         low, high = self.length
         if not (isfinite(low) and isfinite(high) and 0.0 < low <= high):
             raise ParameterError("bounds of the second crank", self.length, "be two lengths above zero, in order (m)")
-        geared(self.ratio)
+        gear_turns(self.ratio)
         if self.harmonics < 0:
             raise ParameterError("harmonics", self.harmonics, "be zero or greater")
 

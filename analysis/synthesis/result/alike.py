@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from ...display import format_count
 from ..linkage.linkage import LINKS, Linkage, SliderCrank
-from ..linkage.pivot import SecondCrank, geared
+from ..linkage.pivot import SecondCrank, gear_turns
 from ..task.task import RockerFunction
 from .solution import Solution
 
@@ -18,11 +18,11 @@ from .solution import Solution
 SHARE, RATIO = 0.03, 1.25
 
 
-def grouped(solutions: Sequence[Solution]) -> tuple[Solution, ...]:
-    """Return the first solution of each group of similar ones, with the others of the group as its ``variants``.
+def group_similar(solutions: Sequence[Solution]) -> tuple[Solution, ...]:
+    """Group similar solutions; return the first of each group, with the others of the group as its ``variants``.
 
-    Position in the plane, sense of rotation and start of the crank do not count, nor does the size for a function of the
-    rocker. Linkages with a commanded pivot are never grouped.
+    Solutions count as similar if their linkages differ only in position in the plane, sense of rotation or start of the crank,
+    or for a rocker function in size. Linkages with a commanded pivot are never grouped.
     """
     groups: list[list[Solution]] = []
     for solution in solutions:
@@ -67,7 +67,10 @@ def _gear_ratio(linkage: Linkage) -> float | None:
 
 
 def _coupler_sides(linkage: Linkage) -> tuple[int, ...]:
-    """Return +1 if C lies to the left of B -> D, -1 to the right; both, its own first, for a guide with almost no offset."""
+    """Return the sides of B -> D on which C can lie, +1 left or -1 right.
+
+    It is the side of the assembly, but both sides, that of the assembly first, for a slider-crank with almost no offset.
+    """
     if not isinstance(linkage, SliderCrank):
         return (linkage.branch,)
     offset = linkage.ground_length
@@ -81,7 +84,7 @@ def _shape(linkage: Linkage, side: int) -> NDArray[np.float64]:
     second, pivot = 0j, linkage.pivot
     if isinstance(pivot, SecondCrank):
         # from its angle while the first crank lies along the ground link, times the turns k so that whole turns do not count
-        k, m = geared(pivot.ratio)
+        k, m = gear_turns(pivot.ratio)
         second = pivot.length * np.exp(1j * side * (k * pivot.phase - m * linkage.crank_phase))
     links = (abs(getattr(linkage, name)) for name in LINKS)
     return np.array([*links, point.real, point.imag, second.real, second.imag]) / linkage.largest_link

@@ -10,14 +10,16 @@ import numpy as np
 
 from ...units import with_unit
 from ..linkage import linkage as geometry
-from ..linkage.linkage import Linkage, SliderCrank, on_line
-from ..linkage.machine import Make
+from ..linkage.linkage import Linkage, SliderCrank, is_on_line
+from ..linkage.machine import MachineSpec
 from ..linkage.pivot import SecondCrank, SliderMotion
 
 _NAME = "found-linkage"
 
 
-def description(linkage: Linkage, make: Make, *, rotation: float = 0.0, direction: float = 1.0) -> dict[str, Any]:
+def description(
+    linkage: Linkage, make: MachineSpec, *, rotation: float = 0.0, direction: float = 1.0
+) -> dict[str, Any]:
     """Return the table ``[linkage]`` with the description of a four-bar, a slider-crank or a five-bar.
 
     A rocker pivot that moves on a guide, or on a crank without gears, is a second freedom: `drives` returns both speeds.
@@ -25,7 +27,7 @@ def description(linkage: Linkage, make: Make, *, rotation: float = 0.0, directio
     Parameters
     ----------
     linkage : Linkage
-    make : Make
+    make : MachineSpec
         Bars, gravity and the speed of the crank.
     rotation : float
         Rotation of the input shaft at the start (rad).
@@ -56,14 +58,14 @@ def description(linkage: Linkage, make: Make, *, rotation: float = 0.0, directio
         "assembly": {"C": linkage.branch},
     }
     if isinstance(linkage, SliderCrank):
-        bodies["block"] = {"points": {"C": [0, 0]}, "mass": with_unit(make.block, "kg")}
+        bodies["block"] = {"points": {"C": [0, 0]}, "mass": with_unit(make.block_mass, "kg")}
         tables["slides"] = {"guide": {"body": "block", "through": "E", "direction": with_unit(a1 + 0.5 * pi, "rad")}}
     else:
         bodies["rocker"] = _bar_table("DC", linkage.rocker_length, make, make.rocker_mass)
     second = linkage.pivot
     if isinstance(second, SliderMotion):
         along = with_unit(a1 + second.guide_angle, "rad")
-        bodies["block"] = {"points": {"D": [0, 0]}, "mass": with_unit(make.block, "kg")}
+        bodies["block"] = {"points": {"D": [0, 0]}, "mass": with_unit(make.block_mass, "kg")}
         tables["slides"] = {"guide": {"body": "block", "through": "E", "direction": along}}
         position = with_unit(float(second.series(rotation)), "m")
         tables["freedoms"]["pivot"] = {"joint": "guide", "start": position, "driven": True}
@@ -87,7 +89,7 @@ def description(linkage: Linkage, make: Make, *, rotation: float = 0.0, directio
     return tables
 
 
-def loads(linkage: Linkage, make: Make) -> dict[str, Any]:
+def loads(linkage: Linkage, make: MachineSpec) -> dict[str, Any]:
     """Return the table with the load of ``make``, by the name of the point on which it acts; empty without a load."""
     if not any(make.load):
         return {}
@@ -96,7 +98,7 @@ def loads(linkage: Linkage, make: Make) -> dict[str, Any]:
     return {point: {f"load_{axis}": with_unit(force, "N") for axis, force in zip("xy", make.load)}}
 
 
-def drives(linkage: Linkage, make: Make, *, rotation: float = 0.0, direction: float = 1.0) -> dict[str, Any]:
+def drives(linkage: Linkage, make: MachineSpec, *, rotation: float = 0.0, direction: float = 1.0) -> dict[str, Any]:
     """Return the drive tables of a linkage whose rocker pivot is a second freedom: the speeds of crank and pivot over time.
 
     The arguments are those of `description`. For other linkages the result is empty, because `description` gives the speed.
@@ -119,14 +121,14 @@ def drives(linkage: Linkage, make: Make, *, rotation: float = 0.0, direction: fl
     return {"crankDrive": {"speed": with_unit(speed, "rad/s")}, "pivotDrive": {"speed": waves}}
 
 
-def _coupler_masses(linkage: Linkage, make: Make) -> dict[str, Any]:
+def _coupler_masses(linkage: Linkage, make: MachineSpec) -> dict[str, Any]:
     """Return mass, centre of mass and moment of inertia of a coupler with an arm to its point, as in the plant."""
     line = make.density * make.width * make.thickness
     r, a2 = linkage.point_distance, linkage.point_angle
-    straight = on_line(linkage.coupler_length, r, a2)
+    straight = is_on_line(linkage.coupler_length, r, a2)
     links = linkage.crank_length, linkage.coupler_length, linkage.rocker_length
-    made = geometry.bodies(*links, r, a2, line, make.width, straight)
-    made |= make.weighed(made)
+    made = geometry.link_mass_properties(*links, r, a2, line, make.width, straight)
+    made |= make.link_masses(made)
     centre = rect(made["coupler_cog_distance"], made["coupler_cog_angle"])
     return {
         "mass": with_unit(made["coupler_mass"], "kg"),
@@ -140,7 +142,7 @@ def _point_entry(z: complex) -> list[Any]:
     return [0 if c == 0.0 else with_unit(c, "m") for c in (z.real, z.imag)]
 
 
-def _bar_table(ends: str, length: float, make: Make, mass: float | None) -> dict[str, Any]:
+def _bar_table(ends: str, length: float, make: MachineSpec, mass: float | None) -> dict[str, Any]:
     """Return the table of a bar with the section of ``make``, and its mass if it is given."""
     section = {"kind": "bar", "width": with_unit(make.width, "m"), "thickness": with_unit(make.thickness, "m")}
     table = {"bar": list(ends), "length": with_unit(length, "m"), "section": section | {"material": make.density}}

@@ -75,7 +75,7 @@ class LinkageScene:
 
     @cached_property
     def way(self) -> FloatArray:
-        """Return densely spaced crank rotations over the range of the task, shape (n,)."""
+        """Return closely spaced crank rotations over the range of the task, shape (n,)."""
         at = self.solution.rotation
         if self._closed or whole_turn(self.solution.task, at):
             return self.turn
@@ -83,7 +83,7 @@ class LinkageScene:
 
     @property
     def rotation(self) -> FloatArray:
-        """Return the crank rotations of the task, in order: its stations, or a turn."""
+        """Return the crank rotations of the task in order: those of its stations, or of a turn."""
         return self.turn if self.way is self.turn else self.solution.rotation
 
     @cached_property
@@ -119,7 +119,7 @@ class LinkageScene:
         return tuple(p for p in pieces if np.isfinite(p).all() and len(p) > 1)
 
     @cached_property
-    def traced(self) -> FloatArray | None:
+    def traced_curve(self) -> FloatArray | None:
         """Return the part of the coupler curve that belongs to the task, shape (n, 2); None for a rocker function."""
         return None if self.target is None else self.linkage.path(self.way)
 
@@ -146,13 +146,16 @@ class LinkageScene:
         return isinstance(self.linkage, FiveBar)
 
     @property
-    def lettered(self) -> str:
+    def pin_letters(self) -> str:
         """Return the letters of the pins that are labelled."""
         return self.linkage.letters + ("" if self.linkage.point_is_pin else "P")
 
     @cached_property
     def transmission(self) -> FloatArray:
-        """Return crank rotations over a turn and the angle between coupler and rocker, NaN if unjoined, shape (2, n)."""
+        """Return crank rotations over a turn, and the angle between coupler and rocker there, shape (2, n).
+
+        The angle is NaN where the links cannot be joined.
+        """
         return np.vstack([self.turn, angle_at_c(self.linkage, self.turn)])
 
     @property
@@ -238,7 +241,7 @@ def drawing(solution: Solution, rotation: float | None = None, *, poses: int = 0
     texts = [
         Text(layer="text", position=(x + 1.5 * radius, y + 1.5 * radius), height=height, text=name)
         for name, (x, y) in pins.items()
-        if name in scene.lettered
+        if name in scene.pin_letters
     ]
     return Drawing(
         title=scene.title,
@@ -256,7 +259,7 @@ def drawing(solution: Solution, rotation: float | None = None, *, poses: int = 0
 def _link_dimensions(
     pins: Mapping[str, Point], linkage: Linkage, height: float, others: Sequence[LineString]
 ) -> Iterator[Dimension]:
-    """Yield the dimension of each link, beside it and clear of other lines; for a slider-crank also the guide's offset."""
+    """Yield the dimension of each link, placed beside the link and clear of other lines; for a slider-crank also the offset."""
     named = [ends for _, ends in linkage.bars]
     names: list[str] = [name for name in ("AE", "AB", "BC", "ED", "DC") if name == "BC" or name in named]
     names += ["BP"] if "P" in pins and not linkage.point_is_pin else []
@@ -265,7 +268,7 @@ def _link_dimensions(
     placed: list[Dimension] = []
 
     def covered(one: Dimension) -> tuple[int, int]:
-        """Return the number of overlaps with links and, counted three times, dimensions; and the number with lines."""
+        """Return two counts of overlaps: with links and dimensions, dimensions counted three times; and with other lines."""
         room, strokes = _number_box(one), _dimension_lines(one)
         count = sum(room.intersects(link) for link in links)
         count += 3 * sum(room.intersects(shape(other)) for other in placed for shape in (_number_box, _dimension_lines))
@@ -291,7 +294,7 @@ def _dimension_lines(dimension: Dimension) -> Any:
 
 
 def _number_box(dimension: Dimension) -> Any:
-    """Return the box that the number of a dimension needs, with gaps around it, on either side of the dimension line."""
+    """Return the box that the text of a dimension needs, with gaps around it, on either side of the dimension line."""
     (x0, y0), (x1, y1) = dimension.line
     middle, way = np.array([x0 + x1, y0 + y1]) / 2.0, np.array([x1 - x0, y1 - y0]) / hypot(x1 - x0, y1 - y0)
     return LineString([middle - 2.2 * dimension.height * way, middle + 2.2 * dimension.height * way]).buffer(
@@ -390,7 +393,7 @@ def _hole_dimensions(places: NDArray[np.complex128], width: float) -> Iterator[t
 
 
 def rounded_hull(places: NDArray[np.complex128], radius: float) -> tuple[FloatArray, tuple[float, ...]]:
-    """Return an outline at a radius (m) around two or three points: its points, and bulges of arcs as in `files.Polyline`."""
+    """Return the outline at a radius (m) around two or three points: its corners, and bulges of its arcs as in `Polyline`."""
     farthest = max(combinations(range(len(places)), 2), key=lambda pair: float(abs(places[pair[0]] - places[pair[1]])))
     ends = places[list(farthest)]
     if len(places) == 3:

@@ -14,7 +14,7 @@ from linkwork.errors import InputError
 
 from ...units import ROUNDING
 from ..linkage.kernels import PLACES
-from ..linkage.linkage import ANGLES, LENGTHS, LINKS, FiveBar, Linkage, SliderCrank, wrapped
+from ..linkage.linkage import ANGLES, LENGTHS, LINKS, FiveBar, Linkage, SliderCrank, wrap_angles
 from ..linkage.pivot import SecondCrank, SliderMotion, format_ratio
 from ..task.constraint import SECOND_LENGTH, stroke
 from ..task.limit_position import dead_centres, mechanical_advantage, time_ratio, toggles
@@ -90,9 +90,10 @@ def length_step(linkage: Linkage) -> float:
 
 
 def derivatives(solution: Solution) -> tuple[list[str], FloatArray, FloatArray, FloatArray]:
-    """Return names of the k dimensions, derivatives (m, k) of the residuals with respect to them, residuals (m,), weights (m,).
+    """Compute how the residuals of the quality function depend on the dimensions.
 
-    The residuals are those of the quality function; for an untimed path, the distances along the target's normals.
+    The result is: the names of the k dimensions; the derivatives of the residuals with respect to them, (m, k); the residuals,
+    (m,); their weights, (m,). For an untimed path the residuals are the distances along the target's normals.
     """
     task, linkage = solution.task, solution.linkage
     normal = normal_form(task)
@@ -107,9 +108,10 @@ def derivatives(solution: Solution) -> tuple[list[str], FloatArray, FloatArray, 
 
 
 def _residuals(linkage: Linkage, normal: Normal, at: FloatArray, across: bool) -> tuple[FloatArray, FloatArray]:
-    """Compute derivatives (m, k) and values (m,) of the residuals at crank rotations ``at``: of points, then of angles.
+    """Compute derivatives (m, k) and values (m,) of the residuals at crank rotations ``at``.
 
-    The residuals of points are those in x and y or, if ``across``, those along the normals of the curve.
+    The residuals of points come first, then those of angles. The residuals of points are in x and y or, if ``across``, along
+    the normals of the curve.
     """
     columns = [column for _, _, column in _pivot_dimensions(linkage, at)]
     angular = normal.angle is not None
@@ -145,7 +147,7 @@ def _residuals(linkage: Linkage, normal: Normal, at: FloatArray, across: bool) -
         if not normal.of_rocker:
             own[:, PLACES.index("ground_angle")] += 1.0
         leverage = normal.leverage * normal.unit
-        parts.append(leverage * wrapped(left_angle))
+        parts.append(leverage * wrap_angles(left_angle))
         blocks.append(leverage * own)
     return np.vstack(blocks), np.concatenate(parts)
 
@@ -173,8 +175,8 @@ def sensitivities(solution: Solution) -> tuple[Sensitivity, ...]:
     )
 
 
-def rounded(solution: Solution, length: float | None = None, angle: float = ANGLE_STEP) -> Rounding:
-    """Compute the cost of rounding lengths and angles to whole steps.
+def round_dimensions(solution: Solution, length: float | None = None, angle: float = ANGLE_STEP) -> Rounding:
+    """Round lengths and angles to whole steps, and compute the cost of this.
 
     Parameters
     ----------
@@ -191,9 +193,9 @@ def rounded(solution: Solution, length: float | None = None, angle: float = ANGL
         if not (np.isfinite(step) and step > 0.0):
             raise InputError(f"step of {what} is {step}: it must be greater than zero")
     linkage = solution.linkage
-    steps = {name: angle if name in (*ANGLES, *PIVOT_ANGLES) else length for name in _manufactured(linkage)}
+    steps = {name: angle if name in (*ANGLES, *PIVOT_ANGLES) else length for name in _manufactured_dimensions(linkage)}
     rounded_to = linkage
-    for name, value in _manufactured(linkage).items():
+    for name, value in _manufactured_dimensions(linkage).items():
         whole = round(value / steps[name])
         # a link is not rounded to zero
         rounded_to = _replace_dimension(
@@ -234,7 +236,7 @@ def _expected_error(solution: Solution, steps: Mapping[str, float]) -> float:
         if area:
             continue
         small = DIFFERENCE * (1.0 if name in (*ANGLES, *PIVOT_ANGLES) else linkage.largest_link)
-        value = _manufactured(linkage)[name]
+        value = _manufactured_dimensions(linkage)[name]
         if _is_link(linkage, name):
             small = min(small, 0.1 * value)
         ahead, behind = (
@@ -251,9 +253,9 @@ def _expected_error(solution: Solution, steps: Mapping[str, float]) -> float:
 
 
 def costs(solution: Solution, length: float, angle: float) -> dict[str, float]:
-    """Compute how much the quality function grows if one dimension has an error of one step, in the worse direction.
+    """Compute, for each dimension, how much the quality function grows by an error of one step in the worse direction.
 
-    The changed linkages are evaluated, so that steps may have any size; infinite if the links cannot be joined.
+    The changed linkages are evaluated, so that steps may have any size; the growth is infinite if the links cannot be joined.
 
     Parameters
     ----------
@@ -266,7 +268,7 @@ def costs(solution: Solution, length: float, angle: float) -> dict[str, float]:
         Growth of the quality function by name of the dimension, without those of a slider's motion.
     """
     linkage, grown = solution.linkage, {}
-    for name, value in _manufactured(linkage).items():
+    for name, value in _manufactured_dimensions(linkage).items():
         if name == "guide_angle":
             continue
         step = angle if name in (*ANGLES, *PIVOT_ANGLES) else length
@@ -302,7 +304,7 @@ def _names(linkage: Linkage, normal: Normal) -> list[str]:
 
 
 def _pivot_dimensions(linkage: Linkage, at: FloatArray) -> list[tuple[str, float, tuple[FloatArray, FloatArray]]]:
-    """Return, for each dimension of a moving pivot, name, value, and derivatives of D's displacement at crank rotations."""
+    """Return, for each dimension of a moving pivot: name, value, and derivatives of x and y of D at crank rotations ``at``."""
     pivot = linkage.pivot
     if isinstance(pivot, SliderMotion):
         c, s, u = np.cos(pivot.guide_angle), np.sin(pivot.guide_angle), pivot.series(at)
@@ -326,8 +328,8 @@ def _dimension_values(linkage: Linkage) -> dict[str, float]:
     return linkage.values() | {name: value for name, value, _ in _pivot_dimensions(linkage, np.zeros(1))}
 
 
-def _manufactured(linkage: Linkage) -> dict[str, float]:
-    """Return, by name, the dimensions that are manufactured and can have errors, without those of a commanded motion."""
+def _manufactured_dimensions(linkage: Linkage) -> dict[str, float]:
+    """Return by name the dimensions that are manufactured, and so can have errors: those of a commanded motion are left out."""
     values = _dimension_values(linkage)
     made = (*LENGTHS, *ANGLES, SECOND_LENGTH, *PIVOT_ANGLES)
     return {name: values[name] for name in made if name in values and name not in linkage.absent}
@@ -402,7 +404,7 @@ def format_poor(solution: Solution) -> str:
     task, share = solution.task, solution.share
     if not POOR < share < inf:
         return ""
-    if solution.by_area:
+    if solution.measures_area:
         said = f"{100.0 * share:.2g} % of the target's area is wrong"
     else:
         of = "swing" if isinstance(task, RockerFunction) else "size"
@@ -481,17 +483,17 @@ class Assessment:
 def assess(solution: Solution, violated: Callable[[Solution], str] | None = None) -> Assessment:
     """Compute the cost of errors in the dimensions of a solution.
 
-    ``violated`` is a function that names the constraint that a solution violates, and returns "" if it meets all.
+    ``violated`` is a function that returns the name of the constraint that a solution violates, or "" if it meets all.
     """
     factor, unit = quality_unit(solution.task)
     step = length_step(solution.linkage)
-    rounding = rounded(solution, step)
+    rounding = round_dimensions(solution, step)
     words = (
         f"rounded to {1e3 * step:g} mm and {degrees(ANGLE_STEP):g} deg: {factor * rounding.error:.6g} {unit}; "
         f"mean over dimensions that are off by up to half as much: {factor * rounding.expected:.6g} {unit}"
     )
     if violated and not violated(solution):
-        broken = violated(Solution.of(solution.task, rounding.linkage, solution.evaluation.rotation))
+        broken = violated(Solution.from_linkage(solution.task, rounding.linkage, solution.evaluation.rotation))
         words += f"; rounded so, it violates a constraint: {broken}" if broken else ""
     return Assessment(
         solution=solution, dimensions=_dimension_rows(solution, step), rounding=words, poor=format_poor(solution)
@@ -510,7 +512,7 @@ def quality_headings(task: Task) -> tuple[str, str, str]:
 
 
 def quality_cells(solution: Solution, digits: int = 5) -> tuple[str, str, str]:
-    """Return quality function, rms error and greatest error of a solution as text; "0" if only rounding is left."""
+    """Return three texts: quality function, rms error and greatest error of a solution; "0" for errors of mere rounding."""
     factor, scale = quality_unit(solution.task)[0], error_unit(solution.task)[0]
     found = solution.evaluation
     if _meets_task(solution):

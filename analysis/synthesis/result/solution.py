@@ -19,9 +19,9 @@ from ...files import write_csv
 from ...run import parameter_tables
 from ...units import with_unit
 from ..linkage.kernels import PLACES
-from ..linkage.linkage import Linkage, SliderCrank, wrapped
-from ..linkage.machine import Make
-from ..task.target import area_between, distance_to, halves, hausdorff, straightness
+from ..linkage.linkage import Linkage, SliderCrank, wrap_angles
+from ..linkage.machine import MachineSpec
+from ..task.target import area_between, distance_to, half_lengths, hausdorff, straightness
 from ..task.task import PrecisionPoints, RockerFunction, Task, TimedPath, UntimedPath, covers_turn, normal_form
 from .described import description, drives, loads
 
@@ -82,7 +82,7 @@ class Evaluation:
 def evaluate(task: Task, linkage: Linkage, rotation: FloatArray | None = None) -> Evaluation:
     """Compute the errors of a linkage in a task by the task's measure.
 
-    They are independent of any search: the coupler curve for an untimed path is a polygon of `CURVE` points.
+    The errors do not depend on the sampling of a search: for an untimed path the coupler curve is a polygon of `CURVE` points.
 
     Parameters
     ----------
@@ -103,7 +103,7 @@ def evaluate(task: Task, linkage: Linkage, rotation: FloatArray | None = None) -
         raise InputError("the task gives no crank rotations: say at which ones the linkage is to be compared")
     at = np.asarray(given, dtype=float)
     if isinstance(task, RockerFunction):
-        left = wrapped(linkage.rocker_angle(at) - np.asarray(task.angle))
+        left = wrap_angles(linkage.rocker_angle(at) - np.asarray(task.angle))
         error, value = _objective_values(task, np.asarray(task.weights) * left**2)
         return Evaluation(error=error, value=value, errors=left, angle_errors=None, rotation=at)
     points = np.asarray(task.points)
@@ -112,7 +112,7 @@ def evaluate(task: Task, linkage: Linkage, rotation: FloatArray | None = None) -
     squares = distance**2
     turned, length = None, 0.0
     if not isinstance(task, TimedPath) and task.angle is not None:
-        turned, length = wrapped(linkage.coupler_angle(at) - np.asarray(task.angle)), float(task.length or 0.0)
+        turned, length = wrap_angles(linkage.coupler_angle(at) - np.asarray(task.angle)), float(task.length or 0.0)
         squares = squares + (length * turned) ** 2
     error, value = _objective_values(task, weights * squares)
     return Evaluation(error=error, value=value, errors=distance, angle_errors=turned, rotation=at, length=length)
@@ -153,7 +153,7 @@ def _evaluate_path(task: UntimedPath, linkage: Linkage, rotation: FloatArray | N
         traced = curve @ np.array([1.0, 1j])
         steps = np.abs(np.diff(np.append(traced, traced[0]) if path.closed else traced))
         nearest = np.abs(traced[:, None] - stations[None, :]).argmin(axis=1)
-        back = halves(steps, path.closed) * distance_to(points, curve, closed=path.closed)
+        back = half_lengths(steps, path.closed) * distance_to(points, curve, closed=path.closed)
         error = 0.5 * float(normal.weights @ (normal.unit * normal.arc * apart) + normal.weights[nearest] @ back)
     value = error if task.objective == "error" else hausdorff(curve, path, closed=path.closed)
     return Evaluation(error=error, value=value, errors=distance, angle_errors=None, rotation=rotation)
@@ -206,8 +206,8 @@ class Verdicts:
 def judge(linkage: Linkage, rotation: FloatArray, *, closed: bool) -> Verdicts:
     """Check a linkage for defects between the least and the greatest of its crank rotations, or if ``closed`` over a turn.
 
-    The distance from crank pin to rocker pivot, which determines the transmission angle, is evaluated densely and, with a
-    fixed pivot, where the crank lies along the ground link.
+    The distance from crank pin to rocker pivot determines the transmission angle. It is evaluated at closely spaced rotations
+    and, with a fixed pivot, where the crank lies along the ground link.
     """
     steps = np.diff(rotation)
     order = bool(np.all(steps > 0.0) or np.all(steps < 0.0))
@@ -280,7 +280,7 @@ class Solution(Shown):
     variants: tuple[Solution, ...] = ()
 
     def __repr__(self) -> str:
-        return f"<Solution of a {type(self.task).__name__}: {self.describe()}>"
+        return f"<Solution.from_linkage a {type(self.task).__name__}: {self.describe()}>"
 
     def describe(self) -> str:
         """Return error and verdicts in one line."""
@@ -292,7 +292,7 @@ class Solution(Shown):
         )
 
     @classmethod
-    def of(cls, task: Task, linkage: Linkage, rotation: FloatArray | None = None) -> Solution:
+    def from_linkage(cls, task: Task, linkage: Linkage, rotation: FloatArray | None = None) -> Solution:
         """Evaluate and judge a linkage; see `evaluate`."""
         evaluation = evaluate(task, linkage, rotation)
         closed = isinstance(task, UntimedPath) and task.path.closed
@@ -311,7 +311,7 @@ class Solution(Shown):
         return self.evaluation.value
 
     @property
-    def by_area(self) -> bool:
+    def measures_area(self) -> bool:
         """Return whether the error is the area between two closed curves, without weights."""
         task = self.task
         if not (isinstance(task, UntimedPath) and task.path.closed and task.measure == "area"):
@@ -322,11 +322,11 @@ class Solution(Shown):
     def share(self) -> float:
         """Return the error relative to the target.
 
-        If `by_area`, it is the area between the curves divided by the area that the target encloses. Otherwise it is the rms
-        error divided by the target's size, the diagonal of its bounding box, or by the swing of a rocker function.
+        If `measures_area`, it is the area between the curves divided by the area that the target encloses. Otherwise it is the
+        rms error divided by the target's size, the diagonal of its bounding box, or by the swing of a rocker function.
         """
         task = self.task
-        if self.by_area:
+        if self.measures_area:
             assert isinstance(task, UntimedPath)
             return self.error / task.path.enclosed_area
         size = float(np.ptp(task.angle)) if isinstance(task, RockerFunction) else normal_form(task).unit
@@ -341,7 +341,7 @@ class Solution(Shown):
 
     @property
     def way(self) -> tuple[float, float] | None:
-        """Return the least and greatest crank rotation of the task; None if the crank can turn fully."""
+        """Return the least and the greatest crank rotation of the task; None if the crank can turn fully."""
         return None if self.verdicts.full_turn else (float(self.rotation.min()), float(self.rotation.max()))
 
     def straight(self) -> StraightPart | None:
@@ -378,11 +378,11 @@ class Solution(Shown):
 
     @property
     def direction(self) -> float:
-        """Return the direction in which the crank turns over the task: 1 counter-clockwise, -1 clockwise."""
+        """Return the sense in which the crank turns during the task: 1 counter-clockwise, -1 clockwise."""
         at = self.evaluation.rotation
         return -1.0 if at is not None and len(at) > 1 and at[-1] < at[0] else 1.0
 
-    def run_case(self, make: Make, title: str) -> dict[str, Any]:
+    def run_case(self, make: MachineSpec, title: str) -> dict[str, Any]:
         """Return the tables of a case file that runs the linkage through its task at constant speed.
 
         A slider-crank runs as the slider-crank's plant, any other linkage as the five-bar slider; see `docs/case-files.md`.
@@ -407,7 +407,7 @@ class Solution(Shown):
             "run": run,
         }
 
-    def described_case(self, make: Make, title: str) -> dict[str, Any]:
+    def described_case(self, make: MachineSpec, title: str) -> dict[str, Any]:
         """Return the tables of a case file that describes the linkage and simulates it; see `docs/linkages.md`."""
         at = self.evaluation.rotation
         start = 0.0 if at is None else float(at[0])
@@ -461,9 +461,9 @@ class Solution(Shown):
 
 
 def whole_turn(task: Task, rotation: FloatArray) -> bool:
-    """Return whether the stations of a task cover a whole turn.
+    """Return whether the crank rotations of a task's stations cover a whole turn.
 
-    Those of untimed precision points do not count as a whole turn, whatever the steps between them.
+    For untimed precision points the result is False, whatever the steps between their rotations.
     """
     if isinstance(task, PrecisionPoints) and task.rotation is None:
         return False
@@ -520,7 +520,7 @@ def nearest_rotations(
     return unwrapped
 
 
-def ranked(solutions: Sequence[Solution]) -> tuple[Solution, ...]:
+def rank_solutions(solutions: Sequence[Solution]) -> tuple[Solution, ...]:
     """Rank solutions: sound ones first, then by the task's objective.
 
     Solutions that are exact to rounding are ranked by their transmission angles.

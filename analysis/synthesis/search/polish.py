@@ -23,15 +23,25 @@ from threadpoolctl import threadpool_limits
 from linkwork.errors import InputError
 
 from ..linkage.kernels import coupler_path_jacobian, link_jacobian
-from ..linkage.linkage import ANGLES, FiveBar, SliderCrank, wrapped
-from ..linkage.pivot import CrankUnknown, PivotUnknown, SliderUnknown, geared
+from ..linkage.linkage import ANGLES, FiveBar, SliderCrank, wrap_angles
+from ..linkage.pivot import CrankUnknown, PivotUnknown, SliderUnknown, gear_turns
 from ..result.solution import Solution
 from ..task.constraint import UNKNOWNS, Constraint, InfeasibleError, Stroke
 from ..task.limits import Limits, limits_by_kind
 from ..task.task import Normal, normal_form
 from .program import KEPT, Program
 from .refine import ITERATIONS, Refinement
-from .start import USUAL_SEARCH, Answer, Search, Start, as_start, inside, keep_distinct, outside, over_cores
+from .start import (
+    USUAL_SEARCH,
+    Answer,
+    Search,
+    Start,
+    clip_to_bounds,
+    convert_to_start,
+    distances_from_bounds,
+    keep_distinct,
+    run_on_cores,
+)
 from .statement import Objective
 
 FloatArray = NDArray[np.float64]
@@ -89,9 +99,9 @@ ONE_THREAD = _OneThread()
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Polished:
-    """Answers of all starts: ``kept`` are the feasible ones, best first, ``others`` the infeasible ones.
+    """Answers of the searches from all starts: ``kept`` are the feasible ones, best first, ``others`` the infeasible ones.
 
-    ``done`` is the number of searches; ``begun`` are the starts that are feasible without a search.
+    ``done`` is the number of searches; ``begun`` are the starts that are feasible before any search, as answers.
     """
 
     kept: tuple[Answer, ...]
@@ -101,15 +111,15 @@ class Polished:
     begun: tuple[Answer, ...] = ()
 
     @classmethod
-    def of(
+    def from_answers(
         cls, found: Sequence[Answer], kept: Sequence[Answer], interrupted: bool, begun: Sequence[Answer] = ()
     ) -> Polished:
-        """Build the record from all answers, the feasible ones in order, and the feasible starts."""
+        """Build the record from all answers ``found``, the feasible answers in order, and the starts that are feasible."""
         others = tuple(a for a in found if not a.feasible)
         return cls(kept=tuple(kept), others=others, done=len(found), interrupted=interrupted, begun=tuple(begun))
 
-    def merged(self, other: Polished) -> Polished:
-        """Return the answers of both searches, such as for two kinds of linkages, in one record."""
+    def merge(self, other: Polished) -> Polished:
+        """Return the answers of two searches, such as for two kinds of linkages, in one record."""
         return Polished(
             kept=self.kept + other.kept,
             others=self.others + other.others,
@@ -119,7 +129,7 @@ class Polished:
         )
 
 
-def infeasible(done: Polished) -> InfeasibleError:
+def infeasible_error(done: Polished) -> InfeasibleError:
     """Return the error for a search without a feasible answer."""
     if not done.others:
         return InfeasibleError("no linkage keeps all bounds and constraints")
@@ -140,7 +150,7 @@ def polish(
     pivot: PivotUnknown | None = None,
     search: Search = USUAL_SEARCH,
 ) -> Polished:
-    """Optimise from every start. On Ctrl-C the answers so far are returned, marked as interrupted."""
+    """Optimise from every start; on Ctrl-C return the answers so far, marked as interrupted."""
     worker = Polisher(normal, limits, pivot)
 
     def spread(name: str, items: Sequence[Any], what: str) -> tuple[list[Answer], bool]:
@@ -148,10 +158,10 @@ def polish(
         size = 1 if cores == 1 else min(MOST, max(1, -(-len(items) // (3 * cores))))
         # a polisher holds compiled solvers, which cannot be sent to a process: each part of the work makes its own
         step = getattr(worker, name) if cores == 1 else partial(_call_polisher, name, normal, limits, pivot)
-        parts, interrupted = over_cores(step, [items[k : k + size] for k in range(0, len(items), size)], search, what)
+        parts, interrupted = run_on_cores(step, [items[k : k + size] for k in range(0, len(items), size)], search, what)
         return [answer for part in parts for answer in part], interrupted
 
-    begun = kept_answers([worker.kept(start) for start in starts])
+    begun = feasible_answers([worker.judge_start(start) for start in starts])
     given = [answer for answer in begun if answer.start.given]
     # if enough starts can be refined directly, only a few are fitted by squares; not with a straight part, whose ends need more
     # iterations
@@ -159,31 +169,31 @@ def polish(
     enough = races and len(begun) >= FITTED
     fitted = starts[: sum(start.given for start in starts) + FITTED] if enough else starts
     found, interrupted = spread("fit_all", fitted, f"fitting {len(fitted)} starts")
-    kept = kept_answers(found)
+    kept = feasible_answers(found)
     # an interruption after the last search is ignored
     if interrupted and len(found) < len(fitted):
-        return Polished.of(found, kept, True, begun)
+        return Polished.from_answers(found, kept, True, begun)
     interrupted = False
     if normal.quality == "squares":
         if limits.along:
-            kept = distinct(kept, ONWARDS, pivot)
-        kept = [*map(worker.finish, kept[:FINISHED]), *kept[FINISHED:]]
+            kept = distinct_answers(kept, ONWARDS, pivot)
+        kept = [*map(worker.finish_squares, kept[:FINISHED]), *kept[FINISHED:]]
     elif not races:
-        best = [*given, *distinct(kept, ONWARDS, pivot)]
+        best = [*given, *distinct_answers(kept, ONWARDS, pivot)]
         kept, interrupted = spread(
-            "onwards", [(answer, ITERATIONS) for answer in best], f"refining the best {len(best)}"
+            "minimise_measures", [(answer, ITERATIONS) for answer in best], f"refining the best {len(best)}"
         )
     else:
-        begin = kept_answers([worker.measured(answer) for answer in [*kept, *begun]])
+        begin = feasible_answers([worker.with_measure(answer) for answer in [*kept, *begun]])
         laps = RACE["open area" if normal.quality == "area" and not normal.closed else normal.quality]
         kept, interrupted = _refine_in_laps(spread, begin, given, laps)
     if limits.least is not None and not interrupted:
-        best = distinct(kept_answers(kept) or kept_answers(found), ONWARDS, pivot)
-        kept, interrupted = spread("least", best, f"making least the {limits.least.along.name}")
+        best = distinct_answers(feasible_answers(kept) or feasible_answers(found), ONWARDS, pivot)
+        kept, interrupted = spread("minimise_objectives", best, f"making least the {limits.least.along.name}")
         found = [*(answer for answer in found if not answer.feasible), *kept] if kept else found
     elif limits.along:
-        kept = [answer for answer in kept if worker.kept(answer.start).feasible]
-    return replace(Polished.of(found, kept_answers(kept), interrupted, begun), done=len(starts))
+        kept = [answer for answer in kept if worker.judge_start(answer.start).feasible]
+    return replace(Polished.from_answers(found, feasible_answers(kept), interrupted, begun), done=len(starts))
 
 
 def _refine_in_laps(
@@ -192,34 +202,38 @@ def _refine_in_laps(
     given: Sequence[Answer],
     laps: Sequence[tuple[int, int]],
 ) -> tuple[list[Answer], bool]:
-    """Refine many answers by few iterations each, then the best by more; return the answers, and whether Ctrl-C interrupted."""
+    """Refine many answers by few iterations each, then the best by more; return the answers, and whether Ctrl-C came.
+
+    ``given`` are guesses, which take part in the first lap in any case; ``laps`` has for each lap how many of the best answers
+    take part, and their iterations. ``spread`` calls a method of `Polisher` for many items.
+    """
     for lap, (count, iterations) in enumerate(laps):
         # guesses take part in the first lap however poor they are; answers that do not take part are dropped
-        best = distinct([*given, *kept], count + len(given), distance=RACED)
+        best = distinct_answers([*given, *kept], count + len(given), distance=RACED)
         stage = "refining" if lap else "comparing"
         done, interrupted = spread(
-            "onwards", [(answer, iterations) for answer in best], f"{stage} the best {len(best)}"
+            "minimise_measures", [(answer, iterations) for answer in best], f"{stage} the best {len(best)}"
         )
         if interrupted:
             return [*done, *kept], True
         rest = [answer for answer in kept if answer not in best] if lap else []
         # answers that have reached the same optimum count as one
-        kept, given = distinct(kept_answers([*done, *rest]), len(done) + len(rest), distance=RACED), []
+        kept, given = distinct_answers(feasible_answers([*done, *rest]), len(done) + len(rest), distance=RACED), []
     return list(kept), False
 
 
-def kept_answers(answers: Sequence[Answer]) -> list[Answer]:
+def feasible_answers(answers: Sequence[Answer]) -> list[Answer]:
     """Return the feasible answers, best first."""
     return sorted((a for a in answers if a.feasible), key=lambda a: a.start.quality)
 
 
 @ONE_THREAD
 def _call_polisher(name: str, normal: Normal, limits: Limits, pivot: PivotUnknown | None, item: Any) -> Any:
-    """Call a method of a new `Polisher` by its name; for use in another process or thread."""
+    """Call the method ``name`` of a new `Polisher` with an item; for use in another process or thread."""
     return getattr(Polisher(normal, limits, pivot), name)(item)
 
 
-def distinct(
+def distinct_answers(
     answers: Sequence[Answer], count: int, pivot: PivotUnknown | None = None, *, distance: float = DIFFERENT
 ) -> list[Answer]:
     """Return the first ``count`` answers that differ by ``distance`` in a dimension; lengths relative to the longest link."""
@@ -232,7 +246,7 @@ def distinct(
             v = np.concatenate([np.cos(v[0]) * v[1:], np.sin(v[0]) * v[1:]])
         if isinstance(pivot, CrankUnknown):
             # the second crank's angle while the first lies along the ground link, independent of whole turns
-            turned = geared(pivot.ratio)
+            turned = gear_turns(pivot.ratio)
             relative = turned[0] * v[1] - turned[1] * q[8]
             v = np.array([v[0], largest * np.cos(relative), largest * np.sin(relative), *v[2:]])
         side = 3.0 * answer.start.branch
@@ -272,11 +286,11 @@ class Polisher:
     def fit(self, start: Start) -> Answer:
         """Minimise the squared errors from a start; if precision points are met, then maximise the transmission angle."""
         fitted = self.by_least_squares
-        return self.best_exact(
+        return self.maximise_transmission(
             fit_least_squares(self.normal, self.limits, start) if fitted else self._solve_squares(start)
         )
 
-    def best_exact(self, answer: Answer) -> Answer:
+    def maximise_transmission(self, answer: Answer) -> Answer:
         """Maximise the transmission angle from an answer that meets its precision points; return other answers unchanged."""
         if self.normal.exact and answer.feasible and answer.start.quality < EXACT:
             met = self.program("transmission").solve(answer.start)
@@ -289,7 +303,11 @@ class Polisher:
         return [self.fit(start) for start in starts]
 
     def _solve_squares(self, start: Start) -> Answer:
-        """Minimise the squared errors by IPOPT, in the nearest triangles of each region, until the answer stops improving."""
+        """Minimise the squared errors by IPOPT.
+
+        If a pivot's region consists of several triangles, the program is solved for those nearest to the pivot, again from each
+        better answer, until none is better.
+        """
         program = self.program("squares")
         if all(len(triangles) == 1 for _, triangles in self.limits.regions):
             return program.solve(start)
@@ -297,7 +315,7 @@ class Polisher:
         tried: set[tuple[int, ...]] = set()
         now = start
         while True:
-            ways = product(*(order[:PIECES] for order in program.nearest_pieces(now.q)))
+            ways = product(*(order[:PIECES] for order in program.nearest_triangles(now.q)))
             fresh = [way for way in ways if way not in tried]
             tried |= set(fresh)
             answers = [program.solve(now, pieces=way) for way in fresh]
@@ -310,10 +328,11 @@ class Polisher:
         assert best is not None
         return best
 
-    def finish(self, answer: Answer) -> Answer:
-        """Continue a search that reached its limit of iterations, then impose bounds at the extremes of the solution.
+    def finish_squares(self, answer: Answer) -> Answer:
+        """Finish a fit of squared errors: continue it if it reached its limit of iterations, then settle its extremes.
 
-        On a flat slope the result of an unfinished search depends on rounding.
+        The last step imposes the bounds at the extremes of the solution, see `Program.settle_extremes`. On a flat slope the
+        result of an unfinished search would depend on rounding.
         """
         if self.by_least_squares:
             return answer
@@ -321,19 +340,19 @@ class Polisher:
         if not answer.converged and self.pivot is None:
             longer = program.solve(answer.start, iterations=LONG)
             if longer.feasible and longer.start.quality < answer.start.quality:
-                answer = self.best_exact(longer)
+                answer = self.maximise_transmission(longer)
         if self.normal.exact:
             return answer
         last = self.program("squares", exact=True)
-        return last.exact(answer, lambda start, places: last.solve(start, places=places))
+        return last.settle_extremes(answer, lambda start, places: last.solve(start, places=places))
 
-    def least(self, answers: Sequence[Answer]) -> list[Answer]:
-        """Minimise the objective that replaces the error, from answers with small errors."""
+    def minimise_objectives(self, answers: Sequence[Answer]) -> list[Answer]:
+        """Minimise, from each answer, the objective that replaces the error."""
         return [self._minimise_objective(answer) for answer in answers]
 
     def _minimise_objective(self, answer: Answer) -> Answer:
         program = self.program("least", exact=True)
-        size = program.greatest(answer.start)
+        size = program.greatest_value(answer.start)
         found = program.solve(answer.start, size=size)
         solve: Callable[..., Answer] = partial(program.solve, size=size)
         if self.normal.outline is not None:
@@ -342,29 +361,33 @@ class Polisher:
             program = refinement.program
 
             def solve(start: Start, *, places: Sequence[FloatArray] | None = None) -> Answer:
-                return refinement.refined(replace(answer, start=start), places=places, size=size)
+                return refinement.refine(replace(answer, start=start), places=places, size=size)
 
             for begin in [found.start, answer.start] if found.feasible else [answer.start]:
                 found = solve(begin)
                 if found.feasible:
                     break
-        return program.exact(found, lambda start, places: solve(start, places=places)) if found.feasible else found
+        return (
+            program.settle_extremes(found, lambda start, places: solve(start, places=places))
+            if found.feasible
+            else found
+        )
 
-    def measured(self, answer: Answer) -> Answer:
-        """Return the answer with the measure between its path and the target as its quality."""
-        curve, _ = self.refinement.traced(*self.refinement.program.at(answer.start))
+    def with_measure(self, answer: Answer) -> Answer:
+        """Return the answer with another quality: the measure of the deviation of its path from the target."""
+        curve, _ = self.refinement.trace(*self.refinement.program.unknowns_and_parameters(answer.start))
         return replace(answer, start=replace(answer.start, quality=self.refinement.measure(curve)))
 
-    def onwards(self, items: Sequence[tuple[Answer, int]]) -> list[Answer]:
-        """Minimise the area or the greatest error, from pairs of an answer and its limit of iterations."""
+    def minimise_measures(self, items: Sequence[tuple[Answer, int]]) -> list[Answer]:
+        """Minimise the area or the greatest error from each answer; ``items`` are pairs of answer and limit of iterations."""
         return [self._minimise_measure(*item) for item in items]
 
     def _minimise_measure(self, answer: Answer, iterations: int) -> Answer:
         if self.normal.outline is not None:
             refinement = self.refinement
-            found = refinement.refined(answer, iterations=iterations)
-            return refinement.program.exact(
-                found, lambda start, places: refinement.refined(replace(answer, start=start), places=places)
+            found = refinement.refine(answer, iterations=iterations)
+            return refinement.program.settle_extremes(
+                found, lambda start, places: refinement.refine(replace(answer, start=start), places=places)
             )
         program = self.program("worst", exact=True)
         size = max(program.value(answer.start), 1e-9)
@@ -378,7 +401,7 @@ class Polisher:
         found = solve(answer.start)
         if not (found.feasible and found.start.quality < size):
             return unchanged
-        return program.exact(found, solve)
+        return program.settle_extremes(found, solve)
 
     @property
     def refinement(self) -> Refinement:
@@ -387,34 +410,34 @@ class Polisher:
             self._refinement = Refinement(self.program("curve", exact=True))
         return self._refinement
 
-    def kept(self, start: Start) -> Answer:
-        """Return a start, not optimised, as an answer that tells whether it meets every constraint and bound."""
+    def judge_start(self, start: Start) -> Answer:
+        """Judge a start as it is: return it as an answer that says whether it meets every constraint and bound."""
         if self.by_least_squares:
-            within = outside(self.normal, self.limits.low, self.limits.high, start).max() <= KEPT
+            within = distances_from_bounds(self.normal, self.limits.low, self.limits.high, start).max() <= KEPT
             quality = sum_of_squares(self.normal, start)
             return replace(
-                Answer.unjoined(start),
-                start=replace(start, q=inside(start.q, self.limits.low, self.limits.high), quality=quality),
+                Answer.for_unjoined_links(start),
+                start=replace(start, q=clip_to_bounds(start.q, self.limits.low, self.limits.high), quality=quality),
                 feasible=within and np.isfinite(quality),
             )
         objective: Objective = "squares" if self.normal.outline is None else "curve"
-        return self.program(objective, exact=True, judged=self.limits.way is not None).kept(start)
+        return self.program(objective, exact=True, judged=self.limits.way is not None).judge_start(start)
 
 
-def violated(
+def worst_violation(
     solution: Solution, bounds: Mapping[str, tuple[float, float]] | None, constraints: Sequence[Constraint | Stroke]
 ) -> str:
-    """Return, as text, which constraint a linkage violates most and by how much; empty if it violates none."""
+    """Return as text which constraint a linkage violates most, and by how much; empty if it violates none."""
     task, linkage = solution.task, solution.linkage
     normal = normal_form(task)
     ratios = [linkage.pivot.ratio] if isinstance(linkage, FiveBar) else []
     (limits,) = limits_by_kind(task, normal, bounds, constraints, [linkage.kind], ratios)
     pivot = limits.second_crank(normal.unit)
-    start = as_start(solution, normal, pivot)
-    answer = Polisher(normal, limits, pivot).kept(start)
+    start = convert_to_start(solution, normal, pivot)
+    answer = Polisher(normal, limits, pivot).judge_start(start)
     if answer.feasible:
         return ""
-    off = outside(normal, limits.low, limits.high, start)
+    off = distances_from_bounds(normal, limits.low, limits.high, start)
     if off.max() <= KEPT:
         return f"{answer.worst} by {answer.excess}"
     name = UNKNOWNS[int(off.argmax())]
@@ -460,7 +483,7 @@ def residuals(
         own = np.column_stack([jacobian[:10, which].T, np.ones(n)])
         own[:, 7] += 0.0 if normal.of_rocker else 1.0
         factor = normal.leverage * root
-        parts.append(factor * wrapped(left))
+        parts.append(factor * wrap_angles(left))
         jacobians.append(factor[:, None] * own)
         rates.append(factor * jacobian[8, which])
     return np.concatenate(parts), np.concatenate(jacobians), np.concatenate(rates)
@@ -479,7 +502,7 @@ def fit_least_squares(normal: Normal, limits: Limits, start: Start) -> Answer:
     """Minimise the squared errors within bounds by SciPy's trust region method, with the exact Jacobian of the kernels."""
     free = np.nonzero(limits.high > limits.low)[0]
     timed, n = normal.timed, normal.n
-    base = inside(start.q, limits.low, limits.high)
+    base = clip_to_bounds(start.q, limits.low, limits.high)
     low, high = limits.low[free], limits.high[free]
     x0 = base[free]
     # strictly inside, as the method asks
@@ -514,7 +537,7 @@ def fit_least_squares(normal: Normal, limits: Limits, start: Start) -> Answer:
         return np.hstack([columns, own])
 
     if not all(np.isfinite(part).all() for part in residuals(normal, start.branch, *unpacked(x0))):
-        return Answer.unjoined(start)
+        return Answer.for_unjoined_links(start)
     result = least_squares(
         value, x0, jac=derivative, bounds=(low, high), x_scale="jac", xtol=1e-12, ftol=1e-13, gtol=1e-13, max_nfev=400
     )

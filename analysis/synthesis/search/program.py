@@ -22,8 +22,8 @@ from linkwork.errors import InputError
 from ...numerics import symbolic
 from ..linkage.linkage import BY_SHORTEST
 from ..task.constraint import UNKNOWNS, half_planes
-from ..task.formula import find_peaks, physical
-from .start import Answer, Start, inside, outside, pivot_size
+from ..task.formula import convert_to_si, find_peaks
+from .start import Answer, Start, clip_to_bounds, distances_from_bounds, pivot_size
 from .statement import FURTHER, GRID, SOUGHT, Statement
 
 FloatArray = NDArray[np.float64]
@@ -52,7 +52,7 @@ class Program(Statement):
 
     @cached_property
     def _initial_values(self) -> Any:
-        """Return the starting values of the auxiliary unknowns, a greatest value or the middle of a range, as a function."""
+        """Return a function that computes the starting values of the auxiliary unknowns: greatest values, middles of ranges."""
         casadi = self._casadi
         return casadi.Function(
             "begin", [self._nlp["x"], self._nlp["p"]], [casadi.vertcat(casadi.SX(0, 1), *self._initial)]
@@ -66,13 +66,16 @@ class Program(Statement):
 
     @cached_property
     def _differentiate(self) -> Any:
-        """Return the gradient of the objective and the Jacobian of the constraints, dense, as a CasADi function."""
+        """Return a CasADi function: the gradient of the objective and the Jacobian of the constraints, both dense."""
         casadi, (x, p, f, g) = self._casadi, (self._nlp[name] for name in "xpfg")
         both = [casadi.densify(casadi.jacobian(e, x)) for e in (casadi.SX(f), g)]
         return casadi.Function("slopes", [x, p], both)
 
-    def stated(self, z: FloatArray, parameters: FloatArray) -> tuple[float, FloatArray]:
-        """Return objective and constraints, with bounds `g_low` and `g_high`, at unknowns and parameters as from `at`."""
+    def evaluate(self, z: FloatArray, parameters: FloatArray) -> tuple[float, FloatArray]:
+        """Return objective and constraints at unknowns z and parameters; the constraints lie in [`g_low`, `g_high`] if met.
+
+        The arguments are those that `unknowns_and_parameters` returns.
+        """
         objective, constraints = self._evaluate(z, parameters)
         return float(objective), np.asarray(constraints).ravel()
 
@@ -92,7 +95,7 @@ class Program(Statement):
 
     @cached_property
     def trace(self) -> Any:
-        """Return a CasADi function: the coupler point, (2, 1), at a fraction of a path's rotation, and its derivatives."""
+        """Return a CasADi function: the coupler point at a fraction of a path's rotation, (2, 1), and its derivatives."""
         casadi, x, p = self._casadi, self._nlp["x"], self._nlp["p"]
         share = casadi.SX.sym("share")
         first, last = self._ends
@@ -116,8 +119,8 @@ class Program(Statement):
         )
         return self._solvers[iterations, near]
 
-    def nearest_pieces(self, q: FloatArray) -> list[list[int]]:
-        """Return the numbers of each region's triangles, the nearest to the pivot first."""
+    def nearest_triangles(self, q: FloatArray) -> list[list[int]]:
+        """Return, for each region, the indices of its triangles, the nearest to the pivot first."""
         order = []
         for name, triangles in self.limits.regions:
             x, y = float(q[0]), float(q[1])
@@ -128,20 +131,20 @@ class Program(Statement):
         return order
 
     def value(self, start: Start) -> float:
-        """Return the objective of a start; infinite if the links cannot be joined."""
-        f = self.stated(*self.at(start))[0]
+        """Return the value of the objective at a start; infinite if the links cannot be joined."""
+        f = self.evaluate(*self.unknowns_and_parameters(start))[0]
         return f if isfinite(f) else inf
 
     @property
-    def own(self) -> int:
-        """Return the index of the unknown that is the greatest value of the function minimised instead of an error."""
+    def greatest_value_index(self) -> int:
+        """Return the index of the unknown that bounds the function that is minimised instead of an error."""
         return len(self.low) - len(self._initial)
 
-    def greatest(self, start: Start) -> float:
-        """Return, at a start, the greatest value of the function that is minimised instead of an error."""
-        return float(np.asarray(self._initial_values(*self.at(start))).ravel()[0])
+    def greatest_value(self, start: Start) -> float:
+        """Return the greatest value, at a start, of the function that is minimised instead of an error."""
+        return float(np.asarray(self._initial_values(*self.unknowns_and_parameters(start))).ravel()[0])
 
-    def at(
+    def unknowns_and_parameters(
         self,
         start: Start,
         *,
@@ -158,7 +161,7 @@ class Program(Statement):
         pivot = np.zeros(count) if len(start.pivot) == 0 else start.pivot
         if len(pivot) != count:
             raise InputError(f"a start with {len(pivot)} unknowns of the pivot: there must be {count}")
-        known = [inside(start.q, self.low[: len(UNKNOWNS)], self.high[: len(UNKNOWNS)]), pivot]
+        known = [clip_to_bounds(start.q, self.low[: len(UNKNOWNS)], self.high[: len(UNKNOWNS)]), pivot]
         direction = 1.0
         if not self.normal.timed:
             if start.rotation is None:
@@ -172,7 +175,7 @@ class Program(Statement):
         if share is None:
             share = cos(pi * harmonics / max(GRID, 16 * harmonics)) if places is None else 1.0 - HELD
         held = [np.zeros(self._peak_count)] * count if places is None else places[:count]
-        chosen = [nearest[0] for nearest in self.nearest_pieces(z)] if pieces is None else pieces
+        chosen = [nearest[0] for nearest in self.nearest_triangles(z)] if pieces is None else pieces
         parameters = np.concatenate(
             [
                 [float(start.branch), direction, size, share],
@@ -213,18 +216,18 @@ class Program(Statement):
         iterations : int
             Limit of iterations.
         pieces : sequence of int, optional
-            Number of the triangle of each region in which the pivot must lie; by default the nearest.
+            Index of the triangle of each region in which the pivot must lie; by default the nearest.
         places : sequence of ndarray, optional
             Rotations of `extremes` at which the bounds of the pivot's motion are imposed. Without them the bounds are imposed
             on a grid, with a margin that guarantees them everywhere.
         """
-        z0, parameters = self.at(start, size=size, pieces=pieces, places=places)
-        if not all(np.isfinite(value).all() for value in self.stated(z0, parameters)):
-            return Answer.unjoined(start)
+        z0, parameters = self.unknowns_and_parameters(start, size=size, pieces=pieces, places=places)
+        if not all(np.isfinite(value).all() for value in self.evaluate(z0, parameters)):
+            return Answer.for_unjoined_links(start)
         solver = self._solver(iterations, places is not None)
         result = solver(x0=z0, lbx=self.low, ubx=self.high, lbg=self.g_low, ubg=self.g_high, p=parameters)
         stats = solver.stats()
-        answer = self.judged(np.asarray(result["x"]).ravel(), parameters, start)
+        answer = self.judge_unknowns(np.asarray(result["x"]).ravel(), parameters, start)
         return replace(
             answer,
             converged=bool(stats["success"]),
@@ -232,9 +235,12 @@ class Program(Statement):
             iterations=int(stats["iter_count"]),
         )
 
-    def judged(self, z: FloatArray, parameters: FloatArray, start: Start) -> Answer:
-        """Evaluate unknowns, and return the answer. CasADi's own values are not used: if IPOPT ends at NaN, they are zero."""
-        f, g = self.stated(z, parameters)
+    def judge_unknowns(self, z: FloatArray, parameters: FloatArray, start: Start) -> Answer:
+        """Return the answer that the unknowns z, reached from ``start``, stand for.
+
+        The program is evaluated anew, because CasADi's own values are zero if IPOPT ends at NaN.
+        """
+        f, g = self.evaluate(z, parameters)
         over = np.maximum(self.g_low - g, g - self.g_high) if np.isfinite(g).all() else np.full(len(g), inf)
         violation = float(over.max(initial=0.0))
         worst = self.labels[int(np.argmax(over))] if len(over) else None
@@ -247,7 +253,7 @@ class Program(Statement):
             converged=True,
             violation=violation,
             worst=worst.name if worst else "",
-            excess=worst.measured(violation, z) if worst else "",
+            excess=worst.format_violation(violation, z) if worst else "",
             status="",
             iterations=0,
         )
@@ -267,29 +273,30 @@ class Program(Statement):
             linkage=start.linkage,
         )
 
-    def kept(self, start: Start) -> Answer:
-        """Return a start, not optimised, as an answer: whether it meets every constraint and bound, and its worst violation."""
+    def judge_start(self, start: Start) -> Answer:
+        """Judge a start as it is: return it as an answer, with whether it meets all constraints and its worst violation."""
         places = self.extremes(start)
         ways = product(*(range(len(triangles)) for _, triangles in self.limits.regions))
         best: Answer | None = None
         for way in ways:
-            z, parameters = self.at(start, pieces=way, places=places, share=1.0)
-            answer = self.judged(z, parameters, start)
+            z, parameters = self.unknowns_and_parameters(start, pieces=way, places=places, share=1.0)
+            answer = self.judge_unknowns(z, parameters, start)
             if best is None or answer.violation < best.violation:
                 best = answer
         assert best is not None
         pivot = float(np.abs(best.start.pivot - start.pivot).max(initial=0.0))
-        within = max(outside(self.normal, self.low, self.high, start).max(), pivot) <= KEPT
+        within = max(distances_from_bounds(self.normal, self.low, self.high, start).max(), pivot) <= KEPT
         return replace(best, feasible=best.feasible and within)
 
-    def exact(self, answer: Answer, solve: Callable[[Start, Sequence[FloatArray]], Answer]) -> Answer:
-        """Solve repeatedly, with bounds imposed at the extremes of the last solution, until the pivot's motion settles.
+    def settle_extremes(self, answer: Answer, solve: Callable[[Start, Sequence[FloatArray]], Answer]) -> Answer:
+        """Solve repeatedly, each time with bounds at the extremes of the previous solution, until the pivot's motion settles.
 
-        The extremes are those of the pivot's motion, and of functions that are bounded along the crank's rotation.
+        The extremes are those of the pivot's motion, and of functions that are bounded along the crank's rotation. ``solve``
+        returns an answer from a start and its extremes.
         """
         if not (self._peaks or self._along_functions):
             return answer
-        first = self.kept(answer.start) if self._along_functions else answer
+        first = self.judge_start(answer.start) if self._along_functions else answer
         least = first if self.objective in SOUGHT else answer
 
         def better(found: Answer) -> Answer:
@@ -301,13 +308,13 @@ class Program(Statement):
             if not following.feasible:
                 return replace(answer, feasible=first.feasible)
             now, before = following, now
-            kept = self.kept(now.start)
+            kept = self.judge_start(now.start)
             if kept.feasible and np.abs(now.start.pivot - before.start.pivot).max(initial=0.0) <= KEPT:
                 return better(now)
         return better(now) if kept.feasible else replace(answer, feasible=first.feasible)
 
     def extremes(self, start: Start) -> list[FloatArray]:
-        """Return the crank rotations at which the bounded motions of the pivot, and the functions `Along`, are extreme.
+        """Return the crank rotations at which bounded motions of the pivot, or functions `RotationRequirement`, are extreme.
 
         Extremes of a motion or of one of its derivatives are roots of the next derivative, a trigonometric polynomial.
         """
@@ -325,9 +332,9 @@ class Program(Statement):
         return found + self._peak_rotations(start)
 
     def _peak_rotations(self, start: Start) -> list[FloatArray]:
-        """Return the rotations at which each function `Along` has its greatest values; see `find_peaks`."""
+        """Return the rotations at which each function `RotationRequirement` has its greatest values; see `find_peaks`."""
         values = dict(zip(UNKNOWNS, start.q.tolist())) | {"branch": float(start.branch)}
-        p = physical(SimpleNamespace(**values), self.normal.unit, self.normal.origin)
+        p = convert_to_si(SimpleNamespace(**values), self.normal.unit, self.normal.origin)
         return [find_peaks(along, p, FURTHER) for along, _ in self._along_functions]
 
 

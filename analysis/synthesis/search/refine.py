@@ -18,10 +18,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import isotonic_regression, minimize
 
-from ...numerics.overlap import nearest, symmetric_difference
+from ...numerics.overlap import find_nearest, symmetric_difference
 from ..result.solution import CURVE
 from ..task.constraint import UNKNOWNS
-from ..task.target import TargetPath, hausdorff, ring
+from ..task.target import TargetPath, closed_vertices, hausdorff
 from .program import Program
 from .start import Answer, Start
 
@@ -43,7 +43,7 @@ WITHIN = 1e-5
 PHASE = UNKNOWNS.index("crank_phase")
 
 
-class Near(NamedTuple):
+class Distances(NamedTuple):
     """Distances between points of curve and target, with their derivatives with respect to the curve's points.
 
     Attributes
@@ -79,17 +79,17 @@ class Refinement:
         self._scale = float(weights[0]) if even else 1.0
         self._by_area = normal.closed and even
         self._outline = _coordinates(normal.outline)
-        self._line, self._weights = divided(normal.outline, weights / self._scale, normal.closed)
+        self._line, self._weights = cut_into_pieces(normal.outline, weights / self._scale, normal.closed)
         self.free = np.nonzero(program.high > program.low)[0]
         if normal.closed and program.pivot is None:
             self.free = self.free[self.free != PHASE]
         if self.limit is not None:
-            self.free = self.free[self.free != program.own]
+            self.free = self.free[self.free != program.greatest_value_index]
 
     # The measure
 
-    def traced(self, z: FloatArray, parameters: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Return the curve's points, shape (2, n), and their derivatives with respect to the unknowns, shape (2, n, k)."""
+    def trace(self, z: FloatArray, parameters: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Compute the curve's points, shape (2, n), and their derivatives with respect to the unknowns, shape (2, n, k)."""
         place, slopes = self._trace(z, parameters, self._shares)
         return np.ascontiguousarray(place), np.asarray(slopes).reshape(2, CURVE, len(z))
 
@@ -108,10 +108,10 @@ class Refinement:
             area = symmetric_difference(curve, self._outline, gradient)
             return self._scale * area, self._scale * gradient
         closed = self.normal.closed
-        steps = np.diff(ring(curve.T, closed), axis=0).T
+        steps = np.diff(closed_vertices(curve.T, closed), axis=0).T
         lengths = np.maximum(np.hypot(*steps), 1e-300)
         missed, away = self.both_distances(curve)
-        w = self._weights * np.hypot(*np.diff(ring(self._line.T, closed), axis=0).T)
+        w = self._weights * np.hypot(*np.diff(closed_vertices(self._line.T, closed), axis=0).T)
         v = self._weights[_nearest(_midpoints(curve, closed), self._line, closed)[1]]
         for near, weight in ((missed, w), (away, v * lengths)):
             np.add.at(gradient.T, near.before, (weight * near.early).T)
@@ -123,7 +123,7 @@ class Refinement:
         total = float(w @ missed.distance + (v * lengths) @ away.distance)
         return 0.5 * self._scale * total, 0.5 * self._scale * gradient
 
-    def both_distances(self, curve: FloatArray) -> tuple[Near, Near]:
+    def both_distances(self, curve: FloatArray) -> tuple[Distances, Distances]:
         """Compute the distances of the target's pieces from the curve, and of the curve's pieces from the target.
 
         A piece is represented by its middle; if the greatest distance is minimised, the target's corners count as well.
@@ -135,28 +135,31 @@ class Refinement:
             middles = np.hstack([self._outline, middles])
         distance, before, share, foot = _nearest(middles, curve, closed)
         along = (foot - middles) / np.maximum(distance, 1e-300)
-        missed = Near(distance, before, (before + 1) % n, (1.0 - share) * along, share * along)
+        missed = Distances(distance, before, (before + 1) % n, (1.0 - share) * along, share * along)
         middles = _midpoints(curve, closed)
         distance, _, _, foot = _nearest(middles, self._line, closed)
         half = 0.5 * (middles - foot) / np.maximum(distance, 1e-300)
         before = np.arange(len(distance))
-        return missed, Near(distance, before, (before + 1) % n, half, half)
+        return missed, Distances(distance, before, (before + 1) % n, half, half)
 
     # Minimisation
 
     def value(self, z: FloatArray, parameters: FloatArray, curve: FloatArray) -> float:
-        """Return the measure; if it is only bounded, the program's objective, infinite if the bound is exceeded."""
+        """Return the value that is minimised: the measure or, if that is only bounded, the program's objective.
+
+        The result is infinite if the bound is exceeded.
+        """
         if self.limit is None:
             return self.measure(curve)
-        return self.program.stated(z, parameters)[0] if self.over(curve) <= WITHIN * self.limit else inf
+        return self.program.evaluate(z, parameters)[0] if self.excess_over_bound(curve) <= WITHIN * self.limit else inf
 
-    def over(self, curve: FloatArray) -> float:
-        """Return the excess of the greatest distance over its bound (units)."""
+    def excess_over_bound(self, curve: FloatArray) -> float:
+        """Return by how much the greatest distance exceeds its bound (units), negative within it."""
         if self.limit is None or not np.isfinite(curve).all():
             return inf
         return hausdorff(curve.T, self._target, closed=self.normal.closed) - self.limit
 
-    def refined(
+    def refine(
         self,
         answer: Answer,
         *,
@@ -164,28 +167,28 @@ class Refinement:
         places: Sequence[FloatArray] | None = None,
         size: float = 1.0,
     ) -> Answer:
-        """Minimise the measure near an answer, and return the best answer that meets the constraints, or the first one."""
+        """Minimise the measure near an answer; return the best answer that meets the constraints, or else the given one."""
         program = self.program
-        z0, parameters = program.at(answer.start, places=places, size=size)
-        curve, slopes = self.traced(z0, parameters)
+        z0, parameters = program.unknowns_and_parameters(answer.start, places=places, size=size)
+        curve, slopes = self.trace(z0, parameters)
         first = self.value(z0, parameters, curve)
         if not (np.isfinite(self.measure(curve)) and np.isfinite(slopes).all()):
             return replace(answer, feasible=False)
-        unchanged = program.judged(z0, parameters, answer.start)
+        unchanged = program.judge_unknowns(z0, parameters, answer.start)
         best = [(first if unchanged.feasible else inf, z0)]
 
         def seen(z: FloatArray) -> None:
             value = self.value(z, parameters, down.curve(z)[0])
-            if value < best[0][0] and program.judged(z, parameters, answer.start).feasible:
+            if value < best[0][0] and program.judge_unknowns(z, parameters, answer.start).feasible:
                 best[0] = (value, z)
 
         for some in self._distance_choices():
             z = best[0][1]
-            curve, slopes = self.traced(z, parameters)
+            curve, slopes = self.trace(z, parameters)
             scale = max(self.measure(curve), 1e-9)
             if self.limit is not None:
                 # the path is judged at other points of the curves: tighten the bound by the excess
-                scale *= self.limit / (self.limit + self.over(curve))
+                scale *= self.limit / (self.limit + self.excess_over_bound(curve))
             down = _Descent(self, z, parameters, self._scaled_directions(curve, slopes), scale, some(curve))
             found = minimize(
                 down.value, down.begin(), jac=True, method="SLSQP", constraints=down.constraints(),
@@ -195,15 +198,15 @@ class Refinement:
             seen(down.unknowns(found.x))
         value, z = best[0]
         if not np.isfinite(value):
-            more = {} if self.limit is None or not unchanged.feasible else program.excess(self.over(curve))
+            more = {} if self.limit is None or not unchanged.feasible else program.excess(self.excess_over_bound(curve))
             return replace(unchanged, feasible=False, start=replace(answer.start, quality=first), **more)
-        ended = program.judged(z, parameters, answer.start)
+        ended = program.judge_unknowns(z, parameters, answer.start)
         quality = value if self.limit is None else ended.start.quality
         start = replace(ended.start, rotation=self.met(ended.start, z, parameters), quality=quality)
         return replace(ended, start=start, converged=bool(found.success), iterations=int(found.nit))
 
     def _distance_choices(self) -> Sequence[Callable[[FloatArray], Sequence[Any]]]:
-        """Return, for each round, a function that chooses the distances to constrain: first a few, then the large ones."""
+        """Return, for each round, a function that chooses the distances to be constrained: first a few, then the large ones."""
         if self.normal.quality != "worst":
             return (lambda _: (),)
 
@@ -231,14 +234,14 @@ class Refinement:
         return stretch
 
     def met(self, start: Start, z: FloatArray, parameters: FloatArray) -> FloatArray:
-        """Find, by dynamic programming, the crank rotations, in order, at which the curve is nearest to the stations."""
+        """Find the crank rotations in order at which the curve is nearest to the stations, by dynamic programming."""
         normal, program = self.normal, self.program
         assert normal.points is not None
         assert start.rotation is not None
         rotation, forward = program.stations(z, parameters), copysign(1.0, start.rotation[-1] - start.rotation[0])
         if normal.straight is not None:
             return rotation
-        curve = self.traced(z, parameters)[0].T @ np.array([1.0, 1j])
+        curve = self.trace(z, parameters)[0].T @ np.array([1.0, 1j])
         turn = self._shares * 2.0 * pi
         if normal.closed:
             # from the point nearest to the first station, all the way round
@@ -288,13 +291,13 @@ class _Descent:
         self._z0, self._stretch, self._size = z0, size * stretch, size
         if refinement.limit is not None:
             # the unknown that is minimised is a direction of its own
-            self._stretch = np.column_stack([self._stretch, np.eye(len(z0))[refinement.program.own]])
+            self._stretch = np.column_stack([self._stretch, np.eye(len(z0))[refinement.program.greatest_value_index]])
         self._chosen = some
         self._bounds_distances = refinement.normal.quality == "worst"
         self._bound_unknown = self._bounds_distances and refinement.limit is None
         # SLSQP asks for each twice at the same unknowns: for the measure and for the constraints
-        self.curve = _cache_last(lambda z: refinement.traced(z, parameters))
-        self._evaluate = _cache_last(lambda z: refinement.program.stated(z, parameters))
+        self.curve = _cache_last(lambda z: refinement.trace(z, parameters))
+        self._evaluate = _cache_last(lambda z: refinement.program.evaluate(z, parameters))
         self._differentiate = _cache_last(lambda z: refinement.program.gradient_and_jacobian(z, parameters))
 
     def begin(self) -> FloatArray:
@@ -322,8 +325,8 @@ class _Descent:
         whole = np.einsum("an,ank->k", gradient, slopes) + self._differentiate(z)[0]
         return (area + added) / self._size, whole @ self._stretch / self._size
 
-    def _bounded_distances(self, z: FloatArray) -> list[tuple[Near, Any]]:
-        """Return the two sets of distances of `Refinement.apart`, each with the indices of those that are bounded."""
+    def _bounded_distances(self, z: FloatArray) -> list[tuple[Distances, Any]]:
+        """Return the two sets of distances of `Refinement.both_distances`, each with the indices of the bounded ones."""
         return list(zip(self._refinement.both_distances(self.curve(z)[0]), self._chosen))
 
     def constraints(self) -> list[dict[str, Any]]:
@@ -382,7 +385,7 @@ class _Descent:
 
 
 def _cache_last(function: Callable[[FloatArray], Made]) -> Callable[[FloatArray], Made]:
-    """Return the function with a cache of its last value, for a second call with the same unknowns."""
+    """Return a function that keeps the last value of ``function``, for a second call with the same unknowns."""
     last: list[tuple[bytes, Made]] = []
 
     def called(z: FloatArray) -> Made:
@@ -410,12 +413,14 @@ def _nearest(
     """Return each point's distance from a polyline, its nearest piece, the fraction along this piece, and the nearest point."""
     count = points.shape[1]
     distance, piece, share = np.empty(count), np.empty(count, dtype=np.int64), np.empty(count)
-    nearest(points, line, closed, distance, piece, share)
+    find_nearest(points, line, closed, distance, piece, share)
     foot = (1.0 - share) * line[:, piece] + share * line[:, (piece + 1) % line.shape[1]]
     return distance, piece, share, foot
 
 
-def divided(outline: NDArray[np.complex128], weights: FloatArray, closed: bool) -> tuple[FloatArray, FloatArray]:
+def cut_into_pieces(
+    outline: NDArray[np.complex128], weights: FloatArray, closed: bool
+) -> tuple[FloatArray, FloatArray]:
     """Cut the segments of an outline into short pieces; return their ends, rows x, y, and the weight of each piece."""
     points = np.append(outline, outline[0]) if closed else outline
     around = np.append(weights, weights[0]) if closed else weights

@@ -84,7 +84,7 @@ class _FourBarShapes:
 
     @staticmethod
     def meet_transmission(shapes: FloatArray, links: FloatArray, limits: Limits, least: float) -> NDArray[np.bool_]:
-        """Return which shapes meet the least transmission angle over a turn."""
+        """Return for each shape whether it meets the least transmission angle (rad) over a turn."""
         l1, l2, l3, l4, _ = links.T
         ends = (l1 - l2) ** 2, (l1 + l2) ** 2
         excess = limits.linkage.transmission_excess(l3, l4, *ends, cos(max(least, TURNING)))
@@ -93,7 +93,7 @@ class _FourBarShapes:
 
     @staticmethod
     def ratios(start: Start) -> FloatArray:
-        """Return the ratios by which starts are distinguished."""
+        """Return the ratios of links by which starts are distinguished."""
         ratios: FloatArray = start.q[3:6] / start.q[2]
         return ratios
 
@@ -124,7 +124,7 @@ class _FiveBarShapes(_FourBarShapes):
 
     @staticmethod
     def meet_transmission(shapes: FloatArray, links: FloatArray, limits: Limits, least: float) -> NDArray[np.bool_]:
-        """Return which shapes meet the least transmission angle at `AROUND` rotations.
+        """Return for each shape whether it meets the least transmission angle (rad) at `AROUND` rotations.
 
         Some rotations are tried first, and the others only for the shapes that are left.
         """
@@ -212,7 +212,7 @@ def _merge_chunks(chunks: Iterator[FloatArray]) -> Iterator[FloatArray]:
 
 
 def _impossible_limit(limits: Limits, seed: int) -> str:
-    """Return, in words, the limit that alone leaves no shape, or all limits if only together they leave none."""
+    """Describe in words the limit that alone leaves no shape, or all limits if only all together leave none."""
     free = replace(limits, low=np.full(len(limits.low), 1e-9), high=np.full(len(limits.high), 1e9))
     alone = {"is within the bounds of the links": replace(limits, turn=None, grashof=None)}
     if limits.turn is not None:
@@ -245,7 +245,7 @@ def _ratio_ranges(limits: Limits) -> FloatArray:
 
 
 def _is_allowed(shapes: FloatArray, limits: Limits) -> NDArray[np.bool_]:
-    """Return which shapes meet transmission angle and Grashof type and, for some size, the bounds of their links."""
+    """Return for each shape whether it meets transmission angle, Grashof type and, for some size, the bounds of its links."""
     sized = _SHAPES[limits.linkage.kind].links(shapes, limits)
     links = sized[:, :4]
     allowed = np.ones(len(shapes), dtype=bool)
@@ -308,7 +308,7 @@ def _directions(
 ) -> tuple[ComplexArray, ComplexArray]:
     """Compute the directions of coupler and rocker, complex, shape (m, n), at n crank rotations of m shapes.
 
-    Each shape may have its own rotation ``turned``, from which the others are counted.
+    Each shape may have its own rotation ``turned`` (rad), which is added to all of its rotations.
     """
     first, second = limits.gears
     links = _SHAPES[limits.linkage.kind].links(shapes, limits)

@@ -21,9 +21,9 @@ from ..exact.quick_return import QuickReturn, QuickSwing, quick_returns
 from ..linkage.kind import Kind
 from ..linkage.linkage import UNITS, Linkage
 from ..linkage.pivot import PivotUnknown
-from ..result.alike import grouped
+from ..result.alike import group_similar
 from ..result.report import solution_columns
-from ..result.solution import Solution, ranked
+from ..result.solution import Solution, rank_solutions
 from ..task.constraint import (
     USUAL,
     Constraint,
@@ -34,17 +34,17 @@ from ..task.constraint import (
     MaxPinForce,
     Stroke,
 )
-from ..task.limits import GEARS, Limits, as_asked, limits_by_kind, make_limits, usual_kinds
-from ..task.task import Normal, Task, UntimedPath, normal_form, reweighted
-from .polish import EXACT, Polished, distinct, infeasible, kept_answers, polish
+from ..task.limits import GEARS, Limits, limits_by_kind, make_limits, place_as_task, usual_kinds
+from ..task.task import Normal, Task, UntimedPath, normal_form, replace_weights
+from .polish import EXACT, Polished, distinct_answers, feasible_answers, infeasible_error, polish
 from .scan import scan
 from .start import (
     QUICK_SEARCH,
     USUAL_SEARCH,
     Answer,
     Search,
-    as_start,
-    closed_form,
+    closed_form_solutions,
+    convert_to_start,
     make_linkage,
     random_pivot,
 )
@@ -190,7 +190,7 @@ def synthesize(
     if search.starts < 1:
         raise InputError(f"{search.starts} starts: there must be at least one")
     begun = perf_counter()
-    task = reweighted(task, weights)
+    task = replace_weights(task, weights)
     kinds = usual_kinds(task) if kinds is None else kinds
     if isinstance(task, QuickReturn | QuickSwing):
         return _solve_in_closed_form(task, bounds, constraints, kinds, search, begun)
@@ -205,15 +205,15 @@ def synthesize(
                 f"guess {number} is a {guess.verdicts.grashof}: it must be of the kinds that are asked for"
             )
     found: list[tuple[Solution, ...]] = []
-    exact = closed_form(task) if pivot is None else ()
-    done, refused, total = Polished.of((), (), False), None, 0
+    exact = closed_form_solutions(task) if pivot is None else ()
+    done, refused, total = Polished.from_answers((), (), False), None, 0
     for limits in every:
         own = pivot or limits.second_crank(normal.unit)
         given = [guess for guess in (*guesses, *exact) if limits.admits(guess.linkage)]
         # the ratios of gears share the starts and the candidates of a kind
         share = 1 if limits.second is None else len(gears)
         how = replace(search, starts=-(-search.starts // share), candidates=-(-search.candidates // share))
-        total += (len(given) + how.starts) * (1 if limits.sound(normal) is None else 2)
+        total += (len(given) + how.starts) * (1 if limits.without_defects(normal) is None else 2)
         try:
             part = _search_kind(normal, limits, given, own, how)
         except InfeasibleError as error:
@@ -222,7 +222,7 @@ def synthesize(
         except KeyboardInterrupt:
             done = replace(done, interrupted=True)
             break
-        done = done.merged(part)
+        done = done.merge(part)
         found.append(make_solutions(task, normal, limits, part, own, search.solutions))
         if done.interrupted:
             break
@@ -243,7 +243,7 @@ def _solve_in_closed_form(
     if tuple(kinds) != usual_kinds(task):
         of = "slider of a slider-crank" if isinstance(task, QuickReturn) else "rocker of a four-bar"
         raise InputError(f"a {type(task).__name__} is of the {of}: kinds must be {usual_kinds(task)}")
-    found = grouped(quick_returns(task, bounds, constraints))[: search.solutions]
+    found = group_similar(quick_returns(task, bounds, constraints))[: search.solutions]
     seconds = perf_counter() - begun
     return Synthesis(
         task=task, solutions=found, method="closed form", seed=search.seed, starts=len(found), seconds=seconds
@@ -257,7 +257,7 @@ def _search_kind(
 
     Linkages without defects rank first: if the limits do not exclude defects, a second search excludes them.
     """
-    begin = [as_start(guess, normal, pivot) for guess in guesses]
+    begin = [convert_to_start(guess, normal, pivot) for guess in guesses]
     random = np.random.default_rng(search.seed)
     again = AGAIN if normal.exact and not normal.timed and normal.n <= MOST_EXACT else 1
     scanned = scan(normal, limits, seed=search.seed, candidates=search.candidates, starts=again * search.starts)
@@ -267,22 +267,22 @@ def _search_kind(
     rest, met = scanned[search.starts :], bool(done.kept) and done.kept[0].start.quality < EXACT
     if rest and not met and not done.interrupted:
         more = polish(normal, limits, rest, pivot=pivot, search=search)
-        done = replace(done.merged(more), kept=tuple(kept_answers([*done.kept, *more.kept])))
-    sound = limits.sound(normal)
+        done = replace(done.merge(more), kept=tuple(feasible_answers([*done.kept, *more.kept])))
+    sound = limits.without_defects(normal)
     if done.interrupted or sound is None:
         return done
     try:
-        return _search_kind(normal, sound, guesses, pivot, search).merged(done)
+        return _search_kind(normal, sound, guesses, pivot, search).merge(done)
     except InfeasibleError:
         return done
 
 
 def _merge_kinds(found: Sequence[Sequence[Solution]], count: int) -> tuple[Solution, ...]:
     """Return the best ``count`` solutions, which include the best one of each kind."""
-    every = ranked([s for part in found for s in part])
+    every = rank_solutions([s for part in found for s in part])
     first = {s.linkage.kind: s for s in reversed(every)}.values()
     rest = [s for s in every if not any(s is best for best in first)]
-    return ranked([*ranked(list(first))[:count], *rest[: max(0, count - len(first))]])
+    return rank_solutions([*rank_solutions(list(first))[:count], *rest[: max(0, count - len(first))]])
 
 
 @in_si(bounds=UNITS)
@@ -297,7 +297,7 @@ def improve(
     kept: Collection[str] = (),
     search: Search = USUAL_SEARCH,
 ) -> Synthesis:
-    """Search from a linkage with a moving rocker pivot: from ``search.starts`` random motions of the pivot and from guesses.
+    """Let the rocker pivot of a linkage move: optimise from ``search.starts`` random motions of the pivot, and from guesses.
 
     Parameters
     ----------
@@ -320,7 +320,7 @@ def improve(
     task = _prepare_task(task, constraints, pivot)
     normal = search_form(task, pivot)
     limits = make_limits(task, normal, bounds, constraints)
-    base, *begin = (as_start(of, normal, pivot) for of in (linkage, *guesses))
+    base, *begin = (convert_to_start(of, normal, pivot) for of in (linkage, *guesses))
     random = np.random.default_rng(search.seed)
     begin += [replace(base, pivot=random_pivot(pivot, base.q[2], normal.unit, random)) for _ in range(search.starts)]
     done = polish(normal, limits, begin, pivot=pivot, search=search)
@@ -328,7 +328,7 @@ def improve(
     same: dict[str, Any] = {name: getattr(given, name) for name in kept}
 
     def put_back(s: Solution) -> Solution:
-        made = Solution.of(task, replace(s.linkage, **same), s.evaluation.rotation)
+        made = Solution.from_linkage(task, replace(s.linkage, **same), s.evaluation.rotation)
         return replace(made, variants=tuple(map(put_back, s.variants)))
 
     found = tuple(map(put_back, make_solutions(task, normal, limits, done, pivot, search.solutions)))
@@ -364,7 +364,7 @@ def _make_result(
     if done.interrupted:
         raise SynthesisInterrupted(result if found else None, done.done, total)
     if not found:
-        raise infeasible(done)
+        raise infeasible_error(done)
     return result
 
 
@@ -382,9 +382,9 @@ def make_solutions(
 
     def made(answers: Sequence[Answer]) -> tuple[Solution, ...]:
         found = (
-            Solution.of(
+            Solution.from_linkage(
                 task,
-                as_asked(task, make_linkage(a.start, normal, pivot, limits)),
+                place_as_task(task, make_linkage(a.start, normal, pivot, limits)),
                 _task_rotations(task, normal, a.start.rotation),
             )
             for a in answers
@@ -393,14 +393,14 @@ def make_solutions(
         if limits.least is not None:
             # in the order of the function that is minimised instead of an error
             return tuple(sorted(there, key=lambda s: not s.verdicts.sound))
-        return ranked(there)
+        return rank_solutions(there)
 
-    solutions = made(distinct(done.kept, 4 * count, pivot))
+    solutions = made(distinct_answers(done.kept, 4 * count, pivot))
     # the best start is a solution itself if it is better than all answers
     first = made(done.begun)[:1] if limits.least is None else ()
-    if first and ranked([*solutions[:1], *first])[0] is first[0]:
-        solutions = ranked([*first, *solutions])
-    return grouped(solutions)[:count]
+    if first and rank_solutions([*solutions[:1], *first])[0] is first[0]:
+        solutions = rank_solutions([*first, *solutions])
+    return group_similar(solutions)[:count]
 
 
 def _task_rotations(task: Task, normal: Normal, rotation: NDArray[np.float64] | None) -> NDArray[np.float64] | None:
@@ -453,7 +453,7 @@ class TradeOff:
         return write_csv(path, self.columns())
 
 
-class Over(NamedTuple):
+class TradedQuantity(NamedTuple):
     """The quantity traded against the error: name and SI unit of its limit, and whether a smaller limit is tighter."""
 
     name: str
@@ -461,10 +461,10 @@ class Over(NamedTuple):
     small: bool
 
 
-OVER: Mapping[str, Over] = {
-    "size": Over("largest link", "m", True),
-    "transmission": Over("least transmission angle", "rad", False),
-    "pin-force": Over("greatest pin force", "N", True),
+OVER: Mapping[str, TradedQuantity] = {
+    "size": TradedQuantity("largest link", "m", True),
+    "transmission": TradedQuantity("least transmission angle", "rad", False),
+    "pin-force": TradedQuantity("greatest pin force", "N", True),
 }
 
 
@@ -553,9 +553,9 @@ def solve_both_ways(
     Parameters
     ----------
     order : sequence of int
-        Numbers of the problems, the loosest first.
+        Indices of the problems, the loosest first.
     search : callable
-        Function of a problem's number, guesses, and whether it is the way back; returns solutions or raises `InfeasibleError`.
+        Function of a problem's index, guesses, and whether it is the way back; returns solutions or raises `InfeasibleError`.
     begin : sequence of Solution
         Guesses for the first problem.
 
@@ -585,7 +585,7 @@ def solve_both_ways(
                 last = error.synthesis if isinstance(error, SynthesisInterrupted) else None
                 result, done = last.solutions if last else (), back * len(order) + number
             if result or kept:
-                found[k] = ranked([*kept, *result])[0]
+                found[k] = rank_solutions([*kept, *result])[0]
                 previous = [found[k]] if back else list(result)
             if done is not None:
                 return found, done

@@ -149,7 +149,7 @@ class Answer:
 
     @classmethod
     def for_unjoined_links(cls, start: Start) -> Answer:
-        """Return the answer for a start whose links cannot be joined."""
+        """Return an infeasible answer for a start whose links cannot be joined."""
         return cls(
             start=replace(start, quality=inf),
             feasible=False,
@@ -185,7 +185,7 @@ def random_pivot(unknown: PivotUnknown, ground: float, unit: float, random: np.r
 
 
 def pivot_size(pivot: PivotUnknown | None) -> int:
-    """Return the number of the pivot's unknowns."""
+    """Return how many unknowns a moving pivot has."""
     if pivot is None:
         return 0
     return 2 + 2 * pivot.harmonics

@@ -17,9 +17,9 @@ from numpy.typing import NDArray
 
 from ...numerics import symbolic
 from ..linkage.linkage import Linkage
-from ..linkage.pivot import CrankUnknown, PivotUnknown, SliderUnknown, geared
-from ..task.constraint import TURNING, UNKNOWNS, Along, Least, Require
-from ..task.formula import physical, traced
+from ..linkage.pivot import CrankUnknown, PivotUnknown, SliderUnknown, gear_turns
+from ..task.constraint import TURNING, UNKNOWNS, MinimisedFunction, Require, RotationRequirement
+from ..task.formula import convert_to_si, trace_requirement
 from ..task.limits import Limits
 from ..task.task import Normal, turn
 from .start import pivot_bounds
@@ -44,7 +44,7 @@ GAP = 8.0
 SOUGHT = ("least", "least curve")
 #: Name of the bound of the greatest error; fraction of it that smooths the absolute value at an error of zero.
 ERROR, SMOOTH = "bound of the greatest error", 1e-3
-#: Number of further rotations at which an `Along` is bounded: those of its greatest values in the previous solution.
+#: Number of further rotations at which a `RotationRequirement` is bounded: those of its peaks in the previous solution.
 FURTHER = 8
 
 
@@ -59,8 +59,11 @@ class Label(NamedTuple):
     unit: str
     linkage: type[Linkage] = Linkage
 
-    def measured(self, violation: float, q: FloatArray) -> str:
-        """Format a violation with its unit; that of a transmission angle as degrees below its limit, for the unknowns q."""
+    def format_violation(self, violation: float, q: FloatArray) -> str:
+        """Format a violation with its unit; that of a transmission angle is given in degrees below its limit.
+
+        The unknowns q determine how the transmission angle follows from the violation.
+        """
         if self.unit == "transmission":
             least = self.factor
             cosine = cos(least) + violation / float(self.linkage.excess_slope(q[4], q[5], cos(least)))
@@ -105,7 +108,7 @@ class Statement:
         self.normal, self.limits, self.pivot, self.objective = normal, limits, pivot, objective
         self._judged, self._parts = judged, max(PARTS, -(-JUDGED // normal.n)) if judged else PARTS
         #: Turns of the crank, and of a second crank, per turn of the input shaft.
-        self._turns = geared(pivot.ratio) if isinstance(pivot, CrankUnknown) else (1, 0)
+        self._turns = gear_turns(pivot.ratio) if isinstance(pivot, CrankUnknown) else (1, 0)
         casadi = self._casadi = symbolic.library()
         SX = casadi.SX
         self._unknowns: list[tuple[Any, FloatArray, FloatArray]] = []
@@ -116,7 +119,7 @@ class Statement:
         self._peak_count = 2 * pivot.harmonics if pivot is not None and exact else 0
         self._peak_derivatives: list[Any] = []
         #: Functions bounded along the crank's rotation, and parameters for the further rotations at which they are bounded.
-        self._along_functions: list[tuple[Along, Any]] = []
+        self._along_functions: list[tuple[RotationRequirement, Any]] = []
         self._constraints: list[tuple[Any, float, float, Label]] = []
         self.knots: list[int] = list(range(normal.n))
         self._solvers: dict[tuple[int, bool], Any] = {}
@@ -176,32 +179,35 @@ class Statement:
         self._nlp = {"x": casadi.vertcat(*z), "f": quality, "g": g, "p": parameters}
 
     def _unknown(self, name: str, low: FloatArray, high: FloatArray) -> Any:
-        """Add a column of unknowns between bounds."""
+        """Add a column of unknowns between bounds, and return its symbols."""
         symbol = self._casadi.SX.sym(name, len(low))
         self._unknowns.append((symbol, low, high))
         return symbol
 
     def _auxiliary(self, name: str, initial: Any, low: float = -inf, high: float = inf) -> Any:
-        """Add an auxiliary unknown, such as a greatest value or the middle of a range, with its starting value."""
+        """Add an auxiliary unknown, such as a greatest value or the middle of a range, and return its symbol.
+
+        ``initial`` is its starting value.
+        """
         self._initial.append(initial)
         return self._unknown(name, np.array([low]), np.array([high]))
 
     @property
-    def least(self) -> Least:
+    def least(self) -> MinimisedFunction:
         """Return the function that is minimised instead of an error."""
         assert self.limits.least is not None
         return self.limits.least
 
     def _trace(self, require: Require, p: Any) -> Any:
-        """Return a required function in CasADi symbols; an `Along` also at the rotations given by parameters."""
-        casadi, values = self._casadi, physical(p, self.normal.unit, self.normal.origin)
-        if not isinstance(require, Along):
-            return traced(require, values)
-        held = traced(require, values, casadi.DM(require.rotation))
+        """Return a required function in CasADi symbols; a `RotationRequirement` also at the rotations given by parameters."""
+        casadi, values = self._casadi, convert_to_si(p, self.normal.unit, self.normal.origin)
+        if not isinstance(require, RotationRequirement):
+            return trace_requirement(require, values)
+        held = trace_requirement(require, values, casadi.DM(require.rotation))
         if require.ends is None:
             return casadi.vec(held)
         places = casadi.SX.sym(f"places{len(self._along_functions)}", FURTHER)
-        further = traced(require, values, places)
+        further = trace_requirement(require, values, places)
         bends = casadi.SX.sym(f"bends{len(self._along_functions)}", *further.shape)
         self._along_functions.append((require, casadi.horzcat(places, bends)))
         # height of the peak near each place to second order, which follows the peak as it moves
@@ -322,7 +328,7 @@ class Statement:
     def excess(self, violation: float) -> dict[str, Any]:
         """Return the fields of an `Answer` whose greatest error exceeds its bound by ``violation`` (units)."""
         label = Label(ERROR, self._display_factor(1.0), "deg" if self.normal.of_rocker else "mm")
-        return {"violation": violation, "worst": ERROR, "excess": label.measured(violation, np.empty(0))}
+        return {"violation": violation, "worst": ERROR, "excess": label.format_violation(violation, np.empty(0))}
 
     def _constrain(
         self, value: Any, low: float, high: float, name: str, unit: str = "mm", factor: float | None = None
@@ -467,7 +473,7 @@ class Statement:
         return pivot.smoothness * casadi.sumsqr(_series(casadi, v[1:], x, order=2)) / x.numel()
 
     def _bound_derivative(self, v: Any, order: int, bound: float, name: str, unit: str) -> None:
-        """Bound the magnitude of a derivative of the slider's position (m/rad, m/rad2)."""
+        """Bound the magnitude of a derivative of the slider's position (m/rad, m/rad2) by ``bound``."""
         if isfinite(bound):
             scale = self.normal.unit / bound
             self._bound_motion(

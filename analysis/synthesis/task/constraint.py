@@ -16,7 +16,7 @@ from ...numerics import symbolic
 from ...units import Amount, in_si, quantity
 from ..linkage.kernels import PLACES
 from ..linkage.linkage import Linkage
-from ..linkage.machine import PINS, USUAL_MAKE, Make, pin_functions
+from ..linkage.machine import PINS, USUAL_MAKE, MachineSpec, pin_functions
 from .task import Normal
 
 FloatArray = NDArray[np.float64]
@@ -183,8 +183,8 @@ class Require:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Along(Require):
-    """A function of the dimensions and the crank rotation is at most zero at given rotations, or everywhere between two.
+class RotationRequirement(Require):
+    """A requirement that a function of dimensions and crank rotation is at most zero at given rotations, or between two.
 
     Attributes
     ----------
@@ -198,7 +198,7 @@ class Along(Require):
     ends: tuple[float, float] | None = None
 
 
-class Way(NamedTuple):
+class RotationRange(NamedTuple):
     """The range of crank rotations over which a constraint holds.
 
     Attributes
@@ -221,7 +221,7 @@ class Way(NamedTuple):
     def ends(self, what: str) -> tuple[float, float]:
         """Return the first and last crank angle of a turn, or the first and last crank rotation of the task (rad).
 
-        Raises InputError, which names ``what`` needs them, if neither is known.
+        Raises InputError if neither is known; the message names ``what`` needs them.
         """
         if self.turn:
             return 0.0, 2.0 * pi
@@ -235,10 +235,10 @@ class Way(NamedTuple):
         return self.rotation
 
 
-class Least(NamedTuple):
-    """Objective: the greatest value of ``along``, minimised while the greatest error is at most ``error`` (units)."""
+class MinimisedFunction(NamedTuple):
+    """An objective: the greatest value of ``along`` is minimised, while the greatest error is at most ``error`` (units)."""
 
-    along: Along
+    along: RotationRequirement
     error: float
 
 
@@ -253,11 +253,11 @@ class Demand:
     #: Whether it is an objective that replaces the error.
     seeks: ClassVar[bool] = False
 
-    def requires(self, way: Way) -> tuple[Require, ...]:
+    def requires(self, way: RotationRange) -> tuple[Require, ...]:
         """Return the functions of the dimensions that must be at most zero."""
         raise NotImplementedError
 
-    def least_function(self, way: Way, normal: Normal) -> Least | None:
+    def least_function(self, way: RotationRange, normal: Normal) -> MinimisedFunction | None:
         """Return the function that is minimised instead of an error; None if there is none."""
         return None
 
@@ -281,7 +281,7 @@ class TimeRatio(Demand):
         if not 1.0 <= self.least <= self.greatest:
             raise ParameterError("time ratio", (self.least, self.greatest), "be two numbers in order, 1 or greater")
 
-    def requires(self, way: Way) -> tuple[Require, ...]:
+    def requires(self, way: RotationRange) -> tuple[Require, ...]:
         """Return the required functions."""
 
         def differs(d: Any) -> Any:
@@ -356,7 +356,7 @@ def stroke(d: Any) -> Any:
 
 
 def advance(d: Any) -> Any:
-    """Return the crank rotation between the dead centres of a slider-crank minus half a turn (rad), for numbers and symbols."""
+    """Return half a turn less than the crank rotation between a slider-crank's dead centres (rad), for numbers and symbols."""
     l1, l2, l3 = d.ground_length, d.crank_length, d.coupler_length
     angles = [np.arctan2(np.sqrt(np.maximum((l3 + side * l2) ** 2 - l1**2, 1e-18)), l1) for side in (1.0, -1.0)]
     return angles[0] - angles[1]
@@ -382,10 +382,10 @@ class _Forces(Demand):
     """A constraint on the forces on the pins."""
 
     __slots__ = ()
-    make: Make
+    make: MachineSpec
     pins: str
 
-    def pin_force_function(self, way: Way) -> Along:
+    def pin_force_function(self, way: RotationRange) -> RotationRequirement:
         """Return the magnitudes of the pin forces (N) as a function of the crank's rotation, with a column for each pin."""
         ends, turn = way.ends("a force on the pins"), way.turn
 
@@ -397,7 +397,7 @@ class _Forces(Demand):
             chosen = [found[pin] for pin in self.pins]
             return casadi.horzcat(*(casadi.sqrt(x * x + y * y + 1e-18) for x, y in chosen))
 
-        return Along(
+        return RotationRequirement(
             function=magnitudes,
             name="force on the pins",
             unit="N",
@@ -416,14 +416,14 @@ class MaxPinForce(_Forces):
     ----------
     force : float
         Greatest force (N).
-    make : Make
+    make : MachineSpec
         Masses, gravity, load, and the constant speed of the crank.
     pins : str
         Which pins: letters of "ABCD".
     """
 
     force: Amount
-    make: Make = USUAL_MAKE
+    make: MachineSpec = USUAL_MAKE
     pins: str = PINS
 
     def __post_init__(self) -> None:
@@ -431,7 +431,7 @@ class MaxPinForce(_Forces):
             raise ParameterError("greatest pin force", self.force, "be a finite number greater than zero (N)")
         _check_pins(self.pins)
 
-    def requires(self, way: Way) -> tuple[Require, ...]:
+    def requires(self, way: RotationRange) -> tuple[Require, ...]:
         """Return the required functions."""
         forces = self.pin_force_function(way)
 
@@ -449,7 +449,7 @@ class LeastPinForce(_Forces):
     ----------
     error : float or str
         Bound of the greatest error, as defined by the objective "worst" (m; for a rocker function rad).
-    make : Make
+    make : MachineSpec
         Masses, gravity, load, and the constant speed of the crank.
     pins : str
         Which pins: letters of "ABCD".
@@ -458,27 +458,27 @@ class LeastPinForce(_Forces):
     seeks: ClassVar[bool] = True
 
     error: Amount
-    make: Make = USUAL_MAKE
+    make: MachineSpec = USUAL_MAKE
     pins: str = PINS
 
     def __post_init__(self) -> None:
         _check_pins(self.pins)
 
-    def requires(self, way: Way) -> tuple[Require, ...]:
+    def requires(self, way: RotationRange) -> tuple[Require, ...]:
         """Return no required functions, since the pin force is the objective."""
         return ()
 
-    def least_function(self, way: Way, normal: Normal) -> Least:
+    def least_function(self, way: RotationRange, normal: Normal) -> MinimisedFunction:
         """Return the function that is minimised instead of an error, with the bound of the greatest error."""
         error = quantity(self.error, "rad" if normal.of_rocker else "m", "greatest error")
         if not (isfinite(error) and error > 0.0):
             raise ParameterError("greatest error", self.error, "be a finite number greater than zero")
-        return Least(self.pin_force_function(way), error / normal.unit)
+        return MinimisedFunction(self.pin_force_function(way), error / normal.unit)
 
 
 #: The constraints on pin forces.
 FORCES = (MaxPinForce, LeastPinForce)
-#: Number of rotations at which an `Along` is bounded from the beginning.
+#: Number of rotations at which a `RotationRequirement` is bounded from the beginning.
 GRID = 48
 #: Rotation by which the search for peaks extends a full turn at either end (rad).
 BEYOND = 0.02

@@ -19,7 +19,7 @@ from linkwork.errors import InputError, LinkworkError, ParameterError
 from ...files import unknown_name
 from ...numerics import symbolic
 from ...units import quantity
-from .constraint import UNKNOWNS, Along, Require
+from .constraint import UNKNOWNS, Require, RotationRequirement
 from .target import TargetPath
 
 FloatArray = NDArray[np.float64]
@@ -385,8 +385,8 @@ RENAMED: dict[str, Callable[..., Any]] = {
 }
 
 
-def physical(p: SimpleNamespace, unit: float, origin: complex) -> SimpleNamespace:
-    """Convert dimensions from normal form to SI, as functions of the user expect them."""
+def convert_to_si(p: SimpleNamespace, unit: float, origin: complex) -> SimpleNamespace:
+    """Convert dimensions from normal form to SI, in which users' functions take them."""
     values = dict(vars(p))
     for name in UNKNOWNS[:7]:
         values[name] = unit * values[name]
@@ -394,7 +394,7 @@ def physical(p: SimpleNamespace, unit: float, origin: complex) -> SimpleNamespac
     return SimpleNamespace(**values)
 
 
-def traced(require: Require, values: SimpleNamespace, *rotation: Any) -> Any:
+def trace_requirement(require: Require, values: SimpleNamespace, *rotation: Any) -> Any:
     """Evaluate a required function with CasADi symbols; functions of `math` and NumPy are replaced by those of CasADi.
 
     Raises
@@ -421,7 +421,7 @@ def traced(require: Require, values: SimpleNamespace, *rotation: Any) -> Any:
     return value
 
 
-def find_peaks(along: Along, values: SimpleNamespace, count: int) -> FloatArray:
+def find_peaks(along: RotationRequirement, values: SimpleNamespace, count: int) -> FloatArray:
     """Find the greatest values of a function along the crank's rotation, and their curvature.
 
     Returns

@@ -22,18 +22,18 @@ from linkwork.errors import ParameterError
 
 from ...mechanisms import FIVE_BAR
 from ...numerics import symbolic
-from ...run import traced
+from ...run import symbolic_equations
 from ...units import Amount, in_si
 from ..linkage.kind import Kind
 from ..linkage.linkage import Linkage
-from .constraint import TURNING, Along, Demand, Require, Way, even_rotations, search_range
+from .constraint import TURNING, Demand, Require, RotationRange, RotationRequirement, even_rotations, search_range
 
 FloatArray = NDArray[np.float64]
 #: Two collinear links: one extends the other, or lies over it.
 InLine = Literal["stretched", "folded"]
 
 
-class _FourBarPositions:
+class _FourBarConditions:
     """Conditions for the limit positions of a four-bar, for numbers and symbols; `POSITIONS` has the class of each kind."""
 
     @staticmethod
@@ -60,25 +60,25 @@ class _FourBarPositions:
         return (l1**2 + l2**2 - 2.0 * l1 * l2 * c - reach**2) / (l1**2 + l3**2)
 
     @staticmethod
-    def out_of_line(d: Any, c: Any) -> Any:
-        """Return values that are negative unless coupler and rocker are almost collinear; c as in `toggle_gap`."""
+    def collinearity(d: Any, c: Any) -> Any:
+        """Return values that are all negative unless coupler and rocker are almost collinear; c as in `toggle_gap`."""
         l1, l2, l3, l4 = d.ground_length, d.crank_length, d.coupler_length, d.rocker_length
         square = l1**2 + l2**2 - 2.0 * l1 * l2 * c
         both = Linkage.transmission_excess(l3, l4, square, square, cos(TURNING))
         return symbolic.library().horzcat(*both) / (2.0 * l3 * l4)
 
     @staticmethod
-    def gained(linkage: Linkage, c3: Any, s3: Any, c4: Any, s4: Any) -> Any:
+    def advantage_numerator(linkage: Linkage, c3: Any, s3: Any, c4: Any, s4: Any) -> Any:
         """Return the numerator of the mechanical advantage, zero in a toggle."""
         return linkage.rocker_length * (s3 * c4 - c3 * s4) / linkage.crank_length
 
     @staticmethod
     def speed(g: Any, c2: Any, s2: Any, l2: Any, l3: Any, l4: Any) -> Any:
         """Return the speed of the driven link divided by that of the crank; g is the closed loop's position."""
-        return traced(FIVE_BAR).coefficients(g, SimpleNamespace(l2=l2, l3=l3, l4=l4, ca=1.0, sa=0.0)).k42
+        return symbolic_equations(FIVE_BAR).coefficients(g, SimpleNamespace(l2=l2, l3=l3, l4=l4, ca=1.0, sa=0.0)).k42
 
 
-class _SliderCrankPositions(_FourBarPositions):
+class _SliderCrankConditions(_FourBarConditions):
     """Conditions for the limit positions of a slider-crank; in a toggle the coupler is perpendicular to the guide."""
 
     @staticmethod
@@ -98,12 +98,12 @@ class _SliderCrankPositions(_FourBarPositions):
         return (d.ground_length - d.crank_length * c) / d.coupler_length - side
 
     @staticmethod
-    def out_of_line(d: Any, c: Any) -> Any:
+    def collinearity(d: Any, c: Any) -> Any:
         apart = (d.ground_length - d.crank_length * c) / d.coupler_length
         return apart * apart - cos(TURNING) ** 2
 
     @staticmethod
-    def gained(linkage: Linkage, c3: Any, s3: Any, c4: Any, s4: Any) -> Any:
+    def advantage_numerator(linkage: Linkage, c3: Any, s3: Any, c4: Any, s4: Any) -> Any:
         return s3
 
     @staticmethod
@@ -112,9 +112,9 @@ class _SliderCrankPositions(_FourBarPositions):
 
 
 #: Conditions for each kind of linkage; a geared five-bar has no dead centres.
-POSITIONS: Mapping[Kind, type[_FourBarPositions]] = {
-    "four-bar": _FourBarPositions,
-    "slider-crank": _SliderCrankPositions,
+POSITIONS: Mapping[Kind, type[_FourBarConditions]] = {
+    "four-bar": _FourBarConditions,
+    "slider-crank": _SliderCrankConditions,
 }
 
 
@@ -201,7 +201,7 @@ def mechanical_advantage(linkage: Linkage, rotation: ArrayLike) -> FloatArray:
     phi = np.atleast_1d(np.asarray(rotation, dtype=float))
     c3, s3, c4, s4, _, _ = linkage.directions(phi)
     th2 = phi + linkage.crank_phase
-    gained = POSITIONS[linkage.kind].gained(linkage, c3, s3, c4, s4)
+    gained = POSITIONS[linkage.kind].advantage_numerator(linkage, c3, s3, c4, s4)
     given = s3 * np.cos(th2) - c3 * np.sin(th2)
     with np.errstate(divide="ignore"):
         ratio = np.where(given == 0.0, inf, gained / np.where(given == 0.0, 1.0, given))
@@ -216,7 +216,10 @@ def _fixed_lengths(linkage: Linkage) -> tuple[float, float, float, float]:
 
 
 def _rotations(value: Any, name: str, longest: float = 2.0 * pi) -> tuple[float, float]:
-    """Return the ends of a range of crank rotations (rad), given as two or as one; raise ParameterError if it is too long."""
+    """Return the ends of a range of crank rotations (rad) from two numbers, or from one for both ends.
+
+    Raises ParameterError if the range is longer than ``longest``.
+    """
     try:
         low, high = (float(end) for end in (value if isinstance(value, tuple | list) else (value, value)))
     except (TypeError, ValueError):
@@ -255,7 +258,7 @@ class MechanicalAdvantage(Demand):
                 raise ParameterError("rotations of the mechanical advantage", self.at, "be finite numbers (rad)")
             object.__setattr__(self, "at", at)
 
-    def requires(self, way: Way) -> tuple[Require, ...]:
+    def requires(self, way: RotationRange) -> tuple[Require, ...]:
         """Return the required functions of the dimensions."""
         all_the_way = self.at is None
         ends = way.ends("mechanical advantage") if all_the_way else None
@@ -280,7 +283,7 @@ class MechanicalAdvantage(Demand):
 
         asked = {"least": (slow, self.least > 0.0), "greatest": (fast, isfinite(self.greatest))}
         return tuple(
-            Along(
+            RotationRequirement(
                 function=f,
                 name=f"{which} mechanical advantage",
                 rotation=rotation,
@@ -320,7 +323,7 @@ class _LimitPosition(Demand):
     def _require(self, function: Callable[[Any], Any], *, equal: bool = False) -> Require:
         return Require(function=function, equal=equal, name=f"{self.position} {self._name()}", symbolic=True)
 
-    def _require_sign_change(self, way: Way, distance: Callable[[Any, float], Any]) -> tuple[Require, ...]:
+    def _require_sign_change(self, way: RotationRange, distance: Callable[[Any, float], Any]) -> tuple[Require, ...]:
         """Require that a function changes its sign within the range, so that its zero, the limit position, lies there."""
         way.timed(f"a {self._name()} at crank rotations")
         low, high = self.at
@@ -346,7 +349,7 @@ class DeadCentre(_LimitPosition):
     def _name(cls) -> str:
         return "dead centre"
 
-    def requires(self, way: Way) -> tuple[Require, ...]:
+    def requires(self, way: RotationRange) -> tuple[Require, ...]:
         """Return the required functions of the dimensions."""
         stretched = self.position == "stretched"
 
@@ -384,7 +387,7 @@ class Toggle(_LimitPosition):
     def _name(cls) -> str:
         return "toggle"
 
-    def requires(self, way: Way) -> tuple[Require, ...]:
+    def requires(self, way: RotationRange) -> tuple[Require, ...]:
         """Return the required functions of the dimensions."""
 
         def closes(d: Any, rotation: float) -> Any:
@@ -410,16 +413,16 @@ class NoToggle(Demand):
     def __post_init__(self) -> None:
         object.__setattr__(self, "between", _rotations(self.between, "rotations without a toggle"))
 
-    def requires(self, way: Way) -> tuple[Require, ...]:
+    def requires(self, way: RotationRange) -> tuple[Require, ...]:
         """Return the required functions of the dimensions."""
         way.timed("a range of crank rotations without a toggle")
 
         def excess(d: Any, rotation: Any) -> Any:
-            return POSITIONS[way.linkage.kind].out_of_line(d, symbolic.library().cos(rotation + d.crank_phase))
+            return POSITIONS[way.linkage.kind].collinearity(d, symbolic.library().cos(rotation + d.crank_phase))
 
         ends = self.between
         return (
-            Along(
+            RotationRequirement(
                 function=excess,
                 name="range without a toggle",
                 rotation=even_rotations(ends),

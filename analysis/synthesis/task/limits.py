@@ -15,11 +15,10 @@ from linkwork.errors import InputError, ParameterError
 from ...files import unknown_name
 from ..linkage.kind import Kind
 from ..linkage.linkage import ANGLES, LINKS, FiveBar, Linkage, SliderCrank
-from ..linkage.pivot import CrankUnknown, geared
+from ..linkage.pivot import CrankUnknown, gear_turns
 from .constraint import (
     SECOND_LENGTH,
     UNKNOWNS,
-    Along,
     Assembly,
     Constraint,
     Demand,
@@ -27,13 +26,14 @@ from .constraint import (
     Grashof,
     InfeasibleError,
     LargestLink,
-    Least,
     LeastTransmission,
+    MinimisedFunction,
     PivotRegion,
     Require,
+    RotationRange,
+    RotationRequirement,
     Stroke,
     TimeRatio,
-    Way,
     _constraint_names,
     _slider_time_ratio,
 )
@@ -73,7 +73,7 @@ class Limits:
         Bounds of the second crank's length of a geared five-bar, in units.
     ratio : float
         Gear ratio of that five-bar.
-    least : Least, optional
+    least : MinimisedFunction, optional
         The function that is minimised instead of an error.
     """
 
@@ -88,12 +88,12 @@ class Limits:
     linkage: type[Linkage] = Linkage
     second: tuple[float, float] | None = None
     ratio: float = 1.0
-    least: Least | None = None
+    least: MinimisedFunction | None = None
 
     @property
     def gears(self) -> tuple[int, int]:
         """Return the turns of the first and of the second crank per turn of the input shaft."""
-        return (1, 0) if self.second is None else geared(self.ratio)
+        return (1, 0) if self.second is None else gear_turns(self.ratio)
 
     def second_crank(self, unit: float) -> CrankUnknown | None:
         """Return the unknowns of a geared five-bar's second crank, otherwise None. ``unit`` is the target's size (m)."""
@@ -111,10 +111,10 @@ class Limits:
     @property
     def along(self) -> bool:
         """Return whether a function is bounded along the crank's rotation."""
-        return any(isinstance(require, Along) for require in self.requires)
+        return any(isinstance(require, RotationRequirement) for require in self.requires)
 
-    def sound(self, normal: Normal) -> Limits | None:
-        """Return these limits with defects excluded; None if they exclude them already, or do not minimise an error."""
+    def without_defects(self, normal: Normal) -> Limits | None:
+        """Return these limits with defects excluded; None if they exclude defects already, or do not minimise an error."""
         if self.turn is not None or self.way is not None or self.least is not None:
             return None
         return replace(self, turn=0.0) if normal.whole_turn else replace(self, way=0.0)
@@ -167,7 +167,7 @@ def make_limits(
     if way is not None and normal.whole_turn and grashof not in _SWINGING:
         turn, way = max(turn or 0.0, way), None
     straight = given["point_distance"][1] == 0.0 or given["point_angle"] in ((0.0, 0.0), (pi, pi), (-pi, -pi))
-    over = Way(turn is not None, normal.rotation, straight, linkage)
+    over = RotationRange(turn is not None, normal.rotation, straight, linkage)
     least = [found for c in constraints if isinstance(c, Demand) and (found := c.least_function(over, normal))]
     if len(least) > 1:
         raise InputError("more than one thing is to be minimised: a search has one objective")
@@ -229,7 +229,7 @@ def _dimension_ranges(
     return ends
 
 
-def _required_functions(constraint: Constraint, way: Way) -> tuple[Require, ...]:
+def _required_functions(constraint: Constraint, way: RotationRange) -> tuple[Require, ...]:
     if isinstance(constraint, Demand):
         return constraint.requires(way)
     return (constraint,) if isinstance(constraint, Require) else ()
@@ -450,8 +450,11 @@ def _five_bar_limits(
     return [replace(limits, linkage=FiveBar, second=second, ratio=float(ratio)) for ratio in made]
 
 
-def as_asked(task: Task, linkage: Linkage) -> Linkage:
-    """Return the linkage; for a slider function with its guide exactly on the x axis, and its coupler point at the slider."""
+def place_as_task(task: Task, linkage: Linkage) -> Linkage:
+    """Return a linkage placed as the task asks: for a slider function its guide is exactly on the x axis.
+
+    Its coupler point is then the slider's pin; for other tasks the linkage is returned unchanged.
+    """
     if not isinstance(task, SliderFunction):
         return linkage
     side = 1.0 if linkage.ground_angle > 0.0 else -1.0

@@ -49,8 +49,8 @@ def plane_points(points: ArrayLike, what: str, least: int) -> FloatArray:
     return array
 
 
-def ring(points: FloatArray, closed: bool) -> FloatArray:
-    """Return the polyline's vertices in order; a closed one ends with the first vertex again."""
+def closed_vertices(points: FloatArray, closed: bool) -> FloatArray:
+    """Return the vertices of a polyline in order, for a closed one with the first vertex again at the end."""
     return np.vstack([points, points[:1]]) if closed else points
 
 
@@ -65,8 +65,11 @@ def arc_lengths(vertices: FloatArray) -> FloatArray:
     return np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(vertices, axis=0).T))])
 
 
-def halves(lengths: FloatArray, closed: bool) -> FloatArray:
-    """Return, for each point of a polyline, half the total length of the segments that meet there, from all lengths."""
+def half_lengths(lengths: FloatArray, closed: bool) -> FloatArray:
+    """Return, for each point of a polyline, half the total length of the segments that meet there.
+
+    ``lengths`` are the lengths of all segments.
+    """
     before = np.roll(lengths, 1) if closed else np.append(0.0, lengths)
     after = lengths if closed else np.append(lengths, 0.0)
     both: FloatArray = 0.5 * (before + after)
@@ -94,7 +97,7 @@ def even_odd_area(*rings: FloatArray) -> float:
     """
     import shapely
 
-    vertices = [ring(points, True) for points in rings]
+    vertices = [closed_vertices(points, True) for points in rings]
     pieces = shapely.get_parts(shapely.unary_union([shapely.LineString(v) for v in vertices]))
     faces = shapely.get_parts(shapely.polygonize(pieces))
     x, y = shapely.get_coordinates(shapely.point_on_surface(faces)).T
@@ -132,7 +135,7 @@ class TargetPath:
                 f"all {len(points)} points of the target are the same one: {points[0, 0]:.6g} m, {points[0, 1]:.6g} m"
             )
         # relative to the coordinates, too: far from the origin rounding makes close points coincide
-        steps = np.hypot(*np.diff(ring(points, self.closed), axis=0).T)
+        steps = np.hypot(*np.diff(closed_vertices(points, self.closed), axis=0).T)
         same = np.flatnonzero(steps <= nothing)
         if len(same):
             first, second = int(same[0]), int(same[0] + 1) % len(points)
@@ -165,10 +168,10 @@ class TargetPath:
     @property
     def length(self) -> float:
         """Return the length of the polyline (m)."""
-        return float(arc_lengths(ring(self.points, self.closed))[-1])
+        return float(arc_lengths(closed_vertices(self.points, self.closed))[-1])
 
     def _segments(self) -> tuple[FloatArray, FloatArray]:
-        vertices = ring(self.points, self.closed)
+        vertices = closed_vertices(self.points, self.closed)
         return 0.5 * (vertices[:-1] + vertices[1:]), np.hypot(*np.diff(vertices, axis=0).T)
 
     @property
@@ -218,7 +221,7 @@ class TargetPath:
     @property
     def weights(self) -> FloatArray:
         """Return the arc length that belongs to each point: half the length of its two segments (m), shape (n,)."""
-        return halves(self._segments()[1], self.closed)
+        return half_lengths(self._segments()[1], self.closed)
 
     @property
     def normals(self) -> FloatArray:
@@ -227,7 +230,7 @@ class TargetPath:
         The tangent is that of the parabola through the point and its two neighbours (second order in the spacing), or at an
         open end that of the end segment. For a closed curve that crosses itself, outward refers to the lobe with more area.
         """
-        vertices = ring(self.points, self.closed)
+        vertices = closed_vertices(self.points, self.closed)
         steps = np.diff(vertices, axis=0)
         lengths = np.hypot(*steps.T)[:, None]
         units = steps / lengths
@@ -244,13 +247,15 @@ class TargetPath:
         normals: FloatArray = side * np.column_stack([tangents[:, 1], -tangents[:, 0]])
         return normals
 
-    def reversed(self) -> TargetPath:
+    def reverse(self) -> TargetPath:
         """Return the same curve in the opposite direction; a closed one starts at the same point."""
         points = np.roll(self.points[::-1], 1, axis=0) if self.closed else self.points[::-1]
         return TargetPath(points=points, closed=self.closed)
 
-    def resampled(self, n: int) -> TargetPath:
-        """Return n points at equal arc length along the polyline, from the first point, including both ends of an open one.
+    def resample(self, n: int) -> TargetPath:
+        """Return the curve through n points of the polyline at equal arc lengths, from the first point.
+
+        An open curve keeps both ends.
 
         Raises
         ------
@@ -261,9 +266,9 @@ class TargetPath:
         if n < least:
             raise InputError(f"{n} points are asked for: there must be at least {least}")
         s = np.linspace(0.0, self.length, n, endpoint=not self.closed)
-        return TargetPath(points=interpolate_polyline(ring(self.points, self.closed), s), closed=self.closed)
+        return TargetPath(points=interpolate_polyline(closed_vertices(self.points, self.closed), s), closed=self.closed)
 
-    def transformed(
+    def transform(
         self, *, scale: float = 1.0, angle: float = 0.0, shift: tuple[float, float] = (0.0, 0.0)
     ) -> TargetPath:
         """Return the curve scaled and turned (rad, counter-clockwise) about the origin, then shifted (m).
@@ -277,8 +282,8 @@ class TargetPath:
             raise InputError(f"the scale is {scale!r}: it must be greater than zero")
         return TargetPath(points=transform_points(self.points, scale, angle, shift), closed=self.closed)
 
-    def smoothed(self, n: int, *, deviation: float | None = None) -> TargetPath:
-        """Fit a cubic smoothing spline to a noisy curve; return n points of it at equal arc length.
+    def smooth(self, n: int, *, deviation: float | None = None) -> TargetPath:
+        """Fit a cubic smoothing spline to a noisy curve; return the curve through n points of it at equal arc lengths.
 
         The spline z(u) over the chord length u of the points z_k = x + i y minimises::
 
@@ -306,9 +311,9 @@ class TargetPath:
 
         if len(self.points) < 6:
             raise InputError(f"the target has {len(self.points)} points: smoothing needs at least 6")
-        points = self.points if len(self.points) <= MOST_SMOOTHED else self.resampled(MOST_SMOOTHED).points
+        points = self.points if len(self.points) <= MOST_SMOOTHED else self.resample(MOST_SMOOTHED).points
         origin, unit = points.mean(axis=0), self.size
-        vertices = ring(points - origin, self.closed) / unit
+        vertices = closed_vertices(points - origin, self.closed) / unit
         u = arc_lengths(vertices)
         z = vertices[: len(points)] @ np.array([1.0, 1j])
         stiffness, modes = np.linalg.eigh(_bending(np.diff(u), self.closed))
@@ -342,18 +347,17 @@ class TargetPath:
                 )
             log = low if misfit(low) >= wanted else brentq(lambda g: misfit(g) - wanted, low, high, xtol=1e-12)
         fitted = modes @ (c / (1.0 + np.exp(log) * stiffness))
-        knots = ring(np.column_stack([fitted.real, fitted.imag]), self.closed)
+        knots = closed_vertices(np.column_stack([fitted.real, fitted.imag]), self.closed)
         spline = CubicSpline(u, knots, bc_type="periodic" if self.closed else "natural")
         fine = spline(np.linspace(0.0, u[-1], max(20 * n, 10 * len(u)), endpoint=not self.closed))
-        return TargetPath(points=origin + unit * fine, closed=self.closed).resampled(n)
+        return TargetPath(points=origin + unit * fine, closed=self.closed).resample(n)
 
 
 def _bending(h: FloatArray, closed: bool) -> FloatArray:
     """Return the matrix K = Q R^-1 Q' for which z' K z is the integral of z''^2 over the cubic spline through the values z.
 
-    ``h`` has the distances between the knots.
-
-    Green and Silverman, section 2.1.2; periodic, or natural with z'' = 0 at both ends.
+    ``h`` has the distances between the knots. The spline is periodic if ``closed``, otherwise natural with z'' = 0 at both ends
+    (Green and Silverman, section 2.1.2).
     """
     n = len(h) if closed else len(h) + 1
     inner = np.arange(n) if closed else np.arange(1, n - 1)
@@ -393,7 +397,7 @@ def distance_to(curve: ArrayLike, points: ArrayLike, *, closed: bool = True) -> 
     """
     import shapely
 
-    line = shapely.LineString(ring(plane_points(curve, "the curve", 2), closed))
+    line = shapely.LineString(closed_vertices(plane_points(curve, "the curve", 2), closed))
     distances: FloatArray = shapely.distance(line, shapely.points(plane_points(points, "the points", 0)))
     return distances
 
@@ -438,7 +442,7 @@ def area_between(curve: ArrayLike, target: TargetPath, *, closed: bool = True) -
     points = plane_points(curve, "the curve", 3 if closed else 2)
     if closed and target.closed:
         return even_odd_area(target.points, points)
-    middles, length = _cut_into_pieces(ring(target.points, target.closed))
+    middles, length = _cut_into_pieces(closed_vertices(target.points, target.closed))
     missed = length * float(distance_to(points, middles, closed=closed).mean())
     if closed:
         return missed
@@ -463,11 +467,11 @@ def hausdorff(curve: ArrayLike, target: TargetPath, *, closed: bool = True) -> f
         As for `area_between`.
     """
     points = plane_points(curve, "the curve", 3 if closed else 2)
-    seen = np.vstack([target.points, _cut_into_pieces(ring(target.points, target.closed))[0]])
+    seen = np.vstack([target.points, _cut_into_pieces(closed_vertices(target.points, target.closed))[0]])
     largest = float(distance_to(points, seen, closed=closed).max())
     if closed and not target.closed:
         return largest
-    seen = np.vstack([points, _cut_into_pieces(ring(points, closed))[0]])
+    seen = np.vstack([points, _cut_into_pieces(closed_vertices(points, closed))[0]])
     return max(largest, float(distance_to(target.points, seen, closed=target.closed).max()))
 
 

@@ -21,7 +21,7 @@ from numpy.typing import ArrayLike, NDArray
 from linkwork.errors import InputError
 
 from ...units import in_si
-from .target import TargetPath, halves
+from .target import TargetPath, half_lengths
 
 FloatArray = NDArray[np.float64]
 #: Default size of a target at which a body only rotates (m).
@@ -428,7 +428,7 @@ class Normal:
     outline_weights : ndarray, shape (m,)
         Weights of the errors at these points.
     straight : Straight or None
-        Straight part, with its ends as numbers of stations and its flatness in units.
+        Straight part, with its ends as indices of stations and its flatness in units.
     exact : bool
         Whether the points must be passed exactly.
     quality : "squares", "area" or "worst"
@@ -484,7 +484,7 @@ class Normal:
         return shares
 
 
-def reweighted(task: Task, weights: ArrayLike | None) -> Task:
+def replace_weights(task: Task, weights: ArrayLike | None) -> Task:
     """Return the task with other weights, if any are given.
 
     Raises InputError if the number of weights differs from that of the targets, or the task does not take weights.
@@ -582,7 +582,7 @@ def _path_normal(task: UntimedPath) -> Normal:
         weights=station_weights,
         rotation=None,
         closed=closed,
-        arc=halves(edges, closed) / unit,
+        arc=half_lengths(edges, closed) / unit,
         outline=(outline - origin) / unit,
         outline_weights=outline_weights,
         straight=straight,
