@@ -236,14 +236,14 @@ class Motion:
             if isinstance(step, FreedomStep):
                 add_support(step.joint, step.parent, step.body)
             elif isinstance(step, GearStep):
-                add_tooth_force(step, "mesh_force", self._mesh(step))
+                add_tooth_force(step, "mesh_force", self._mate_force(step))
                 add_support(step.pin, step.parent, step.body)
             elif isinstance(step, RackStep):
-                add_tooth_force(step, f"in_{step.rack}", self._teeth(step))
+                add_tooth_force(step, f"in_{step.rack}", self._rack_force(step))
                 add_support(step.joint, step.parent, step.body)
             else:
                 first, second = step.ends
-                add_reaction(step.inner, second, first, self._inner(step))
+                add_reaction(step.inner, second, first, self._inner_force(step))
                 inner = f"in_{self.reactions[-1].name}"
                 rows.append(f"on_{first} = subtract_wrenches(on_{first}, {inner})")
                 rows.append(f"on_{second} = add_wrenches(on_{second}, {inner})")
@@ -261,7 +261,7 @@ class Motion:
         arguments = "b: Places, m: tuple[Mass, ...], wrenches: tuple[Wrench, ...], e: tuple[float, ...], p: Constants"
         yield function(f"forces({arguments}) -> Forces", doc, [*rows, f"return Forces({', '.join(names)})"])
 
-    def _mesh(self, step: GearStep) -> str:
+    def _mate_force(self, step: GearStep) -> str:
         pins = [
             j
             for j in self.structure.joints.values()
@@ -270,14 +270,14 @@ class Motion:
         ratio = f"1.0 / p.{step.gear}_ratio" if step.inverse else f"p.{step.gear}_ratio"
         return f"force_from_mate(b.at_{step.pin.name}, b.at_{pins[0].name}, {ratio}, on_{step.body})"
 
-    def _teeth(self, step: RackStep) -> str:
+    def _rack_force(self, step: RackStep) -> str:
         """Return the expression of the tooth force on the body of a step, a rack or a gear, from its mate."""
         side = "" if step.slide.bodies[0] == step.parent else "-"
         call = "force_on_gear" if step.turns else "force_on_rack"
         line = f"b.{step.slide.name}_line"
         return f"{call}(b.at_{step.pin.name}, {line}, {side}p.{step.rack}_radius, on_{step.body})"
 
-    def _inner(self, step: Dyad) -> str:
+    def _inner_force(self, step: Dyad) -> str:
         def total(side: Side) -> str:
             names = [f"on_{body}" for body in side.bodies]
             return names[0] if len(names) == 1 else f"add_wrenches({', '.join(names)})"

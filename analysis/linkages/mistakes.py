@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Iterator, Mapping
-from itertools import chain, combinations
+from itertools import chain
 
 from linkwork.errors import ParameterError
 
@@ -27,15 +27,7 @@ def check_entries(description: Description) -> None:
     for name, body in d.bodies.items():
         for own in body.all_points:
             owners.setdefault(own, set()).add(name)
-    found = chain(
-        _names(d, owners),
-        _bodies(d),
-        _rigid_pairs(d, owners),
-        _gears(d, owners),
-        _slots(d, owners),
-        _springs(d, owners),
-        _freedoms(d, owners),
-    )
+    found = chain(_bodies(d), _gears(d, owners), _slots(d, owners), _springs(d, owners), _freedoms(d, owners))
     for where, wrong, right in chain(
         found, _find_duplicates("loads", [load.point for load in d.loads]), _find_duplicates("torques", d.torques)
     ):
@@ -51,36 +43,6 @@ def _find_duplicates(where: str, names: Iterable[str]) -> Found:
     for name in names:
         if names.count(name) > 1:
             yield where, f"has {name} twice", "once is enough"
-
-
-#: Tables of variables that every linkage has.
-_RESERVED = ("initial", "solver", "energy", "assembly")
-
-
-def _names(d: Description, owners: Mapping[str, set[str]]) -> Found:
-    for table in ("bodies", "slides", "slots", "gears", "racks", "springs", "freedoms"):
-        for name in getattr(d, table):
-            if name in _RESERVED:
-                yield f"{table}.{name}", "has a name that is taken", f"no entry may be called {', '.join(_RESERVED)}"
-    for table in ("slides", "slots"):
-        for name in getattr(d, table):
-            if name in owners:
-                yield f"{table}.{name}", "has the name of a point", "it must have another"
-
-
-def _rigid_pairs(d: Description, owners: Mapping[str, set[str]]) -> Found:
-    """Yield pairs of bodies that two joints hold together."""
-    joined: dict[frozenset[str], str] = {}
-    pins = (
-        (frozenset(pair), f"at {own}") for own, bodies in owners.items() for pair in combinations(sorted(bodies), 2)
-    )
-    slides = ((frozenset((slide.body, slide.on)), f"by slides.{name}") for name, slide in d.slides.items())
-    for pair, joint in chain(pins, slides):
-        if pair in joined:
-            one, other = sorted(pair, key=lambda body: body == GROUND)
-            twice = f"is joined to {other} twice, {joined[pair]} and {joint}"
-            yield f"bodies.{one}", twice, "then neither moves against the other; one joint must go"
-        joined[pair] = joint
 
 
 def _bodies(d: Description) -> Found:
@@ -142,15 +104,7 @@ def _springs(d: Description, owners: Mapping[str, set[str]]) -> Found:
 
 
 def _freedoms(d: Description, owners: Mapping[str, set[str]]) -> Found:
-    taken: dict[str, str] = {}
     for name, freedom in d.freedoms.items():
-        if freedom.joint in taken:
-            yield (
-                f"freedoms.{name}",
-                f"is of {freedom.joint}, as {taken[freedom.joint]} is",
-                "it must be of another joint",
-            )
-        taken[freedom.joint] = name
         slide = d.slides.get(freedom.joint)
         joined = owners.get(freedom.joint, set()) if slide is None else {slide.on, slide.body}
         if name in d.bodies and len(joined) == 2 and name not in joined:

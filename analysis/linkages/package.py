@@ -204,9 +204,6 @@ class Package:
             return known
         if known is not None and not hasattr(sys.modules[str(known.modules[-1].__package__)], "equations"):
             raise LinkageError(f"linkage.name is {name}: it must not be that of a mechanism of Linkwork")
-        for other in MECHANISMS.values():
-            if other.name != name and name in other.published:
-                raise LinkageError(f"linkage.name is {name}: it must not be that of a published set of {other.name}")
         place = code_folder("linkages") if folder is None else Path(folder)
         own = place / self.name
         own.mkdir(parents=True, exist_ok=True)
@@ -217,10 +214,6 @@ class Package:
             sys.path.append(str(place))
         importlib.invalidate_caches()
         made: Mechanism = importlib.import_module(self.name).MECHANISM
-        for other in MECHANISMS.values():
-            if other.name != name and other.fmu == made.fmu:
-                of = f"its FMU would be called {made.fmu}, as that of {other.name}"
-                raise LinkageError(f"linkage.name is {name}: {of}; it must have another name")
         start = made.published[name]
         try:
             made.check_assembly(start.parameters, made.state(start.initial))
@@ -254,9 +247,7 @@ class Package:
                 sizes = f", {one:.6g} m and {other:.6g} m long between pins that are {apart:.6g} m apart"
             for dyad in self.structure.dyads:
                 if any(f"margin_{dyad.inner.name} =" in line for line in lines):
-                    slots = self.description.slots
-                    tables = ("slots" if side.body in slots else "bodies" for side in dyad.sides)
-                    bodies = " and ".join(f"linkage.{t}.{side.body}" for t, side in zip(tables, dyad.sides))
+                    bodies = " and ".join(f"linkage.bodies.{side.body}" for side in dyad.sides)
                     return f", {bodies}, joined at {dyad.inner.name}{sizes}"
         return ""
 
@@ -270,22 +261,14 @@ class Package:
         except (ValueError, TypeError, ArithmeticError):
             pass
         springs = self.description.springs.items()
-        places = made.modules[-1].places(x, p)
-        laws = []
-        try:
-            if springs and all(map(isfinite, made.modules[-1].springs(places, x, p))):
-                springs = {}.items()
-        except (ValueError, TypeError, ArithmeticError):
-            pass
         laws = [f"the law of linkage.springs.{name}" for name, s in springs if s.law]
+        places = made.modules[-1].places(x, p)
         for name, spring in springs:
             if spring.between:
                 (one, other) = (getattr(places, f"at_{own}") for own in spring.between)
                 if one.x == other.x and one.y == other.y:
                     laws.append(f"the length of linkage.springs.{name}, which has no direction at 0 m,")
-        still = [f"linkage.bodies.{name}" for name, body in self.description.bodies.items() if not has_mass(body)]
-        masses = f"a mass or inertia{f', of {still}' if (still := ' or '.join(still)) else ' in linkage.bodies'}"
-        causes = " or ".join(laws or (masses,))
+        causes = " or ".join((*laws, "a mass or inertia in linkage.bodies"))
         raise LinkageError(f"the accelerations at the start are no finite numbers: {causes} must be another")
 
     def _check_twists(self, made: Mechanism) -> None:
