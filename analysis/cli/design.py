@@ -19,13 +19,13 @@ from .common import (
     changes,
     check_kind,
     console,
-    report_errors,
     out_option,
     output_folder,
     plots_option,
-    save_plot,
     print_error,
     print_written,
+    report_errors,
+    save_plot,
     set_option,
     show_table,
     workers_options,
@@ -186,7 +186,7 @@ def _forces(solution: Solution, make: MachineSpec) -> PinForces | None:
 
     if solution.linkage.pivot is not None or not (solution.verdicts.circuit and solution.verdicts.branch):
         return None
-    return pin_forces(solution.linkage, make, solution.way, run=False)
+    return pin_forces(solution.linkage, make, solution.rotation_range, run=False)
 
 
 @click.command()

@@ -69,7 +69,7 @@ class PoseWriter:
             return turn
         return f"incline_direction({turn}, p.{joint.name}_COS, {'-' if sign < 0 else ''}p.{joint.name}_SIN)"
 
-    def place_freed(self, step: FreedomStep, lead: str = "") -> None:
+    def place_freedom_body(self, step: FreedomStep, lead: str = "") -> None:
         """Write the pose of a body that a freedom joins to a known one, in the ground or relative to the body ``lead``."""
         suffix = f"in_{lead}" if lead else "frame"
         parent = "" if step.parent in (GROUND, lead) else f"{step.parent}_{suffix}"
@@ -170,7 +170,7 @@ class PoseWriter:
         angle = " + ".join((*words, *constants)) or "0.0"
         return f"linear_direction({angle.replace('+ -', '- ')}, {self.derivative_tuple(terms)}, v)"
 
-    def place_geared(self, step: GearStep) -> None:
+    def place_gear(self, step: GearStep) -> None:
         """Write the pose of a gear from the angle of its mate."""
         ratio, phase = f"p.{step.gear}_ratio", f"p.{step.gear}_phase"
         (mate, mate_constants), (carrier, carrier_constants) = self.angles[step.mate], self.angles[step.parent]
@@ -258,7 +258,7 @@ class PoseWriter:
             self.angles[side.body] = {}, []
             for inside in side.inside:
                 if isinstance(inside, FreedomStep):
-                    self.place_freed(inside, side.body)
+                    self.place_freedom_body(inside, side.body)
                 else:
                     self.place_nested_dyad(inside, side.body)
             self.angles = kept
@@ -304,16 +304,16 @@ class PoseWriter:
                 ends = ", ".join(f"{origin}, {line}, {arm}" for (origin, line), arm in zip(lines, arms))
                 self.lines.append(f"{along[0]}, {along[1]}, {margin} = slide_pin_slide({ends}, v)")
         elif step.kind == "RPR":
-            self._between_pins(step, step.inner, pins, branch, margin)
+            self._place_between_pins(step, step.inner, pins, branch, margin)
         else:
-            self._to_block(step, step.inner, pins[0], lines[1], margin)
+            self._place_on_block(step, step.inner, pins[0], lines[1], margin)
         self.margins.append(margin)
         for side, turn, way, (origin, line) in zip(step.sides, turns, along, lines):
             self.place_side(side, turn, way, origin, line)
         if isinstance(step.inner, Pin):
             self.point_variable(step.ends[0], name)
 
-    def _between_pins(self, step: Dyad, inner: Slider, pins: list[str], branch: str, margin: str) -> None:
+    def _place_between_pins(self, step: Dyad, inner: Slider, pins: list[str], branch: str, margin: str) -> None:
         holder, block = (0, 1) if step.sides[0].body == inner.bodies[0] else (1, 0)
         first, second = step.sides[holder], step.sides[block]
         a = self.own_arm(first, first.body, first.joint.name, inner.through, inner.name if inner.inclined else "")
@@ -323,7 +323,7 @@ class PoseWriter:
         self.lines.append(f"{first.body}_turn = {self.incline_turn(f'{inner.name}_line', inner, -1)}")
         self.lines.append(f"{second.body}_turn = {inner.name}_line")
 
-    def _to_block(self, step: Dyad, inner: Slider, pin: str, line: tuple[str, str], margin: str) -> None:
+    def _place_on_block(self, step: Dyad, inner: Slider, pin: str, line: tuple[str, str], margin: str) -> None:
         first, second = step.sides
         origin, direction = line
         outer = second.joint
@@ -358,10 +358,10 @@ class PoseWriter:
                 self.lines.append(
                     f"# the freedom {self.interface.drives[step.freedom].name}: {step.body} from {step.parent}"
                 )
-                self.place_freed(step)
+                self.place_freedom_body(step)
             elif isinstance(step, GearStep):
                 self.lines.append(f"# {step.body}, geared to {step.mate}")
-                self.place_geared(step)
+                self.place_gear(step)
             elif isinstance(step, RackStep):
                 self.lines.append(f"# {step.body}, in the teeth of {step.mate}")
                 (self.place_pinion if step.turns else self.place_rack)(step)

@@ -25,7 +25,7 @@ from ..files import (
     entry,
     entry_names,
     flag,
-    overridden,
+    override,
     read,
     read_rows,
     read_tables,
@@ -64,7 +64,7 @@ from .tracking import TrackingController, TrackingResult, track
 DIMENSIONS = (*LENGTHS, *ANGLES)
 
 
-def _increasing(value: Any, name: str) -> tuple[int, ...]:
+def _read_increasing(value: Any, name: str) -> tuple[int, ...]:
     return tuple(sorted(set(Many(Whole(0), least=1, single=True)(value, name))))
 
 
@@ -84,7 +84,7 @@ class SliderTable:
         Number of starts of each search.
     """
 
-    harmonics: tuple[int, ...] = entry(_increasing, (2,))
+    harmonics: tuple[int, ...] = entry(_read_increasing, (2,))
     links: str = entry(Choice(("kept", "free")), "kept")
     guide_angle: tuple[float, float] = entry(Range(Quantity("rad")), (-pi, pi))
     position: tuple[float, float] | None = entry(Range(Quantity("m")), None)
@@ -440,7 +440,7 @@ def read_slider_case(
     data: Mapping[str, Any], *, folder: Path, title: str = "", overrides: Mapping[str, Any] | None = None
 ) -> SliderCase:
     """Build a case from the tables of a case file; file names in it are relative to ``folder``."""
-    data = {"title": title} | overridden(data, overrides or {})
+    data = {"title": title} | override(data, overrides or {})
     own = [name for name in entry_names(SliderCase) if name != "synthesis"]
     check_names(data, "", [name for name in (*entry_names(SynthesisCase), *own) if name != "trade_off"])
     if "slider" not in data and "strategy" not in data:

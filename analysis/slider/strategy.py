@@ -167,7 +167,7 @@ def simplest_mechanism(
         task = replace(task, objective="worst")
     tried = _Trials(task, tolerance, criterion, bounds, constraints, search)
     four_bar = tried.find_four_bar()
-    if tried.met():
+    if tried.meets_tolerance():
         return tried.result()
     numbers = range(1, int(harmonics) + 1)
     reach = 0.5 * four_bar.linkage.ground_length if stroke is None else stroke
@@ -175,7 +175,7 @@ def simplest_mechanism(
     for count in numbers:
         slider = SliderUnknown(harmonics=count, stroke=reach)
         found = tried.attempt(f"four-bar with a moved slider, {format_count(count, 'harmonic')}", slider, guesses)
-        if tried.met():
+        if tried.meets_tolerance():
             return tried.result()
         guesses += [found] if found else []
     longest = 0.5 * reach if second_crank is None else second_crank
@@ -184,7 +184,7 @@ def simplest_mechanism(
     for ratio in ratios:
         crank = CrankUnknown(ratio=ratio, length=between)
         found = tried.attempt(f"five-bar, second crank geared {ratio}:1", crank, [four_bar])
-        if tried.met():
+        if tried.meets_tolerance():
             return tried.result()
         if found:
             geared[ratio] = found
@@ -196,7 +196,7 @@ def simplest_mechanism(
         found = tried.attempt(
             f"five-bar, second crank turned independently, {format_count(count, 'harmonic')}", crank, guesses
         )
-        if tried.met():
+        if tried.meets_tolerance():
             break
         guesses += [found] if found else []
     return tried.result()
@@ -215,7 +215,7 @@ class _Trials:
     steps: list[Step] = field(default_factory=list)
     _met: bool = False
 
-    def met(self) -> bool:
+    def meets_tolerance(self) -> bool:
         """Return whether the last mechanism meets the tolerance without a defect."""
         return self._met
 

@@ -163,7 +163,7 @@ class _Problem:
         return np.array(kinds * len(self.assemblies)), np.repeat(self.assemblies, len(kinds))
 
     def _limits(self) -> list[tuple[float, float, float]]:
-        """Return the limits of the distance BD: angle at C (rad), BD (m), and 1 for an upper limit of BD, -1 for a lower one."""
+        """Return the limits of the distance BD: angle at C (rad), BD (m), and 1 for an upper limit, -1 for a lower one."""
         l3, l4 = self.linkage.coupler_length, self.linkage.rocker_length
         low = self.least_transmission
         least = sqrt((l3 - l4) ** 2 + 4.0 * l3 * l4 * sin(0.5 * low) ** 2)

@@ -116,7 +116,7 @@ def test_the_greatest_error_of_a_slider_crank_is_made_small(body: bool) -> None:
     assert flat.value == pytest.approx(flat.evaluation.worst)
     assert flat.value < 0.99 * plain.evaluation.worst
     # several are the greatest at once
-    assert np.sum(flat.evaluation.combined > 0.999 * flat.value) >= 4
+    assert np.sum(flat.evaluation.combined_errors > 0.999 * flat.value) >= 4
 
 
 def test_an_advantage_and_a_dead_centre_are_kept() -> None:

@@ -24,7 +24,7 @@ from ...files import (
     as_table,
     entry,
     flag,
-    overridden,
+    override,
     read,
     read_tables,
     text,
@@ -257,7 +257,7 @@ class SynthesisCase:
         """Return the pin forces of solutions from runs of the plant; None if no constraint involves pin forces."""
         if not any(isinstance(c, FORCES) for c in self.constraints):
             return None
-        return [pin_forces(s.linkage, self.make, s.way) for s in solutions]
+        return [pin_forces(s.linkage, self.make, s.rotation_range) for s in solutions]
 
     def trade(self, *, progress: bool = False) -> TradeOff | None:
         """Compute the trade-off that the file describes; None if there is none. See `trade_off`."""
@@ -303,5 +303,5 @@ def read_synthesis_case(
     data: Mapping[str, Any], *, folder: Path, title: str = "", overrides: Mapping[str, Any] | None = None
 ) -> SynthesisCase:
     """Read a synthesis from the tables of a case file; names of further files are relative to ``folder``."""
-    tables = {"title": title} | overridden(data, overrides or {})
+    tables = {"title": title} | override(data, overrides or {})
     return read(SynthesisCase, tables, "", readers={"task": partial(read_task, folder=folder)})

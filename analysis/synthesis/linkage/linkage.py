@@ -188,7 +188,7 @@ class Linkage:
         return False
 
     @property
-    def absent(self) -> tuple[str, ...]:
+    def absent_dimensions(self) -> tuple[str, ...]:
         """Return the names of the dimensions that this type of linkage does not have."""
         return ()
 
@@ -523,7 +523,7 @@ class SliderCrank(Linkage):
         return self.point_angle == 0.0 and self.point_distance == self.coupler_length
 
     @property
-    def absent(self) -> tuple[str, ...]:
+    def absent_dimensions(self) -> tuple[str, ...]:
         """Return the names of the missing dimensions: the rocker's length, and those of a coupler point that is the pin."""
         return ("rocker_length", *(("point_distance", "point_angle") if self.point_is_pin else ()))
 

@@ -74,7 +74,7 @@ class LinkageScene:
         return begin + np.linspace(0.0, 2.0 * pi, 2 * CURVE + 1)
 
     @cached_property
-    def way(self) -> FloatArray:
+    def task_rotations(self) -> FloatArray:
         """Return closely spaced crank rotations over the range of the task, shape (n,)."""
         at = self.solution.rotation
         if self._closed or whole_turn(self.solution.task, at):
@@ -84,7 +84,7 @@ class LinkageScene:
     @property
     def rotation(self) -> FloatArray:
         """Return the crank rotations of the task in order: those of its stations, or of a turn."""
-        return self.turn if self.way is self.turn else self.solution.rotation
+        return self.turn if self.task_rotations is self.turn else self.solution.rotation
 
     @cached_property
     def target(self) -> FloatArray | None:
@@ -121,12 +121,16 @@ class LinkageScene:
     @cached_property
     def traced_curve(self) -> FloatArray | None:
         """Return the part of the coupler curve that belongs to the task, shape (n, 2); None for a rocker function."""
-        return None if self.target is None else self.linkage.path(self.way)
+        return None if self.target is None else self.linkage.path(self.task_rotations)
 
     @cached_property
     def function(self) -> FloatArray | None:
         """Return crank rotation and rocker angle of a rocker function, shape (2, n); None for another task."""
-        return np.vstack([self.way, self.linkage.rocker_angle(self.way)]) if self.target is None else None
+        return (
+            np.vstack([self.task_rotations, self.linkage.rocker_angle(self.task_rotations)])
+            if self.target is None
+            else None
+        )
 
     @cached_property
     def guide(self) -> FloatArray | None:
@@ -212,7 +216,9 @@ def drawing(solution: Solution, rotation: float | None = None, *, poses: int = 0
             (held, d),
         )
     ]
-    further = np.linspace(scene.way[0], scene.way[-1], poses, endpoint=scene.way is not scene.turn)
+    further = np.linspace(
+        scene.task_rotations[0], scene.task_rotations[-1], poses, endpoint=scene.task_rotations is not scene.turn
+    )
     polylines = [
         Polyline(layer="poses", points=np.array([there[name] for name in names]))
         for phi in further
@@ -267,7 +273,7 @@ def _link_dimensions(
     links += [LineString([pins["C"], pins["P"]])] if "P" in pins and pins["P"] != pins["C"] else []
     placed: list[Dimension] = []
 
-    def covered(one: Dimension) -> tuple[int, int]:
+    def count_overlaps(one: Dimension) -> tuple[int, int]:
         """Return two counts of overlaps: with links and dimensions, dimensions counted three times; and with other lines."""
         room, strokes = _number_box(one), _dimension_lines(one)
         count = sum(room.intersects(link) for link in links)
@@ -284,7 +290,7 @@ def _link_dimensions(
                 for side in (1.0, -1.0)
             ]
             # the nearest place with the fewest overlaps
-            placed.append(min(choices, key=covered))
+            placed.append(min(choices, key=count_overlaps))
     yield from placed
 
 

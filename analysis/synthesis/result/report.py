@@ -166,7 +166,7 @@ def sensitivities(solution: Solution) -> tuple[Sensitivity, ...]:
     idle = (
         set(PLACES) - {*LINKS, "crank_phase"}
         if isinstance(solution.task, RockerFunction)
-        else set(solution.linkage.absent)
+        else set(solution.linkage.absent_dimensions)
     )
     return tuple(
         Sensitivity(name=name, value=float(values[name]), slope=float(slope), shift=float(shift))
@@ -332,7 +332,7 @@ def _manufactured_dimensions(linkage: Linkage) -> dict[str, float]:
     """Return by name the dimensions that are manufactured, and so can have errors: those of a commanded motion are left out."""
     values = _dimension_values(linkage)
     made = (*LENGTHS, *ANGLES, SECOND_LENGTH, *PIVOT_ANGLES)
-    return {name: values[name] for name in made if name in values and name not in linkage.absent}
+    return {name: values[name] for name in made if name in values and name not in linkage.absent_dimensions}
 
 
 def _replace_dimension(linkage: Linkage, name: str, value: float) -> Linkage:

@@ -61,7 +61,7 @@ class Evaluation:
     length: float = 0.0
 
     @property
-    def combined(self) -> FloatArray:
+    def combined_errors(self) -> FloatArray:
         """Return the errors of position and angle combined, as they count in the quality function (m or rad), shape (n,)."""
         if self.angle_errors is None:
             return np.abs(self.errors)
@@ -71,12 +71,12 @@ class Evaluation:
     @property
     def rms(self) -> float:
         """Return the root mean square of the combined errors (m or rad)."""
-        return float(np.sqrt(np.mean(self.combined**2)))
+        return float(np.sqrt(np.mean(self.combined_errors**2)))
 
     @property
     def worst(self) -> float:
         """Return the largest of the combined errors (m or rad)."""
-        return float(self.combined.max())
+        return float(self.combined_errors.max())
 
 
 def evaluate(task: Task, linkage: Linkage, rotation: FloatArray | None = None) -> Evaluation:
@@ -340,7 +340,7 @@ class Solution(Shown):
         return np.linspace(0.0, 2.0 * pi, CURVE, endpoint=False)
 
     @property
-    def way(self) -> tuple[float, float] | None:
+    def rotation_range(self) -> tuple[float, float] | None:
         """Return the least and the greatest crank rotation of the task; None if the crank can turn fully."""
         return None if self.verdicts.full_turn else (float(self.rotation.min()), float(self.rotation.max()))
 

@@ -175,7 +175,7 @@ def polish(
         return Polished.from_answers(found, kept, True, begun)
     interrupted = False
     if normal.quality == "squares":
-        if limits.along:
+        if limits.bounds_rotations:
             kept = distinct_answers(kept, ONWARDS, pivot)
         kept = [*map(worker.finish_squares, kept[:FINISHED]), *kept[FINISHED:]]
     elif not races:
@@ -191,7 +191,7 @@ def polish(
         best = distinct_answers(feasible_answers(kept) or feasible_answers(found), ONWARDS, pivot)
         kept, interrupted = spread("minimise_objectives", best, f"making least the {limits.least.along.name}")
         found = [*(answer for answer in found if not answer.feasible), *kept] if kept else found
-    elif limits.along:
+    elif limits.bounds_rotations:
         kept = [answer for answer in kept if worker.judge_start(answer.start).feasible]
     return replace(Polished.from_answers(found, feasible_answers(kept), interrupted, begun), done=len(starts))
 
@@ -516,18 +516,18 @@ def fit_least_squares(normal: Normal, limits: Limits, start: Start) -> Answer:
     size = len(free)
     blocks = (normal.points is not None) * 2 + (normal.angle is not None)
 
-    def unpacked(x: FloatArray) -> tuple[FloatArray, FloatArray]:
+    def unpack(x: FloatArray) -> tuple[FloatArray, FloatArray]:
         q = base.copy()
         q[free] = x[:size]
         return q, rotation0 if timed else x[size:]
 
     def value(x: FloatArray) -> FloatArray:
-        found = residuals(normal, start.branch, *unpacked(x))
+        found = residuals(normal, start.branch, *unpack(x))
         # beyond the limit of assembly: residuals larger than any others, so that the step is shortened
         return found[0] if all(np.isfinite(part).all() for part in found) else np.full(len(found[0]), 1e3)
 
     def derivative(x: FloatArray) -> FloatArray:
-        _, jacobian, rate = residuals(normal, start.branch, *unpacked(x))
+        _, jacobian, rate = residuals(normal, start.branch, *unpack(x))
         columns = jacobian[:, free]
         if timed:
             return columns
@@ -536,12 +536,12 @@ def fit_least_squares(normal: Normal, limits: Limits, start: Start) -> Answer:
             own[np.arange(block * n, (block + 1) * n), np.arange(n)] = rate[block * n : (block + 1) * n]
         return np.hstack([columns, own])
 
-    if not all(np.isfinite(part).all() for part in residuals(normal, start.branch, *unpacked(x0))):
+    if not all(np.isfinite(part).all() for part in residuals(normal, start.branch, *unpack(x0))):
         return Answer.for_unjoined_links(start)
     result = least_squares(
         value, x0, jac=derivative, bounds=(low, high), x_scale="jac", xtol=1e-12, ftol=1e-13, gtol=1e-13, max_nfev=400
     )
-    q, rotation = unpacked(result.x)
+    q, rotation = unpack(result.x)
     ordered = timed or bool(np.all(np.sign(np.diff(rotation)) == np.sign(rotation[-1] - rotation[0])))
     ordered = ordered and abs(rotation[-1] - rotation[0]) <= 2.0 * pi + 1e-9
     ended = replace(start, q=q, rotation=None if timed else rotation)

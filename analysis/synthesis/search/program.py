@@ -299,7 +299,7 @@ class Program(Statement):
         first = self.judge_start(answer.start) if self._along_functions else answer
         least = first if self.objective in SOUGHT else answer
 
-        def better(found: Answer) -> Answer:
+        def better_answer(found: Answer) -> Answer:
             return found if not first.feasible or found.start.quality <= least.start.quality else answer
 
         now = answer
@@ -310,8 +310,8 @@ class Program(Statement):
             now, before = following, now
             kept = self.judge_start(now.start)
             if kept.feasible and np.abs(now.start.pivot - before.start.pivot).max(initial=0.0) <= KEPT:
-                return better(now)
-        return better(now) if kept.feasible else replace(answer, feasible=first.feasible)
+                return better_answer(now)
+        return better_answer(now) if kept.feasible else replace(answer, feasible=first.feasible)
 
     def extremes(self, start: Start) -> list[FloatArray]:
         """Return the crank rotations at which bounded motions of the pivot, or functions `RotationRequirement`, are extreme.

@@ -177,7 +177,7 @@ class Refinement:
         unchanged = program.judge_unknowns(z0, parameters, answer.start)
         best = [(first if unchanged.feasible else inf, z0)]
 
-        def seen(z: FloatArray) -> None:
+        def record(z: FloatArray) -> None:
             value = self.value(z, parameters, down.curve(z)[0])
             if value < best[0][0] and program.judge_unknowns(z, parameters, answer.start).feasible:
                 best[0] = (value, z)
@@ -192,10 +192,10 @@ class Refinement:
             down = _Descent(self, z, parameters, self._scaled_directions(curve, slopes), scale, some(curve))
             found = minimize(
                 down.value, down.begin(), jac=True, method="SLSQP", constraints=down.constraints(),
-                callback=lambda y, down=down: seen(down.unknowns(y)),
+                callback=lambda y, down=down: record(down.unknowns(y)),
                 options={"maxiter": iterations, "ftol": CHANGE},
             )  # fmt: skip
-            seen(down.unknowns(found.x))
+            record(down.unknowns(found.x))
         value, z = best[0]
         if not np.isfinite(value):
             more = {} if self.limit is None or not unchanged.feasible else program.excess(self.excess_over_bound(curve))
@@ -210,17 +210,17 @@ class Refinement:
         if self.normal.quality != "worst":
             return (lambda _: (),)
 
-        def great(curve: FloatArray) -> Sequence[Any]:
+        def choose_large(curve: FloatArray) -> Sequence[Any]:
             both = self.both_distances(curve)
             most = max(float(near.distance.max()) for near in both)
             return [np.nonzero(near.distance >= GREAT * most)[0] for near in both]
 
-        def few(curve: FloatArray) -> Sequence[Any]:
+        def choose_few(curve: FloatArray) -> Sequence[Any]:
             corners = self._outline.shape[1]
             missed, away = (np.arange(len(near.distance)) for near in self.both_distances(curve))
             return np.concatenate([missed[:corners], missed[corners::STRIDE]]), away[::STRIDE]
 
-        return few, great, great
+        return choose_few, choose_large, choose_large
 
     def _scaled_directions(self, curve: FloatArray, slopes: FloatArray) -> FloatArray:
         """Return directions of the unknowns, shape (k, free); each moves the curve across itself by 1, root mean square."""
@@ -339,7 +339,7 @@ class _Descent:
         lower, upper = free[np.isfinite(program.low[free])], free[np.isfinite(program.high[free])]
         width = len(self.begin())
 
-        def padded(rows: FloatArray) -> FloatArray:
+        def pad(rows: FloatArray) -> FloatArray:
             wide: FloatArray = np.pad(rows @ self._stretch, ((0, 0), (0, width - self._stretch.shape[1])))
             return wide
 
@@ -358,7 +358,7 @@ class _Descent:
             z = self._z0 + self._stretch @ y[: self._stretch.shape[1]]
             j = self._differentiate(z)[1]
             eye = np.eye(len(z))
-            rows = padded(np.vstack([j[above], -j[below], eye[lower], -eye[upper]]))
+            rows = pad(np.vstack([j[above], -j[below], eye[lower], -eye[upper]]))
             if not self._bounds_distances:
                 return rows
             jacobian = self.curve(z)[1]
@@ -366,7 +366,7 @@ class _Descent:
             for near, k in self._bounded_distances(z):
                 grown = np.einsum("ak,akz->kz", near.early[:, k], jacobian[:, near.before[k]])
                 grown += np.einsum("ak,akz->kz", near.late[:, k], jacobian[:, near.after[k]])
-                part = padded(-grown / self._size)
+                part = pad(-grown / self._size)
                 part[:, -1] = 1.0 if self._bound_unknown else part[:, -1]
                 parts.append(part)
             every: FloatArray = np.nan_to_num(np.vstack([rows, *parts]))
@@ -378,7 +378,7 @@ class _Descent:
                 {
                     "type": "eq",
                     "fun": lambda y: (self._evaluate(self.unknowns(y))[1] - low)[equal],
-                    "jac": lambda y: padded(self._differentiate(self.unknowns(y))[1][equal]),
+                    "jac": lambda y: pad(self._differentiate(self.unknowns(y))[1][equal]),
                 }
             )
         return found
@@ -388,13 +388,13 @@ def _cache_last(function: Callable[[FloatArray], Made]) -> Callable[[FloatArray]
     """Return a function that keeps the last value of ``function``, for a second call with the same unknowns."""
     last: list[tuple[bytes, Made]] = []
 
-    def called(z: FloatArray) -> Made:
+    def cached(z: FloatArray) -> Made:
         key = z.tobytes()
         if not last or last[0][0] != key:
             last[:] = [(key, function(z))]
         return last[0][1]
 
-    return called
+    return cached
 
 
 def _coordinates(points: NDArray[np.complex128]) -> FloatArray:

@@ -83,7 +83,7 @@ class _FourBarShapes:
         return np.column_stack([np.ones(len(shapes)), shapes[:, :3], np.zeros(len(shapes))])
 
     @staticmethod
-    def meet_transmission(shapes: FloatArray, links: FloatArray, limits: Limits, least: float) -> NDArray[np.bool_]:
+    def meets_transmission(shapes: FloatArray, links: FloatArray, limits: Limits, least: float) -> NDArray[np.bool_]:
         """Return for each shape whether it meets the least transmission angle (rad) over a turn."""
         l1, l2, l3, l4, _ = links.T
         ends = (l1 - l2) ** 2, (l1 + l2) ** 2
@@ -123,7 +123,7 @@ class _FiveBarShapes(_FourBarShapes):
         return np.column_stack([np.ones(len(shapes)), shapes[:, :3], np.exp(low + (high - low) * shapes[:, 6])])
 
     @staticmethod
-    def meet_transmission(shapes: FloatArray, links: FloatArray, limits: Limits, least: float) -> NDArray[np.bool_]:
+    def meets_transmission(shapes: FloatArray, links: FloatArray, limits: Limits, least: float) -> NDArray[np.bool_]:
         """Return for each shape whether it meets the least transmission angle (rad) at `AROUND` rotations.
 
         Some rotations are tried first, and the others only for the shapes that are left.
@@ -250,7 +250,7 @@ def _is_allowed(shapes: FloatArray, limits: Limits) -> NDArray[np.bool_]:
     links = sized[:, :4]
     allowed = np.ones(len(shapes), dtype=bool)
     if limits.turn is not None:
-        allowed = _SHAPES[limits.linkage.kind].meet_transmission(shapes, sized, limits, limits.turn)
+        allowed = _SHAPES[limits.linkage.kind].meets_transmission(shapes, sized, limits, limits.turn)
     if limits.grashof is not None:
         order = np.sort(links, axis=1)
         excess = order[:, 0] + order[:, 3] - order[:, 1] - order[:, 2]

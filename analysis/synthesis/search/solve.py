@@ -380,7 +380,7 @@ def make_solutions(
 ) -> tuple[Solution, ...]:
     """Evaluate answers as solutions, rank them, and return at most ``count``."""
 
-    def made(answers: Sequence[Answer]) -> tuple[Solution, ...]:
+    def evaluate_answers(answers: Sequence[Answer]) -> tuple[Solution, ...]:
         found = (
             Solution.from_linkage(
                 task,
@@ -395,9 +395,9 @@ def make_solutions(
             return tuple(sorted(there, key=lambda s: not s.verdicts.sound))
         return rank_solutions(there)
 
-    solutions = made(distinct_answers(done.kept, 4 * count, pivot))
+    solutions = evaluate_answers(distinct_answers(done.kept, 4 * count, pivot))
     # the best start is a solution itself if it is better than all answers
-    first = made(done.begun)[:1] if limits.least is None else ()
+    first = evaluate_answers(done.begun)[:1] if limits.least is None else ()
     if first and rank_solutions([*solutions[:1], *first])[0] is first[0]:
         solutions = rank_solutions([*first, *solutions])
     return group_similar(solutions)[:count]

@@ -67,11 +67,11 @@ def formula(text: str, variable: str = "t") -> Callable[[ArrayLike], FloatArray]
     """
     tree = _parse(text)
 
-    def refused(node: ast.AST, reason: str) -> InputError:
+    def refusal(node: ast.AST, reason: str) -> InputError:
         return InputError(f"in the formula {text!r}: {ast.unparse(node)!r} {reason}")
 
-    def unknown(node: ast.AST, name: str, known: list[str]) -> InputError:
-        return refused(node, f"is not known: {unknown_name(name, known)}")
+    def unknown_name_refusal(node: ast.AST, name: str, known: list[str]) -> InputError:
+        return refusal(node, f"is not known: {unknown_name(name, known)}")
 
     def value(node: ast.AST, t: FloatArray) -> Any:
         match node:
@@ -79,30 +79,30 @@ def formula(text: str, variable: str = "t") -> Callable[[ArrayLike], FloatArray]
                 try:
                     return np.float64(number)
                 except OverflowError:
-                    raise refused(node, "is too large") from None
+                    raise refusal(node, "is too large") from None
             case ast.Name(id=name):
                 if name == variable:
                     return t
                 if name not in _CONSTANTS:
-                    raise unknown(node, name, [variable, *_CONSTANTS])
+                    raise unknown_name_refusal(node, name, [variable, *_CONSTANTS])
                 return _CONSTANTS[name]
             case ast.BinOp(left=left, op=op, right=right) if type(op) in _OPERATORS:
                 return _OPERATORS[type(op)](value(left, t), value(right, t))
             case ast.BinOp(op=ast.BitXor()):
-                raise refused(node, "has ^, which is no power here: write **")
+                raise refusal(node, "has ^, which is no power here: write **")
             case ast.UnaryOp(op=op, operand=operand) if type(op) in _OPERATORS:
                 return _OPERATORS[type(op)](value(operand, t))
             case ast.Call(func=ast.Name(id=name), args=args, keywords=[]):
                 if name not in _FUNCTIONS:
-                    raise unknown(node, name, list(_FUNCTIONS))
+                    raise unknown_name_refusal(node, name, list(_FUNCTIONS))
                 function, count = _FUNCTIONS[name]
                 if len(args) != count:
-                    raise refused(node, f"has {len(args)} arguments: {name} takes {count}")
+                    raise refusal(node, f"has {len(args)} arguments: {name} takes {count}")
                 return function(*(value(arg, t) for arg in args))
             case _:
-                raise refused(node, "is not allowed: a formula has numbers, operators, functions and constants only")
+                raise refusal(node, "is not allowed: a formula has numbers, operators, functions and constants only")
 
-    def evaluated(t: ArrayLike) -> FloatArray:
+    def evaluate_formula(t: ArrayLike) -> FloatArray:
         t = np.asarray(t, dtype=float)
         with np.errstate(all="ignore"):  # the values are checked below
             values: FloatArray = np.array(np.broadcast_to(value(tree, t), t.shape), dtype=float)
@@ -119,7 +119,7 @@ def formula(text: str, variable: str = "t") -> Callable[[ArrayLike], FloatArray]
             value(tree, np.zeros(()))
     except RecursionError:
         raise InputError(f"the formula {text[:40]!r}... cannot be read: it is nested too deeply") from None
-    return evaluated
+    return evaluate_formula
 
 
 def _parse(text: str) -> ast.expr:
@@ -322,7 +322,7 @@ def requirement(text: Any, name: str = "constraints.require") -> Require:
 
 
 def _check_side(node: ast.AST, text: str, numbers: list[float]) -> None:
-    def refused(reason: str) -> InputError:
+    def refusal(reason: str) -> InputError:
         return InputError(f"in the requirement {text!r}: {ast.unparse(node)!r} {reason}")
 
     match node:
@@ -342,7 +342,7 @@ def _check_side(node: ast.AST, text: str, numbers: list[float]) -> None:
             for arg in args:
                 _check_side(arg, text, numbers)
         case _:
-            raise refused("is not allowed: it must be dimensions, numbers, + - * / ** and functions")
+            raise refusal("is not allowed: it must be dimensions, numbers, + - * / ** and functions")
 
 
 class _Dimensions(ast.NodeTransformer):

@@ -159,13 +159,13 @@ def toggles(linkage: Linkage) -> tuple[float, ...]:
 def _toggles_by_roots(linkage: Linkage) -> tuple[float, ...]:
     """Find the rotations at which the cosine of the angle between coupler and rocker passes -1 or 1."""
 
-    def beyond(phi: Any) -> Any:
+    def excess_of_cosine(phi: Any) -> Any:
         return np.abs(linkage.cosine_at_c(linkage.reach(phi))) - 1.0
 
     phi = np.linspace(0.0, 2.0 * pi, 1441)
-    off = beyond(phi)
+    off = excess_of_cosine(phi)
     passed = np.flatnonzero(np.sign(off[1:]) != np.sign(off[:-1]))
-    return tuple(float(brentq(beyond, phi[k], phi[k + 1], xtol=1e-13)) for k in passed)
+    return tuple(float(brentq(excess_of_cosine, phi[k], phi[k + 1], xtol=1e-13)) for k in passed)
 
 
 def time_ratio(linkage: Linkage) -> float | None:
@@ -359,11 +359,11 @@ class DeadCentre(_LimitPosition):
             c = symbolic.library().cos(rotation + d.crank_phase) * (1.0 if stretched else -1.0)
             return POSITIONS[way.linkage.kind].dead_gap(d, reach, c)
 
-        def aside(d: Any, rotation: float) -> Any:
+        def opposite(d: Any, rotation: float) -> Any:
             s = symbolic.library().sin(rotation + d.crank_phase)
             return -d.branch * s if stretched else d.branch * s
 
-        sides = [self._require(partial(aside, rotation=end)) for end in dict.fromkeys(self.at)]
+        sides = [self._require(partial(opposite, rotation=end)) for end in dict.fromkeys(self.at)]
         return (*self._require_sign_change(way, closes), *sides)
 
 

@@ -109,7 +109,7 @@ class Limits:
         return isinstance(linkage, SliderCrank) == (self.linkage is SliderCrank)
 
     @property
-    def along(self) -> bool:
+    def bounds_rotations(self) -> bool:
         """Return whether a function is bounded along the crank's rotation."""
         return any(isinstance(require, RotationRequirement) for require in self.requires)
 
