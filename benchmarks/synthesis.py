@@ -103,7 +103,7 @@ def _jacobians(repeats, c, s, zero, q, out, jacobian):
 
 def curve_by_numpy(linkage: Linkage, rotation: FloatArray) -> ComplexArray:
     """Compute the coupler curve over arrays, by the plant's own loop closure with NumPy's square root."""
-    close_loop = rebind_functions((kinematics,), {"sqrt": np.sqrt}).of(kinematics.close_loop)
+    close_loop = rebind_functions((kinematics,), {"sqrt": np.sqrt}).find(kinematics.close_loop)
     q = linkage
     th2 = rotation + q.crank_phase
     c2, s2 = np.cos(th2), np.sin(th2)

@@ -55,7 +55,7 @@ def basins(
     """
     from .. import figures
     from ..periodic import basins as find_basins
-    from ..periodic import join_orbits, search_orbits, turns_sought
+    from ..periodic import describe_turns, join_orbits, search_orbits
 
     parameters, drive = chosen.case.parameters, chosen.drive()
     start = chosen.start(drive)
@@ -66,7 +66,7 @@ def basins(
         for texts, unit, option in zip((position, rate), units, ("--position", "--rate"))
     ]
     found = [search_orbits(parameters, drive, turns=number, start=start) for number in range(1, turns + 1)]
-    _motions(f"{chosen.case.title}: periodic motions of {turns_sought(flow, turns)}", found, flow.turns)
+    _motions(f"{chosen.case.title}: periodic motions of {describe_turns(flow, turns)}", found, flow.turns)
     picture = find_basins(
         parameters,
         drive,

@@ -189,7 +189,7 @@ def _reach(mechanism: Mechanism, x: Any, p: Any) -> Any:
     casadi = symbolic.library()
     if mechanism.unjoined is None or mechanism.unjoined.reach is None:
         return casadi.SX(0.0)
-    reach = symbolic.symbolic_functions(mechanism.modules).of(mechanism.unjoined.reach)
+    reach = symbolic.symbolic_functions(mechanism.modules).find(mechanism.unjoined.reach)
     return casadi.vertcat(*reach(tuple(casadi.vertsplit(x)), mechanism.constants(*casadi.vertsplit(p)[:-1])))
 
 
@@ -243,8 +243,8 @@ def _with_solution(
     x = tuple(casadi.vertsplit(s.x))
 
     def traced(what: str, *further: Any) -> Any:
-        acting = functions.of(mechanism.equations.apply_inputs)(modes, channels, k)
-        result = functions.of(getattr(mechanism.equations, what))(x, acting, *further, k)
+        acting = functions.find(mechanism.equations.apply_inputs)(modes, channels, k)
+        result = functions.find(getattr(mechanism.equations, what))(x, acting, *further, k)
         return casadi.densify(casadi.vertcat(*result) if isinstance(result, tuple) else casadi.SX(result))
 
     values = [traced("outputs", energy), traced("derivative"), traced("clearance")]
@@ -268,11 +268,11 @@ def beginning(mechanism: Mechanism, modes: Any, u: Any) -> tuple[Any, ...]:
     k = parameters.constants()
     channels = tuple(casadi.vertsplit(u)) if mechanism.channels else ()
     e = mechanism.equations
-    acting = functions.of(e.apply_inputs)(tuple(casadi.vertsplit(modes)) if mechanism.modes else (), channels, k)
-    x = functions.of(e.start)((*casadi.vertsplit(state), 0.0, 0.0), acting, k)
-    energy = functions.of(e.energy)(x, k)
-    scale = functions.of(mechanism.error_scale)(parameters, x)
-    bounds = [functions.of(least.of)(parameters) for least in mechanism.rules.least]
+    acting = functions.find(e.apply_inputs)(tuple(casadi.vertsplit(modes)) if mechanism.modes else (), channels, k)
+    x = functions.find(e.start)((*casadi.vertsplit(state), 0.0, 0.0), acting, k)
+    energy = functions.find(e.energy)(x, k)
+    scale = functions.find(mechanism.error_scale)(parameters, x)
+    bounds = [functions.find(least.of)(parameters) for least in mechanism.rules.least]
     return own, state, *(casadi.densify(casadi.vertcat(*v)) for v in ((*k, energy), x, scale, bounds))
 
 

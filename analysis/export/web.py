@@ -165,5 +165,5 @@ def _places(mechanism: Mechanism, x: Any, modes: Any, u: Any, p: Any) -> Any:
     if mechanism.switch:  # the positions of the joints do not depend on friction
         k = k._replace(**{mechanism.switch: 0.0})
     modes, channels = (tuple(casadi.vertsplit(v)) if v.numel() else () for v in (modes, u))
-    acting = functions.of(mechanism.equations.apply_inputs)(modes, channels, k)
-    return casadi.vertcat(*functions.of(drawing.positions)(tuple(casadi.vertsplit(x)), acting, k))
+    acting = functions.find(mechanism.equations.apply_inputs)(modes, channels, k)
+    return casadi.vertcat(*functions.find(drawing.positions)(tuple(casadi.vertsplit(x)), acting, k))

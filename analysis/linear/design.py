@@ -49,7 +49,7 @@ class Design:
     channel : str
         FMI name of the force.
     freedom : int
-        Number of the freedom that is controlled, on which the force acts.
+        Index of the freedom that is controlled, on which the force acts.
     gains : ndarray, shape (2 n,)
         Gains k of the model's state (q, q'), in N per unit of each component.
     integral_gain : float

@@ -273,7 +273,7 @@ class _Balance:
         return (*q.tolist(), *[0.0] * (self.mechanism.size - len(q)))
 
     def starts(self, held: FloatArray) -> list[FloatArray]:
-        """Return the points of a grid over all configurations that have no more imbalance than their neighbours."""
+        """Return starts for Newton's method: the points of a grid with no more imbalance than their neighbours."""
         lengths = [
             abs(getattr(self.parameters, field.name))
             for field in fields(self.parameters)

@@ -52,7 +52,7 @@ def saturate(force: float, limit: float) -> float:
 
 
 def check_limit(limit: float) -> None:
-    """Check that a limit of a force (N) is above zero.
+    """Check that the limit of a force (N) is above zero.
 
     Raises
     ------
@@ -176,7 +176,7 @@ class LoopResult:
     force, reference : ndarray, shape (n,)
         Force (N) and reference (m); each value holds until the next sample.
     freedom : int
-        Number of the freedom that is controlled; by default the last.
+        Index of the freedom that is controlled; by default the last.
     trajectory : Trajectory or None
         All outputs of the plant; None for a linear model.
     status : int

@@ -58,10 +58,10 @@ class Layout:
     Attributes
     ----------
     free, commanded : tuple of int
-        Numbers of the freedoms that forces move, and of the freedoms with commanded rates. A freedom that is tied to another,
+        Indices of the freedoms that forces move, and of the freedoms with commanded rates. A freedom that is tied to another,
         as by a groove, is neither.
     forces : tuple of int
-        Numbers of the channels whose forces act.
+        Indices of the channels whose forces act.
     input_names : tuple of str
         Inputs of a linear model: the forces, then the acceleration, speed and coordinate of each commanded freedom.
     state_names : tuple of str
@@ -235,7 +235,7 @@ class Matrices:
 
     @property
     def output_names(self) -> tuple[str, ...]:
-        """FMI names of the outputs: all of the contract but `missing_outputs`."""
+        """FMI names of the outputs: all outputs of the mechanism except `missing_outputs`."""
         return linear_outputs(self.mechanism)
 
     @property
@@ -296,7 +296,7 @@ class LinearModel(Matrices):
         return np.sort(np.sqrt(squares.real[(squares.real > 0.0) & (squares.imag == 0.0)]))
 
     def force_channel(self, name: str | None = None) -> tuple[str, int]:
-        """Return the FMI name of a force that drives a free freedom, and the number of this freedom.
+        """Return the FMI name of a force that drives a free freedom, and the index of this freedom.
 
         Parameters
         ----------
@@ -369,7 +369,7 @@ def _index(name: str, names: tuple[str, ...]) -> int:
 
 
 def constant_inputs(mechanism: Mechanism, modes: Modes, channels: ArrayLike) -> Inputs:
-    """Return constant inputs with the values ``channels``, in the given modes."""
+    """Return inputs that hold the channels at the values ``channels``, in the given modes."""
     values = dict(zip((channel.argument for channel in mechanism.channels), np.asarray(channels, float).tolist()))
     forces = {mechanism.channels[n].argument for n in layout(mechanism, modes).forces}
     acting = {name: values[name] for name in forces if values[name] != 0.0}

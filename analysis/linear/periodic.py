@@ -119,7 +119,7 @@ class PeriodicModel(Matrices):
         return self._model(lambda values: np.asarray(values.mean(axis=0)))
 
     def interpolate(self, values: FloatArray) -> Callable[[float], FloatArray]:
-        """Return the trigonometric polynomial through values at the samples (s, ...), as a function of time."""
+        """Interpolate values at the samples, shape (s, ...), by a trigonometric polynomial; return it as a function of time."""
         return trigonometric(values, self.period)
 
     def motion(self) -> Callable[[float], FloatArray]:

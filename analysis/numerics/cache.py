@@ -34,7 +34,7 @@ def code_folder(name: str) -> Path:
     if _is_usable(folder):
         if _is_safe(folder, user):
             return folder
-        _say_shared(folder.parent)
+        _warn_shared(folder.parent)
     folder = Path(tempfile.gettempdir()) / f"linkwork-{user}" / name
     if _is_usable(folder) and _is_safe(folder, user):
         return folder
@@ -84,7 +84,7 @@ def read_hashes(path: Path) -> dict[str, str]:
 
 
 @cache
-def _say_shared(folder: Path) -> None:
+def _warn_shared(folder: Path) -> None:
     sys.stderr.write(
         f"linkwork: others can write to {folder}, or to a folder above it: compiled code is kept elsewhere; "
         "LINKWORK_CACHE_DIR can name a folder of yours alone\n"

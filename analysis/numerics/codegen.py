@@ -67,13 +67,13 @@ class MachineCode:
         Of SX, with the inputs (t, a, b, c, d) and dense outputs. The outputs follow one another in ``out``, matrices column
         by column.
     lanes : int
-        How many arguments each call takes at once: with more than one, arrays have so many numbers for each of theirs, and t
+        Number of lanes, arguments that a call takes at once: with several, each entry of an array is a vector of lanes, and t
         is the same for all.
     rows : sequence of str
         Names of the functions whose outputs are written one lane after the other, which readers of single lanes need: to
         gather them takes some processors longer than to compute them.
     shared : bool
-        Whether all lanes have the same b, c and d, which are then arrays as for one.
+        Whether b, c and d are the same for all lanes; they are then plain arrays.
 
     Attributes
     ----------
@@ -238,12 +238,12 @@ class _Writer:
         build.ret_void()
 
     def _place(self, which: int, place: int) -> Any:
-        """Return a pointer to a number of an argument, or to that of each lane."""
+        """Return a pointer to the entry ``place`` of the argument ``which``, or to the vector of its values in all lanes."""
         pointer = self.build.gep(self.arguments[which], [_index(place * self.lanes)])
         return self.build.bitcast(pointer, self.kind.as_pointer())
 
     def _store(self, value: Any, place: int, count: int) -> None:
-        """Write one of so many outputs."""
+        """Write the output ``place`` of ``count`` outputs."""
         if not self.in_rows:
             self.build.store(value, self._place(5, place), align=8)
             return
@@ -252,7 +252,7 @@ class _Writer:
             self.build.store(self.build.extract_element(value, _index(lane)), target)
 
     def _input(self, which: int, place: int) -> Any:
-        """Return a number of an argument in each lane."""
+        """Return the entry ``place`` of the argument ``which`` in each lane."""
         if which == 0:
             return self._repeat(self.arguments[0])
         if which > 1 and self.shared:
@@ -260,7 +260,7 @@ class _Writer:
         return self.build.load(self._place(which, place), align=8)
 
     def _repeat(self, number: Any) -> Any:
-        """Return a number as that of each lane."""
+        """Return a vector with the same number in each lane."""
         return vectors.repeat_number(self.build, number, self.lanes)
 
     def _constant(self, value: float) -> Any:
@@ -442,7 +442,7 @@ class Kernel:
         return self._compiled
 
     def _compile(self, folder: Path | None) -> Any:
-        """Compile, and keep the code in a folder unless that is None."""
+        """Compile the kernel, and keep its code in a folder unless the folder is None."""
         before = numba.config.CACHE_DIR
         if folder is not None:
             numba.config.CACHE_DIR = str(folder)

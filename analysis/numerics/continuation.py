@@ -284,7 +284,7 @@ class Follower:
         )
 
     def resume(self, y: ArrayLike, parameter: float, ahead: ArrayLike) -> Point:
-        """Return a first `Point` at a known solution, with its tangent to the side of ``ahead`` (scaled, shape (n + 1,))."""
+        """Return a first `Point` at a known solution, with the tangent in the sense nearer to ``ahead`` (scaled, (n + 1,))."""
         whole = np.append(np.asarray(y, dtype=float), parameter)
         found = _Landing(whole / self.scale, self.evaluate(whole[:-1], parameter), 0)
         return self._point(found, np.asarray(ahead, dtype=float))

@@ -93,14 +93,14 @@ class Decay:
         return sqrt(4.0 * pi**2 + self.decrement**2)
 
     def damping(self, mass: float) -> tuple[float, float]:
-        """Return the damping coefficient for a mass (kg), and its standard error (N.s/m)."""
+        """Return the damping coefficient (N.s/m) that follows for a mass (kg), and its standard error."""
         factor = mass / pi
         value = factor * self.decrement * self.frequency
         relative = self.decrement_error / self.decrement, self.frequency_error / self.frequency
         return value, abs(value) * sqrt(relative[0] ** 2 + relative[1] ** 2)
 
     def stiffness(self, mass: float) -> tuple[float, float]:
-        """Return the stiffness of the spring for a mass (kg), and its standard error (N/m)."""
+        """Return the stiffness of the spring (N/m) that follows for a mass (kg), and its standard error."""
         value = mass * self.natural_frequency**2
         return value, 2.0 * value * self.natural_frequency_error / self.natural_frequency
 

@@ -96,7 +96,7 @@ class Vector:
         return count
 
     def as_vector(self, other: Any) -> Any:
-        """Return an operand as an LLVM vector; a number becomes the same in all lanes."""
+        """Return an operand as an LLVM vector: a number is repeated in all lanes."""
         return other.value if isinstance(other, Vector) else ir.Constant(self.value.type, [float(other)] * self.lanes)
 
     def _make(self, value: Any) -> Vector:
@@ -150,10 +150,10 @@ class Vector:
         """Return this vector times a factor plus a summand, rounded once."""
         return self.intrinsic("fma", factor, summand)
 
-    def root(self) -> Vector:
+    def square_root(self) -> Vector:
         return self.intrinsic("sqrt")
 
-    def size(self) -> Vector:
+    def absolute(self) -> Vector:
         return self.intrinsic("fabs")
 
     def with_signs(self, other: Vector) -> Vector:
@@ -179,7 +179,7 @@ class Vector:
 
 
 def declare_function(module: Any, name: str, kind: Any, arguments: int) -> Any:
-    """Return an external function of so many arguments, all of one type; declare it in the module if that is not done yet."""
+    """Return an external function of ``arguments`` arguments of one type; declare it in the module if necessary."""
     if (found := module.globals.get(name)) is None:
         found = ir.Function(module, ir.FunctionType(kind, [kind] * arguments), name)
         found.attributes.add("nounwind")
@@ -216,7 +216,7 @@ def _with_fallback(great: Any, result: Vector, name: str, x: Vector) -> Vector:
 
 
 def _split_quarter_turns(x: Vector, quarters: int) -> tuple[Any, Vector, Vector]:
-    """Split x into quarter turns and a rest; return their number plus ``quarters``, and sine and cosine of the rest."""
+    """Split x into quarter turns and a rest; return their number plus ``quarters``, then sine and cosine of the rest."""
     shifted = x.multiply_add(2.0 / pi, _ROUNDER)
     k = shifted - _ROUNDER
     # exact, as the difference has no more bits than x
@@ -243,7 +243,7 @@ def _circular(x: Vector, quarters: int, name: str) -> Vector:
     chosen = cosine.where(odd, sine)
     sign = build.shl(build.and_(number, x.longs(2)), x.longs(62))
     result = x.from_bits(build.xor(chosen.bits(), sign))
-    return _with_fallback(Vector.__lt__(-x.size(), -GREATEST_ANGLE), result, name, x)
+    return _with_fallback(Vector.__lt__(-x.absolute(), -GREATEST_ANGLE), result, name, x)
 
 
 def _sin(x: Vector) -> Vector:
@@ -297,19 +297,19 @@ def _limit_above(a: Vector, limit: float) -> Vector:
 
 
 def _tanh(x: Vector) -> Vector:
-    e = _exp_minus_one(2.0 * _limit_above(x.size(), 22.0))
+    e = _exp_minus_one(2.0 * _limit_above(x.absolute(), 22.0))
     return (e / (e + 2.0)).with_signs(x)
 
 
 def _sinh(x: Vector) -> Vector:
-    a = x.size()
+    a = x.absolute()
     small = _exp_minus_one(_limit_above(a, 22.0))
     root = _exp(0.5 * a)
     return (0.5 * (small + small / (small + 1.0))).where(a < 22.0, 0.5 * root * root).with_signs(x)
 
 
 def _cosh(x: Vector) -> Vector:
-    root = _exp(0.5 * x.size())
+    root = _exp(0.5 * x.absolute())
     half = 0.5 * root * root
     return half + 0.25 / half
 
@@ -359,22 +359,22 @@ def _supplement_of_negative(angle: Vector, x: Vector) -> Vector:
 
 
 def _atan2(y: Vector, x: Vector) -> Vector:
-    return _supplement_of_negative(_angle(y.size(), x.size()), x).with_signs(y)
+    return _supplement_of_negative(_angle(y.absolute(), x.absolute()), x).with_signs(y)
 
 
 def _atan(x: Vector) -> Vector:
-    return _angle(x.size(), x._make(x.as_vector(1.0))).with_signs(x)
+    return _angle(x.absolute(), x._make(x.as_vector(1.0))).with_signs(x)
 
 
 def _leg(x: Vector) -> Vector:
-    return ((1.0 - x) * (1.0 + x)).root()
+    return ((1.0 - x) * (1.0 + x)).square_root()
 
 
 def _hypot(x: Vector, y: Vector) -> Vector:
-    a, b = x.size(), y.size()
+    a, b = x.absolute(), y.absolute()
     great, small = b.where(a < b, a), a.where(a < b, b)
     ratio = small / great
-    return great.where(great.equals(0.0), great * ratio.multiply_add(ratio, 1.0).root())
+    return great.where(great.equals(0.0), great * ratio.multiply_add(ratio, 1.0).square_root())
 
 
 #: The functions by their names in `math`.
@@ -382,8 +382,8 @@ FUNCTIONS: dict[str, Callable[..., Vector]] = {
     "sin": _sin,
     "cos": _cos,
     "tan": lambda x: _sin(x) / _cos(x),
-    "asin": lambda x: _angle(x.size(), _leg(x)).with_signs(x),
-    "acos": lambda x: _supplement_of_negative(_angle(_leg(x), x.size()), x),
+    "asin": lambda x: _angle(x.absolute(), _leg(x)).with_signs(x),
+    "acos": lambda x: _supplement_of_negative(_angle(_leg(x), x.absolute()), x),
     "atan": _atan,
     "atan2": _atan2,
     "sinh": _sinh,
@@ -391,8 +391,8 @@ FUNCTIONS: dict[str, Callable[..., Vector]] = {
     "tanh": _tanh,
     "exp": _exp,
     "log": _log,
-    "sqrt": Vector.root,
-    "fabs": Vector.size,
+    "sqrt": Vector.square_root,
+    "fabs": Vector.absolute,
     "hypot": _hypot,
     "pow": lambda x, y: lane_by_lane("pow", x, y),
 }

@@ -81,7 +81,7 @@ class PartCompiler(KernelCompiler):
 
 
 class _Noted(JITCodeLibrary):
-    """Code of a kernel that notes what it is before it is optimised."""
+    """Code of a kernel that stores its portable form before it is optimised."""
 
     def _optimize_final_module(self) -> None:
         self.noted = self._final_module.as_bitcode()
@@ -106,7 +106,7 @@ def portable_code(dispatcher: Any) -> bytes:
 
 
 def _read_portable_code(content: bytes) -> tuple[Any, ...]:
-    """Return what Numba keeps of a kernel, from its code for any processor."""
+    """Return what Numba keeps of a kernel, read from the kernel's code for any processor."""
     name, noted, *rest = pickle.loads(zlib.decompress(content))
     library = cpu_target.target_context.codegen().create_library(name)
     library.enable_object_caching()
@@ -126,7 +126,7 @@ class _Files(IndexDataCacheFile):
         found = super().load(key)
         if found is None and os.path.exists(self.source):
             try:
-                found = _read_portable_code(_read_checked(self.source))
+                found = _read_portable_code(_read_verified(self.source))
             except Exception as error:  # of the file, of pickle, zlib or LLVM
                 warnings.warn(
                     f"{self.source} is not used ({error!r}): the kernel is compiled", RuntimeWarning, stacklevel=2
@@ -143,11 +143,11 @@ class _Files(IndexDataCacheFile):
 
     def _load_index(self) -> Any:
         if Path(self._index_path).exists():
-            _read_checked(Path(self._index_path))
+            _read_verified(Path(self._index_path))
         return super()._load_index()
 
     def _load_data(self, name: str) -> Any:
-        _read_checked(Path(self._data_path(name)))
+        _read_verified(Path(self._data_path(name)))
         return super()._load_data(name)
 
 
@@ -155,7 +155,7 @@ def _with_hash(content: bytes) -> bytes:
     return content + sha256(content).digest()
 
 
-def _read_checked(path: Path) -> bytes:
+def _read_verified(path: Path) -> bytes:
     """Return the bytes of a file before the hash at its end, which Numba ignores; raise ValueError if it is not their hash."""
     whole = path.read_bytes()
     content = whole[:-_DIGEST]

@@ -41,7 +41,7 @@ def _segments(curve, target):
 
 @part
 def _sort_into_bands(box, floor, scale):
-    """Sort segments into horizontal bands; return first and last band of each segment, and the segments of each band.
+    """Sort segments into horizontal bands; return the first and the last band of each segment, and the segments of each band.
 
     The segments of band b are ``members[begin[b] : begin[b + 1]]``; the return value is (first, last, begin, members).
     """
@@ -171,8 +171,8 @@ def symmetric_difference(curve, target, gradient):
 
 
 @kernel(void(MATRIX, MATRIX, boolean, VECTOR, int64[::1], VECTOR), purpose="the curves of linkages")
-def nearest(points, line, closed, distance, segment, share):
-    """Find the nearest place on a polyline to each point; write its distance, segment number and fraction of the segment.
+def find_nearest(points, line, closed, distance, segment, share):
+    """Find the nearest place on a polyline to each point; write its distance, segment index and fraction of the segment.
 
     ``points`` and ``line`` have the rows x, y, shape (2, k) and (2, m); a closed line goes on from its last point to its first.
     The results have shape (k,).

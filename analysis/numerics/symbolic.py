@@ -30,7 +30,7 @@ def library() -> Any:
 
 
 def symbolic_functions(modules: tuple[ModuleType, ...], **others: Any) -> ReboundFunctions:
-    """Return the functions of ``modules`` for CasADi symbols; ``others`` replace further functions by their names."""
+    """Return copies of the functions of ``modules`` for CasADi symbols; ``others`` replace further functions by their names."""
     casadi = library()
     functions = {name: getattr(casadi, {"pow": "power"}.get(name, name)) for name in ELEMENTARY}
     return rebind_functions(modules, functions | others)

@@ -16,13 +16,13 @@ from linkwork.errors import LinkworkError
 
 
 class ReboundFunctions(SimpleNamespace):
-    """Functions as attributes by name, the later module's if two share a name; methods are found by `of` only."""
+    """Rebound functions as attributes by name, the later module's if two share a name; methods are found by `find` only."""
 
     def __init__(self, functions: Mapping[Callable[..., Any], FunctionType]) -> None:
         super().__init__(**{f.__name__: f for f in functions.values() if "." not in f.__qualname__})
         self._functions = functions
 
-    def of(self, function: Callable[..., Any]) -> Callable[..., Any]:
+    def find(self, function: Callable[..., Any]) -> Callable[..., Any]:
         """Return the new function for an original function or method.
 
         Raises
@@ -37,7 +37,7 @@ class ReboundFunctions(SimpleNamespace):
 
 
 def rebind_functions(modules: tuple[ModuleType, ...], elementary: Mapping[str, Any]) -> ReboundFunctions:
-    """Return copies of the functions of ``modules`` that calculate with another kind of number.
+    """Return copies of the functions of ``modules`` that calculate with symbols, arrays or dual numbers instead of floats.
 
     Parameters
     ----------

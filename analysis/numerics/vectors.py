@@ -73,7 +73,7 @@ def _pointer(context: Any, builder: Any, kind: Any, array: Any, index: Any) -> A
 
 @intrinsic
 def load(typing_context, array, index):
-    """Return number ``index`` of each lane from an array in lanes."""
+    """Return the entry ``index`` of each lane from an array in lanes."""
 
     def generate(context, builder, signature, arguments):
         return builder.load(_pointer(context, builder, signature.args[0], *arguments), align=8)
@@ -83,7 +83,7 @@ def load(typing_context, array, index):
 
 @intrinsic
 def store(typing_context, array, index, value):
-    """Write number ``index`` of each lane into an array in lanes."""
+    """Write the entry ``index`` of each lane into an array in lanes."""
 
     def generate(context, builder, signature, arguments):
         value = _to_vector(builder, signature.args[2], arguments[2])
@@ -95,7 +95,7 @@ def store(typing_context, array, index, value):
 
 @intrinsic
 def spread(typing_context, rows, index, value):
-    """Write the number of each lane into row ``lane`` of an array, shape (LANES, n), at the column ``index``.
+    """Write the value of lane l into row l of an array, shape (LANES, n), at the column ``index``.
 
     Single lanes read their rows: to gather a lane's numbers from an array in lanes is slower on some processors.
     """

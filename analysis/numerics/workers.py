@@ -119,7 +119,7 @@ def run_in_parallel(
     n_jobs: int | None = None,
     threads: bool = False,
 ) -> Iterator[tuple[int, Made]]:
-    """Apply a function to items in parallel; yield number and result of each item as soon as it is done.
+    """Apply a function to items in parallel; yield index and result of each item as soon as it is done.
 
     The workers are ``n_jobs`` processes of this machine, threads if ``threads`` is true, or those of the backend that
     `joblib.parallel_config` has set, such as "dask", "loky" or "threading". With one worker the work is done in this process.

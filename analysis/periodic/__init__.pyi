@@ -20,7 +20,7 @@ from .chart.coexistence import Basins as Basins
 from .chart.coexistence import Coexistence as Coexistence
 from .chart.coexistence import basins as basins
 from .chart.coexistence import coexistence as coexistence
-from .chart.coexistence import turns_sought as turns_sought
+from .chart.coexistence import describe_turns as describe_turns
 from .chart.grid import Grid as Grid
 from .chart.grid import GridInterrupted as GridInterrupted
 from .chart.grid import grid as grid

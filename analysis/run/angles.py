@@ -40,9 +40,9 @@ class WholeTurns:
     def take(
         self, x: NDArray[np.float64], u: NDArray[np.float64], laws: NDArray[np.float64], first: int, watch: Any = None
     ) -> None:
-        """Subtract whole turns from the state x, in place, if it has many and the mechanism is then the same.
+        """Subtract whole turns from the state x, in place, if its angles are large and the mechanism is the same without them.
 
-        ``u`` are the channels, ``laws`` the torque laws of the inputs, ``first`` the number of the next sample, and ``watch``
+        ``u`` are the channels, ``laws`` the torque laws of the inputs, ``first`` the index of the next sample, and ``watch``
         has the table of events, whose levels are reduced too.
         """
         if not self.has_many_turns(x) or laws[:, 2].any():
@@ -94,7 +94,7 @@ def repeats(
     u: NDArray[np.float64],
     way: NDArray[np.float64],
 ) -> bool:
-    """Return whether outputs and derivatives of a mechanism are the same at the states x and x + way, coordinates aside."""
+    """Return whether outputs and derivatives, but for the coordinates, are the same at the states x and x + way."""
     equations = mechanism.equations
     acting = equations.apply_inputs(modes, tuple(u.tolist()), p)
     coordinates = coordinate_outputs(mechanism)

@@ -38,7 +38,7 @@ def published_set(known: str | PublishedSet) -> PublishedSet:
 
 
 def takes_published(**fills: Fill) -> Callable[[_Function], _Function]:
-    """Decorate a function so that its argument ``parameters`` may be a published set or its name, or a list with such.
+    """Decorate a function so that its argument ``parameters`` may be a published set, its name, or a list with these.
 
     Parameters
     ----------
@@ -101,7 +101,7 @@ def takes_options(kind: type) -> Callable[[_Function], _Function]:
 
 
 def complete_inputs(known: PublishedSet, inputs: Any) -> Any:
-    """Return inputs completed with the drives of the published set, for freedoms that they do not drive themselves."""
+    """Complete inputs with the drives of the published set, for freedoms that the inputs do not drive."""
     inputs = Inputs() if inputs is None else inputs
     if not isinstance(inputs, Inputs):
         return inputs
@@ -119,7 +119,7 @@ def _without_drives(known: PublishedSet, names: Iterable[str]) -> PublishedSet:
 
 
 def complete_initial_state(known: PublishedSet, initial: Any) -> Any:
-    """Return the initial state: as given, a mapping completed from the published set, or that of the set if it is None."""
+    """Complete the initial state: None becomes that of the published set, a mapping is completed from it."""
     if isinstance(initial, Mapping):
         return read_start(mechanism_of(known.parameters), initial, known.initial)
     return known.initial if initial is None else initial
@@ -131,7 +131,7 @@ def complete_speed(known: PublishedSet, speed: Any) -> Any:
 
 
 def turn_durations(inputs: Inputs, mechanism: Mechanism) -> tuple[float, float] | None:
-    """Return how long one turn of the slowest and of the fastest crank with a constant speed takes (s), None without any."""
+    """Return the duration of a turn (s) of the slowest and of the fastest crank with a constant speed; None without any."""
     found = []
     angles = {v.name for v in mechanism.variables if v.unit == "rad"}
     for number, freedom in enumerate(mechanism.freedoms):

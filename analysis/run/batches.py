@@ -22,7 +22,7 @@ from linkwork.mechanism import Mechanism
 from ..files import load_array, save_array
 from ..mechanisms import MECHANISMS, InitialState, Parameters
 from .cautions import MANY_STEPS, is_too_slow
-from .inputs import Encoded, Inputs, align, compiled_source, encode
+from .inputs import Encoded, Inputs, align, compile_source, encode
 from .prepared import STEPS_PER_CALL, Run, Settings, compute_outputs, make_problem, verdict
 from .sampling import function_values
 from .varied import VariedSequence, array_functions, distinct_objects, varied_constants
@@ -46,7 +46,7 @@ class Task:
     Attributes
     ----------
     first : int
-        Number in the ensemble of the first of these runs.
+        Index in the ensemble of the first of these runs.
     outputs : tuple of int or None
         Columns of the chosen outputs; None for states and channels.
     folder : path or None
@@ -162,7 +162,7 @@ def _load_or_solve(task: Task, prepared: PreparedBatch, interrupts: Sequence[boo
 
 
 def _verdicts(task: Task, prepared: PreparedBatch, ends: NDArray[np.float64]) -> tuple[list[int], list[str]]:
-    """Return the solver.status and solver.message of each run."""
+    """Return solver.status and solver.message of each run."""
     from . import records as k
 
     status, messages, size = [k.FINISHED] * len(ends), [""] * len(ends), task.mechanism.size
@@ -201,7 +201,7 @@ def _integrate(
     """Solve the runs; return False if they were interrupted.
 
     A row of ``ends`` receives for each run the status of the compiled code, the number of samples, the time of the end (s), the
-    number of a channel that was not finite, the number of steps, and state and channels at the end. ``samples`` receive states
+    index of a channel that was not finite, the number of steps, and state and channels at the end. ``samples`` receive states
     and channels, or the chosen outputs, at the samples, NaN after the end of a run.
     """
     from ..numerics.vectors import LANES
@@ -217,8 +217,8 @@ def _integrate(
         else (np.empty((m, n, mechanism.size)), np.empty((m, n, len(mechanism.channels))))
     )
     # kept alive while their addresses are in use
-    source, _kept = compiled_source(encoded)
-    switched = _switched(mechanism, batch.p)
+    source, _kept = compile_source(encoded)
+    switched = _is_switched_on(mechanism, batch.p)
     problem = make_problem(encoded, settings, switched)
     state = k.State(np.zeros(m, dtype=k.CARRY), prepared.x.copy(), np.zeros((m, len(mechanism.channels))))
     carries = state.carries
@@ -285,7 +285,7 @@ def prepare(task: Task) -> PreparedBatch:
     p = np.full((len(x), len(mechanism.constants._fields) + 1), np.nan)
     u = np.zeros((len(x), len(mechanism.channels)))
     # users' functions are called as Python functions, as in `sample`
-    source = compiled_source(replace(encoded, functions=((None, None),) * len(encoded.functions)))[0]
+    source = compile_source(replace(encoded, functions=((None, None),) * len(encoded.functions)))[0]
     compiled.channels_of_many(t, source, batch, x, u)
     doubtful: set[int] = set()
     if any(chain.from_iterable(encoded.functions)):
@@ -303,14 +303,14 @@ def prepare(task: Task) -> PreparedBatch:
             for n, column in enumerate(columns):
                 p[:, n] = column
             if mechanism.switch:
-                columns = columns._replace(**{mechanism.switch: float(_switched(mechanism, p))})
-            applied = functions.of(equations.apply_inputs)(
+                columns = columns._replace(**{mechanism.switch: float(_is_switched_on(mechanism, p))})
+            applied = functions.find(equations.apply_inputs)(
                 tuple(map(float, encoded.modes.values())), tuple(u.T), columns
             )
-            state = functions.of(equations.start)(tuple(x.T), applied, columns)
-            clearance = np.broadcast_to(functions.of(equations.clearance)(state, applied, columns), len(x))
-            p[:, -1] = functions.of(equations.energy)(state, columns)
-            for n, (column, scale) in enumerate(zip(state, functions.of(mechanism.error_scale)(parameters, state))):
+            state = functions.find(equations.start)(tuple(x.T), applied, columns)
+            clearance = np.broadcast_to(functions.find(equations.clearance)(state, applied, columns), len(x))
+            p[:, -1] = functions.find(equations.energy)(state, columns)
+            for n, (column, scale) in enumerate(zip(state, functions.find(mechanism.error_scale)(parameters, state))):
                 x[:, n], scales[:, n] = column, scale
         # near the limit of assembly the mechanism itself writes the error message
         sound = np.isfinite(np.column_stack([u, x, scales, p[:, -1]])).all(axis=1) & (clearance > 2 * LIMIT_SINE)
@@ -332,7 +332,7 @@ def prepare(task: Task) -> PreparedBatch:
     return PreparedBatch(encoded, batch._replace(p=p, scales=scales), x, failures)
 
 
-def _switched(mechanism: Mechanism, p: NDArray[np.float64]) -> bool:
+def _is_switched_on(mechanism: Mechanism, p: NDArray[np.float64]) -> bool:
     """Return whether the mechanism's switch is on in any row of constants."""
     return mechanism.switch_index >= 0 and bool(p[:, mechanism.switch_index].any())
 
@@ -362,7 +362,7 @@ def _encode_inputs(task: Task) -> tuple[Encoded, Any]:
     constant = -1
 
     def encode_kind(inputs: Inputs) -> tuple[int, list[float] | None]:
-        """Encode inputs if they are of a new kind; return the number of their kind, and their values if all are constant."""
+        """Encode inputs if they are of a new kind; return the index of their kind, and their values if all are constant."""
         nonlocal constant
         values = inputs.constants(signals)
         if values is None or constant < 0:

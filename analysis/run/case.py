@@ -12,7 +12,7 @@ from .masses import Mass, mass_origins
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Case:
-    """Everything a run needs, in process or through the FMU. SI units.
+    """All that a run needs, in process or through the FMU, in SI units.
 
     Attributes
     ----------

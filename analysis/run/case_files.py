@@ -56,7 +56,7 @@ def read_parameters(
         raise ParameterError("mechanism", data["mechanism"], f"be {mechanism.name}")
     data = {name: value for name, value in data.items() if name != "mechanism"}
     keys = {field_name(name): name for name in mechanism.mechanism_variables}
-    flat = resolve_sections(mechanism, files.flattened(data), base)
+    flat = resolve_sections(mechanism, files.flatten(data), base)
     try:
         made: Parameters = files.read(
             mechanism.parameters, flat, "", readers=parameter_readers(mechanism), keys=keys, base=base
@@ -108,7 +108,7 @@ def _find_mechanism(data: Mapping[str, Any]) -> Mechanism:
         except UnknownNameError as error:
             error.args = (f"{error}; a linkage of your own is loaded first: load_linkage(FILE)",)
             raise
-    names = set(files.flattened(data))
+    names = set(files.flatten(data))
     found = {name: len(names & set(mechanism.mechanism_variables)) for name, mechanism in MECHANISMS.items()}
     best = [name for name, count in found.items() if count == max(found.values())]
     if len(best) > 1:
@@ -215,7 +215,7 @@ def read_case(
     if named.get("mechanism", mechanism.name) != mechanism.name:
         raise ParameterError("mechanism", named["mechanism"], f"be that of the published set {named['published']}")
     acting = case_inputs(mechanism)
-    data = files.overridden(_without_rivals(data, overrides, mechanism, acting), overrides)
+    data = files.override(_without_rivals(data, overrides, mechanism, acting), overrides)
     own, found = _split_tables(data, mechanism, acting, folder)
     printed = None if published is None else published.parameters
     try:
@@ -241,12 +241,12 @@ def read_case(
         stop_time=stop_time,
         step=step,
         tolerance=run.tolerance,
-        masses=mass_origins(parameters, files.flattened(own), published, str(named.get("published", ""))),
+        masses=mass_origins(parameters, files.flatten(own), published, str(named.get("published", ""))),
     )
 
 
 def with_case_file_names(data: Mapping[str, Any], mechanism: Mechanism) -> dict[str, Any]:
-    """Return the tables of a case with inputs under their names in case files instead of their FMI names."""
+    """Return the tables of a case with the FMI names of inputs replaced by their names in case files."""
     result = dict(data)
     for channel in mechanism.channels:
         table, _, leaf = channel.name.rpartition(".")
@@ -270,7 +270,7 @@ def _case_file_name(name: str, mechanism: Mechanism) -> str:
 def _without_rivals(
     data: Mapping[str, Any], overrides: Mapping[str, Any], mechanism: Mechanism, acting: Mapping[str, ActingInput]
 ) -> dict[str, Any]:
-    """Return the tables without the entries that an override replaces: other drives of the same freedom, or end of the run."""
+    """Return the tables without the entries that an override replaces: drives of the same freedom, or the end of the run."""
     result = dict(data)
     for given, rival in (("run.stop_time", "revolutions"), ("run.revolutions", "stop_time")):
         if given in overrides and isinstance(run := result.get("run"), Mapping):

@@ -38,7 +38,7 @@ def disturbance_rates(mechanism: Mechanism, x: NDArray[np.float64], held: Any, p
 
 
 def stiffness(rates: NDArray[np.complex128], steps: float, duration: float, usual: float) -> str:
-    """Return a caution if fast decay or fast vibration of small disturbances makes the steps of a run short; else empty.
+    """Return a caution if small disturbances that decay or vibrate fast make the steps of a run short; else an empty text.
 
     ``rates`` are the eigenvalues of `disturbance_rates`; ``steps`` is the number of steps in the ``duration`` (s). A vibration
     up to the angular frequency ``usual`` (rad/s) is not reported: samples or drive explain it.
@@ -59,7 +59,7 @@ def stiffness(rates: NDArray[np.complex128], steps: float, duration: float, usua
 
 
 def is_too_slow(steps: Any, passed: Any, span: float, most: int) -> Any:
-    """Return whether a stiff run is to end now, since it would need too many steps for its duration ``span`` (s).
+    """Return whether a stiff run should end now, as it would need too many steps for its duration ``span`` (s).
 
     ``steps`` is the number of steps so far, ``passed`` the time that they covered (s), both of one run or arrays of several;
     ``most`` is the largest number of steps.

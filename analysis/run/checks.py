@@ -31,7 +31,7 @@ def standard_cases(mechanism: Mechanism) -> Mapping[str, Case]:
 
 
 class _Cases(Mapping[str, Case]):
-    """The standard cases of all known mechanisms."""
+    """The standard cases of all known mechanisms, by name."""
 
     def _all(self) -> dict[str, Case]:
         return {name: case for m in MECHANISMS.values() for name, case in standard_cases(m).items()}

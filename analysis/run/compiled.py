@@ -118,7 +118,7 @@ def _first_step(motion):
 
 @inner
 def choose_first_size(motion):
-    """Compute the first step size of a run from the rates at its beginning."""
+    """Choose the first step size of a run from the rates at its beginning."""
     carry, x, k = motion.carry, motion.x, motion.room.k
     if not carry.step > 0.0:
         ratio = 1e-300
@@ -175,7 +175,7 @@ def _accept(h, last, t_new, motion):
 
 @inner
 def _keep_balance(motion):
-    """Scale the rates at the end of a step so that the energy balance holds, unless the mechanism is nearly at rest."""
+    """Scale the rates at the end of a step so that the energy balance holds; do nothing if the mechanism is nearly at rest."""
     y, outputs, balance = motion.room.y, motion.room.outputs, motion.watch.balance
     equation(OUTPUTS, 0.0, y, motion.u, outputs, motion)
     share = outputs[balance[0]] / outputs[balance[1]]
@@ -342,7 +342,7 @@ def single_batch(source: Source, p: NDArray[np.float64], scale: NDArray[np.float
 
 @part
 def _run_source(i, source, batch):
-    """Return the inputs of run i of a batch; ``source`` has the data common to all runs."""
+    """Return the inputs of run i of a batch as a `Source`; ``source`` has the data common to all runs."""
     pieces, waves = batch.sizes[i]
     return Source(
         batch.breaks[i, : pieces + 1],

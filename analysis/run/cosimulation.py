@@ -135,7 +135,7 @@ def cosimulate(
 def input_sampler(case: Case, steps: int) -> Callable[[int, Sequence[float] | None], dict[str, float]]:
     """Return a function that samples the inputs of a case, over ``case.stop_time`` in equal steps, for co-simulation.
 
-    The function takes the number of a step and the outputs at its start, None at the start of the run; it must be called for
+    The function takes the index of a step and the outputs at its start, None at the start of the run; it must be called for
     the steps in order, and returns the inputs by name.
     """
     times = np.linspace(0.0, case.stop_time, steps + 1)
@@ -172,7 +172,7 @@ class _Stepwise:
         return self.inputs(0, self.start)
 
     def inputs(self, number: int, x: NDArray[np.float64]) -> dict[str, float]:
-        """Return the inputs over the step from the communication point with this number, at the state x."""
+        """Return the inputs over the step from the communication point ``number`` (an index), at the state x."""
         times, t = self.times, float(self.times[number])
         if self.linear:
             release(self.encoded, x, self.laws)
@@ -200,7 +200,7 @@ class _Stepwise:
         return np.array([*(row[n] for n in self.coordinates), *(row[n] for n in self.rates), 0.0, 0.0])
 
     def rows(self, run: Any) -> Iterator[tuple[float, list[float]]]:
-        """Run the FMU and yield times and outputs until the end or a step that the FMU refuses."""
+        """Run the FMU; yield time and outputs at each communication point, until the end or a step that the FMU refuses."""
         if self.linear and not run.interpolates:
             raise CosimulationError(
                 f"{run.name} does not take inputs that are linear over a step: it can only hold them"
@@ -237,7 +237,7 @@ class _Continuous:
         return name_channels(prepared.encoded, sample(prepared.encoded, float(prepared.settings.times[0]), x, laws))
 
     def rows(self, model: Any) -> Iterator[tuple[float, list[float]]]:
-        """Run the FMU and yield times and outputs until the end or the limit of assembly, the outputs at the limit included."""
+        """Run the FMU; yield time and outputs at each sample, until the end or, included, the limit of assembly."""
         from .exchange import Exchange, ExchangeError
 
         times = self.prepared.settings.times

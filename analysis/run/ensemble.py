@@ -30,7 +30,7 @@ from .arguments import complete_initial_state, complete_inputs, takes_options, t
 from .batches import NOT_RUN, Result, Task, solve
 from .equations import machine
 from .events import show_progress
-from .inputs import Inputs, check_run, compiled_source, encode
+from .inputs import Inputs, check_run, compile_source, encode
 from .prepared import compute_outputs
 from .signals import Function
 from .simulation import MOST_STEPS, RunOptions, check_settings, sample_times
@@ -115,7 +115,7 @@ class Ensemble:
 
     @property
     def failures(self) -> dict[int, str]:
-        """Return the messages of the runs that did not reach their end, by the number of the run."""
+        """Return the messages of the runs that did not reach their end, by the index of the run."""
         return {i: self.messages[i] for i in np.flatnonzero(self.status != 0).tolist()}
 
     def output(self, name: str) -> np.ma.MaskedArray[Any, np.dtype[np.float64]]:
@@ -254,7 +254,7 @@ def simulate_many(
     where = None if folder is None else Path(folder)
     # what cannot be compiled is reported here, and not by a worker
     encoded = encode(all_inputs[0], mechanism)
-    compiled_source(encoded)
+    compile_source(encoded)
     usual = max(min(128, len(parameters) // 4), min(256, len(parameters) // 16))
     # a multiple of 8 fills whole vectors
     batch = batch or max(16, min(usual, _SAMPLES_OF_BATCH // len(settings.times)) // 8 * 8)

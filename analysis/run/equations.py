@@ -34,7 +34,7 @@ _ALLOWED = (
 
 @cache
 def symbolic_equations(mechanism: Mechanism) -> ReboundFunctions:
-    """Return the functions of the mechanism's modules for CasADi symbols instead of floats."""
+    """Return copies of the functions of the mechanism's modules that take CasADi symbols instead of floats."""
     return symbolic.symbolic_functions(mechanism.modules)
 
 
@@ -62,7 +62,7 @@ def inertia_and_stiffness(mechanism: Mechanism, cranks: tuple[int, ...], freedom
     x[freedom], x[len(mechanism.freedoms) + freedom] = s, v
     for crank, angle in zip(cranks, angles):
         x[crank] = angle
-    energy = symbolic_equations(mechanism).of(mechanism.equations.energy)(tuple(x), k)
+    energy = symbolic_equations(mechanism).find(mechanism.equations.energy)(tuple(x), k)
     seconds = [casadi.densify(casadi.jacobian(casadi.jacobian(energy, z), z)) for z in (v, s)]
     resting = casadi.substitute(seconds, [s, v], [casadi.SX(0.0)] * 2)
     return casadi.Function("at_rest", [*angles, p], resting)
@@ -89,9 +89,9 @@ def parameter_symbols(mechanism: Mechanism) -> ParameterSymbols:
 
 
 def parameters_class(mechanism: Mechanism, functions: ReboundFunctions) -> type[SimpleNamespace]:
-    """Return a class like a mechanism's parameters whose fields may be symbols or arrays; ``functions`` has its methods."""
+    """Return a class with the methods of a mechanism's parameters, from ``functions``, for fields of symbols or arrays."""
     own = vars(mechanism.parameters).items()
-    methods = {name: functions.of(f) for name, f in own if isinstance(f, FunctionType) and name[:2] != "__"}
+    methods = {name: functions.find(f) for name, f in own if isinstance(f, FunctionType) and name[:2] != "__"}
     return type("LikeParameters", (SimpleNamespace,), methods)
 
 
@@ -157,7 +157,7 @@ def expressions(mechanism: Mechanism, switched: bool = False) -> TracedEquations
 
     def call(what: str, *arguments: Any) -> Any:
         try:
-            return functions.of(getattr(mechanism.equations, what))(*arguments)
+            return functions.find(getattr(mechanism.equations, what))(*arguments)
         except RuntimeError as error:
             raise LinkworkError(
                 f"the {what} of {mechanism.name} cannot be traced, as where it branches on its arguments: {_ALLOWED}"
@@ -174,8 +174,8 @@ def expressions(mechanism: Mechanism, switched: bool = False) -> TracedEquations
     )
 
 
-def _compiled(traces: TracedEquations, functions: Mapping[str, Any], lanes: int = 1) -> MachineCode:
-    """Compile expressions in the symbols of ``traces``, by name; with several lanes, outputs are written row by row."""
+def _compile(traces: TracedEquations, functions: Mapping[str, Any], lanes: int = 1) -> MachineCode:
+    """Compile expressions in the symbols of ``traces``, given by name; with several lanes, outputs are written row by row."""
     from ..numerics.codegen import MachineCode
 
     casadi = symbolic.library()
@@ -198,7 +198,7 @@ class Machine:
 
     def __init__(self, mechanism: Mechanism, switched: bool, lanes: int) -> None:
         traces = expressions(mechanism, switched)
-        self._code = _compiled(traces, {name: getattr(traces, name) for name in _NAMES}, lanes)
+        self._code = _compile(traces, {name: getattr(traces, name) for name in _NAMES}, lanes)
         self.addresses: NDArray[np.int64] = np.array([self._code.addresses[name] for name in _NAMES], dtype=np.int64)
         self.fingerprint = self._code.fingerprint
 
@@ -225,4 +225,4 @@ def compile_outputs(mechanism: Mechanism, switched: bool, columns: tuple[int, ..
 
     traces = expressions(mechanism, switched)
     with MAKING:
-        return _compiled(traces, {"chosen": traces.outputs[list(columns)]}, lanes)
+        return _compile(traces, {"chosen": traces.outputs[list(columns)]}, lanes)

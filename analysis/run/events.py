@@ -102,7 +102,7 @@ def progress_listener(listener: Callable[[str, float], None]) -> Iterator[None]:
 
 @contextmanager
 def show_progress(progress: bool, duration: float, what: str = "running") -> Iterator[Callable[[float], None]]:
-    """Show a progress bar for a run of a given duration; yield a function to call with the part of it done so far."""
+    """Show a progress bar for a run of a given duration; yield a function to call with the duration done so far."""
     listener = _LISTENER.get()
     if listener is not None:
         yield lambda done: listener(what, done / duration if duration else 1.0)

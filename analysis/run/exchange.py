@@ -87,7 +87,7 @@ class Exchange(CVodeSolver):  # type: ignore[misc]
         return np.ctypeslib.as_array(x, (self.nx,))
 
     def inputs(self, t: float, x: NDArray[np.float64], left: bool = False) -> dict[str, float]:
-        """Return all inputs by name, at a time and a state; ``left`` for the limit from the left where an input jumps."""
+        """Return all inputs by name, at a time and a state; where an input jumps, the limit from the left if ``left``."""
         return name_channels(self.encoded, sample(self.encoded, t, x, self.laws, left=left))
 
     def begin(self, released: Any = ()) -> bool:

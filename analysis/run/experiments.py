@@ -85,7 +85,7 @@ class Deviation:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Outcome:
-    """Result of an experiment: deviations of all variables, largest first, the allowed one, and why a run failed, if so."""
+    """Result of an experiment: deviations of all variables, largest first; the allowed deviation; why the run failed."""
 
     experiment: str
     description: str

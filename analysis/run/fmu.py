@@ -92,7 +92,7 @@ def read_description(fmu: str | Path, *, validate: bool = False) -> Any:
 
 
 def list_interfaces(fmu: str | Path) -> dict[str, str]:
-    """Return the interfaces that an FMU has: their descriptions by their names in `cosimulate`.
+    """Return the interfaces of an FMU: descriptions by the names that `cosimulate` takes.
 
     Raises
     ------
@@ -301,7 +301,7 @@ class FmuModel(_Instance):
     Attributes
     ----------
     states, indicators : int
-        Numbers of continuous states and of event indicators.
+        Number of continuous states, and number of event indicators.
     """
 
     interface = "model exchange"

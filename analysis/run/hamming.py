@@ -213,7 +213,7 @@ class Hamming(OdeSolver):  # type: ignore[misc]
         return (error if np.isfinite(new.f).all() else np.inf), new, p - c
 
     def _runge_kutta(self, length: float) -> tuple[float, Point, Point]:
-        """Take two Runge-Kutta steps of half the length; return their error, the middle and the end.
+        """Take two Runge-Kutta steps of half the length; return their error, and the points at the middle and at the end.
 
         The error, relative to the tolerance, is estimated from the difference to one step of the full length.
         """

@@ -313,8 +313,8 @@ class Encoded:
     source : Source
         Arrays for the compiled code, without the users' functions.
     commands : ndarray of int, shape (c, 3)
-        For each commanded rate (such as a crank speed): the number of its channel, the component of the state that it
-        prescribes, and the number of the channel of its derivative.
+        For each commanded rate (such as a crank speed): the index of its channel, the component of the state that it
+        prescribes, and the index of the channel of its derivative.
     functions : tuple
         For each signal the user's Python function and the function of its derivative, or None.
     """
@@ -341,13 +341,13 @@ class Encoded:
         )
 
     def value_name(self, channel: int) -> str:
-        """Return the name of a channel, by its number, as in `Inputs`."""
+        """Return the name in `Inputs` of a channel, given by its index."""
         return self.mechanism.channels[channel].argument
 
 
 @lru_cache(maxsize=64)
 def _signals(mechanism: Mechanism) -> tuple[tuple[str, int, int], ...]:
-    """Return for each signal its name, the number of its channel and that of its derivative's channel, -1 if none."""
+    """Return for each signal its name, the index of its channel, and that of its derivative's channel, -1 if there is none."""
     rates = {channel.freedom: n for n, channel in enumerate(mechanism.channels) if channel.kind == "rate"}
     return tuple(
         (channel.argument, n, rates.get(channel.freedom, -1) if channel.kind == "command" else -1)
@@ -379,7 +379,7 @@ def encode(inputs: Inputs, mechanism: Mechanism) -> Encoded:
     functions: list[tuple[StateFunction | None, StateFunction | None]] = [(None, None)] * len(signals)
     for n, part in pieces:
         if isinstance(part, Piecewise):
-            coefficients[:, n, :] += _on_breaks(part, merged)
+            coefficients[:, n, :] += _refine_breaks(part, merged)
         elif isinstance(part, Harmonics):
             coefficients[:, n, 0] += part.mean
             harmonics += [(float(n), *row) for row in zip(part.amplitudes, part.frequencies, part.phases)]
@@ -414,7 +414,7 @@ def encode(inputs: Inputs, mechanism: Mechanism) -> Encoded:
     return Encoded(mechanism, modes, source, np.array(commanded, dtype=np.int64).reshape(-1, 3), tuple(functions))
 
 
-def _on_breaks(part: Piecewise, breaks: NDArray[np.float64]) -> NDArray[np.float64]:
+def _refine_breaks(part: Piecewise, breaks: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return the polynomial coefficients of a signal on finer breaks, shape (n, 4); its outer pieces extend beyond its ends."""
     left = breaks[:-1]
     index = np.clip(np.searchsorted(part.breaks, left, side="right") - 1, 0, len(part.coefficients) - 1)
@@ -472,7 +472,7 @@ def _reason(error: Exception) -> str:
     return (telling or lines or [type(error).__name__])[0]
 
 
-def compiled_source(encoded: Encoded) -> tuple[Source, list[Any]]:
+def compile_source(encoded: Encoded) -> tuple[Source, list[Any]]:
     """Return the inputs for the compiled code, with a copy of the torque laws, and the objects to keep while these are used."""
     freedoms = len(encoded.mechanism.freedoms)
     kept = [[f and compile_function(f, freedoms) for f in row] for row in encoded.functions]

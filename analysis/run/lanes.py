@@ -47,7 +47,7 @@ from .stepping_in_lanes import errors_in_lanes, interpolants_in_lanes, interpola
 class Lanes(NamedTuple):
     """Work arrays of all lanes.
 
-    ``code`` are the addresses of the equations in lanes. For each lane: ``run`` is the number of its run or -1, ``phase`` and
+    ``code`` are the addresses of the equations in lanes. For each lane: ``run`` is the index of its run or -1, ``phase`` and
     ``outcome`` are constants of this module, ``last`` is 1 if the step is the last of its interval. In lanes: state ``x``,
     state at the end of the step ``y`` and at a stage ``z``, modes, channels, constants, scales, step size, error, fraction of
     the step, stages, interpolant, clearance. A row of ``between`` is the state of a lane at its fraction.
@@ -191,7 +191,7 @@ def _motion(i, w):
 
 @inner
 def _take_run(lane, first, most, v, w):
-    """Give a lane the next run, from number ``first`` on, that fits and has steps to take; return the number after it."""
+    """Give a lane the next run, from the index ``first`` on, that fits and has steps to take; return the index after it."""
     i, end = first, w.status.shape[0]
     while i < end and not (w.fits[i] and w.status[i] == RUNNING and w.state.carries[i].steps < most):
         i += 1
@@ -222,7 +222,7 @@ def _enter(lane, v, w):
 
 @inner
 def _fill(first, most, v, w):
-    """Bring each lane to the beginning of a step; return how many lanes have a step, and the number of the next run."""
+    """Bring each lane to the beginning of a step; return how many lanes have a step, and the index of the next run."""
     busy = 0
     for lane in range(LANES):
         v.outcome[lane] = _IDLE
@@ -321,7 +321,7 @@ def _accept_step(lane, v, w):
 
 @inner
 def _run(lanes, work, most, budget):
-    """Do the work of `run_in_lanes`: that function keeps the arrays alive to which this one has references."""
+    """Do the work of `run_in_lanes`, which keeps the arrays alive to which ``lanes`` and ``work`` refer."""
     v, w = refer(lanes), refer(work)
     least = LEAST_STEP * (w.problem.end - w.samples.times[0])
     first = 0

@@ -38,7 +38,7 @@ RELEASE, NOTHING, ASSEMBLY = np.arange(-3, 0)
 
 @inner
 def _gap(e, t, x, u, motion):
-    """Return the value, at time t, state x and inputs u, of the function that is zero when event number e happens."""
+    """Return the value, at time t, state x and inputs u, of the function that is zero when event e happens."""
     watch, source = motion.watch, motion.source
     if e == ASSEMBLY:
         return state_clearance(x, u, motion) - LIMIT_SINE

@@ -175,7 +175,7 @@ def mass_origins(
 
 
 def trace_masses(parameters: Parameters) -> tuple[Mass, ...]:
-    """Tell where the masses of parameters come from: those equal to the most similar published set's count as from this set.
+    """Tell where the masses of parameters come from: those equal to the most similar published set's are from this set.
 
     Raises
     ------
@@ -199,7 +199,7 @@ def trace_masses(parameters: Parameters) -> tuple[Mass, ...]:
 def describe_masses(masses: tuple[Mass, ...]) -> tuple[str, list[str]]:
     """Return a sentence with all masses and their origins, and a warning for each mass that is ``stale``.
 
-    >>> in_sentences((Mass("crank.mass", 0.1, "as given"), Mass("slider.mass", 0.6, "as given")))[0]
+    >>> describe_masses((Mass("crank.mass", 0.1, "as given"), Mass("slider.mass", 0.6, "as given")))[0]
     'masses: crank.mass 0.1 kg, slider.mass 0.6 kg (as given)'
     """
     by_origin: dict[str, list[str]] = {}

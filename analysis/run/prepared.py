@@ -21,7 +21,7 @@ from .angles import WholeTurns
 from .cautions import MANY_STEPS, disturbance_rates, energy_balance, is_too_slow, stiffness
 from .equations import OUTPUTS, compile_outputs, machine
 from .events import Event, RunInterrupted, show_progress
-from .inputs import Encoded, Inputs, align, check_run, compile_function, compiled_source, encode
+from .inputs import Encoded, Inputs, align, check_run, compile_function, compile_source, encode
 from .sampling import NotFiniteError, sample
 from .trajectory import Occurrence, Trajectory
 
@@ -37,7 +37,7 @@ _HARMONICS = 30.0
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Settings:
-    """Solver settings of a run: times of its samples (s), hold (s, 0 for none), tolerance, largest number of steps."""
+    """Solver settings of a run: times of the samples (s), step of held inputs (s, 0 for none), tolerance, most steps."""
 
     times: NDArray[np.float64]
     hold: float
@@ -47,7 +47,7 @@ class Settings:
 
 @dataclass(frozen=True, slots=True)
 class Start:
-    """The start of a run: state, mechanical energy (J), error scale."""
+    """The start of a run: state, mechanical energy (J), and magnitudes to which errors are relative."""
 
     x: NDArray[np.float64]
     energy: float
@@ -138,7 +138,7 @@ class Run:
         return stiffness(disturbance_rates(mechanism, x, self.apply_inputs(u), self.p), steps, passed, usual)
 
     def not_finite_error(self, channel: int, t: float, x: NDArray[np.float64]) -> NotFiniteError:
-        """Return the error for an input, by the number of its channel, that is not finite at the time t and the state x."""
+        """Return the error for an input, by the index of its channel, that is not finite at the time t and the state x."""
         return NotFiniteError(self.encoded, channel, t, x)
 
     def _records(self, times: NDArray[np.float64], x: NDArray[np.float64]) -> tuple[Any, Any]:
@@ -170,7 +170,7 @@ class Run:
             # the energy at the start must be that of the reduced angles
             start = replace(start, energy=self.mechanism.equations.energy(tuple(start.x.tolist()), self.p))
         problem = make_problem(self.encoded, self.settings, self.mechanism.is_switched_on(self.p))
-        source, kept = compiled_source(self.encoded)
+        source, kept = compile_source(self.encoded)
         batch = compiled.single_batch(source, np.array([*self.p, start.energy]), start.scale, self.encoded.steady)
         watch, watching = self._watch(self._balance() if balanced else ())
         kept += watching

@@ -26,7 +26,7 @@ class Problem(NamedTuple):
     """Data shared by the runs of a batch.
 
     ``equations`` are the addresses of the equations, with the indices `equations.DERIVATIVE` to `equations.JUMP`. A row of
-    ``commands``, shape (c, 3), has for a commanded rate the numbers of its channel, of the component of the state that it
+    ``commands``, shape (c, 3), has for a commanded rate the indices of its channel, of the component of the state that it
     prescribes, and of the channel of its derivative. ``outputs`` is the number of outputs. ``hold`` is the step (s) over which
     inputs are held after they are sampled at the samples' times, 0 if they act continuously. ``end`` is the run's end (s).
     """
@@ -44,7 +44,7 @@ class Watch(NamedTuple):
     """Events to look for, and those found.
 
     An event has a row of ``table`` (columns OUTPUT, LEVEL, DIRECTION, STOPS), the address of its function, or 0 if it uses an
-    output, and its last value in ``gaps``. A row of ``found`` has the number of an event, its time and the state. ``balance``
+    output, and its last value in ``gaps``. A row of ``found`` has the index of an event, its time and the state. ``balance``
     are the indices of the outputs energy residual and kinetic energy if the energy balance is to be restored, else empty.
     """
 

@@ -13,7 +13,7 @@ from .inputs import NUMBER, Encoded
 
 
 class NotFiniteError(InputError):
-    """An input, given by the number of its channel, is not a finite number at a time t and a state x."""
+    """An input, given by the index of its channel, is not a finite number at a time t and a state x."""
 
     def __init__(self, encoded: Encoded, number: int, t: float, x: NDArray[np.float64]) -> None:
         self.number = number
@@ -73,7 +73,7 @@ def sample(
 
 
 def name_channels(encoded: Encoded, u: NDArray[np.float64]) -> dict[str, float]:
-    """Return the values u of the channels by their names in the FMI contract."""
+    """Return the values u of the channels in a mapping, by their FMI names."""
     return dict(zip(encoded.mechanism.input_names, u.tolist()))
 
 

@@ -258,9 +258,9 @@ class Source(NamedTuple):
     coefficients : ndarray, shape (n, signals, 4)
         Polynomials of the signals between the breaks.
     harmonics : ndarray, shape (m, 4)
-        For each harmonic: number of the signal, amplitude, frequency (rad/s), phase (rad).
+        For each harmonic: index of the signal, amplitude, frequency (rad/s), phase (rad).
     places : ndarray of int, shape (signals, 2)
-        For each signal the numbers of its channel and of its derivative's channel, -1 if it has none.
+        For each signal the index of its channel, and the index of its derivative's channel, -1 if it has none.
     laws : ndarray, shape (torques, 6)
         For each of `Mechanism.torques` a torsion bar (torque, release angle, and 1 while it acts, 0 after its release or
         without a bar) and a motor (breakdown torque, breakdown slip, synchronous speed; the torque is 0 without a motor).

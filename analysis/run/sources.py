@@ -19,7 +19,7 @@ SOURCE = types.NamedTuple((VECTOR, CUBE, MATRIX, PLACES, MATRIX, PLACES, PLACES)
 
 @inner
 def find(t, breaks):
-    """Return the number of the polynomial piece that holds from t on; the outer pieces extend beyond the outer breaks."""
+    """Return the index of the polynomial piece that holds from t on; the outer pieces extend beyond the outer breaks."""
     piece, above = 0, breaks.shape[0] - 1
     while above - piece > 1:
         middle = (piece + above) // 2
@@ -32,7 +32,7 @@ def find(t, breaks):
 
 @inner
 def _find_piece(t, breaks):
-    """Return the number of the polynomial piece that holds up to t."""
+    """Return the index of the polynomial piece that holds up to t."""
     piece = find(t, breaks)
     return piece - 1 if piece > 0 and t == breaks[piece] else piece
 
@@ -91,7 +91,7 @@ def is_bar_unwound(n, x, source):
 
 
 @inner
-def _held_bar(law, angle, speed, step):
+def _held_bar_correction(law, angle, speed, step):
     """Return the correction to a torsion bar's torque at the beginning of a step over which the torque is held.
 
     The held torque is that at the angle predicted for the middle of the step: its impulse is correct to second order, while the
@@ -123,7 +123,7 @@ def hold(t, ahead, x, source, commands, u, there):
     for n in range(source.laws.shape[0]):
         if source.laws[n, 2] != 0.0:
             channel, coordinate, speed = source.law_places[n]
-            u[channel] += _held_bar(source.laws[n], x[coordinate], x[speed], ahead - t)
+            u[channel] += _held_bar_correction(source.laws[n], x[coordinate], x[speed], ahead - t)
     if commands.shape[0] > 0:
         write_channels(ahead, 0.0, _find_piece(ahead, source.breaks), x, source, there)
         for n in range(commands.shape[0]):

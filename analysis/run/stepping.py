@@ -86,7 +86,7 @@ def attempt(flow, begin, elapsed, h, x, room, u, piece, source):
 
 @inner
 def _local_error(x, y, k, h, scale):
-    """Estimate the error of a step from x to y relative to scale and state, of order 8 (Hairer); NaN if y is not finite."""
+    """Return Hairer's error estimate of order 8 for a step from x to y, relative to scale + state; NaN if y is not finite."""
     sum3 = sum5 = 0.0
     for i in range(x.shape[0]):
         e3 = e5 = 0.0

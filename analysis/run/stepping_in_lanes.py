@@ -37,7 +37,7 @@ def stage_in_lanes(s, x, k, h, y):
 
 @inner
 def errors_in_lanes(x, y, k, h, scale, errors):
-    """Estimate the errors of steps from x to y relative to scale and state, of order 8 (Hairer); NaN if y is not finite."""
+    """Write Hairer's error estimates of order 8 for steps from x to y, relative to scale plus state; NaN if y is not finite."""
     step = load(h, 0)
     sum3, sum5, valid = 0.0 * step, 0.0 * step, 0.0 * step
     n = x.shape[0] // LANES

@@ -37,7 +37,7 @@ class Occurrence:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Trajectory(Shown):
-    """A run: times, outputs, how it ended, and how it was computed.
+    """Result of a run: times and outputs, how it ended, and how it was computed.
 
     Attributes
     ----------
@@ -107,7 +107,7 @@ class Trajectory(Shown):
 
     @property
     def masses(self) -> str:
-        """Return a sentence on the masses of the mechanism and where they come from; empty if the parameters are not known.
+        """Return a sentence on the masses of the mechanism and their origin; empty if the parameters are not known.
 
         Links that have the masses of a published set but other lengths are also named.
         """
@@ -117,7 +117,7 @@ class Trajectory(Shown):
         return "; ".join((describe_masses(masses)[0], *(mass.stale for mass in masses if mass.stale)))
 
     def column(self, name: str) -> int:
-        """Return the column number of an output.
+        """Return the index of an output's column.
 
         Raises
         ------

@@ -179,13 +179,13 @@ def array_functions(mechanism: Mechanism) -> tuple[ReboundFunctions, type[Simple
 
     They apply the functions of `math` to each element, as NumPy's functions differ in the last bits.
     """
-    elementwise = {name: _elementwise(getattr(math, name)) for name in ELEMENTARY}
+    elementwise = {name: _vectorise(getattr(math, name)) for name in ELEMENTARY}
     ours = {"sqrt": np.sqrt, "fabs": np.abs, "max": np.maximum, "min": np.minimum, "float": lambda value: value}
     functions = rebind_functions(equation_modules(mechanism), elementwise | ours)
     return functions, parameters_class(mechanism, functions)
 
 
-def _elementwise(function: Callable[..., float]) -> Callable[..., Any]:
+def _vectorise(function: Callable[..., float]) -> Callable[..., Any]:
     """Return a function of arrays that applies a function of floats to each element."""
 
     def applied(*values: Any) -> Any:

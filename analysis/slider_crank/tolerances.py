@@ -75,7 +75,7 @@ QUANTITIES: Mapping[str, str] = MappingProxyType(
 FREE_OF_LOAD = (*KINEMATIC, "drive.applied_torque", "guide.mx", "guide.my", "guide.mz")
 
 #: `SliderCrankParameters.constants` for parameters that are arrays or dual numbers.
-_CONSTANTS: Callable[[Any], Constants] = rebind_functions((parameters,), {"cos": np.cos, "sin": np.sin}).of(
+_CONSTANTS: Callable[[Any], Constants] = rebind_functions((parameters,), {"cos": np.cos, "sin": np.sin}).find(
     SliderCrankParameters.constants
 )
 

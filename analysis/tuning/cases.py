@@ -10,7 +10,7 @@ from typing import Any
 
 from linkwork.errors import InputError, MissingParameterError, ParameterError
 
-from ..files import Many, Quantity, Table, Whole, as_table, entry, flag, overridden, read, read_tables, text, unchanged
+from ..files import Many, Quantity, Table, Whole, as_table, entry, flag, override, read, read_tables, text, unchanged
 from ..linkages import with_linkage
 from ..mechanisms import mechanism_of, name_in_files
 from ..periodic import default_variable, parameter_unit, rest_guess, steady_drive
@@ -88,7 +88,7 @@ class TuningCase:
         changes = {inputs.get(name, name): with_unit(value, parameter_unit(mechanism, name)) for name, value in values}
         if isinstance(own := self.tables.get("linkage"), str):
             changes["linkage"] = Path(os.path.relpath(self.folder / own, folder)).as_posix()
-        return overridden(with_case_file_names(self.tables, mechanism), changes)
+        return override(with_case_file_names(self.tables, mechanism), changes)
 
 
 def load_tuning_case(path: str | Path, overrides: Mapping[str, Any] | None = None) -> TuningCase:
@@ -107,7 +107,7 @@ def read_tuning_case(
     data: Mapping[str, Any], *, folder: Path, title: str = "", overrides: Mapping[str, Any] | None = None
 ) -> TuningCase:
     """Build a case from the tables of a case file; names of files in it are relative to ``folder``."""
-    tables = overridden({"title": title} | dict(data), overrides or {})
+    tables = override({"title": title} | dict(data), overrides or {})
     if "tune" not in tables:
         raise MissingParameterError("tune")
     wanted = read(TuneTable, tables.pop("tune"), "tune")

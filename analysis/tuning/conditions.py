@@ -69,7 +69,7 @@ class Expansion(NamedTuple):
     ways : ndarray, shape (panels, nodes, n, n + 1 + k)
         Derivatives of the motion over the period.
     constants : ndarray, shape (c, n + 1 + k)
-        Derivatives of the numbers of the drive and the constants of the equations.
+        Derivatives of the drive vector and the constants of the equations.
     """
 
     gaps: FloatArray
@@ -91,7 +91,7 @@ def family(wish: Wish, x: FloatArray, spot: Spot | None = None) -> Family:
 
 
 class Spot(NamedTuple):
-    """A motion on the response, given by its start."""
+    """A motion on the response, given by y at crank angle 0 and its level."""
 
     x: FloatArray  # the changes in units of the tolerances, shape (k,)
     y: FloatArray  # y at crank angle 0, shape (n,)
@@ -101,7 +101,7 @@ class Spot(NamedTuple):
 
 
 def known_spot(wish: Wish, x: FloatArray, orbit: PeriodicOrbit) -> Spot:
-    """Return the spot of a motion that was found with the changes x."""
+    """Return the `Spot` of a motion that was found with the changes x."""
     return Spot(x, orbit.start, wish.level(orbit), orbit.turns, orbit.drive.ratios)
 
 
@@ -133,7 +133,10 @@ def expansion(wish: Wish, spot: Spot) -> Expansion:
 
 
 def margin_matrix(monodromy: FloatArray, kind: Crossing, radius: float = 1.0) -> FloatArray:
-    """Return a matrix A such that det(I - A) is zero when multipliers cross the circle in this way, and positive inside it."""
+    """Return a matrix A such that det(I - A) is zero when multipliers cross the circle of ``radius`` in the way ``kind``.
+
+    The determinant is positive if all multipliers are inside the circle.
+    """
     if kind is not Crossing.TORUS:
         return monodromy / radius if kind is Crossing.FOLD else -monodromy / radius
     # the matrix of minors of order 2, whose eigenvalues are the products of two multipliers
@@ -145,7 +148,7 @@ def margin_matrix(monodromy: FloatArray, kind: Crossing, radius: float = 1.0) ->
 
 
 def crossing_margin(monodromy: FloatArray, kind: Crossing, radius: float = 1.0) -> float:
-    """Return det(I - A) of `margin_matrix`."""
+    """Return det(I - A) with the matrix A of `margin_matrix`: positive if all multipliers are inside the circle."""
     matrix = margin_matrix(monodromy, kind, radius)
     return float(np.linalg.det(np.eye(len(matrix)) - matrix))
 
@@ -194,7 +197,7 @@ class CrossPlane:
 
 @dataclass(frozen=True, slots=True)
 class StabilityLoss:
-    """The equation of lost stability: a multiplier is on the unit circle."""
+    """The equation of a loss of stability: a multiplier is on the unit circle."""
 
     kind: Crossing
 
@@ -210,7 +213,7 @@ class StabilityLoss:
 
 
 class PickedMotion:
-    """A motion that was picked from its branch with some changes, and its derivatives by the changes."""
+    """The motion that an equation picks from its branch after some changes, with its derivatives by the changes."""
 
     def __init__(self, wish: Wish, row: Row, spot: Spot) -> None:
         self.spot = spot
@@ -240,7 +243,7 @@ class PickedMotion:
         return found
 
     def output_slopes(self, number: int, angle: float) -> FloatArray:
-        """Return the derivatives by the changes of an output, given by its number, at a crank angle; shape (k,)."""
+        """Return the derivatives of an output, given by its index, at a crank angle, by the changes; shape (k,)."""
         found = self.expansion
         v = found.variations
         angle = float(angle % (self.spot.turns * v.flow.period))
@@ -272,7 +275,7 @@ class TrackedMotion:
         self._last = spot
         self._scale = np.append(motion_scales(*wish.operation(spot.x, spot.level), spot.y), wish.size)
 
-    def at(self, x: FloatArray) -> PickedMotion:
+    def find(self, x: FloatArray) -> PickedMotion:
         """Find the motion for changes x in units of the tolerances; raises LostError if it is not found again."""
         last = self._last
         moved = np.abs(x - last.x) * self.wish.tolerance
@@ -349,9 +352,9 @@ def value_at_angles(turn: Turn, limit: Limit, angles: Sequence[float]) -> float:
 
 
 def limited_value(turn: Turn, limit: Limit) -> tuple[float, tuple[float, ...]]:
-    """Return the value that the limit bounds over a period, and its crank angles.
+    """Return the value that the limit bounds, over a period, and the crank angles at which it occurs.
 
-    There is one angle, of the greatest magnitude; for an amplitude there are two, of the greatest and of the least value.
+    It is the greatest magnitude, with one angle; or the amplitude, half the range, with the angles of maximum and minimum.
     """
     samples = reduce(np.hypot, (turn.oscillation(part) for part in limit.parts))
     places = [np.abs(samples).argmax()]
@@ -362,7 +365,7 @@ def limited_value(turn: Turn, limit: Limit) -> tuple[float, tuple[float, ...]]:
 
 
 def peak_angles(turn: Turn, limit: Limit, angles: Sequence[float]) -> tuple[float, ...]:
-    """Return the crank angles near given ones of the greatest magnitude or, for two angles, of a maximum and a minimum."""
+    """Find the angle of the greatest magnitude near one given angle or, near two, the angles of a maximum and a minimum."""
     value, step = curve(turn, limit), float(turn.angle[1] - turn.angle[0])
     signs = (1.0, -1.0) if len(angles) > 1 else (float(np.sign(value(angles[0])) or 1.0),)
     return tuple(_climb(value, angle, step, sign) for angle, sign in zip(angles, signs))
@@ -407,7 +410,7 @@ class Condition(Protocol):
 
 
 class MultipliersInside:
-    """Condition that no multiplier has crossed a circle in a given way: `crossing_margin` is not negative."""
+    """Condition that no multiplier has left the circle of radius ``radius`` in the way ``kind``: `crossing_margin` >= 0."""
 
     slack = 1e-9
 
@@ -415,10 +418,10 @@ class MultipliersInside:
         self.group, self.place, self.kind, self.radius = group, place, kind, radius
 
     def value(self, x: FloatArray) -> float:
-        return crossing_margin(self.place.at(x).orbit.monodromy, self.kind, self.radius)
+        return crossing_margin(self.place.find(x).orbit.monodromy, self.kind, self.radius)
 
     def slopes(self, x: FloatArray) -> FloatArray:
-        found = self.place.at(x)
+        found = self.place.find(x)
         return found.total_derivatives(margin_slopes(found.expansion, self.kind, self.radius))
 
 
@@ -431,10 +434,10 @@ class StabilityLossBeyond:
         self.group, self.place, self.level, self._share = group, place, level, side / place.wish.size
 
     def value(self, x: FloatArray) -> float:
-        return self._share * (self.place.at(x).spot.level - self.level)
+        return self._share * (self.place.find(x).spot.level - self.level)
 
     def slopes(self, x: FloatArray) -> FloatArray:
-        slopes: FloatArray = self._share * self.place.at(x).slopes[-1]
+        slopes: FloatArray = self._share * self.place.find(x).slopes[-1]
         return slopes
 
 
@@ -464,7 +467,7 @@ def find_resonance(wish: Wish, x: FloatArray, near: Spot) -> tuple[Gradient, Spo
 
     Raises LinkworkError if there is no resonance near the motion.
     """
-    orbit = TrackedMotion(wish, CrossPlane.level_plane(wish, near, near.level), near).at(x).orbit
+    orbit = TrackedMotion(wish, CrossPlane.level_plane(wish, near, near.level), near).find(x).orbit
     found = extremum_gradient(orbit, wish.over, wish.names)
     return found.place, known_spot(wish, x, found.orbit)
 
@@ -512,7 +515,7 @@ class OutputBelow:
         return found, value
 
     def _reading(self, x: FloatArray, level: float) -> tuple[PickedMotion, float]:
-        found = TrackedMotion(self._wish, CrossPlane.level_plane(self._wish, self._last, level), self._last).at(x)
+        found = TrackedMotion(self._wish, CrossPlane.level_plane(self._wish, self._last, level), self._last).find(x)
         turn = sample_turn(found.orbit)
         return found, value_at_angles(turn, self.limit, peak_angles(turn, self.limit, self.angles))
 

@@ -187,7 +187,7 @@ _BELOW, _ABOVE, _REMOVED = -1, 1, 0
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Way:
-    """The way in which a region of lost stability, or a resonance, is to leave the range."""
+    """The way in which a region of lost stability, or a resonance, shall leave the range."""
 
     kind: Crossing | None  # kind of the region; None for a resonance
     level: float  # middle of the region, or the resonance
@@ -223,7 +223,7 @@ class _Search:
         return bool(new), several
 
     def excess(self, found: Survey, several: tuple[float, ...]) -> float:
-        """Return the sum of the excesses of all requirements."""
+        """Return the sum of the excesses of all requirements: see `Reading`."""
         return sum(reading.excess for reading in readings(found, several).values())
 
     def keep(self, found: Survey, several: tuple[float, ...]) -> None:
@@ -462,7 +462,7 @@ def _exchange(search: _Search, first: Survey, ways: list[_Way]) -> tuple[Survey,
 
 
 def _counts(condition: Condition, answer: Answer) -> bool:
-    """Return whether the violation of a condition exceeds the violation of its requirement that the answer has anyway."""
+    """Return whether an answer violates a condition more than it violates the other conditions of the same requirement."""
     return _value(condition, answer) < -answer.violations.get(condition.group, 0.0) - condition.slack
 
 

@@ -9,7 +9,7 @@ from typing import Any
 from ..display import Shown, format_count
 from ..mechanisms import Parameters
 from ..run import parameter_tables
-from ..units import displayed
+from ..units import display_text
 from .conditions import FloatArray
 from .survey import MARGINAL, Survey
 from .wishes import Wish
@@ -22,7 +22,7 @@ NO_EXCESS = 1e-6
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Reading:
-    """State of a requirement with some parameters.
+    """State of a requirement for one set of parameters.
 
     Attributes
     ----------
@@ -57,7 +57,7 @@ class Requirement:
 
 
 def describe_wish(wish: Wish) -> dict[str, str]:
-    """Return a description of each requirement of a wish, by its name."""
+    """Describe each requirement of a wish, by its name."""
     found: dict[str, str] = {}
     if wish.no_resonance:
         found[RESONANCE] = f"none from {wish.say(*wish.range_with_margin, joint=' to ')}"
@@ -65,7 +65,7 @@ def describe_wish(wish: Wish) -> dict[str, str]:
         found[JUMP] = "none"
     if wish.judges_stability:
         found[STABLE] = f"largest multiplier at most {wish.radius:.6g}"
-    found |= {str(limit): f"below {displayed(limit.below, limit.unit)}" for limit in wish.limits}
+    found |= {str(limit): f"below {display_text(limit.below, limit.unit)}" for limit in wish.limits}
     return found if wish.judges_stability else found | {STABLE: "one at each place of the range"}
 
 
@@ -94,8 +94,8 @@ def readings(found: Survey, several: Sequence[float] = ()) -> dict[str, Reading]
         greatest = max((top for top in found.greatest if top.limit is limit), key=lambda top: top.value)
         over = greatest.value / limit.below - 1.0
         over = over if over > NO_EXCESS else 0.0
-        text_of = f"{displayed(greatest.value, limit.unit)} at {wish.say(greatest.spot.level)}"
-        missed = f"{text_of}, {displayed(greatest.value - limit.below, limit.unit, 3)} too much" if over else ""
+        text_of = f"{display_text(greatest.value, limit.unit)} at {wish.say(greatest.spot.level)}"
+        missed = f"{text_of}, {display_text(greatest.value - limit.below, limit.unit, 3)} too much" if over else ""
         result[str(limit)] = Reading(text=text_of, excess=over, missed=missed)
     if not wish.judges_stability:
         result[STABLE] = _stability_reading(found)
@@ -115,7 +115,7 @@ def _stability_reading(found: Survey) -> Reading:
 def _interval_reading(
     wish: Wish, intervals: Sequence[tuple[float, float]], words: str, span: tuple[float, float]
 ) -> Reading:
-    """Return the state of a requirement that a span be free of intervals, given the intervals found."""
+    """Return the state of the requirement that ``span`` contains none of the intervals that were found."""
     if not intervals:
         return Reading(text="none")
     low, high = span

@@ -114,7 +114,7 @@ class OutputMaximum:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Survey:
-    """Survey of the range of a wish with some changes.
+    """Survey of the range of a wish with the changes x.
 
     Attributes
     ----------
@@ -379,7 +379,7 @@ def _find_minimum(
 
     def test(offset: float) -> float:
         place = TrackedMotion(wish, across(offset), spot)
-        return crossing_margin(place.at(x).orbit.monodromy, kind, radius)
+        return crossing_margin(place.find(x).orbit.monodromy, kind, radius)
 
     offset = float(normal @ np.append(spot.y, spot.level))
     value = crossing_margin(orbit.monodromy, kind, radius)
@@ -391,11 +391,11 @@ def _find_minimum(
         except LinkworkError:
             pass  # next to the limit of assembly a neighbour may not be found: keep the point itself
     row = across(offset)
-    return TrackedMotion(wish, row, spot).at(x).spot, row, value
+    return TrackedMotion(wish, row, spot).find(x).spot, row, value
 
 
 def _test_minima(wish: Wish, x: FloatArray, branch: Branch) -> Iterator[TestMinimum]:
-    """Yield the minima of the test functions along a branch in the range, at fixed levels."""
+    """Yield the minima of the test functions along a branch in the range; their motions are picked by their levels."""
     inside = np.flatnonzero(_is_inside(wish, branch.parameter))
     if not len(inside):
         return
@@ -450,7 +450,7 @@ def _refine_maximum(wish: Wish, limit: Limit, near: Spot) -> OutputMaximum:
 
     def value(level: float) -> float:
         try:
-            there = TrackedMotion(wish, CrossPlane.level_plane(wish, near, level), near).at(near.x)
+            there = TrackedMotion(wish, CrossPlane.level_plane(wish, near, level), near).find(near.x)
         except LostError:
             return 0.0  # beyond a fold
         size, angles = limited_value(sample_turn(there.orbit), limit)
@@ -492,7 +492,7 @@ def _nearest_motion(wish: Wish, response: Response, level: float) -> PeriodicOrb
 
 
 def chart_range(found: Survey) -> tuple[float, float, int]:
-    """Compute a row of a chart over the range; return its largest multiplier, the level of this multiplier, number of points.
+    """Compute a row of a chart over the range; return its largest multiplier, the level of that, and the number of points.
 
     The multiplier is infinite if no motion was found at some point.
     """

@@ -31,14 +31,14 @@ from ..periodic import (
     with_values,
 )
 from ..run import published_set
-from ..units import RAD_S_PER_RPM, Amount, displayed, pair, quantity, si
+from ..units import RAD_S_PER_RPM, Amount, display_text, pair, quantity, si
 
 FloatArray = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Change:
-    """A parameter of the mechanism, or a number of its drive, that may be changed.
+    """A parameter of the mechanism, or a quantity of its drive, that may be changed.
 
     Attributes
     ----------
@@ -105,7 +105,7 @@ class Wish:
         Present parameters; or a published set or its name.
     change : mapping or sequence of Change
         Parameters that may be changed, by FMI name or by field, and acting drive quantities such as a force on the slider, a
-        torque on the crank, or a motor's numbers. Each has a tolerance, such as "5 %" or "10 N/m", which is the greatest change
+        torque on the crank, or a motor's data. Each has a tolerance, such as "5 %" or "10 N/m", which is the greatest change
         in either direction and the unit in which the change is measured; or a range (least, greatest), half of whose width is
         this unit; or both, as a mapping with ``tolerance`` and ``between``.
     speeds : (float, float), optional
@@ -216,7 +216,7 @@ class Wish:
             self.operation(x, self.span[0])
 
     def _check_range(self) -> str:
-        """Check the arguments about the range, and return the FMI name of the quantity that it is of."""
+        """Check the arguments about the range; return the FMI name of the quantity whose range it is."""
         speed = speed_name(self.mechanism, self.drive)
         if (self.speeds is None) == (self.between is None) or (self.between is None) == bool(self.over):
             raise InputError(
@@ -273,7 +273,7 @@ class Wish:
 
     @property
     def range_with_margin(self) -> tuple[float, float]:
-        """The range with the margin of a resonance on either side, in SI."""
+        """The range, widened at both ends by the margin for resonances, in SI."""
         (low, high), margin = self.span, self.resonance_margin
         return low - margin * abs(low), high + margin * abs(high)
 
@@ -310,7 +310,7 @@ class Wish:
         return np.array([change.tolerance for change in self.change])
 
     def scale_changes(self, values: FloatArray) -> FloatArray:
-        """Return the changes from the present to given values, in units of the tolerances."""
+        """Convert values of the parameters to changes from the present values, in units of the tolerances."""
         return (values - self.present) / self.tolerance
 
     def operation(self, x: FloatArray, level: float) -> Operation:
@@ -323,7 +323,7 @@ class Wish:
 def _span(mechanism: Mechanism, over: str, given: Any) -> tuple[float, float]:
     name, unit = "speeds" if over in speed_names(mechanism) else over, parameter_unit(mechanism, over)
     low, high = pair(given, unit, name)
-    shown = [displayed(end, unit) for end in (low, high)]
+    shown = [display_text(end, unit) for end in (low, high)]
     if not low < high:
         raise ParameterError(name, shown, "be a range: [least, greatest]")
     if name == "speeds" and not low > 0.0:
@@ -404,7 +404,7 @@ def _tolerance(value: Any, unit: str, now: float, name: str) -> float:
 
 
 def _check_limit(mechanism: Mechanism, limit: Limit) -> Limit:
-    """Check a limit; return it in SI, with its unit and its outputs filled in."""
+    """Check a limit; return it with its bound in SI, its unit, and the outputs in ``parts``."""
     name = limit.output.removeprefix(AMPLITUDE)
     units = {v.name: v.unit for v in mechanism.variables if v.name in mechanism.output_names}
     known = {output: (output,) for output in units} | (mechanism.joints if name == limit.output else {})

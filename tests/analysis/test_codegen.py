@@ -22,7 +22,7 @@ from numba import float64, int64
 
 from analysis.mechanisms import FIVE_BAR, MECHANISMS, SLIDER_CRANK
 from analysis.numerics import codegen
-from analysis.numerics.cache import _say_shared, code_folder
+from analysis.numerics.cache import _warn_shared, code_folder
 from analysis.numerics.codegen import (
     VECTOR,
     Kernel,
@@ -461,7 +461,7 @@ def test_code_is_kept_only_where_nobody_else_can_write(
     folder = code_folder("kept")
     assert folder == root / "kept"
     {"above": root.parent, "root": root, "folder": folder}[place].chmod(mode)
-    _say_shared.cache_clear()
+    _warn_shared.cache_clear()
     again, more = code_folder("kept"), code_folder("kept")
     assert (again == folder) == trusted
     assert again == more

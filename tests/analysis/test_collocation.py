@@ -32,7 +32,7 @@ def test_a_neighbour_followed_by_collocation_is_the_integrator_s(linkage: str | 
     path = Discretisation(angles, True)
     used = 0
     for speed in np.linspace(30.0, 31.0, 6):
-        parameters, drive = family.at(float(speed))
+        parameters, drive = family.operation(float(speed))
         orbit = newton_orbit(parameters, drive)
         point = orbit.point
         starts = np.vstack([orbit.start, point.shoot(angles[:2], orbit.start[None, :]).y])

@@ -10,7 +10,7 @@ import pytest
 
 from analysis import Function, InductionMotor, Inputs, find_orbit, find_orbits, natural_frequency, simulate
 from analysis.periodic import Drive, OrbitError, Stability, confirm, newton_orbit, sweep
-from analysis.periodic.motion.drive import coordinate_ranges, spread_starts
+from analysis.periodic.motion.drive import assembly_ranges, spread_starts
 from analysis.units import RAD_S_PER_RPM
 from linkwork.errors import AssemblyError, InputError
 from linkwork.five_bar.assembly import check_assembly
@@ -40,7 +40,7 @@ def test_one_motion_is_found_where_all_of_them_are() -> None:
 def test_starts_fill_a_range_that_is_wider_on_one_side() -> None:
     """With a coupler of 20 cm the slider goes from -6 to 24 cm: both sides are searched, not the nearer one alone."""
     parameters, guess = replace(TABLE_3_1, coupler_length=0.2), np.zeros(2)
-    low, high = coordinate_ranges(parameters, Drive(speed=40.0), guess)
+    low, high = assembly_ranges(parameters, Drive(speed=40.0), guess)
     for end in (low[0], high[0]):
         check_assembly(parameters, 0.0, end / 1.25)
         with pytest.raises(AssemblyError):

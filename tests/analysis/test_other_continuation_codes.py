@@ -43,7 +43,7 @@ def ours() -> dict[str, list[SpecialPoint]]:
     for name, ends in (("duffing", (0.9, 1.8)), ("pendulum", (1.06, 1.0823))):
         family, start = oscillators(name)
         case = continued.CASES[name]
-        orbit = newton_orbit(*family.at(case.begin), start=start)
+        orbit = newton_orbit(*family.operation(case.begin), start=start)
         branch = follow(family, orbit, case.begin, low=ends[0], high=ends[1])
         found[name] = list(branch.special)
     for turns in (2, 4):
@@ -54,7 +54,7 @@ def ours() -> dict[str, list[SpecialPoint]]:
     for name in ("five-bar, small motion", "five-bar, large motion"):
         case = continued.CASES[name]
         scale = rig.crank_length * np.array([1.0, case.begin])
-        orbit = newton_orbit(*family.at(case.begin), start=scale * case.start)
+        orbit = newton_orbit(*family.operation(case.begin), start=scale * case.start)
         branch = follow(family, orbit, case.begin, low=case.low, high=case.high, direction=case.direction)
         found[name] = list(branch.special)
     case = continued.CASES["five-bar, 2 turns"]

@@ -102,7 +102,7 @@ def collocated(family: Family, special: SpecialPoint, samples: int) -> oscillato
     """The special point by Fourier collocation, begun at ours."""
 
     def law(value: float) -> tuple[float, torsion.Constants]:
-        parameters, drive = family.at(value)
+        parameters, drive = family.operation(value)
         assert drive.speed is not None
         return drive.speed, parameters.constants()
 

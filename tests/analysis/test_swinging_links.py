@@ -22,12 +22,12 @@ from analysis.periodic import (
     Stability,
     basins,
     describe_end,
+    describe_turns,
     find_orbit,
     find_orbits,
     frequency_response,
     newton_orbit,
     sweep,
-    turns_sought,
     unsought_hint,
     with_isolas,
 )
@@ -273,7 +273,7 @@ def test_turns_in_a_period_are_those_of_the_crank() -> None:
     assert describe_end(replace(part, turns=2, orbits=tuple(replace(o, turns=2) for o in part.orbits))).startswith(
         "the branch with a period of 4 turns"
     )
-    assert turns_sought(orbit.flow, 1) == "2 turns"
+    assert describe_turns(orbit.flow, 1) == "2 turns"
 
 
 def going_round(speed: float, start: Any, damping: float = DAMPING) -> Any:

@@ -47,12 +47,12 @@ def test_derivatives_are_exact(kind: Any, seed: int) -> None:
     state = casadi.SX.sym("x", len(x))
     ours = symbolic_equations(mechanism)
     of_state = casadi.vertcat(
-        *ours.of(mechanism.equations.derivative)(
+        *ours.find(mechanism.equations.derivative)(
             tuple(casadi.vertsplit(state)), mechanism.equations.apply_inputs(flags, tuple(u), p), p
         )
     )
     exact = np.array(casadi.Function("jacobian", [state], [casadi.densify(casadi.jacobian(of_state, state))])(x))
-    derivative = rebind_functions(mechanism.modules, COMPLEX).of(mechanism.equations.derivative)
+    derivative = rebind_functions(mechanism.modules, COMPLEX).find(mechanism.equations.derivative)
     stepped = np.empty((len(x), len(x)))
     for j in range(len(x)):
         shifted = x.astype(complex)

@@ -225,12 +225,12 @@ def test_workers_end_with_a_process_that_is_killed(backend: str, tmp_path: Path)
 from functools import partial
 from pathlib import Path
 import joblib
-from analysis.numerics.workers import over_workers
+from analysis.numerics.workers import run_in_parallel
 from tests.analysis.test_workers import dawdle
 
 def main():
     with joblib.parallel_config({backend!r}):
-        list(over_workers(partial(dawdle, folder=Path({str(tmp_path)!r})), range(4), n_jobs=2))
+        list(run_in_parallel(partial(dawdle, folder=Path({str(tmp_path)!r})), range(4), n_jobs=2))
 
 if __name__ == "__main__":
     if {backend!r} == "dask":

@@ -256,7 +256,7 @@ def orbit_monodromy(operation: Plane, *, start: ArrayLike | None = None, near: G
 
 
 def plane_test(matrix: Monodromy, crossing: Crossing | int) -> Test:
-    """Return the test function `crossing_test` of a monodromy matrix over a plane."""
+    """Return a function of a point (x, y) of the plane: `crossing_test` of the monodromy matrix there."""
     return lambda x, y: float(crossing_test(matrix(x, y), crossing))
 
 

@@ -313,7 +313,7 @@ def _steps(coexisting: bool) -> Iterator[str]:
 
 @dataclass(slots=True)
 class _Survey:
-    """A chart that is being computed."""
+    """State of a chart while it is computed."""
 
     operation: Plane
     axes: tuple[Axis, Axis]
@@ -485,7 +485,7 @@ class _Survey:
                 self.runs.append(Run(x=x, y=y, confirmation=check))
 
     def removals(self, matrix: Monodromy) -> tuple[str, ...]:
-        """Return a sentence for each region of a motion of the mechanism on the damping that removes it, if that is an axis."""
+        """Return a sentence on the damping that removes each region of the mechanism's motions; none if no axis is damping."""
         names = [axis.name for axis in self.axes]
         if self.damping not in names:
             return ()
@@ -497,7 +497,7 @@ class _Survey:
         )
 
     def _removal(self, matrix: Monodromy, boundary: TracedBoundary, which: int) -> str:
-        """Return a sentence on the damping, along axis ``which``, that removes the region of a boundary."""
+        """Return a sentence on the damping, varied along axis ``which``, that removes the region within a boundary."""
         other, up = self.axes[1 - which], self.axes[which]
         spans = (self.box.x, self.box.y)
         across, dampings = boundary.points[:, 1 - which], boundary.points[:, which]

@@ -19,7 +19,7 @@ from ...mechanisms import Parameters, mechanism_of
 from ...run import takes_published
 from ...units import Amount, pair
 from ..motion.discretisation import OperatingPoint, operating_point
-from ..motion.drive import Drive, coordinate_ranges
+from ..motion.drive import Drive, assembly_ranges
 from ..motion.floquet import TOLERANCE, multipliers
 from ..motion.flow import GAP, IN_LANES, PLAIN, VARIATIONAL, Flow
 from ..motion.orbit import PeriodicOrbit, require_turns
@@ -204,7 +204,7 @@ class Basins(Shown):
         Initial values of the first free coordinate, for a slider in m, and of its rate (m/s); the other components of y are
         those of the first motion.
     ends : ndarray of int, shape (ny, nx)
-        Number of the stable motion in ``motions``; -1 if the links reach the limit of assembly, -2 if the run reaches no
+        Index of the stable motion in ``motions``; -1 if the links reach the limit of assembly, -2 if the run reaches no
         motion within the turns that are followed.
     found : Orbits
         All motions that were found; the unstable ones lie on the boundaries of the basins.
@@ -231,7 +231,7 @@ class Basins(Shown):
         return self.found.stable
 
     def share(self, end: int) -> float:
-        """Return the share of the starts whose number in ``ends`` is ``end``."""
+        """Return the share of the starts with this value in ``ends``: an index into ``motions``, or -1 or -2."""
         return float(np.mean(self.ends == end))
 
     def to_csv(self, path: str | Path) -> Path:
@@ -316,10 +316,10 @@ def basins(
         found = search_orbits(parameters, drive, turns=range(1, turns + 1), start=start)
     motions = found.stable
     if not motions:
-        of, also = turns_sought(drive.flow(mechanism_of(parameters)), turns), unsought_hint(parameters, drive)
+        of, also = describe_turns(drive.flow(mechanism_of(parameters)), turns), unsought_hint(parameters, drive)
         raise InputError(f"there is no stable motion of {of} here: no start ends in one{also}")
     first = motions[0].start
-    low, high = (side[0] for side in coordinate_ranges(parameters, drive, first))
+    low, high = (side[0] for side in assembly_ranges(parameters, drive, first))
     rest, scale, half = float(motions[0].flow.rest[0]), motions[0].scale, len(first) // 2
     extent = min(rest - low, high - rest)
     spans = (
@@ -346,13 +346,13 @@ def basins(
     return Basins(position=across, rate=up, ends=met, found=found, computed=computed)
 
 
-def turns_sought(flow: Flow, turns: int) -> str:
+def describe_turns(flow: Flow, turns: int) -> str:
     """Return in words the crank's turns in up to ``turns`` common periods: "one turn", "up to 4 turns"."""
     return ("" if turns == 1 else "up to ") + format_turns(turns * flow.turns)
 
 
 def _ends(point: OperatingPoint, known: FloatArray, across: FloatArray, rate: float) -> FloatArray:
-    """Return where a row of starts with the same rate ends: a number in ``known``, LOST or UNSETTLED, shape (points,)."""
+    """Return where each start of a row, all at one rate, ends: an index into ``known``, LOST or UNSETTLED; shape (points,)."""
     starts = np.tile(known[0], (len(across), 1))
     starts[:, 0], starts[:, point.flow.size // 2] = across, rate
     ends = np.zeros(len(across), dtype=np.int64)

@@ -54,10 +54,10 @@ MOST_ORBITS = 8
 
 
 class Points(NamedTuple):
-    """Numbers of the m mechanisms of a row, in the form of `Section`."""
+    """Arrays with the data of the m mechanisms of a row, in the form of `Section`."""
 
     constants: NDArray[np.float64]  # constants of the equations and their derivatives, shape (m, 2 constants)
-    drives: NDArray[np.float64]  # numbers of the drive and their derivatives, (m, 2 drive)
+    drives: NDArray[np.float64]  # drive vectors and their derivatives, (m, 2 drive)
     scales: NDArray[np.float64]  # magnitudes of y, (m, n)
 
 
@@ -102,9 +102,10 @@ def point_section(section, points, row, tolerance):
 
 @part
 def divide(section, search, level, start, path, desk, room):
-    """Find an orbit by collocation with the fewest elements that suffice, starting at a level of `COUNTS`.
+    """Find an orbit by collocation with the fewest elements that suffice; ``level`` is the first index into `COUNTS` to try.
 
-    Return the level, -1 if none suffices, and the relative size of the highest Legendre coefficients. ``path`` is (y, w).
+    Return the level that suffices, -1 if there is none, and the relative size of the highest Legendre coefficients.
+    ``start`` is y at crank angle 0. ``path`` = (y, w) receives y at the beginnings of the elements and the slopes w.
     """
     y, w = path
     while level < len(COUNTS):
@@ -127,7 +128,7 @@ def divide(section, search, level, start, path, desk, room):
 
 @inner
 def predict(known, size, path):
-    """Extrapolate the first ``size`` numbers of the next ``known`` rows of ``path`` into its first row."""
+    """Extrapolate ``known`` previous orbits, rows 1, 2, ... of ``path``, latest first; write ``size`` entries into row 0."""
     for i in range(size):
         path[0, i] = 0.0
         for old in range(known):
@@ -136,7 +137,7 @@ def predict(known, size, path):
 
 @inner
 def shift(size, path):
-    """Copy the first ``size`` numbers of each row of ``path`` into the row below it."""
+    """Move each orbit in ``path`` one row down, to make room for the next one: the first ``size`` entries of each row."""
     for old in range(PASSED, 0, -1):
         copy(path[old - 1, :size], path[old, :size])
 
@@ -245,7 +246,7 @@ def solve_from_right(section, points, search, found):
 
 @part
 def solve_from_guesses(section, points, search, guesses, found):
-    """Find orbits that are still missing from their neighbours on the left once more, then from the other guesses."""
+    """Find orbits that are still missing: once more from the neighbour on the left, then from all guesses but the first."""
     starts, monodromies, status = found
     n = starts.shape[1]
     z, carry, report = np.empty(n * (1 + n)), np.array([0.1, 0.0]), np.zeros(3)
@@ -297,7 +298,7 @@ def solve_row(section, points, search, guesses, found):
 
 @inner
 def _is_known(start, known, section, away):
-    """Return whether a start is among the known ones, up to whole turns; ``away`` is work space."""
+    """Return whether a start is one of the known ones, whole turns of angles apart; ``away`` is work space."""
     found = False
     for k in range(known.shape[0]):
         subtract_modulo_turns(start, known[k], section.ways, away)
@@ -325,7 +326,7 @@ def _make_seekers(n):
 
 @inline
 def _hunt(lane, hunts):
-    """Return the state of the search in a lane."""
+    """Return the state of the search in one lane, a view of the arrays of all lanes."""
     return Hunt(
         hunts.start[lane], hunts.trial[lane], hunts.correction[lane], hunts.following[lane],
         hunts.system[lane], hunts.last[lane], hunts.numbers[lane],
@@ -464,7 +465,10 @@ LOST, UNSETTLED = -1, -2
 
 @inner
 def _find_known(z, known, near, section, away):
-    """Return the number of the known motion that a state is near to, up to whole turns; UNSETTLED if there is none."""
+    """Return the index of the known motion to which the state z is close, whole turns of angles apart; UNSETTLED if none is.
+
+    ``near`` is the greatest distance relative to the scale; ``away`` is work space.
+    """
     end = UNSETTLED
     for k in range(known.shape[0]):
         subtract_modulo_turns(z, known[k], section.ways, away)
@@ -477,7 +481,7 @@ def _find_known(z, known, near, section, away):
 def _settle(section, turn, near, most, starts, known, ends, tables):
     """Do the work of `settle_starts`, which keeps the arrays of ``tables`` alive while they are used here."""
     v, away = refer(tables), np.empty(starts.shape[1])
-    # for each lane: the number of its start, or -1, and the turns that it has made
+    # for each lane: the index of its start, or -1, and the turns that it has made
     rows, turns = np.full(LANES, -1), np.zeros(LANES, np.int64)
     following, running = 0, True
     while running:
@@ -518,7 +522,7 @@ def settle_starts(section, turn, near, most, starts, known, ends):
     starts, known : ndarray, shapes (m, n) and (k, n)
         y at crank angle 0 of each start, and of the known motions.
     ends : ndarray of int64, shape (m,)
-        Written: number of the known motion, or `LOST` or `UNSETTLED`.
+        Written: index of the known motion, or `LOST` or `UNSETTLED`.
     """
     tables = make_tracks(starts.shape[1], 0)
     set_scale(section.scale, tables)

@@ -31,7 +31,7 @@ class PointRow:
     first : OperatingPoint
         The first point.
     constants, vectors, scales : ndarray, shapes (m, constants), (m, drive) and (m, n)
-        Constants of the equations, numbers of the drive, and magnitudes of y.
+        Constants of the equations, drive vectors (`Drive.vector`), and magnitudes of y.
     smooth : bool
         Whether collocation can be used at all points.
     """
@@ -54,7 +54,7 @@ class PointRow:
         return place >= 0 and bool(self.constants[:, place].any())
 
     def points(self) -> Points:
-        """Return the numbers of the points for the kernels."""
+        """Return the data of the points as arrays for the kernels."""
         numbers, vectors = self.constants, self.vectors
         return Points(
             np.hstack([numbers, np.zeros_like(numbers)]), np.hstack([vectors, np.zeros_like(vectors)]), self.scales
@@ -66,7 +66,7 @@ class PointRow:
 
 
 def point_row(points: Sequence[OperatingPoint], start: FloatArray) -> PointRow:
-    """Return operating points as a row; the magnitudes of y are those at ``start``.
+    """Collect operating points in a row; the magnitudes of y are those at ``start``.
 
     Raises InputError if the points are not driven in the same way.
     """
@@ -91,7 +91,7 @@ def grid_rows(operation: Plane, xs: FloatArray, ys: FloatArray, start: FloatArra
 
 
 def _named_row(operation: NamedPlane, xs: FloatArray, y: float, start: FloatArray) -> PointRow:
-    """Return the row at ``y`` of a plane of named parameters."""
+    """Return the row of a plane of named parameters at one value ``y`` of the second parameter."""
     first = operating_point(*operation(float(xs[0]), y))
     flow, mechanism = first.flow, first.mechanism
     vectors = np.tile(first.vector, (len(xs), 1))
@@ -107,7 +107,7 @@ def _named_row(operation: NamedPlane, xs: FloatArray, y: float, start: FloatArra
             vectors[:, place] = factor * xs
     parameters, columns = varied_constants(mechanism, sets)
     states = flow.state(start, vectors.T)
-    scale = array_functions(mechanism)[0].of(mechanism.error_scale)(parameters, states)
+    scale = array_functions(mechanism)[0].find(mechanism.error_scale)(parameters, states)
     constants, scales = np.empty((len(xs), len(columns))), np.empty((len(xs), flow.size))
     for n, column in enumerate(columns):
         constants[:, n] = column

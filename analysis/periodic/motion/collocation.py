@@ -123,7 +123,7 @@ def _identity(matrix):
 
 @inner
 def _equation(section, desk):
-    """Return the address of the flow with its derivatives, those by lambda included if the desk has room for them."""
+    """Return the address of the equations with their derivatives, those by lambda included if the desk has room for them."""
     n = desk.shift.shape[0]
     directional = desk.out.shape[1] > n * (1 + n) * LANES
     return section.equations[IN_LANES + (DIRECTIONAL if directional else VARIATIONAL)]
@@ -143,7 +143,7 @@ def _pace(section, y, desk):
 
 @inner
 def _evaluate_node(s, row, unit, y, w, desk):
-    """Write y and the angle at a node of a row of elements into ``desk.z``."""
+    """Compute y and the angle at node s of a row of elements from the slopes; the results are written into ``desk.z``."""
     n = desk.shift.shape[0]
     f = n // 2
     h = load(desk.lengths[row], 0)
@@ -271,7 +271,7 @@ def linearise(section, y, w, desk):
 def _carry(e, y, following, desk):
     """Replace ``desk.shift``, the change of y at the beginning of element e, by that at the beginning of the next element.
 
-    ``following`` is the number of the next element; if it is -1, the result is y at the end of element e. The change at the
+    ``following`` is the index of the next element; if it is -1, the result is y at the end of element e. The change at the
     beginning is written into ``desk.shifts``, in the lane of the element and the lanes after it.
     """
     shift, column = desk.shift, desk.column
@@ -302,7 +302,7 @@ def _chain(e, product, desk):
 
 @inner
 def _greatest(values, so_far):
-    """Return the greatest of ``so_far`` and the values, which are not negative; NaN if one is NaN."""
+    """Return the greatest of the values and ``so_far``, none of them negative; NaN if one is NaN."""
     for value in values:
         if not (value <= so_far or isnan(so_far)):
             so_far = value
@@ -433,7 +433,7 @@ def close(section, m, y, w, desk):
 
 @part
 def integrate_elements(section, angles, first, start, y, w, room):
-    """Compute y and w of elements, from number ``first`` on, by the integrator; return a `Status`.
+    """Compute y and w of elements by the integrator, from the element with the index ``first`` on; return a `Status`.
 
     ``start``, y at the beginning of the first element, becomes y at the end of the last. ``angles`` are the beginnings of these
     elements and the end of the last.
@@ -613,7 +613,7 @@ def solve_pieces(section, angles, firsts, starts, change, known, neighbour, foun
     angles : ndarray, shape (m + 1,)
         Crank angles at which the elements begin, and the end of the last.
     firsts : ndarray of int64, shape (k + 1,)
-        Number of the first element of each piece, and m.
+        Index of the first element of each piece, and m.
     starts : ndarray, shape (k, n)
         y at the beginning of each piece.
     change : float

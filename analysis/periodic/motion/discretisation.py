@@ -107,7 +107,7 @@ class Period(NamedTuple):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class OperatingPoint:
-    """A mechanism and its drive in numbers, computed once for all results of a motion.
+    """A mechanism and its drive as arrays for the kernels, computed once for all results of a motion.
 
     Attributes
     ----------
@@ -117,7 +117,7 @@ class OperatingPoint:
     flow : Flow
         The mechanism with this drive, as a flow.
     vector, constants : ndarray
-        Numbers of the drive and constants of the equations.
+        Drive vector (`Drive.vector`) and constants of the equations.
     """
 
     parameters: Parameters
@@ -205,7 +205,7 @@ class OperatingPoint:
 
 
 def operating_point(parameters: Parameters, drive: Drive) -> OperatingPoint:
-    """Return a mechanism and its drive in numbers.
+    """Return a mechanism and its drive as an `OperatingPoint`.
 
     Raises InputError if the drive does not suit the mechanism, or if a gear ratio or a force law was changed so that the period
     is another.
@@ -226,7 +226,7 @@ def operating_point(parameters: Parameters, drive: Drive) -> OperatingPoint:
 
 
 def _repeats(point: OperatingPoint) -> bool:
-    """Return whether a mechanism is the same after a period, and after a whole turn of each link that swings.
+    """Return whether the equations are the same after a common period, and after a whole turn of each free angle.
 
     The result is also True if the links can be joined at none of the angles tried.
     """

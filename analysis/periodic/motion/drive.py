@@ -162,7 +162,7 @@ class Drive:
         return find_crank(mechanism, self.crank)
 
     def ratios_by_freedom(self, mechanism: Mechanism) -> dict[int, Fraction]:
-        """Return the ratios of the other cranks, and of links that go round, by the numbers of their freedoms."""
+        """Return turns per turn of the crank, of the other cranks and of links that go round, by the index of the freedom."""
         return {find_turning_freedom(mechanism, name): ratio for name, ratio in self.ratios.items()}
 
     def arguments(self, mechanism: Mechanism) -> Mapping[str, str]:
@@ -221,7 +221,7 @@ class Drive:
         return made
 
     def with_rounds(self, mechanism: Mechanism, rounds: Mapping[str, int], turns: int) -> tuple[Drive, int]:
-        """Return the drive of motions in which links go round given numbers of times in ``turns`` common periods.
+        """Return the drive of motions in which links make the whole turns ``rounds`` in ``turns`` common periods.
 
         Parameters
         ----------
@@ -242,7 +242,7 @@ class Drive:
         return drive, round(turns * made.period / drive.flow(mechanism).period)
 
     def vector(self, mechanism: Mechanism) -> NDArray[np.float64]:
-        """Return the numbers of the drive: channels, motors, held coordinates, ratios; see `Flow`.
+        """Return the drive vector: channels, motor parameters, held coordinates and ratios, in the order that `Flow` describes.
 
         Raises
         ------
@@ -459,7 +459,7 @@ def _choose_crank(
 ) -> tuple[Crank, dict[int, Fraction]]:
     """Return the crank whose angle is the independent variable under the inputs of a run, and the ratios of the other cranks.
 
-    It is the first crank that is commanded to turn forward, or else the first crank. The ratios, by the numbers of freedoms,
+    It is the first crank that is commanded to turn forward, or else the first crank. The ratios, by the indices of freedoms,
     are those of commanded speeds; a free crank has the ratio of the speeds at the start, to the nearest whole number.
     """
     if len(mechanism.cyclic_freedoms) < 2:
@@ -506,7 +506,7 @@ def motion_scales(parameters: Parameters, drive: Drive, start: ArrayLike) -> NDA
 def flow_scales(
     flow: Flow, parameters: Parameters, vector: NDArray[np.float64], start: NDArray[np.float64]
 ) -> NDArray[np.float64]:
-    """Return the scales of y from a flow and the numbers of the drive."""
+    """Return the scales of y; ``vector`` is the drive vector."""
     scale = flow.mechanism.error_scale(parameters, flow.state(start, vector))
     return np.array([scale[place] for place in flow.places])
 
@@ -523,10 +523,14 @@ def is_smooth(parameters: Parameters) -> bool:
     )
 
 
-def coordinate_ranges(
+def assembly_ranges(
     parameters: Parameters, drive: Drive, guess: NDArray[np.float64]
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return the lower and upper bound of each free coordinate at the crank angle 0, two arrays of shape (free,)."""
+    """Return the low and the high bounds of the free coordinates at crank angle 0 within which the links can be joined.
+
+    Each coordinate is moved away from its default in steps that grow, while the others stay as in ``guess``; a bound may lie
+    one step too far. Both arrays have the shape (free,).
+    """
     mechanism = mechanism_of(parameters)
     flow, vector, scale = drive.flow(mechanism), drive.vector(mechanism), motion_scales(parameters, drive, guess)
     sides = []
@@ -547,7 +551,7 @@ def coordinate_ranges(
     return sides[0], sides[1]
 
 
-def even_rates(drive: Drive, flow: Flow, guess: NDArray[np.float64]) -> NDArray[np.float64]:
+def mean_rates(drive: Drive, flow: Flow, guess: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return the mean rate of each free coordinate: 0, or the rate of a uniform rotation if it goes round; shape (free,)."""
     turning, pace = drive.ratios_by_freedom(flow.mechanism), drive.speed or guess[-1]
     return np.array([pace * turning.get(n, 0) for n in flow.free], dtype=float)
@@ -569,16 +573,16 @@ def spread_starts(
     count : int
         A power of two.
     number : int
-        Number of the set; each number gives other starts.
+        Index of the set, the seed of the sequence: each index gives other starts.
     """
     from scipy.stats import qmc  # takes half a second
 
     flow, scale = drive.flow(mechanism_of(parameters)), motion_scales(parameters, drive, guess)
     half = flow.size // 2
-    low, high = coordinate_ranges(parameters, drive, guess)
+    low, high = assembly_ranges(parameters, drive, guess)
     sequence = qmc.Sobol(flow.size, rng=number).random(count)
     amplitude, phase = sequence[:, :half], 2.0 * pi * sequence[:, half : 2 * half]
-    around = even_rates(drive, flow, guess)
+    around = mean_rates(drive, flow, guess)
     # the centre and the half axes of each ellipse
     rest = flow.rest[:half]
     ellipses = [(rest, np.minimum(rest - low, high - rest))]

@@ -43,7 +43,7 @@ def find_cranks(mechanism: Mechanism) -> tuple[Crank, ...]:
 
 @cache
 def find_turning_freedom(mechanism: Mechanism, name: str) -> int:
-    """Return the number of a freedom that turns, by one of its FMI names: a crank, or a link that swings and may go round."""
+    """Return the index of a freedom that turns, by one of its FMI names: a crank, or a link that swings and may go round."""
     swinging = {freedom.coordinate: n for n, freedom in enumerate(mechanism.freedoms) if freedom.swings}
     return swinging[name] if name in swinging else find_crank(mechanism, name).freedom
 
@@ -100,7 +100,7 @@ class Flow:
     modes : tuple of int
         Values of its modes.
     crank : int
-        Number of the cyclic freedom whose angle is the independent variable.
+        Index of the cyclic freedom whose angle is the independent variable.
     base : int
         Turns of the crank after which all cranks have made whole turns, and all links that go round.
     commons : int
@@ -109,13 +109,13 @@ class Flow:
     Attributes
     ----------
     others : tuple of int
-        Numbers of the other freedoms that turn, or swing and may go round.
+        Indices of the other freedoms that turn, or swing and may go round.
     free : tuple of int
-        Numbers of the other freedoms that are part of y; a freedom commanded without a ratio is held in place.
+        Indices of the other freedoms that are part of y; a freedom commanded without a ratio is held in place.
     torque : bool
         Whether the crank's rate is part of y.
     motors : int
-        Index of the motors' numbers in the drive's vector, after the channels: three for each of `Mechanism.torques`.
+        Index of the motor parameters in the drive vector, after the channels: three for each of `Mechanism.torques`.
     held : int
         Index of the coordinates at crank angle 0 of freedoms that are held or have a ratio; the ratios of ``others`` follow.
     components : tuple of (str, str)
@@ -209,9 +209,9 @@ class Flow:
         return " ".join(self._code[switched, n].fingerprint for n in which)
 
     def state(self, y: NDArray[np.float64], drive: NDArray[np.float64]) -> tuple[Any, ...]:
-        """Return the state of a run at the crank angle 0, from y and the numbers of the drive.
+        """Return the state of a run at the crank angle 0, from y and the drive vector.
 
-        With an array for each number of the drive, shape (drive, m), the state has arrays too.
+        With an array for each entry of the drive vector, shape (drive, m), the state has arrays too.
         """
         rates = len(self.mechanism.freedoms)
         numbers = drive.tolist() if drive.ndim == 1 else list(drive)
@@ -229,7 +229,7 @@ class Flow:
         """Return differences of y, shape (..., n), with whole turns of angles removed."""
         return away - self._whole(away)
 
-    def nearest(self, y: NDArray[np.float64]) -> NDArray[np.float64]:
+    def nearest_to_rest(self, y: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return y with its angles changed by whole turns so that they are nearest to `rest`."""
         return y - self._whole(y - self.rest)
 
@@ -238,12 +238,12 @@ class Flow:
         return whole
 
     def paces(self, drive: NDArray[np.float64]) -> dict[str, float]:
-        """Return the ratio of each coordinate of y that goes round, by FMI name, from the numbers of the drive."""
+        """Return the ratio to the crank of each coordinate of y that goes round, by FMI name, from the drive vector."""
         freedoms = self.mechanism.freedoms
         return {freedoms[n].coordinate: float(r) for n, r in self._ratios(drive).items() if n in self.free and r}
 
     def unknowns(self, states: NDArray[np.float64], drive: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return y from states of a run, shape (..., states), and the numbers of the drive; shape (..., n)."""
+        """Return y, shape (..., n), from states of a run, (..., states), and the drive vector."""
         y = states[..., self.places]
         for place, ratio in self._ratios(drive).items():
             if place in self.places:
@@ -251,7 +251,7 @@ class Flow:
         return y
 
     def _ratios(self, drive: Any) -> dict[int, Any]:
-        """Return the ratios of the freedoms `others`, by their numbers."""
+        """Return the ratios of the freedoms `others`, by their indices."""
         return {n: drive[self.held + len(self.mechanism.freedoms) + i] for i, n in enumerate(self.others)}
 
     @cache  # noqa: B019 - flows themselves are never discarded
@@ -278,17 +278,17 @@ class Flow:
         ]
         x, u = self._state(angle, y, drive)
         functions = symbolic_equations(m)
-        applied = functions.of(m.equations.apply_inputs)(
+        applied = functions.find(m.equations.apply_inputs)(
             tuple(casadi.vertsplit(modes)) if m.modes else (), tuple(casadi.vertsplit(u)) if self.inputs else (), k
         )
         if which == GAP:
-            settled = functions.of(m.equations.start)(x, applied, k)
-            results = [casadi.SX(functions.of(m.equations.clearance)(settled, applied, k))]
+            settled = functions.find(m.equations.start)(x, applied, k)
+            results = [casadi.SX(functions.find(m.equations.clearance)(settled, applied, k))]
         elif which == STATE:
-            settled = functions.of(m.equations.start)(x, applied, k)
+            settled = functions.find(m.equations.start)(x, applied, k)
             results = [casadi.vertcat(*settled), u]
         else:
-            rates = functions.of(m.equations.derivative)(x, applied, k)
+            rates = functions.find(m.equations.derivative)(x, applied, k)
             f = casadi.vertcat(*[rates[place] for place in self.places]) / x[len(m.freedoms) + self.crank]
             ratios = self._ratios(drive)
             if any(place in ratios for place in self.places):

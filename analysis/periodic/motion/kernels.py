@@ -66,7 +66,7 @@ class Section(NamedTuple):
 
     equations: NDArray[np.int64]  # addresses of the flow's functions
     modes: NDArray[np.float64]
-    drive: NDArray[np.float64]  # numbers of the drive, then their derivatives by lambda
+    drive: NDArray[np.float64]  # drive vector, then its derivatives by lambda
     p: NDArray[np.float64]  # constants of the equations, then their derivatives by lambda
     scale: NDArray[np.float64]  # magnitudes of y, shape (n,)
     ways: NDArray[np.float64]  # whole turn of each component of y that is an angle, otherwise 0, shape (n,)
@@ -80,7 +80,7 @@ SECTION = types.NamedTuple((int64[::1], VECTOR, VECTOR, VECTOR, VECTOR, VECTOR, 
 
 @part
 def replace_numbers(section, drive, p, scale, tolerance):
-    """Return the section with new numbers of the drive, constants, scale and tolerance, and 1 for the magnitude of lambda."""
+    """Return the section with another drive vector, constants p, scale and tolerance, and 1 for the magnitude of lambda."""
     return Section(section.equations, section.modes, drive, p, scale, section.ways, 1.0, tolerance, section.torque)
 
 
@@ -280,7 +280,7 @@ _ITERATION, _FRACTION, _SIZE, _RESIDUAL = range(4)
 
 
 class Hunt(NamedTuple):
-    """The state of Newton's method between integrations."""
+    """State of a search by Newton's method, between two integrations over the period."""
 
     start: NDArray[np.float64]  # last accepted start
     trial: NDArray[np.float64]  # start of the next integration
@@ -301,7 +301,7 @@ def make_hunt(n):
 
 @inner
 def begin_hunt(start, hunt):
-    """Begin a search at a start."""
+    """Begin a search: ``start`` becomes the start of the first integration."""
     copy(start, hunt.start)
     copy(start, hunt.trial)
     hunt.numbers[_ITERATION], hunt.numbers[_FRACTION] = 0.0, 1.0
@@ -399,7 +399,7 @@ def continue_deflated_newton(section, most, reach, status, known, z, hunt):
 
 @part
 def newton(section, end, most, start, z, room, carry, report):
-    """Solve y(end) = y(0) by Newton's method; see `solve`."""
+    """Solve y(end) = y(0) by Newton's method; parameters and result are those of `solve`."""
     n = section.scale.shape[0]
     hunt = make_hunt(n)
     begin_hunt(start, hunt)
@@ -444,7 +444,7 @@ def solve(section, end, most, start, z, report):
 
 @part
 def deflated_newton(section, end, most, reach, start, known, z, room, carry):
-    """Run Newton's method with the known orbits divided out; see `search`."""
+    """Run Newton's method with the known orbits divided out; parameters and result are those of `search`."""
     n = section.scale.shape[0]
     hunt = make_hunt(n)
     begin_hunt(start, hunt)

@@ -39,7 +39,7 @@ from .discretisation import (
     operating_point,
     orbit_error,
 )
-from .drive import Drive, even_rates, spread_starts
+from .drive import Drive, mean_rates, spread_starts
 from .floquet import TOLERANCE, StabilityVerdict, liouville, multipliers, verdict
 from .flow import PLAIN, STATE, VARIATIONAL, Flow
 from .kernels import Status
@@ -209,7 +209,7 @@ class PeriodicOrbit(Shown):
         The pieces in which the period was followed, if it is too unstable to be followed as a whole.
     others : int or None
         Number of other periodic motions of the same period, as far as they were sought; None if they were not.
-    nearest : float or None
+    least_clearance : float or None
         Least clearance to the limit of assembly, see `clearance`, if it was computed on the way.
     """
 
@@ -222,7 +222,7 @@ class PeriodicOrbit(Shown):
     iterations: int
     stations: Stations | None = None
     others: int | None = None
-    nearest: float | None = None
+    least_clearance: float | None = None
     # cached values of `point`, `scale`, `multipliers` and `amplitude`
     _kept: dict[str, Any] = field(default_factory=dict, init=False)
 
@@ -245,7 +245,7 @@ class PeriodicOrbit(Shown):
 
     @property
     def point(self) -> OperatingPoint:
-        """The mechanism and its drive in numbers."""
+        """The mechanism and its drive as arrays for the kernels."""
         if "point" not in self._kept:
             self._kept["point"] = operating_point(self.parameters, self.drive)
         point: OperatingPoint = self._kept["point"]
@@ -386,7 +386,7 @@ class PeriodicOrbit(Shown):
 
 
 def make_orbit(point: OperatingPoint, **rest: Any) -> PeriodicOrbit:
-    """Return an orbit that keeps its operating point; the other arguments are those of `PeriodicOrbit`."""
+    """Build an orbit at an operating point, which it keeps; ``rest`` are the other fields of `PeriodicOrbit`."""
     orbit = PeriodicOrbit(parameters=point.parameters, drive=point.drive, **rest)
     orbit._kept["point"] = point
     return orbit
@@ -460,7 +460,7 @@ def settle_motion(
     settled, flow = start.copy(), point.flow
     section = point.section(start, PLAIN, tolerance=tolerance)
     status = kernels.settle(section, flow.period, change, turns, settled)
-    return Status(status), flow.nearest(settled)
+    return Status(status), flow.nearest_to_rest(settled)
 
 
 def _solve_with_rounds(point: OperatingPoint, turns: int, start: FloatArray) -> PeriodicOrbit:
@@ -566,7 +566,7 @@ def first_guess(flow: Flow, drive: Drive, start: ArrayLike | None, speed: float 
                 speed = drive.motor.synchronous_speed * (1.0 - 0.5 * drive.motor.breakdown_slip)
             guess[-1] = speed
         free = len(flow.free)
-        guess[free : 2 * free] = even_rates(drive, flow, guess)
+        guess[free : 2 * free] = mean_rates(drive, flow, guess)
     else:
         guess = np.array(start, dtype=float)
         if guess.shape != (flow.size,) or not np.isfinite(guess).all():
@@ -678,13 +678,13 @@ def trial_orbit(
         monodromy=ends.matrices[0].copy(),
         residual=float(np.abs(shift / point.scale(start)).max()),
         iterations=1,
-        nearest=ends.clearance,
+        least_clearance=ends.clearance,
     )
     return made, shift
 
 
 def _close(ends: Ends, starts: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return the gaps between the ends of k pieces and the next beginnings, shape (k, n), and their Jacobian, (k n, k n)."""
+    """Return the gaps of a period of k pieces, each end minus the next beginning, (k, n), and their Jacobian, (k n, k n)."""
     (k, n), pieces = starts.shape, np.arange(len(starts))
     following = (pieces + 1) % k
     jacobian: FloatArray = np.zeros((k, n, k, n))
@@ -712,7 +712,7 @@ class OrbitEquations:
 
     def __init__(self, family: Family, turns: int, low: float, high: float, angles: FloatArray | None = None) -> None:
         self.family, self.turns, self.low, self.high = family, turns, low, high
-        self._bounds = [family.at(value) for value in (low, high)]
+        self._bounds = [family.operation(value) for value in (low, high)]
         (mechanism, drive), (other, last) = self._bounds
         flow = drive.flow(mechanism_of(mechanism))
         self.angles = np.array([0.0, flow.period * turns]) if angles is None else angles
@@ -730,7 +730,7 @@ class OrbitEquations:
 
     def __call__(self, unknowns: FloatArray, value: float) -> Evaluation:
         """Evaluate the residual with its exact derivatives; raises OrbitError if a piece cannot be followed."""
-        point = operating_point(*self.family.at(value))
+        point = operating_point(*self.family.operation(value))
         starts = unknowns.reshape(self._shape).copy()
         direction = self._direction or self.family.direction(value, self.low, self.high)
         ends = self._discretised.ends(point, starts, value, direction, self.high - self.low)
@@ -747,6 +747,6 @@ class OrbitEquations:
             residual=float(np.abs(gaps / scale).max()),
             iterations=1,
             stations=stations,
-            nearest=ends.clearance,
+            least_clearance=ends.clearance,
         )
         return Evaluation(gaps.ravel(), jacobian, ends.slopes.ravel(), orbit)

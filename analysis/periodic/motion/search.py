@@ -26,7 +26,7 @@ from ...mechanisms import InitialState, Parameters, mechanism_of
 from ...run import Inputs, complete_initial_state, complete_inputs, takes_published
 from ...units import Amount, in_si
 from .discretisation import OperatingPoint, OrbitError, operating_point, orbit_error
-from .drive import SAME, Drive, Torque, even_rates, spread_starts, steady_drive
+from .drive import SAME, Drive, Torque, mean_rates, spread_starts, steady_drive
 from .floquet import Stability
 from .kernels import Status
 from .orbit import (
@@ -302,7 +302,7 @@ class Orbits(Shown):
 
 @takes_published()
 def unsought_hint(parameters: Parameters, drive: Drive) -> str:
-    """Return what an error message adds about motions that are not sought, in which swinging links go round; may be empty."""
+    """Return a hint for an error message: which motions of links that go round were not sought; empty without such links."""
     names = list(drive.flow(mechanism_of(parameters)).swinging)
     if not names:
         return ""
@@ -478,7 +478,7 @@ def search_orbits(
 def _search_rounds(
     point: OperatingPoint, turns: int, start: ArrayLike | None, known: Iterable[PeriodicOrbit] = ()
 ) -> Orbits:
-    """Find the periodic motions in which links go round as often as the drive says."""
+    """Find the periodic motions in which swinging links make as many turns as the drive's ratios say."""
     guess = first_guess(point.flow, point.drive, start)
     require_turns(turns, point, guess)
     many, deflated = (_FoundMotions(point, turns, guess) for _ in range(2))
@@ -489,7 +489,7 @@ def _search_rounds(
     if whole == 0:
         # motions near a uniform rotation may begin at other angles of the link
         even, free = guess.copy(), len(point.flow.free)
-        even[free : 2 * free] = even_rates(point.drive, point.flow, guess)
+        even[free : 2 * free] = mean_rates(point.drive, point.flow, guess)
         near = (
             approach_uniform_rotation(point, turns, even + share * point.flow.ways) for share in (0.0, 0.25, 0.5, 0.75)
         )
@@ -538,7 +538,7 @@ class _FoundMotions:
         self.index = 0
 
     def places(self, count: int, number: int) -> list[FloatArray]:
-        """Return the starts of a set: see `spread_starts`."""
+        """Return the starts of the set with the index ``number``: see `spread_starts`."""
         return list(spread_starts(self.point.parameters, self.point.drive, self.guess, count, number))
 
     def knows(self, start: FloatArray, near: float = SAME) -> bool:
@@ -552,7 +552,7 @@ class _FoundMotions:
         if start is None or (not divide and self.knows(start, _NEAR)):
             return False
         try:
-            return self.add(solve_orbit(self.point, self.turns, self.point.flow.nearest(start)))
+            return self.add(solve_orbit(self.point, self.turns, self.point.flow.nearest_to_rest(start)))
         except OrbitError:
             return False
 
@@ -577,7 +577,7 @@ class _FoundMotions:
         return all(other.knows(orbit.start) for orbit in self.orbits)
 
     def intermediate_starts(self) -> list[FloatArray]:
-        """Return starts between the motions of each pair, where a third motion often lies, and around each motion."""
+        """Return starts between each two motions, where a third motion often lies, and around each motion."""
         places = [
             a + share * (b - a) for n, a in enumerate(self.known) for b in self.known[:n] for share in (0.25, 0.5, 0.75)
         ]

@@ -26,7 +26,7 @@ RUNNING, IDLE = -1, -2
 
 
 class Tracks(NamedTuple):
-    """Work space of the lanes, for z, which is y and the columns of its derivatives: arrays in lanes, then numbers of lanes."""
+    """Work space for z, which is y and the columns of its derivatives: arrays in lanes, then arrays with an entry per lane."""
 
     x: NDArray[np.float64]  # z at the beginning of a step
     y: NDArray[np.float64]  # z at a stage, then at the end of a step
@@ -48,7 +48,7 @@ class Tracks(NamedTuple):
 
 @part
 def make_tracks(n, columns):
-    """Make work space for y of n components and a number of columns of derivatives, with idle lanes."""
+    """Make work space for y of n components with ``columns`` columns of derivatives; all lanes are idle."""
     width = n * (1 + columns)
     lanes = width * LANES
     return Tracks(
@@ -129,7 +129,7 @@ def _attempt(section, v):
 
 @inner
 def _judge(lane, section, last, v):
-    """Accept the step of a lane or make it shorter; return whether its motion has ended; ``last``: it goes to the end."""
+    """Accept the step of a lane or make it shorter; return whether the motion has ended. ``last``: the step ends the motion."""
     h, n = v.h[lane], section.scale.shape[0]
     error = v.error[lane] / v.tolerance[lane]
     if not error <= 1.0:

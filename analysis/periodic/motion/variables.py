@@ -171,7 +171,7 @@ def format_value(name: str, value: float, unit: str) -> str:
 
 @lru_cache(maxsize=64)
 def _replace_parameters(parameters: Parameters, *values: tuple[str, float]) -> Parameters:
-    """Return parameters with new values; cached, since all points in a row of a chart over the speed share one mechanism."""
+    """Return parameters with new values; cached, as all points of a chart's row over the speed share a mechanism."""
     return replace(parameters, **dict(values))
 
 
@@ -301,7 +301,7 @@ class Family:
         object.__setattr__(self, "name", self.name or vary)
         object.__setattr__(self, "unit", self.unit or parameter_unit(mechanism_of(self.parameters), vary))
 
-    def at(self, value: float) -> Operation:
+    def operation(self, value: float) -> Operation:
         """Return the mechanism and drive at a value of the parameter."""
         if callable(self.vary):
             return self.vary(value)
@@ -321,11 +321,13 @@ class Family:
         return format_value(self.name, value, self.unit)
 
     def direction(self, value: float, low: float, high: float) -> Direction:
-        """Differentiate the numbers of the drive and the constants by the parameter, with finite differences in its range."""
+        """Differentiate the drive vector and the constants by the parameter, by finite differences in its range."""
         step = _DIFFERENCE * max(abs(value), 1e-3 * (high - low))
         a, b = max(value - step, low), min(value + step, high)
         mechanism = mechanism_of(self.parameters)
-        vectors, numbers = zip(*((d.vector(mechanism), np.array(p.constants())) for p, d in (self.at(a), self.at(b))))
+        vectors, numbers = zip(
+            *((d.vector(mechanism), np.array(p.constants())) for p, d in (self.operation(a), self.operation(b)))
+        )
         return Direction((vectors[1] - vectors[0]) / (b - a), (numbers[1] - numbers[0]) / (b - a))
 
 
@@ -386,7 +388,7 @@ def differentiate_constants(parameters: Parameters, names: Sequence[str], along:
 
 
 def parameter_places(flow: Flow, drive: Drive, name: str) -> dict[int, float] | None:
-    """Return the numbers of the drive that are multiples of a parameter, as indices into `Drive.vector` with the factors.
+    """Return the entries of `Drive.vector` that are multiples of a parameter: their factors by index.
 
     For a parameter of the mechanism the result is None.
     """
@@ -401,9 +403,9 @@ def parameter_places(flow: Flow, drive: Drive, name: str) -> dict[int, float] | 
 
 
 def stack_derivatives(drive: Drive, flow: Flow, names: Sequence[str], p: FloatArray) -> FloatArray:
-    """Return the derivatives of the numbers of the drive by parameters, with those of the constants, ``p``, below them.
+    """Return the derivatives of the drive vector by parameters, and below them those of the constants, ``p``.
 
-    The shape is (numbers of the drive + constants, m).
+    The shape is (size of the drive vector + constants, m).
     """
     found = np.zeros((flow.drive_size, p.shape[1]))
     for column, name in enumerate(names):

@@ -234,7 +234,7 @@ def _resonances(arc: Arc) -> list[Interval]:
 
 
 def _band_end(arc: Arc, top: int, way: int) -> float:
-    """Return the half-power point of a peak on one side; infinite if the amplitude first rises above the peak."""
+    """Return the half-power point on one side (``way``) of the peak ``top``; infinite if the arc rises above the peak first."""
     a, x = arc.amplitude, arc.parameter
     level, i = HALF_POWER * a[top], top
     while 0 <= i + way < len(a):
@@ -335,7 +335,7 @@ def _locate_extremum(
                 return place, rested
 
     def near(value: float) -> PeriodicOrbit:
-        parameters, drive = family.at(value)
+        parameters, drive = family.operation(value)
         return newton_orbit(parameters, drive, turns=orbit.turns, start=orbit.start, settle=False)
 
     try:

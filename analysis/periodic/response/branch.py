@@ -313,7 +313,7 @@ def _growth(orbit: PeriodicOrbit) -> float:
 
 
 def _divide_period(family: Family, last: Point, settings: Settings) -> tuple[Follower, Point]:
-    """Divide the period into pieces: return a follower by multiple shooting, and its first point at the last point so far."""
+    """Divide the period into pieces at the last point; return a follower by multiple shooting and its first point there."""
     orbit: PeriodicOrbit = last.data
     places = orbit.flow.unknowns(orbit.turn(PLACES * orbit.periods).states, orbit.point.vector)
     angles, starts = choose_pieces(orbit.point, places, orbit.turns)
@@ -331,7 +331,7 @@ def reason_to_leave(point: Point, largest: float = GREATEST_MULTIPLIER) -> str:
         return (
             f"beyond, a disturbance grows more than {largest:g} times in each period (the largest Floquet multiplier)"
         )
-    sine = orbit.clearance(64) if orbit.nearest is None else orbit.nearest
+    sine = orbit.clearance(64) if orbit.least_clearance is None else orbit.least_clearance
     if sine < LEAST_SINE:
         return f"the links come near to the limit of assembly (sine of the angle to it {sine:.3g})"
     return ""
@@ -413,7 +413,7 @@ def _meets_half(before: Point, after: Point) -> bool:
 
 
 def _tests(point: Point) -> dict[Crossing, float]:
-    """Return the value of a test function for each kind of crossing; it changes sign where a multiplier crosses the circle."""
+    """Return the value of a test function for each kind of crossing; its sign changes where a multiplier crosses the circle."""
     # det(M - 1) is also zero where two branches cross; the parameter turns back only at a fold
     return {
         kind: float(point.tangent[-1]) if kind is Crossing.FOLD else float(crossing_test(point.data.monodromy, kind))
@@ -424,7 +424,7 @@ def _tests(point: Point) -> dict[Crossing, float]:
 def _special_points(
     curve: Curve, follower: Follower, pieces: Sequence[tuple[Follower, Curve]] = ()
 ) -> list[SpecialPoint]:
-    """Locate the special points of a piece of a branch; their ``after`` counts the points of the pieces before it, too."""
+    """Locate the special points on the part of a branch along ``curve``; ``pieces`` are the parts before it."""
     passed = sum(len(piece.points) - 1 for _, piece in pieces)
     found: list[tuple[int, float, SpecialPoint]] = []
     values = [_tests(point) for point in curve.points]

@@ -56,12 +56,12 @@ LATTICE = 633
 
 
 def oscillating_freedoms(mechanism: Mechanism) -> tuple[int, ...]:
-    """Return the numbers of the freedoms that are not cranks."""
+    """Return the indices of the freedoms that are not cranks."""
     return tuple(number for number in range(len(mechanism.freedoms)) if number not in mechanism.cyclic_freedoms)
 
 
 def first_freedom(mechanism: Mechanism) -> int:
-    """Return the number of the first freedom that is not a crank; raises ParameterError if there is none."""
+    """Return the index of the first freedom that is not a crank; raises ParameterError if there is none."""
     for number in oscillating_freedoms(mechanism):
         return number
     raise ParameterError("mechanism", mechanism.name, "have a second freedom for a natural frequency")
@@ -354,7 +354,7 @@ class _Search:
             show(done)
 
         for value, direction, guess in ((self.low, 1, start), (self.high, -1, None)):
-            at, driven = self.family.at(value)
+            at, driven = self.family.operation(value)
             if direction < 0 and not driven.speed_drive and self.branches:
                 # there is no guess of the speed at the other end
                 break
@@ -384,7 +384,7 @@ class _Search:
                 break
 
     def follow_doublings(self, times: int) -> None:
-        """Follow the branches of twice the period, and so on ``times`` times, each branch from only one of its ends."""
+        """Follow the branches of twice the period, of four times and so on, ``times`` times; each from only one of its ends."""
         ends: list[tuple[int, float, NDArray[np.float64]]] = []
 
         def is_end(special: SpecialPoint) -> bool:
@@ -426,7 +426,7 @@ class _Search:
 
     def seek(self, value: float, turns: int) -> None:
         """Find the motions of ``turns`` turns at a value of the parameter, and follow each that lies on no branch."""
-        parameters, drive = self.family.at(value)
+        parameters, drive = self.family.operation(value)
         start = None
         if not drive.speed_drive:
             # under a torque only a known motion gives a guess of the speed
@@ -465,7 +465,7 @@ class _Search:
 
 
 def describe_end(branch: Branch) -> str:
-    """Return a sentence that says how far a branch was followed, and why not to its end."""
+    """Return a sentence on a branch that was lost: how far it was followed, and why no further."""
     first, last = (branch.family.format_value(float(branch.parameter[i])) for i in (0, -1))
     period = "" if branch.periods == 1 else f"with a period of {branch.crank_turns} turns "
     return f"the branch {period}from {first} is followed to {last} only: {branch.reason}"

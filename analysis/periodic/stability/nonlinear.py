@@ -252,7 +252,7 @@ def form_coefficient(of: Forms, kind: Crossing, multiplier: complex, h: float) -
 def _slope(family: Family, of: Forms, special: SpecialPoint) -> float:
     """Return the component, along the left eigenvector of a fold, of the map's derivative with respect to the parameter."""
     _, p, _ = _eigenvectors(of.matrix, 1.0)
-    point, start = operating_point(*family.at(special.parameter)), special.orbit.start
+    point, start = operating_point(*family.operation(special.parameter)), special.orbit.start
     reach = 1e-3 * max(abs(special.parameter), 1e-9)
     direction = family.direction(special.parameter, special.parameter - reach, special.parameter + reach)
     slope = point.period(start, special.orbit.turns, direction).slope
@@ -305,7 +305,7 @@ def confirm_form(family: Family, special: SpecialPoint, form: NormalForm) -> For
     sides: list[tuple[float, PeriodicOrbit]] = []
     for sign in (-1.0, 1.0):
         value = special.parameter + sign * step
-        parameters, drive = family.at(value)
+        parameters, drive = family.operation(value)
         sides.append(
             (sign, newton_orbit(parameters, drive, turns=special.orbit.turns, start=special.orbit.start, settle=False))
         )
@@ -315,7 +315,7 @@ def confirm_form(family: Family, special: SpecialPoint, form: NormalForm) -> For
         raise LinkworkError(f"the motion at {family.format_value(special.parameter)} is unstable on neither side")
     beyond = float(np.clip(_SMALL * abs(form.coefficient), *_BEYOND))
     value = special.parameter + sign * beyond / rate
-    parameters, drive = family.at(value)
+    parameters, drive = family.operation(value)
     old = newton_orbit(parameters, drive, turns=special.orbit.turns, start=special.orbit.start, settle=False)
     scale = old.scale
     expected = sqrt((old.largest - 1.0) / abs(form.coefficient))

@@ -120,7 +120,7 @@ class MotionGradient:
     values : ndarray, shape (m,)
         Values of the parameters.
     along : ndarray, shape (c, m)
-        Derivatives by the parameters of the numbers of the drive and, below them, of the constants of the equations.
+        Derivatives by the parameters of the drive vector and, below them, of the constants of the equations.
     """
 
     def __init__(self, orbit: PeriodicOrbit, names: Sequence[str] | None = None) -> None:
@@ -246,7 +246,7 @@ class MotionGradient:
     def _extreme(self, numbers: list[int], sign: float) -> Gradient:
         """Return the gradient of the greatest (sign 1) or least (-1) value of an output, or of the greatest modulus (0).
 
-        ``numbers`` are the outputs; for the modulus of a force they are its components.
+        ``numbers`` are the indices of the outputs; for the modulus of a force, those of its components.
         """
         values = self._outputs[..., numbers]
         value, place = self.variations.greatest_value(sign * values[..., 0] if sign else values)

@@ -66,7 +66,7 @@ class Variations:
     switched : bool
         Whether the equations of the mechanism's switch are included: it is on, or a derivative with respect to it is wanted.
     along : ndarray, shape (c, m)
-        Derivatives of the drive's numbers and then of the constants with respect to parameters; the panels must resolve
+        Derivatives of the drive vector and then of the constants with respect to parameters; the panels must resolve
         the forcing by these, too.
 
     Attributes
@@ -80,7 +80,7 @@ class Variations:
     by_y : ndarray, shape (k, s, n, n)
         Derivatives of the rates with respect to y.
     by_constant : ndarray, shape (k, s, n, c)
-        Derivatives of the rates with respect to the numbers of the drive and, after them, the constants.
+        Derivatives of the rates with respect to the drive vector and, after it, the constants.
     forcing : ndarray, shape (k, s, n, m)
         Derivatives of the rates with respect to the parameters, at fixed y.
     monodromy : ndarray, shape (n, n)
@@ -159,7 +159,7 @@ class Variations:
 
     @property
     def constants(self) -> int:
-        """Count of the numbers of the drive and of the constants together."""
+        """Size of the drive vector plus the number of constants."""
         return self.flow.drive_size + len(self._p)
 
     def _first_derivatives(self) -> tuple[FloatArray, FloatArray]:
@@ -178,7 +178,7 @@ class Variations:
         direction : ndarray, shape (k, s, n)
             Direction of y at the nodes.
         along : ndarray, shape (c,), optional
-            Direction of the numbers of the drive and the constants; zero without it.
+            Direction of the drive vector and the constants; zero without it.
         """
         n, width = self.flow.size, self.flow.size + self.constants
         found = self._call("second", n * width, direction, along)
