@@ -37,17 +37,17 @@ def density(value: Amount, name: str = "density") -> float:
         return DENSITIES[value]
     if isinstance(value, str) and not any(c.isdigit() for c in value):
         raise ParameterError(name, value, f"be one of {', '.join(DENSITIES)}, or a density such as '7.85 g/cm3'")
-    return _positive(quantity(value, "kg/m3", name), name)
+    return _check_positive(quantity(value, "kg/m3", name), name)
 
 
-def _positive(value: float, name: str) -> float:
+def _check_positive(value: float, name: str) -> float:
     if value <= 0.0:
         raise ParameterError(name, value, "be greater than zero")
     return value
 
 
-def _length(value: Amount) -> float:
-    return _positive(quantity(value, "m", "length"), "length")
+def _check_length(value: Amount) -> float:
+    return _check_positive(quantity(value, "m", "length"), "length")
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,7 +58,7 @@ class _Section:
         for field in fields(self):
             value = getattr(self, field.name)
             number = density(value) if field.name == "density" else quantity(value, "m", field.name)
-            object.__setattr__(self, field.name, _positive(number, field.name))
+            object.__setattr__(self, field.name, _check_positive(number, field.name))
 
 
 @dataclass(frozen=True, slots=True)
@@ -83,11 +83,11 @@ class Rod(_Section):
 
     def mass(self, length: Amount) -> float:
         """Return the mass (kg) of a length (m)."""
-        return float(0.25 * pi * self.diameter**2 * self.density * _length(length))
+        return float(0.25 * pi * self.diameter**2 * self.density * _check_length(length))
 
     def inertia(self, length: Amount) -> float:
         """Return the moment of inertia (kg.m2) about the centre of mass, across the rod: m (3 r^2 + L^2)/12."""
-        return float(self.mass(length) * (0.75 * self.diameter**2 + _length(length) ** 2) / 12.0)
+        return float(self.mass(length) * (0.75 * self.diameter**2 + _check_length(length) ** 2) / 12.0)
 
 
 @dataclass(frozen=True, slots=True)
@@ -118,12 +118,12 @@ class Tube(_Section):
 
     def mass(self, length: Amount) -> float:
         """Return the mass (kg) of a length (m)."""
-        return float(0.25 * pi * (self.outer**2 - self.inner**2) * self.density * _length(length))
+        return float(0.25 * pi * (self.outer**2 - self.inner**2) * self.density * _check_length(length))
 
     def inertia(self, length: Amount) -> float:
         """Return the moment of inertia (kg.m2) about the centre of mass, across the tube: m (3 (ro^2 + ri^2) + L^2)/12."""
         across = 0.75 * (self.outer**2 + self.inner**2)
-        return float(self.mass(length) * (across + _length(length) ** 2) / 12.0)
+        return float(self.mass(length) * (across + _check_length(length) ** 2) / 12.0)
 
 
 @dataclass(frozen=True, slots=True)
@@ -151,11 +151,11 @@ class Bar(_Section):
 
     def mass(self, length: Amount) -> float:
         """Return the mass (kg) of a length (m)."""
-        return float(self.width * self.thickness * self.density * _length(length))
+        return float(self.width * self.thickness * self.density * _check_length(length))
 
     def inertia(self, length: Amount) -> float:
         """Return the moment of inertia (kg.m2) about the centre of mass, normal to the plane of motion: m (L^2 + w^2)/12."""
-        return float(self.mass(length) * (self.width**2 + _length(length) ** 2) / 12.0)
+        return float(self.mass(length) * (self.width**2 + _check_length(length) ** 2) / 12.0)
 
 
 #: Section of a link with two pins.
@@ -216,9 +216,10 @@ class Plate(_Section):
         b = np.roll(a, -1, axis=0)
         cross = a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]
         area = 0.5 * float(cross.sum())
-        if abs(area) <= 1e-12 * float(np.ptp(corners, axis=0).max()) ** 2:
+        across, along = np.linalg.svd(a, compute_uv=False)[::-1]
+        if across <= 1e-12 * along:
             raise ParameterError("points", corners.tolist(), "enclose an area: they are on one line")
-        if _crossing(a, b):
+        if abs(area) <= 1e-12 * along**2 or _edges_cross(a, b):
             raise ParameterError("points", corners.tolist(), "be in order round the plate: its edges cross")
         centre = (cross[:, None] * (a + b)).sum(axis=0) / (6.0 * area)
         polar = float((cross * ((a * a) + a * b + b * b).sum(axis=1)).sum()) / (12.0 * area)
@@ -227,7 +228,7 @@ class Plate(_Section):
         return MassProperties(mass, (x, y), mass * (polar - float(centre @ centre)))
 
 
-def _crossing(a: Any, b: Any) -> bool:
+def _edges_cross(a: Any, b: Any) -> bool:
     """Return whether any two edges cross; edge i runs from a[i] to b[i], and a and b have shape (n, 2)."""
 
     def side(p: Any, q: Any, r: Any) -> Any:

@@ -55,7 +55,7 @@ def display_scale(unit: str) -> tuple[str, float]:
     return displays[0] if displays else (unit, 1.0)
 
 
-def displayed(value: float, unit: str, digits: int = 6) -> str:
+def display_text(value: float, unit: str, digits: int = 6) -> str:
     """Return a value given in SI as text in the unit in which tables show it, such as "700 rpm" or "3 mm"."""
     shown, factor = display_scale(unit)
     return f"{factor * value:.{digits}g}" + ("" if shown == "1" else f" {shown}")

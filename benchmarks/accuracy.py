@@ -29,7 +29,7 @@ class Choice(NamedTuple):
     reached: bool
 
 
-def loosest(error: Callable[[float], float], settings: Iterable[float]) -> Choice:
+def loosest_setting(error: Callable[[float], float], settings: Iterable[float]) -> Choice:
     """Find the first of the settings, from loose to tight, that reaches the accuracy; if none does, return the most accurate.
 
     A setting counts only if the next tighter one reaches the accuracy as well, to exclude lucky cancellation.
@@ -45,7 +45,7 @@ def loosest(error: Callable[[float], float], settings: Iterable[float]) -> Choic
     return min(tried, key=lambda choice: choice.error)._replace(reached=False)
 
 
-def best_time(run: Callable[[], object], repeats: int = 7) -> float:
+def shortest_time(run: Callable[[], object], repeats: int = 7) -> float:
     """Return the shortest processor time of several runs (s), which other work on the machine disturbs little."""
     times = []
     for _ in range(repeats):
@@ -56,7 +56,7 @@ def best_time(run: Callable[[], object], repeats: int = 7) -> float:
 
 
 @njit(error_model="numpy")
-def _in_turn(equation, modes, constants, states, forces):
+def _evaluate_in_turn(equation, modes, constants, states, forces):
     """Evaluate an equation along states; each evaluation waits for the previous result, as do the stages of a step."""
     x, out = np.empty(states.shape[1]), np.zeros(states.shape[1])
     for i in range(states.shape[0]):
@@ -66,11 +66,11 @@ def _in_turn(equation, modes, constants, states, forces):
     return out
 
 
-def right_hand_side(parameters: Parameters, inputs: Inputs, states: NDArray[np.float64]) -> float:
+def right_hand_side_time(parameters: Parameters, inputs: Inputs, states: NDArray[np.float64]) -> float:
     """Return the time of one compiled right-hand side (s), evaluated at states without forces one after the other."""
     mechanism = mechanism_of(parameters)
     p = parameters.constants()
     equation = machine(mechanism, mechanism.is_switched_on(p)).addresses[DERIVATIVE]
     modes = np.array([*encode(inputs, mechanism).modes.values()], dtype=float)
     arguments = (equation, modes, np.array([*p, 0.0]), states, np.zeros(len(mechanism.channels)))
-    return best_time(lambda: _in_turn(*arguments), 20) / len(states)
+    return shortest_time(lambda: _evaluate_in_turn(*arguments), 20) / len(states)

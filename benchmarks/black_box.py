@@ -105,9 +105,9 @@ def evolve(
 def descend(
     box: BlackBox, random: np.random.Generator, score: Callable[[FloatArray], float] | None = None
 ) -> OptimizeResult:
-    """Minimise a score, by default `BlackBox.charge`, by Nelder and Mead's simplex from the best of `DRAWS` random linkages."""
+    """Minimise a score, by default the penalised quality, by Nelder and Mead's simplex from the best of `DRAWS` linkages."""
     draws = random.uniform(box.low, box.high, (DRAWS, len(box.low)))
-    return minimise_score(box, draws[np.argmin(box.charged(draws))], score or box.charge)
+    return minimise_score(box, draws[np.argmin(box.penalised_qualities(draws))], score or box.penalised_quality)
 
 
 def minimise_score(box: BlackBox, first: FloatArray, score: Callable[[FloatArray], float]) -> OptimizeResult:
@@ -157,7 +157,7 @@ class BlackBox:
         q = self._linkages(x)
         return self._errors(q, self._rotations(x, q))
 
-    def charged(self, x: FloatArray) -> FloatArray:
+    def penalised_qualities(self, x: FloatArray) -> FloatArray:
         """Return the quality plus proportional penalties for violated constraints, shape (m,)."""
         q = self._linkages(x)
         rotation = self._rotations(x, q)
@@ -165,9 +165,9 @@ class BlackBox:
         charged: FloatArray = self._errors(q, rotation) + PENALTY * self.normal.weights.sum() * charge
         return charged
 
-    def charge(self, x: FloatArray) -> float:
-        """Return `charged` for one linkage."""
-        return float(self.charged(x[None, :])[0])
+    def penalised_quality(self, x: FloatArray) -> float:
+        """Return `penalised_qualities` for one linkage."""
+        return float(self.penalised_qualities(x[None, :])[0])
 
     def violations(self, x: FloatArray) -> FloatArray:
         """Return the left sides of the inequalities g(x) <= 0, shape (m, number of inequalities)."""

@@ -258,7 +258,7 @@ def built_fmu(mechanism: Mechanism, kind: str, folder: Path) -> Path:
     return target
 
 
-def right(command: Command, row: Row) -> float:
+def exact_end(command: Command, row: Row) -> float:
     """Return the exact coordinate at the end; for `cosimulate`, which starts like the published set, its exact change."""
     end = COUNT * STEPS[0]
     start = {v.name: v.start for v in MECHANISMS[command.mechanism].variables}[
@@ -267,7 +267,7 @@ def right(command: Command, row: Row) -> float:
     return command.a * end + command.b * (1.0 - cos(20.0 * end)) / 20.0 + (0.0 if row.sets_rate else float(start))
 
 
-def text(errors: list[float]) -> str:
+def format_errors(errors: list[float]) -> str:
     """Format the error at the smaller step and the order."""
     coarse, fine = errors
     if fine < LEAST:
@@ -276,7 +276,7 @@ def text(errors: list[float]) -> str:
     return f"{fine:.1e}, {'whatever the step' if abs(order) < 0.5 else f'order {order:g}'}"
 
 
-def find(master: str, folder: Path) -> Table:
+def measure_master(master: str, folder: Path) -> Table:
     """Measure a master and return its rows; if FMUs of several kinds differ, a cell has all results."""
     looked = [
         (row, command, rated, kind)
@@ -303,7 +303,7 @@ def find(master: str, folder: Path) -> Table:
     for n, (row, command, rated, kind) in enumerate(looked):
         found = table.setdefault(row, {"master": row.master, "interface": row.interface} | dict.fromkeys(COLUMNS, ""))
         name = _column(command, rated)
-        said = text([abs(end - right(command, row)) for end in ends[2 * n : 2 * n + 2]])
+        said = format_errors([abs(end - exact_end(command, row)) for end in ends[2 * n : 2 * n + 2]])
         if not found[name]:
             found[name] = said
         elif found[name] != said:
@@ -339,7 +339,7 @@ if __name__ == "__main__":
     chosen = parser.parse_args()
     with tempfile.TemporaryDirectory() as place:
         folder = (chosen.fmus or Path(place)).resolve()
-        table = [row for master in chosen.master or names for row in find(master, folder)]
+        table = [row for master in chosen.master or names for row in measure_master(master, folder)]
     if not chosen.master:
         write(RESULTS, table)
     print(markdown(table))

@@ -107,14 +107,14 @@ class Contest:
         q[self.limits.high > self.limits.low] = x
         return q
 
-    def charged_area(self, box: BlackBox, x: FloatArray) -> float:
+    def penalised_area(self, box: BlackBox, x: FloatArray) -> float:
         """Return the area plus proportional penalties for violated constraints."""
         if (x < box.low).any() or (x > box.high).any():
             return inf
         curve = Linkage.from_vector(self.unknowns(x)[:10], box.branch).path(turn(AREA_N)) @ np.array([1.0, 1j])
-        return self.area(curve) + self.charge(box, x) if np.isfinite(curve).all() else inf
+        return self.area(curve) + self.penalty(box, x) if np.isfinite(curve).all() else inf
 
-    def charge(self, box: BlackBox, x: FloatArray) -> float:
+    def penalty(self, box: BlackBox, x: FloatArray) -> float:
         """Return the penalty to add to an area: PENALTY times the sum of the constraint violations."""
         return PENALTY * float(np.maximum(self.plain[box.branch].violations(x[None, :]), 0.0).sum())
 
@@ -176,7 +176,7 @@ class Trace:
             raise TimeUp
         return seconds
 
-    def offer(self, box: BlackBox, x: FloatArray) -> None:
+    def record_if_best(self, box: BlackBox, x: FloatArray) -> None:
         """Measure a linkage, and record it if it is the best.
 
         Raises
@@ -192,7 +192,7 @@ class Trace:
         if value <= self.enough:
             raise TimeUp
 
-    def watched(self, box: BlackBox, score: Score) -> Score:
+    def watch(self, box: BlackBox, score: Score) -> Score:
         """Wrap a function to be minimised so that each improvement by `SLIGHT` is offered."""
         least = inf
 
@@ -201,14 +201,14 @@ class Trace:
             found = score(x)
             if found < (1.0 - SLIGHT) * least:
                 least = found
-                self.offer(box, x)
+                self.record_if_best(box, x)
             else:
                 self.tick()
             return found
 
         return value
 
-    def at(self, seconds: float) -> float:
+    def least_error(self, seconds: float) -> float:
         """Return the least error within a time (s), in the reported unit; infinite if nothing was found by then."""
         return min((value for passed, value in self.points if passed <= seconds), default=inf)
 
@@ -220,14 +220,14 @@ class Trace:
 # The other searches: each function makes one run with random numbers; `TimeUp` ends it
 
 
-def by_scipy(trace: Trace, box: BlackBox, random: np.random.Generator) -> None:
+def search_with_scipy(trace: Trace, box: BlackBox, random: np.random.Generator) -> None:
     """Run SciPy's differential evolution over whole generations."""
-    found = evolve(box, random, lambda intermediate_result: trace.offer(box, intermediate_result.x))
+    found = evolve(box, random, lambda intermediate_result: trace.record_if_best(box, intermediate_result.x))
     if trace.contest.on_area:
-        minimise_score(box, found.x, trace.watched(box, partial(trace.contest.charged_area, box)))
+        minimise_score(box, found.x, trace.watch(box, partial(trace.contest.penalised_area, box)))
 
 
-def by_cma(trace: Trace, box: BlackBox, random: np.random.Generator) -> None:
+def search_with_cma(trace: Trace, box: BlackBox, random: np.random.Generator) -> None:
     """Run Hansen's evolution strategy by its own package, for each assembly, repeatedly with twice as many members."""
     import cma
 
@@ -246,22 +246,22 @@ def by_cma(trace: Trace, box: BlackBox, random: np.random.Generator) -> None:
             strategy.tell(drawn, scores.tolist())
             if scores.min() < (1.0 - SLIGHT) * least:
                 least = scores.min()
-                trace.offer(box, rows[scores.argmin()])
+                trace.record_if_best(box, rows[scores.argmin()])
             trace.tick()
         return np.asarray(strategy.result.xbest)
 
     members = int(4 + 3 * log(n))
     for doubled in range(DOUBLED):
         for own in contest.boxes:
-            best = run(own, random.uniform(size=n), 0.3, members << doubled, own.charged)
+            best = run(own, random.uniform(size=n), 0.3, members << doubled, own.penalised_qualities)
             if contest.on_area:
-                charged = partial(contest.charged_area, own)
+                charged = partial(contest.penalised_area, own)
                 run(own, best, 0.01, members, lambda rows, charged=charged: np.array([charged(x) for x in rows]))
 
 
-def by_simplex(trace: Trace, box: BlackBox, random: np.random.Generator) -> None:
+def search_with_simplex(trace: Trace, box: BlackBox, random: np.random.Generator) -> None:
     """Run the thesis's simplex from the best of some random linkages."""
-    descend(box, random, trace.watched(box, box.charge))
+    descend(box, random, trace.watch(box, box.penalised_quality))
 
 
 # pylinkage
@@ -343,7 +343,7 @@ class PylinkageScore:
         if self.normal.rotation is not None:
             own = round(tau / float(np.abs(np.diff(self.normal.rotation)).min()))
             steps = own * -(-N // own)
-            self.at = np.rint(self.normal.rotation * steps / tau).astype(int) % steps
+            self.least_error = np.rint(self.normal.rotation * steps / tau).astype(int) % steps
         self.four_bar = PlacedFourBar(0.5 * (low + high), np.nonzero(high > low)[0], box.branch, steps)
         # the straight part is judged on pylinkage's curve
         self.plain = contest.plain[box.branch]
@@ -357,21 +357,21 @@ class PylinkageScore:
         track = linkage.track()
         if not np.isfinite(track).all():
             return inf
-        at = track[self.at] if self.normal.timed else track
-        quality, excess = self.measured(at, linkage.q[10])
+        at = track[self.least_error] if self.normal.timed else track
+        quality, excess = self.errors_and_excess(at, linkage.q[10])
         excess += float(np.maximum(self.plain.violations(x[None, :]), 0.0).sum())
         return quality + PENALTY * float(self.normal.weights.sum()) * excess
 
-    def charged_area(self, linkage: PlacedFourBar, values: Sequence[float], coords: object = None) -> float:
-        """Return `Contest.charged_area` on pylinkage's own curve."""
+    def penalised_area(self, linkage: PlacedFourBar, values: Sequence[float], coords: object = None) -> float:
+        """Return `Contest.penalised_area` on pylinkage's own curve."""
         x = np.asarray(values, dtype=float)
         if (x < self.box.low).any() or (x > self.box.high).any():
             return inf
         linkage.set_constraints(values)
         curve = linkage.track()[:, 4]
-        return self.contest.area(curve) + self.contest.charge(self.box, x) if np.isfinite(curve).all() else inf
+        return self.contest.area(curve) + self.contest.penalty(self.box, x) if np.isfinite(curve).all() else inf
 
-    def measured(self, track: ComplexArray, mounting: float) -> tuple[float, float]:
+    def errors_and_excess(self, track: ComplexArray, mounting: float) -> tuple[float, float]:
         """Return the weighted squared errors, and the violation of the straight part's requirements."""
         normal = self.normal
         if normal.angle is not None:
@@ -380,10 +380,10 @@ class PylinkageScore:
         assert normal.points is not None
         if normal.timed:
             return float(normal.weights @ np.abs(track[:, 4] - normal.points) ** 2), 0.0
-        return min(self._paired(track[:, 4], way) for way in (1, -1))
+        return min(self._errors_at_equal_shares(track[:, 4], way) for way in (1, -1))
 
-    def _paired(self, curve: ComplexArray, way: int) -> tuple[float, float]:
-        """Return errors and violation as `measured` does, at equal shares of the lengths of curve and target."""
+    def _errors_at_equal_shares(self, curve: ComplexArray, way: int) -> tuple[float, float]:
+        """Return errors and violation as `errors_and_excess` does, at equal shares of the lengths of curve and target."""
         normal = self.normal
         points = normal.points
         assert points is not None
@@ -403,48 +403,48 @@ class PylinkageScore:
         return float(normal.weights @ np.abs(met - points) ** 2), excess
 
 
-def _by_pylinkage(trace: Trace, box: BlackBox, *stages: tuple[Callable[..., Any], dict[str, Any]]) -> None:
+def _search_with_pylinkage(trace: Trace, box: BlackBox, *stages: tuple[Callable[..., Any], dict[str, Any]]) -> None:
     """Run optimisers of pylinkage one after another; if the measure is an area, its Nelder-Mead minimises the area at last."""
     from pylinkage.optimization import chain_optimizers, minimize_linkage
 
     score = PylinkageScore(trace.contest, box)
 
-    def watched(of: Callable[..., float]) -> Callable[..., float]:
-        value = trace.watched(box, lambda x: of(score.four_bar, x.tolist()))
+    def watch_score(of: Callable[..., float]) -> Callable[..., float]:
+        value = trace.watch(box, lambda x: of(score.four_bar, x.tolist()))
         return lambda linkage, values, coords: value(np.asarray(values))
 
     if trace.contest.on_area:
-        stages = (*stages, (minimize_linkage, {"eval_func": watched(score.charged_area)}))
-    chain_optimizers(watched(score), score.four_bar, stages, order_relation=min, verbose=False)
+        stages = (*stages, (minimize_linkage, {"eval_func": watch_score(score.penalised_area)}))
+    chain_optimizers(watch_score(score), score.four_bar, stages, order_relation=min, verbose=False)
 
 
-def by_swarm(trace: Trace, box: BlackBox, random: np.random.Generator) -> None:
+def search_with_swarm(trace: Trace, box: BlackBox, random: np.random.Generator) -> None:
     """Run pylinkage's particle swarm and, from its best linkage, its Nelder-Mead, with default settings."""
     from pylinkage.optimization import minimize_linkage, particle_swarm_optimization
 
     bounds = (box.low, box.high)
-    _by_pylinkage(trace, box, (particle_swarm_optimization, {"bounds": bounds}), (minimize_linkage, {}))
+    _search_with_pylinkage(trace, box, (particle_swarm_optimization, {"bounds": bounds}), (minimize_linkage, {}))
 
 
-def by_pylinkage_evolution(trace: Trace, box: BlackBox, random: np.random.Generator) -> None:
+def search_with_pylinkage_evolution(trace: Trace, box: BlackBox, random: np.random.Generator) -> None:
     """Run pylinkage's differential evolution and, from its best linkage, its Nelder-Mead, with default settings."""
     from pylinkage.optimization import differential_evolution_optimization, minimize_linkage
 
     settings = {"bounds": (box.low, box.high), "seed": int(random.integers(1 << 31))}
-    _by_pylinkage(trace, box, (differential_evolution_optimization, settings), (minimize_linkage, {}))
+    _search_with_pylinkage(trace, box, (differential_evolution_optimization, settings), (minimize_linkage, {}))
 
 
-def by_pylinkage_simplex(trace: Trace, box: BlackBox, random: np.random.Generator) -> None:
+def search_with_pylinkage_simplex(trace: Trace, box: BlackBox, random: np.random.Generator) -> None:
     """Run pylinkage's Nelder-Mead from the best of as many random linkages as our simplex takes, with default settings."""
     from pylinkage.optimization import minimize_linkage
 
     score = PylinkageScore(trace.contest, box)
     draws = random.uniform(box.low, box.high, (DRAWS, len(box.low)))
     first = min(draws.tolist(), key=lambda x: score(score.four_bar, x))
-    _by_pylinkage(trace, box, (minimize_linkage, {"x0": first}))
+    _search_with_pylinkage(trace, box, (minimize_linkage, {"x0": first}))
 
 
-def by_freudenstein(trace: Trace, box: BlackBox, random: np.random.Generator) -> None:
+def search_with_freudenstein(trace: Trace, box: BlackBox, random: np.random.Generator) -> None:
     """Run pylinkage's function generation once at every phase; it solves Freudenstein's equation by least squares."""
     from pylinkage.synthesis import function_generation
 
@@ -460,22 +460,22 @@ def by_freudenstein(trace: Trace, box: BlackBox, random: np.random.Generator) ->
             q[3:6] = found.crank_length, found.coupler_length, found.rocker_length
             q[8] = phase
             for other in trace.contest.boxes:
-                trace.offer(other, q[free])
+                trace.record_if_best(other, q[free])
     raise TimeUp
 
 
 BlackBoxSearch = Callable[[Trace, BlackBox, np.random.Generator], None]
 
 SEARCHES: dict[str, BlackBoxSearch] = {
-    "SciPy's differential evolution": by_scipy,
-    "simplex, many starts (the thesis)": by_simplex,
-    "pylinkage, particle swarm": by_swarm,
-    "pylinkage, differential evolution": by_pylinkage_evolution,
-    "pylinkage, Nelder-Mead, many starts": by_pylinkage_simplex,
+    "SciPy's differential evolution": search_with_scipy,
+    "simplex, many starts (the thesis)": search_with_simplex,
+    "pylinkage, particle swarm": search_with_swarm,
+    "pylinkage, differential evolution": search_with_pylinkage_evolution,
+    "pylinkage, Nelder-Mead, many starts": search_with_pylinkage_simplex,
 }
 
 
-def searched(
+def run_search(
     search: BlackBoxSearch, contest: Contest, budget: float, enough: float, clock: Callable[[], float] = perf_counter
 ) -> Trace:
     """Repeat a search, alternating the assemblies, until its time is over or its goal is reached; return its trace."""

@@ -59,7 +59,7 @@ def show(found: Convergence, powers: bool = True) -> None:
     CONSOLE.print(table)
 
 
-def of_ours(name: str, decades: int, out: Path) -> None:
+def measure_our_couplings(name: str, decades: int, out: Path) -> None:
     """Measure the couplings of our master on a system of the library."""
     system = load_system(library()[name])
     periods = [m.values.get("sample_time", 1e-3) for m in system.members.values() if m.controller]
@@ -69,7 +69,7 @@ def of_ours(name: str, decades: int, out: Path) -> None:
     figures.plot(found).savefig(out / f"coupling-{name}.png", dpi=110)
 
 
-def of_others(steps: Sequence[float], stop_time: float, out: Path) -> None:
+def measure_other_masters(steps: Sequence[float], stop_time: float, out: Path) -> None:
     """Measure the other masters on the system motor-crank with inputs held."""
     system = load_system(library()["motor-crank"]).without_rates()
     name = "linkage.crank.speed"
@@ -106,9 +106,9 @@ def main() -> None:
     options = parser.parse_args()
     options.out.mkdir(parents=True, exist_ok=True)
     for name in options.system or (() if options.masters else library()):
-        of_ours(name, options.decades, options.out)
+        measure_our_couplings(name, options.decades, options.out)
     if options.masters or not options.system:
-        of_others([10.0 ** -(3 + n) for n in range(options.decades + 1)], 1e-3 * POINTS, options.out)
+        measure_other_masters([10.0 ** -(3 + n) for n in range(options.decades + 1)], 1e-3 * POINTS, options.out)
 
 
 if __name__ == "__main__":

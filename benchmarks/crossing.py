@@ -135,7 +135,7 @@ class Evolution:
         _areas(q, spans, branch, self._target, self._middles, self._lengths, self.normal.closed, areas)
         return areas
 
-    def charge(self, x: FloatArray) -> float:
+    def penalised_area(self, x: FloatArray) -> float:
         """Return the area of one linkage plus proportional penalties for violated constraints."""
         if (x < self.box.low).any() or (x > self.box.high).any():
             return inf
@@ -159,10 +159,10 @@ class Evolution:
             maxiter=GENERATIONS,
             tol=1e-4,
         )
-        return min(self.error(found.x), self.error(minimise_score(self.box, found.x, self.charge).x))
+        return min(self.error(found.x), self.error(minimise_score(self.box, found.x, self.penalised_area).x))
 
 
-def by_evolution(task: UntimedPath, constraints: Sequence[Constraint], budget: float) -> float:
+def search_with_evolution(task: UntimedPath, constraints: Sequence[Constraint], budget: float) -> float:
     """Return the least error of all runs within the time (m2)."""
     normal = normal_form(task)
     limits = make_limits(task, normal, None, constraints)
@@ -187,7 +187,7 @@ def run(name: str, path: TargetPath, asked: str, budget: float) -> Row:
         begun = process_time()
         ours = synthesize(task, constraints=constraints).best.error
         seconds = process_time() - begun
-        return Row(name, asked, ours, by_evolution(task, constraints, budget), seconds)
+        return Row(name, asked, ours, search_with_evolution(task, constraints, budget), seconds)
 
 
 # Results

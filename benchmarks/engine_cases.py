@@ -94,12 +94,12 @@ class EngineRun:
 @cache
 def reference(case: Case) -> np.ndarray:
     """Compute the slider position (m) at `Case.times`, from the reduced equations by DOP853 at rtol 1e-13."""
-    result = by_scipy(case, "DOP853", 1e-13, 1e-15)
+    result = run_scipy(case, "DOP853", 1e-13, 1e-15)
     result.setflags(write=False)
     return result
 
 
-def by_scipy(case: Case, method: str, rtol: float, atol: float | np.ndarray) -> np.ndarray:
+def run_scipy(case: Case, method: str, rtol: float, atol: float | np.ndarray) -> np.ndarray:
     """Compute the slider position (m) by `solve_ivp` on the reduced equations in plain Python; NaN if the method fails.
 
     It integrates the four mechanical states only, and switches the torque at an event.

@@ -23,7 +23,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from benchmarks.accuracy import loosest
+from benchmarks.accuracy import loosest_setting
 from benchmarks.engine_cases import CASES, Case, EngineRun, centre, relative_error, start, step_count
 from linkwork.five_bar.parameters import Constants
 
@@ -440,7 +440,7 @@ def time_steps(case: Case, first: float, last: float, ratio: float = 2.0**-0.25)
     return (interval / n for n in dict.fromkeys(fitted))
 
 
-def fastest(run: Run, case: Case, time_step: float, repeats: int = 7) -> EngineRun:
+def fastest_run(run: Run, case: Case, time_step: float, repeats: int = 7) -> EngineRun:
     """Return the fastest of several equal runs, the one that the machine has disturbed least."""
     return min((run(case, time_step) for _ in range(repeats)), key=lambda result: result.seconds)
 
@@ -474,10 +474,10 @@ def main() -> None:
     for case in CASES:
         for engine in ENGINES:
             for step in time_steps(case, engine.first_step, engine.last_step, 0.25):
-                line(case, "", step, fastest(engine.run, case, step, 3))
+                line(case, "", step, fastest_run(engine.run, case, step, 3))
             series = time_steps(case, engine.first_step, engine.last_step)
-            choice = loosest(lambda step, e=engine, c=case: e.run(c, step).error, series)
-            best = fastest(engine.run, case, choice.setting)
+            choice = loosest_setting(lambda step, e=engine, c=case: e.run(c, step).error, series)
+            best = fastest_run(engine.run, case, choice.setting)
             line(case, "<= 1e-6" if choice.reached else "best", choice.setting, best)
             step = next(time_steps(case, engine.finest_step, engine.finest_step))
             line(case, "finest", step, engine.finest_run(case, step))

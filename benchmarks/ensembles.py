@@ -45,11 +45,11 @@ def without_lanes() -> Iterator[None]:
 
 
 @contextmanager
-def kernels_timed(spent: list[float]) -> Iterator[None]:
+def time_kernels(spent: list[float]) -> Iterator[None]:
     """Append the CPU time (s) of each call of the compiled solvers to ``spent`` while the context lasts."""
     kernels = compiled.run, lanes.run_in_lanes
 
-    def timed(kernel: Callable[..., None]) -> Callable[..., None]:
+    def time_kernel(kernel: Callable[..., None]) -> Callable[..., None]:
         def call(*arguments: object) -> None:
             begun = process_time()
             kernel(*arguments)
@@ -57,7 +57,7 @@ def kernels_timed(spent: list[float]) -> Iterator[None]:
 
         return call
 
-    compiled.run, lanes.run_in_lanes = map(timed, kernels)
+    compiled.run, lanes.run_in_lanes = map(time_kernel, kernels)
     try:
         yield
     finally:
@@ -67,20 +67,20 @@ def kernels_timed(spent: list[float]) -> Iterator[None]:
 def integration_time(run: Callable[[], object], repeats: int) -> float:
     """Return the shortest CPU time (s) that the compiled solver takes within a run of one mechanism."""
     spent: list[float] = []
-    with kernels_timed(spent):
+    with time_kernels(spent):
         for _ in range(repeats):
             run()
     return min(spent)
 
 
-def measured(runs: list[Callable[[], object]]) -> list[tuple[float, float, float]]:
+def measure_runs(runs: list[Callable[[], object]]) -> list[tuple[float, float, float]]:
     """Return for each run the shortest CPU time, CPU time within the compiled solver, and clock time (s); runs alternate."""
     times = []
     for _ in range(REPEATS + 1):
         row = []
         for run in runs:
             spent: list[float] = []
-            with kernels_timed(spent):
+            with time_kernels(spent):
                 begun, clock = process_time(), perf_counter()
                 run()
                 row.append((process_time() - begun, sum(spent), perf_counter() - clock))
@@ -126,26 +126,28 @@ def main() -> None:
         for drive, values in drives.items():
             samples = {"stop_time": stop_time, "step": 1e-3}
 
-            def together(
+            def run_together(
                 n_jobs: int | None = None, drive: str = drive, values: object = values, samples: dict = samples
             ) -> Ensemble:
                 return simulate_many(
                     TABLE_3_1, vary={"slider.stiffness": stiffness, drive: values}, n_jobs=n_jobs, **samples
                 )
 
-            def apart(together: Callable[[], Ensemble] = together) -> None:
+            def run_one_by_one(run_together: Callable[[], Ensemble] = run_together) -> None:
                 with without_lanes():
-                    together()
+                    run_together()
 
-            springs = together().parameters
+            springs = run_together().parameters
 
-            def alone(
+            def run_alone(
                 drive: str = drive, values: np.ndarray = values, samples: dict = samples, springs: Sequence = springs
             ) -> None:
                 for i in some:
                     simulate(springs[i], Inputs(**{drive: values[i]}), **samples)
 
-            single, other, ours, two = measured([alone, apart, together, lambda together=together: together(2)])
+            single, other, ours, two = measure_runs(
+                [run_alone, run_one_by_one, run_together, lambda run_together=run_together: run_together(2)]
+            )
             own = single[0] / len(some), other[0] / n, ours[0] / n
             table.add_row(
                 f"{length}, {drive}",

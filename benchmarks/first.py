@@ -49,7 +49,7 @@ BEFORE = "toggle-press"
 MEASURED = ("klann", "jansen", "geared-five-bar", "elastic-bearing")
 
 
-def waited(arguments: tuple[str, ...], folder: str) -> tuple[str, str, str]:
+def measure_waiting(arguments: tuple[str, ...], folder: str) -> tuple[str, str, str]:
     """Run Python with these arguments; return clock time and processor time (s), and the number of compilations announced."""
     before, begin = resource.getrusage(resource.RUSAGE_CHILDREN), perf_counter()
     environment = os.environ | {"LINKWORK_CACHE_DIR": folder}
@@ -61,11 +61,11 @@ def waited(arguments: tuple[str, ...], folder: str) -> tuple[str, str, str]:
     return f"{seconds:.2f}", f"{processor:.2f}", str(done.stderr.count("linkwork: compiling"))
 
 
-def first(arguments: tuple[str, ...], *, carried: bool) -> tuple[str, str, str]:
-    """Measure as `waited` with an empty cache, with or without the kernels that the installation carries."""
+def measure_first(arguments: tuple[str, ...], *, carried: bool) -> tuple[str, str, str]:
+    """Measure as `measure_waiting` with an empty cache, with or without the kernels that the installation carries."""
     code, *others = arguments
     with tempfile.TemporaryDirectory() as folder:
-        return waited((code if carried else WITHOUT + code, *others), folder)
+        return measure_waiting((code if carried else WITHOUT + code, *others), folder)
 
 
 def linkages(names: list[str]) -> Table:
@@ -82,11 +82,17 @@ def linkages(names: list[str]) -> Table:
     for name in names:
         for what, command in FROM_A_FILE.items():
             measured, other = ((*command, str(LIBRARY / f"{own}.toml")) for own in (name, BEFORE))
-            bare = first(measured, carried=False)
-            alone = first(measured, carried=True)
+            bare = measure_first(measured, carried=False)
+            alone = measure_first(measured, carried=True)
             with tempfile.TemporaryDirectory() as folder:
-                waited(other, folder)
-                table.add_row(f"{name}: {what}", *bare, *alone, *waited(measured, folder), *waited(measured, folder))
+                measure_waiting(other, folder)
+                table.add_row(
+                    f"{name}: {what}",
+                    *bare,
+                    *alone,
+                    *measure_waiting(measured, folder),
+                    *measure_waiting(measured, folder),
+                )
     return table
 
 
@@ -105,8 +111,8 @@ def main() -> None:
         table.add_column(heading, justify="right" if heading else "left")
     for what, arguments in WAITS.items():
         with tempfile.TemporaryDirectory() as folder:
-            bare = first(arguments, carried=False) if what not in IDLE else ("", "", "")
-            table.add_row(what, *bare, *waited(arguments, folder), *waited(arguments, folder))
+            bare = measure_first(arguments, carried=False) if what not in IDLE else ("", "", "")
+            table.add_row(what, *bare, *measure_waiting(arguments, folder), *measure_waiting(arguments, folder))
     Console(width=150).print(table)
 
 

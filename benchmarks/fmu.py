@@ -66,12 +66,12 @@ class Trivial(Fmi2Slave):
 """
 
 
-def best(measure: Callable[[], float]) -> float:
+def least_measurement(measure: Callable[[], float]) -> float:
     """Return the least of several measurements."""
     return min(measure() for _ in range(REPEATS))
 
 
-def by_fmpy(fmu: Path) -> float:
+def time_with_fmpy(fmu: Path) -> float:
     """Measure the time (s) of a step through FMPy, with inputs set and outputs read."""
     description = read_model_description(str(fmu))
     fmi3 = description.fmiVersion == "3.0"
@@ -105,7 +105,7 @@ def by_fmpy(fmu: Path) -> float:
     return took
 
 
-def by_host(host: Path, fmu: Path, folder: Path) -> float:
+def time_with_host(host: Path, fmu: Path, folder: Path) -> float:
     """Measure the time (s) of a step from the host in C, with inputs set and outputs read."""
     unpacked = unpack(fmu, folder / fmu.stem)
     inputs = {s.name: float(s.attributes["start"]) for s in unpacked.reals("input")}
@@ -118,10 +118,10 @@ def by_host(host: Path, fmu: Path, folder: Path) -> float:
         assert run["status"] == 0, run["logged"]
         return float(run["microseconds"]) * 1e-6
 
-    return best(measure)
+    return least_measurement(measure)
 
 
-def right_hand_sides(folder: Path) -> tuple[float, float]:
+def count_and_time_right_hand_sides(folder: Path) -> tuple[float, float]:
     """Return the number of right-hand sides in a step, and the time of a bare one (s)."""
     files = source_files(MECHANISM, NATIVE)
     driver = Path(__file__).with_name("right_hand_sides.c")
@@ -138,7 +138,7 @@ def right_hand_sides(folder: Path) -> tuple[float, float]:
     return float(counted), float(nanoseconds) * 1e-9
 
 
-def plain_step() -> float:
+def time_plain_step() -> float:
     """Measure the time (s) of a step of the plant in plain Python, with its outputs."""
     entry = MECHANISM.published["table-3.1"]
     plant = Plant(MECHANISM, entry.parameters, entry.initial, inputs={"drive.speed": entry.crank_speed}, drive_mode=1)
@@ -149,7 +149,7 @@ def plain_step() -> float:
     return (time.perf_counter() - begun) / STEPS
 
 
-def compiled_step() -> float:
+def time_compiled_step() -> float:
     """Measure the time (s) of a step in this process, with inputs held as in the FMU."""
     entry = MECHANISM.published["table-3.1"]
     begun = time.perf_counter()
@@ -158,7 +158,7 @@ def compiled_step() -> float:
     return (time.perf_counter() - begun) / STEPS
 
 
-def as_component(native: Path, component: Path) -> list[tuple[float, float]]:
+def compare_component(native: Path, component: Path) -> list[tuple[float, float]]:
     """Compare a WebAssembly component with the native library; return pairs of a step length (s) and the ratio of the times."""
     entry = MECHANISM.published["table-3.1"]
     inputs, initial = check_run(MECHANISM, Inputs(speed=entry.crank_speed), entry.initial)
@@ -173,7 +173,11 @@ def as_component(native: Path, component: Path) -> list[tuple[float, float]]:
             return time.perf_counter() - begun
 
     return [
-        (length, best(lambda length=length: step(component, length)) / best(lambda length=length: step(native, length)))
+        (
+            length,
+            least_measurement(lambda length=length: step(component, length))
+            / least_measurement(lambda length=length: step(native, length)),
+        )
         for length in (1.0, 0.1, STEP)
     ]
 
@@ -193,20 +197,23 @@ def main() -> None:
             "smallest native FMU: a pendulum": build_native(PENDULUM, NATIVE, folder),
         }
         host = compile_host(folder)
-        seconds = {what: (by_host(host, fmu, folder), best(lambda f=fmu: by_fmpy(f))) for what, fmu in fmus.items()}
-        counted, bare = right_hand_sides(folder)
+        seconds = {
+            what: (time_with_host(host, fmu, folder), least_measurement(lambda f=fmu: time_with_fmpy(f)))
+            for what, fmu in fmus.items()
+        }
+        counted, bare = count_and_time_right_hand_sides(folder)
         web = folder / "web"
-        ratios = as_component(fmus["native FMU, FMI 3.0"], build_native(MECHANISM, NATIVE_FMI3, web, [WASM]))
+        ratios = compare_component(fmus["native FMU, FMI 3.0"], build_native(MECHANISM, NATIVE_FMI3, web, [WASM]))
 
-    compiled_step()  # the first one loads what is compiled
+    time_compiled_step()  # the first one loads what is compiled
     table = Table(title=f"Table 3.1 at 420 rpm, 1 ms steps, tolerance 1e-9; microseconds a step, best of {REPEATS}")
     for heading in ("what", "from C", "through FMPy"):
         table.add_column(heading, justify="left" if heading == "what" else "right")
     rows: dict[str, tuple[float | None, float | None]] = {
         **seconds,
         f"{counted:.2f} bare right-hand sides of {bare * 1e9:.0f} ns": (counted * bare, None),
-        "the plant in plain Python, without FMI": (None, best(plain_step)),
-        "in process, compiled, inputs held likewise": (None, best(compiled_step)),
+        "the plant in plain Python, without FMI": (None, least_measurement(time_plain_step)),
+        "in process, compiled, inputs held likewise": (None, least_measurement(time_compiled_step)),
     }
     for what, pair in rows.items():
         table.add_row(what, *("" if value is None else f"{value * 1e6:.2f}" for value in pair))

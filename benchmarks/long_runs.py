@@ -78,7 +78,7 @@ def free_run(mechanism: str, turns: float, *, begun: float = 0.0, **options: Any
     return residual, float(run["crank.angle"][-1] - run["crank.angle"][0])
 
 
-def shifted(what: str, late: float = LATE, **options: Any) -> tuple[float, float]:
+def compare_late_run(what: str, late: float = LATE, **options: Any) -> tuple[float, float]:
     """Compare a run of half a second that begins at ``late`` with one that begins at zero.
 
     Returns
@@ -107,7 +107,7 @@ def plant_run(mechanism: str, *, time: float = 0.0, begun: float = 0.0, toleranc
     return plant.outputs()[names.index("energy.residual")] / kinetic, plant.state[0] - start.crank_angle
 
 
-def late_fmu(
+def compare_late_fmu(
     file: str | Path, mechanism: str, step: float, interface: str = "co-simulation", late: float = LATE
 ) -> tuple[float, float]:
     """Compare 512 steps of a built FMU from ``late`` on with those from zero.
@@ -150,7 +150,7 @@ def times_table() -> Table:
     out = Table("what acts", "tolerance", "difference", "times the steps", title=f"from {LATE:g} s on, beside from 0")
     for what in ACTING:
         for tolerance in TOLERANCES:
-            difference, steps = shifted(what, tolerance=tolerance)
+            difference, steps = compare_late_run(what, tolerance=tolerance)
             out.add_row(what, f"{tolerance:g}", f"{difference:.1e}", f"{steps:.2f}")
     return out
 
@@ -192,7 +192,7 @@ def built_table() -> Table:
                 if file is files[0] and interface == "model-exchange":
                     continue  # the Python FMU has none
                 for step in (2.0**-10, 1e-3):
-                    angle, position = late_fmu(file, mechanism, step, interface)
+                    angle, position = compare_late_fmu(file, mechanism, step, interface)
                     out.add_row(file.name, interface, f"{step:g} s", f"{angle:.1e}", f"{position:.1e}")
     return out
 

@@ -31,7 +31,7 @@ SETTLED, SAME = 1e-4, 1e-3
 RIGS = [known.parameters for known in SETS.values() if known.parameters.slider_stiffness > 0.0]
 
 
-def drawn(random: np.random.Generator):
+def draw_five_bar(random: np.random.Generator):
     """Draw a five-bar near a published one, and a speed near its natural frequency."""
     rig = RIGS[random.integers(len(RIGS))]
     while True:
@@ -93,7 +93,7 @@ def main() -> None:
     asked = parser.parse_args()
     random = np.random.default_rng(asked.seed)
     light = replace(SETS["rig-1-spring-b"].parameters, slider_damping=2.0)
-    cases = [drawn(random) for _ in range(asked.mechanisms)]
+    cases = [draw_five_bar(random) for _ in range(asked.mechanisms)]
     cases += [(light, rpm * RAD_S_PER_RPM) for rpm in np.linspace(1120.0, 2640.0, asked.light)]
     total = 0
     for parameters, speed in cases:

@@ -25,10 +25,10 @@ from analysis import Inputs, TorsionBar, simulate, simulate_many
 from analysis.figures import Curve, Panel, plot_curves
 from analysis.figures.style import COLOURS
 from benchmarks import engines
-from benchmarks.accuracy import ACCURACY, SCIPY_METHODS, best_time
-from benchmarks.engine_cases import CASES, Case, by_scipy, relative_error
+from benchmarks.accuracy import ACCURACY, SCIPY_METHODS, shortest_time
+from benchmarks.engine_cases import CASES, Case, relative_error, run_scipy
 from benchmarks.ensembles import integration_time, without_lanes
-from benchmarks.solvers import by_multipliers
+from benchmarks.solvers import run_multipliers
 from linkwork.five_bar.parameters import InitialState
 from linkwork.five_bar.published import SETS, TABLE_3_1
 
@@ -47,7 +47,7 @@ class Point(NamedTuple):
     seconds: float
 
 
-def in_process(case: Case, of: str) -> list[Point]:
+def measure_in_process(case: Case, of: str) -> list[Point]:
     """Measure the compiled solver at all tolerances: the "integration" alone, or the "whole" call with all outputs."""
     inputs = Inputs(speed=case.crank_speed) if case.crank_speed else Inputs(torque=TorsionBar(torque=case.torque))
     start = InitialState(crank_speed=case.start_speed)
@@ -55,7 +55,7 @@ def in_process(case: Case, of: str) -> list[Point]:
     def run(tolerance: float) -> Any:
         return simulate(case.parameters, inputs, initial=start, samples=case.times, tolerance=tolerance)
 
-    measure_time = best_time if of == "whole" else integration_time
+    measure_time = shortest_time if of == "whole" else integration_time
     points = []
     for tolerance in TOLERANCES.tolist():
         error = relative_error(case, run(tolerance)["slider.position"])
@@ -63,34 +63,34 @@ def in_process(case: Case, of: str) -> list[Point]:
     return points
 
 
-def at_tolerances(case: Case, run: Callable[[float], np.ndarray], repeats: int = 2) -> list[Point]:
+def measure_tolerances(case: Case, run: Callable[[float], np.ndarray], repeats: int = 2) -> list[Point]:
     """Measure a solver at every other tolerance."""
     points = []
     for tolerance in TOLERANCES[::2].tolist():
         error = relative_error(case, run(tolerance))
-        points.append(Point(error, best_time(partial(run, tolerance), repeats)))
+        points.append(Point(error, shortest_time(partial(run, tolerance), repeats)))
     return points
 
 
-def scipy_points(case: Case, method: str) -> list[Point]:
+def measure_scipy(case: Case, method: str) -> list[Point]:
     """Measure one of SciPy's methods on the plain right-hand side."""
     length, speed = case.parameters.crank_length, max(1.0, case.start_speed)
     scale = np.array([1.0, length, speed, length * 40.0])
-    return at_tolerances(case, lambda rtol: by_scipy(case, method, rtol, rtol * scale))
+    return measure_tolerances(case, lambda rtol: run_scipy(case, method, rtol, rtol * scale))
 
 
-def by_engine(case: Case, engine: engines.Engine, run: engines.Run) -> list[Point]:
+def measure_engine(case: Case, engine: engines.Engine, run: engines.Run) -> list[Point]:
     """Measure a multibody engine at its steps."""
     steps = engines.time_steps(case, engine.first_step, engine.last_step, 0.5)
-    found = (engines.fastest(run, case, step, 2) for step in steps)
+    found = (engines.fastest_run(run, case, step, 2) for step in steps)
     return [Point(result.error, result.seconds) for result in found]
 
 
-def measured(case: Case, say: Callable[[str], None]) -> dict[str, list[Point]]:
+def measure_case(case: Case, say: Callable[[str], None]) -> dict[str, list[Point]]:
     """Return the points of all solvers that are installed, ours first."""
-    found = {OURS: in_process(case, "integration"), "Linkwork, all outputs": in_process(case, "whole")}
-    found |= {f"SciPy {method}": scipy_points(case, method) for method in SCIPY_METHODS}
-    found["multiplier form, SciPy DOP853"] = at_tolerances(case, partial(by_multipliers, case), 1)
+    found = {OURS: measure_in_process(case, "integration"), "Linkwork, all outputs": measure_in_process(case, "whole")}
+    found |= {f"SciPy {method}": measure_scipy(case, method) for method in SCIPY_METHODS}
+    found["multiplier form, SciPy DOP853"] = measure_tolerances(case, partial(run_multipliers, case), 1)
     mujoco, exudyn = engines.ENGINES
     for name, engine, run in (
         ("MuJoCo", mujoco, partial(engines.run_mujoco, iterations=2)),
@@ -98,13 +98,13 @@ def measured(case: Case, say: Callable[[str], None]) -> dict[str, list[Point]]:
         ("Exudyn", exudyn, partial(engines.run_exudyn, newton_tolerance=1e-9)),
     ):
         try:
-            found[name] = by_engine(case, engine, run)
+            found[name] = measure_engine(case, engine, run)
         except ImportError as error:
             say(f"left out, not installed (extra 'bench'): {error.name or error}")
     return found
 
 
-def at_accuracy(points: Iterable[Point]) -> float:
+def least_time_at_accuracy(points: Iterable[Point]) -> float:
     """Return the least time of the points that reach the accuracy."""
     return min(point.seconds for point in points if point.error <= ACCURACY)
 
@@ -113,7 +113,7 @@ def picture(found: dict[str, dict[str, list[Point]]]) -> Any:
     """Plot error against time, a panel for each case."""
     panels = []
     for case, solvers in found.items():
-        unit = at_accuracy(solvers[OURS])
+        unit = least_time_at_accuracy(solvers[OURS])
         curves = []
         for name, points in solvers.items():
             usable = [p for p in points if isfinite(p.error) and p.error < 1.0]
@@ -149,7 +149,7 @@ def costs(most: int) -> list[tuple[int, float, float]]:
     """Measure ensembles: number of runs, and time per run divided by that of one run alone, with and without lanes."""
     speed = SETS["table-3.1"].crank_speed
     settings = {"stop_time": 0.1, "step": 1e-2}
-    alone = best_time(lambda: simulate(TABLE_3_1, Inputs(speed=speed), **settings), 40)
+    alone = shortest_time(lambda: simulate(TABLE_3_1, Inputs(speed=speed), **settings), 40)
     rows = []
     for count in (count for count in COUNTS if count <= most):
         values = {"slider.stiffness": np.linspace(500.0, 1500.0, count)}
@@ -158,9 +158,9 @@ def costs(most: int) -> list[tuple[int, float, float]]:
             return simulate_many(TABLE_3_1, Inputs(speed=speed), vary=values, outputs=["slider.position"], **settings)
 
         repeats = max(1, min(20, 20_000 // count))
-        lanes = best_time(together, repeats)
+        lanes = shortest_time(together, repeats)
         with without_lanes():
-            apart = best_time(together, max(1, repeats // 4))
+            apart = shortest_time(together, max(1, repeats // 4))
         rows.append((count, lanes / count / alone, apart / count / alone))
     return rows
 
@@ -189,7 +189,7 @@ def main() -> None:
     options = parser.parse_args()
     options.folder.mkdir(parents=True, exist_ok=True)
     console = Console(width=110)
-    found = {case.name: measured(case, lambda text: console.print(text, highlight=False)) for case in CASES}
+    found = {case.name: measure_case(case, lambda text: console.print(text, highlight=False)) for case in CASES}
     picture(found).savefig(options.folder / "work-precision.png", dpi=110)
     rows = costs(options.runs)
     cost_picture(rows).savefig(options.folder / "cost-of-runs.png", dpi=110)

@@ -40,11 +40,11 @@ from .contest import (
     BlackBoxSearch,
     Contest,
     Trace,
-    by_cma,
-    by_pylinkage_simplex,
-    by_scipy,
-    by_swarm,
-    searched,
+    run_search,
+    search_with_cma,
+    search_with_pylinkage_simplex,
+    search_with_scipy,
+    search_with_swarm,
 )
 from .targets import TARGETS, Target
 
@@ -70,7 +70,7 @@ class Row(NamedTuple):
     exact: float
     errors: tuple[float, ...]
 
-    def at(self, seconds: float) -> float:
+    def least_error(self, seconds: float) -> float:
         """Return the least error after one of `TIMES` (s), but not less than the error that counts as exact."""
         return max(self.exact, self.errors[TIMES.index(seconds)])
 
@@ -78,7 +78,7 @@ class Row(NamedTuple):
 # Running
 
 
-def by_linkwork(trace: Trace, box: BlackBox, random: np.random.Generator) -> None:
+def search_with_linkwork(trace: Trace, box: BlackBox, random: np.random.Generator) -> None:
     """Call `synthesize` with growing effort, and measure its answers as those of the other searches."""
     contest = trace.contest
     problem, limits = contest.problem, contest.limits
@@ -90,16 +90,16 @@ def by_linkwork(trace: Trace, box: BlackBox, random: np.random.Generator) -> Non
             linkage = answer.best.linkage
             q = make_start(linkage, contest.normal).q
             if ((q >= limits.low - EXACT) & (q <= limits.high + EXACT)).all():
-                trace.offer(contest.plain[linkage.branch], q[limits.high > limits.low])
+                trace.record_if_best(contest.plain[linkage.branch], q[limits.high > limits.low])
         trace.tick()
 
 
 RACERS: Mapping[str, BlackBoxSearch] = {
-    OURS: by_linkwork,
-    "SciPy DE": by_scipy,
-    "CMA-ES": by_cma,
-    "pylinkage swarm": by_swarm,
-    "pylinkage Nelder-Mead": by_pylinkage_simplex,
+    OURS: search_with_linkwork,
+    "SciPy DE": search_with_scipy,
+    "CMA-ES": search_with_cma,
+    "pylinkage swarm": search_with_swarm,
+    "pylinkage Nelder-Mead": search_with_pylinkage_simplex,
 }
 
 
@@ -108,13 +108,13 @@ def run(target: Target, search: str, budget: float) -> Row:
     contest = Contest.of(target, on_area=True)
     normal = contest.normal
     with threadpool_limits(1):
-        trace = searched(RACERS[search], contest, budget, -inf, process_time)
+        trace = run_search(RACERS[search], contest, budget, -inf, process_time)
     exact = (EXACT * normal.unit) ** 2 * (1.0 if contest.on_area else float(normal.weights.sum()))
-    errors = tuple(trace.at(seconds) if seconds <= budget else np.nan for seconds in TIMES)
+    errors = tuple(trace.least_error(seconds) if seconds <= budget else np.nan for seconds in TIMES)
     return Row(target.kind, target.name, search, exact, errors)
 
 
-def prepared() -> None:
+def prepare_searches() -> None:
     """Compile and load everything that the searches need, before they are timed."""
     for target in {target.kind: target for target in TARGETS}.values():
         for search in RACERS:
@@ -144,13 +144,13 @@ def write(path: Path, rows: Iterable[Row]) -> None:
     os.replace(beside, path)
 
 
-def ordered(rows: Iterable[Row]) -> list[Row]:
+def sort_rows(rows: Iterable[Row]) -> list[Row]:
     """Sort rows by targets and searches."""
     targets = [(target.kind, target.name) for target in TARGETS]
     return sorted(rows, key=lambda row: (targets.index(row[:2]), list(RACERS).index(row.search)))
 
 
-def completed(
+def run_missing(
     path: Path, targets: Sequence[Target], searches: Sequence[str], budget: float, say: Callable[..., Any]
 ) -> None:
     """Run the searches that are missing in a file."""
@@ -158,18 +158,18 @@ def completed(
     wanted = [(target, search) for target in targets for search in searches]
     missing = [(t, s) for t, s in wanted if (t.kind, t.name, s) not in rows]
     if missing:
-        prepared()
+        prepare_searches()
     for target, search in missing:
         row = run(target, search, budget)
         rows[row[:3]] = row
-        write(path, ordered(rows.values()))
-        say(f"{target.kind}, {target.name}: {search} {row.at(last([row])):.4g}")
+        write(path, sort_rows(rows.values()))
+        say(f"{target.kind}, {target.name}: {search} {row.least_error(last_time([row])):.4g}")
 
 
 # Tables
 
 
-def last(rows: Iterable[Row]) -> float:
+def last_time(rows: Iterable[Row]) -> float:
     """Return the last time at which all rows have an error (s)."""
     return max(seconds for k, seconds in enumerate(TIMES) if not any(np.isnan(row.errors[k]) for row in rows))
 
@@ -182,36 +182,36 @@ def by_target(rows: Iterable[Row]) -> dict[tuple[str, str], dict[str, Row]]:
     return {target: of for target, of in found.items() if set(of) == set(RACERS)}
 
 
-def rival(of: Mapping[str, Row], seconds: float) -> float:
+def rival_error(of: Mapping[str, Row], seconds: float) -> float:
     """Return the least error of the searches other than ours after a time (s); ``of`` has the rows of a target by search."""
-    return min(row.at(seconds) for search, row in of.items() if search != OURS)
+    return min(row.least_error(seconds) for search, row in of.items() if search != OURS)
 
 
-def ahead(of: Mapping[str, Row], seconds: float) -> bool:
+def is_ahead(of: Mapping[str, Row], seconds: float) -> bool:
     """Return whether no other search has a smaller error than ours, within `LEVEL`."""
-    ours = of[OURS].at(seconds)
-    return isfinite(ours) and ours <= (1.0 + LEVEL) * rival(of, seconds)
+    ours = of[OURS].least_error(seconds)
+    return isfinite(ours) and ours <= (1.0 + LEVEL) * rival_error(of, seconds)
 
 
-def level(of: Mapping[str, Row], seconds: float) -> bool:
+def is_level(of: Mapping[str, Row], seconds: float) -> bool:
     """Return whether our search is ahead, but another one is as good within `LEVEL`."""
-    return ahead(of, seconds) and rival(of, seconds) <= (1.0 + LEVEL) * of[OURS].at(seconds)
+    return is_ahead(of, seconds) and rival_error(of, seconds) <= (1.0 + LEVEL) * of[OURS].least_error(seconds)
 
 
-def found(of: Mapping[str, Row], search: str, seconds: float, end: float) -> bool:
+def has_found(of: Mapping[str, Row], search: str, seconds: float, end: float) -> bool:
     """Return whether a search has come within `FOUND` of the least error that any search has at the end."""
-    return of[search].at(seconds) <= (1.0 + FOUND) * min(row.at(end) for row in of.values())
+    return of[search].least_error(seconds) <= (1.0 + FOUND) * min(row.least_error(end) for row in of.values())
 
 
 def standings(rows: Sequence[Row]) -> list[list[str]]:
     """Count, at each time, the targets on which Linkwork is ahead or level, and the targets that each search has found."""
-    targets, end = by_target(rows).values(), last(rows)
+    targets, end = by_target(rows).values(), last_time(rows)
     return [
         [
             f"{seconds:g}",
-            f"{sum(ahead(of, seconds) for of in targets)} of {len(targets)}",
-            str(sum(level(of, seconds) for of in targets)),
-            *(str(sum(found(of, search, seconds, end) for of in targets)) for search in RACERS),
+            f"{sum(is_ahead(of, seconds) for of in targets)} of {len(targets)}",
+            str(sum(is_level(of, seconds) for of in targets)),
+            *(str(sum(has_found(of, search, seconds, end) for of in targets)) for search in RACERS),
         ]
         for seconds in TIMES
         if seconds <= end
@@ -220,13 +220,13 @@ def standings(rows: Sequence[Row]) -> list[list[str]]:
 
 def finals(rows: Sequence[Row]) -> list[list[str]]:
     """List the errors of each search at the end by target, the least in bold."""
-    end = last(rows)
+    end = last_time(rows)
     lines = []
     for (kind, name), of in by_target(rows).items():
-        least = min(row.at(end) for row in of.values())
+        least = min(row.least_error(end) for row in of.values())
 
         def cell(row: Row, least: float = least) -> str:
-            value = row.at(end)
+            value = row.least_error(end)
             text = "exact" if value <= row.exact else f"{value:.4g}" if value < inf else "none"
             return f"**{text}**" if value <= (1.0 + LEVEL) * least else text
 
@@ -234,21 +234,21 @@ def finals(rows: Sequence[Row]) -> list[list[str]]:
     return lines
 
 
-def lost(rows: Sequence[Row]) -> list[str]:
+def list_lost(rows: Sequence[Row]) -> list[str]:
     """List the targets on which another search has a smaller error at the end, and the difference."""
-    end = last(rows)
+    end = last_time(rows)
     return [
-        f"- {kind}, {name}: {of[OURS].at(end) / rival(of, end) - 1.0:.2%} above "
-        f"{min(of.values(), key=lambda row: row.at(end)).search}"
+        f"- {kind}, {name}: {of[OURS].least_error(end) / rival_error(of, end) - 1.0:.2%} above "
+        f"{min(of.values(), key=lambda row: row.least_error(end)).search}"
         for (kind, name), of in by_target(rows).items()
-        if not ahead(of, end)
+        if not is_ahead(of, end)
     ]
 
 
 def markdown(rows: Sequence[Row], of: str) -> str:
     """Write a part of a page: the table "standings" or "targets", or the list "lost"."""
     if of == "lost":
-        return "\n".join(lost(rows) or ["None."])
+        return "\n".join(list_lost(rows) or ["None."])
     headings, lines = {
         "standings": (["s", "Linkwork ahead", "of these level", *RACERS], standings),
         "targets": (["kind", "target", *RACERS], finals),
@@ -260,13 +260,15 @@ def picture(rows: Sequence[Row]) -> Any:
     """Plot the number of targets that each search has found over time, and its distance from the best at the end."""
     from analysis.figures import Curve, Panel, plot_curves
 
-    targets, end = by_target(rows).values(), last(rows)
+    targets, end = by_target(rows).values(), last_time(rows)
     times = [seconds for seconds in TIMES if seconds <= end]
     over_time, profile = [], []
     for search in RACERS:
         width = 2.2 if search == OURS else 1.0
-        shares = [sum(found(of, search, seconds, end) for of in targets) for seconds in times]
-        ratios = np.sort([of[search].at(end) / min(row.at(end) for row in of.values()) for of in targets])
+        shares = [sum(has_found(of, search, seconds, end) for of in targets) for seconds in times]
+        ratios = np.sort(
+            [of[search].least_error(end) / min(row.least_error(end) for row in of.values()) for of in targets]
+        )
         over_time.append(Curve(x=times, y=shares, label=search, width=width))
         profile.append(Curve(x=ratios[np.isfinite(ratios)], y=1 + np.flatnonzero(np.isfinite(ratios)), width=width))
     panels = [
@@ -294,7 +296,7 @@ def main(path: Path, targets: Sequence[Target], searches: Sequence[str], budget:
     """Run the missing searches, and print the tables."""
     console = Console(width=200)
     write(path, [row for row in read(path) if row.search not in again])
-    completed(path, targets, searches, budget, lambda text: console.print(text, highlight=False))
+    run_missing(path, targets, searches, budget, lambda text: console.print(text, highlight=False))
     rows = read(path)
     for part in ("targets", "standings", "lost"):
         console.print(f"{part}\n{markdown(rows, part)}\n", highlight=False, markup=False)

@@ -72,7 +72,7 @@ def processor_time() -> float:
     return sum(sum(process.cpu_times()[:2]) for process in [own, *own.children(recursive=True)])
 
 
-def timed(work: Callable[[], Any], backend: str | None) -> tuple[float, float, Any]:
+def time_work(work: Callable[[], Any], backend: str | None) -> tuple[float, float, Any]:
     """Run work on one worker or on two of a backend; return clock time, processor time (s) and the result."""
     with joblib.parallel_config(backend, n_jobs=2) if backend else nullcontext():
         begun, spent = perf_counter(), processor_time()
@@ -80,7 +80,7 @@ def timed(work: Callable[[], Any], backend: str | None) -> tuple[float, float, A
         return perf_counter() - begun, processor_time() - spent, result
 
 
-def nothing(_: int) -> None:
+def import_packages(_: int) -> None:
     """Do no work but import the packages that a worker needs."""
     import analysis.periodic.chart.grid
     import analysis.run.compiled
@@ -99,9 +99,9 @@ def main() -> None:
     with LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=":0") as cluster, Client(cluster):
         for backend in backends[1:]:
             with joblib.parallel_config(backend, n_jobs=2):
-                list(run_in_parallel(nothing, range(8)))
+                list(run_in_parallel(import_packages, range(8)))
         for name, work in WORK.items():
-            found = [[timed(work, backend) for backend in backends] for _ in range(repeats + 1)]
+            found = [[time_work(work, backend) for backend in backends] for _ in range(repeats + 1)]
             # the first compiles
             times = [min(row[n][what] for row in found[1:]) for n in range(len(backends)) for what in (0, 1)]
             alike = all(np.array_equal(result, found[0][0][2], equal_nan=True) for row in found for *_, result in row)

@@ -17,7 +17,14 @@ from scipy.integrate import solve_ivp
 from analysis import Inputs, Trajectory, simulate
 from analysis.cli.common import say, show_table
 from analysis.slider_crank import QUANTITIES, ConstantShift, Tolerance, close, force_turn, joint_loads, monte_carlo
-from benchmarks.accuracy import ACCURACY, SCIPY_METHODS, TOLERANCES, best_time, loosest, right_hand_side
+from benchmarks.accuracy import (
+    ACCURACY,
+    SCIPY_METHODS,
+    TOLERANCES,
+    loosest_setting,
+    right_hand_side_time,
+    shortest_time,
+)
 from benchmarks.ensembles import integration_time
 from linkwork.slider_crank import dynamics, published
 from linkwork.slider_crank.kinematics import coefficients, position
@@ -29,20 +36,20 @@ TIMES = np.linspace(0.0, STOP, 49)
 ANGLES = np.linspace(0.0, 2.0 * np.pi, 361)
 
 
-def in_process(tolerance: float) -> Trajectory:
+def run_in_process(tolerance: float) -> Trajectory:
     """Run the compiled solver."""
     inputs = Inputs(torque=TORQUE)
     return simulate(PARAMETERS, inputs, initial=INITIAL, stop_time=STOP, samples=TIMES, tolerance=tolerance)
 
 
-def acting(torque: float) -> dynamics.Inputs:
+def constant_torque(torque: float) -> dynamics.Inputs:
     """Return the plant's inputs: a torque on the crank, the shift held."""
     return dynamics.apply_inputs((0.0, 1.0), (torque, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0), PARAMETERS.constants())
 
 
-def by_scipy(method: str, tolerance: float) -> np.ndarray:
+def run_scipy(method: str, tolerance: float) -> np.ndarray:
     """Compute the slider position at `TIMES` by one of SciPy's methods on the plain-Python right-hand side."""
-    p, inputs = PARAMETERS.constants(), acting(TORQUE)
+    p, inputs = PARAMETERS.constants(), constant_torque(TORQUE)
     start = [INITIAL.crank_angle, INITIAL.shift_position, INITIAL.crank_speed, 0.0, 0.0, 0.0]
 
     def rate(_: float, x: np.ndarray) -> tuple[float, ...]:
@@ -55,7 +62,7 @@ def by_scipy(method: str, tolerance: float) -> np.ndarray:
 @cache
 def reference() -> np.ndarray:
     """Compute the slider position at `TIMES` at a tolerance of 1e-13."""
-    return in_process(1e-13)["slider.position"]
+    return run_in_process(1e-13)["slider.position"]
 
 
 def error(position: np.ndarray) -> float:
@@ -65,14 +72,16 @@ def error(position: np.ndarray) -> float:
 
 def runs() -> None:
     """Measure and print the runs in time."""
-    tolerance, off, _ = loosest(lambda tolerance: error(in_process(tolerance)["slider.position"]), TOLERANCES)
-    whole = best_time(partial(in_process, tolerance), 30)
-    inner = integration_time(partial(in_process, tolerance), 30)
-    steps = int(in_process(tolerance).statistics["steps"])
+    tolerance, off, _ = loosest_setting(
+        lambda tolerance: error(run_in_process(tolerance)["slider.position"]), TOLERANCES
+    )
+    whole = shortest_time(partial(run_in_process, tolerance), 30)
+    inner = integration_time(partial(run_in_process, tolerance), 30)
+    steps = int(run_in_process(tolerance).statistics["steps"])
     others = []
     for method in SCIPY_METHODS:
-        choice = loosest(lambda setting, m=method: error(by_scipy(m, setting)), TOLERANCES)
-        others.append((best_time(partial(by_scipy, method, choice.setting), 3), choice.error, method))
+        choice = loosest_setting(lambda setting, m=method: error(run_scipy(m, setting)), TOLERANCES)
+        others.append((shortest_time(partial(run_scipy, method, choice.setting), 3), choice.error, method))
     best = min(others)
     show_table(
         f"{STOP} s under {TORQUE:g} N.m, error at most {ACCURACY:g} of the stroke",
@@ -106,11 +115,11 @@ def _dual_turn() -> None:
 def forces() -> None:
     """Measure and print all joint forces over a turn of 361 points."""
     shift = ConstantShift(INITIAL.shift_position)
-    arrays = best_time(lambda: force_turn(PARAMETERS, crank_speed=INITIAL.crank_speed, shift=shift, angles=ANGLES))
+    arrays = shortest_time(lambda: force_turn(PARAMETERS, crank_speed=INITIAL.crank_speed, shift=shift, angles=ANGLES))
     times = {
         "vector mechanics on arrays, force_turn": arrays,
-        "vector mechanics, the plant in plain Python": best_time(_scalar_turn),
-        "dual numbers: closure by Newton-Raphson, 17 equations": best_time(_dual_turn),
+        "vector mechanics, the plant in plain Python": shortest_time(_scalar_turn),
+        "dual numbers: closure by Newton-Raphson, 17 equations": shortest_time(_dual_turn),
     }
     show_table(
         "all joint forces at 361 angles",
@@ -142,7 +151,7 @@ def tolerances() -> None:
         ("motion of the slider, torque and every joint force", tuple(QUANTITIES)),
     ):
         found = []
-        seconds = best_time(lambda q=quantities, f=found: f.append(monte_carlo(turn, off, quantities=q)), 3)
+        seconds = shortest_time(lambda q=quantities, f=found: f.append(monte_carlo(turn, off, quantities=q)), 3)
         spread, linear = found[0].spreads["slider.position"], found[0].estimates["slider.position"]
         ratio = float(spread.deviation[0] / linear.deviation[0])
         rows.append((name, f"{seconds:.2f}", f"{ratio:.5f}"))
@@ -154,9 +163,9 @@ def main() -> None:
     """Measure and print the tables."""
     runs()
     x = (1.0, INITIAL.shift_position, INITIAL.crank_speed, 0.0, 0.0, 0.0)
-    p, inputs = PARAMETERS.constants(), acting(TORQUE)
-    fast = right_hand_side(PARAMETERS, Inputs(torque=TORQUE), np.tile(x, (20_000, 1)))
-    plain = best_time(lambda: [dynamics.derivative(x, inputs, p) for _ in range(1000)]) / 1000
+    p, inputs = PARAMETERS.constants(), constant_torque(TORQUE)
+    fast = right_hand_side_time(PARAMETERS, Inputs(torque=TORQUE), np.tile(x, (20_000, 1)))
+    plain = shortest_time(lambda: [dynamics.derivative(x, inputs, p) for _ in range(1000)]) / 1000
     say(f"a right-hand side takes {1e9 * fast:.0f} ns compiled, {1e6 * plain:.1f} microseconds in plain Python")
     forces()
     tolerances()

@@ -20,8 +20,15 @@ from rich.table import Table
 
 from analysis import Event, Inputs, TorsionBar, simulate
 from benchmarks import engines
-from benchmarks.accuracy import ACCURACY, SCIPY_METHODS, TOLERANCES, best_time, loosest, right_hand_side
-from benchmarks.engine_cases import CASES, Case, by_scipy, relative_error
+from benchmarks.accuracy import (
+    ACCURACY,
+    SCIPY_METHODS,
+    TOLERANCES,
+    loosest_setting,
+    right_hand_side_time,
+    shortest_time,
+)
+from benchmarks.engine_cases import CASES, Case, relative_error, run_scipy
 from benchmarks.ensembles import integration_time
 from linkwork.five_bar.parameters import InitialState
 from tests.oracles.multipliers import SpeedDrive, simulate_redundant
@@ -37,7 +44,7 @@ class Timing:
     note: str
 
 
-def in_process(case: Case) -> tuple[list[Timing], str]:
+def time_in_process(case: Case) -> tuple[list[Timing], str]:
     """Time the compiled solver: the whole call of `simulate`, the integration inside it, and the bare right-hand sides."""
     inputs = Inputs(speed=case.crank_speed) if case.crank_speed else Inputs(torque=TorsionBar(torque=case.torque))
 
@@ -51,13 +58,13 @@ def in_process(case: Case) -> tuple[list[Timing], str]:
             tolerance=tolerance,
         )
 
-    found = loosest(lambda tolerance: relative_error(case, run(tolerance)["slider.position"]), TOLERANCES)
+    found = loosest_setting(lambda tolerance: relative_error(case, run(tolerance)["slider.position"]), TOLERANCES)
     assert found.reached, "the in-process solver does not reach the accuracy"
-    whole = best_time(lambda: run(found.setting), 50)
+    whole = shortest_time(lambda: run(found.setting), 50)
     inner = integration_time(lambda: run(found.setting), 50)
     statistics = run(found.setting).statistics
     steps, evaluations = int(statistics["steps"]), int(statistics["evaluations"])
-    bare = right_hand_side(case.parameters, inputs, _states(case)) * evaluations
+    bare = right_hand_side_time(case.parameters, inputs, _states(case)) * evaluations
     note = f"tolerance {found.setting:.1e}, {steps} steps, {evaluations} evaluations"
     timings = [
         Timing(solver="in process, the integration", seconds=inner, error=found.error, note=note),
@@ -76,7 +83,7 @@ def _states(case: Case) -> np.ndarray:
     return np.column_stack([angles, 0.01 * np.sin(angles), speed, 0.2 * np.cos(angles), none, none])
 
 
-def with_scipy(case: Case) -> Timing:
+def time_scipy(case: Case) -> Timing:
     """Time `solve_ivp` on the plain-Python right-hand side, by the method that is fastest at the accuracy."""
     length, speed = case.parameters.crank_length, max(1.0, case.start_speed)
     scale = np.array([1.0, length, speed, length * 40.0])
@@ -84,14 +91,14 @@ def with_scipy(case: Case) -> Timing:
     for method in SCIPY_METHODS:
 
         def run(rtol: float, method: str = method) -> np.ndarray:
-            return by_scipy(case, method, rtol, rtol * scale)
+            return run_scipy(case, method, rtol, rtol * scale)
 
-        rtol, error, reached = loosest(lambda rtol, run=run: relative_error(case, run(rtol)), TOLERANCES)
+        rtol, error, reached = loosest_setting(lambda rtol, run=run: relative_error(case, run(rtol)), TOLERANCES)
         if reached:
             timings.append(
                 Timing(
                     solver="SciPy, plain-Python right-hand side",
-                    seconds=best_time(partial(run, rtol), 3),
+                    seconds=shortest_time(partial(run, rtol), 3),
                     error=error,
                     note=f"{method}, rtol {rtol:.1e}",
                 )
@@ -99,17 +106,19 @@ def with_scipy(case: Case) -> Timing:
     return min(timings, key=lambda timing: timing.seconds)
 
 
-def with_multipliers(case: Case) -> Timing:
+def time_multipliers(case: Case) -> Timing:
     """Time the multiplier form under SciPy's DOP853; the torsion bar's time of release is given to it, and not timed."""
-    rtol, error, reached = loosest(lambda rtol: relative_error(case, by_multipliers(case, rtol)), TOLERANCES[::5])
+    rtol, error, reached = loosest_setting(
+        lambda rtol: relative_error(case, run_multipliers(case, rtol)), TOLERANCES[::5]
+    )
     assert reached, "the multiplier form does not reach the accuracy"
-    seconds = best_time(lambda: by_multipliers(case, rtol), 2)
+    seconds = shortest_time(lambda: run_multipliers(case, rtol), 2)
     return Timing(
         solver="multiplier form under SciPy", seconds=seconds, error=error, note=f"DOP853, rtol {rtol:.1e}, 8 states"
     )
 
 
-def by_multipliers(case: Case, rtol: float) -> np.ndarray:
+def run_multipliers(case: Case, rtol: float) -> np.ndarray:
     """Compute the slider position (m) by the multiplier form under SciPy's DOP853."""
 
     def run(start: InitialState, torque: float, times: np.ndarray, **drive: Any) -> Any:
@@ -145,11 +154,11 @@ def _release_time(case: Case) -> float:
     return run.events[0].time
 
 
-def with_engine(engine: engines.Engine, case: Case) -> Timing:
+def time_engine(engine: engines.Engine, case: Case) -> Timing:
     """Time a multibody engine at its largest step that reaches the accuracy."""
     steps = engines.time_steps(case, engine.first_step, engine.last_step)
-    choice = loosest(lambda step: engine.run(case, step).error, steps)
-    run = engines.fastest(engine.run, case, choice.setting)
+    choice = loosest_setting(lambda step: engine.run(case, step).error, steps)
+    run = engines.fastest_run(engine.run, case, choice.setting)
     reached = "" if choice.reached else ", accuracy not reached"
     note = f"step {choice.setting:.2e} s, {run.steps} steps{reached}"
     return Timing(solver=run.label, seconds=run.seconds, error=run.error, note=note)
@@ -159,13 +168,13 @@ def main() -> None:
     """Measure and print a table for each case."""
     console = Console(width=130)
     for case in CASES:
-        timings, remark = in_process(case)
-        timings += [with_scipy(case), with_multipliers(case)]
+        timings, remark = time_in_process(case)
+        timings += [time_scipy(case), time_multipliers(case)]
         missing = []
         plain = engines.ENGINES[0]._replace(run=partial(engines.run_mujoco, stiffened=False))
         for engine in (*engines.ENGINES, plain):
             try:
-                timings.append(with_engine(engine, case))
+                timings.append(time_engine(engine, case))
             except ImportError as error:
                 missing += [error.name or str(error)] * (error.name not in missing)
         table = Table(title=f"{case.name}: error in u at most {ACCURACY:g}")

@@ -67,7 +67,7 @@ def chromium() -> str | None:
     return next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
 
 
-def measured(browser: Any, seconds: float = 4.0) -> Figures:
+def measure_page(browser: Any, seconds: float = 4.0) -> Figures:
     """Measure the built page in a browser of Playwright."""
     page = browser.new_page(viewport={"width": 1400, "height": 1000})
     page.goto(PAGE.as_uri())
@@ -118,7 +118,7 @@ def _work(events: list[dict[str, Any]]) -> np.ndarray:
     return np.bincount(frame, [e.get("tdur", 0) / 1e3 for e in tasks], len(ends) + 1)[1:-1]
 
 
-def report(found: Figures) -> str:
+def figures_in_words(found: Figures) -> str:
     """Write the figures as a sentence."""
     return (
         f"first sight {found.first:.0f} ms; Floquet verdict {found.verdict[0]:.1f} ms after a change (greatest "
@@ -135,7 +135,7 @@ def main() -> None:
     with sync_playwright() as playwright:
         browser = playwright.chromium.launch(executable_path=chromium(), args=["--no-sandbox"])
         for _ in range(3):
-            print(report(measured(browser, float(sys.argv[1]) if len(sys.argv) > 1 else 4.0)))
+            print(figures_in_words(measure_page(browser, float(sys.argv[1]) if len(sys.argv) > 1 else 4.0)))
         browser.close()
 
 

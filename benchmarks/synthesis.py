@@ -56,7 +56,7 @@ from analysis.synthesis.task.task import Normal
 from linkwork.five_bar import kinematics
 
 from .black_box import DRAWS, BlackBox, minimise_score
-from .contest import PHASES, SEARCHES, Contest, PlacedFourBar, Trace, by_freudenstein, searched
+from .contest import PHASES, SEARCHES, Contest, PlacedFourBar, Trace, run_search, search_with_freudenstein
 
 FloatArray = NDArray[np.float64]
 ComplexArray = NDArray[np.complex128]
@@ -116,7 +116,7 @@ def curve_by_numpy(linkage: Linkage, rotation: FloatArray) -> ComplexArray:
     return curve
 
 
-def per_call(run: Callable[[int], object], calls: int) -> float:
+def time_per_call(run: Callable[[int], object], calls: int) -> float:
     """Return the median time of one call (s), from `REPEATS` measurements of a number of calls."""
     run(1)
     times = []
@@ -133,11 +133,11 @@ def kernel_times(linkage: Linkage, n: int = N) -> dict[str, float]:
     c, s, zero = np.cos(rotation), np.sin(rotation), np.zeros(n)
     q, out, jacobian = linkage.vector, np.empty((2, n)), np.empty((12, 2, n))
     times = {
-        "compiled, in a compiled loop": per_call(lambda k: _curves(k, c, s, zero, q, out), 20_000),
-        "its Jacobian and the curve, in a compiled loop": per_call(
+        "compiled, in a compiled loop": time_per_call(lambda k: _curves(k, c, s, zero, q, out), 20_000),
+        "its Jacobian and the curve, in a compiled loop": time_per_call(
             lambda k: _jacobians(k, c, s, zero, q, out, jacobian), 5_000
         ),
-        "NumPy over arrays": per_call(lambda k: [curve_by_numpy(linkage, rotation) for _ in range(k)], 200),
+        "NumPy over arrays": time_per_call(lambda k: [curve_by_numpy(linkage, rotation) for _ in range(k)], 200),
     }
     with suppress(ImportError):
         times.update(_kernel_times_of_pylinkage(linkage, n))
@@ -160,15 +160,15 @@ def _kernel_times_of_pylinkage(linkage: Linkage, n: int) -> dict[str, float]:
         return total
 
     return {
-        "pylinkage's compiled simulate, in a compiled loop": per_call(
+        "pylinkage's compiled simulate, in a compiled loop": time_per_call(
             lambda k: loop(k, data.positions, *arrays), 2_000
         ),
-        "pylinkage's step_fast": per_call(lambda k: [four_bar.linkage.step_fast(n) for _ in range(k)], 200),
-        "pylinkage's step": per_call(lambda k: [list(four_bar.linkage.step(n)) for _ in range(k)], 5),
+        "pylinkage's step_fast": time_per_call(lambda k: [four_bar.linkage.step_fast(n) for _ in range(k)], 200),
+        "pylinkage's step": time_per_call(lambda k: [list(four_bar.linkage.step(n)) for _ in range(k)], 5),
     }
 
 
-def ours(contest: Contest, search: Search) -> Trace:
+def run_synthesize(contest: Contest, search: Search) -> Trace:
     """Run `synthesize` on a problem; its answer counts from the end of the call."""
     problem = contest.problem
     trace = Trace(contest, inf)
@@ -178,21 +178,21 @@ def ours(contest: Contest, search: Search) -> Trace:
     return trace
 
 
-def contested(contest: Contest, budget: float) -> dict[str, Trace]:
+def run_contest(contest: Contest, budget: float) -> dict[str, Trace]:
     """Run every search on a problem, ours first; without those of pylinkage if it is not installed."""
     traces = {
-        "synthesize": ours(contest, Search()),
-        "synthesize, 2 cores": ours(contest, Search(n_jobs=2)),
-        f"synthesize, {FEW.starts} starts": ours(contest, FEW),
+        "synthesize": run_synthesize(contest, Search()),
+        "synthesize, 2 cores": run_synthesize(contest, Search(n_jobs=2)),
+        f"synthesize, {FEW.starts} starts": run_synthesize(contest, FEW),
     }
     enough = (1.0 + ENOUGH) * min(trace.best for trace in traces.values())
     searches = dict(SEARCHES)
     task = contest.problem.task
     if isinstance(task, RockerFunction) and np.ptp(np.asarray(task.weights)) == 0.0:
-        searches[f"pylinkage, function generation, {PHASES} phases"] = by_freudenstein
+        searches[f"pylinkage, function generation, {PHASES} phases"] = search_with_freudenstein
     for name, search in searches.items():
         with suppress(ImportError):
-            traces[name] = searched(search, contest, budget, enough)
+            traces[name] = run_search(search, contest, budget, enough)
     return traces
 
 
@@ -229,7 +229,7 @@ def convergence(weighted: bool, scanned: bool, number: int = STARTS) -> list[Sta
         first = np.clip(start.q[free], box.low, box.high)
         # angles within the turn that the box has
         first[-3:] = (start.q[free][-3:] + pi) % tau - pi
-        return float(box.quality(minimise_score(box, first, box.charge).x[None, :])[0])
+        return float(box.quality(minimise_score(box, first, box.penalised_quality).x[None, :])[0])
 
     runs: dict[str, Callable[[Start], float]] = {
         "least squares, exact Jacobian": lambda start: fit_least_squares(normal, limits, start).start.quality,
@@ -250,7 +250,7 @@ def _random_starts(boxes: dict[int, BlackBox], normal: Normal, number: int) -> I
     for k in range(number):
         box = list(boxes.values())[k % len(boxes)]
         draws = random.uniform(box.low, box.high, (DRAWS, len(box.low)))
-        best = draws[np.argmin(box.charged(draws))]
+        best = draws[np.argmin(box.penalised_qualities(draws))]
         answer = box.answer(SimpleNamespace(x=best, success=True, message="", nit=0))
         yield make_start(make_linkage(answer.start, normal), normal)
 
@@ -279,7 +279,7 @@ def contest_table(names: Sequence[str], budget: float, console: Console) -> Tabl
         table.add_column(heading, justify="left" if heading in ("problem", "search") else "right")
     for name in names:
         problem = PROBLEMS[name]
-        traces = contested(Contest.of(problem), budget)
+        traces = run_contest(Contest.of(problem), budget)
         best = min(trace.best for trace in traces.values())
         first = next(iter(traces.values())).reaching_time((1.0 + NEAR) * best)
         title = f"{name}: goal {problem.goal:g} {problem.unit}"
@@ -333,7 +333,7 @@ def main(budget: float = BUDGET, names: Sequence[str] = tuple(PROBLEMS)) -> None
     console.print(kernel_table())
     # machine code, CasADi and the workers are loaded before the clock
     for cores in (1, 2):
-        ours(Contest.of(PROBLEMS["ellipse-a"]), Search(n_jobs=cores))
+        run_synthesize(Contest.of(PROBLEMS["ellipse-a"]), Search(n_jobs=cores))
     console.print(contest_table(names, budget, console))
     console.print(start_table())
     try:

@@ -81,14 +81,14 @@ def curves(n: int) -> dict[str, FloatArray]:
     }
 
 
-def outlined(corners: ArrayLike, n: int = CURVE) -> FloatArray:
+def polygon_points(corners: ArrayLike, n: int = CURVE) -> FloatArray:
     """Return n points at equal distances along a closed polygon, shape (n, 2)."""
     line = closed_vertices(np.asarray(corners, dtype=float), True)
     length = float(np.hypot(*np.diff(line, axis=0).T).sum())
     return interpolate_polyline(line, np.linspace(0.0, length, n, endpoint=False))
 
 
-def drawn(seed: int) -> TargetPath:
+def hand_drawn(seed: int) -> TargetPath:
     """Draw a closed curve of random harmonics with a tremor, and smooth it."""
     random = np.random.default_rng(seed)
     t, order = turn(120), np.array([-3, -2, -1, 2, 3])
@@ -97,7 +97,7 @@ def drawn(seed: int) -> TargetPath:
     return TargetPath(points=np.column_stack([z.real, z.imag]), closed=True).smooth(CURVE)
 
 
-def waves(seed: int) -> RockerFunction:
+def random_waves(seed: int) -> RockerFunction:
     """Draw a periodic function of two random harmonics, with a range of 40 degrees."""
     random = np.random.default_rng(seed)
     t = turn(TIMED)
@@ -108,7 +108,7 @@ def waves(seed: int) -> RockerFunction:
     return RockerFunction(angle=radians(40.0) * angle / np.ptp(angle), mounting=True)
 
 
-def over(function: Any, low: float, high: float, output_deg: float = 60.0) -> RockerFunction:
+def function_target(function: Any, low: float, high: float, output_deg: float = 60.0) -> RockerFunction:
     """Return y = f(x) as a function of the rocker: 90 degrees of the crank, both scales linear, zeros free."""
     x = np.linspace(low, high, 31)
     y = function(x)
@@ -117,7 +117,7 @@ def over(function: Any, low: float, high: float, output_deg: float = 60.0) -> Ro
     )
 
 
-def dwelling() -> RockerFunction:
+def rise_and_dwell() -> RockerFunction:
     """Return a cycloidal rise of 40 degrees over 120, a dwell over 60, a return over 120, and a dwell over 60."""
     t = np.degrees(turn(72))
     up = np.clip(t / 120.0, 0.0, 1.0) - np.clip((t - 180.0) / 120.0, 0.0, 1.0)
@@ -156,7 +156,7 @@ def _all() -> list[Target]:
         ),
         *published("untimed", "path-a", "path-b"),
         *usual("untimed", {name: traced(smooth[name]) for name in smooth}),
-        Target(kind="untimed", name="foot", task=traced(outlined(foot))),
+        Target(kind="untimed", name="foot", task=traced(polygon_points(foot))),
         *usual("polygonal", {name: traced(points) for name, points in POLYGONS.items()}),
         Target(
             kind="drawn",
@@ -164,19 +164,19 @@ def _all() -> list[Target]:
             task=UntimedPath(path=TargetPath.from_file(HAND_DRAWN).smooth(CURVE)),
             constraints=(LargestLink(length=0.3), *USUAL),
         ),
-        *usual("drawn", {f"seed {seed}": UntimedPath(path=drawn(seed)) for seed in range(1, 10)}),
+        *usual("drawn", {f"seed {seed}": UntimedPath(path=hand_drawn(seed)) for seed in range(1, 10)}),
         *published("function", "rocker", "rocker-weighted"),
         *usual(
             "function",
             {
-                "sine": over(np.sin, 0.0, 0.5 * pi),
-                "square": over(np.square, 0.0, 1.0),
-                "exponential": over(np.exp, 0.0, 1.0),
-                "reciprocal": over(np.reciprocal, 1.0, 2.0),
-                "logarithm": over(np.log, 1.0, 2.0),
-                "rise and dwell": dwelling(),
-                "waves 1": waves(1),
-                "waves 2": waves(2),
+                "sine": function_target(np.sin, 0.0, 0.5 * pi),
+                "square": function_target(np.square, 0.0, 1.0),
+                "exponential": function_target(np.exp, 0.0, 1.0),
+                "reciprocal": function_target(np.reciprocal, 1.0, 2.0),
+                "logarithm": function_target(np.log, 1.0, 2.0),
+                "rise and dwell": rise_and_dwell(),
+                "waves 1": random_waves(1),
+                "waves 2": random_waves(2),
             },
         ),
     ]

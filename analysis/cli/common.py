@@ -31,16 +31,16 @@ console = Console(emoji=False) if sys.stdout.isatty() else Console(emoji=False, 
 errors = Console(emoji=False, stderr=True)
 
 
-def visible(text: str) -> str:
+def escape_controls(text: str) -> str:
     """Return a text with a terminal's control characters escaped as Python writes them, such as \\x1b."""
     if text.isprintable():
         return text
     return "".join(c if c.isprintable() or c == "\n" else c.encode("unicode_escape").decode() for c in text)
 
 
-def plain(text: str) -> Text:
+def plain_text(text: str) -> Text:
     """Return a text for a table in which markup and emoji codes have no effect."""
-    return Text(visible(text))
+    return Text(escape_controls(text))
 
 
 #: Patterns of a number in a sentence, and of a number with a unit in SI; numbers in quotes are left out.
@@ -51,16 +51,16 @@ _QUANTITY = re.compile(rf"(?<![-'\w.])({NUMBER}) (N\.m|N|m)(?!\w|[./](?!rad\b)\w
 def in_units(text: str, shown: Callable[[str], tuple[str, float]]) -> str:
     """Return a sentence with its lengths, forces and torques in other units; ``shown`` maps a unit to (name, factor)."""
 
-    def converted(found: re.Match[str]) -> str:
+    def convert(found: re.Match[str]) -> str:
         unit, factor = shown(found[2])
         return found[0] if unit == found[2] else f"{float(found[1]) * factor:.6g} {unit}"
 
-    return _QUANTITY.sub(converted, text)
+    return _QUANTITY.sub(convert, text)
 
 
 def print_error(text: str, style: str = "yellow") -> None:
     """Print a sentence on standard error: a note in yellow, an error in red."""
-    errors.print(visible(text), style=style, markup=False, highlight=False, soft_wrap=True)
+    errors.print(escape_controls(text), style=style, markup=False, highlight=False, soft_wrap=True)
 
 
 def print_written(paths: Iterable[Path]) -> None:
@@ -69,7 +69,7 @@ def print_written(paths: Iterable[Path]) -> None:
         say(f"wrote {path}")
 
 
-def handled(command: Callable[..., Any]) -> Callable[..., Any]:
+def report_errors(command: Callable[..., Any]) -> Callable[..., Any]:
     """Decorate a command: report errors as a sentence and an exit code, and protect files that the command did not write."""
 
     @wraps(command)
@@ -255,7 +255,7 @@ def save_picture(picture: Any, path: str | Path, *, html: bool) -> list[Path]:
     return written
 
 
-def plotted(wanted: bool, result: Any, path: str | Path, **options: Any) -> list[Path]:
+def save_plot(wanted: bool, result: Any, path: str | Path, **options: Any) -> list[Path]:
     """Plot a result to a file if plots are ``wanted``, and return the paths written."""
     from .. import figures
     from ..files import save_figure
@@ -292,7 +292,7 @@ def number_or_text(text: str) -> bool | int | float | str:
     return text
 
 
-def unknown(name: str, known: Iterable[str], words: str) -> click.UsageError:
+def unknown_name_error(name: str, known: Iterable[str], words: str) -> click.UsageError:
     """Return the error for an unknown name on the command line, with the closest known names."""
     from ..files import unknown_name
 
@@ -406,7 +406,7 @@ def chosen_case(file: str | None, published: str | None, settings: Sequence[str]
 
 def say(text: str) -> None:
     """Print a sentence in one line, without markup or colours."""
-    console.print(visible(text), markup=False, highlight=False, soft_wrap=True)
+    console.print(escape_controls(text), markup=False, highlight=False, soft_wrap=True)
 
 
 def show_table(
@@ -433,11 +433,11 @@ def show_table(
     styles : iterable of str, optional
         Styles of the rows, as rich names them.
     """
-    grid = Table(title=plain(title), title_justify="left", show_header=bool(headings))
+    grid = Table(title=plain_text(title), title_justify="left", show_header=bool(headings))
     for heading in headings:
         justify: Any = "left" if heading in words else "right"
         # in a narrow terminal a long word is broken, not cut
-        grid.add_column(plain(heading), justify=justify, no_wrap=heading in unwrapped, overflow="fold")
+        grid.add_column(plain_text(heading), justify=justify, no_wrap=heading in unwrapped, overflow="fold")
     for row, style in zip(rows, styles):
-        grid.add_row(*(plain(cell) for cell in row), style=style)
+        grid.add_row(*(plain_text(cell) for cell in row), style=style)
     console.print(grid)

@@ -20,11 +20,11 @@ from .common import (
     INTERRUPTED,
     case_options,
     chosen_case,
-    handled,
     out_option,
     print_error,
     print_written,
     quantity,
+    report_errors,
 )
 
 
@@ -85,12 +85,12 @@ class Chosen:
             sys.exit(INTERRUPTED if interrupted else ENDED_EARLY)
 
 
-def about_a_case(command: Callable[..., None]) -> Callable[..., None]:
+def add_case_options(command: Callable[..., None]) -> Callable[..., None]:
     """Add the options that select a case and its drive to a command, which receives them as one `Chosen`."""
 
-    @handled
+    @report_errors
     @wraps(command)
-    def with_case(
+    def run_with_case(
         case: str | None,
         published: str | None,
         settings: Sequence[str],
@@ -109,8 +109,8 @@ def about_a_case(command: Callable[..., None]) -> Callable[..., None]:
         click.option("--speed", metavar="SPEED", help="Prescribe this crank speed instead of the case's drive."),
         case_options(PUBLISHED),
     ):
-        with_case = option(with_case)
-    return with_case
+        run_with_case = option(run_with_case)
+    return run_with_case
 
 
 def swing_unit(orbit: Any) -> tuple[str, float, str]:

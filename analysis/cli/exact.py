@@ -12,13 +12,13 @@ from .common import (
     SYNTHESIS,
     check_kind,
     console,
-    handled,
     out_option,
     output_folder,
     plots_option,
-    plotted,
     print_error,
     print_written,
+    report_errors,
+    save_plot,
     set_option,
 )
 from .design import print_best, print_solutions, read_overrides, write_described, write_linkages
@@ -35,7 +35,7 @@ from .design import print_best, print_solutions, read_overrides, write_described
 )
 @plots_option
 @out_option(help="Folder for the results.")
-@handled
+@report_errors
 def exact(case: str, settings: Sequence[str], crank_phase: str | None, count: int, plots: bool, out: str) -> None:
     """Find every four-bar that does exactly what a CASE file (TOML or JSON) asks for at a few points.
 
@@ -83,9 +83,9 @@ def exact(case: str, settings: Sequence[str], crank_phase: str | None, count: in
             )
             written += write_linkages(found.solutions, folder, chosen.title, make=chosen.make)
     if not isinstance(found, Generators):
-        written += plotted(plots, found, folder / "poses.png", title=chosen.title)
+        written += save_plot(plots, found, folder / "poses.png", title=chosen.title)
     if found.solutions:
-        written += plotted(plots, found.solutions[0], folder / "best-linkage.png", title=chosen.title)
+        written += save_plot(plots, found.solutions[0], folder / "best-linkage.png", title=chosen.title)
     print_written(written)
     if not any(s.verdicts.sound for s in found.solutions):
         print_error(f"note: {found.describe()}")

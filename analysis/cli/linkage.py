@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from .common import handled, out_option, say, show_table
+from .common import out_option, report_errors, say, show_table
 
 if TYPE_CHECKING:
     from linkwork.mechanism import Mechanism
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 @click.option("--equations", is_flag=True, help="Print only the equations, as the FMU contains them.")
 @out_option(help="Folder for the picture.")
 @click.option("--animation", is_flag=True, help="Write also an animation.")
-@handled
+@report_errors
 def linkage(file: str, equations: bool, out: str, animation: bool) -> None:
     """Describe the linkage of a FILE: structure, freedoms, dyads in order, range of motion, dead centres; and draw it.
 

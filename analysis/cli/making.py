@@ -9,14 +9,14 @@ from pathlib import Path
 import click
 
 from ..libraries import MissingLibraryError
-from .common import check_place, console, handled, print_error, say
+from .common import check_place, console, print_error, report_errors, say
 
 PACKAGE = Path(__file__).resolve().parents[1]
 #: The examples: beside the package in a checkout, inside it where Linkwork is installed as a wheel.
 EXAMPLES = (PACKAGE.parent / "examples", PACKAGE / "_examples")
 
 
-def _several(context: click.Context, parameter: click.Parameter, values: Sequence[str]) -> tuple[str, ...]:
+def _split_values(context: click.Context, parameter: click.Parameter, values: Sequence[str]) -> tuple[str, ...]:
     """Read an option that can be given several times, or once with commas (a callback of Click)."""
     return tuple(name for value in values for name in value.split(",") if name)
 
@@ -34,14 +34,14 @@ def _several(context: click.Context, parameter: click.Parameter, values: Sequenc
 @click.option(
     "--kinds",
     multiple=True,
-    callback=_several,
+    callback=_split_values,
     metavar="KIND,...",
     help="Kinds of FMU: python, native, native-fmi3; by default all that can be built here. The native ones need Zig.",
 )
 @click.option(
     "--platforms",
     multiple=True,
-    callback=_several,
+    callback=_split_values,
     metavar="PLATFORM,...",
     help="Platforms of native FMUs: all, or some of x86_64-linux, aarch64-linux, x86_64-windows, x86_64-darwin, "
     "aarch64-darwin, and wasm32-wasip2 for FMI 3.0; by default this one.",
@@ -53,7 +53,7 @@ def _several(context: click.Context, parameter: click.Parameter, values: Sequenc
     callback=check_place,
     help="Write each FMU there too, with inputs, reference results and who imports it.",
 )
-@handled
+@report_errors
 def build(
     models: Sequence[str], dest: str, kinds: Sequence[str], platforms: Sequence[str], publish: str | None
 ) -> None:
@@ -83,7 +83,7 @@ def build(
     "--dest", default="examples", show_default=True, type=click.Path(file_okay=False), help="Folder for the examples."
 )
 @click.option("--force", is_flag=True, help="Overwrite files of the same name.")
-@handled
+@report_errors
 def examples(dest: str, force: bool) -> None:
     """Copy the examples to a folder: case files of every kind, a drawn curve, scripts.
 

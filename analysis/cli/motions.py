@@ -10,14 +10,14 @@ import click
 from ..display import format_count, format_rounds
 from ..mechanisms import mechanism_of
 from .common import console, html_option, output_folder, quantity, save_picture, say, show_table, workers_options
-from .driven import Chosen, about_a_case, swing_unit
+from .driven import Chosen, add_case_options, swing_unit
 
 if TYPE_CHECKING:
     from ..periodic import Orbits
 
 
 @click.command()
-@about_a_case
+@add_case_options
 @click.option(
     "--turns",
     default=4,

@@ -12,7 +12,7 @@ from linkwork.mechanism import Mechanism
 from linkwork.parameters import field_name
 
 from ..mechanisms import MECHANISMS
-from .common import handled, say, unknown
+from .common import report_errors, say, unknown_name_error
 
 SLIDER_MOTION = "slider-motion"
 TUNING = "tuning"
@@ -88,17 +88,17 @@ def case_text(kind: str, file: str, *, parameters: bool = False) -> str:
     if kind in MECHANISMS:
         mechanism = MECHANISMS[kind]
         command = f"linkwork {kind if kind == 'slider-crank' else ''} info".replace("  ", " ")
-        title, lines = mechanism.title, _parameters(mechanism)
+        title, lines = mechanism.title, _parameter_file(mechanism)
         if not parameters:
-            command, title, lines = "linkwork run", f"A run of the {kind}", _run(mechanism, file)
+            command, title, lines = "linkwork run", f"A run of the {kind}", _run_case(mechanism, file)
     else:
         titles = {SLIDER_MOTION: "A motion of the slider", TUNING: "A tuning"}
         command, title = kinds()[kind], titles.get(kind, f"A synthesis, {kind}")
-        lines = _tuning(file) if kind == TUNING else _synthesis(kind, file)
+        lines = _tuning_case(file) if kind == TUNING else _synthesis_case(kind, file)
     return _HEAD.format(title=title, command=command, file=file) + "\n".join(lines) + "\n"
 
 
-def _grouped(rows: Mapping[str, str]) -> Iterator[str]:
+def _group_by_table(rows: Mapping[str, str]) -> Iterator[str]:
     """Yield lines grouped by the tables of their dotted names, lines without a table first."""
     for group in dict.fromkeys(sorted((name.rpartition(".")[0] for name in rows), key=bool)):
         if group:
@@ -153,14 +153,14 @@ def _mass_comments(mechanism: Mechanism) -> str:
     )
 
 
-def _parameters(mechanism: Mechanism) -> Iterator[str]:
+def _parameter_file(mechanism: Mechanism) -> Iterator[str]:
     source = mechanism.first_set.source
     yield f"# All numbers, masses too, are those of {source}: give your own."
     yield f'mechanism = "{mechanism.name}"'
-    yield from _grouped(_parameter_rows(mechanism, sections=False))
+    yield from _group_by_table(_parameter_rows(mechanism, sections=False))
 
 
-def _run(mechanism: Mechanism, file: str) -> Iterator[str]:
+def _run_case(mechanism: Mechanism, file: str) -> Iterator[str]:
     """Yield the lines of a run of the first published set at its speed, or of one second if it has no drive."""
     from ..files import entries, in_words, line
     from ..run import RunTable, case_inputs, signal_kinds
@@ -191,12 +191,12 @@ def _run(mechanism: Mechanism, file: str) -> Iterator[str]:
         value = published.drive.get(argument, 1.0)
         rows[name] = line(leaf, in_words(value, unit), words[argument], active=driven)
     given: dict[str, Any] = {"revolutions": 3.0} if published.drive else {"stop_time": "1 s"}
-    yield from _grouped(rows)
+    yield from _group_by_table(rows)
     yield "\n[run]"
     yield from entries(RunTable, given)
 
 
-def _tuning(file: str) -> Iterator[str]:
+def _tuning_case(file: str) -> Iterator[str]:
     from ..files import entries, line
     from ..tuning import TuneTable
 
@@ -207,7 +207,7 @@ def _tuning(file: str) -> Iterator[str]:
     yield from entries(TuneTable, _WISH)
 
 
-def _synthesis(kind: str, file: str) -> Iterator[str]:
+def _synthesis_case(kind: str, file: str) -> Iterator[str]:
     """Yield the lines of a synthesis task, or of a task and the motion of its slider."""
     from ..files import Quantity, entries, line
     from ..slider import TABLES as MOTION
@@ -244,7 +244,7 @@ def _synthesis(kind: str, file: str) -> Iterator[str]:
     "--parameters", is_flag=True, help="For a mechanism: only its parameters, as 'linkwork slider-crank' reads them."
 )
 @click.option("--force", is_flag=True, help="Overwrite a file of the same name.")
-@handled
+@report_errors
 def new(kind: str | None, file: str | None, parameters: bool, force: bool) -> None:
     """Write a case file to start from, with every entry explained, which runs as it is. Without KIND the kinds are listed.
 
@@ -263,7 +263,7 @@ def new(kind: str | None, file: str | None, parameters: bool, force: bool) -> No
             say(f"{name:<18} for {command}")
         return
     if kind not in known:
-        raise unknown(kind, known, f"kind of case {kind!r}")
+        raise unknown_name_error(kind, known, f"kind of case {kind!r}")
     if parameters and kind not in MECHANISMS:
         raise click.UsageError(f"--parameters is for a mechanism, {' or '.join(MECHANISMS)}: {kind} is a task")
     path = Path(file or f"{kind}.toml")

@@ -16,9 +16,9 @@ from .common import (
     check_place,
     console,
     force_option,
-    handled,
     print_error,
     print_written,
+    report_errors,
     say,
     show_table,
 )
@@ -66,7 +66,7 @@ from .common import (
     metavar="CASE",
     help="Run one case of a report again and show its calls, such as 0/cs/forbidden/12.",
 )
-@handled
+@report_errors
 def probe(
     fmu: str,
     calls: int,

@@ -9,7 +9,7 @@ import click
 import numpy as np
 
 from ..units import RAD_S_PER_RPM
-from .common import console, handled, out_option, output_folder, plot_option, print_written, quantity, show_table
+from .common import console, out_option, output_folder, plot_option, print_written, quantity, report_errors, show_table
 
 
 @click.command()
@@ -27,7 +27,7 @@ from .common import console, handled, out_option, output_folder, plot_option, pr
 @click.option("--least-swing", type=float, help="Smallest swing that is used, relative to the range; 0.1 by default.")
 @plot_option
 @out_option()
-@handled
+@report_errors
 def decrement(
     record: str, time: str | None, position: str | None, mass: str | None, out: str, plot: bool, **options: Any
 ) -> None:

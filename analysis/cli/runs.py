@@ -27,7 +27,7 @@ from .common import (
     check_kind,
     chosen_case,
     console,
-    handled,
+    escape_controls,
     in_units,
     number_or_text,
     out_option,
@@ -36,12 +36,12 @@ from .common import (
     print_error,
     print_written,
     quantity,
+    report_errors,
     say,
     set_option,
     show_table,
     tolerance_option,
-    unknown,
-    visible,
+    unknown_name_error,
 )
 
 #: A value below this share of the largest value in the same unit is rounding, and printed as zero.
@@ -79,7 +79,7 @@ class Given(TypedDict):
 @tolerance_option(help="Tolerance of the solver; 1e-9 by default.")
 @out_option(help="Folder for CSV and plot.")
 @plot_option
-@handled
+@report_errors
 def run(
     case: str | None,
     published: str | None,
@@ -158,12 +158,12 @@ def run(
 
 def _bare_speeds(file: str | None, settings: Sequence[str], case: Any) -> list[str]:
     """Return a note for each speed given as a number without unit, which asks whether rpm was meant instead of rad/s."""
-    from ..files import flattened, read_tables
+    from ..files import flatten, read_tables
     from ..mechanisms import mechanism_of
     from ..run import case_inputs
 
     given = {
-        **flattened(read_tables(file) if file else {}),
+        **flatten(read_tables(file) if file else {}),
         **changes(settings, number_or_text, "drive.speed='420 rpm'"),
     }
     speeds = [name for name, acting in case_inputs(mechanism_of(case.parameters)).items() if acting.unit == "rad/s"]
@@ -234,7 +234,7 @@ def _with_magnitudes(result: Any) -> Iterator[tuple[str, Any, str]]:
 )
 @tolerance_option(default=1e-6, help="Largest relative difference that passes.")
 @out_option()
-@handled
+@report_errors
 def check(
     cases: Sequence[str],
     fmu: str | None,
@@ -306,7 +306,7 @@ def _find_fmus(model: str, fmu: str | None, only: str | None) -> list[tuple[Path
     from ..run import CHECKED, list_interfaces
 
     if only is not None and only not in CHECKED:
-        raise unknown(only, CHECKED, f"interface {only!r} to check")
+        raise unknown_name_error(only, CHECKED, f"interface {only!r} to check")
     kinds = sorted(DEFAULT_FOLDER.glob(f"{model}-*.fmu")) if fmu is None else []
     first = DEFAULT_FOLDER / f"{model}.fmu" if fmu is None else Path(fmu)
     paths = [path for path in (first, *kinds) if path.is_file()] or [first]
@@ -341,7 +341,7 @@ def _find_cases(names: Sequence[str], fmu: str | None, everything: bool) -> list
         elif Path(name).suffix in (".toml", ".json"):
             chosen.append((Path(name).stem, load_case(name)))
         else:
-            raise unknown(name, CASES, f"standard case or case file {name!r}")
+            raise unknown_name_error(name, CASES, f"standard case or case file {name!r}")
     return chosen
 
 
@@ -398,7 +398,7 @@ def _print_comparison(title: str, comparison: Any) -> None:
 
 @click.command()
 @click.argument("what", required=False)
-@handled
+@report_errors
 def info(what: str | None) -> None:
     """Describe all mechanisms and published sets, or one of them, a parameter file, a case file or an FMU.
 
@@ -436,7 +436,9 @@ def info(what: str | None) -> None:
             _print_parameters(case.title, case.parameters)
             say(describe_masses(case.masses)[0])
     else:
-        raise unknown(what, (*MECHANISMS, *PUBLISHED), f"mechanism, published set, case file or FMU {what!r}")
+        raise unknown_name_error(
+            what, (*MECHANISMS, *PUBLISHED), f"mechanism, published set, case file or FMU {what!r}"
+        )
 
 
 def _print_mechanism(mechanism: Any) -> None:
@@ -503,7 +505,7 @@ def _print_fmu(path: Path) -> None:
         words=("variable", "causality", "unit", "description"),
     )
     problems = validate_fmu(str(path))
-    console.print(visible("; ".join(problems) or "valid"), style="red" if problems else "green", markup=False)
+    console.print(escape_controls("; ".join(problems) or "valid"), style="red" if problems else "green", markup=False)
     if problems:
         sys.exit(CHECK_FAILED)
 
@@ -513,7 +515,7 @@ def _print_fmu(path: Path) -> None:
 @out_option("out/figures", help="Folder.")
 @set_option("rod.length='45 in'; bare numbers are in SI. The verdicts are then on the changed mechanism")
 @click.option("--list", "listing", is_flag=True, help="Only list the figures, with what each is about.")
-@handled
+@report_errors
 def figures(numbers: Sequence[str], out: str, settings: Sequence[str], listing: bool) -> None:
     """Make the theses' figures, a picture and an animation of the linkage: plots, CSV, and each statement with its verdict.
     NUMBERS are such as 3.2 (Youssef) or R5 (Rahman's figure 5); all figures by default.
@@ -545,7 +547,7 @@ def figures(numbers: Sequence[str], out: str, settings: Sequence[str], listing: 
         raise click.UsageError("name the figures whose mechanism --set changes, such as linkwork figures R5 --set ...")
     for number in numbers:
         if number not in STUDIES:
-            raise unknown(number, STUDIES, f"figure {number}")
+            raise unknown_name_error(number, STUDIES, f"figure {number}")
     for number in numbers or STUDIES:
         with console.status(f"figure {number}"):
             result, paths = make(number, Path(out), values)

@@ -39,15 +39,15 @@ def report_sensitivity(response: Any, factor: float, unit: str, path: str) -> li
     ]
     what, size, length = swing_unit(response.branches[0].orbits[0])
     rows, shown = [], []
-    for word, point in _points(response):
+    for word, point in _response_points(response):
         try:
             found = special_gradient(family, point, names)
         except LinkworkError as error:
             print_error(f"note: the {word} at {family.format_value(point.parameter)} has no gradient: {error}")
             continue
         place, amplitude = found.place, found.amplitude
-        rows.append([factor * place.value, size * amplitude.value, *_shares(place), *_shares(amplitude)])
-        shown.append((word, f"{rows[-1][0]:.2f}", _named(place), f"{rows[-1][1]:.3f}", _named(amplitude)))
+        rows.append([factor * place.value, size * amplitude.value, *_elasticities(place), *_elasticities(amplitude)])
+        shown.append((word, f"{rows[-1][0]:.2f}", _movers_text(place), f"{rows[-1][1]:.3f}", _movers_text(amplitude)))
     if not rows:
         console.print("no special point of which one could say what moves it", highlight=False)
         return []
@@ -59,16 +59,16 @@ def report_sensitivity(response: Any, factor: float, unit: str, path: str) -> li
     return [write_csv(path, dict(zip(headings, np.array(rows).T)))]
 
 
-def _points(response: Any) -> Iterator[tuple[str, Any]]:
+def _response_points(response: Any) -> Iterator[tuple[str, Any]]:
     extrema = [("maximum", e) for e in response.maxima()] + [("minimum", e) for e in response.minima()]
     special = [(s.kind.value, s) for branch in response.branches for s in branch.special]
     yield from sorted(extrema + special, key=lambda entry: entry[1].parameter)
 
 
-def _shares(gradient: Any) -> list[float]:
+def _elasticities(gradient: Any) -> list[float]:
     return list(gradient.elasticities.values())
 
 
-def _named(gradient: Any) -> str:
+def _movers_text(gradient: Any) -> str:
     shares = gradient.elasticities
     return "\n".join(f"{name} {shares[name]:+.3g}" for name in gradient.movers(_NAMED))

@@ -18,11 +18,11 @@ from .common import (
     SLIDER_MOTION,
     check_kind,
     console,
-    report_errors,
     output_folder,
-    save_plot,
     print_error,
     print_written,
+    report_errors,
+    save_plot,
     set_option,
     show_table,
 )

@@ -21,9 +21,9 @@ from .common import (
     check_kind,
     check_place,
     force_option,
-    handled,
     number_or_text,
     print_error,
+    report_errors,
     say,
     set_option,
 )
@@ -46,7 +46,7 @@ _SCREENS = ("DISPLAY", "WAYLAND_DISPLAY", "BROWSER")
 )
 @set_option("slider.stiffness='2e6 dyn/cm' or drive.speed='300 rpm'; bare numbers are in SI")
 @force_option
-@handled
+@report_errors
 def studio(what: str | None, out: str | None, browser: bool, port: int, settings: Sequence[str]) -> None:
     """Open the page on which a mechanism moves and can be dragged.
 

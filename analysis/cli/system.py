@@ -10,13 +10,13 @@ import click
 from . import Commands
 from .common import (
     ENDED_EARLY,
-    handled,
     out_option,
     output_folder,
     plot_option,
-    plotted,
     print_error,
     quantity,
+    report_errors,
+    save_plot,
     say,
     show_table,
 )
@@ -63,7 +63,7 @@ def _wiring(file: str, fmi: str = "2") -> Wiring:
 @system.command()
 @click.argument("name", required=False)
 @click.argument("file", required=False, type=click.Path(dir_okay=False))
-@handled
+@report_errors
 def new(name: str | None, file: str | None) -> None:
     """Write the description of the example system NAME; without NAME list the example systems."""
     from ..files import read_tables, unknown_name, write_text
@@ -88,7 +88,7 @@ def new(name: str | None, file: str | None) -> None:
 @_FILE
 @_FMI
 @out_option(help="Folder for the archive.")
-@handled
+@report_errors
 def build(file: str, fmi: str, out: str) -> None:
     """Build the FMUs of a system and write it as an SSP 1.0 archive; with --fmi 3 as SSP 2.0."""
     from ..systems import write_ssp
@@ -114,7 +114,7 @@ def build(file: str, fmi: str, out: str) -> None:
 @_FMI
 @out_option()
 @plot_option
-@handled
+@report_errors
 def run(
     file: str,
     step: str | None,
@@ -157,7 +157,7 @@ def run(
     folder, stem = output_folder(out), Path(file).stem
     residuals = {f"power residual of {name}": power for name, power in found.powers.items()}
     say(f"wrote {write_csv(folder / f'{stem}.csv', {'time': found.time, **found.values, **residuals})}")
-    for path in plotted(plot, found, folder / f"{stem}.png"):
+    for path in save_plot(plot, found, folder / f"{stem}.png"):
         say(f"wrote {path}")
     if found.status:
         print_error(found.message)
@@ -172,7 +172,7 @@ def run(
 )
 @out_option(help="Folder for the plot.")
 @plot_option
-@handled
+@report_errors
 def check(file: str, stop: str | None, decades: int, out: str, plot: bool) -> None:
     """Check the wiring of a system; for a description also measure the error of each coupling over the communication step.
 
@@ -213,24 +213,24 @@ def check(file: str, stop: str | None, decades: int, out: str, plot: bool) -> No
                    ("step [ms]", *found.powers), rows)  # fmt: skip
     for when, message in found.messages.items():
         print_error(f"note: {when}: {message}")
-    for path in plotted(plot, found, output_folder(out) / f"{Path(file).stem}-check.png"):
+    for path in save_plot(plot, found, output_folder(out) / f"{Path(file).stem}-check.png"):
         say(f"wrote {path}")
 
 
 @system.command()
 @_FILE
 @out_option(help="Folder for the picture.")
-@handled
+@report_errors
 def draw(file: str, out: str) -> None:
     """Draw the parts of a system and their connections."""
-    for path in plotted(True, _wiring(file), output_folder(out) / f"{Path(file).stem}-diagram.png"):
+    for path in save_plot(True, _wiring(file), output_folder(out) / f"{Path(file).stem}-diagram.png"):
         say(f"wrote {path}")
 
 
 @system.command()
 @_FILE
 @out_option(help="Folder in which the host's folder is made.")
-@handled
+@report_errors
 def host(file: str, out: str) -> None:
     """Build a system as one C program for real-time targets, without heap or Python, with step times and missed deadlines."""
     from ..systems import build_host

@@ -14,13 +14,13 @@ from .common import (
     TUNING,
     check_kind,
     console,
-    handled,
     out_option,
     output_folder,
     plot_option,
-    plotted,
     print_error,
     print_written,
+    report_errors,
+    save_plot,
     say,
     set_option,
     show_table,
@@ -34,7 +34,7 @@ from .design import read_settings
 @click.option("--json", "as_json", is_flag=True, help="Print the result as JSON instead of tables.")
 @plot_option
 @out_option()
-@handled
+@report_errors
 def tune(case: str, settings: Sequence[str], as_json: bool, plot: bool, out: str) -> None:
     """Find the least change of parameters of a CASE file (TOML or JSON) that gives a range of speeds the properties in [tune].
 
@@ -69,7 +69,7 @@ def tune(case: str, settings: Sequence[str], as_json: bool, plot: bool, out: str
         write_tables(f"{stem}.toml", chosen.tuned_tables(tuned, folder)),
         write_tables(f"{stem}.json", tables),
     ]
-    written += plotted(plot, tuned, f"{stem}.png", title=chosen.title)
+    written += save_plot(plot, tuned, f"{stem}.png", title=chosen.title)
     if not as_json:
         print_written(written)
     for sentence in tuned.missed:

@@ -6,14 +6,14 @@ import sys
 
 import click
 
-from .common import CHECK_FAILED, console, handled, print_error, show_table, tolerance_option
+from .common import CHECK_FAILED, console, print_error, report_errors, show_table, tolerance_option
 
 
 @click.command()
 @click.argument("fmu", type=click.Path(exists=True, dir_okay=False))
 @tolerance_option(help="Greatest relative difference; by default that of the FMU, or 100 times the solver's tolerance.")
 @click.option("--rebuild", is_flag=True, help="Compile an FMU of Linkwork again from its own sources, and compare.")
-@handled
+@report_errors
 def verify(fmu: str, tolerance: float | None, rebuild: bool) -> None:
     """Run the experiments that an FMU of any make contains (FMI-LS-REF), and compare with its reference results.
 

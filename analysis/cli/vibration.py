@@ -26,7 +26,7 @@ from .common import (
     show_table,
     workers_options,
 )
-from .driven import Chosen, about_a_case, swing_unit
+from .driven import Chosen, add_case_options, swing_unit
 from .sensitivity import report_sensitivity
 
 #: Default range of speeds relative to the natural frequency; it contains 2, near which parametric resonance begins.
@@ -47,7 +47,7 @@ def _require_range(parameters: Any, low: float, high: float, name: str, first: s
 
 
 @click.command()
-@about_a_case
+@add_case_options
 @click.option(
     "--vary",
     metavar="NAME",
@@ -294,7 +294,7 @@ def _print_ranges_to_avoid(response: Any, factor: float, unit: str) -> None:
 
 
 @click.command()
-@about_a_case
+@add_case_options
 @click.option("--x", "x", metavar="NAME", help="Parameter along x, by its FMI name; by default the crank speed.")
 @click.option("--x-range", nargs=2, metavar="FROM TO", help="Range of x, such as '100 rpm' '1500 rpm'.")
 @click.option(

@@ -1,14 +1,14 @@
 """Build FMUs of the mechanisms."""
 
 from .archive import SOURCES, BuildError, run_trial
-from .builds import Built, build_all, kinds_here
+from .builds import BuiltFmu, build_all, kinds_here
 from .compatibility import publish
 from .description import KINDS, NATIVE, NATIVE_FMI3, PYTHON, Kind
 from .interface import Entry, interface, with_starts
 from .native_fmu import PLATFORMS, WASM, build_native, compile_library, source_files, this_platform
 from .python_fmu import build, build_controller
-from .rebuild import Compared, rebuild
-from .web import build_web, crank_number
+from .rebuild import Comparison, rebuild
+from .web import build_web, crank_index
 
 __all__ = [
     "KINDS",
@@ -19,8 +19,8 @@ __all__ = [
     "SOURCES",
     "WASM",
     "BuildError",
-    "Built",
-    "Compared",
+    "BuiltFmu",
+    "Comparison",
     "Entry",
     "Kind",
     "build",
@@ -29,7 +29,7 @@ __all__ = [
     "build_native",
     "build_web",
     "compile_library",
-    "crank_number",
+    "crank_index",
     "interface",
     "kinds_here",
     "publish",

@@ -38,7 +38,7 @@ CAPTION = (
 )
 
 
-def measured(case: Case, tolerance: float) -> tuple[float, dict[str, float]]:
+def measure_work_and_errors(case: Case, tolerance: float) -> tuple[float, dict[str, float]]:
     """Return evaluations of the equations per simulated second, and the largest relative error of each kind of output.
 
     The reference is a run at the tightest tolerance. Residuals are left out.
@@ -63,25 +63,27 @@ def measured(case: Case, tolerance: float) -> tuple[float, dict[str, float]]:
 def rows(mechanism: Mechanism) -> Iterator[list[float]]:
     """Yield a row of the table for each tolerance: the tolerance, then the largest work and errors of all standard cases."""
     for tolerance in TOLERANCES:
-        cases = [measured(case, tolerance) for case in standard_cases(mechanism).values()]
+        cases = [measure_work_and_errors(case, tolerance) for case in standard_cases(mechanism).values()]
         worst = np.max([[work, *errors.values()] for work, errors in cases], axis=0)
         yield [tolerance, *(float(f"{value:.2g}") for value in worst)]
 
 
-def known(mechanism: Mechanism) -> list[list[float]]:
+def stored_rows(mechanism: Mechanism) -> list[list[float]]:
     """Return the rows of a mechanism in `DATA`; an empty list if the mechanism is not there."""
     found: list[list[float]] = json.loads(DATA.read_text(encoding="utf-8")).get(mechanism.name, [])
     return found
 
 
-def texts(row: list[float]) -> list[str]:
+def format_row(row: list[float]) -> list[str]:
     """Return the numbers of a row as they are printed."""
     return [f"{row[0]:.0e}", f"{row[1]:.0f}", *(f"{value:.1e}" for value in row[2:])]
 
 
 def to_html(mechanism: Mechanism) -> str:
     """Return the table for the page of an FMU; an empty text for a mechanism without data."""
-    body = ["<tr>" + "".join(f"<td>{cell}</td>" for cell in texts(row)) + "</tr>" for row in known(mechanism)]
+    body = [
+        "<tr>" + "".join(f"<td>{cell}</td>" for cell in format_row(row)) + "</tr>" for row in stored_rows(mechanism)
+    ]
     if not body:
         return ""
     head = "".join(f"<th>{html.escape(heading)}</th>" for heading in HEADINGS)

@@ -18,7 +18,7 @@ TYPE = "application/vnd.cyclonedx+json"
 _MAKERS = {"python": ("pythonfmu", "fmpy"), "native": ("casadi", "ziglang", "fmpy")}
 
 
-def with_bill(name: str, entries: Mapping[str, bytes], *, native: bool, fmi: int) -> dict[str, bytes]:
+def add_bill(name: str, entries: Mapping[str, bytes], *, native: bool, fmi: int) -> dict[str, bytes]:
     """Return the files of an FMU with their bill of materials.
 
     Parameters

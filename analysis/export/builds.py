@@ -19,7 +19,7 @@ from .python_fmu import build
 ALL = "all"
 
 
-class Built(NamedTuple):
+class BuiltFmu(NamedTuple):
     """An FMU that was built: its path, and the platforms of its native libraries."""
 
     path: Path
@@ -39,7 +39,7 @@ def build_all(
     platforms: Sequence[str] = (),
     *,
     publish_to: Path | str | None = None,
-) -> Iterator[Built]:
+) -> Iterator[BuiltFmu]:
     """Build FMUs one after the other; validate each, and try it out if it can run on this platform.
 
     Parameters
@@ -92,4 +92,4 @@ def build_all(
                 run_trial(made)
                 if publish_to is not None:
                     publish(known[name], kind, made, publish_to)
-            yield Built(made, () if python else native)
+            yield BuiltFmu(made, () if python else native)

@@ -17,7 +17,7 @@ import linkwork
 from linkwork.mechanism import Mechanism
 
 from .archive import run_trial
-from .description import NATIVE_FMI3, PYTHON, Kind, started
+from .description import NATIVE_FMI3, PYTHON, Kind, start_plant
 
 #: Importers in which the tests of Linkwork run the FMUs, by package: the kinds of FMU and the interfaces.
 IMPORTERS = {
@@ -45,19 +45,19 @@ def publish(mechanism: Mechanism, kind: Kind, fmu: Path, folder: Path | str) -> 
     """
     place = Path(folder) / fmu.stem
     place.mkdir(parents=True, exist_ok=True)
-    names, rows = reference(mechanism)
+    names, rows = reference_results(mechanism)
     start, stop, step, _ = mechanism.experiment
     starts = {v.name: float(v.start) for v in mechanism.variables if v.name in mechanism.input_names}
     inputs = [starts[name] for name in mechanism.input_names]
     shutil.copy2(fmu, place)
     written = {
-        "_in.csv": table(["time", *mechanism.input_names], [[start, *inputs], [stop, *inputs]]),
-        "_ref.csv": table(names, rows),
-        "_ref.opt": options(mechanism),
+        "_in.csv": format_csv(["time", *mechanism.input_names], [[start, *inputs], [stop, *inputs]]),
+        "_ref.csv": format_csv(names, rows),
+        "_ref.opt": format_options(mechanism),
     }
     for suffix, text in written.items():
         (place / f"{fmu.stem}{suffix}").write_text(text, encoding="utf-8")
-    (place / "Readme.txt").write_text(readme(mechanism, kind), encoding="utf-8")
+    (place / "Readme.txt").write_text(write_readme(mechanism, kind), encoding="utf-8")
     run_trial(place / fmu.name, _COMPARISON, *map(str, (start, stop, step, RELATIVE, ABSOLUTE)))
     return place
 
@@ -80,13 +80,13 @@ for place, name in enumerate(names):
 """
 
 
-def reference(mechanism: Mechanism) -> tuple[list[str], list[list[float]]]:
+def reference_results(mechanism: Mechanism) -> tuple[list[str], list[list[float]]]:
     """Run the default experiment with the plant in Python; return names and, for each step, time and the main outputs."""
     start, stop, step, _ = mechanism.experiment
     first = [name for freedom in mechanism.freedoms for name in (freedom.coordinate, freedom.rate)]
     names = list(dict.fromkeys([*first, *mechanism.output_names]))[: VARIABLES - 1]
     places = [mechanism.output_names.index(name) for name in names]
-    plant = started(mechanism)
+    plant = start_plant(mechanism)
     count = int((stop - start) / step * (1.0 + 1e-12))
     times = [start + n * step for n in range(count + 1)]
     # as in FMPy, the last step may be shorter
@@ -101,7 +101,7 @@ def reference(mechanism: Mechanism) -> tuple[list[str], list[list[float]]]:
     return ["time", *names], rows
 
 
-def table(names: Sequence[str], rows: Sequence[Sequence[float]]) -> str:
+def format_csv(names: Sequence[str], rows: Sequence[Sequence[float]]) -> str:
     """Return comma-separated values in the form of fmi-standard.org: names in quotes, numbers as in C."""
     text = io.StringIO()
     csv.writer(text, quoting=csv.QUOTE_ALL, lineterminator="\n").writerow(names)
@@ -109,7 +109,7 @@ def table(names: Sequence[str], rows: Sequence[Sequence[float]]) -> str:
     return text.getvalue()
 
 
-def options(mechanism: Mechanism) -> str:
+def format_options(mechanism: Mechanism) -> str:
     """Return the options of the reference and the tolerance for an importer."""
     start, stop, step, _ = mechanism.experiment
     values: Mapping[str, float | str] = {
@@ -124,7 +124,7 @@ def options(mechanism: Mechanism) -> str:
     return "".join(f"{name}, {value}\n" for name, value in values.items())
 
 
-def readme(mechanism: Mechanism, kind: Kind) -> str:
+def write_readme(mechanism: Mechanism, kind: Kind) -> str:
     """Return a text on the FMU, the parts of FMI that it tests, and its importers."""
     features = {
         2: "saved and serialised states, directional derivatives, derivatives of inputs and outputs over time, a state event",

@@ -12,7 +12,7 @@ from collections.abc import Iterator
 from functools import lru_cache
 
 from ..libraries import require
-from .description import layered_standard, written
+from .description import layered_standard, to_xml_bytes
 
 #: The layered standard, and its manifest.
 STANDARD = "org.modelica.fmi-ls-wasm"
@@ -138,7 +138,7 @@ def component(module: bytes) -> bytes:
 def manifest() -> bytes:
     """Return the manifest of the layered standard."""
     text = "FMI Layered Standard for WebAssembly"
-    return written(layered_standard("fmiLayeredStandardManifest", STANDARD, "0.1.0", text))
+    return to_xml_bytes(layered_standard("fmiLayeredStandardManifest", STANDARD, "0.1.0", text))
 
 
 def _length(data: bytes, place: int) -> tuple[int, int]:
@@ -184,44 +184,44 @@ class _Types:
     def __init__(self, lines: list[str], known: dict[str, str] | None = None) -> None:
         self.lines, self.known = lines, dict(known or {})
 
-    def of(self, text: str) -> str:
+    def define(self, text: str) -> str:
         """Return the name of a type in this scope; define the type first if it is not known."""
         if text in _PRIMITIVE:
             return text
         if text not in self.known:
-            definition = self._defined(text)
+            definition = self._definition(text)
             self.known[text] = f"$t{len(self.lines)}"
             self.lines.append(f"(type {self.known[text]} {definition})")
         return self.known[text]
 
-    def named(self, text: str) -> str:
+    def define_named(self, text: str) -> str:
         """Return the name of a type; a primitive type is given a name, too."""
         if text in _PRIMITIVE:
             self.lines.append(f"(type $t{len(self.lines)} {text})")
             return f"$t{len(self.lines) - 1}"
-        return self.of(text)
+        return self.define(text)
 
-    def _defined(self, text: str) -> str:
+    def _definition(self, text: str) -> str:
         found = re.fullmatch(r"([a-z]+)<(.*)>", text)
         assert found, text
         kind, parts = found[1], _split(found[2])
         if kind == "enum":
-            return f"(enum {' '.join(map(_quoted, parts))})"
+            return f"(enum {' '.join(map(_quote, parts))})"
         if kind == "record":
             fields = (part.partition(":") for part in parts)
-            return f"(record {' '.join(f'(field {_quoted(name)} {self.of(of)})' for name, _, of in fields)})"
+            return f"(record {' '.join(f'(field {_quote(name)} {self.define(of)})' for name, _, of in fields)})"
         if kind == "result":
-            return f"(result {self.of(parts[0])} (error {self.of(parts[1])}))"
-        return f"({kind} {' '.join(map(self.of, parts))})"
+            return f"(result {self.define(parts[0])} (error {self.define(parts[1])}))"
+        return f"({kind} {' '.join(map(self.define, parts))})"
 
     def function(self, parameters: str, result: str) -> str:
         """Return the parameters and the result of a function in the text format."""
         pairs = [part.partition(":") for part in _split(parameters)]
-        given = " ".join(f"(param {_quoted(name)} {self.of(of)})" for name, _, of in pairs)
-        return f"{given} (result {self.of(result)})" if result else given
+        given = " ".join(f"(param {_quote(name)} {self.define(of)})" for name, _, of in pairs)
+        return f"{given} (result {self.define(result)})" if result else given
 
 
-def _quoted(name: str) -> str:
+def _quote(name: str) -> str:
     return f'"{name}"'
 
 
@@ -244,26 +244,26 @@ def _outer_lines() -> list[str]:
     shared: list[str] = []
     types = _Types(shared)
     for name, of in _TYPES.items():
-        shared.append(f"(export {_quoted(name)} (type ${name} (eq {types.named(of)})))")
+        shared.append(f"(export {_quote(name)} (type ${name} (eq {types.define_named(of)})))")
         types.known[name] = f"${name}"
     log = "instance-name:string,status:status,category:string,message:string"
     lines = [
         f"(type $shared (instance {' '.join(shared)}))",
         f"(import {_interface('types')} (instance $types (type $shared)))",
-        *(f"(alias export $types {_quoted(name)} (type ${name}))" for name in _TYPES),
-        f"(type $heard (instance (alias outer 1 $status (type $s)) (export {_quoted('status')} (type $status (eq $s)))",
-        f" (export {_quoted('log-message')} (func {_Types([], {'status': '$status'}).function(log, '')}))))",
+        *(f"(alias export $types {_quote(name)} (type ${name}))" for name in _TYPES),
+        f"(type $heard (instance (alias outer 1 $status (type $s)) (export {_quote('status')} (type $status (eq $s)))",
+        f" (export {_quote('log-message')} (func {_Types([], {'status': '$status'}).function(log, '')}))))",
         f"(import {_interface('callbacks')} (instance $callbacks (type $heard)))",
         f'(core module $memory (memory (export "memory") {PAGES}))',
         "(core module $fmu)",
         "(core instance $memory (instantiate $memory))",
         '(alias core export $memory "memory" (core memory $space))',
-        f"(alias export $callbacks {_quoted('log-message')} (func $log))",
+        f"(alias export $callbacks {_quote('log-message')} (func $log))",
         "(core func $lowered (canon lower (func $log) (memory $space) string-encoding=utf8))",
-        f"(core instance $host (export {_quoted('log-message')} (func $lowered)))",
+        f"(core instance $host (export {_quote('log-message')} (func $lowered)))",
         '(core instance $fmu (instantiate $fmu (with "env" (instance $memory)) (with "callbacks" (instance $host))))',
         *(
-            f"(alias core export $fmu {_quoted(name)} (core func ${name}))"
+            f"(alias core export $fmu {_quote(name)} (core func ${name}))"
             for name in ("cabi_realloc", "forget", "drop")
         ),
     ]
@@ -282,19 +282,19 @@ def _outer_lines() -> list[str]:
     ]
     for interface, (own, _, _) in _INTERFACES.items():
         for name, of in own.items():
-            known.known[name] = known.of(of)
+            known.known[name] = known.define(of)
         given = []
         for c_name, name, parameters, result in _methods(interface):
             core, lifted = f"$core-{interface}-{c_name}", f"${interface}-{c_name}"
             made = f"$make-{interface}" if name.startswith("[static]") else "$fmu"
             signature = known.function(parameters, result)
             lines += [
-                f"(alias core export {made} {_quoted(c_name)} (core func {core}))",
+                f"(alias core export {made} {_quote(c_name)} (core func {core}))",
                 f"(func {lifted} {signature} (canon lift (core func {core}) {how}))",
             ]
-            given.append(f"(with {_quoted(c_name)} (func {lifted}))")
+            given.append(f"(with {_quote(c_name)} (func {lifted}))")
         given += [
-            f"(with {_quoted(f'type-{name}')} (type {known.of(name)}))"
+            f"(with {_quote(f'type-{name}')} (type {known.define(name)}))"
             for name in (*_TYPES, *own, f"{interface}-instance")
         ]
         lines += [
@@ -316,12 +316,12 @@ def _resource(interface: str) -> list[str]:
     return [
         f"(type {resource} (resource (rep i32) (dtor (core func $drop))))",
         f"(core func $new-{interface} (canon resource.new {resource}))",
-        f"(alias core export $fmu {_quoted(making)} (core func $raw-{interface}))",
+        f"(alias core export $fmu {_quote(making)} (core func $raw-{interface}))",
         f'(core instance $parts-{interface} (export "raw" (func $raw-{interface})) (export "new" (func $new-{interface}))',
         ' (export "memory" (memory $space)))',
         f'(core module $maker-{interface} (import "" "memory" (memory 1))',
         f' (import "" "raw" (func $raw (param {numbers}) (result i32))) (import "" "new" (func $new (param i32) (result i32)))',
-        f" (func (export {_quoted(making)}) (param {numbers}) (result i32) (local i32)",
+        f" (func (export {_quote(making)}) (param {numbers}) (result i32) (local i32)",
         f" (local.set {count} (call $raw {passed}))",
         f" (if (i32.load8_u {area}) (then (i32.store offset=4 {area} (call $new (i32.load offset=4 {area}))))) {area}))",
         f'(core instance $make-{interface} (instantiate $maker-{interface} (with "" (instance $parts-{interface}))))',
@@ -334,18 +334,18 @@ def _inner_lines(interface: str) -> list[str]:
     lines: list[str] = []
     outer, inner = _Types(lines), _Types(lines)
     for name, of in (_TYPES | own).items():
-        lines.append(f"(import {_quoted(f'type-{name}')} (type $in-{name} (eq {outer.named(of)})))")
+        lines.append(f"(import {_quote(f'type-{name}')} (type $in-{name} (eq {outer.define_named(of)})))")
         outer.known[name] = f"$in-{name}"
-    lines.append(f"(import {_quoted(f'type-{resource}')} (type $in-{resource} (sub resource)))")
+    lines.append(f"(import {_quote(f'type-{resource}')} (type $in-{resource} (sub resource)))")
     outer.known[resource] = f"$in-{resource}"
     functions = list(_methods(interface))
     for c_name, _, parameters, result in functions:
         signature = outer.function(parameters, result)
-        lines.append(f"(import {_quoted(c_name)} (func $in-{c_name} {signature}))")
+        lines.append(f"(import {_quote(c_name)} (func $in-{c_name} {signature}))")
     for name in (*_TYPES, *own, resource):
-        lines.append(f"(export $out-{name} {_quoted(name)} (type $in-{name}))")
+        lines.append(f"(export $out-{name} {_quote(name)} (type $in-{name}))")
         inner.known[name] = f"$out-{name}"
     for c_name, name, parameters, result in functions:
         signature = inner.function(parameters, result)
-        lines.append(f"(export {_quoted(name)} (func $in-{c_name}) (func {signature}))")
+        lines.append(f"(export {_quote(name)} (func $in-{c_name}) (func {signature}))")
     return [f"(component $shim-{interface}", *lines, ")"]

@@ -164,11 +164,11 @@ class Controller(Fmi2Slave):  # type: ignore[misc]
         if self.phase not in phases:
             self._refuse(f"{call} out of order: the controller is {self.phase}, not {' or '.join(phases)}")
 
-    def _valid(self, name: str, value: float) -> bool:
+    def _is_valid(self, name: str, value: float) -> bool:
         return isfinite(value) and RULES[self.parameters[name].rule][1](value)
 
     def _check(self, name: str, value: float) -> None:
-        if not self._valid(name, value):
+        if not self._is_valid(name, value):
             self._refuse(f"parameter {name} is {value}: it must {RULES[self.parameters[name].rule][0]}")
 
     def _refuse(self, sentence: str) -> NoReturn:
@@ -179,7 +179,7 @@ class Controller(Fmi2Slave):  # type: ignore[misc]
 
     def preview(self) -> None:
         """Set the outputs that a sample at the start would give, without changing the states."""
-        if not all(self._valid(name, getattr(self, name)) for name in self.parameters):
+        if not all(self._is_valid(name, getattr(self, name)) for name in self.parameters):
             return
         states = {row.name: getattr(self, row.name) for row in self.rows if row.causality == "local"}
         self.sample(0.0)
@@ -239,7 +239,7 @@ class Controller(Fmi2Slave):  # type: ignore[misc]
         raise NotImplementedError
 
 
-def _limited(value: float, limit: float) -> float:
+def _clamp(value: float, limit: float) -> float:
     return min(max(value, -limit), limit)
 
 
@@ -276,7 +276,7 @@ class Pid(Controller):
             change = self.derivative_gain * (self.error - before)
             self.derivative = (self.filter_time * self.derivative + change) / (self.filter_time + self.sample_time)
         wanted = self.gain * self.error + self.integral + self.derivative + self.feed_forward
-        self.force = _limited(wanted, self.limit)
+        self.force = _clamp(wanted, self.limit)
         back = (self.force - wanted) / self.tracking_time
         self.integral += self.sample_time * (self.integral_gain * self.error + back)
 
@@ -299,7 +299,7 @@ class StateFeedback(Controller):
     def sample(self, t: float) -> None:
         back = self.position_gain * (self.position - self.reference)
         back += self.velocity_gain * (self.velocity - self.reference_velocity)
-        self.force = _limited(self.feed_forward - back, self.limit)
+        self.force = _clamp(self.feed_forward - back, self.limit)
 
 
 #: Harmonics of a `MotionReference`.
@@ -328,11 +328,11 @@ class MotionReference(Controller):
     )
 
     def sample(self, t: float) -> None:
-        self.position, slope = self._at("motion")
+        self.position, slope = self._evaluate_series("motion")
         self.velocity = slope * self.speed
-        self.force, _ = self._at("load")
+        self.force, _ = self._evaluate_series("load")
 
-    def _at(self, name: str) -> tuple[float, float]:
+    def _evaluate_series(self, name: str) -> tuple[float, float]:
         value, slope = getattr(self, f"{name}_0"), 0.0
         for n in range(1, HARMONICS + 1):
             a, b, angle = getattr(self, f"{name}_cos_{n}"), getattr(self, f"{name}_sin_{n}"), n * self.angle
@@ -400,9 +400,9 @@ class DcServo(Controller):
             end = (self.voltage - induced) / self.resistance
             left = exp(-self.sample_time * self.resistance / self.inductance)
             self.current = end + (self.current - end) * left
-        wanted = _limited(self.torque_reference / self.torque_constant, self.current_limit)
+        wanted = _clamp(self.torque_reference / self.torque_constant, self.current_limit)
         voltage = self.resistance * wanted + induced + self.current_gain * (wanted - self.current)
-        self.voltage = _limited(voltage, self.voltage_limit)
+        self.voltage = _clamp(voltage, self.voltage_limit)
         self.torque = self.torque_constant * self.current
         count = 2.0 * pi / self.encoder_counts
         self.encoder_angle = count * floor(self.angle / count)

@@ -172,7 +172,7 @@ def description(mechanism: Mechanism, kind: Kind, sources: Sequence[str] = ()) -
     SubElement(root, "DefaultExperiment", dict(zip(names, map(repr, mechanism.experiment))))
     root.append(_variables(mechanism, kind, entries))
     root.append(_structure(mechanism, kind, entries))
-    return written(root)
+    return to_xml_bytes(root)
 
 
 def _entries(mechanism: Mechanism, kind: Kind) -> tuple[Entry, ...]:
@@ -195,7 +195,7 @@ def layered_standard(tag: str, name: str, version: str, text: str) -> Element:
     return Element(tag, space | {f"fmi-ls:fmi-ls-{key}": value for key, value in stated.items()})
 
 
-def written(root: Element) -> bytes:
+def to_xml_bytes(root: Element) -> bytes:
     """Return the content of an XML file with this root element."""
     indent(root, "\t")
     return f'<?xml version="1.0" encoding="UTF-8"?>\n{tostring(root, encoding="unicode")}\n'.encode()
@@ -224,10 +224,10 @@ _INITIAL = {"parameter": "exact", "output": "approx", "local": "calculated"}
 
 
 def _variables(mechanism: Mechanism, kind: Kind, entries: Iterable[Entry]) -> Element:
-    plant = started(mechanism)
+    plant = start_plant(mechanism)
     starts = dict(zip(mechanism.output_names, plant.outputs()))
     scale = dict(zip(states(mechanism), mechanism.error_scale(plant.parameters, plant.state))) if kind.native else {}
-    reinitialised = _reinitialised(mechanism) if kind.native else ()
+    reinitialised = _states_that_jump(mechanism) if kind.native else ()
     listed = Element("ModelVariables")
     for entry in entries:
         variable = entry.variable
@@ -242,7 +242,7 @@ def _variables(mechanism: Mechanism, kind: Kind, entries: Iterable[Entry]) -> El
             attributes["initial"] = _INITIAL[variable.causality]
         value = _value(variable, starts.get(variable.name, variable.start))
         if entry.derivative_of in scale:  # only for states: OMSimulator takes every other variable for one, too
-            value["derivative"] = _number(kind, entry.derivative_of)
+            value["derivative"] = _index_or_reference(kind, entry.derivative_of)
         nominal = scale.get(entry.reference, variable.nominal)
         if nominal is not None:
             value["nominal"] = repr(nominal)
@@ -288,7 +288,7 @@ def _value(variable: Variable, start: float | int | str) -> dict[str, str]:
     return value
 
 
-def started(mechanism: Mechanism) -> Plant:
+def start_plant(mechanism: Mechanism) -> Plant:
     """Return the plant of a mechanism at its start, with the start values of all parameters and inputs."""
     values = {v.name: v.start for v in mechanism.variables}
     return Plant.from_values(mechanism, values, time=mechanism.experiment[0])
@@ -297,7 +297,7 @@ def started(mechanism: Mechanism) -> Plant:
 # Structure
 
 
-def _number(kind: Kind, reference: int) -> str:
+def _index_or_reference(kind: Kind, reference: int) -> str:
     """Return the number by which the model structure names a variable: its index, in FMI 3.0 its value reference."""
     return str(reference + 1 if kind.fmi == 2 else reference)
 
@@ -305,7 +305,7 @@ def _number(kind: Kind, reference: int) -> str:
 def _structure(mechanism: Mechanism, kind: Kind, entries: Sequence[Entry]) -> Element:
     reference = {entry.variable.name: entry.reference for entry in entries}
     outputs = [entry.reference for entry in entries if entry.role == "output"]
-    depends = _on_inputs(mechanism)
+    depends = _declared_dependencies(mechanism)
     groups: list[tuple[str, Sequence[int]]] = [("Output", outputs)]
     initial = outputs
     if kind.native:
@@ -323,10 +323,10 @@ def _structure(mechanism: Mechanism, kind: Kind, entries: Sequence[Entry]) -> El
         parent = structure if kind.fmi == 3 else SubElement(structure, f"{group}s")
         for number in references:
             name = "valueReference" if kind.fmi == 3 else "index"
-            node = SubElement(parent, group if kind.fmi == 3 else "Unknown", {name: _number(kind, number)})
+            node = SubElement(parent, group if kind.fmi == 3 else "Unknown", {name: _index_or_reference(kind, number)})
             on = of[number]
             if on is not None:
-                node.set("dependencies", " ".join(_number(kind, known) for known in sorted(on)))
+                node.set("dependencies", " ".join(_index_or_reference(kind, known) for known in sorted(on)))
 
     for group, references in groups:
         add(group, references, depends)
@@ -336,7 +336,7 @@ def _structure(mechanism: Mechanism, kind: Kind, entries: Sequence[Entry]) -> El
     return structure
 
 
-def _on_inputs(mechanism: Mechanism) -> dict[int, References]:
+def _declared_dependencies(mechanism: Mechanism) -> dict[int, References]:
     """Return the inputs on which each output depends according to the table of variables, as value references."""
     reference = {entry.variable.name: entry.reference for entry in interface(mechanism)}
     inputs = {
@@ -374,7 +374,7 @@ def traced_dependencies(mechanism: Mechanism) -> dict[int, References]:
     return {unknown: frozenset(on) for unknown, on in found.items()}
 
 
-def _reinitialised(mechanism: Mechanism) -> tuple[int, ...]:
+def _states_that_jump(mechanism: Mechanism) -> tuple[int, ...]:
     """Return the value references of the states that a jump of a commanded rate changes."""
     casadi = symbolic.library()
     traced = expressions(mechanism)
@@ -392,4 +392,4 @@ def build_description(identifier: str, sources: Sequence[str]) -> bytes:
     files = SubElement(configuration, "SourceFileSet", {"language": "C11"})
     for source in sources:
         SubElement(files, "SourceFile", {"name": source})
-    return written(root)
+    return to_xml_bytes(root)

@@ -28,7 +28,7 @@ from .interface import Entry, interface, states
 TINY = 1e-300
 
 
-def generated(mechanism: Mechanism, kind: Kind) -> dict[str, str]:
+def generated_files(mechanism: Mechanism, kind: Kind) -> dict[str, str]:
     """Return the generated files by name: sizes.h, tables.c, tableau.h and equations.c."""
     return {
         "sizes.h": _sizes(mechanism, kind),
@@ -136,7 +136,7 @@ def _table(mechanism: Mechanism, switched: bool) -> dict[str, tuple[list[Any], l
     trace = equations.expressions(mechanism, switched)
     s = trace.symbols
     try:
-        own, state, p, x, scale, bounds = beginning(mechanism, s.modes, s.u)
+        own, state, p, x, scale, bounds = trace_start(mechanism, s.modes, s.u)
     except RuntimeError as error:
         raise LinkworkError(f"the start of {mechanism.name} cannot be traced: {_START}") from error
     dx, du, dp = (sx.sym(f"d{n}", *v.shape) for n, v in (("x", s.x), ("u", s.u), ("p", s.p)))
@@ -174,7 +174,7 @@ def _table(mechanism: Mechanism, switched: bool) -> dict[str, tuple[list[Any], l
         "solution": (run, [solution]),
         "values": ([*run, *beside_plain], plain[:2]),
         "clearance": (run, [trace.clearance]),
-        "apart": ([s.x, s.p], [_reach(mechanism, s.x, s.p)]),
+        "apart": ([s.x, s.p], [_unjoined_numbers(mechanism, s.x, s.p)]),
         "jump": (run, [trace.jump]),
         "jump_forward": ([*run, dx, du, dp], forward([trace.jump], at, change)),
         "jump_reverse": ([*run, *jump_weights], jump_gradient),
@@ -184,7 +184,7 @@ def _table(mechanism: Mechanism, switched: bool) -> dict[str, tuple[list[Any], l
     }
 
 
-def _reach(mechanism: Mechanism, x: Any, p: Any) -> Any:
+def _unjoined_numbers(mechanism: Mechanism, x: Any, p: Any) -> Any:
     """Return the numbers in the message that the links cannot be joined; a zero if there are none."""
     casadi = symbolic.library()
     if mechanism.unjoined is None or mechanism.unjoined.reach is None:
@@ -242,12 +242,12 @@ def _with_solution(
     functions = symbolic.symbolic_functions(mechanism.modules, mark_converged=mark_converged, **others)
     x = tuple(casadi.vertsplit(s.x))
 
-    def traced(what: str, *further: Any) -> Any:
+    def trace_function(what: str, *further: Any) -> Any:
         acting = functions.find(mechanism.equations.apply_inputs)(modes, channels, k)
         result = functions.find(getattr(mechanism.equations, what))(x, acting, *further, k)
         return casadi.densify(casadi.vertcat(*result) if isinstance(result, tuple) else casadi.SX(result))
 
-    values = [traced("outputs", energy), traced("derivative"), traced("clearance")]
+    values = [trace_function("outputs", energy), trace_function("derivative"), trace_function("clearance")]
     # what they have in common is differentiated once
     joined = casadi.cse(casadi.vertcat(*values))
     parts = casadi.vertsplit(joined, np.cumsum([0, *(value.numel() for value in values)]).tolist())
@@ -257,7 +257,7 @@ def _with_solution(
     return parts, symbols, expressions
 
 
-def beginning(mechanism: Mechanism, modes: Any, u: Any) -> tuple[Any, ...]:
+def trace_start(mechanism: Mechanism, modes: Any, u: Any) -> tuple[Any, ...]:
     """Trace the start of a run; return symbols of the parameters and of the given state, and four expressions of them.
 
     These are the constants followed by the start energy, the initial state, its error scale, and lower bounds of parameters.
@@ -342,14 +342,14 @@ def _sizes(mechanism: Mechanism, kind: Kind) -> str:
             *(f"#define {name} {_number(value)}" for name, value in constants.items()),
             f"#define ASSEMBLY {_text(limits.ASSEMBLY)}",
             f"#define JAMMING {_text(limits.JAMMING)}",
-            *_unjoined(mechanism),
+            *_unjoined_messages(mechanism),
             "#endif",
             "",
         ]
     )
 
 
-def _unjoined(mechanism: Mechanism) -> list[str]:
+def _unjoined_messages(mechanism: Mechanism) -> list[str]:
     """Return the C macros of the messages for links that cannot be joined, or hardly."""
     said = mechanism.unjoined or limits.UnjoinedMessages("the links cannot be joined", "", "")
     numbers = [f"(r)[{n}]" for n in range(said.apart.count("{"))]
@@ -411,7 +411,7 @@ def _row(mechanism: Mechanism, entry: Entry) -> str:
         _KINDS[v.kind],
         causality,
         _number(v.start) if causality != "COMPUTED" else "0.0",  # type: ignore[arg-type]
-        _place(mechanism, entry),
+        _c_index(mechanism, entry),
         int(v.tunable),
         rule,
         _number(low),
@@ -421,7 +421,7 @@ def _row(mechanism: Mechanism, entry: Entry) -> str:
     return "{" + ", ".join(map(str, cells)) + "}"
 
 
-def _place(mechanism: Mechanism, entry: Entry) -> str:
+def _c_index(mechanism: Mechanism, entry: Entry) -> str:
     """Return as C the row of a computed variable or the number of an input; -1 for any other variable."""
     if entry.role == "input":
         return str(mechanism.input_names.index(entry.variable.name))

@@ -20,8 +20,8 @@ from linkwork.plant import Plant
 from ..mechanisms import MECHANISMS
 from ..run import ALLOWED, EXPERIMENTS, MANIFEST, STANDARD, Case, input_sampler, standard_cases
 from .bill import BILL, TYPE
-from .compatibility import table
-from .description import layered_standard, written
+from .compatibility import format_csv
+from .description import layered_standard, to_xml_bytes
 
 #: Communication steps of an experiment, rows of its reference, and digits of its numbers.
 STEPS, ROWS, DIGITS = 100, 10, 12
@@ -57,9 +57,9 @@ def experiments(mechanism: Mechanism) -> dict[str, bytes]:
             SubElement(node, "Parameters", {"source": f"{name}.ssv"})
         constant = all(row[1:] == stimuli[0][1:] for row in stimuli)
         rows = [stimuli[0], stimuli[-1]] if constant else stimuli
-        files[f"{name}-in.csv"] = table(["time", *mechanism.input_names], rows).encode()
+        files[f"{name}-in.csv"] = format_csv(["time", *mechanism.input_names], rows).encode()
         results = [mechanism.output_names[place] for place in _result_places(mechanism)]
-        files[f"{name}-ref.csv"] = table(["time", *results], reference).encode()
+        files[f"{name}-ref.csv"] = format_csv(["time", *results], reference).encode()
         SubElement(node, "Stimuli", {"source": f"{name}-in.csv"})
         SubElement(node, "References", {"source": f"{name}-ref.csv"})
         notes = SubElement(node, "Annotations")
@@ -82,7 +82,7 @@ def experiments(mechanism: Mechanism) -> dict[str, bytes]:
         else:
             assert refused is not None
             raise refused
-    files[_EXPERIMENTS[0]] = written(root)
+    files[_EXPERIMENTS[0]] = to_xml_bytes(root)
     return {f"{EXPERIMENTS}/{name}": content for name, content in files.items()} | {MANIFEST: _manifest()}
 
 
@@ -93,7 +93,7 @@ def _manifest() -> bytes:
     bill = (f"../{BILL.partition('/')[2]}", TYPE, "meta-data", "Bill of materials")
     for source, kind, role, text in (own, bill):
         SubElement(root, "Related", {"type": kind, "source": source, "role": role, "description": text})
-    return written(root)
+    return to_xml_bytes(root)
 
 
 #: Function that returns the inputs of a step by name, from the number of the step and the outputs at its start.
@@ -120,10 +120,10 @@ def _reference(
     The results are those before the next inputs are set.
     """
 
-    def rounded(number: int, outputs: Sequence[float] | None) -> dict[str, float]:
+    def rounded_inputs(number: int, outputs: Sequence[float] | None) -> dict[str, float]:
         return {name: float(f"{value:.{DIGITS}g}") for name, value in inputs(number, outputs).items()}
 
-    first = rounded(0, None)
+    first = rounded_inputs(0, None)
     starts = {v.name: v.start for v in mechanism.variables}
     plant = Plant.from_values(mechanism, {**starts, **values, **first}, tolerance=REFERENCE, time=times[0])
     stimuli = [[times[0], *(first[name] for name in mechanism.input_names)]]
@@ -135,14 +135,14 @@ def _reference(
         outputs = list(plant.outputs())
         if n * ROWS % STEPS == 0:
             rows.append([time, *(outputs[place] for place in places)])
-        now = rounded(n, outputs)
+        now = rounded_inputs(n, outputs)
         stimuli.append([time, *(now[name] for name in mechanism.input_names)])
         for name, value in now.items():
             plant.set_input(name, value)
-    return stimuli, _rounded(mechanism, rows)
+    return stimuli, _round_results(mechanism, rows)
 
 
-def _rounded(mechanism: Mechanism, rows: list[list[float]]) -> list[list[float]]:
+def _round_results(mechanism: Mechanism, rows: list[list[float]]) -> list[list[float]]:
     """Round results to `DIGITS` digits of the largest value of their unit, so that another C library gives the same texts."""
     units = [v.unit for v in mechanism.variables if v.name in mechanism.output_names]
     units = ["", *(units[place] for place in _result_places(mechanism))]
@@ -161,4 +161,4 @@ def _parameter_set(name: str, values: Mapping[str, Any]) -> bytes:
     for key, value in values.items():
         tag = "ssv:Integer" if isinstance(value, int) else "ssv:Real"
         SubElement(SubElement(listed, "ssv:Parameter", {"name": key}), tag, {"value": repr(value)})
-    return written(root)
+    return to_xml_bytes(root)

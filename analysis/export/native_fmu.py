@@ -25,10 +25,10 @@ from ..mechanisms import check
 from ..numerics.cache import code_folder, hashes_below, keep_hashes, lock_folder, read_hashes
 from ..run import show_progress
 from .archive import SOURCES, BuildError, documentation, write
-from .bill import with_bill
+from .bill import add_bill
 from .component import MANIFEST, MEMORY, component, manifest
 from .description import Kind, build_description, description
-from .equations_c import generated
+from .equations_c import generated_files
 from .experiments import experiments
 from .interface import interface
 from .terminals import terminal_files
@@ -151,7 +151,7 @@ def build_native(
     entries |= documentation(mechanism, variables, mechanism.title, made, _NOTES, icon)
     entries |= experiments(mechanism)
     target = dest / kind.file_name(mechanism)
-    return write(with_bill(target.stem, entries, native=True, fmi=kind.fmi), target)
+    return write(add_bill(target.stem, entries, native=True, fmi=kind.fmi), target)
 
 
 def source_files(mechanism: Mechanism, kind: Kind, *, web: bool = False) -> dict[str, str]:
@@ -169,7 +169,7 @@ def source_files(mechanism: Mechanism, kind: Kind, *, web: bool = False) -> dict
     files |= {name: (headers / name).read_text(encoding="utf-8") for name in _HEADERS[kind.fmi]}
     if kind.fmi == 2:
         files["fmi2Functions.h"] = _with_prefix(files["fmi2Functions.h"], (headers / "fmi3Functions.h").read_text())
-    files |= generated(mechanism, kind)
+    files |= generated_files(mechanism, kind)
     units = "".join(f'#include "{name}"\n' for name in files if name.endswith(".c"))
     units = f'#define ALL_IN_ONE\n#include "model.h"\n{units}'
     return files | {"all.c": f"/* All of the FMU in one file. Generated. */\n{units}"}
@@ -200,7 +200,7 @@ def compile_binaries(
                 compile_library(folder, COMPILED, library, platform.target, options)
             made = (Path(folder) / library).read_bytes()
             found.setdefault(f"binaries/{place}/{library}", []).append(component(made) if name == WASM else made)
-    return {place: parts[0] if len(parts) == 1 else _universal(parts) for place, parts in found.items()}
+    return {place: parts[0] if len(parts) == 1 else _join_macos_libraries(parts) for place, parts in found.items()}
 
 
 def compile_library(
@@ -241,7 +241,7 @@ def compile_library(
         keep_hashes(known, hashes_below(cache / "o"))
 
 
-def _universal(parts: Sequence[bytes]) -> bytes:
+def _join_macos_libraries(parts: Sequence[bytes]) -> bytes:
     """Join libraries of macOS for several architectures in one file, as Apple's loader reads it (<mach-o/fat.h>)."""
     align = 14  # pages of 16 KiB
     header = struct.pack(">II", 0xCAFEBABE, len(parts))

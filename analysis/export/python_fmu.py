@@ -27,7 +27,7 @@ from ..mechanisms import check
 from ..numerics.cache import store_file
 from . import controllers
 from .archive import SOURCES, BuildError, documentation, write
-from .bill import with_bill
+from .bill import add_bill
 from .description import PYTHON, description, token
 from .experiments import experiments
 
@@ -87,7 +87,7 @@ def build(mechanism: Mechanism, dest: Path | str = "build", sources: Path | str 
     entries |= documentation(mechanism, mechanism.variables, mechanism.title, made, (_NEEDS_PYTHON,))
     entries |= experiments(mechanism)
     target = dest / PYTHON.file_name(mechanism)
-    return write(with_bill(target.stem, entries, native=False, fmi=2), target)
+    return write(add_bill(target.stem, entries, native=False, fmi=2), target)
 
 
 _SLAVE = """import sys

@@ -20,7 +20,7 @@ from .native_fmu import EVERYWHERE, compile_binaries
 _FAT, _X86, _ARM = b"\xca\xfe\xba\xbe", b"\x07\x00\x00\x01", b"\x0c\x00\x00\x01"
 
 
-class Compared(NamedTuple):
+class Comparison(NamedTuple):
     """A comparison: what was compared, whether it is the same, and a text on what it was compared with."""
 
     what: str
@@ -28,7 +28,7 @@ class Compared(NamedTuple):
     text: str
 
 
-def rebuild(fmu: Path | str) -> Iterator[Compared]:
+def rebuild(fmu: Path | str) -> Iterator[Comparison]:
     """Compare an FMU with its bill of materials, and its libraries with those that its sources give here.
 
     The libraries of a native FMU are compiled again; library and modules of PythonFMU in a Python FMU are compared with the
@@ -59,8 +59,8 @@ def rebuild(fmu: Path | str) -> Iterator[Compared]:
     found = {name: hashlib.sha256(content).hexdigest() for name, content in files.items() if name != BILL}
     wrong = sorted(name for name in {*stated, *found} if stated.get(name) != found.get(name))
     text = "SHA-256 of every file" if not wrong else f"differing, missing or not listed: {', '.join(wrong[:5])}"
-    yield Compared(f"{len(found)} files, with the bill of materials", not wrong, text)
-    yield from _compiled(files, tools) if "ziglang" in tools else _packed(files, tools)
+    yield Comparison(f"{len(found)} files, with the bill of materials", not wrong, text)
+    yield from _compare_libraries(files, tools) if "ziglang" in tools else _compare_pythonfmu(files, tools)
 
 
 def _versions(tools: dict[str, str], name: str) -> str:
@@ -69,7 +69,7 @@ def _versions(tools: dict[str, str], name: str) -> str:
     return f"{name} {here}" if tools.get(name) == here else f"made by {name} {tools.get(name)}, here is {here}"
 
 
-def _compiled(files: dict[str, bytes], tools: dict[str, str]) -> Iterator[Compared]:
+def _compare_libraries(files: dict[str, bytes], tools: dict[str, str]) -> Iterator[Comparison]:
     """Compile the sources for every platform of the binaries and compare the results."""
     root = ElementTree.fromstring(files["modelDescription.xml"])
     kind = NATIVE_FMI3 if root.get("fmiVersion", "").startswith("3") else NATIVE
@@ -90,13 +90,13 @@ def _compiled(files: dict[str, bytes], tools: dict[str, str]) -> Iterator[Compar
         if len(wanted) > 1 and head[:4] != _FAT:  # only one of the two architectures of macOS
             wanted = [name for name in wanted if head[4:] == (_ARM if name.startswith("aarch64") else _X86)]
         if not wanted:
-            yield Compared(place, False, "is for none of the platforms that Linkwork compiles for")
+            yield Comparison(place, False, "is for none of the platforms that Linkwork compiles for")
             continue
         made = compile_binaries(identifier, kind, sources, wanted)
-        yield Compared(place, made.get(place) == files[place], _versions(tools, "ziglang"))
+        yield Comparison(place, made.get(place) == files[place], _versions(tools, "ziglang"))
 
 
-def _packed(files: dict[str, bytes], tools: dict[str, str]) -> Iterator[Compared]:
+def _compare_pythonfmu(files: dict[str, bytes], tools: dict[str, str]) -> Iterator[Comparison]:
     """Compare library and modules of PythonFMU with those of the installed package."""
     package: Any = resources.files("pythonfmu")
     for folder, suffix, name in (
@@ -105,8 +105,8 @@ def _packed(files: dict[str, bytes], tools: dict[str, str]) -> Iterator[Compared
     ):
         content = (package / "resources" / "binaries" / folder / name).read_bytes()
         for place in (p for p in files if p.startswith(f"binaries/{folder}/") and p.endswith(suffix)):
-            yield Compared(place, files[place] == content, _versions(tools, "pythonfmu"))
+            yield Comparison(place, files[place] == content, _versions(tools, "pythonfmu"))
     prefix = "resources/pythonfmu/"
     modules = {place.removeprefix(prefix): text for place, text in files.items() if place.startswith(prefix)}
     same = all((package / name).is_file() and (package / name).read_bytes() == text for name, text in modules.items())
-    yield Compared(prefix, same, _versions(tools, "pythonfmu"))
+    yield Comparison(prefix, same, _versions(tools, "pythonfmu"))

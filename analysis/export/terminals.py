@@ -9,7 +9,7 @@ from xml.etree.ElementTree import Element, SubElement
 
 from linkwork.mechanism import Mechanism
 
-from .description import written
+from .description import to_xml_bytes
 
 #: Size of an icon (pixels), and of the drawing that terminals are placed in.
 _PIXELS, _SIZE = 32, 100
@@ -57,7 +57,7 @@ def terminals(mechanism: Mechanism) -> bytes:
         place = dict(zip(("x1", "y1", "x2", "y2"), map(str, (-_SIZE - 10, top - 10, -_SIZE + 10, top + 10))))
         colour = {"defaultConnectionColor": "0 0 0", "defaultConnectionStrokeSize": "1", "iconBaseName": kind}
         SubElement(node, "TerminalGraphicalRepresentation", colour | place)
-    return written(root)
+    return to_xml_bytes(root)
 
 
 def _terminals(mechanism: Mechanism) -> dict[str, tuple[str, dict[str, str]]]:

@@ -17,7 +17,7 @@ from ..numerics import symbolic
 from ..run import MOTOR, expressions, inertia_and_stiffness, kloss
 from .archive import SOURCES
 from .description import NATIVE
-from .equations_c import beginning, generated, write_c_functions
+from .equations_c import generated_files, trace_start, write_c_functions
 from .native_fmu import EVERYWHERE, WASM, WASM_OPTIONS, compile_library
 
 #: C files that a browser's module shares with a native FMU, and the folder of its own files.
@@ -53,10 +53,12 @@ def web_sources(mechanism: Mechanism) -> dict[str, str]:
     files |= {path.name: path.read_text(encoding="utf-8") for path in sorted(_OWN.glob("*.[ch]"))}
     others = [f"Equation driven_{name};\n#define equations_{name} driven_{name}\n" for name in _DRIVEN]
     files["model.h"] += f"#ifndef DRIVEN_C\n{''.join(others)}#endif\n"
-    return files | generated(mechanism, NATIVE) | {"drawing.h": _header(mechanism), "drawing.c": _drawing(mechanism)}
+    return (
+        files | generated_files(mechanism, NATIVE) | {"drawing.h": _header(mechanism), "drawing.c": _drawing(mechanism)}
+    )
 
 
-def crank_number(mechanism: Mechanism) -> int:
+def crank_index(mechanism: Mechanism) -> int:
     """Return the number of the first freedom that turns; -1 if there is none."""
     return next(iter(mechanism.cyclic_freedoms), -1)
 
@@ -65,7 +67,7 @@ def _header(mechanism: Mechanism) -> str:
     """Return the text of drawing.h: the declarations that a browser's module has in addition to a native FMU's."""
     joints = mechanism.drawing.joints if mechanism.drawing else ()
     freedoms = mechanism.freedoms
-    crank = crank_number(mechanism)
+    crank = crank_index(mechanism)
     forces = {c.argument for c in mechanism.channels if c.kind == "force"}
     modes = [-1 if freedom.mode is None else mechanism.modes.index(freedom.mode) for freedom in freedoms]
     freeing = [
@@ -108,8 +110,8 @@ def _drawing(mechanism: Mechanism) -> str:
     join, sx = casadi.vertcat, casadi.SX
     modes, u = sx.sym("modes", len(mechanism.modes)), sx.sym("u", len(mechanism.channels))
     x, p = sx.sym("x", mechanism.size), sx.sym("p", len(mechanism.constants._fields) + 1)
-    own, state, p_begun, x_begun, _, _ = beginning(mechanism, modes, u)
-    at = casadi.Function("at", [x, modes, u, p], [_places(mechanism, x, modes, u, p)])
+    own, state, p_begun, x_begun, _, _ = trace_start(mechanism, modes, u)
+    at = casadi.Function("at", [x, modes, u, p], [_joint_positions(mechanism, x, modes, u, p)])
     given = join(own, state)
     d_own, d_state = sx.sym("d_own", *own.shape), sx.sym("d_state", *state.shape)
     change = casadi.jtimes(at(x_begun, modes, u, p_begun), given, join(d_own, d_state))
@@ -118,19 +120,19 @@ def _drawing(mechanism: Mechanism) -> str:
         for name, arguments, *results in (
             ("joints", [x, modes, u, p], at(x, modes, u, p)),
             ("joints_forward", [modes, own, state, u, d_own, d_state], change),
-            *_driven(mechanism),
+            *_motor_functions(mechanism),
         )
     )
     return write_c_functions(made, "drawing")
 
 
-def _driven(mechanism: Mechanism) -> list[tuple[Any, ...]]:
+def _motor_functions(mechanism: Mechanism) -> list[tuple[Any, ...]]:
     """Return functions, each as name, arguments and results: motor torque, derivatives with a motor, matrices at rest."""
     casadi = symbolic.library()
     join, sx, freedoms = casadi.vertcat, casadi.SX, len(mechanism.freedoms)
     motor, speed, d_motor, d_speed = (sx.sym(n, size) for n, size in zip("mvde", (len(MOTOR), 1, len(MOTOR), 1)))
     torque = kloss(motor, speed)
-    crank = crank_number(mechanism)
+    crank = crank_index(mechanism)
     other = next((n for n in range(freedoms) if n != crank), -1)
     trace, place = expressions(mechanism), _torque_input(mechanism, crank)
     run = trace.symbols
@@ -154,7 +156,7 @@ def _driven(mechanism: Mechanism) -> list[tuple[Any, ...]]:
     ]
 
 
-def _places(mechanism: Mechanism, x: Any, modes: Any, u: Any, p: Any) -> Any:
+def _joint_positions(mechanism: Mechanism, x: Any, modes: Any, u: Any, p: Any) -> Any:
     casadi = symbolic.library()
     drawing = mechanism.drawing
     if drawing is None:

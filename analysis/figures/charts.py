@@ -18,8 +18,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..periodic import OTHER_ORBIT, TOLERANCE, TRUE_ORBIT, Basins, Coexistence, Crossing, Outcome, StabilityChart
 from ..units import RAD_S_PER_RPM, display_scale
-from .curves import Curve, Panel, Picture, draw, draw_panel, draw_part, pictured
-from .style import COLOURS, LIGHT, legend_above, spoken, spoken_label
+from .curves import Curve, Panel, Picture, draw, draw_panel, draw_part, register_picture
+from .style import COLOURS, LIGHT, label_in_words, legend_above, name_in_words
 
 #: Colour of points that have no value.
 EMPTY = "0.82"
@@ -172,7 +172,7 @@ def _hatched_points(chart: HeatMap, values: _Masked) -> list[tuple[NDArray[np.fl
     return [(np.asarray(values.filled(-1.0) == i, dtype=float), hatch) for i, hatch in enumerate(hatches) if hatch]
 
 
-@pictured
+@register_picture
 def plot_stability_chart(chart: StabilityChart, *, title: str = "") -> Picture:
     """Plot the largest Floquet multiplier in colours, the stability boundaries, and the outcomes of long runs.
 
@@ -221,8 +221,8 @@ def plot_stability_chart(chart: StabilityChart, *, title: str = "") -> Picture:
         )
     low, high = (np.array([chart.box.x[i], chart.box.y[i]]) * [x.factor, y.factor] for i in (0, 1))
     panel = Panel(
-        x_label=spoken_label(x.label),
-        y_label=spoken_label(y.label),
+        x_label=label_in_words(x.label),
+        y_label=label_in_words(y.label),
         curves=curves,
         legend_at="above",
         x_range=(float(low[0]), float(high[0])),
@@ -250,7 +250,7 @@ def _coexistence_picture(chart: StabilityChart, beside: Coexistence, panel: Pane
     what, unit = beside.swing
     shown, factor = display_scale(unit)
     sizes = {
-        f"amplitude of {spoken(what)}, {word} stable motion [{shown}]": factor * amplitude
+        f"amplitude of {name_in_words(what)}, {word} stable motion [{shown}]": factor * amplitude
         for word, amplitude in (("smallest", beside.least), ("largest", beside.greatest))
     }
     hover: dict[str, ArrayLike] = {"motions found": beside.count, "stable motions": beside.stable}
@@ -277,7 +277,7 @@ def _coexistence_picture(chart: StabilityChart, beside: Coexistence, panel: Pane
     return Picture(parts=[several, *maps], title=title, size=_SIZE)
 
 
-@pictured
+@register_picture
 def plot_basins(found: Basins, *, title: str = "") -> Picture:
     """Plot each initial condition in the colour of the motion it settles to, and mark the motions at crank angle 0."""
     name, _, position_unit = found.labels[0].removesuffix("]").partition(" [")
@@ -297,22 +297,22 @@ def plot_basins(found: Basins, *, title: str = "") -> Picture:
                     colour="0.05",
                     label="stable motion" if stable else "unstable motion",
                     hover={
-                        f"amplitude of {spoken(name)} [{shown}]": [factor * orbit.amplitude for orbit in those],
+                        f"amplitude of {name_in_words(name)} [{shown}]": [factor * orbit.amplitude for orbit in those],
                         "largest multiplier": [orbit.largest for orbit in those],
                     },
                 )
             )
     panel = Panel(
-        x_label=f"{spoken(name)} at crank angle 0 [{drawn}]",
-        y_label=spoken_label(found.labels[1]),
+        x_label=f"{name_in_words(name)} at crank angle 0 [{drawn}]",
+        y_label=label_in_words(found.labels[1]),
         curves=curves,
         legend_at="above",
         x_range=(scale * float(found.position[0]), scale * float(found.position[-1])),
         y_range=(float(found.rate[0]), float(found.rate[-1])),
     )
     names = [
-        f"ends in motion {n}{'' if orbit.periods == 1 else f' of {orbit.crank_turns} turns'}, amplitude of {spoken(name)} "
-        f"{factor * orbit.amplitude:.3g} {shown}"
+        f"ends in motion {n}{'' if orbit.periods == 1 else f' of {orbit.crank_turns} turns'}, "
+        f"amplitude of {name_in_words(name)} {factor * orbit.amplitude:.3g} {shown}"
         for n, orbit in enumerate(found.motions, start=1)
     ]
     numbers = found.ends.copy()

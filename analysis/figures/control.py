@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 from ..libraries import lazy
 from ..linear import Design, LinearModel
 from .dispatch import plot
-from .style import BOLD, COLOURS, DOT, LINE, LINES, REFERENCE, finish, legend_above, styled, write_title
+from .style import BOLD, COLOURS, DOT, LINE, LINES, REFERENCE, figure_style, finish, legend_above, write_title
 
 if TYPE_CHECKING:
     import control
@@ -48,7 +48,7 @@ def plot_bode(
     title : str
     """
     responses = control.frequency_response(list(systems.values()), frequencies)
-    with styled():
+    with figure_style():
         figure = Figure(figsize=(6.4, 4.8))
         above, below = figure.subplots(2, 1, sharex=True, height_ratios=(3, 2))
         for number, ((label, system), response) in enumerate(zip(systems.items(), responses)):
@@ -155,7 +155,7 @@ def plot_poles(systems: Mapping[str, Any], *, title: str = "") -> Figure:
     systems : mapping
         Linear systems of python-control, by their names in the legend.
     """
-    with styled():
+    with figure_style():
         figure = Figure(figsize=(6.4, 5.0))
         axis = figure.subplots()
         axis.axhline(0.0, **REFERENCE)

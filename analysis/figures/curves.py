@@ -32,9 +32,9 @@ from .style import (
     THIN,
     Figure,
     align_labels,
+    figure_style,
     finish,
     legend_above,
-    styled,
     write_notes,
     write_title,
 )
@@ -195,19 +195,19 @@ def plot_curves(
     return draw(Picture(parts=panels, title=title, columns=columns, size=size, notes=notes))
 
 
-def pictured(of: Callable[_Arguments, Picture]) -> Callable[_Arguments, Figure]:
+def register_picture(of: Callable[_Arguments, Picture]) -> Callable[_Arguments, Figure]:
     """Register a function that returns the picture of a result, and return a function that draws this picture as a figure.
 
     Both are registered by the type of their first argument, with `dispatch.picture` and `dispatch.plot`.
     """
 
     @wraps(of)
-    def plotted(*arguments: _Arguments.args, **options: _Arguments.kwargs) -> Figure:
+    def plot_picture(*arguments: _Arguments.args, **options: _Arguments.kwargs) -> Figure:
         return draw(of(*arguments, **options))
 
     picture.register(of)
-    plot.register(plotted)
-    return plotted
+    plot.register(plot_picture)
+    return plot_picture
 
 
 def draw(picture: Picture) -> Figure:
@@ -215,7 +215,7 @@ def draw(picture: Picture) -> Figure:
     parts, columns, size = picture.parts, picture.columns, picture.size
     rows = ceil(len(parts) / columns)
     heights = picture.heights or [1.0] * rows
-    with styled():
+    with figure_style():
         figure = Figure(figsize=(size[0] * columns, 0.35 + size[1] * sum(heights)))
         axes = figure.subplots(
             rows, columns, squeeze=False, height_ratios=heights, sharex="col" if picture.heights else False
@@ -235,7 +235,7 @@ def draw(picture: Picture) -> Figure:
 
 def resize(figure: Figure, width: float, height: float) -> Figure:
     """Change the size of a drawn figure (inches) and lay it out again."""
-    with styled():
+    with figure_style():
         figure.set_layout_engine("constrained")
         figure.set_size_inches(width, height)
         write_title(figure, figure.get_suptitle().replace("\n", " "))

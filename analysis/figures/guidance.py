@@ -29,8 +29,8 @@ from .style import (
     TARGET,
     THIN,
     TRACE,
+    figure_style,
     finish,
-    styled,
     write_notes,
     write_title,
 )
@@ -50,7 +50,7 @@ def plot_guidance(found: Guidance, *, title: str = "") -> Figure:
     count = len(found.solutions)
     columns = 3
     rows = ceil(count / columns)
-    with styled():
+    with figure_style():
         figure = Figure(figsize=(9.0, 4.0 + 3.2 * rows))
         parts: Any = figure.subfigures(2, 1, height_ratios=(4.0, 3.2 * rows)) if rows else [figure]
         poses, axis = parts[0].subplots(1, 2)
@@ -88,7 +88,7 @@ def plot_guidance_map(found: GuidanceMap, *, title: str = "") -> Figure:
 
     The quality is the largest least transmission angle that any rocker gives with this crank.
     """
-    with styled():
+    with figure_style():
         figure = Figure(figsize=(10.4, 5.4))
         left, right = figure.subplots(1, 2, sharex=True, sharey=True)
         low, high = _view(found)

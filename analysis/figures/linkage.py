@@ -22,7 +22,7 @@ from ..run import Trajectory
 from ..units import CM_PER_METRE
 from .animation import check_frames, gif
 from .dispatch import draw_mechanism, last_samples, plot
-from .marks import roomiest
+from .marks import roomiest_position
 from .style import (
     BLOCK,
     BOLD,
@@ -40,8 +40,8 @@ from .style import (
     TITLE,
     TRACE,
     Figure,
+    figure_style,
     finish,
-    styled,
     write_title,
 )
 
@@ -230,7 +230,7 @@ class _Scene:
         for name, pin in pins.items():
             # of places with equal room one outside the loop is preferred
             outwards = 0.1 * (pin - centre) / max(hypot(*(pin - centre)), 1e-9)
-            best = roomiest(pin, 1.15 * unit, [lines], (*taken, *pins.values()), outwards)
+            best = roomiest_position(pin, 1.15 * unit, [lines], (*taken, *pins.values()), outwards)
             self._write(axis, best, name)
             taken.append(best)
         # the slider position
@@ -285,7 +285,7 @@ def draw_linkage(
     path = CM_PER_METRE * (np.empty((0, 2)) if trace is None else np.asarray(trace, dtype=float))
     scene = _Scene(parameters, [q, *(replace(q, p=point) for point in path if np.all(np.isfinite(point)))])
     width, height = scene.high - scene.low
-    with styled():
+    with figure_style():
         figure = Figure(figsize=(6.4, 6.4 * height / width + (0.3 if title else 0.0)))
         axis = figure.subplots()
         scene.prepare(axis)
@@ -350,7 +350,7 @@ def animate_linkage(
     configurations = [_pins(parameters, float(trajectory["crank.angle"][i]), float(slides[i])) for i in chosen]
     scene = _Scene(parameters, configurations)
     width, height = scene.high - scene.low
-    with styled():
+    with figure_style():
         figure = Figure(figsize=(5.0, 5.0 * height / width + 1.9))
         above, below = figure.subplots(2, 1, height_ratios=(5.0 * height / width, 1.7))
         write_title(figure, title)

@@ -257,7 +257,7 @@ def _leader(label: Annotation, box: Bbox) -> Path:
     return Path([point + 0.1 * (end - point), end])
 
 
-def roomiest(
+def roomiest_position(
     pin: FloatArray, reach: float, drawn: Sequence[object], marks: Sequence[FloatArray], away: FloatArray | None = None
 ) -> FloatArray:
     """Return the position of a letter, at a distance ``reach`` from a pin, that is farthest from other shapes.

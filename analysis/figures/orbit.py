@@ -11,7 +11,7 @@ from ..units import RAD_S_PER_RPM
 from .curves import Curve, Panel, plot_curves
 from .dispatch import plot
 from .runs import display_unit
-from .style import Figure, spoken
+from .style import Figure, name_in_words
 
 #: Samples of a period.
 _SAMPLES = 512
@@ -41,21 +41,21 @@ def plot_orbit(orbit: PeriodicOrbit, *, title: str = "") -> Figure:
         name for n in mechanism.cyclic_freedoms for name in mechanism.names("drive", mechanism.freedoms[n].coordinate)
     ]
 
-    def closed(name: str) -> tuple[np.ndarray, str]:
+    def output_over_period(name: str) -> tuple[np.ndarray, str]:
         """Return an output over the period in display units, with its value at the end of the period, and its axis label."""
         unit, factor = display_unit(variables[name])
-        return factor * _closed(turn, name), f"{spoken(name)} [{unit}]"
+        return factor * _output_over_turn(turn, name), f"{name_in_words(name)} [{unit}]"
 
     angle = np.degrees(np.append(turn.angle, orbit.flow.period * orbit.turns))
     ticks = np.linspace(0.0, angle[-1], 5).tolist()
     panels = []
     for name in names:
-        values, label = closed(name)
+        values, label = output_over_period(name)
         panels.append(
             Panel(x_label="crank angle [deg]", y_label=label, curves=[Curve(x=angle, y=values)], x_ticks=ticks)
         )
     if free:
-        (x, x_label), (y, y_label) = closed(turn.swing), closed(rates[turn.swing])
+        (x, x_label), (y, y_label) = output_over_period(turn.swing), output_over_period(rates[turn.swing])
         begin = Curve(x=x[:1], y=y[:1], line="", marker="o")
         caption = "point at the crank angle 0"
         panels.append(Panel(x_label=x_label, y_label=y_label, curves=[Curve(x=x, y=y), begin], title=caption))
@@ -63,7 +63,7 @@ def plot_orbit(orbit: PeriodicOrbit, *, title: str = "") -> Figure:
     return plot_curves(panels, title=title or _title(orbit, turn.period), columns=2, size=(4.4, 2.9))
 
 
-def _closed(turn: Turn, name: str) -> np.ndarray:
+def _output_over_turn(turn: Turn, name: str) -> np.ndarray:
     """Return an output over the period with its value at the end, which of an angle may be whole turns on."""
     values = turn[name]
     whole = 2.0 * np.pi * np.round((values[-1] - values[0]) / (2.0 * np.pi)) if name in turn.angles else 0.0
@@ -99,12 +99,12 @@ def plot_orbits(found: Orbits, *, title: str = "") -> Figure:
         turn = orbit.turn(_SAMPLES)
         variable = next(v for v in mechanism_of(orbit.parameters).variables if v.name == turn.swing)
         unit, factor = display_unit(variable)
-        label = f"{spoken(turn.swing)} [{unit}]"
+        label = f"{name_in_words(turn.swing)} [{unit}]"
         stable = orbit in found.stable
         curves.append(
             Curve(
                 x=np.degrees(np.append(turn.angle, orbit.flow.period * orbit.turns)),
-                y=factor * _closed(turn, turn.swing),
+                y=factor * _output_over_turn(turn, turn.swing),
                 line="-" if stable else "--",
                 label=f"{orbit.verdict().stability.value}, largest multiplier {orbit.largest:.3g}",
             )

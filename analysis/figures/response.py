@@ -31,8 +31,8 @@ from ..periodic import (
 )
 from ..units import display_scale
 from ..youssef import Approximations
-from .curves import Arrow, Curve, Label, Panel, Picture, Shade, draw, pictured
-from .style import COLOURS, LINE, THIN, spoken
+from .curves import Arrow, Curve, Label, Panel, Picture, Shade, draw, register_picture
+from .style import COLOURS, LINE, THIN, name_in_words
 
 #: Line styles of the approximations, and of motions by their stability.
 _LINES: tuple[Any, ...] = ("-.", ":", (0, (5, 1)))
@@ -80,7 +80,7 @@ class _Scale:
 
     @property
     def axis(self) -> str:
-        name = spoken(self.family.name)
+        name = name_in_words(self.family.name)
         return f"{name} [{self.unit}]" if self.unit else name
 
     def place(self, value: float) -> str:
@@ -136,9 +136,9 @@ def describe_branches(
     unit, factor = display_scale(family.unit) if rpm or family.unit != "rad/s" else (family.unit, 1.0)
     shown, scale = display_scale(si)
     outputs = (v for v in mechanism_of(family.parameters).variables if v.causality == "output")
-    name = next((spoken(v.name) for v in outputs if v.symbol == what), spoken(what))
+    name = next((name_in_words(v.name) for v in outputs if v.symbol == what), name_in_words(what))
     look = _Scale(family=family, factor=factor, unit=unit, scale=scale, shown=shown, what=what, name=name)
-    others = [] if beside is None else _approximated(branches, beside)
+    others = [] if beside is None else _evaluate_approximations(branches, beside)
     shades = [
         Shade(low=factor * a.low, high=factor * a.high, label=f"avoid: {a.risk.value}", number=_RISKS.index(a.risk))
         for a in avoid
@@ -154,7 +154,7 @@ def describe_branches(
 
 
 def _amplitudes(
-    branches: Sequence[Branch], look: _Scale, others: Sequence[_Approximated], shades: Sequence[Shade]
+    branches: Sequence[Branch], look: _Scale, others: Sequence[_Approximation], shades: Sequence[Shade]
 ) -> Panel:
     """Return the panel of the amplitude along all branches, with special points, jumps, and visible approximations."""
     # the scale is that of the true motion, as linear approximations have unbounded resonances
@@ -170,18 +170,18 @@ def _amplitudes(
             colour = COLOURS[(branch.periods.bit_length() - 1) % len(COLOURS)]
             x, y = look.factor * branch.parameter, look.scale * branch.amplitude
             curves.append(_letters(x, y, str(branch.crank_turns), colour=colour))
-    curves += _visible(others, branches, look, top)
-    curves += _specials(branches, look, found)
+    curves += _visible_approximations(others, branches, look, top)
+    curves += _special_points(branches, look, found)
     labels = [label for branch in branches if branch.periods == 1 for label in _peaks(branch, look, top)]
     labels += [
         Label(x=look.factor * jump.parameter, y=look.scale * jump.before, text=_jump(jump, look)) for jump in found
     ]
     labels += _crossings(branches, look, top)
-    short = "" if spoken(look.what) == look.name else f" {look.what}"
+    short = "" if name_in_words(look.what) == look.name else f" {look.what}"
     return Panel(
         x_label=look.axis,
         y_label=f"amplitude of {look.name}{short} [{look.shown}]",
-        curves=[*_keys(branches), *curves],
+        curves=[*_legend_entries(branches), *curves],
         y_range=(0.0, top),
         legend_at="above",
         shades=shades,
@@ -209,7 +209,7 @@ def _peaks(branch: Branch, look: _Scale, top: float) -> list[Label]:
     x, y = branch.parameter, look.scale * branch.amplitude
     found, _ = find_peaks(y, prominence=_STANDS_OUT * top)
     labels = []
-    for n in (n for n in found if not _unstable(branch)[n]):
+    for n in (n for n in found if not _unstable_mask(branch)[n]):
         # the vertex of the parabola through three points
         near = x[n - 1 : n + 2] - x[n]
         bend, slope, height = np.polyfit(near, y[n - 1 : n + 2], 2)
@@ -256,7 +256,7 @@ def _is_reachable(branch: Branch, special: SpecialPoint) -> bool:
 
 def _stability_curves(branch: Branch, number: int, look: _Scale, y: FloatArray, **options: Any) -> list[Curve]:
     """Return the curves of a quantity ``y`` (display units) along a branch, one per stability; the colour shows the period."""
-    words = _words(branch)
+    words = _stability_words(branch)
     order = branch.periods.bit_length() - 1
     style: dict[str, Any] = {"colour": COLOURS[order % len(COLOURS)], "order": 2.0 + 0.1 * order}
     style["hover"] = {"branch": np.full(len(branch), number + 1), "stability": words}
@@ -279,7 +279,7 @@ def _hover_values(branch: Branch, number: int) -> Mapping[str, ArrayLike]:
     return {
         "branch": np.full(len(branch), number + 1),
         "turns in a period": np.full(len(branch), branch.crank_turns),
-        "stability": _words(branch),
+        "stability": _stability_words(branch),
         "largest multiplier": branch.largest_multiplier,
     } | ({torque: table[torque]} if torque in table else {})
 
@@ -294,7 +294,7 @@ def _letters(x: FloatArray, y: FloatArray, text: str, *, shift: float = 0.0, **o
     return Curve(x=x[finite], y=y[finite], line="", marker=f"${text}$", order=3.0, **options)
 
 
-def _specials(branches: Sequence[Branch], look: _Scale, found: Sequence[FoldJump]) -> list[Curve]:
+def _special_points(branches: Sequence[Branch], look: _Scale, found: Sequence[FoldJump]) -> list[Curve]:
     """Return the special points of all branches as markers, one curve per kind."""
     curves = []
     says = {jump.parameter: _jump(jump, look).replace("\n", " ") for jump in found}
@@ -323,10 +323,10 @@ def _specials(branches: Sequence[Branch], look: _Scale, found: Sequence[FoldJump
     return curves
 
 
-def _keys(branches: Sequence[Branch]) -> list[Curve]:
+def _legend_entries(branches: Sequence[Branch]) -> list[Curve]:
     """Return the entries of the legend as curves without points: turns in a period, if they differ, and stability."""
     turns = sorted({(branch.periods, branch.crank_turns) for branch in branches})
-    words = {str(word) for branch in branches for word in _words(branch)}
+    words = {str(word) for branch in branches for word in _stability_words(branch)}
     keys = []
     if len(turns) > 1:
         keys += [
@@ -349,7 +349,7 @@ def _keys(branches: Sequence[Branch]) -> list[Curve]:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class _Approximated:
+class _Approximation:
     """Amplitude by an approximation over the parameter, both (m,), and its errors along each branch of one turn.
 
     Each item of ``errors`` has the rows parameter, relative error (%) and true amplitude, shape (3, n), with NaN at gaps.
@@ -367,9 +367,9 @@ class _Approximated:
         return {"colour": COLOURS[(self.number + 1) % len(COLOURS)], "line": _LINES[self.number % len(_LINES)]}
 
 
-def _approximated(
+def _evaluate_approximations(
     branches: Sequence[Branch], beside: Callable[[FloatArray], Mapping[str, FloatArray]]
-) -> list[_Approximated]:
+) -> list[_Approximation]:
     """Evaluate the approximations at stable motions of one turn, and evenly over the range of the parameter."""
     chosen = [(branch, _comparison_points(branch)) for branch in branches if branch.periods == 1]
     every = np.concatenate([branch.parameter for branch, _ in chosen])
@@ -381,16 +381,16 @@ def _approximated(
         for branch, i in chosen:
             own, true = values[np.searchsorted(places, branch.parameter[i])], branch.amplitude[i]
             # no line across unstable motions
-            gaps = np.flatnonzero(np.diff(np.cumsum(_unstable(branch))[i])) + 1
+            gaps = np.flatnonzero(np.diff(np.cumsum(_unstable_mask(branch))[i])) + 1
             error = 100.0 * np.abs(own / true - 1.0)
             errors.append(np.insert(np.array([branch.parameter[i], error, true]), gaps, np.nan, axis=1))
         approximations.append(
-            _Approximated(name=name, number=number, parameter=places, amplitude=values, errors=errors)
+            _Approximation(name=name, number=number, parameter=places, amplitude=values, errors=errors)
         )
     return approximations
 
 
-def _words(branch: Branch) -> NDArray[np.str_]:
+def _stability_words(branch: Branch) -> NDArray[np.str_]:
     """Return the stability of each point of a branch as a word."""
     margin = 1.0 - branch.largest_multiplier
     return np.select(
@@ -400,7 +400,7 @@ def _words(branch: Branch) -> NDArray[np.str_]:
     )
 
 
-def _unstable(branch: Branch) -> NDArray[np.bool_]:
+def _unstable_mask(branch: Branch) -> NDArray[np.bool_]:
     return np.asarray(branch.largest_multiplier > 1.0 + TOLERANCE)
 
 
@@ -409,10 +409,12 @@ def _comparison_points(branch: Branch) -> NDArray[np.int64]:
     steps = [np.diff(v, prepend=v[0]) / (float(np.ptp(v)) or 1.0) for v in (branch.parameter, branch.amplitude)]
     way = np.cumsum(np.hypot(*steps))
     chosen = np.unique(np.searchsorted(way, np.linspace(0.0, way[-1], _COMPARED)))
-    return chosen[~_unstable(branch)[chosen]]
+    return chosen[~_unstable_mask(branch)[chosen]]
 
 
-def _visible(others: Sequence[_Approximated], branches: Sequence[Branch], look: _Scale, top: float) -> list[Curve]:
+def _visible_approximations(
+    others: Sequence[_Approximation], branches: Sequence[Branch], look: _Scale, top: float
+) -> list[Curve]:
     """Return the curves of the approximations that can be told apart from the true motion in a figure of usual size."""
     if not others:
         return []
@@ -454,7 +456,7 @@ def _harmonics(branches: Sequence[Branch], look: _Scale, shades: Sequence[Shade]
             x = look.factor * branch.parameter
             # the letters of different harmonics are shifted, as their curves may be near each other
             shift = (order + 1.0) / (len(names) + 1.0) - 0.5
-            stable = np.where(_unstable(branch), np.nan, y)
+            stable = np.where(_unstable_mask(branch), np.nan, y)
             if np.isfinite(stable).any():
                 letters.append(_letters(x, stable, str(order + 1), shift=shift, label=label, **options))
                 label = ""
@@ -490,7 +492,7 @@ def _without_overlaps(letters: Sequence[Curve], width: float, ratio: float) -> l
     return kept
 
 
-def _errors(others: Sequence[_Approximated], look: _Scale, shades: Sequence[Shade]) -> Panel:
+def _errors(others: Sequence[_Approximation], look: _Scale, shades: Sequence[Shade]) -> Panel:
     """Return the panel of the errors of approximations relative to the stable one-turn motions (%)."""
     curves = [
         Curve(
@@ -539,7 +541,7 @@ def _loads(branches: Sequence[Branch], look: _Scale, shades: Sequence[Shade]) ->
     ]
 
 
-@pictured
+@register_picture
 def plot_branch(branch: Branch, *, title: str = "") -> Picture:
     """Plot amplitude, harmonics, crank torque and pin force of one branch over its parameter, with its special points.
 
@@ -550,7 +552,7 @@ def plot_branch(branch: Branch, *, title: str = "") -> Picture:
     return describe_branches([branch], title=title, avoid=alone.speeds_to_avoid, caution=alone.caution)
 
 
-@pictured
+@register_picture
 def plot_response(
     response: Response, *, title: str = "", rpm: bool = True, beside: Approximations | None = None
 ) -> Picture:

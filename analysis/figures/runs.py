@@ -24,10 +24,10 @@ from .style import (
     MARKED,
     SMALL,
     Figure,
+    figure_style,
     finish,
     legend_above,
-    spoken,
-    styled,
+    name_in_words,
     write_notes,
     write_title,
 )
@@ -93,7 +93,7 @@ def plot_outputs(
         notes.append(f"The run ended early: {run.message}.")
     elif run.message:
         notes.append(f"Note: {run.message}.")
-    with styled():
+    with figure_style():
         grid = _picture_grid(len(panels)) if picture else _column_grid(len(panels), columns)
         width, height = (2 * _BESIDE, 1.15 * _HEIGHT) if picture else (_WIDTH * columns, _HEIGHT)
         figure = Figure(figsize=(width, 1.0 + height * len(grid)))
@@ -208,7 +208,7 @@ def display_unit(variable: Variable) -> tuple[str, float]:
 def _output_row(run: Trajectory, table: Mapping[str, Variable], name: str) -> _Rows:
     values = run[name]  # raises an error for an unknown name
     unit, factor = display_unit(table[name])
-    return _Rows(name=spoken(name), unit=unit, curves={"": factor * values})
+    return _Rows(name=name_in_words(name), unit=unit, curves={"": factor * values})
 
 
 def _default_rows(run: Trajectory, table: Mapping[str, Variable]) -> list[_Rows]:
@@ -291,20 +291,20 @@ def plot_comparison(
     pairs = [(factor * first[name][:n], factor * second[name][:n]) for name, (_, factor) in zip(names, units)]
     said = [_rounding_text(a, b, unit) for (a, b), (unit, _) in zip(pairs, units)]
     beside = not all(said)
-    with styled():
+    with figure_style():
         figure = Figure(figsize=(9.6 if beside else 7.2, 0.9 + 1.8 * len(names)))
         rows = figure.subplots(len(names), 1 + beside, sharex=True, squeeze=False, width_ratios=(3, 2)[: 1 + beside])
         for axes, name, (unit, _), (a, b), size in zip(rows, names, units, pairs, said):
             for values, label, colour, line in zip((a, b), labels, COLOURS, LINES):
                 axes[0].plot(time, values, line, color=colour, label=label)
-            axes[0].set_ylabel(f"{spoken(name)}\n[{unit}]")
+            axes[0].set_ylabel(f"{name_in_words(name)}\n[{unit}]")
             if beside:
                 _draw_difference(axes[1], time, b - a, unit, size)
         legend_above(rows[0, 0])
         if beside:
             rows[0, 1].set_title(f"{labels[1]} less {labels[0]}")
         else:
-            each = ", ".join(f"{spoken(name)} by {size}" for name, size in zip(names, said) if size != "0")
+            each = ", ".join(f"{name_in_words(name)} by {size}" for name, size in zip(names, said) if size != "0")
             apart = f"differ by rounding only: {each} at most" if each else "are identical"
             write_notes(figure, [f"{labels[0]} and {labels[1]} {apart}."])
         for axis in rows[-1]:

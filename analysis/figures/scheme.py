@@ -20,7 +20,7 @@ from ..mechanisms import mechanism_of
 from ..run import Trajectory
 from .animation import check_frames, gif
 from .dispatch import animate, last_samples, plot
-from .marks import roomiest
+from .marks import roomiest_position
 from .style import (
     BLOCK,
     COLOURS,
@@ -33,8 +33,8 @@ from .style import (
     THIN,
     TRACE,
     Figure,
+    figure_style,
     finish,
-    styled,
     write_title,
 )
 
@@ -44,7 +44,7 @@ _SIDE = 5.0
 _TRACED = 240
 
 
-def places(mechanism: Mechanism, parameters: Any, coordinates: Array) -> dict[str, Array]:
+def joint_positions(mechanism: Mechanism, parameters: Any, coordinates: Array) -> dict[str, Array]:
     """Return the positions (mm) of a drawing's joints by name, shape (n, 2), for ``coordinates`` of shape (n, freedoms).
 
     They are NaN at configurations at which the mechanism cannot be assembled.
@@ -64,7 +64,7 @@ def places(mechanism: Mechanism, parameters: Any, coordinates: Array) -> dict[st
 
 
 def draw(axis: Axes, mechanism: Mechanism, parameters: Any, at: dict[str, Array], *, letters: bool = True) -> None:
-    """Draw a mechanism at the first configuration, and the paths of its points over the others; ``at`` is from `places`."""
+    """Draw a mechanism at the first configuration, and the paths of its points over the others, of `joint_positions`."""
     drawing = mechanism.drawing
     assert drawing is not None
     now = {name: path[0] for name, path in at.items()}
@@ -101,7 +101,7 @@ def _write_letters(axis: Axes, pins: dict[str, Array], unit: float) -> None:
     taken = list(pins.values())
     for name, pin in pins.items():
         if not name.endswith("Block"):
-            place = roomiest(pin, 1.3 * unit, drawn, taken)
+            place = roomiest_position(pin, 1.3 * unit, drawn, taken)
             taken.append(place)
             axis.text(
                 float(place[0]), float(place[1]), name, fontsize=SMALL, color=MARKED, ha="center", va="center", zorder=7
@@ -116,7 +116,7 @@ def _draw_part(axis: Axes, part: Part, through: Sequence[Array], unit: float, co
         if len(through) > 2:
             axis.add_patch(
                 Polygon(
-                    _sorted_by_angle(through), facecolor=colour, alpha=0.15, edgecolor=colour, linewidth=THIN, zorder=3
+                    _sort_by_angle(through), facecolor=colour, alpha=0.15, edgecolor=colour, linewidth=THIN, zorder=3
                 )
             )
         axis.plot(*np.array(through).T, color=colour, linewidth=2.0 * LINE, solid_capstyle="round", zorder=4)
@@ -144,7 +144,7 @@ def _draw_part(axis: Axes, part: Part, through: Sequence[Array], unit: float, co
             axis.plot(*coil.T, color="0.5", linewidth=THIN, zorder=2)
 
 
-def _sorted_by_angle(points: Sequence[Array]) -> Array:
+def _sort_by_angle(points: Sequence[Array]) -> Array:
     """Return points sorted by their angles about their mean."""
     array = np.array(points)
     spread = array - array.mean(axis=0)
@@ -158,7 +158,7 @@ def draw_run(parameters: Any, axis: Axes, run: Trajectory) -> str:
     names = [freedom.coordinate for freedom in mechanism.freedoms]
     coordinates = np.column_stack([run[name][samples] for name in names])
     chosen = np.unique(np.linspace(0, len(coordinates) - 1, min(len(coordinates), 2000)).astype(int))
-    at = places(mechanism, parameters, coordinates[chosen])
+    at = joint_positions(mechanism, parameters, coordinates[chosen])
     draw(axis, mechanism, parameters, at)
     drawing = mechanism.drawing
     assert drawing is not None
@@ -177,14 +177,14 @@ def _swept_coordinates(mechanism: Mechanism, found: Reach) -> Array:
 def plot_scheme(mechanism: Mechanism, *, title: str = "") -> Figure:
     """Draw a planar mechanism at its start, and the paths of its points through the range of its first freedom."""
     known = mechanism.first_set
-    with styled():
+    with figure_style():
         figure = Figure(figsize=(1.3 * _SIDE, _SIDE))
         axis = figure.add_subplot()
         draw(
             axis,
             mechanism,
             known.parameters,
-            places(mechanism, known.parameters, _swept_coordinates(mechanism, reach(mechanism))),
+            joint_positions(mechanism, known.parameters, _swept_coordinates(mechanism, reach(mechanism))),
         )
         write_title(figure, title or mechanism.title)
         return finish(figure)
@@ -193,12 +193,12 @@ def plot_scheme(mechanism: Mechanism, *, title: str = "") -> Figure:
 def plot_schemes(mechanisms: Sequence[Mechanism], *, columns: int = 4, title: str = "") -> Figure:
     """Draw several planar mechanisms at their start, with the paths of their points through the range of the first freedom."""
     rows = -(-len(mechanisms) // columns)
-    with styled():
+    with figure_style():
         figure = Figure(figsize=(0.5 * _SIDE * columns, 0.5 * _SIDE * rows))
         for number, mechanism in enumerate(mechanisms):
             axis = figure.add_subplot(rows, columns, number + 1)
             known = mechanism.first_set
-            at = places(mechanism, known.parameters, _swept_coordinates(mechanism, reach(mechanism)))
+            at = joint_positions(mechanism, known.parameters, _swept_coordinates(mechanism, reach(mechanism)))
             draw(axis, mechanism, known.parameters, at, letters=False)
             axis.set_axis_off()
             axis.set_title(mechanism.name, fontsize=SMALL)
@@ -219,14 +219,14 @@ def animate_scheme(mechanism: Mechanism, path: str | Path, *, frames: int = 60, 
     known = mechanism.first_set
     found = reach(mechanism)
     swept = _swept_coordinates(mechanism, found)[1:]
-    at = places(mechanism, known.parameters, swept)
+    at = joint_positions(mechanism, known.parameters, swept)
     order = np.linspace(0, len(swept) - 1, frames).astype(int)
     if not found.turns:
         order = np.concatenate([order, order[::-1]])
     points = np.concatenate(list(at.values()))
     low, high = np.nanmin(points, axis=0), np.nanmax(points, axis=0)
     room = 0.06 * float((high - low).max())
-    with styled():
+    with figure_style():
         figure = Figure(figsize=(_SIDE, _SIDE))
         axis = figure.add_subplot()
         with gif(figure, path, 25) as (file, add_frame):

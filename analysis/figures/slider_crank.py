@@ -18,7 +18,21 @@ from linkwork.errors import InputError
 from ..slider_crank import JOINTS, QUANTITIES, SLIDER_FORCE, SYMBOLS, ForceTurn, MonteCarlo, shown_units
 from .curves import Curve, Panel, plot_curves
 from .dispatch import plot
-from .style import BOLD, COLOURS, HAIR, LINE, MARK, PLAIN, SMALL, THIN, finish, spoken, styled, write_notes, write_title
+from .style import (
+    BOLD,
+    COLOURS,
+    HAIR,
+    LINE,
+    MARK,
+    PLAIN,
+    SMALL,
+    THIN,
+    figure_style,
+    finish,
+    name_in_words,
+    write_notes,
+    write_title,
+)
 
 FloatArray = NDArray[np.float64]
 
@@ -110,7 +124,7 @@ def _force_panel(turn: ForceTurn, title: str, si: str, unit: str, one: float, co
         # a gap at each pole, where a curve changes its sign
         values[[int(np.argmin(np.abs(turn.angle - place.crank_angle))) for place in poles]] = np.nan
         curves.append(
-            Curve(x=_with_breaks(angle, turn.breaks, angle), y=_with_breaks(values, turn.breaks), label=label)
+            Curve(x=_insert_breaks(angle, turn.breaks, angle), y=_insert_breaks(values, turn.breaks), label=label)
         )
     limits = None
     if np.concatenate(inside).size:
@@ -174,7 +188,7 @@ def plot_tolerances(
     foot = [f"{found.samples:,} samples at each angle; {lost if most else 'all can be assembled'}."]
     foot += [f"{note[0].upper()}{note[1:]}." for note in found.notes(units)]
     lines = sum(len(fill(note, _LETTERS).splitlines()) for note in foot) - 1
-    with styled():
+    with figure_style():
         figure = Figure(figsize=(9.6, 7.0 + 0.16 * lines))
         above, below = np.ravel(figure.subfigures(2, 1, squeeze=False, height_ratios=(1.0, 1.0 + 0.03 * lines)))
         band = above.subplots()
@@ -192,10 +206,10 @@ def plot_tolerances(
 def _draw_band(axis: Axes, found: MonteCarlo, quantity: str, at: int, one: float) -> None:
     turn, spread, linear = found.turn, found.spreads[quantity], found.estimates[quantity]
     angle = np.degrees(turn.angle)
-    whole = _with_breaks(angle, turn.breaks, angle)
+    whole = _insert_breaks(angle, turn.breaks, angle)
 
     def curve(values: Any) -> FloatArray:
-        return _with_breaks(np.ma.filled(values, np.nan) / one, turn.breaks)
+        return _insert_breaks(np.ma.filled(values, np.nan) / one, turn.breaks)
 
     three = curve(3.0 * linear.deviation)
     axis.fill_between(whole, -three, three, color=_LINEAR, alpha=0.18, linewidth=0.0, label=r"linear, $\pm 3\,\sigma$")
@@ -229,7 +243,7 @@ def _draw_band(axis: Axes, found: MonteCarlo, quantity: str, at: int, one: float
     axis.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=5, borderaxespad=0.2, columnspacing=1.2)
 
 
-def _with_breaks(values: FloatArray, breaks: Sequence[int], fill: FloatArray | None = None) -> FloatArray:
+def _insert_breaks(values: FloatArray, breaks: Sequence[int], fill: FloatArray | None = None) -> FloatArray:
     """Return values (n,) with one value inserted after each index of ``breaks``: NaN, or the next value of ``fill`` (n,)."""
     after = np.array(breaks, dtype=int) + 1
     return np.insert(values, after, np.nan if fill is None else fill[after])
@@ -298,7 +312,8 @@ def _draw_shares(axis: Axes, found: MonteCarlo, quantity: str, at: int) -> None:
     if second:
         axis.legend(loc="lower right")
     axis.set_yticks(
-        np.arange(len(names)), [spoken(name) + (f" ${SYMBOLS[name]}$" if name in SYMBOLS else "") for name in names]
+        np.arange(len(names)),
+        [name_in_words(name) + (f" ${SYMBOLS[name]}$" if name in SYMBOLS else "") for name in names],
     )
     axis.set_xlim(0.0, 1.22 * float(np.nanmax(shares)))
     axis.xaxis.set_major_formatter(PercentFormatter(1.0, decimals=0))

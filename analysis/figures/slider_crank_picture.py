@@ -35,7 +35,7 @@ from ..slider_crank import PeriodicShift, Range, assembled_ranges, constant_shif
 from ..units import INCH
 from .animation import check_frames, gif
 from .dispatch import animate, draw_mechanism, last_samples, plot
-from .solids import ball, box, paint, tube
+from .solids import ball, box, cylinder, paint
 from .style import (
     BOLD,
     COLOURS,
@@ -49,9 +49,9 @@ from .style import (
     THIN,
     TINY,
     TRACE,
+    figure_style,
     finish,
     legend_above,
-    styled,
     write_title,
 )
 
@@ -252,15 +252,15 @@ class _Scene:
         start, end = self._rail
         # the crank ends before the ball, so that the ball seems to lie in a fork
         solids: list[tuple[FloatArray, str]] = [
-            (tube(bearing * k1, (bearing + 3.2 * u) * k1, 0.95 * u, pieces=3), "#AEB7BE"),
-            (tube(pose.centre, np.array([0.0, 0.0, self.high_shift + 6.6 * u]), 0.42 * u, pieces=16), CRANK),
-            (tube(pose.centre - 0.42 * u * k1, pose.centre + 0.42 * u * k1, 0.85 * u, sides=24), CRANK),
+            (cylinder(bearing * k1, (bearing + 3.2 * u) * k1, 0.95 * u, pieces=3), "#AEB7BE"),
+            (cylinder(pose.centre, np.array([0.0, 0.0, self.high_shift + 6.6 * u]), 0.42 * u, pieces=16), CRANK),
+            (cylinder(pose.centre - 0.42 * u * k1, pose.centre + 0.42 * u * k1, 0.85 * u, sides=24), CRANK),
             (box([0.6 * u, -0.45 * u, -0.3 * u], [self.a1 - 0.45 * u, 0.45 * u, 0.3 * u], crank, pose.centre, pieces=6),
              CRANK),
             (ball(pose.crank_pin, 0.66 * u), "#F0A57A"),
-            (tube(pose.crank_pin + 0.5 * u * along, pin - 0.5 * u * along, 0.3 * u, pieces=30), COUPLER),
+            (cylinder(pose.crank_pin + 0.5 * u * along, pin - 0.5 * u * along, 0.3 * u, pieces=30), COUPLER),
             (ball(pin, 0.66 * u), "#86BFE3"),
-            (tube(pin + 0.5 * u * guide[2], pin + 0.95 * u * guide[2], 0.34 * u), SLIDER),
+            (cylinder(pin + 0.5 * u * guide[2], pin + 0.95 * u * guide[2], 0.34 * u), SLIDER),
             (box([-1.6 * u, -1.2 * u, 0.9 * u], [1.6 * u, 1.2 * u, 2.0 * u], guide, pin, pieces=4), "#84929D"),
             (box([start, -0.7 * u, 2.0 * u], [end, 0.7 * u, 2.45 * u], guide, self.foot, pieces=24), "#D9DEE2"),
         ]  # fmt: skip
@@ -402,7 +402,7 @@ def plot_mechanism(
     pose = _checked_pose(parameters, crank_angle, shift, _factor(unit))
     parts = _parts(parameters, constant_shift(shift) if law is None else law, _factor(unit))
     scene = _Scene(parameters, parts, [pose], unit, view)
-    with styled(laid_out=False):
+    with figure_style(laid_out=False):
         figure, axis = _sheet(scene, 9.0, head=0.35 if title else 0.0)
         scene.draw(axis, pose)
         write_title(figure, title)
@@ -485,7 +485,7 @@ def animate_mechanism(
     poses = [_pose(parameters, float(a), law.at(float(a))[0], factor) for a in angles]
     parts = _parts(parameters, law, factor)
     scene = _Scene(parameters, parts, poses, unit, view)
-    with styled(laid_out=False):
+    with figure_style(laid_out=False):
         head, foot = (0.35 if title else 0.0), 1.6
         figure, above = _sheet(scene, 7.0, head=head, foot=foot)
         total = figure.get_figheight()
@@ -548,7 +548,7 @@ def plot_range(
     angles = np.linspace(min(ends), max(ends), 2 * _POINTS)
     square = np.array([kinematics.assembly_square(float(a), law.at(float(a))[0], p) for a in angles])
     margin = factor * (p.a2 - np.sqrt(p.a2 * p.a2 - square))
-    with styled():
+    with figure_style():
         figure = Figure(figsize=(9.6, 4.4))
         panels = figure.subplot_mosaic(
             [["circle", "margin"], ["circle", "slider"]], width_ratios=(1.0, 1.35), height_ratios=(1.0, 1.0)

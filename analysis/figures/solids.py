@@ -22,7 +22,7 @@ FloatArray: TypeAlias = NDArray[np.float64]
 _LIGHT = np.array([-0.25, 0.75, 0.61])
 
 
-def tube(start: FloatArray, end: FloatArray, radius: float, *, pieces: int = 1, sides: int = 16) -> FloatArray:
+def cylinder(start: FloatArray, end: FloatArray, radius: float, *, pieces: int = 1, sides: int = 16) -> FloatArray:
     """Return a cylinder with closed ends; it is divided along its length into pieces, which are painted by depth."""
     way = (end - start) / np.linalg.norm(end - start)
     first = np.cross(way, np.eye(3)[np.argmin(np.abs(way))])

@@ -1,6 +1,6 @@
 """Style of all figures: Matplotlib's settings, and colours, line widths and letter sizes.
 
-Figures are made inside ``with styled():``, so that the user's own settings of Matplotlib have no effect.
+Figures are made inside ``with figure_style():``, so that the user's own settings of Matplotlib have no effect.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.transforms import ScaledTranslation
 
-__all__ = ["COLOURS", "STYLE", "Figure", "finish", "styled"]
+__all__ = ["COLOURS", "STYLE", "Figure", "figure_style", "finish"]
 
 #: Colours of curves in order, which colour-blind readers can tell apart, also in grey (Okabe and Ito).
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")
@@ -68,19 +68,19 @@ MARK: dict[str, Any] = {"color": "0.35", "linewidth": THIN, "linestyle": ":", "z
 _LETTERS, _NOTED = 11.6, 15.0
 
 
-def spoken(name: str) -> str:
+def name_in_words(name: str) -> str:
     """Return a variable's name in words: "crank speed" for ``drive.speed``, "slider damping" for ``slider.damping``."""
     return "crank speed" if name == "drive.speed" else name.replace(".", " ").replace("_", " ")
 
 
-def spoken_label(label: str) -> str:
-    """Return an axis label, "name [unit]", with the name in words, see `spoken`."""
+def label_in_words(label: str) -> str:
+    """Return an axis label, "name [unit]", with the name in words, see `name_in_words`."""
     name, bracket, unit = label.partition(" [")
-    return spoken(name) + bracket + unit
+    return name_in_words(name) + bracket + unit
 
 
 @contextmanager
-def styled(*, laid_out: bool = True) -> Iterator[None]:
+def figure_style(*, laid_out: bool = True) -> Iterator[None]:
     """Use this style instead of the user's; without ``laid_out`` Matplotlib does not lay out the axes."""
     with matplotlib.style.context(STYLE | {"figure.constrained_layout.use": laid_out}, after_reset=True):
         yield
@@ -111,7 +111,10 @@ def legend_above(axis: Axes, **options: Any) -> None:
 
 
 def finish(figure: Figure) -> Figure:
-    """Lay the figure out once and return it; to be called inside `styled`, as Matplotlib makes the styled ticks only here."""
+    """Lay out the figure, fix the layout and return it.
+
+    Call it inside `figure_style`: Matplotlib creates the ticks, and gives them their style, only at the layout.
+    """
     engine = figure.get_layout_engine()
     if engine is None:
         figure.draw_without_rendering()

@@ -61,8 +61,8 @@ from .style import (
     THIN,
     TINY,
     TRACE,
-    finish,
     figure_style,
+    finish,
     write_notes,
     write_title,
 )

@@ -21,9 +21,9 @@ from .style import (
     THIN,
     TINY,
     Figure,
+    figure_style,
     finish,
-    spoken,
-    styled,
+    name_in_words,
     write_notes,
     write_title,
 )
@@ -38,7 +38,7 @@ def plot_wiring(wiring: Wiring, *, title: str = "") -> Figure:
     placed = boxes(wiring)
     lowest = min(box.bottom for box in placed.values())
     width = max(box.right for box in placed.values()) + 60.0
-    with styled():
+    with figure_style():
         lanes = len(wiring.connections) * _LANE
         figure = Figure(figsize=(max(6.0, width / 30.0), max(2.6, (lanes + 40.0 - lowest) / 28.0)))
         axes = figure.add_subplot()
@@ -100,7 +100,7 @@ def _path(
 def plot_system_run(run: SystemRun, names: Sequence[str] = (), *, title: str = "") -> Figure:
     """Plot outputs of a run over time, by default all connected ones but accelerations, and the power residuals."""
     names = names or [name for name in run.connected if not name.endswith("acceleration")]
-    with styled():
+    with figure_style():
         rows = len(names) + bool(run.powers)
         figure = Figure(figsize=(7.0, 1.4 + 1.5 * rows))
         axes = np.atleast_1d(figure.subplots(rows, sharex=True))
@@ -108,9 +108,9 @@ def plot_system_run(run: SystemRun, names: Sequence[str] = (), *, title: str = "
             unit, factor = display_scale(run.units[name])
             draw_over_time(place, run.time, factor * run[name])
             of, _, output = name.rpartition(".")
-            place.set_ylabel(f"{spoken(of)}\n{spoken(output)}\n[{unit}]", fontsize=SMALL)
+            place.set_ylabel(f"{name_in_words(of)}\n{name_in_words(output)}\n[{unit}]", fontsize=SMALL)
         for name, power in run.powers.items():
-            draw_over_time(axes[-1], run.time, power, label=f"at {spoken(name.rpartition('.')[0])}")
+            draw_over_time(axes[-1], run.time, power, label=f"at {name_in_words(name.rpartition('.')[0])}")
         if run.powers:
             axes[-1].set_ylabel("power that the\ncoupling brings in\n[W]", fontsize=SMALL)
             # above the axes, as the curves fill them
@@ -125,7 +125,7 @@ def plot_system_run(run: SystemRun, names: Sequence[str] = (), *, title: str = "
 @plot.register
 def plot_convergence(found: Convergence, *, title: str = "") -> Figure:
     """Plot the error of each coupling over the communication step; the legend states the order of convergence."""
-    with styled():
+    with figure_style():
         figure = Figure(figsize=(6.0, 4.2))
         axes = figure.add_subplot()
         for number, (way, errors) in enumerate(found.errors.items()):

@@ -12,7 +12,7 @@ from ..tuning import Survey, Tuned
 from ..units import RAD_S_PER_RPM, display_scale
 from .curves import Curve, Panel, Shade, plot_curves
 from .dispatch import plot
-from .style import COLOURS, LINE, spoken
+from .style import COLOURS, LINE, name_in_words
 
 #: Greatest Floquet multiplier on the axis.
 _GREATEST = 2.0
@@ -31,7 +31,7 @@ def plot_tuned(tuned: Tuned, *, title: str = "") -> Figure:
     branches = [branch for survey in (tuned.before, tuned.after) for branch in survey.response.branches]
     cut = max(float(branch.largest_multiplier.max()) for branch in branches) > _GREATEST
     rows = (
-        (f"amplitude of {spoken(what)} [{unit}]", lambda b: factor * b.amplitude),
+        (f"amplitude of {name_in_words(what)} [{unit}]", lambda b: factor * b.amplitude),
         (
             "largest Floquet multiplier,\nunstable above 1" + (f" (cut at {_GREATEST:g})" if cut else ""),
             lambda b: np.minimum(b.largest_multiplier, _GREATEST),
@@ -50,7 +50,7 @@ def plot_tuned(tuned: Tuned, *, title: str = "") -> Figure:
             curves.append(Curve(x=span, y=[1.0, 1.0], colour="0.6", line=":"))
         panels.append(
             Panel(
-                x_label=f"{spoken(family.name)} [{of_x}]",
+                x_label=f"{name_in_words(family.name)} [{of_x}]",
                 y_label=label,
                 curves=curves,
                 shades=[Shade(low=low, high=high, label="" if number else "range to be kept clear")],
@@ -60,7 +60,7 @@ def plot_tuned(tuned: Tuned, *, title: str = "") -> Figure:
             )
         )
     changed = [
-        f"{spoken(name)} {scaled * before:.5g} to {scaled * after:.5g} {quantity}"
+        f"{name_in_words(name)} {scaled * before:.5g} to {scaled * after:.5g} {quantity}"
         for name, before, after in zip(tuned.wish.names, tuned.wish.present, tuned.values)
         for quantity, scaled in [display_scale(parameter_unit(tuned.wish.mechanism, name))]
     ]

@@ -36,8 +36,8 @@ from .reader import read as read
 from .reader import text as text
 from .reader import unchanged as unchanged
 from .reader import unknown_name as unknown_name
-from .structured import flattened as flattened
-from .structured import overridden as overridden
+from .structured import flatten as flatten
+from .structured import override as override
 from .structured import read_tables as read_tables
 from .structured import write_tables as write_tables
 from .tables import load_array as load_array

@@ -14,7 +14,7 @@ from linkwork.errors import InputError, LinkworkError
 
 from ..libraries import require
 from ..units import INCH, LENGTHS, quantity
-from .paths import checked_ending, first_line, is_number, read_text
+from .paths import check_ending, first_line, is_number, read_text
 from .reader import unknown_name
 
 #: Lengths of SVG in m (CSS: an inch has 96 px, 72 pt, 6 pc).
@@ -71,7 +71,7 @@ def read_points(
         If the unit is not a unit of length.
     """
     path = Path(path)
-    ending = checked_ending(path, (".csv", ".txt", ".svg"))
+    ending = check_ending(path, (".csv", ".txt", ".svg"))
     scale = None if unit is None else quantity(f"1 {unit}", "m", "unit")
     text = read_text(path)
     if ending == ".svg":

@@ -23,7 +23,7 @@ from linkwork.errors import InputError, ParameterError
 from ..libraries import require
 from ..units import LENGTHS
 from .outputs import output, write_text
-from .paths import checked_ending
+from .paths import check_ending
 from .reader import unknown_name
 
 Point = tuple[float, float]
@@ -455,7 +455,7 @@ def save_drawing(path: str | Path, drawing: Drawing, *, unit: str = "mm") -> Pat
         If the format does not have the unit.
     """
     path = Path(path)
-    text = to_dxf(drawing, unit) if checked_ending(path, (".dxf", ".svg")) == ".dxf" else to_svg(drawing, unit)
+    text = to_dxf(drawing, unit) if check_ending(path, (".dxf", ".svg")) == ".dxf" else to_svg(drawing, unit)
     return write_text(path, text)
 
 

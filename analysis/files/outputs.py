@@ -16,7 +16,7 @@ from dataclasses import dataclass, field
 from itertools import count
 from pathlib import Path
 
-from .paths import whole
+from .paths import write_completely
 
 RECORD = ".linkwork"
 
@@ -57,7 +57,7 @@ def attribute_files(command: str, force: bool = False) -> Iterator[Writing]:
 def output(path: str | Path) -> Iterator[tuple[Path, Path]]:
     """Yield a temporary path to write to, and the final path, to which the file is moved when it is complete."""
     path = free_path(path)
-    with whole(path) as part:
+    with write_completely(path) as part:
         yield part, path
     record_output(path)
 

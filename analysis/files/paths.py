@@ -50,7 +50,7 @@ def prepare(path: str | Path) -> Path:
     return path
 
 
-def checked_ending(path: Path, known: Sequence[str]) -> str:
+def check_ending(path: Path, known: Sequence[str]) -> str:
     """Return the ending of a path in lower case; raise InputError unless it is among those ``known``."""
     ending = path.suffix.lower()
     if ending not in known:
@@ -60,7 +60,7 @@ def checked_ending(path: Path, known: Sequence[str]) -> str:
 
 
 @contextmanager
-def whole(path: Path) -> Iterator[Path]:
+def write_completely(path: Path) -> Iterator[Path]:
     """Yield a temporary path to write to, which is renamed to ``path`` at the end, so that no incomplete file appears."""
     part = prepare(path).with_name(f"{path.name}.{os.getpid()}.part")
     try:

@@ -14,7 +14,7 @@ import tomli_w
 from linkwork.errors import InputError
 
 from .outputs import write_text
-from .paths import checked_ending, first_line, read_text
+from .paths import check_ending, first_line, read_text
 from .reader import as_table
 
 ENDINGS = (".toml", ".json")
@@ -31,7 +31,7 @@ def write_tables(path: str | Path, data: Mapping[str, Any], *, head: str = "") -
         If the path has another ending.
     """
     path = Path(path)
-    if checked_ending(path, ENDINGS) == ".json":
+    if check_ending(path, ENDINGS) == ".json":
         text = json.dumps(data, indent=2) + "\n"
     else:
         # TOML needs plain values before tables
@@ -49,7 +49,7 @@ def read_tables(path: str | Path) -> dict[str, Any]:
         If the file cannot be read, or does not have the format of its ending.
     """
     path = Path(path)
-    ending = checked_ending(path, ENDINGS)
+    ending = check_ending(path, ENDINGS)
     text = read_text(path)
     try:
         data = tomllib.loads(text) if ending == ".toml" else json.loads(text)
@@ -105,7 +105,7 @@ def _check_text(path: Path, name: str, text: str, longest: int) -> None:
         raise InputError(f"{path}: {name} has half a character: \\ud800 to \\udfff come in pairs")
 
 
-def overridden(
+def override(
     data: Mapping[str, Any], overrides: Mapping[str, Any], *, exclusive: Collection[str] = ()
 ) -> dict[str, Any]:
     """Return a copy of nested tables with single values replaced.
@@ -137,9 +137,9 @@ def overridden(
     return result
 
 
-def flattened(data: Mapping[str, Any], prefix: str = "") -> dict[str, Any]:
+def flatten(data: Mapping[str, Any], prefix: str = "") -> dict[str, Any]:
     """Return the values of nested tables by dotted name."""
     flat: dict[str, Any] = {}
     for name, value in data.items():
-        flat |= flattened(value, f"{prefix}{name}.") if isinstance(value, Mapping) else {prefix + name: value}
+        flat |= flatten(value, f"{prefix}{name}.") if isinstance(value, Mapping) else {prefix + name: value}
     return flat

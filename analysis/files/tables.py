@@ -18,7 +18,7 @@ from numpy.typing import ArrayLike, NDArray
 from linkwork.errors import InputError, Interrupted
 
 from .outputs import output
-from .paths import first_line, is_number, read_text, whole
+from .paths import first_line, is_number, read_text, write_completely
 from .reader import unknown_name
 
 #: Numbers that are written in one block; Ctrl-C takes effect between blocks.
@@ -66,14 +66,14 @@ def _write_rows(file: TextIO, path: Path, columns: Sequence[NDArray[np.float64]]
             size = len(text) / len(values) * count
             if first == 0 and size >= LARGE:
                 sys.stderr.write(f"linkwork: writing {path}, about {size / 1e6:.0f} MB; Ctrl-C stops it ...\n")
-                done = stack.enter_context(_bar(path.name, count))
+                done = stack.enter_context(_progress_bar(path.name, count))
             file.write(text)
             if done is not None:
                 done(first + len(values))
 
 
 @contextmanager
-def _bar(what: str, count: int) -> Iterator[Callable[[int], None]]:
+def _progress_bar(what: str, count: int) -> Iterator[Callable[[int], None]]:
     """Show a progress bar if standard error is a terminal; yield a function to be called with the number of rows done."""
     from rich.console import Console
     from rich.progress import Progress
@@ -184,7 +184,7 @@ def save_array(path: str | Path, values: ArrayLike) -> Path:
     """Write an array with its hash to a file of a cache, and return the path; see `load_array`."""
     content = io.BytesIO()
     np.save(content, np.asarray(values, dtype=float))
-    with whole(path := Path(path)) as part:
+    with write_completely(path := Path(path)) as part:
         part.write_bytes(content.getvalue() + hashlib.sha256(content.getvalue()).digest())
     return path
 

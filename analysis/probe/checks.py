@@ -7,11 +7,18 @@ from typing import NamedTuple
 
 from . import places
 from .context import Case, Context
-from .leaks import leaks
+from .leaks import check_leaks
 from .model import Model
-from .repeats import deserialize_there, repeated, restored, serialize_here, split
-from .sequences import Forbidden, legal
-from .values import bounded_parameters, bounds, derivatives, out_of_bounds, past_the_end, starts
+from .repeats import check_deserializing, check_repetition, check_restoring, check_serializing, compare_half_steps
+from .sequences import ForbiddenCalls, run_legal_calls
+from .values import (
+    bounded_parameters,
+    check_bounds,
+    check_derivatives,
+    check_parameter_bounds,
+    check_starts,
+    check_step_past_end,
+)
 
 
 class Check(NamedTuple):
@@ -23,64 +30,76 @@ class Check(NamedTuple):
     share: float = 0.0  # share of the calls that the check gets if it has no number of cases
 
 
-def _is(case: Case) -> Callable[[Context], Case]:
+def _one_check(case: Case) -> Callable[[Context], Case]:
     return lambda context: case
 
 
-def _derivatives(model: Model) -> int:
+def _count_derivative_cases(model: Model) -> int:
     return 0 if not (model.directional and model.dependencies) else 1 if model.interface == "cs" else 3
 
 
-def _saves(model: Model) -> bool:
+def _can_save(model: Model) -> bool:
     return model.can_save and model.can_serialize
 
 
 #: The checks, in the order in which they are made.
 CHECKS = {
     "starts": Check(
-        "parameters and inputs have their declared starts after the initialization", _is(starts), lambda model: 1
+        "parameters and inputs have their declared starts after the initialization",
+        _one_check(check_starts),
+        lambda model: 1,
     ),
     "repeat": Check(
         "the same calls give the same bits: in a new instance, after a reset, beside another instance",
-        _is(repeated),
+        _one_check(check_repetition),
         lambda model: 2,
     ),
     "restore": Check(
         "a run continued from a restored state gives the same bits, whatever came between",
-        _is(restored),
+        _one_check(check_restoring),
         lambda model: 3 if model.can_save else 0,
     ),
     "serialize": Check(
-        "a state becomes bytes, each time the same", _is(serialize_here), lambda model: 2 * _saves(model)
+        "a state becomes bytes, each time the same", _one_check(check_serializing), lambda model: 2 * _can_save(model)
     ),
     "deserialize": Check(
         "a run continued from those bytes in another process gives the same bits",
-        _is(deserialize_there),
-        lambda model: 2 * _saves(model),
+        _one_check(check_deserializing),
+        lambda model: 2 * _can_save(model),
     ),
     "split": Check(
-        "one step and two halves: the largest difference", _is(split), lambda model: model.interface == "cs"
+        "one step and two halves: the largest difference",
+        _one_check(compare_half_steps),
+        lambda model: model.interface == "cs",
     ),
-    "derivatives": Check("directional and adjoint derivatives against differences", _is(derivatives), _derivatives),
+    "derivatives": Check(
+        "directional and adjoint derivatives against differences",
+        _one_check(check_derivatives),
+        _count_derivative_cases,
+    ),
     "bounds": Check(
-        "over a run with random inputs every variable keeps to its declared range", _is(bounds), lambda model: 2
+        "over a run with random inputs every variable keeps to its declared range",
+        _one_check(check_bounds),
+        lambda model: 2,
     ),
     "parameters": Check(
         "a parameter beyond its declared range is refused",
-        _is(out_of_bounds),
+        _one_check(check_parameter_bounds),
         lambda model: len(bounded_parameters(model)),
     ),
-    "stop": Check("a step past the stop time is refused", _is(past_the_end), lambda model: model.interface == "cs"),
+    "stop": Check(
+        "a step past the stop time is refused", _one_check(check_step_past_end), lambda model: model.interface == "cs"
+    ),
     "leaks": Check(
         "memory does not grow over lives of instances, steps, saved states",
-        _is(leaks),
+        _one_check(check_leaks),
         lambda model: 3 if model.can_save else 2,
     ),
     "places": Check(
         "it works in folders of any name, with resources said in every form that the standard allows",
-        _is(places.places),
+        _one_check(places.check_places),
         places.count,
     ),
-    "legal": Check("random legal calls are accepted", _is(legal), share=0.5),
-    "forbidden": Check("a forbidden call is refused, and the instance can still be freed", Forbidden, share=0.5),
+    "legal": Check("random legal calls are accepted", _one_check(run_legal_calls), share=0.5),
+    "forbidden": Check("a forbidden call is refused, and the instance can still be freed", ForbiddenCalls, share=0.5),
 }

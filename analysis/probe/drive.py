@@ -104,7 +104,7 @@ class Run:
         """Return the values of all variables, and the continuous states, as bytes."""
         found = {}
         for group in self.model.groups:
-            array = self.get(self.model.named(group))
+            array = self.get(self.model.select_variables(group))
             found[group] = b"\0".join(text or b"" for text in array) if group == "String" else bytes(array)
         if self.model.interface == "me" and self.model.states:
             found["states"] = bytes(self.states("GetContinuousStates"))
@@ -188,7 +188,7 @@ def step_size(model: Any) -> float:
     return float(model.step if model.interface == "cs" else model.step / 10)
 
 
-def differing(one: Values, other: Values, model: Any) -> str:
+def first_difference(one: Values, other: Values, model: Any) -> str:
     """Return the name of the first variable that differs between two sets of values, with its values; empty if none does."""
     for group, data in one.items():
         if data == other[group]:
@@ -200,7 +200,7 @@ def differing(one: Values, other: Values, model: Any) -> str:
         kind = model.c_types[group]
         a, b = (kind.from_buffer_copy(d[position : position + size]).value for d in (data, other[group]))
         count = position // size
-        for variable in model.named(group):
+        for variable in model.select_variables(group):
             if count < variable.size:
                 return f"{variable.name} ({a!r} and {b!r})"
             count -= variable.size

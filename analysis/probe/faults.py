@@ -43,7 +43,7 @@ class Fault:
         return f"{self.function}{' in ' + self.state if self.state else ''}: {self.what}"
 
 
-def swapped(position: int, value: Any) -> Change:
+def swap_argument(position: int, value: Any) -> Change:
     """Return a change that puts another value at a position of the arguments, counted from the end if negative."""
 
     def change(walk: Walk, name: str, arguments: list[Any]) -> list[Any] | None:
@@ -55,7 +55,7 @@ def swapped(position: int, value: Any) -> Change:
     return change
 
 
-def _fill(position: int, number: float) -> Change:
+def _set_first_element(position: int, number: float) -> Change:
     def change(walk: Walk, name: str, arguments: list[Any]) -> list[Any] | None:
         arguments[position][0] = number
         return arguments
@@ -63,13 +63,13 @@ def _fill(position: int, number: float) -> Change:
     return change
 
 
-def _unknown(walk: Walk, arguments: Sequence[Any]) -> Any:
+def _unknown_references(walk: Walk, arguments: Sequence[Any]) -> Any:
     used = {v.reference for v in walk.model.variables}
     free = next(n for n in (0xFFFFFFF0, 0x7FFFFFFF, 0x00FFFFFF) if n not in used)
     return (ctypes.c_uint * len(arguments[0]))(*[free] * len(arguments[0]))
 
 
-def _other_type(walk: Walk, name: str, arguments: list[Any]) -> list[Any] | None:
+def _references_of_other_type(walk: Walk, name: str, arguments: list[Any]) -> list[Any] | None:
     own = {v.reference for v in walk.model.variables if v.group == name[3:]}
     others = [v for v in walk.model.variables if v.reference not in own and v.size == 1]
     if not others:
@@ -78,25 +78,25 @@ def _other_type(walk: Walk, name: str, arguments: list[Any]) -> list[Any] | None
     return [*one, 1] if walk.model.version == 3 else one
 
 
-def _not_settable(walk: Walk, name: str, arguments: list[Any]) -> list[Any] | None:
+def _set_forbidden_variable(walk: Walk, name: str, arguments: list[Any]) -> list[Any] | None:
     cell = walk.cell(name)
     allowed = CONDITIONS["5" if cell == "i" else cell]  # FMI 3.0 contradicts itself on states in continuous-time mode
     forbidden = [v for v in walk.model.variables if v.group == name[3:] and not allowed(v)]
-    return _setting(walk, forbidden)
+    return _arguments_to_set(walk, forbidden)
 
 
-def _setting(walk: Walk, variables: list[Variable]) -> list[Any] | None:
+def _arguments_to_set(walk: Walk, variables: list[Variable]) -> list[Any] | None:
     """Return arguments that set one of these variables, chosen at random; None if there are none."""
     chosen = [walk.rng.choice(variables)] if variables else []
     return access(walk.model, chosen, walk.values(chosen)) if chosen else None
 
 
-def _constant(walk: Walk, name: str, arguments: list[Any]) -> list[Any] | None:
+def _set_constant(walk: Walk, name: str, arguments: list[Any]) -> list[Any] | None:
     constants = [v for v in walk.model.variables if v.group == name[3:] and v.variability == "constant"]
-    return _setting(walk, constants)
+    return _arguments_to_set(walk, constants)
 
 
-def _longer(walk: Walk, name: str, arguments: list[Any]) -> list[Any]:
+def _lengthen_array(walk: Walk, name: str, arguments: list[Any]) -> list[Any]:
     """Return arguments with a count that is one too large, and an array that has room for it."""
     array = arguments[-2]
     longer = (array._type_ * (len(array) + 1))()
@@ -104,7 +104,7 @@ def _longer(walk: Walk, name: str, arguments: list[Any]) -> list[Any]:
     return [*arguments[:-2], longer, len(array) + 1]
 
 
-def _bytes(data: Callable[[bytes], bytes]) -> Change:
+def _change_bytes(data: Callable[[bytes], bytes]) -> Change:
     def change(walk: Walk, name: str, arguments: list[Any]) -> list[Any]:
         altered = data(bytes(arguments[0]))
         return [byte_array(walk.session, altered), len(altered), ctypes.c_void_p()]
@@ -112,16 +112,16 @@ def _bytes(data: Callable[[bytes], bytes]) -> Change:
     return change
 
 
-def _too_small(walk: Walk, name: str, arguments: list[Any]) -> list[Any] | None:
+def _shorten_buffer(walk: Walk, name: str, arguments: list[Any]) -> list[Any] | None:
     size = len(arguments[1]) - 1
     return [arguments[0], byte_array(walk.session, bytes(size)), size] if size >= 0 else None
 
 
-def _unknown_category(walk: Walk, name: str, arguments: list[Any]) -> list[Any]:
+def _use_unknown_category(walk: Walk, name: str, arguments: list[Any]) -> list[Any]:
     return [True, 1, (ctypes.c_char_p * 1)(b"no such category")]
 
 
-def _start(position: int, value: float) -> Change:
+def _change_start(position: int, value: float) -> Change:
     """Return a change of the time or tolerance at the start, in SetupExperiment (FMI 2) or EnterInitializationMode (FMI 3)."""
 
     def change(walk: Walk, name: str, arguments: list[Any]) -> list[Any] | None:
@@ -137,67 +137,68 @@ def _start(position: int, value: float) -> Change:
 _VECTORS = (
     "[GS]etContinuousStates|GetNominalsOfContinuousStates|GetDerivatives|Get.*StateDerivatives|GetEventIndicators"
 )
+_PARTIAL = "GetDirectionalDerivative|GetAdjointDerivative"
 _SLOPES = "GetRealOutputDerivatives|GetOutputDerivatives|SetRealInputDerivatives"
 
 #: Function (a pattern of names without prefix), what is wrong, severity if the call is accepted, change of the arguments
 FAULTS: tuple[tuple[str, str, str | None, Change], ...] = (
-    ("[GS]et{type}", "unknown value reference", WRONG, swapped(0, _unknown)),
-    ("[GS]et{type}", "value reference of another type", WRONG, _other_type),
-    ("[GS]et{type}", "NULL value references", WRONG, swapped(0, None)),
-    ("[GS]et{type}", "NULL values", WRONG, swapped(2, None)),
-    ("[GS]et{type}", "wrong number of values", WRONG, swapped(3, lambda walk, a: a[3] - 1)),
-    ("Set{type}", "a variable that may not be set", WRONG, _not_settable),
-    ("Set{type}", "a constant", WRONG, _constant),
-    ("SetReal|SetFloat64", "NaN", None, _fill(2, NAN)),
-    ("SetReal|SetFloat64", "infinity", None, _fill(2, INF)),
-    ("SetReal|SetFloat64", "1e300", None, _fill(2, 1e300)),
+    ("[GS]et{type}", "unknown value reference", WRONG, swap_argument(0, _unknown_references)),
+    ("[GS]et{type}", "value reference of another type", WRONG, _references_of_other_type),
+    ("[GS]et{type}", "NULL value references", WRONG, swap_argument(0, None)),
+    ("[GS]et{type}", "NULL values", WRONG, swap_argument(2, None)),
+    ("[GS]et{type}", "wrong number of values", WRONG, swap_argument(3, lambda walk, a: a[3] - 1)),
+    ("Set{type}", "a variable that may not be set", WRONG, _set_forbidden_variable),
+    ("Set{type}", "a constant", WRONG, _set_constant),
+    ("SetReal|SetFloat64", "NaN", None, _set_first_element(2, NAN)),
+    ("SetReal|SetFloat64", "infinity", None, _set_first_element(2, INF)),
+    ("SetReal|SetFloat64", "1e300", None, _set_first_element(2, 1e300)),
     ("SetString", "NULL string", QUESTIONABLE, lambda walk, n, a: [a[0], a[1], (ctypes.c_char_p * a[1])(), *a[3:]]),
-    ("SetString", "invalid UTF-8", QUESTIONABLE, _fill(2, b"\xff\xfe\xc3(")),  # type: ignore[arg-type]
-    ("SetString", "1 MB of text", None, _fill(2, b"x" * 1_000_000)),  # type: ignore[arg-type]
-    ("DoStep", "step of zero", QUESTIONABLE, swapped(1, 0.0)),
-    ("DoStep", "negative step", WRONG, swapped(1, lambda walk, a: -a[1])),
-    ("DoStep", "step of NaN", WRONG, swapped(1, NAN)),
-    ("DoStep", "infinite step", WRONG, swapped(1, INF)),
-    ("DoStep", "time of NaN", WRONG, swapped(0, NAN)),
-    ("DoStep", "a gap in time", QUESTIONABLE, swapped(0, lambda walk, a: a[0] + 10 * a[1])),
-    ("DoStep", "a time in the past", QUESTIONABLE, swapped(0, lambda walk, a: a[0] - 10 * a[1])),
-    ("DoStep", "NULL results", QUESTIONABLE, swapped(3, None)),
-    ("SetTime", "NaN", QUESTIONABLE, swapped(0, NAN)),
-    ("SetTime", "infinity", QUESTIONABLE, swapped(0, INF)),
-    ("SetTime", "before the start", QUESTIONABLE, swapped(0, lambda walk, a: walk.model.start_time - 1.0)),
-    ("SetupExperiment|EnterInitializationMode", "start at NaN", QUESTIONABLE, _start(2, NAN)),
-    ("SetupExperiment|EnterInitializationMode", "stop before start", QUESTIONABLE, _start(4, -1e9)),
-    ("SetupExperiment|EnterInitializationMode", "tolerance of NaN", QUESTIONABLE, _start(1, NAN)),
-    ("SetupExperiment|EnterInitializationMode", "negative tolerance", QUESTIONABLE, _start(1, -1.0)),
-    ("GetFMU[sS]tate", "NULL", WRONG, swapped(0, None)),
-    ("SetFMU[sS]tate", "NULL state", WRONG, swapped(0, None)),
-    ("FreeFMU[sS]tate", "NULL pointer", ACCEPT, swapped(0, None)),
-    ("FreeFMU[sS]tate", "pointer to NULL", ACCEPT, swapped(0, lambda walk, a: ctypes.c_void_p())),
-    ("Serialize.*", "NULL state", WRONG, swapped(0, None)),
-    ("SerializedFMU[sS]tateSize", "NULL size", WRONG, swapped(1, None)),
-    ("SerializeFMU[sS]tate", "NULL bytes", WRONG, swapped(1, None)),
-    ("SerializeFMU[sS]tate", "too little room", WRONG, _too_small),
-    ("De[sS]erializeFMU[sS]tate", "NULL bytes", WRONG, swapped(0, None)),
-    ("De[sS]erializeFMU[sS]tate", "NULL state", WRONG, swapped(2, None)),
-    ("De[sS]erializeFMU[sS]tate", "no bytes", WRONG, _bytes(lambda data: b"")),
-    ("De[sS]erializeFMU[sS]tate", "bytes of something else", WRONG, _bytes(lambda data: b"this is not a state" * 10)),
-    ("De[sS]erializeFMU[sS]tate", "half of the bytes", WRONG, _bytes(lambda data: data[: len(data) // 2])),
-    ("De[sS]erializeFMU[sS]tate", "a byte changed", None, _bytes(lambda data: data[:-9] + b"\x55" + data[-8:])),
-    ("GetDirectionalDerivative|GetAdjointDerivative", "unknown unknown", WRONG, swapped(0, _unknown)),
-    ("GetDirectionalDerivative|GetAdjointDerivative", "unknown known", WRONG, swapped(2, lambda w, a: _unknown(w, a[2:3]))),
-    ("GetDirectionalDerivative|GetAdjointDerivative", "NULL seed", WRONG, swapped(4, None)),
-    ("GetDirectionalDerivative|GetAdjointDerivative", "NaN seed", None, _fill(4, NAN)),
-    (_VECTORS, "one too many", WRONG, _longer),
-    (_VECTORS, "NULL array", WRONG, swapped(0, None)),
-    ("SetContinuousStates", "NaN", None, _fill(0, NAN)),
-    (_SLOPES, "order 0", WRONG, _fill(2, 0)),
-    (_SLOPES, "order 1000", WRONG, _fill(2, 1000)),
-    (_SLOPES, "unknown value reference", WRONG, swapped(0, _unknown)),
-    ("GetStatus|GetRealStatus|GetBooleanStatus|GetStringStatus", "unknown kind", WRONG, swapped(0, 99)),
-    ("GetStatus|GetRealStatus|GetBooleanStatus|GetStringStatus", "NULL value", WRONG, swapped(1, None)),
-    ("CompletedIntegratorStep", "NULL results", WRONG, swapped(1, None)),
-    ("NewDiscreteStates|UpdateDiscreteStates", "NULL results", WRONG, swapped(0, None)),
-    ("SetDebugLogging", "unknown category", QUESTIONABLE, _unknown_category),
+    ("SetString", "invalid UTF-8", QUESTIONABLE, _set_first_element(2, b"\xff\xfe\xc3(")),  # type: ignore[arg-type]
+    ("SetString", "1 MB of text", None, _set_first_element(2, b"x" * 1_000_000)),  # type: ignore[arg-type]
+    ("DoStep", "step of zero", QUESTIONABLE, swap_argument(1, 0.0)),
+    ("DoStep", "negative step", WRONG, swap_argument(1, lambda walk, a: -a[1])),
+    ("DoStep", "step of NaN", WRONG, swap_argument(1, NAN)),
+    ("DoStep", "infinite step", WRONG, swap_argument(1, INF)),
+    ("DoStep", "time of NaN", WRONG, swap_argument(0, NAN)),
+    ("DoStep", "a gap in time", QUESTIONABLE, swap_argument(0, lambda walk, a: a[0] + 10 * a[1])),
+    ("DoStep", "a time in the past", QUESTIONABLE, swap_argument(0, lambda walk, a: a[0] - 10 * a[1])),
+    ("DoStep", "NULL results", QUESTIONABLE, swap_argument(3, None)),
+    ("SetTime", "NaN", QUESTIONABLE, swap_argument(0, NAN)),
+    ("SetTime", "infinity", QUESTIONABLE, swap_argument(0, INF)),
+    ("SetTime", "before the start", QUESTIONABLE, swap_argument(0, lambda walk, a: walk.model.start_time - 1.0)),
+    ("SetupExperiment|EnterInitializationMode", "start at NaN", QUESTIONABLE, _change_start(2, NAN)),
+    ("SetupExperiment|EnterInitializationMode", "stop before start", QUESTIONABLE, _change_start(4, -1e9)),
+    ("SetupExperiment|EnterInitializationMode", "tolerance of NaN", QUESTIONABLE, _change_start(1, NAN)),
+    ("SetupExperiment|EnterInitializationMode", "negative tolerance", QUESTIONABLE, _change_start(1, -1.0)),
+    ("GetFMU[sS]tate", "NULL", WRONG, swap_argument(0, None)),
+    ("SetFMU[sS]tate", "NULL state", WRONG, swap_argument(0, None)),
+    ("FreeFMU[sS]tate", "NULL pointer", ACCEPT, swap_argument(0, None)),
+    ("FreeFMU[sS]tate", "pointer to NULL", ACCEPT, swap_argument(0, lambda walk, a: ctypes.c_void_p())),
+    ("Serialize.*", "NULL state", WRONG, swap_argument(0, None)),
+    ("SerializedFMU[sS]tateSize", "NULL size", WRONG, swap_argument(1, None)),
+    ("SerializeFMU[sS]tate", "NULL bytes", WRONG, swap_argument(1, None)),
+    ("SerializeFMU[sS]tate", "too little room", WRONG, _shorten_buffer),
+    ("De[sS]erializeFMU[sS]tate", "NULL bytes", WRONG, swap_argument(0, None)),
+    ("De[sS]erializeFMU[sS]tate", "NULL state", WRONG, swap_argument(2, None)),
+    ("De[sS]erializeFMU[sS]tate", "no bytes", WRONG, _change_bytes(lambda data: b"")),
+    ("De[sS]erializeFMU[sS]tate", "bytes of something else", WRONG, _change_bytes(lambda data: b"this is not a state" * 10)),
+    ("De[sS]erializeFMU[sS]tate", "half of the bytes", WRONG, _change_bytes(lambda data: data[: len(data) // 2])),
+    ("De[sS]erializeFMU[sS]tate", "a byte changed", None, _change_bytes(lambda data: data[:-9] + b"\x55" + data[-8:])),
+    (_PARTIAL, "unknown unknown", WRONG, swap_argument(0, _unknown_references)),
+    (_PARTIAL, "unknown known", WRONG, swap_argument(2, lambda w, a: _unknown_references(w, a[2:3]))),
+    (_PARTIAL, "NULL seed", WRONG, swap_argument(4, None)),
+    (_PARTIAL, "NaN seed", None, _set_first_element(4, NAN)),
+    (_VECTORS, "one too many", WRONG, _lengthen_array),
+    (_VECTORS, "NULL array", WRONG, swap_argument(0, None)),
+    ("SetContinuousStates", "NaN", None, _set_first_element(0, NAN)),
+    (_SLOPES, "order 0", WRONG, _set_first_element(2, 0)),
+    (_SLOPES, "order 1000", WRONG, _set_first_element(2, 1000)),
+    (_SLOPES, "unknown value reference", WRONG, swap_argument(0, _unknown_references)),
+    ("GetStatus|GetRealStatus|GetBooleanStatus|GetStringStatus", "unknown kind", WRONG, swap_argument(0, 99)),
+    ("GetStatus|GetRealStatus|GetBooleanStatus|GetStringStatus", "NULL value", WRONG, swap_argument(1, None)),
+    ("CompletedIntegratorStep", "NULL results", WRONG, swap_argument(1, None)),
+    ("NewDiscreteStates|UpdateDiscreteStates", "NULL results", WRONG, swap_argument(0, None)),
+    ("SetDebugLogging", "unknown category", QUESTIONABLE, _use_unknown_category),
     ("SetDebugLogging", "NULL categories", WRONG, lambda walk, n, a: [True, 1, None]),
 )  # fmt: skip
 
@@ -269,6 +270,6 @@ def bad_starts(model: Model) -> list[BadStart]:
     return starts
 
 
-def refused(status: int) -> bool:
+def is_refused(status: int) -> bool:
     """Return whether a status means that the call was refused."""
     return status > WARNING

@@ -80,7 +80,7 @@ class Report:
     def calls(self) -> int:
         return sum(outcome.calls for outcome in self.outcomes)
 
-    def of(self, *severities: str) -> list[Finding]:
+    def with_severity(self, *severities: str) -> list[Finding]:
         """Return the findings of these severities."""
         return [finding for finding in self.findings if finding.severity in severities]
 
@@ -101,7 +101,7 @@ class Report:
 
     def to_markdown(self) -> str:
         """Return the report as Markdown."""
-        counts = ", ".join(f"{len(self.of(severity))} {severity}" for severity in SEVERITIES)
+        counts = ", ".join(f"{len(self.with_severity(severity))} {severity}" for severity in SEVERITIES)
         lines = [
             f"# Probe of {self.fmu}",
             "",

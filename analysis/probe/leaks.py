@@ -64,7 +64,7 @@ def memory() -> Memory | None:
     return Memory(info.uordblks + info.hblkhd, resident)
 
 
-def leaks(context: Context, case: int) -> None:
+def check_leaks(context: Context, case: int) -> None:
     """Measure the growth of memory over lives of instances (case 0), steps (case 1), or saved states (case 2)."""
     if memory() is None:
         context.say("not made: this system does not say how much memory is used")

@@ -107,7 +107,7 @@ class Model:
     #: Each Real derivative and output with the Real inputs and states on which it may depend.
     dependencies: tuple[tuple[Variable, tuple[Variable, ...]], ...] = field(repr=False)
 
-    def named(self, group: str, condition: str = "x") -> list[Variable]:
+    def select_variables(self, group: str, condition: str = "x") -> list[Variable]:
         """Return the variables of a group of functions that meet one of `CONDITIONS`."""
         meets = CONDITIONS[condition]
         if condition == "2":

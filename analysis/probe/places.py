@@ -65,7 +65,7 @@ def count(model: Model) -> int:
     return len(FOLDERS) + len(_URIS if model.version == 2 else _PATHS)
 
 
-def places(context: Context, case: int) -> None:
+def check_places(context: Context, case: int) -> None:
     """Run the FMU for a short time in a folder with an unusual name, or with another form of the location of its resources."""
     if case < len(FOLDERS):
         _folder(context, FOLDERS[case])

@@ -7,16 +7,16 @@ import math
 from collections.abc import Callable, Sequence
 
 from .context import Context
-from .drive import Inputs, Run, Values, differing, random_inputs, step_size
+from .drive import Inputs, Run, Values, first_difference, random_inputs, step_size
 from .findings import QUESTIONABLE, WRONG
-from .walk import byte_array, serialized
+from .walk import byte_array, serialize
 
 _STEPS = 20
 #: Relative difference between a step and two half steps above which it is questionable.
 SPLIT_TOLERANCE = 1e-2
 
 
-def _course(run: Run, steps: Sequence[Inputs]) -> list[Values]:
+def _run_steps(run: Run, steps: Sequence[Inputs]) -> list[Values]:
     values = []
     for inputs in steps:
         run.step(step_size(run.model), inputs)
@@ -26,23 +26,23 @@ def _course(run: Run, steps: Sequence[Inputs]) -> list[Values]:
 
 def _compare(context: Context, one: Sequence[Values], other: Sequence[Values], key: str, what: str) -> None:
     for number, (a, b) in enumerate(zip(one, other), 1):
-        name = differing(a, b, context.model)
+        name = first_difference(a, b, context.model)
         if name:
             context.note(WRONG, key, f"{what}: {name} differs from step {number} on")
             return
 
 
-def repeated(context: Context, case: int) -> None:
+def check_repetition(context: Context, case: int) -> None:
     """Check that the same calls give the same values in a new instance, after a reset, and beside another instance."""
     steps = random_inputs(context.random(case), context.model, _STEPS)
     first = Run(context.session())
-    expected = _course(first, steps)
+    expected = _run_steps(first, steps)
     first.session.need("Reset")
     again = Run(first.session, instantiate=False)
     _compare(
         context,
         expected,
-        _course(again, steps),
+        _run_steps(again, steps),
         "Reset: another run",
         "a run after Reset is not that of a new instance",
     )
@@ -52,8 +52,8 @@ def repeated(context: Context, case: int) -> None:
     one, other = Run(context.session()), Run(context.session())
     courses: tuple[list[Values], list[Values]] = ([], [])
     for inputs, different in zip(steps, reversed(steps)):
-        courses[0].extend(_course(one, [inputs]))
-        courses[1].extend(_course(other, [different]))
+        courses[0].extend(_run_steps(one, [inputs]))
+        courses[1].extend(_run_steps(other, [different]))
     one.session.free()
     _compare(
         context,
@@ -66,7 +66,7 @@ def repeated(context: Context, case: int) -> None:
     other.session.free()
 
 
-def restored(context: Context, case: int) -> None:
+def check_restoring(context: Context, case: int) -> None:
     """Check that a run continued from a restored state is bit-identical, whatever the instance did before."""
     rng = context.random(case)
     steps = random_inputs(rng, context.model, 2 * _STEPS)
@@ -75,10 +75,10 @@ def restored(context: Context, case: int) -> None:
         run.step(step_size(context.model), inputs)
     state, time, event = run.save(), run.time, run.next_event
     at = run.values()
-    expected = _course(run, steps[_STEPS:])
+    expected = _run_steps(run, steps[_STEPS:])
     ways: list[tuple[str, Callable[[], object]]] = [
         ("after more steps", lambda: None),
-        ("after other steps", lambda: _course(run, steps[:5])),
+        ("after other steps", lambda: _run_steps(run, steps[:5])),
         ("after Terminate", lambda: run.session.need("Terminate")),
         ("after Reset", lambda: run.session.need("Reset")),
     ]
@@ -87,24 +87,24 @@ def restored(context: Context, case: int) -> None:
         run.restore(state, time, event)
         what = f"a run continued from a state that was restored {way} is not the run that was saved"
         _compare(context, [at], [run.values()], f"{way}: state not restored", what)
-        _compare(context, expected, _course(run, steps[_STEPS:]), f"{way}: state not restored", what)
+        _compare(context, expected, _run_steps(run, steps[_STEPS:]), f"{way}: state not restored", what)
     run.forget(state)
     run.session.free()
 
 
-def serialize_here(context: Context, case: int) -> None:
+def check_serializing(context: Context, case: int) -> None:
     """Check that a state gives the same bytes each time; write them and the run that follows, for another process."""
     steps = random_inputs(context.random(case), context.model, 2 * _STEPS)
     run = Run(context.session())
-    _course(run, steps[:_STEPS])
+    _run_steps(run, steps[:_STEPS])
     state = run.save()
-    data = serialized(run.session, state)
-    if serialized(run.session, state) != data:
+    data = serialize(run.session, state)
+    if serialize(run.session, state) != data:
         context.note(
             QUESTIONABLE, "SerializeFMUState: other bytes", "two serializations of one state are not the same bytes"
         )
     time, event = run.time, run.next_event
-    expected = _course(run, steps[_STEPS:])
+    expected = _run_steps(run, steps[_STEPS:])
     run.forget(state)
     run.session.free()
     kept = {"data": data.hex(), "time": time, "event": None if math.isinf(event) else event}
@@ -113,7 +113,7 @@ def serialize_here(context: Context, case: int) -> None:
     context.say(f"{len(data)} bytes")
 
 
-def deserialize_there(context: Context, case: int) -> None:
+def check_deserializing(context: Context, case: int) -> None:
     """Check that a run continued from the bytes of another process gives the same values as in that process."""
     path = context.work / f"serialized-{context.model.interface}-{case}.json"
     if not path.exists():
@@ -129,12 +129,12 @@ def deserialize_there(context: Context, case: int) -> None:
     run.restore(state, kept["time"], math.inf if kept["event"] is None else kept["event"])
     expected = [{group: bytes.fromhex(value) for group, value in values.items()} for values in kept["values"]]
     what = "a run continued from a state of another process is not the run that was serialized"
-    _compare(context, expected, _course(run, steps[_STEPS:]), "another process: state not restored", what)
+    _compare(context, expected, _run_steps(run, steps[_STEPS:]), "another process: state not restored", what)
     run.forget(state)
     run.session.free()
 
 
-def split(context: Context, case: int) -> None:
+def compare_half_steps(context: Context, case: int) -> None:
     """Compare one step h with two steps h/2 at constant inputs; measure the largest difference of an output."""
     model = context.model
     if model.fixed_step:

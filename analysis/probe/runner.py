@@ -107,7 +107,7 @@ def probe(
             text = f"model description: {problem}"
             report.add(Finding(severity=WRONG, key=f"static: {problem}", text=text, calls=[], replay=""))
         until = time.monotonic() + seconds
-        for name in _chosen(interface, interfaces(description)):
+        for name in _select_interfaces(interface, interfaces(description)):
             model = read_model(work / "fmu", name)
             for check, about in CHECKS.items():
                 if (checks and check not in checks) or (about.cases is not None and about.cases(model) == 0):
@@ -134,7 +134,7 @@ def replay(fmu: str | Path, case: str, *, hang: float = 10.0) -> tuple[list[str]
     with tempfile.TemporaryDirectory(prefix="probe-") as temporary:
         work = Path(temporary)
         description = _extract(Path(fmu), work / "fmu")
-        _chosen(interface, interfaces(description))
+        _select_interfaces(interface, interfaces(description))
         report = Report(fmu=Path(fmu).name, fmi_version=description.fmiVersion, seed=int(seed))
         for name in [*(["serialize"] if check == "deserialize" else []), check]:
             job = _Job(
@@ -162,7 +162,7 @@ def _extract(fmu: Path, folder: Path) -> Any:
     return description
 
 
-def _chosen(interface: str | None, offered: Sequence[str]) -> Sequence[str]:
+def _select_interfaces(interface: str | None, offered: Sequence[str]) -> Sequence[str]:
     if interface is not None and interface not in offered:
         raise InputError(
             f"the FMU has no interface {interface!r}: it has {', '.join(offered) or 'none that is probed'}"
@@ -213,7 +213,7 @@ def _one_process(job: _Job, report: Report, begun: float) -> bool:
     if any("finished" in record for record in records):
         job.stopped = "finished"
     elif code != AFTER_FATAL:
-        _crashed(job, report, entry, subject, "hangs" if hangs else f"ends with {_ending(code)}", errors)
+        _record_crash(job, report, entry, subject, "hangs" if hangs else f"ends with {_describe_end(code)}", errors)
     if sum(job.crashes.values()) >= _CRASHES:
         job.stopped = f"ended after {_CRASHES} crashes"
     return True
@@ -271,7 +271,7 @@ def _collect(records: Sequence[dict[str, Any]], job: _Job, report: Report) -> st
     return subject
 
 
-def _crashed(job: _Job, report: Report, entry: journal.Entry, subject: str, how: str, errors: str) -> None:
+def _record_crash(job: _Job, report: Report, entry: journal.Entry, subject: str, how: str, errors: str) -> None:
     last = entry.lines[-1] if entry.lines else ""
     name = last.split("(")[0] or "the loading of the library"
     where = f"after {name}" if " -> " in last else f"in {name}"
@@ -289,7 +289,7 @@ def _crashed(job: _Job, report: Report, entry: journal.Entry, subject: str, how:
         job.stopped = "ended: it crashes before the first case"
 
 
-def _ending(code: int) -> str:
+def _describe_end(code: int) -> str:
     try:
         return signal.Signals(-code).name if code < 0 else f"exit code {code}"
     except ValueError:

@@ -7,7 +7,7 @@ import random
 from functools import cached_property
 
 from .context import Context
-from .faults import ACCEPT, BadStart, Fault, bad_starts, catalogue, refused
+from .faults import ACCEPT, BadStart, Fault, bad_starts, catalogue, is_refused
 from .findings import QUESTIONABLE, WRONG
 from .session import ERROR, FATAL, OK, Session
 from .walk import Walk, access
@@ -16,13 +16,15 @@ from .walk import Walk, access
 _LENGTH = 60
 
 
-def legal(context: Context, case: int) -> None:
+def run_legal_calls(context: Context, case: int) -> None:
     """Run one instance through random legal calls, and check that they are accepted."""
     rng = context.random(case)
     session = context.session()
     if not session.instantiate(event_mode=rng.random() < 0.7, early_return=rng.random() < 0.5):
         context.note(
-            WRONG, "Instantiate: NULL", f"{session.prefix}Instantiate returned NULL for a legal call{_said(session)}"
+            WRONG,
+            "Instantiate: NULL",
+            f"{session.prefix}Instantiate returned NULL for a legal call{_last_message(session)}",
         )
         return
     walk = Walk(session, rng, context.note)
@@ -33,7 +35,7 @@ def legal(context: Context, case: int) -> None:
     _end(walk)
 
 
-class Forbidden:
+class ForbiddenCalls:
     """A case of lives of instances with one forbidden call each: the faults of the catalogue in turn."""
 
     def __init__(self, context: Context) -> None:
@@ -62,7 +64,7 @@ class Forbidden:
             self._start(walk, fault)
         elif session.instantiate(event_mode=rng.random() < 0.5):
             self._call(walk, fault, case // len(self.faults))
-            _aftermath(walk)
+            _make_later_calls(walk)
 
     def _start(self, walk: Walk, fault: BadStart) -> None:
         session = walk.session
@@ -76,7 +78,7 @@ class Forbidden:
                 QUESTIONABLE, fault.key, f"{session.prefix}Instantiate refuses {fault.what}, which is allowed"
             )
         if made:
-            _aftermath(walk)
+            _make_later_calls(walk)
 
     def _call(self, walk: Walk, fault: Fault, again: int) -> None:
         session, machine = walk.session, walk.machine
@@ -101,9 +103,9 @@ class Forbidden:
         status = session.call_instance(instance, fault.function, *changed)
         full = f"{session.prefix}{fault.function}"
         if fault.accepted == ACCEPT:
-            if refused(status):
+            if is_refused(status):
                 self.context.note(QUESTIONABLE, fault.key, f"{full} refuses {fault.what}, which the standard allows")
-        elif not refused(status) and fault.accepted is not None:
+        elif not is_refused(status) and fault.accepted is not None:
             what = f"a call in the state {state!r}, where it is not allowed" if fault.state else fault.what
             self.context.note(fault.accepted, fault.key, f"{full} accepts {what}")
         elif status == FATAL:
@@ -117,11 +119,11 @@ class Forbidden:
                 f"{full} logs no reason for its Error, with logging on",
             )
         elif fault.what in ("NaN", "infinity"):
-            self._poisoned(walk, fault)
+            self._check_nan_step(walk, fault)
         if status == ERROR and instance:
             walk.state = "error"
 
-    def _poisoned(self, walk: Walk, fault: Fault) -> None:
+    def _check_nan_step(self, walk: Walk, fault: Fault) -> None:
         """Check whether a step with NaN in an input returns OK and outputs that are NaN."""
         outputs = [v for v in walk.model.variables if v.causality == "output" and v.group == fault.function[3:]]
         if not outputs or walk.state != "step" or not walk.call("DoStep"):
@@ -132,12 +134,12 @@ class Forbidden:
             self.context.note(QUESTIONABLE, f"{fault.key}: goes through", text)
 
 
-def _aftermath(walk: Walk) -> None:
+def _make_later_calls(walk: Walk) -> None:
     """Make calls that may follow a forbidden call: read, continue, reset, end. Only a crash is a finding."""
     for _ in range(walk.rng.randint(0, 12)):
         walk.step()
     if walk.state == "error" and walk.rng.random() < 0.5 and walk.session.call("Reset") == OK:
-        walk.after("Reset", [], OK)
+        walk.follow_call("Reset", [], OK)
         walk.go("step" if walk.model.interface == "cs" else "continuous")
     _end(walk)
 
@@ -149,5 +151,5 @@ def _end(walk: Walk) -> None:
         walk.session.free()
 
 
-def _said(session: Session) -> str:
+def _last_message(session: Session) -> str:
     return f": {session.messages[-1]}" if session.messages else ""

@@ -18,10 +18,10 @@ _DIFFERENCES = (1e-3, 1e-4, 1e-5, 1e-6, 1e-7)
 DERIVATIVE_TOLERANCE = 1e-4
 
 
-def derivatives(context: Context, case: int) -> None:
+def check_derivatives(context: Context, case: int) -> None:
     """Compare directional derivatives with finite differences, and adjoint with directional derivatives, at random states."""
     model, rng = context.model, context.random(case)
-    run = _at_a_point(context, case)
+    run = _run_at_random_state(context, case)
     worst, name = 0.0, ""
     for unknown, knowns in rng.sample(model.dependencies, min(len(model.dependencies), 40)):
         knowns = tuple(k for k in knowns if model.interface == "me" or k.causality == "input")
@@ -37,7 +37,7 @@ def derivatives(context: Context, case: int) -> None:
                 context.note(WRONG, f"d {unknown.name} / d {known.name}: derivative", text)
         if knowns:
             seed = [rng.gauss(0, 1) for _ in knowns]
-            _sums(context, run, unknown, knowns, seed, row)
+            _check_sums(context, run, unknown, knowns, seed, row)
     run.session.free()
     context.say(f"largest relative error {worst:.1e}{' of ' + name if name else ''}")
 
@@ -47,7 +47,7 @@ def _floor(unknown: Variable) -> float:
     return 1e-8 * abs(unknown.nominal)
 
 
-def _at_a_point(context: Context, case: int) -> Run:
+def _run_at_random_state(context: Context, case: int) -> Run:
     """Return a run in a mode that allows derivatives: continuous-time mode, or initialization mode for co-simulation."""
     exchange = context.model.interface == "me"
     run = Run(context.session(), finish=exchange)
@@ -98,7 +98,7 @@ def _put(run: Run, known: Variable, value: float) -> None:
     run.session.need("SetContinuousStates", states, len(states))
 
 
-def _sums(
+def _check_sums(
     context: Context,
     run: Run,
     unknown: Variable,
@@ -126,7 +126,7 @@ def _sums(
                 context.note(WRONG, f"d {unknown.name} / d {known.name}: adjoint derivative", text)
 
 
-def bounds(context: Context, case: int) -> None:
+def check_bounds(context: Context, case: int) -> None:
     """Check that over a run with random inputs each variable stays within its declared bounds and no output is NaN."""
     model = context.model
     numbers = [v for v in model.variables if v.group not in ("String", "Boolean") and v.size == 1]
@@ -148,11 +148,15 @@ def bounds(context: Context, case: int) -> None:
     run.session.free()
 
 
-def starts(context: Context, case: int) -> None:
+def check_starts(context: Context, case: int) -> None:
     """Check that parameters and inputs have the start values of the model description after the initialization."""
     run = Run(context.session())
     for group in context.model.groups:
-        chosen = [v for v in context.model.named(group, "3") if v.size == 1 and v.causality in ("parameter", "input")]
+        chosen = [
+            v
+            for v in context.model.select_variables(group, "3")
+            if v.size == 1 and v.causality in ("parameter", "input")
+        ]
         for variable, found in zip(chosen, run.get(chosen) if chosen else ()):
             expected = context.model.c_types[group](variable.start).value
             if (found or (b"" if group == "String" else 0)) != expected:
@@ -161,7 +165,7 @@ def starts(context: Context, case: int) -> None:
     run.session.free()
 
 
-def past_the_end(context: Context, case: int) -> None:
+def check_step_past_end(context: Context, case: int) -> None:
     """Check that a step past the stop time is refused, as both standards require."""
     size = step_size(context.model)
     run = Run(context.session(), stop=context.model.start_time + 4 * size)
@@ -195,7 +199,7 @@ def bounded_parameters(model: Model) -> list[tuple[Variable, float]]:
     return [(v, x) for v, x in beyond if v.is_real or "U" not in v.group or x >= 0]
 
 
-def out_of_bounds(context: Context, case: int) -> None:
+def check_parameter_bounds(context: Context, case: int) -> None:
     """Check that a parameter beyond its bounds is refused when it is set, or at the end of the initialization."""
     variable, beyond = bounded_parameters(context.model)[case]
     session = context.session()

@@ -82,9 +82,9 @@ class Walk:
         self.forced: str | None = None
         self.saved: list[tuple[Any, str, float, float]] = []
         self.judged = self.logging = True
-        self.functions = [name for name in self.machine.allowed if self._offered(name)]
+        self.functions = [name for name in self.machine.allowed if self._is_offered(name)]
 
-    def _offered(self, name: str) -> bool:
+    def _is_offered(self, name: str) -> bool:
         """Return whether the FMU declares a function, or has variables for it."""
         key, model = name.lower(), self.model
         if "serializ" in key:
@@ -129,7 +129,7 @@ class Walk:
             return False
         for function in self.machine.path(target, self.session.event_mode) or []:
             for _ in range(self.rng.randint(0, most)):
-                names = [n for n in self.functions if self.cell(n) not in ".?" and self._stays(n)]
+                names = [n for n in self.functions if self.cell(n) not in ".?" and self._keeps_state(n)]
                 if names:
                     self.call(self.rng.choice(names))
             if self.cell(function) in ".?":
@@ -143,7 +143,7 @@ class Walk:
                     return False  # an event iteration that does not end
         return self.state == target
 
-    def _stays(self, name: str) -> bool:
+    def _keeps_state(self, name: str) -> bool:
         return self.machine.follow(name, "", True) == "" and name.lower() != "setfmustate"
 
     def call(self, name: str) -> bool:
@@ -154,7 +154,7 @@ class Walk:
         before = self.state
         status = self.session.call(name, *arguments)
         self._judge(name, before, status)
-        self.after(name, arguments, status)
+        self.follow_call(name, arguments, status)
         return status <= WARNING
 
     def _judge(self, name: str, state: str, status: int) -> None:
@@ -174,7 +174,7 @@ class Walk:
                 f"{full} returned Error for a legal call in the state {state!r}{said}",
             )
 
-    def after(self, name: str, arguments: Sequence[Any], status: int) -> None:
+    def follow_call(self, name: str, arguments: Sequence[Any], status: int) -> None:
         """Update the state of the machine after a call, and keep what the call returned."""
         if status == ERROR:
             self.state = "error"
@@ -203,9 +203,9 @@ class Walk:
         cell = self.cell(verb + group)
         if cell in ".?":  # only for a call out of order
             cell = "x" if verb == "Get" else "3"
-        variables = self.model.named(group, cell)
+        variables = self.model.select_variables(group, cell)
         if not variables and whatever:
-            variables = self.model.named(group)
+            variables = self.model.select_variables(group)
         if not variables:
             return None
         chosen = self.rng.sample(variables, min(len(variables), self.rng.randint(1, 4)))
@@ -232,11 +232,11 @@ def access(model: Model, variables: Sequence[Variable], values: Sequence[Any] = 
     return [references(variables), len(variables), array, *([size] if model.version == 3 else [])]
 
 
-def _setup(walk: Walk) -> list[Any]:
+def _setup_arguments(walk: Walk) -> list[Any]:
     return [walk.rng.random() < 0.5, 1e-6, walk.model.start_time, 0, 0.0]
 
 
-def _do_step(walk: Walk) -> list[Any]:
+def _step_arguments(walk: Walk) -> list[Any]:
     size = walk.model.step * (1.0 if walk.model.fixed_step else walk.rng.choice([1.0, 1.0, 0.1, 0.37, 2.0]))
     if walk.model.version == 2:
         return [walk.time, size, 0]
@@ -252,7 +252,7 @@ def _get_state(walk: Walk) -> list[Any] | None:
     return [walk.rng.choice(walk.saved)[0]] if reuse else [ctypes.c_void_p()]
 
 
-def serialized(session: Session, state: Any) -> bytes:
+def serialize(session: Session, state: Any) -> bytes:
     """Return the bytes of a saved state."""
     size = ctypes.c_size_t()
     session.need("SerializedFMUStateSize", state, size)
@@ -349,13 +349,13 @@ def _input_derivatives(walk: Walk) -> list[Any] | None:
     return [references([walk.rng.choice(inputs)]), 1, (ctypes.c_int * 1)(1), (ctypes.c_double * 1)(slope)]
 
 
-def _update(walk: Walk) -> list[Any]:
+def _update_arguments(walk: Walk) -> list[Any]:
     if walk.model.version == 2:
         return [fmi2.fmi2EventInfo()]
     return [*(ctypes.c_bool() for _ in range(5)), ctypes.c_double()]
 
 
-def _completed(walk: Walk) -> list[Any]:
+def _completed_step_arguments(walk: Walk) -> list[Any]:
     kind = ctypes.c_int if walk.model.version == 2 else ctypes.c_bool
     return [0, kind(), kind()]
 
@@ -363,9 +363,9 @@ def _completed(walk: Walk) -> list[Any]:
 #: Functions that make legal arguments, by the name of an FMI function in lower case; other functions have no arguments.
 _ARGUMENTS: dict[str, Callable[[Walk], list[Any] | None]] = {
     "setdebuglogging": lambda walk: [walk.rng.random() < 0.9, 0, None],
-    "setupexperiment": _setup,
-    "enterinitializationmode": lambda walk: _setup(walk) if walk.model.version == 3 else [],
-    "dostep": _do_step,
+    "setupexperiment": _setup_arguments,
+    "enterinitializationmode": lambda walk: _setup_arguments(walk) if walk.model.version == 3 else [],
+    "dostep": _step_arguments,
     "getfmustate": _get_state,
     "setfmustate": _set_state,
     "freefmustate": _set_state,
@@ -386,9 +386,9 @@ _ARGUMENTS: dict[str, Callable[[Walk], list[Any] | None]] = {
     "getrealoutputderivatives": _output_derivatives,
     "getoutputderivatives": _output_derivatives,
     "setrealinputderivatives": _input_derivatives,
-    "newdiscretestates": _update,
-    "updatediscretestates": _update,
-    "completedintegratorstep": _completed,
+    "newdiscretestates": _update_arguments,
+    "updatediscretestates": _update_arguments,
+    "completedintegratorstep": _completed_step_arguments,
     "getstatus": lambda walk: [fmi2.fmi2DoStepStatus, ctypes.c_int()],
     "getrealstatus": lambda walk: [fmi2.fmi2LastSuccessfulTime, ctypes.c_double()],
     "getbooleanstatus": lambda walk: [fmi2.fmi2Terminated, ctypes.c_int()],
@@ -398,7 +398,7 @@ _ARGUMENTS: dict[str, Callable[[Walk], list[Any] | None]] = {
 }  # fmt: skip
 
 
-def _stepped(walk: Walk, arguments: Sequence[Any]) -> None:
+def _follow_step(walk: Walk, arguments: Sequence[Any]) -> None:
     walk.time += arguments[1]
     if walk.model.version == 3:
         event, terminate, early, reached = (argument.value for argument in arguments[3:])
@@ -407,20 +407,20 @@ def _stepped(walk: Walk, arguments: Sequence[Any]) -> None:
         walk.forced = "Terminate" if terminate else "EnterEventMode" if event else None
 
 
-def _kept(walk: Walk, arguments: Sequence[Any]) -> None:
+def _follow_save(walk: Walk, arguments: Sequence[Any]) -> None:
     walk.saved = [entry for entry in walk.saved if entry[0] is not arguments[-1]]
     if walk.state not in ("error", "failed"):
         walk.saved.append((arguments[-1], walk.state, walk.time, walk.next_event))
 
 
-def _restored(walk: Walk, arguments: Sequence[Any]) -> None:
+def _follow_restore(walk: Walk, arguments: Sequence[Any]) -> None:
     walk.forced = None
     for state, *rest in walk.saved:
         if state is arguments[0]:
             walk.state, walk.time, walk.next_event = rest  # type: ignore[assignment]
 
 
-def _freed(walk: Walk, arguments: Sequence[Any]) -> None:
+def _follow_free(walk: Walk, arguments: Sequence[Any]) -> None:
     if arguments[0].value:
         walk.note(
             QUESTIONABLE,
@@ -430,7 +430,7 @@ def _freed(walk: Walk, arguments: Sequence[Any]) -> None:
     walk.saved = [entry for entry in walk.saved if entry[0] is not arguments[0]]
 
 
-def _updated(walk: Walk, arguments: Sequence[Any]) -> None:
+def _follow_update(walk: Walk, arguments: Sequence[Any]) -> None:
     info = arguments[0]
     fields = (
         [getattr(info, name) for name, _ in info._fields_] if walk.model.version == 2 else [a.value for a in arguments]
@@ -441,31 +441,31 @@ def _updated(walk: Walk, arguments: Sequence[Any]) -> None:
     walk.forced = "Terminate" if terminate else None
 
 
-def _integrated(walk: Walk, arguments: Sequence[Any]) -> None:
+def _follow_integrator_step(walk: Walk, arguments: Sequence[Any]) -> None:
     walk.forced = "Terminate" if arguments[2].value else "EnterEventMode" if arguments[1].value else None
 
 
-def _at(walk: Walk, arguments: Sequence[Any]) -> None:
+def _follow_time(walk: Walk, arguments: Sequence[Any]) -> None:
     walk.time = arguments[0]
 
 
-def _begun(walk: Walk, arguments: Sequence[Any]) -> None:
+def _follow_reset(walk: Walk, arguments: Sequence[Any]) -> None:
     walk.time, walk.next_event, walk.forced = walk.model.start_time, math.inf, None
 
 
-def _logged(walk: Walk, arguments: Sequence[Any]) -> None:
+def _follow_logging(walk: Walk, arguments: Sequence[Any]) -> None:
     walk.logging = bool(arguments[0])
 
 
 _AFTER: dict[str, Callable[[Walk, Sequence[Any]], None]] = {
-    "dostep": _stepped,
-    "getfmustate": _kept,
-    "setfmustate": _restored,
-    "freefmustate": _freed,
-    "newdiscretestates": _updated,
-    "updatediscretestates": _updated,
-    "completedintegratorstep": _integrated,
-    "settime": _at,
-    "reset": _begun,
-    "setdebuglogging": _logged,
+    "dostep": _follow_step,
+    "getfmustate": _follow_save,
+    "setfmustate": _follow_restore,
+    "freefmustate": _follow_free,
+    "newdiscretestates": _follow_update,
+    "updatediscretestates": _follow_update,
+    "completedintegratorstep": _follow_integrator_step,
+    "settime": _follow_time,
+    "reset": _follow_reset,
+    "setdebuglogging": _follow_logging,
 }

@@ -99,7 +99,7 @@ class Loops:
         slide = about_k(Dual(np.zeros_like(s4), s4))
         return cast(Dual, self.guide_frame @ slide @ about_i(Dual(p.guide_twist, p.guide_offset)))
 
-    def corrected(self) -> Loops:
+    def take_newton_step(self) -> Loops:
         """Return the loops after one step of Newton's method; raises LinAlgError if its equations are singular."""
         length = scale(self.parameters, self.shift)
         step = _correction(self.product, self.rod_frame, self.guide_frame, length)
@@ -155,7 +155,7 @@ def planar_loops(p: SliderCrankParameters, th: Array, s1: Array) -> Loops:
     )
 
 
-def _moved(start: Closure, th: Array, s1: Array) -> Loops:
+def _start_nearby(start: Closure, th: Array, s1: Array) -> Loops:
     """Return a start from closed loops nearby, one or one for each point: the rod keeps its orientation in space."""
     if start.crank_angle.size not in (1, th.size):
         raise InputError(
@@ -207,7 +207,7 @@ def close(
             f"the rod of {p.rod_length:.6g} m does not reach the guide at theta1 = {th[worst]:.6g} rad, S1 = {s1[worst]:.6g} "
             f"m: the crank pin is {p.rod_length + lacking[worst]:.6g} m from it, {lacking[worst]:.3g} m too far"
         )
-    loops = planar_loops(p, th, s1) if start is None else replace(_moved(start, th, s1), parameters=p)
+    loops = planar_loops(p, th, s1) if start is None else replace(_start_nearby(start, th, s1), parameters=p)
     iterations, found = 0, False
     while not found and iterations < MAX_ITERATIONS:
         iterations += 1
@@ -215,7 +215,7 @@ def close(
         # one more step from inside the tolerance, after which only rounding errors remain
         found = bool(np.all(rotation <= TOLERANCE) and np.all(distance <= TOLERANCE * length))
         try:
-            loops = loops.corrected()
+            loops = loops.take_newton_step()
         except np.linalg.LinAlgError:
             break
     rotation, distance = residuals(loops.product)

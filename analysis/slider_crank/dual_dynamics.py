@@ -27,7 +27,7 @@ from linkwork.slider_crank.parameters import SliderCrankParameters
 from ..numerics.dual import Dual, about_i, apply, cross, join, stack
 from .closure import Closure, close, scale
 from .forces import NO_LEVER, SLIDER_FORCE, ForceTurn
-from .quantities import DEAD_CENTRE, JOINTS, FloatArray, check_joint, per_angle
+from .quantities import DEAD_CENTRE, JOINTS, FloatArray, array_per_angle, check_joint
 from .shifts import has_shaft_groove, plant_functions
 
 #: Cosine of the angle between rod and guide below which the loop is at the limit of assembly.
@@ -157,8 +157,11 @@ def rates(
         At the limit of assembly, where the rod is perpendicular to the guide.
     """
     n = closure.crank_angle.size
-    w, v = per_angle("speed", speed, n), per_angle("shift_velocity", shift_velocity, n)
-    e, a = per_angle("acceleration", acceleration, n), per_angle("shift_acceleration", shift_acceleration, n)
+    w, v = array_per_angle("speed", speed, n), array_per_angle("shift_velocity", shift_velocity, n)
+    e, a = (
+        array_per_angle("acceleration", acceleration, n),
+        array_per_angle("shift_acceleration", shift_acceleration, n),
+    )
     k = np.array([0.0, 0.0, 1.0])
     rod, guide = closure.rod_frame, closure.guide_frame
     cosine = np.abs(np.sum(rod.real[..., 0] * guide.real[..., 2], -1))
@@ -287,7 +290,9 @@ def joint_loads(
     # the moment equation of the rod about its own line is always satisfied
     kept = np.delete(np.arange(18), 9)
     given, value = (5, torque) if torque is not None else (17, slider_force)
-    known = per_angle("torque" if torque is not None else "slider_force", value, n) / (length if given == 5 else 1.0)
+    known = array_per_angle("torque" if torque is not None else "slider_force", value, n) / (
+        length if given == 5 else 1.0
+    )
     free = np.delete(np.arange(18), given)
     unknown = np.linalg.solve(
         matrix[:, kept[:, None], free], (load[:, kept] - known[:, None] * matrix[:, kept, given])[..., None]

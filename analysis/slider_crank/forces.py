@@ -8,7 +8,7 @@ thesis's problem). Load and torque are related by the crank's equation of motion
 
 where T0 is the torque without load. The first problem is therefore regular wherever the mechanism can be assembled, and the
 second has a pole where kth = 0: at the dead centres, where the slider's force has no lever on the crank. The values there are
-masked; `ForceTurn.masked` gives the reason.
+masked; `ForceTurn.mask_reasons` gives the reason.
 
 The equations are the plant's own (`linkwork.slider_crank.dynamics`), evaluated on arrays.
 """
@@ -41,10 +41,10 @@ from .quantities import (
     JOINTS,
     FloatArray,
     MaskedArray,
+    array_per_angle,
     check_joint,
     float_array,
     masked_array,
-    per_angle,
     unit_table,
 )
 from .shifts import ConstantShift, Course, ShiftLaw, ShiftMotion, has_shaft_groove, plant_functions, with_groove
@@ -226,7 +226,7 @@ class ForceTurn:
         return np.asarray(np.hypot(r.x, r.y) <= _PARALLEL * p.a2)
 
     @cached_property
-    def masked(self) -> tuple[str, ...]:
+    def mask_reasons(self) -> tuple[str, ...]:
         """Sentences about masked values with the reasons, one for each set of consecutive angles."""
         sentences = [NO_LEVER] if self.without_lever else []
         dead = np.ma.getmaskarray(self.slider_force) & (not sentences)
@@ -235,9 +235,9 @@ class ForceTurn:
             (self._parallel, "the rod is parallel to the crank axis", "frame 3 has no direction across it"),
         ):
             for first, last in _runs(flags):
-                place = f"crank angle {_deg(self.angle[first])} deg"
+                place = f"crank angle {_degrees_text(self.angle[first])} deg"
                 if last > first:
-                    ends = f"{_deg(self.angle[first])} to {_deg(self.angle[last])} deg"
+                    ends = f"{_degrees_text(self.angle[first])} to {_degrees_text(self.angle[last])} deg"
                     place = f"all {last - first + 1} crank angles from {ends}"
                 sentences.append(f"{what} at {place}: {why}")
         return tuple(sentences)
@@ -297,7 +297,7 @@ class ForceTurn:
             with np.errstate(divide="ignore", invalid="ignore"):
                 turned = f.to_rod_frame(components, q, p)
             mask = mask | self._parallel[:, None]
-        return np.ma.MaskedArray(_stacked(turned, len(self)), mask=mask, fill_value=np.nan)
+        return np.ma.MaskedArray(_stack_components(turned, len(self)), mask=mask, fill_value=np.nan)
 
     def columns(self, units: str = "SI", frames: tuple[int, ...] = (1, 2, 3, 4)) -> dict[str, FloatArray]:
         """Return all values by name with unit, for a file; masked values are NaN, and the last two columns give the reasons.
@@ -402,17 +402,19 @@ def force_turn(
         )
     th = _crank_angles(angles)
     n = th.size
-    w, e = per_angle("crank_speed", crank_speed, n), per_angle("crank_acceleration", crank_acceleration, n)
+    w, e = array_per_angle("crank_speed", crank_speed, n), array_per_angle("crank_acceleration", crank_acceleration, n)
     given = (
-        per_angle("torque", torque, n) if torque is not None else per_angle("load", 0.0 if load is None else load, n)
+        array_per_angle("torque", torque, n)
+        if torque is not None
+        else array_per_angle("load", 0.0 if load is None else load, n)
     )
     moving = ShiftMotion(
-        *(per_angle(f"the shift law's {name}", x, n) for name, x in shift.at(th, w, e)._asdict().items())
+        *(array_per_angle(f"the shift law's {name}", x, n) for name, x in shift.at(th, w, e)._asdict().items())
     )
     p = with_groove(parameters.constants(), shift)
     reached = plant_functions().assembly_square(th, moving.shift, p) >= (LIMIT_SINE * p.a2) ** 2
     if not (reached.any() if partial else reached.all()):
-        raise _not_assembled(parameters, shift, th, moving.shift, reached)
+        raise _assembly_error(parameters, shift, th, moving.shift, reached)
     unreachable = th[~reached]
     th, w, e, given = (x[reached] for x in (th, w, e, given))
     moving = ShiftMotion(*(x[reached] for x in moving))
@@ -447,7 +449,9 @@ def force_turn(
         # the moment on the guide does not depend on the load
         _joints=MappingProxyType(
             {
-                name: masked_array(_stacked(getattr(r, name), n), (never if name == "guide_moment" else dead)[:, None])
+                name: masked_array(
+                    _stack_components(getattr(r, name), n), (never if name == "guide_moment" else dead)[:, None]
+                )
                 for name in JOINTS
             }
         ),
@@ -466,16 +470,16 @@ def _crank_angles(angles: ArrayLike | None) -> FloatArray:
     return th
 
 
-def _stacked(vector: Vector, n: int) -> FloatArray:
+def _stack_components(vector: Vector, n: int) -> FloatArray:
     """Return the components of a vector as an array (n, 3)."""
     return np.stack([np.broadcast_to(x, (n,)) for x in vector], axis=-1).astype(float)
 
 
-def _deg(angle: float) -> str:
+def _degrees_text(angle: float) -> str:
     return f"{degrees(float(angle)):.4f}"
 
 
-def _not_assembled(
+def _assembly_error(
     parameters: SliderCrankParameters, law: ShiftLaw, th: FloatArray, s1: FloatArray, reached: NDArray[np.bool_]
 ) -> AssemblyError:
     """Return the error for angles at which the rod does not reach the guide."""
@@ -487,7 +491,7 @@ def _not_assembled(
     places = "; ".join(
         f"{degrees(float(th[first])):.6g} to {degrees(float(th[last])):.6g} deg" for first, last in _runs(~reached)
     )
-    repeating = law.repeating(parameters)
+    repeating = law.periodic_shift(parameters)
     found = mobility.ranges(parameters, repeating) if repeating is not None else ()
     within = "".join(f"; it can turn from {degrees(r.low):.6g} to {degrees(r.high):.6g} deg" for r in found) or (
         "; it can be assembled at no angle" if repeating is not None else ""

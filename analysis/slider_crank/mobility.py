@@ -307,13 +307,13 @@ def _zeros(function: _Bounded, low: float, high: float, scale: float) -> list[_Z
     return found
 
 
-def _wrapped(angle: float, law: PeriodicShift) -> float:
+def _wrap_angle(angle: float, law: PeriodicShift) -> float:
     """Return the angle reduced to [0, span); the remainder of a tiny negative number, which rounds to the span, becomes 0."""
     wrapped = angle % law.span
     return wrapped if wrapped < law.span else 0.0
 
 
-def _square(angle: float, law: PeriodicShift, p: Constants) -> float:
+def _assembly_square(angle: float, law: PeriodicShift, p: Constants) -> float:
     return kinematics.assembly_square(angle, law.at(angle)[0], p)
 
 
@@ -341,8 +341,8 @@ def greatest_margin(parameters: SliderCrankParameters, law: PeriodicShift) -> Ma
 
 def _margin(choose: Callable[..., float], law: PeriodicShift, p: Constants) -> Margin:
     """Return the least or greatest margin over the turn, chosen by ``choose``, which is min or max."""
-    place = choose(_extremes(law, p), key=lambda angle: _square(angle, law, p))
-    return Margin(p.a2 - sqrt(p.a2 * p.a2 - _square(place, law, p)), _wrapped(place, law))
+    place = choose(_extremes(law, p), key=lambda angle: _assembly_square(angle, law, p))
+    return Margin(p.a2 - sqrt(p.a2 * p.a2 - _assembly_square(place, law, p)), _wrap_angle(place, law))
 
 
 @takes_published()
@@ -385,7 +385,7 @@ def _place(angle: float, law: PeriodicShift, p: Constants, *, limit: bool = Fals
     shift = law.at(angle)[0]
     # at the limit h is set to zero: the square root would magnify the rounding error of the angle
     h = 0.0 if limit else p.branch * sqrt(max(0.0, kinematics.assembly_square(angle, shift, p)))
-    return Place(_wrapped(angle, law), shift, h - p.a1 * sin(angle) * p.sa - shift * p.ca)
+    return Place(_wrap_angle(angle, law), shift, h - p.a1 * sin(angle) * p.sa - shift * p.ca)
 
 
 def _dead_centres(low: float, high: float, law: PeriodicShift, p: Constants, pitch: float) -> tuple[DeadCentre, ...]:
@@ -401,14 +401,14 @@ def _range(low: float, high: float, law: PeriodicShift, p: Constants) -> Range:
     places = [_place(low, law, p, limit=not full), _place(high, law, p, limit=not full)]
     places += [Place(*centre[:3]) for centre in dead]
     places.sort(key=lambda place: place.slider_position)
-    start, end = (0.0, law.span) if full else (_wrapped(low, law), _wrapped(low, law) + (high - low))
+    start, end = (0.0, law.span) if full else (_wrap_angle(low, law), _wrap_angle(low, law) + (high - low))
     return Range(start, end, dead, places[-1], places[0])
 
 
-def _assembled(law: PeriodicShift, p: Constants) -> list[tuple[float, float]]:
+def _find_ranges(law: PeriodicShift, p: Constants) -> list[tuple[float, float]]:
     """Find the ranges (low, high) of crank angles in which the rod reaches the guide."""
     extremes = _extremes(law, p)
-    reached = [_square(angle, law, p) >= 0.0 for angle in extremes]
+    reached = [_assembly_square(angle, law, p) >= 0.0 for angle in extremes]
     if all(reached):
         return [(_SEAM, _SEAM + law.span)]
     # between two extremes D is monotonic; the last interval ends at the first extreme plus a span
@@ -417,12 +417,12 @@ def _assembled(law: PeriodicShift, p: Constants) -> list[tuple[float, float]]:
     ends: list[float] = []
     for (a, b), at_a, at_b in zip(pairwise(closed), reached, [*reached[1:], reached[0]]):
         if at_a != at_b:
-            crossing = _bisect(lambda x: _square(x, law, p) >= 0.0, a, b)
+            crossing = _bisect(lambda x: _assembly_square(x, law, p) >= 0.0, a, b)
             (ends if at_a else starts).append(crossing)
     # a range that contains the seam ends at the first crossing after it, plus a span
     if ends and ends[0] < starts[0]:
         ends.append(ends.pop(0) + law.span)
-    return sorted(zip(starts, ends), key=lambda pair: _wrapped(pair[0], law))
+    return sorted(zip(starts, ends), key=lambda pair: _wrap_angle(pair[0], law))
 
 
 @takes_published()
@@ -434,7 +434,7 @@ def ranges(parameters: SliderCrankParameters, law: PeriodicShift) -> tuple[Range
     within `linkwork.limits.LIMIT_SINE` of such an end.
     """
     p = parameters.constants()
-    return tuple(_range(low, high, law, p) for low, high in _assembled(law, p))
+    return tuple(_range(low, high, law, p) for low, high in _find_ranges(law, p))
 
 
 @takes_published()
@@ -481,5 +481,5 @@ def singularities(parameters: SliderCrankParameters, law: PeriodicShift) -> tupl
     a maximum (on branch +1) at constant shift.
     """
     p = parameters.constants()
-    found = (_dead_centres(low, high, law, p, 0.0) for low, high in _assembled(law, p))
+    found = (_dead_centres(low, high, law, p, 0.0) for low, high in _find_ranges(law, p))
     return tuple(sorted(centre for part in found for centre in part))

@@ -109,7 +109,7 @@ def float_array(value: ArrayLike, message: str) -> FloatArray:
         raise InputError(message) from None
 
 
-def per_angle(name: str, value: ArrayLike, n: int) -> FloatArray:
+def array_per_angle(name: str, value: ArrayLike, n: int) -> FloatArray:
     """Return an array with a finite value for each of n crank angles, from one value or n values.
 
     Raises

@@ -30,8 +30,8 @@ from .tolerances import (
     Tolerance,
     check_names,
     check_tolerances,
+    perturb,
     tolerance_effects,
-    vary,
 )
 
 #: Percentiles of a Monte Carlo: those of the normal distribution at -3, -2, 0, 2, 3 standard deviations.
@@ -331,8 +331,8 @@ def _sample_angle(turn: ForceTurn, i: int, errors: Mapping[str, FloatArray], qua
     for start in range(0, samples, _CHUNK):
         part = {name: x[start : start + _CHUNK] for name, x in errors.items()}
         size = min(_CHUNK, samples - start)
-        varied = vary(turn, i, part)
-        reached = np.broadcast_to(varied.square >= (LIMIT_SINE * varied.p.a2) ** 2, (size,))
+        varied = perturb(turn, i, part)
+        reached = np.broadcast_to(varied.assembly_square >= (LIMIT_SINE * varied.p.a2) ** 2, (size,))
         values, lever = varied.evaluate(quantities)
         determined = np.abs(lever) > DEAD_CENTRE * turn.parameters.crank_length if with_pole else True
         good = reached & determined

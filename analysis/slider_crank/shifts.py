@@ -50,7 +50,7 @@ class ShiftLaw(Protocol):
     def at(self, angle: Any, speed: Any, acceleration: Any) -> ShiftMotion:
         """Return shift and rates at crank angles (rad), speeds (rad/s) and accelerations (rad/s2) of equal shape."""
 
-    def repeating(self, parameters: SliderCrankParameters) -> mobility.PeriodicShift | None:
+    def periodic_shift(self, parameters: SliderCrankParameters) -> mobility.PeriodicShift | None:
         """Return the law in the form for `mobility`; None if it is not known to repeat after whole turns."""
 
 
@@ -76,7 +76,7 @@ class ConstantShift:
         zero = 0.0 * angle
         return ShiftMotion(self.value + zero, zero, zero)
 
-    def repeating(self, parameters: SliderCrankParameters) -> mobility.PeriodicShift:
+    def periodic_shift(self, parameters: SliderCrankParameters) -> mobility.PeriodicShift:
         """See `ShiftLaw`."""
         return mobility.constant_shift(self.value)
 
@@ -117,7 +117,7 @@ class GrooveShift:
         shift, pitch, bend = plant_functions().groove(angle, self)
         return ShiftMotion(shift, pitch * speed, pitch * acceleration + bend * speed * speed)
 
-    def repeating(self, parameters: SliderCrankParameters) -> mobility.PeriodicShift | None:
+    def periodic_shift(self, parameters: SliderCrankParameters) -> mobility.PeriodicShift | None:
         """See `ShiftLaw`."""
         try:
             return mobility.groove_shift(
@@ -151,7 +151,7 @@ class AngleShift:
             slope * acceleration + np.asarray(self.curvature(angle)) * speed * speed,
         )
 
-    def repeating(self, parameters: SliderCrankParameters) -> None:
+    def periodic_shift(self, parameters: SliderCrankParameters) -> None:
         """See `ShiftLaw`."""
         return None
 
@@ -184,7 +184,7 @@ class TimeShift:
         time = angle / w[0]
         return ShiftMotion(*(np.asarray(f(time)) for f in (self.value, self.velocity, self.acceleration)))
 
-    def repeating(self, parameters: SliderCrankParameters) -> None:
+    def periodic_shift(self, parameters: SliderCrankParameters) -> None:
         """See `ShiftLaw`."""
         return None
 
@@ -226,13 +226,13 @@ class Course:
 
     def limits(self, low: float, high: float) -> tuple[float, ...]:
         """Find the ends of the ranges of assembly from ``low`` to ``high`` (rad)."""
-        repeating = self.law.repeating(self.parameters)
+        repeating = self.law.periodic_shift(self.parameters)
         if repeating is None:
             at = _search_angles(low, high)
-            reached = self._square(at) > 0.0
+            reached = self._assembly_square(at) > 0.0
             changes = np.flatnonzero(reached[1:] != reached[:-1])
             return tuple(
-                float(brentq(lambda x: float(self._square(np.array([x]))[0]), at[i], at[i + 1], xtol=1e-14))
+                float(brentq(lambda x: float(self._assembly_square(np.array([x]))[0]), at[i], at[i + 1], xtol=1e-14))
                 for i in changes
             )
         parts = mobility.ranges(self.parameters, repeating)
@@ -242,7 +242,7 @@ class Course:
 
     def _zeros(self, low: float, high: float, *, held: bool) -> tuple[DeadCentre, ...]:
         """Find the zeros of the slider's velocity along the law, or with the shift held constant if ``held``."""
-        repeating = self.law.repeating(self.parameters)
+        repeating = self.law.periodic_shift(self.parameters)
         if repeating is None:
             return self._sign_changes(low, high, 0.0 if held else 1.0)
         find = mobility.singularities if held else mobility.dead_centres
@@ -264,7 +264,7 @@ class Course:
             return np.asarray(k.kth + pitch * moving.velocity / (self.speed or 1.0) * k.ks)
 
         at = _search_angles(low, high)
-        reached = self._square(at) > (LIMIT_SINE * p.a2) ** 2
+        reached = self._assembly_square(at) > (LIMIT_SINE * p.a2) ** 2
         values = np.zeros(at.shape)
         values[reached] = slope(at[reached])
         positive = values > 0.0
@@ -280,7 +280,7 @@ class Course:
     def _shift(self, angle: FloatArray) -> ShiftMotion:
         return self.law.at(angle, np.full(angle.shape, self.speed or 1.0), np.zeros(angle.shape))
 
-    def _square(self, angle: FloatArray) -> FloatArray:
+    def _assembly_square(self, angle: FloatArray) -> FloatArray:
         """Return rod length squared minus squared distance of crank pin and guide (m2); it can be assembled if positive."""
         return np.asarray(
             plant_functions().assembly_square(angle, self._shift(angle).shift, self.parameters.constants())

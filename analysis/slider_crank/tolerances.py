@@ -139,10 +139,10 @@ def sensitivities(
     check_names(errors, ERRORS, "error")
     check_names(quantities, QUANTITIES, "quantity")
     n, m = len(turn), len(errors)
-    found, _ = vary(turn, np.arange(n), error_variables(errors, n)).evaluate(quantities)
+    found, _ = perturb(turn, np.arange(n), error_variables(errors, n)).evaluate(quantities)
     values, derivatives = {}, {}
     for name in quantities:
-        x, dead = dual(found[name]), undetermined(turn, name)
+        x, dead = dual(found[name]), undetermined_mask(turn, name)
         values[name] = masked_array(np.broadcast_to(x.real, (n,)), dead)
         derivatives[name] = masked_array(np.broadcast_to(x.dual, (m, n)), dead)
     return Sensitivities(
@@ -154,7 +154,7 @@ def sensitivities(
 
 
 @dataclass(frozen=True, slots=True)
-class Varied:
+class PerturbedTurn:
     """Mechanism and motion with errors, at the points ``at`` of a turn: constants, crank angle and shift."""
 
     turn: ForceTurn
@@ -164,7 +164,7 @@ class Varied:
     moving: ShiftMotion
 
     @property
-    def square(self) -> Any:
+    def assembly_square(self) -> Any:
         """Rod length squared minus squared distance of crank pin and guide (m2); it can be assembled if this is positive."""
         return plant_functions().assembly_square(self.angle, self.moving.shift, self.p)
 
@@ -204,7 +204,7 @@ class Varied:
         return {name: found[name] for name in quantities}
 
 
-def vary(turn: ForceTurn, at: Any, errors: Mapping[str, Any]) -> Varied:
+def perturb(turn: ForceTurn, at: Any, errors: Mapping[str, Any]) -> PerturbedTurn:
     """Return the mechanism with errors, arrays or dual numbers by name, at the points ``at`` of the turn."""
     nominal = {field.name: getattr(turn.parameters, field.name) for field in fields(turn.parameters)}
     changed = {
@@ -216,7 +216,7 @@ def vary(turn: ForceTurn, at: Any, errors: Mapping[str, Any]) -> Varied:
         moving = turn.law.at(angle, turn.speed[at], turn.acceleration[at])
     else:
         moving = ShiftMotion(turn.shift[at], turn.shift_velocity[at], turn.shift_acceleration[at])
-    return Varied(turn, at, p, angle, moving._replace(shift=moving.shift + errors.get(SHIFT, 0.0)))
+    return PerturbedTurn(turn, at, p, angle, moving._replace(shift=moving.shift + errors.get(SHIFT, 0.0)))
 
 
 def error_variables(names: Sequence[str], n: int, moved: int = 0, step: float = 0.0) -> dict[str, Dual]:
@@ -226,7 +226,7 @@ def error_variables(names: Sequence[str], n: int, moved: int = 0, step: float = 
     return dict(zip(names, independent(*values)))
 
 
-def undetermined(turn: ForceTurn, quantity: str) -> NDArray[np.bool_]:
+def undetermined_mask(turn: ForceTurn, quantity: str) -> NDArray[np.bool_]:
     """Return a mask (n,) of the angles at which a quantity of the nominal mechanism is undetermined: dead centres."""
     dead = np.ma.getmaskarray(turn.slider_force)
     return np.zeros(len(turn), dtype=bool) if quantity in FREE_OF_LOAD else dead
@@ -434,9 +434,9 @@ def _curvatures(
     reached = np.ones(n, dtype=bool)
     for i, deviation in enumerate(deviations.tolist()):
         for sign in (1.0, -1.0):
-            moved = vary(turn, np.arange(n), error_variables(names, n, i, sign * deviation))
+            moved = perturb(turn, np.arange(n), error_variables(names, n, i, sign * deviation))
             found, _ = moved.evaluate(quantities)
-            reached &= np.asarray(dual(moved.square).real > 0.0)
+            reached &= np.asarray(dual(moved.assembly_square).real > 0.0)
             for name in quantities:
                 curvatures[name][i] += (
                     0.5 * sign * np.broadcast_to(dual(found[name]).dual, (m, n)) * deviations[:, None]
@@ -449,7 +449,7 @@ def _near_pole(turn: ForceTurn, names: tuple[str, ...], extents: FloatArray) -> 
     n = len(turn)
     if turn.sought != SLIDER_FORCE:
         return np.zeros(n, dtype=bool)
-    lever = dual(vary(turn, np.arange(n), error_variables(names, n)).evaluate(("slider.load",))[1])
+    lever = dual(perturb(turn, np.arange(n), error_variables(names, n)).evaluate(("slider.load",))[1])
     change = (np.abs(np.broadcast_to(lever.dual, (len(names), n))) * extents[:, None]).sum(axis=0)
     return np.asarray(np.abs(np.broadcast_to(lever.real, (n,))) <= change)
 

@@ -51,7 +51,7 @@ def hash_of_sources() -> str:
     return found.hexdigest()
 
 
-def fresh() -> bool:
+def is_current() -> bool:
     """Return whether the page was built from the sources of this checkout."""
     return _HASH.format(hash_of_sources()) in PAGE.read_text(encoding="utf-8")
 

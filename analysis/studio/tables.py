@@ -11,7 +11,7 @@ from linkwork.mechanism import Mechanism, PublishedSet
 from linkwork.parameters import field_name
 from linkwork.variables import UNITS, Variable
 
-from ..export import Entry, build_web, crank_number, interface
+from ..export import Entry, build_web, crank_index, interface
 from ..mechanisms import name_in_files
 from ..periodic import damping_name, find_crank, motor_parameters, stiffness_name
 
@@ -34,12 +34,12 @@ def mechanism_tables(mechanism: Mechanism) -> dict[str, Any]:
     reference = {entry.variable.name: entry.reference for entry in entries}
     outputs = {v.name: v for v in mechanism.variables if v.name in mechanism.output_names}
     names = list(mechanism.output_names)
-    crank = crank_number(mechanism)
+    crank = crank_index(mechanism)
     return {
         "name": mechanism.name,
         "title": mechanism.title,
         "module": base64.b64encode(gzip.compress(build_web(mechanism), 9, mtime=0)).decode(),
-        "given": [_given(mechanism, entry.variable, entry.reference) for entry in given_entries(mechanism)]
+        "given": [_entry_rows(mechanism, entry.variable, entry.reference) for entry in given_entries(mechanism)]
         + _motor(mechanism, crank),
         "outputs": [{"name": name, "text": v.description, **_unit(v)} for name, v in outputs.items()],
         "freedoms": [
@@ -56,9 +56,9 @@ def mechanism_tables(mechanism: Mechanism) -> dict[str, Any]:
         "states": mechanism.size,
         "tolerance": [reference["solver.tolerance"], TOLERANCE],
         "picture": _picture(mechanism, reference),
-        "moving": [names.index(name) for name in _moving(mechanism)],
+        "moving": [names.index(name) for name in _outputs_with_rates(mechanism)],
         "charts": _charts(mechanism),
-        "natural": _natural(mechanism, reference, crank),
+        "natural": _stiffness_reference(mechanism, reference, crank),
         "damping": damping_name(mechanism)
         if crank >= 0 and len(mechanism.freedoms) > 1 and mechanism.names("damping")
         else "",
@@ -103,7 +103,7 @@ def given_entries(mechanism: Mechanism) -> list[Entry]:
     return [one for one in interface(mechanism) if one.role in roles and one.variable.name not in rates]
 
 
-def _given(mechanism: Mechanism, variable: Variable, reference: int) -> dict[str, Any]:
+def _entry_rows(mechanism: Mechanism, variable: Variable, reference: int) -> dict[str, Any]:
     mode = next((mode for mode in mechanism.modes if mode.name == variable.name), None)
     channel = next((channel for channel in mechanism.channels if channel.name == variable.name), None)
     row: dict[str, Any] = {
@@ -159,7 +159,7 @@ def _motor(mechanism: Mechanism, crank: int) -> list[dict[str, Any]]:
     ]
 
 
-def _natural(mechanism: Mechanism, reference: dict[str, int], crank: int) -> int | None:
+def _stiffness_reference(mechanism: Mechanism, reference: dict[str, int], crank: int) -> int | None:
     """Return the reference of the stiffness for the natural frequency; -1 if it is in the energy, None without a frequency."""
     if crank < 0 or len(mechanism.cyclic_freedoms) == len(mechanism.freedoms):
         return None
@@ -196,7 +196,7 @@ def _picture(mechanism: Mechanism, reference: dict[str, int]) -> dict[str, Any]:
     }
 
 
-def _moving(mechanism: Mechanism) -> list[str]:
+def _outputs_with_rates(mechanism: Mechanism) -> list[str]:
     """Return the names of the outputs that have a rate and an acceleration, except crank angles."""
     rate_of = {v.rate_of: v.name for v in mechanism.variables if v.rate_of}
     crank = [mechanism.freedoms[n].coordinate for n in mechanism.cyclic_freedoms]
@@ -222,7 +222,7 @@ def _charts(mechanism: Mechanism) -> list[dict[str, Any]]:
     ]
     powers = [{"name": "of drives and loads", "of": [power + 1]}, {"name": "lost", "of": [power]}]
     found = [
-        outputs("Motion", "motion", _moving(mechanism)),
+        outputs("Motion", "motion", _outputs_with_rates(mechanism)),
         outputs("Torque of the drive", "motion", turning),
         {"title": "Forces in the joints", "kind": "forces", "unit": "N", "factor": 1.0, "curves": forces},
         {"title": "Power", "kind": "power", **watt, "curves": powers},

@@ -177,7 +177,7 @@ class System:
             If a connection is not valid.
         """
         place = code_folder("systems") if folder is None else Path(folder)
-        parts = {name: Part.of(name, member.built(place, fmi), member.values) for name, member in self.members.items()}
+        parts = {name: Part.of(name, member.build(place, fmi), member.values) for name, member in self.members.items()}
         return Wiring(
             title=self.title,
             parts=parts,
@@ -208,7 +208,7 @@ class Member:
     controller: str = ""
     fmu: Path | None = None
 
-    def built(self, folder: Path, fmi: int = 2) -> Path:
+    def build(self, folder: Path, fmi: int = 2) -> Path:
         """Return the path of its FMU, which is built below ``folder`` if it is not there."""
         kinds = {2: NATIVE, 3: NATIVE_FMI3}
         if fmi not in kinds:
@@ -219,7 +219,7 @@ class Member:
             return build_controller(self.controller, folder)
         shell = sorted((SOURCES / "native").glob("*.[ch]"))
         sources = [*(Path(str(module.__file__)) for module in self.mechanism.modules), *shell]
-        key = _tag(*(path.read_text(encoding="utf-8") for path in sources), __version__)
+        key = _short_hash(*(path.read_text(encoding="utf-8") for path in sources), __version__)
         target = folder / key / kinds[fmi].file_name(self.mechanism)
         return target if target.is_file() else build_native(self.mechanism, kinds[fmi], target.parent)
 
@@ -251,7 +251,7 @@ def _in_unit(value: Any, unit: str, name: str) -> float:
     )
 
 
-def _tag(*texts: str) -> str:
+def _short_hash(*texts: str) -> str:
     return hashlib.sha256("\0".join(texts).encode()).hexdigest()[:8]
 
 

@@ -36,7 +36,7 @@ def write_host(wiring: Wiring, folder: str | Path) -> list[str]:
     files["system.h"] = _header(wiring)
     fmus: dict[str, Path] = {}
     for name, part in wiring.parts.items():
-        if not _compiled(part):
+        if not _files_to_compile(part):
             known = re.findall(r"void (\w+)_sample\(", files[_CONTROLLERS])
             if part.description.modelName not in known:
                 raise WiringError(
@@ -54,7 +54,7 @@ def write_host(wiring: Wiring, folder: str | Path) -> list[str]:
         files |= {name: text for name, text in sources.items() if re.fullmatch(r"fmi2\w+\.h", name)}
         files |= {f"{identifier}/{name}": text for name, text in sources.items()}
         part = next(part for part in wiring.parts.values() if part.fmu == path)
-        included = "".join(f'#include "{identifier}/{name}"\n' for name in _compiled(part))
+        included = "".join(f'#include "{identifier}/{name}"\n' for name in _files_to_compile(part))
         files[f"{identifier}.c"] = (
             f"#define FMI2_FUNCTION_PREFIX {identifier}_\n"
             '#pragma GCC diagnostic ignored "-Wunused-function"\n'
@@ -85,7 +85,7 @@ def _identifier(part: Part) -> str:
     return str(part.description.coSimulation.modelIdentifier)
 
 
-def _compiled(part: Part) -> list[str]:
+def _files_to_compile(part: Part) -> list[str]:
     """Return the C files of an FMU that must be compiled."""
     return [
         name
@@ -99,7 +99,7 @@ def _compiled(part: Part) -> list[str]:
 def _header(wiring: Wiring) -> str:
     """Return the text of system.h: instances of the parts, start values, and functions that call all parts in turn."""
     names = {name: f"part{n}" for n, name in enumerate(wiring.parts)}
-    native = {name: _identifier(part) for name, part in wiring.parts.items() if _compiled(part)}
+    native = {name: _identifier(part) for name, part in wiring.parts.items() if _files_to_compile(part)}
     ends = dict.fromkeys(wiring.connections.values())
     at = {end: f"y[{n}]" for n, end in enumerate(ends)}
     declared = [f"FMU({identifier})" for identifier in dict.fromkeys(native.values())]

@@ -23,7 +23,7 @@ Floats: TypeAlias = NDArray[np.float64]
 
 
 @lru_cache(maxsize=64)
-def _unpacked(fmu: Path, changed: int, folder: str | None) -> tempfile.TemporaryDirectory[str]:
+def _unpack(fmu: Path, changed: int, folder: str | None) -> tempfile.TemporaryDirectory[str]:
     """Unpack an FMU once per process, into a folder that is removed when the process ends."""
     place = tempfile.TemporaryDirectory(dir=folder, prefix="linkwork-", ignore_cleanup_errors=True)
     extract(str(fmu), place.name)
@@ -31,7 +31,7 @@ def _unpacked(fmu: Path, changed: int, folder: str | None) -> tempfile.Temporary
 
 
 class Instance:
-    """An instance of an FMI 2.0 part; call `begin`, `begun`, then `step`.
+    """An instance of an FMI 2.0 part; call `start_initialisation`, `finish_initialisation`, then `step`.
 
     Attributes
     ----------
@@ -48,13 +48,13 @@ class Instance:
     def __init__(self, part: Part) -> None:
         self.part = part
         self.messages: list[str] = []
-        self.outputs = part.named("output")
+        self.outputs = part.real_variables("output")
         self._references = [part.ports[name].reference for name in self.outputs]
         interface = part.description.coSimulation
         self.goes_back = bool(interface.canGetAndSetFMUstate)
         wrapped = str(part.description.generationTool).startswith("PythonFMU")
         changed = part.fmu.stat().st_mtime_ns
-        self._place = _unpacked(part.fmu.resolve(), changed, unpacking_folder() if wrapped else None)
+        self._place = _unpack(part.fmu.resolve(), changed, unpacking_folder() if wrapped else None)
         self._fmu = self._running(
             guid=part.description.guid,
             unzipDirectory=self._place.name,
@@ -73,7 +73,7 @@ class Instance:
     def _log(self, *arguments: Any) -> None:
         self.messages.append(arguments[-1].decode("utf-8", errors="replace"))
 
-    def begin(self) -> None:
+    def start_initialisation(self) -> None:
         """Set the start values and enter initialisation mode."""
         self._fmu.setupExperiment(startTime=0.0)
         self._set_start_values()
@@ -89,7 +89,7 @@ class Instance:
 
     _enumerations = "Integer"
 
-    def begun(self) -> None:
+    def finish_initialisation(self) -> None:
         """Leave initialisation mode."""
         self._fmu.exitInitializationMode()
 
@@ -97,7 +97,9 @@ class Instance:
         """Return all real outputs."""
         return np.array(self._fmu.getReal(self._references))
 
-    def put(self, names: Sequence[str], values: Floats, slopes: Floats | None, *, middle: float, updated: bool) -> None:
+    def set_inputs(
+        self, names: Sequence[str], values: Floats, slopes: Floats | None, *, middle: float, updated: bool
+    ) -> None:
         """Set inputs for a step.
 
         Parameters
@@ -122,7 +124,7 @@ class Instance:
             if lines:
                 self._fmu.setRealInputDerivatives(references, [1] * len(references), self._slopes.tolist())
 
-    def at_end(self, step: float) -> Floats:
+    def end_values(self, step: float) -> Floats:
         """Return the values of the inputs at the end of a step."""
         return self._values + step * self._slopes
 
@@ -130,7 +132,7 @@ class Instance:
         """Take a step; raises FMPy's FMICallException if the part refuses it."""
         self._fmu.doStep(time, step)
 
-    def saved(self) -> Any:
+    def save(self) -> Any:
         """Save the present state and return it."""
         return self._fmu.getFMUState()
 
@@ -164,7 +166,7 @@ class Instance3(Instance):
             self._last = self._values + (time - self._begins) * self._slopes
             self._fmu.setFloat64(self._references_set, self._last.tolist())
 
-    def begin(self) -> None:
+    def start_initialisation(self) -> None:
         """Set the start values and enter initialisation mode."""
         self._set_start_values()
         self._fmu.enterInitializationMode(startTime=0.0)
@@ -173,8 +175,10 @@ class Instance3(Instance):
         """Return all real outputs."""
         return np.array(self._fmu.getFloat64(self._references))
 
-    def put(self, names: Sequence[str], values: Floats, slopes: Floats | None, *, middle: float, updated: bool) -> None:
-        """Set inputs for a step as `Instance.put` does; without updates they are held at their values at ``middle``."""
+    def set_inputs(
+        self, names: Sequence[str], values: Floats, slopes: Floats | None, *, middle: float, updated: bool
+    ) -> None:
+        """Set inputs for a step as `Instance.set_inputs` does; without updates they are held at their values at ``middle``."""
         references = [self.part.ports[name].reference for name in names]
         self._values, self._slopes = values, np.zeros(len(values)) if slopes is None else slopes
         self._lines = bool(references) and slopes is not None and updated
@@ -183,7 +187,7 @@ class Instance3(Instance):
         if references:
             self._fmu.setFloat64(references, self._last.tolist())
 
-    def at_end(self, step: float) -> Floats:
+    def end_values(self, step: float) -> Floats:
         """Return the values of the inputs at the end of a step: those of the last update, or those that the slopes give."""
         return self._last if self._lines else self._values + step * self._slopes
 

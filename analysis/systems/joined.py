@@ -48,7 +48,7 @@ class _Model:
         self.rate_of = {v.rate_of: v.name for v in mechanism.variables if v.rate_of}
         self.constants = [float(values.get(channel.name, 0.0)) for channel in mechanism.channels]
 
-    def commanded(self) -> dict[int, str]:
+    def commanding_inputs(self) -> dict[int, str]:
         """Return the freedoms whose rates are commanded, each with the name of the commanding input."""
         chosen = {mode.name: int(value) for mode, value in zip(self.mechanism.modes, self.modes)}
         commands = (self.mechanism.channels[number] for number in self.mechanism.commands(chosen))
@@ -100,7 +100,7 @@ class Joined:
             sources = {c.name: system.connections.get(End(name, c.name)) for c in m.channels}
             u = [wire(sources[c.name], value) for c, value in zip(m.channels, model.constants)]
             inside = casadi.vertsplit(x)
-            for freedom, command in model.commanded().items():
+            for freedom, command in model.commanding_inputs().items():
                 number = next(k for k, c in enumerate(m.channels) if c.name == command)
                 rate = next(k for k, c in enumerate(m.channels) if c.freedom == freedom and c.kind == "rate")
                 inside[n + freedom], source = u[number], sources[command]
@@ -114,7 +114,7 @@ class Joined:
                 return casadi.substitute([what], [s.u, s.modes, s.x, s.p], [*put, *numbers])[0]
 
             slope = casadi.vertsplit(of(model.traced.derivative))
-            for freedom in model.commanded():
+            for freedom in model.commanding_inputs():
                 slope[n + freedom] = casadi.SX(0)
             states.append(x)
             slopes += slope
@@ -123,12 +123,12 @@ class Joined:
         found = self._solve_connections(casadi, [wires[end] for end in open_ends], [outputs[end] for end in open_ends])
         self.names = list(outputs)
 
-        def closed(what: list[Any]) -> Any:
+        def solve_for_states(what: list[Any]) -> Any:
             return casadi.substitute(casadi.vertcat(*what), casadi.vertcat(*(wires[end] for end in open_ends)), found)
 
         symbols = [casadi.vertcat(*states), held]
-        self._slope = casadi.Function("slope", symbols, [closed(slopes)], {"cse": True})
-        self._outputs = casadi.Function("outputs", symbols, [closed(list(outputs.values()))], {"cse": True})
+        self._slope = casadi.Function("slope", symbols, [solve_for_states(slopes)], {"cse": True})
+        self._outputs = casadi.Function("outputs", symbols, [solve_for_states(list(outputs.values()))], {"cse": True})
         self.start = np.concatenate([model.start for model in self.models.values()])
 
     def _solve_connections(self, casadi: Any, symbols: list[Any], values: list[Any]) -> Any:

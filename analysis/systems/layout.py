@@ -33,8 +33,8 @@ def boxes(wiring: Wiring) -> dict[str, Box]:
     rows = 1 if len(names) < 4 else 2
     for number, name in enumerate(names):
         ends = [end.port for pair in wiring.connections.items() for end in pair if end.part == name]
-        inputs = tuple(port for port in wiring.parts[name].named("input") if port in ends)
-        outputs = tuple(port for port in wiring.parts[name].named("output") if port in ends)
+        inputs = tuple(port for port in wiring.parts[name].real_variables("input") if port in ends)
+        outputs = tuple(port for port in wiring.parts[name].real_variables("output") if port in ends)
         height = HEAD + PORT * max(len(inputs), len(outputs), 1)
         left = (number // rows) * (WIDTH + ROOM)
         top = -(number % rows) * 70.0

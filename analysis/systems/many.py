@@ -124,8 +124,8 @@ def run_many(
         If there is no such variable or output.
     """
     step, stop_time = wiring.step if step is None else step, wiring.stop_time if stop_time is None else stop_time
-    sets = _sets(wiring, vary)
-    known = [f"{name}.{output}" for name, part in wiring.parts.items() for output in part.named("output")]
+    sets = _value_rows(wiring, vary)
+    known = [f"{name}.{output}" for name, part in wiring.parts.items() for output in part.real_variables("output")]
     for name in outputs:
         if name not in known:
             raise unknown_name(name, known, f"output {name!r}")
@@ -151,10 +151,10 @@ def run_many(
     return runs
 
 
-def _sets(wiring: Wiring, vary: Mapping[str, ArrayLike]) -> NDArray[np.float64]:
+def _value_rows(wiring: Wiring, vary: Mapping[str, ArrayLike]) -> NDArray[np.float64]:
     """Check the varied values and return them as an array by run and variable."""
     arrays = {name: np.atleast_1d(np.asarray(values, dtype=float)) for name, values in vary.items()}
-    known = [f"{n}.{v}" for n, p in wiring.parts.items() for k in ("parameter", "input") for v in p.named(k)]
+    known = [f"{n}.{v}" for n, p in wiring.parts.items() for k in ("parameter", "input") for v in p.real_variables(k)]
     for name in arrays:
         if name not in known:
             raise unknown_name(name, known, f"parameter or input {name!r}")

@@ -110,7 +110,7 @@ class SystemRun:
         return float(self.time[-1] / (len(self) - 1) * (share / brought) ** (1.0 / orders[self.coupling]))
 
 
-class _Together:
+class _Instances:
     """All instances of a system, with their inputs and outputs at the present communication point."""
 
     def __init__(self, wiring: Wiring, bonds: Sequence[Bond]) -> None:
@@ -133,16 +133,16 @@ class _Together:
             self.sampled = {
                 name
                 for name, part in wiring.parts.items()
-                if all(part.ports[output].held for output in part.named("output"))
+                if all(part.ports[output].held for output in part.real_variables("output"))
             }
             for instance in self.instances.values():
-                instance.begin()
+                instance.start_initialisation()
             # outputs that depend directly on inputs settle after as many rounds as there are parts
             for _ in self.instances:
                 self.outputs = self._read()
                 self._exchange(self.outputs)
             for instance in self.instances.values():
-                instance.begun()
+                instance.finish_initialisation()
         except BaseException as error:
             said = [text for instance in self.instances.values() for text in instance.messages]
             self.close()
@@ -187,7 +187,7 @@ class _Together:
             own = None if slopes is None else slopes[numbers]
             # sampled parts take their inputs at the start of a step
             later = middle if name not in self.sampled else 0.0
-            self.instances[name].put(ports, values[numbers], own, middle=later, updated=updated)
+            self.instances[name].set_inputs(ports, values[numbers], own, middle=later, updated=updated)
 
     def _slopes(self) -> Floats:
         """Return the slopes of all connected inputs; if a rate is not known, the slope of the step before is used."""
@@ -199,7 +199,7 @@ class _Together:
     def step(self, coupling: str, time: float, step: float) -> None:
         """Take a communication step of length ``step`` (s) from ``time`` (s) with all parts."""
         before, slopes = self.outputs, None if coupling == "hold" else self._slopes()
-        states = {name: each.saved() for name, each in self.instances.items()} if coupling == "rollback" else {}
+        states = {name: each.save() for name, each in self.instances.items()} if coupling == "rollback" else {}
         try:
             self._exchange(before, slopes, middle=0.5 * step, updated=coupling == "updates")
             self._step_all(time, step)
@@ -226,7 +226,7 @@ class _Together:
         values = before[self.sources]
         self.given = values.copy()
         for name, (_, numbers) in self.own.items():
-            self.given[numbers] = self.instances[name].at_end(step)
+            self.given[numbers] = self.instances[name].end_values(step)
         paired = self.partner != np.arange(len(values))
         rates = values if slopes is None else values + 0.5 * step * slopes
         self.given[paired] = (values + step * rates[self.partner])[paired]
@@ -254,7 +254,7 @@ class _Stepper:
         self.step, self.stop_time, self.share = step, stop_time, share
         self.first, self.number, self.before, self.scale = step, 0, 0.0, 0.0
 
-    def next(self, time: float) -> tuple[float, float]:
+    def next_step(self, time: float) -> tuple[float, float]:
         """Return the length of the next step, and the time at its end."""
         if self.share is None:
             end = (self.number + 1) * self.step
@@ -270,7 +270,7 @@ class _Stepper:
         """Number of equal steps."""
         return round(self.stop_time / self.first)
 
-    def learn(self, powers: Floats, flows: Floats) -> None:
+    def adapt(self, powers: Floats, flows: Floats) -> None:
         """Adapt the step to the power residuals and transmitted powers of the last step, by PI control of the added share."""
         if self.share is None:
             return
@@ -334,7 +334,7 @@ def run_system(
             f"steps for a share of {share:g}: the share must be above 0, and the system must have a power bond, "
             f"of which it has {len(bonds)}"
         )
-    together = _Together(wiring, bonds)
+    together = _Instances(wiring, bonds)
     stepper = _Stepper(step, stop_time, share)
     times, rows = [0.0], [together.outputs]
     effort, flow = together.bonds[:2]
@@ -350,7 +350,7 @@ def run_system(
             while times[-1] < stop_time * (1.0 - 1e-12) and not interrupted:
                 if share is None and stepper.number == stepper.count:
                     break
-                length, end = stepper.next(times[-1])
+                length, end = stepper.next_step(times[-1])
                 try:
                     together.step(coupling, times[-1], length)
                 except FMICallException as error:
@@ -361,7 +361,7 @@ def run_system(
                 residual, through = together.powers()
                 powers.append(residual)
                 flows.append(through)
-                stepper.learn(residual, through)
+                stepper.adapt(residual, through)
                 show(end)
     finally:
         together.close()
@@ -384,7 +384,7 @@ def run_system(
     return run
 
 
-def _refusal(together: _Together, time: float, error: FMICallException) -> str:
+def _refusal(together: _Instances, time: float, error: FMICallException) -> str:
     """Return the message that a part refused a step, with the last text of any FMU: FMPy passes all texts to one of them."""
     said = [text for instance in together.instances.values() for text in instance.messages]
     return f"{together.stepping} refused the step from t = {time:.9g} s: {said[-1] if said else error}"

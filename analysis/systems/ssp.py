@@ -86,7 +86,7 @@ def _ports(wiring: Wiring, name: str) -> dict[str, list[str]]:
     """Return the connected ports of a part, by causality."""
     ends = {end.port for pair in wiring.connections.items() for end in pair if end.part == name}
     part = wiring.parts[name]
-    return {kind: [port for port in part.named(kind) if port in ends] for kind in ("input", "output")}
+    return {kind: [port for port in part.real_variables(kind) if port in ends] for kind in ("input", "output")}
 
 
 def _units(wiring: Wiring) -> list[str]:
@@ -203,7 +203,9 @@ def read_ssp(path: str | Path) -> Wiring:
             fmu = folder / Path(element.source).name
             store_file(fmu, (archive.unpacked_path / element.source).read_bytes())
             bindings = [*(element.parameter_bindings or ()), *(system.parameter_bindings or ())]
-            texts = _starts(archive.unpacked_path, bindings, element.name, own=len(element.parameter_bindings or ()))
+            texts = _start_values(
+                archive.unpacked_path, bindings, element.name, own=len(element.parameter_bindings or ())
+            )
             part = Part.of(element.name, fmu, {})
             values = {
                 key: _as_number(text, part.ports.get(key), f"{element.name}.{key}") for key, text in texts.items()
@@ -226,7 +228,7 @@ def read_ssp(path: str | Path) -> Wiring:
     return Wiring(title=structure.name, parts=parts, connections=connections, stop_time=stop_time, step=step)
 
 
-def _starts(folder: Path, bindings: Iterable[Any], name: str, own: int) -> dict[str, str]:
+def _start_values(folder: Path, bindings: Iterable[Any], name: str, own: int) -> dict[str, str]:
     """Return a part's start values as text: first from its ``own`` first bindings, then from the system's for its name."""
     found: dict[str, str] = {}
     for number, binding in enumerate(bindings):

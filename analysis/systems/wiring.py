@@ -119,7 +119,7 @@ class Part:
         }
         return cls(name=name, fmu=Path(fmu), ports=ports, values=values, feeds=feeds, description=description)
 
-    def named(self, causality: str) -> tuple[str, ...]:
+    def real_variables(self, causality: str) -> tuple[str, ...]:
         """Return the names of all real variables with a causality."""
         return tuple(p.name for p in self.ports.values() if p.causality == causality and p.type in REAL)
 
@@ -179,7 +179,9 @@ class Wiring:
                     raise unknown_name(end.part, self.parts, f"part {end.part}, of {source} -> {target}")
                 part = self.parts[end.part]
                 if end.port not in part.ports:
-                    raise unknown_name(end.port, part.named(causality), f"{causality} {end}, of {source} -> {target}")
+                    raise unknown_name(
+                        end.port, part.real_variables(causality), f"{causality} {end}, of {source} -> {target}"
+                    )
                 found = part.ports[end.port].causality
                 if found != causality:
                     raise WiringError(f"{source} -> {target}: {end} is of causality {found}, it must be an {causality}")
@@ -198,7 +200,9 @@ class Wiring:
         """Return the input that is the time derivative of an input: in the same table, with the unit divided by seconds."""
         unit = {"rad/s": "rad/s2", "m/s": "m/s2"}.get(self.port(end).unit)
         inputs = (
-            End(end.part, name) for name in self.parts[end.part].named("input") if _table(name) == _table(end.port)
+            End(end.part, name)
+            for name in self.parts[end.part].real_variables("input")
+            if _table(name) == _table(end.port)
         )
         return next((other for other in inputs if self.port(other).unit == unit), None)
 
@@ -206,12 +210,12 @@ class Wiring:
         """Return hints at possible mistakes: unconnected inputs, controllers without gains, algebraic loops."""
         found = []
         for name, part in self.parts.items():
-            inputs = part.named("input")
+            inputs = part.real_variables("input")
             served = {_table(i) for i in inputs if End(name, i) in self.connections or i in part.values}
             free = [i for i in inputs if _table(i) not in served]
             if free:
                 found.append(f"{name}: not connected, and at their start values: {', '.join(free)}")
-            gains = [own for own in part.named("parameter") if f"_{own}".endswith("_gain")]
+            gains = [own for own in part.real_variables("parameter") if f"_{own}".endswith("_gain")]
             starts = {v.name: float(v.start or 0.0) for v in part.description.modelVariables if v.name in gains}
             if gains and not any(part.values.get(gain, starts[gain]) for gain in gains):
                 found.append(f"{name}: its gains are 0: {', '.join(gains)}")

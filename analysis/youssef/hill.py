@@ -102,7 +102,7 @@ def _slope(table: NDArray[np.float64]) -> NDArray[np.float64]:
     return np.array([k * table[1], -k * table[0]])
 
 
-def _sampled(table: NDArray[np.float64], points: tuple[float, ...]) -> NDArray[np.float64]:
+def _sample_series(table: NDArray[np.float64], points: tuple[float, ...]) -> NDArray[np.float64]:
     """Return the values of the n series of a table at the same points, shape (n, number of points)."""
     cos, sin = _waves(points, table.shape[2] - 1)
     values: NDArray[np.float64] = table[0] @ cos + table[1] @ sin
@@ -116,15 +116,15 @@ def _tables(equations: Sequence[PeriodicEquation]) -> list[NDArray[np.float64]]:
     return [a, _slope(a), b, c]
 
 
-def _even(count: int) -> tuple[float, ...]:
+def _even_steps(count: int) -> tuple[float, ...]:
     return tuple((2.0 * pi / count * np.arange(count)).tolist())
 
 
 def _steps(tables: Sequence[NDArray[np.float64]]) -> int:
     """Return the number of steps a turn that reduces the integration error to rounding."""
     k = np.arange(tables[0].shape[2])
-    points = _even(max(JUDGED, 4 * len(k)))
-    a, slope, b, c = (_sampled(table, points) for table in tables)
+    points = _even_steps(max(JUDGED, 4 * len(k)))
+    a, slope, b, c = (_sample_series(table, points) for table in tables)
     sign = np.sign(a[:, :1])
     if not (a * sign > 0.0).all():
         worst = int(np.argmin((a * sign).min(axis=1)))
@@ -172,7 +172,7 @@ def monodromies(equations: Sequence[PeriodicEquation], *, steps: int | None = No
     h = 2.0 * pi / count
     points = tuple((h * np.add.outer(np.arange(count), nodes)).ravel().tolist())
     shape = (len(equations), count, STAGES)
-    a, slope, b, c = (_sampled(table, points).reshape(shape) for table in tables)
+    a, slope, b, c = (_sample_series(table, points).reshape(shape) for table in tables)
     # z = (y, a y'): z' = A z
     system = np.zeros((*shape, 2, 2))
     system[..., 0, 1] = 1.0 / a
@@ -203,8 +203,8 @@ def monodromy(equation: PeriodicEquation, *, steps: int | None = None) -> NDArra
 
 def determinant(equation: PeriodicEquation) -> float:
     """Return the determinant of the monodromy matrix by Liouville's formula, exp(-integral of b/a)."""
-    points = _even(max(4 * JUDGED, 16 * equation.order))
-    a, b = _sampled(_table([equation.a, equation.b], equation.order), points)
+    points = _even_steps(max(4 * JUDGED, 16 * equation.order))
+    a, b = _sample_series(_table([equation.a, equation.b], equation.order), points)
     return liouville(-b / a)
 
 
@@ -401,7 +401,7 @@ def hill_regions(equation: PeriodicEquation, count: int, *, order: int | None = 
 # Perturbation
 
 
-def _perturbed(equation: PeriodicEquation, number: int, order: int) -> NDArray[np.complex128]:
+def _perturb_boundaries(equation: PeriodicEquation, number: int, order: int) -> NDArray[np.complex128]:
     """Return the boundaries of the region N: one for N = 0, else two, a complex pair if damping has removed the region.
 
     On the harmonics exp(i k x) the equation is (V - lambda S) y = 0. To first order only the harmonics k = +-N/2 count. To
@@ -440,7 +440,7 @@ def perturbed_boundary(equation: PeriodicEquation, *, order: int = 2) -> float:
     InputError
         If the order is neither 1 nor 2, or the mean of a or of the factor is not positive.
     """
-    return float(_perturbed(equation, 0, order)[0].real)
+    return float(_perturb_boundaries(equation, 0, order)[0].real)
 
 
 def perturbed_region(equation: PeriodicEquation, number: int, *, order: int = 2) -> Region | None:
@@ -475,7 +475,7 @@ def perturbed_region(equation: PeriodicEquation, number: int, *, order: int = 2)
     """
     if number < 1:
         raise InputError(f"region {number}: regions count from 1")
-    ends = np.sort_complex(_perturbed(equation, number, order))
+    ends = np.sort_complex(_perturb_boundaries(equation, number, order))
     if np.abs(ends.imag).max() > REAL * max(1.0, float(np.abs(ends).max())):
         return None
     return Region(number=number, low=float(ends[0].real), high=float(ends[1].real))

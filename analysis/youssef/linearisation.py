@@ -114,7 +114,7 @@ class Balance(NamedTuple):
 
 
 @cache
-def _compiled() -> dict[str, Callable[..., tuple[NDArray[np.float64], ...]]]:
+def _compile_functions() -> dict[str, Callable[..., tuple[NDArray[np.float64], ...]]]:
     """Compile the functions ``balance`` and ``taylor`` of arrays of angles and motions; return them by name.
 
     ``balance`` gives the fields of `Balance`. ``taylor`` gives M m45, K m45 omega^2 and F m45 l4 omega^2 in SI at u = u' = 0,
@@ -172,7 +172,7 @@ def balance(
     require_no_contact_friction(p, "the balance of harmonics")
     arrays = np.broadcast_arrays(*(np.asarray(x, dtype=float) for x in (angle, position, velocity, acceleration)))
     _require_assembly(arrays[0], arrays[1], p)
-    values = _compiled()["balance"](*arrays, speed, p, load)
+    values = _compile_functions()["balance"](*arrays, speed, p, load)
     return Balance(*(np.broadcast_to(value, arrays[0].shape) for value in values))
 
 
@@ -309,9 +309,9 @@ def slider_equation(
             variant=variant,
         )
     if variant is Variant.EXACT:
-        mass, stiffness, force = _exact(p, speed, load, order)
+        mass, stiffness, force = _exact_coefficients(p, speed, load, order)
     else:
-        mass, stiffness, force = _taylor(p, speed, load, _POWERS[variant])
+        mass, stiffness, force = _taylor_coefficients(p, speed, load, _POWERS[variant])
     return SliderEquation(
         mass=mass * (1.0 / p.m45),
         stiffness=stiffness * (1.0 / (p.m45 * speed**2)),
@@ -327,7 +327,7 @@ def _without_spring(p: Constants, load: Load) -> tuple[Constants, Load]:
     return p._replace(k=0.0, u0=0.0, mu=0.0, fc=0.0), load._replace(slider=load.slider + p.k * p.u0)
 
 
-def _exact(
+def _exact_coefficients(
     p: Constants, speed: float, load: Load, order: int | None
 ) -> tuple[FourierSeries, FourierSeries, FourierSeries]:
     """Return m22 (kg), K m45 omega^2 (N/m) and F m45 l4 omega^2 (N) as series over the crank angle, from exact samples.
@@ -343,7 +343,7 @@ def _exact(
             FourierSeries.from_samples(values)
             for values in (at_rest.by_acceleration, at_rest.by_position, -at_rest.force)
         ]
-        tails = [_tail(one) for one in series]
+        tails = [_last_harmonic(one) for one in series]
         if max(tails) < samples // 4:
             mass, stiffness, force = (
                 one.to_order(tail if order is None else order) for one, tail in zip(series, tails)
@@ -357,20 +357,22 @@ def _exact(
         samples *= 2
 
 
-def _tail(series: FourierSeries) -> int:
+def _last_harmonic(series: FourierSeries) -> int:
     """Return the order of the last harmonic that exceeds rounding errors."""
     size = np.abs(series.amplitudes)
     return int(np.flatnonzero(size > NEGLIGIBLE * size.max())[-1]) if size.max() > 0.0 else 0
 
 
-def _taylor(p: Constants, speed: float, load: Load, order: int) -> tuple[FourierSeries, FourierSeries, FourierSeries]:
-    """Return the quantities of `_exact` as Taylor polynomials in the crank's length, with harmonics up to their order."""
+def _taylor_coefficients(
+    p: Constants, speed: float, load: Load, order: int
+) -> tuple[FourierSeries, FourierSeries, FourierSeries]:
+    """Return Taylor polynomials in the crank's length of what `_exact_coefficients` returns, with harmonics up to ``order``."""
     bare, loaded = _without_spring(p, load)
     # the expansion is about a crank of zero length
     bare = bare._replace(l2=0.0)
     angle = np.linspace(0.0, 2.0 * pi, 8, endpoint=False)
     _require_assembly(angle, np.zeros(8), bare)
-    terms = np.array([np.broadcast_to(term, 8) for term in _compiled()["taylor"](angle, speed, bare, loaded)])
+    terms = np.array([np.broadcast_to(term, 8) for term in _compile_functions()["taylor"](angle, speed, bare, loaded)])
     values = np.tensordot(p.l2 ** np.arange(order + 1), terms.reshape(3, 3, 8)[: order + 1], axes=1)
     mass, stiffness, force = (FourierSeries.from_samples(value, order) for value in values)
     return mass, stiffness, force

@@ -139,7 +139,7 @@ def convert(parts: Coefficients, form: Form) -> Coefficients:
     if form is Form.QUOTIENT:
         return parts
     inertia = parts.inertia
-    damper, spring, stiffness, force = (_divided(part, inertia) for part in parts[1:])
+    damper, spring, stiffness, force = (_divide_by_inertia(part, inertia) for part in parts[1:])
     if form is not Form.SERIES:
         k0 = spring.mean
         lost = spring * (1.0 / k0)
@@ -163,7 +163,7 @@ def _force(ratios: Ratios, datum: Datum) -> FourierSeries:
     return _series(0.0, -size * cos(datum.coupler), -size * sin(datum.coupler))
 
 
-def _divided(part: FourierSeries, inertia: FourierSeries) -> FourierSeries:
+def _divide_by_inertia(part: FourierSeries, inertia: FourierSeries) -> FourierSeries:
     """Divide a coefficient by the inertia as (4.23) to (4.28) do: to second order, but the mean to first order only."""
     mean = part.mean / inertia.mean
     # first harmonics as cos - i sin: the product of two has half their product as its second harmonic

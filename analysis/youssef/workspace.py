@@ -285,7 +285,7 @@ def accessible_area(
         raise InputError(f"slider range is {low} m to {high} m: it must be two finite numbers, increasing")
     if not tolerance > 0.0:
         raise InputError(f"tolerance is {tolerance}: it must be above zero")
-    sample = _sampled(parameters, low, high)
+    sample = _sample_points(parameters, low, high)
     nothing = AccessibleArea(outer=(), holes=(), area=0.0, error=0.0, missed=0.0, cells=0, converged=True)
     if not len(sample) or hypot(parameters.constants().xp, parameters.constants().yp) == 0.0:
         return nothing
@@ -311,7 +311,7 @@ def accessible_area(
         cells *= 2
 
 
-def _sampled(parameters: FiveBarParameters, low: float, high: float) -> NDArray[np.float64]:
+def _sample_points(parameters: FiveBarParameters, low: float, high: float) -> NDArray[np.float64]:
     """Return P at configurations spread over crank angle and slider position, shape (k, 2)."""
     curves = coupler_curves(parameters, np.linspace(low, high, 33).tolist(), n=120)
     arcs = [np.column_stack([arc.x, arc.y]) for curve in curves for arc in curve.arcs]

@@ -105,7 +105,7 @@ class TestGrading:
         charges, violations = [], []
         for length in np.linspace(0.15, 0.45, 30):
             x = unknowns(black, replace(self.APART, rocker_length=length))
-            charges.append(black.charged(x)[0])
+            charges.append(black.penalised_qualities(x)[0])
             violations.append(float(np.maximum(black.violations(x), 0.0).sum()))
         assert np.isfinite(charges).all()
         # the nearer to joining, the less: no plateau, no cliff

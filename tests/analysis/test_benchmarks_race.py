@@ -12,7 +12,7 @@ import pytest
 
 from analysis.synthesis import Linkage
 from benchmarks import race
-from benchmarks.contest import Contest, PylinkageScore, searched
+from benchmarks.contest import Contest, PylinkageScore, run_search
 from benchmarks.race import OURS, RACERS, TIMES, Row
 from benchmarks.targets import TARGETS, Target
 
@@ -41,10 +41,10 @@ def test_ten_targets_of_each_kind() -> None:
 
 
 def test_the_same_targets_every_time() -> None:
-    from benchmarks.targets import drawn, waves
+    from benchmarks.targets import hand_drawn, random_waves
 
-    np.testing.assert_array_equal(drawn(3).points, target("drawn", "seed 3").task.path.points)
-    np.testing.assert_array_equal(waves(2).angle, target("function", "waves 2").task.angle)
+    np.testing.assert_array_equal(hand_drawn(3).points, target("drawn", "seed 3").task.path.points)
+    np.testing.assert_array_equal(random_waves(2).angle, target("function", "waves 2").task.angle)
 
 
 @pytest.mark.parametrize(
@@ -62,7 +62,7 @@ def test_pylinkage_is_scored_as_the_others_over_any_rotation(kind: str, name: st
             # nearer to the limit of assembly pylinkage may go over to the other one
             if Linkage.from_vector(score.four_bar.q[:10], box.branch).least_transmission > radians(25.0):
                 compared += 1
-                assert value == pytest.approx(box.charge(x), rel=1e-9)
+                assert value == pytest.approx(box.penalised_quality(x), rel=1e-9)
     assert compared > 20
 
 
@@ -75,7 +75,7 @@ def test_an_area_is_scored_by_the_measure_of_the_task() -> None:
     for box in contest.boxes:
         score = PylinkageScore(contest, box)
         for x in random.uniform(box.low, box.high, (300, len(box.low))):
-            value, error = contest.charged_area(box, x), contest.error(box, x)
+            value, error = contest.penalised_area(box, x), contest.error(box, x)
             if not np.isfinite(value):
                 continue
             if np.isfinite(error):
@@ -83,8 +83,8 @@ def test_an_area_is_scored_by_the_measure_of_the_task() -> None:
                 assert value * contest.normal.unit**2 == pytest.approx(error, rel=1e-9)
             if Linkage.from_vector(contest.unknowns(x)[:10], box.branch).least_transmission > radians(25.0):
                 charged += 1
-                assert score.charged_area(score.four_bar, x.tolist()) == pytest.approx(value, rel=1e-9)
-        assert contest.charged_area(box, box.high + 1.0) == inf
+                assert score.penalised_area(score.four_bar, x.tolist()) == pytest.approx(value, rel=1e-9)
+        assert contest.penalised_area(box, box.high + 1.0) == inf
     assert measured > 10
     assert charged > 10
 
@@ -92,10 +92,10 @@ def test_an_area_is_scored_by_the_measure_of_the_task() -> None:
 def test_linkwork_races_as_the_others_do() -> None:
     contest = Contest.of(target("function", "sine"))
     # a search of any kind ends as soon as it has enough; least squares leave 0.0059 rad2
-    trace = searched(race.by_linkwork, contest, 60.0, 0.006, process_time)
+    trace = run_search(race.search_with_linkwork, contest, 60.0, 0.006, process_time)
     assert 0.0058 < trace.best <= 0.006
-    assert trace.at(inf) == trace.best
-    assert trace.at(0.0) == inf
+    assert trace.least_error(inf) == trace.best
+    assert trace.least_error(0.0) == inf
 
 
 def test_results_are_kept_when_a_run_is_stopped(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -111,13 +111,13 @@ def test_results_are_kept_when_a_run_is_stopped(tmp_path: Path, monkeypatch: pyt
     monkeypatch.setattr(race, "prepared", lambda: None)
     two, searches = [target("polygonal", "square"), target("timed", "eight")], [OURS, "CMA-ES"]
     with pytest.raises(KeyboardInterrupt):
-        race.completed(path, two, searches, 1.0, lambda text: None)
+        race.run_missing(path, two, searches, 1.0, lambda text: None)
     kept = race.read(path)
     assert len(kept) == 3
-    assert race.last(kept) == 1.0
+    assert race.last_time(kept) == 1.0
     race_on = ran.copy()
     ran.clear()
-    race.completed(path, two, searches, 1.0, lambda text: None)
+    race.run_missing(path, two, searches, 1.0, lambda text: None)
     assert ran == [("eight", "CMA-ES")]
     assert race_on + ran == [(t.name, s) for t in two for s in searches]
     # in the order of the targets, whatever the order of the runs
@@ -140,8 +140,8 @@ def test_results_are_kept_when_a_run_is_stopped(tmp_path: Path, monkeypatch: pyt
 )
 def test_who_is_ahead(ours: float, least: float, exact: float, is_ahead: bool, is_level: bool) -> None:
     of = race.by_target(rows(ours, least, other=inf, exact=exact))["polygonal", "square"]
-    assert race.ahead(of, TIMES[-1]) is is_ahead
-    assert race.level(of, TIMES[-1]) is is_level
+    assert race.is_ahead(of, TIMES[-1]) is is_ahead
+    assert race.is_level(of, TIMES[-1]) is is_level
 
 
 def test_the_tables_count() -> None:
@@ -150,12 +150,12 @@ def test_the_tables_count() -> None:
     both.append(row(OURS, 1.0, name="star"))
     *_, final = race.standings(both)
     assert final == ["10", "1 of 2", "0", "1", "0", "1", "0", "0"]
-    assert race.lost(both) == ["- polygonal, L: 50.00% above CMA-ES"]
+    assert race.list_lost(both) == ["- polygonal, L: 50.00% above CMA-ES"]
     page = race.markdown(both, "targets").splitlines()
     assert page[2] == "| polygonal | square | **1** | 9 | 2 | 9 | 9 |"
     assert page[3] == "| polygonal | L | 3 | 9 | **2** | 9 | 9 |"
     assert race.markdown(rows(1.0, 2.0), "lost") == "None."
-    assert race.last([row(OURS, 1.0), row("CMA-ES", 1.0, 1.0, *[nan] * (len(TIMES) - 2))]) == TIMES[1]
+    assert race.last_time([row(OURS, 1.0), row("CMA-ES", 1.0, 1.0, *[nan] * (len(TIMES) - 2))]) == TIMES[1]
     assert race.picture(both).axes
 
 
@@ -163,4 +163,4 @@ def test_the_tables_count() -> None:
 def test_the_searches_end_on_the_area(search: str) -> None:
     # of 1 m2 inside; at equal shares of the length the best is a circle with 0.182
     contest = Contest.of(target("polygonal", "square"), on_area=True)
-    assert searched(RACERS[search], contest, 60.0, 0.9, process_time).best <= 0.9
+    assert run_search(RACERS[search], contest, 60.0, 0.9, process_time).best <= 0.9

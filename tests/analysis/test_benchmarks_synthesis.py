@@ -21,9 +21,9 @@ from benchmarks.contest import (
     PylinkageScore,
     TimeUp,
     Trace,
-    by_freudenstein,
     packs,
-    searched,
+    run_search,
+    search_with_freudenstein,
 )
 from benchmarks.synthesis import curve_by_numpy, kernel_times
 
@@ -77,7 +77,7 @@ def test_pylinkage_is_scored_as_our_simplex(name: str) -> None:
             linkage = Linkage.from_vector(score.four_bar.q, box.branch)
             if linkage.least_transmission < radians(25.0):
                 continue
-            ours = float(box.charged(x[None, :])[0])
+            ours = float(box.penalised_qualities(x[None, :])[0])
             compared += 1
             charged += ours > float(box.quality(x[None, :])[0])
             assert value == pytest.approx(ours, rel=1e-9), x
@@ -98,7 +98,7 @@ def test_pylinkage_is_scored_as_our_simplex_on_paths(name: str) -> None:
     for x in first * (1.0 + 0.05 * random.standard_normal((20, len(first)))):
         value = score(score.four_bar, x.tolist())
         if value < inf:
-            assert value == pytest.approx(float(box.charged(x[None, :])[0]), rel=0.02), x
+            assert value == pytest.approx(float(box.penalised_qualities(x[None, :])[0]), rel=0.02), x
 
 
 def test_what_pylinkage_cannot_join_is_infinite() -> None:
@@ -138,7 +138,7 @@ def test_a_linkage_that_violates_a_constraint_does_not_count() -> None:
     linkage = PROBLEMS["ellipse-a"].linkage
     assert linkage.least_transmission < radians(40.0)
     trace = Trace(contest, 10.0)
-    trace.offer(next(b for b in contest.boxes if b.branch == linkage.branch), unknowns(contest, linkage))
+    trace.record_if_best(next(b for b in contest.boxes if b.branch == linkage.branch), unknowns(contest, linkage))
     assert trace.points == []
     assert trace.best == inf
 
@@ -155,10 +155,10 @@ def test_the_clock_stops_while_measuring(monkeypatch: pytest.MonkeyPatch) -> Non
     monkeypatch.setattr(Contest, "error", slow)
     begun = perf_counter()
     trace = Trace(contest, 10.0, enough=3.0)
-    trace.offer(box, box.low)
-    trace.offer(box, box.low)
+    trace.record_if_best(box, box.low)
+    trace.record_if_best(box, box.low)
     with pytest.raises(TimeUp):
-        trace.offer(box, box.low)
+        trace.record_if_best(box, box.low)
     assert perf_counter() - begun >= 0.3
     assert [value for _, value in trace.points] == [5.0, 3.0]
     assert trace.reaching_time(4.0) < 0.1
@@ -172,8 +172,8 @@ def test_what_improves_is_offered() -> None:
     box = contest.boxes[0]
     trace = Trace(contest, 10.0)
     offered: list[float] = []
-    trace.offer = lambda box, x: offered.append(float(x[0]))
-    score = trace.watched(box, lambda x: float(x[0] ** 2))
+    trace.record_if_best = lambda box, x: offered.append(float(x[0]))
+    score = trace.watch(box, lambda x: float(x[0] ** 2))
     minimize(score, [3.0], method="Nelder-Mead")
     assert offered[0] == 3.0
     assert all(abs(b) < abs(a) for a, b in pairwise(offered))
@@ -184,7 +184,7 @@ def test_what_improves_is_offered() -> None:
 def test_every_search_finds_a_rocker_function(search: object) -> None:
     contest = Contest.of(PROBLEMS["rocker"])
     # a long way from the optimum of 1019, but no linkage at random does it
-    trace = searched(search, contest, 20.0, 3000.0)
+    trace = run_search(search, contest, 20.0, 3000.0)
     assert trace.best <= 3000.0
     assert all(b < a for (_, a), (_, b) in pairwise(trace.points))
 
@@ -192,7 +192,7 @@ def test_every_search_finds_a_rocker_function(search: object) -> None:
 def test_function_generation_of_pylinkage_over_phases() -> None:
     # Freudenstein's equation weighs the errors otherwise: near the optimum, not at it
     contest = Contest.of(PROBLEMS["rocker"])
-    trace = searched(by_freudenstein, contest, 20.0, -inf)
+    trace = run_search(search_with_freudenstein, contest, 20.0, -inf)
     assert 1019.0 < trace.best < 1300.0
 
 
@@ -212,4 +212,4 @@ def test_charges_are_those_of_our_simplex() -> None:
     x = unknowns(contest, PROBLEMS["ellipse-a"].linkage)[None, :]
     charge = PENALTY * contest.normal.weights.sum() * np.maximum(box.violations(x), 0.0).sum()
     assert charge > 0.0
-    assert float(box.charged(x)[0] - box.quality(x)[0]) == pytest.approx(charge, rel=1e-9)
+    assert float(box.penalised_qualities(x)[0] - box.quality(x)[0]) == pytest.approx(charge, rel=1e-9)

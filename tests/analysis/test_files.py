@@ -30,7 +30,7 @@ from analysis.files import (
     entry_names,
     flag,
     load_array,
-    overridden,
+    override,
     read,
     read_columns,
     read_csv,
@@ -236,11 +236,11 @@ def test_the_example_of_the_reader():
 def test_values_are_replaced_at_any_depth():
     data = {"drive": {"speed": 1, "torque": {"kind": "ramp", "end": 2}}, "force": 3}
     kept = {"drive": {"speed": 1, "torque": {"kind": "ramp", "end": 4}}, "force": 3}
-    assert overridden(data, {"drive.torque.end": 4}) == kept
+    assert override(data, {"drive.torque.end": 4}) == kept
     del kept["drive"]["speed"]
-    assert overridden(data, {"drive.torque.end": 4}, exclusive=("drive",)) == kept
+    assert override(data, {"drive.torque.end": 4}, exclusive=("drive",)) == kept
     with pytest.raises(ParameterError, match="force is 3: it must be a table"):
-        overridden(data, {"force.x": 4})
+        override(data, {"force.x": 4})
 
 
 # Tables of numbers

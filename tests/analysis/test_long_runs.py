@@ -11,7 +11,7 @@ import pytest
 from analysis import Inputs, simulate
 from analysis.run import Event, Function, TorsionBar, angles, prepared, sample_times
 from benchmarks import long_runs
-from benchmarks.long_runs import ACTING, FREE, free_run, plant_run, shifted
+from benchmarks.long_runs import ACTING, FREE, compare_late_run, free_run, plant_run
 from linkwork.errors import InputError
 from linkwork.five_bar.published import TABLE_3_1, InitialState
 from linkwork.slider_crank.published import OFFSET_CASE
@@ -24,7 +24,7 @@ SPEED = 44.0
 
 @pytest.mark.parametrize("what", ACTING)
 def test_a_run_at_a_late_time_is_the_run_at_zero(what: str) -> None:
-    difference, steps = shifted(what, tolerance=1e-12)
+    difference, steps = compare_late_run(what, tolerance=1e-12)
     # the phase of a harmonic is known as well as the time itself: 30 rad/s times 1.2e-7 s, of 5 of the forces' 50 N
     assert difference < (2e-6 if what == "harmonic force" else 1e-12)
     assert steps == 1.0

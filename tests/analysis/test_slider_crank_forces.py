@@ -56,7 +56,7 @@ class Prescribed(NamedTuple):
     def at(self, angle: Any, speed: Any, acceleration: Any) -> ShiftMotion:
         return self.motion
 
-    def repeating(self, parameters: SliderCrankParameters) -> None:
+    def periodic_shift(self, parameters: SliderCrankParameters) -> None:
         return None
 
 
@@ -237,7 +237,7 @@ def test_dead_centres_are_reported_over_the_angles_that_were_asked_for() -> None
 def test_a_law_that_does_not_repeat_has_its_dead_centres_located() -> None:
     """A groove of an irrational number of periods: between its dead centres the slider moves one way only."""
     law = GrooveShift(0.2, np.sqrt(2.0))
-    assert law.repeating(OFFSET) is None
+    assert law.periodic_shift(OFFSET) is None
     turn = force_turn(OFFSET, crank_speed=1.0, shift=law, angles=np.linspace(0.0, 3.0 * tau, 2000))
     turning = turn.angle[:-1][np.diff(np.sign(turn.slider_velocity)) != 0]
     assert len(turn.dead_centres) == len(turning) == 6
@@ -260,17 +260,17 @@ def test_at_a_dead_centre_values_are_masked_with_the_reason() -> None:
             mask = np.ma.getmaskarray(turn.vector(name, frame))
             assert (mask == (dead & (name != "guide_moment"))[:, None]).all()
     assert not np.ma.getmaskarray(turn.torque).any()
-    assert [text.partition(":")[0] for text in turn.masked] == [
+    assert [text.partition(":")[0] for text in turn.mask_reasons] == [
         "dead centre at crank angle 90.0000 deg",
         "dead centre at crank angle 270.0000 deg",
     ]
-    assert "no lever" in turn.masked[0]
+    assert "no lever" in turn.mask_reasons[0]
     assert [c.crank_angle for c in turn.dead_centres] == pytest.approx([0.5 * pi, 1.5 * pi], abs=1e-12)
     assert turn.vector("guide_moment")[90].tolist() == [0.0, 0.0, 0.0]
     # with the load given the same configuration is like any other
     free = force_turn(ideal, crank_speed=CRANK_SPEED)
     assert not any(np.ma.getmaskarray(free.vector(name)).any() for name in JOINTS)
-    assert free.masked == ()
+    assert free.mask_reasons == ()
 
 
 def test_speeds_and_accelerations_may_vary_over_the_turn() -> None:
@@ -349,12 +349,12 @@ def test_runs_of_masked_angles_are_reported_once() -> None:
     still = force_turn(parameters(0.0, 180.0), crank_speed=1.0, shift=SHIFT, torque=1.0)
     assert np.ma.getmaskarray(still.slider_force).sum() == 361
     assert still.without_lever
-    assert still.masked == (
+    assert still.mask_reasons == (
         "the slider has no lever on the crank at any angle, so that the torque determines no force on it",
     )
     ideal = force_turn(parameters(0.0), crank_speed=1.0, torque=1.0, angles=[1.0, 0.5 * pi, 0.5 * pi + 1e-12, 1.5 * pi])
     assert not ideal.without_lever
-    assert [text.partition(":")[0] for text in ideal.masked] == [
+    assert [text.partition(":")[0] for text in ideal.mask_reasons] == [
         "dead centre at all 3 crank angles from 90.0000 to 270.0000 deg"
     ]
     assert not force_turn(parameters(0.0), crank_speed=1.0, torque=1.0, angles=[0.5 * pi]).without_lever
@@ -366,7 +366,7 @@ def test_a_rod_parallel_to_the_crank_axis_has_no_frame_3() -> None:
     turn = force_turn(mechanism, crank_speed=2.0, shift=ConstantShift(0.1), angles=[pi - 0.5, pi], load=3.0)
     assert not np.ma.getmaskarray(turn.vector("crank_pin", 2)).any()
     assert np.ma.getmaskarray(turn.vector("crank_pin", 3)).all(axis=1).tolist() == [False, True]
-    (reason,) = turn.masked
+    (reason,) = turn.mask_reasons
     assert "parallel to the crank axis at crank angle 180.0000 deg" in reason
     columns = turn.columns()
     assert columns["rod parallel to crank axis (1): frame 3 not determined"].tolist() == [0.0, 1.0]

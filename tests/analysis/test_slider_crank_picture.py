@@ -69,7 +69,7 @@ class TestSolids:
         for faces, volume, tolerance in (
             (solids.box([-1.0, -2.0, 0.0], [3.0, 1.0, 2.0], rows, origin, pieces=3), 24.0, 1e-9),
             (
-                solids.tube(origin, origin + np.array([0.0, 3.0, 4.0]), 0.5, pieces=4, sides=64),
+                solids.cylinder(origin, origin + np.array([0.0, 3.0, 4.0]), 0.5, pieces=4, sides=64),
                 5.0 * pi * 0.25,
                 0.01,
             ),

@@ -20,7 +20,7 @@ from click.testing import Result
 from analysis.mechanisms import MECHANISMS, PUBLISHED, MechanismError, check, mechanism_of, register
 from analysis.periodic import Drive, newton_orbit
 from analysis.run import Case, Inputs, read_case, simulate
-from analysis.studio import PAGE, fresh, make_page, opening_state, page_state
+from analysis.studio import PAGE, is_current, make_page, opening_state, page_state
 from linkwork.five_bar.parameters import InitialState
 from linkwork.five_bar.published import TABLE_3_1
 from tests import slider_cranks, strategies
@@ -113,7 +113,7 @@ def _near(found: Any, wanted: Any) -> None:
 
 
 def test_the_page_is_of_these_sources() -> None:
-    assert fresh(), "the page is older than its sources: make studio"
+    assert is_current(), "the page is older than its sources: make studio"
 
 
 def test_the_page_is_small_whole_and_needs_nothing_from_elsewhere() -> None:

@@ -15,7 +15,7 @@ from analysis.mechanisms import PUBLISHED, mechanism_of
 from analysis.periodic import Drive, frequency_response, natural_frequency, newton_orbit, steady_drive
 from analysis.run import Case, InductionMotor, Inputs, read_case, simulate
 from analysis.studio import PAGE, page_case, page_state
-from benchmarks.studio import measured, report
+from benchmarks.studio import figures_in_words, measure_page
 from tests.analysis.test_studio import _HELD, _load, _near, _opened, _saved, _varied, in_browser
 
 RPM = np.pi / 30.0
@@ -210,8 +210,8 @@ def test_powers_are_those_of_the_equations_and_the_envelope_has_the_greatest_for
 
 @in_browser
 def test_dragging_goes_on_while_a_chart_is_computed(browser: Any, record_property: Any) -> None:
-    found = measured(browser, 3.0)
-    record_property("studio", report(found))
+    found = measure_page(browser, 3.0)
+    record_property("studio", figures_in_words(found))
     # on a machine that does other work too: what would be computed in the page's own thread takes seconds
     assert found.frame[0] < 100.0
     assert found.work[1] < 50.0

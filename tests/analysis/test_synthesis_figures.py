@@ -339,10 +339,10 @@ def test_plates_have_holes_at_the_pins_and_their_distances(tmp_path) -> None:
     outlines = [p for p in cut.polylines if p.layer == "plate"]
     assert len(outlines) == 4
     # a plate with two holes: a rectangle between half circles
-    crank = Polygon(flattened(outlines[1]))
+    crank = Polygon(flatten(outlines[1]))
     assert crank.area == pytest.approx(0.05 * 0.02 + np.pi * 0.01**2, rel=1e-3)
     for outline in outlines:
-        plate = Polygon(flattened(outline))
+        plate = Polygon(flatten(outline))
         inside = [Point(c.centre) for c in cut.circles if plate.contains(Point(c.centre))]
         assert inside
         for hole in inside:
@@ -354,12 +354,12 @@ def test_plates_have_holes_at_the_pins_and_their_distances(tmp_path) -> None:
 def test_a_plate_is_the_hull_of_its_pins_widened(corner: complex) -> None:
     pins = np.array([0.0j, 0.2 + 0.0j, corner])
     points, bulges = rounded_hull(pins, 0.01)
-    plate = Polygon(flattened(Polyline(layer="plate", points=points, bulges=bulges, closed=True)))
+    plate = Polygon(flatten(Polyline(layer="plate", points=points, bulges=bulges, closed=True)))
     hull = MultiPoint([(z.real, z.imag) for z in pins]).convex_hull.buffer(0.01, quad_segs=64)
     assert plate.symmetric_difference(hull).area < 1e-3 * hull.area
 
 
-def flattened(outline) -> np.ndarray:
+def flatten(outline) -> np.ndarray:
     """Points along a polyline with arcs, by their centres."""
     points = outline.points @ np.array([1.0, 1j])
     out = []

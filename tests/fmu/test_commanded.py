@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from benchmarks.commanded import RESULTS, ROWS, find, read
+from benchmarks.commanded import RESULTS, ROWS, measure_master, read
 
 from .test_masters import SLOW, need
 
@@ -22,7 +22,7 @@ def test_the_table_of_commanded_speeds_is_what_a_run_finds(tmp_path: Path, maste
         need(name)
     if name in SLOW and not os.environ.get("LINKWORK_ALL_MASTERS"):
         pytest.skip("it takes a minute: LINKWORK_ALL_MASTERS runs it")
-    assert find(master, tmp_path) == [row for row in read(RESULTS) if row["master"] == master]
+    assert measure_master(master, tmp_path) == [row for row in read(RESULTS) if row["master"] == master]
 
 
 def test_every_master_has_its_rows() -> None:

@@ -20,10 +20,10 @@ def late_runs(root: str, files: list[str], mechanism: str, step: float) -> list[
     import sys
 
     sys.path.insert(0, root)
-    from benchmarks.long_runs import late_fmu
+    from benchmarks.long_runs import compare_late_fmu
 
-    found = [late_fmu(file, mechanism, step) for file in files]
-    return found + [late_fmu(file, mechanism, step, "model-exchange") for file in files[1:]]
+    found = [compare_late_fmu(file, mechanism, step) for file in files]
+    return found + [compare_late_fmu(file, mechanism, step, "model-exchange") for file in files[1:]]
 
 
 @pytest.mark.parametrize("mechanism", FREE)

@@ -14,12 +14,12 @@ from linkwork.slider_crank.assembly import check_assembly
 
 from ... import slider_crank as sc
 from ..common import CHECK_FAILED, console, output_folder, print_error, print_written, say, show_table, tolerance_option
-from .options import Chosen, Problem, about_mechanism, out_option, with_problem
+from .options import Chosen, Problem, add_mechanism_options, out_option, problem_options
 
 
 @click.command(short_help="Compare the thesis's dual-number method with vector mechanics.")
-@about_mechanism
-@with_problem(points=361)
+@add_mechanism_options
+@problem_options(points=361)
 @tolerance_option(default=1e-9, help="Largest relative difference that passes.")
 @click.option("--two-rotations", is_flag=True, help="Show instead the closure error of the thesis's own method.")
 @out_option
@@ -86,7 +86,7 @@ def _show_two_rotations(chosen: Chosen, points: int, folder: Path) -> None:
         worst = int(np.argmin(short))
         check_assembly(chosen.parameters, float(angle[worst]), float(shift[worst]))
     end = sc.settle(chosen.parameters, angle[reached], shift[reached])
-    length, scale = chosen.units.name("m"), chosen.units.per("m")
+    length, scale = chosen.units.name("m"), chosen.units.factor("m")
     columns = {
         "crank angle [deg]": np.degrees(end.crank_angle),
         f"slider position [{length}]": end.unknowns[:, 4] * scale,

@@ -12,15 +12,15 @@ import numpy as np
 from ... import figures
 from ... import slider_crank as sc
 from ..common import output_folder, print_written, say, show_table
-from .options import Chosen, Problem, Units, about_mechanism, angle_text, out_option, plot_option, with_problem
+from .options import Chosen, Problem, Units, add_mechanism_options, angle_text, out_option, plot_option, problem_options
 
 if TYPE_CHECKING:
     from ...slider_crank import ForceTurn
 
 
 @click.command(short_help="Find all joint forces over a turn.")
-@about_mechanism
-@with_problem(points=721)
+@add_mechanism_options
+@problem_options(points=721)
 @click.option(
     "--frame",
     "frames",
@@ -96,7 +96,7 @@ def _extremes(turn: ForceTurn, frames: Sequence[int], units: Units) -> Sequence[
         cells = [name, units.name(si)]
         for i in ends:
             # a value that is rounding compared with the greatest of its unit is zero
-            value = 0.0 if abs(values[i]) <= 1e-12 * size[si] else values[i] * units.per(si)
+            value = 0.0 if abs(values[i]) <= 1e-12 * size[si] else values[i] * units.factor(si)
             cells += [f"{value:.6g}", f"{degrees(turn.angle[i]):.1f}"]
         rows.append(cells)
     return rows
@@ -120,4 +120,4 @@ def _special_places(turn: ForceTurn, units: Units) -> list[str]:
     ]
     if not turn.clear().any():
         sentences.append("no crank angle is clear of these, and no force has extremes")
-    return [*sentences, *(f"masked: {text}" for text in turn.masked)]
+    return [*sentences, *(f"masked: {text}" for text in turn.mask_reasons)]

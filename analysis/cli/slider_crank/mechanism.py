@@ -11,11 +11,11 @@ import click
 from ... import figures
 from ... import slider_crank as sc
 from ..common import console, print_written, quantity, say, show_table
-from .options import Chosen, about_mechanism, angle_text, out_option
+from .options import Chosen, add_mechanism_options, angle_text, out_option
 
 
 @click.command(short_help="Report assembly, dead centres and stroke.")
-@about_mechanism
+@add_mechanism_options
 def info(chosen: Chosen) -> None:
     """Report where the mechanism can be assembled, its dead centres, its stroke, and the greatest shift of its crank.
 
@@ -52,7 +52,7 @@ def info(chosen: Chosen) -> None:
         still = all(part.stroke <= 1e-12 * p.rod_length for part in parts)
         console.print("no dead centres" + ": the slider stands still, whatever the crank angle" * still)
         return
-    length, scale = units.name("m"), units.per("m")
+    length, scale = units.name("m"), units.factor("m")
     show_table(
         "dead centres",
         ("crank angle [deg]", f"shift [{length}]", f"slider position [{length}]", "which"),
@@ -70,7 +70,7 @@ def info(chosen: Chosen) -> None:
 
 
 @click.command(short_help="Draw the mechanism in space.")
-@about_mechanism
+@add_mechanism_options
 @click.option("--angle", default="30 deg", show_default=True, metavar="ANGLE", help="Crank angle of the picture.")
 @click.option("--view", nargs=2, metavar="ELEVATION AZIMUTH", help="Direction of the eye, such as '22 deg' '-112 deg'.")
 @click.option("--range", "with_range", is_flag=True, help="Draw also the range of assembly.")

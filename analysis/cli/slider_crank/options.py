@@ -21,7 +21,17 @@ from ... import slider_crank as sc
 from ...mechanisms import SLIDER_CRANK
 from ...units import RAD_S_PER_RPM
 from .. import common
-from ..common import NUMBER, PARAMETERS, changes, check_kind, handled, in_units, number_or_text, print_error, quantity
+from ..common import (
+    NUMBER,
+    PARAMETERS,
+    changes,
+    check_kind,
+    in_units,
+    number_or_text,
+    print_error,
+    quantity,
+    report_errors,
+)
 
 if TYPE_CHECKING:
     from ...slider_crank import ForceTurn, PeriodicShift, ShiftLaw
@@ -43,14 +53,14 @@ class Units:
         """Return the name of the output's unit for a unit of SI."""
         return self._table.get(si, (si, 1.0))[0]
 
-    def per(self, si: str) -> float:
+    def factor(self, si: str) -> float:
         """Return the factor from a unit of SI to the output's unit."""
         return 1.0 / self._table.get(si, (si, 1.0))[1]
 
     def length(self, value: float) -> str:
-        return f"{value * self.per('m'):.6g} {self.name('m')}"
+        return f"{value * self.factor('m'):.6g} {self.name('m')}"
 
-    def in_error(self, text: str) -> str:
+    def convert_error(self, text: str) -> str:
         """Return the message of an error with its quantities in these units; texts in quotes are not changed."""
         variables = SLIDER_CRANK.mechanism_variables
 
@@ -59,7 +69,7 @@ class Units:
             return found[0][:-1] + f" {unit}:" if unit in ("m", "N", "N.m") else found[0]
 
         text = re.sub(rf"^parameter ([\w.]+) is {NUMBER}:", parameter, text)
-        return in_units(text, lambda si: (self.name(si), self.per(si)))
+        return in_units(text, lambda si: (self.name(si), self.factor(si)))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -255,25 +265,25 @@ out_option = common.out_option(help="Folder for the results.")
 plot_option = click.option("--plot/--no-plot", default=True, show_default=True, help="Whether to write plots.")
 
 
-def about_mechanism(command: Command) -> Command:
+def add_mechanism_options(command: Command) -> Command:
     """Add the options that choose a mechanism to a command, which receives them as one argument ``chosen``."""
 
     @wraps(command)
-    @handled
+    @report_errors
     def run(**options: Any) -> Any:
         own = {field.name: options.pop(field.name) for field in fields(_MechanismOptions) if field.name in options}
         paced = "torque" in options and not options.get("two_rotations")
         try:
             return command(chosen=_MechanismOptions(**own).choose(paced=paced), **options)
         except LinkworkError as error:
-            raise LinkworkError(Units(own["units"]).in_error(str(error))) from error
+            raise LinkworkError(Units(own["units"]).convert_error(str(error))) from error
 
     for option in reversed(_MECHANISM_OPTIONS):
         run = option(run)
     return run
 
 
-def with_problem(points: int) -> Callable[[Command], Command]:
+def problem_options(points: int) -> Callable[[Command], Command]:
     """Return a decorator that adds the options --speed and, passed to the command as ``problem``, those of a force problem."""
 
     def decorate(command: Command) -> Command:

@@ -14,7 +14,7 @@ from linkwork.errors import InputError
 from ... import figures
 from ... import slider_crank as sc
 from ..common import console, output_folder, print_written, quantity, show_table, workers_options
-from .options import Chosen, Problem, Units, about_mechanism, note, out_option, plot_option, with_problem
+from .options import Chosen, Problem, Units, add_mechanism_options, note, out_option, plot_option, problem_options
 
 if TYPE_CHECKING:
     from ...slider_crank import ForceTurn, MonteCarlo, Sensitivities, Tolerance
@@ -33,8 +33,8 @@ class Sampling(TypedDict):
 
 
 @click.command(short_help="Report the effect of manufacturing tolerances.")
-@about_mechanism
-@with_problem(points=73)
+@add_mechanism_options
+@problem_options(points=73)
 @click.option(
     "--tolerance",
     "widths",
@@ -90,7 +90,7 @@ def tolerances(
     """
     from ...files import save_figure, write_csv
 
-    at = _in_the_turn(quantity(angle, "rad", "--angle"), chosen)
+    at = _reduce_to_turn(quantity(angle, "rad", "--angle"), chosen)
     units, quantities = chosen.units, tuple(dict.fromkeys(quantities))
     defaults = [f"{name}={_WIDTHS[sc.ERRORS[name]]}" for name in _TOLERANCES]
     allowed = [_tolerance(text, distribution) for text in widths or defaults]
@@ -131,7 +131,7 @@ def _degrees(turn: ForceTurn, i: int) -> float:
     return degrees(float(turn.angle[i]))
 
 
-def _in_the_turn(angle: float, chosen: Chosen) -> float:
+def _reduce_to_turn(angle: float, chosen: Chosen) -> float:
     """Return the same crank angle (rad) between 0 and 2 pi.
 
     Raises InputError if it is outside of this turn and the shift there differs from that in this turn.
@@ -171,7 +171,7 @@ def _sensitivity_table(
         effect = max(float(np.ma.abs(exact.derivative(name, t.name)).max()) * t.extent for t in allowed)
         for t in allowed:
             below = sc.ERRORS[t.name]
-            unit, scale = _unit_quotient(units.name(si), units.name(below)), units.per(si) / units.per(below)
+            unit, scale = _unit_quotient(units.name(si), units.name(below)), units.factor(si) / units.factor(below)
             values = exact.derivative(name, t.name) * scale
             columns[f"d {name} / d {t.name} [{unit}]"] = values.filled(np.nan)
             greatest = np.where(clear, np.ma.abs(values).filled(-1.0), -1.0)
@@ -208,7 +208,7 @@ def _spread_columns(found: MonteCarlo, units: Units) -> dict[str, Any]:
         }
         parts |= {f"{share:.4g} %": row for share, row in zip(sc.PERCENTILES, spread.percentiles)}
         columns |= {
-            f"{name} {what} [{units.name(si)}]": (x * units.per(si)).filled(np.nan) for what, x in parts.items()
+            f"{name} {what} [{units.name(si)}]": (x * units.factor(si)).filled(np.nan) for what, x in parts.items()
         }
     return columns | {"not assembled": found.not_assembled, "at a dead centre": found.undetermined}
 
@@ -226,6 +226,6 @@ def _show_spread(found: MonteCarlo, place: int, title: str, units: Units) -> Non
             (linear.worst, 3),
             (spread.mean - linear.nominal, 2),
         )
-        rows.append((name, units.name(si), *(_number(x[place] * units.per(si), digits) for x, digits in values)))
+        rows.append((name, units.name(si), *(_number(x[place] * units.factor(si), digits) for x, digits in values)))
     headings = "quantity", "unit", "nominal", "sd, linear", "sd, 2nd order", "sd, samples", "worst, linear", "mean off"
     show_table(title, headings, rows, words=("quantity", "unit"))
