@@ -100,13 +100,13 @@ def test_areas_and_their_gradients(closed: bool, weights: str | None) -> None:
     refinement = Refinement(program)
     start = make_start(known, normal, rotation=np.linspace(turned[0], turned[-1], normal.n))
     z, parameters = program.unknowns_and_parameters(start)
-    curve, slopes = refinement.traced(z, parameters)
+    curve, slopes = refinement.trace(z, parameters)
     area, gradient = refinement.area(curve)
     found = syn.Solution.from_linkage(task, known, start.rotation).error / normal.unit**2
     assert area == pytest.approx(found, rel=2e-3 if weights is None else 3e-2)
     for k in (0, 3, 6, 9):
         step = 1e-6 * np.eye(len(z))[k]
-        ends = [refinement.area(refinement.traced(z + s * step, parameters)[0])[0] for s in (1.0, -1.0)]
+        ends = [refinement.area(refinement.trace(z + s * step, parameters)[0])[0] for s in (1.0, -1.0)]
         slope = float((gradient * slopes[:, :, k]).sum())
         assert slope == pytest.approx(0.5e6 * (ends[0] - ends[1]), rel=1e-3, abs=1e-6)
 
@@ -123,7 +123,7 @@ def test_the_constraints_of_the_greatest_distance_have_exact_slopes() -> None:
     z, parameters = program.unknowns_and_parameters(
         make_start(known, normal, rotation=np.linspace(0.0, 2.0 * pi, normal.n))
     )
-    curve, slopes = refinement.traced(z, parameters)
+    curve, slopes = refinement.trace(z, parameters)
     some = [np.arange(len(near.distance)) for near in refinement.both_distances(curve)]
     down = _Descent(
         refinement, z, parameters, refinement._scaled_directions(curve, slopes), refinement.measure(curve), some

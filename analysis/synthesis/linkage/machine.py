@@ -277,7 +277,7 @@ def _trace_plant() -> tuple[Any, Any, Any]:
     casadi = symbolic.library()
     plant = parameter_symbols(FIVE_BAR)
     law = symbolic.symbolic_functions((geometry,), min=casadi.fmin, max=casadi.fmax)
-    return type(plant.parameters), plant.functions, law.bodies
+    return type(plant.parameters), plant.functions, law.link_mass_properties
 
 
 _DEFAULTS: dict[str, Any] = {
