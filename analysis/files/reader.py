@@ -127,13 +127,18 @@ def read(
         if table[key] is None:  # null of JSON
             raise ParameterError(prefix + key, None, "have a value, or be left out")
     values |= {e.field: e.read(table[key], prefix + key) for key, e in entries.items() if key in table}
-    return kind(**values)
+    try:
+        return kind(**values)
+    except ParameterError as error:
+        if type(error) is not ParameterError or not prefix or error.name not in table:
+            raise
+        raise ParameterError(prefix + error.name, error.value, error.requirement) from None
 
 
 # Readers without options
 
 
-def unchanged(value: Any, name: str) -> Any:
+def any_value(value: Any, name: str) -> Any:
     """Return any value unchanged, for a later check."""
     return value
 

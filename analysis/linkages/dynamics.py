@@ -38,7 +38,9 @@ class Motion:
         self.bodies = self.structure.bodies
         self.reactions: list[Reaction] = []
         #: steps with racks, in the order in which their forces are computed
-        self.racked = [step for step in reversed(self.structure.steps) if isinstance(step, RackStep)]
+        steps = self.structure.steps[::-1]
+        self.geared = [step for step in steps if isinstance(step, GearStep)]
+        self.racked = [step for step in steps if isinstance(step, RackStep)]
 
     def owner(self, own: str) -> str:
         """Return the body that has the point ``own``: the first moving body with it, or the ground if there is none."""
@@ -236,7 +238,7 @@ class Motion:
             if isinstance(step, FreedomStep):
                 add_support(step.joint, step.parent, step.body)
             elif isinstance(step, GearStep):
-                add_tooth_force(step, "mesh_force", self._mate_force(step))
+                add_tooth_force(step, f"in_{step.gear}", self._mate_force(step))
                 add_support(step.pin, step.parent, step.body)
             elif isinstance(step, RackStep):
                 add_tooth_force(step, f"in_{step.rack}", self._rack_force(step))
@@ -254,7 +256,8 @@ class Motion:
 
         for step in reversed(self.structure.steps):
             add_step(step)
-        names = [f"in_{r.name}" for r in self.reactions] + [f"in_{r.rack}" for r in self.racked]
+        teeth = (*(step.gear for step in self.geared), *(step.rack for step in self.racked))
+        names = [f"in_{name}" for name in (*(r.name for r in self.reactions), *teeth)]
         doc = "Forces in the joints, each of one body on another, and their moments about the ground's origin."
         yield record("Forces", doc, dict.fromkeys(names, "Wrench"))
         doc = "Compute the forces in all joints, from the last dyad back to the ground."

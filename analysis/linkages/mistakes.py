@@ -27,7 +27,15 @@ def check_entries(description: Description) -> None:
     for name, body in d.bodies.items():
         for own in body.all_points:
             owners.setdefault(own, set()).add(name)
-    found = chain(_bodies(d), _gears(d, owners), _slots(d, owners), _springs(d, owners), _freedoms(d, owners))
+    found = chain(
+        _names(d, owners),
+        _bodies(d),
+        _bodies_without_length(d, owners),
+        _gears(d, owners),
+        _slots(d, owners),
+        _springs(d, owners),
+        _freedoms(d, owners),
+    )
     for where, wrong, right in chain(
         found, _find_duplicates("loads", [load.point for load in d.loads]), _find_duplicates("torques", d.torques)
     ):
@@ -43,6 +51,31 @@ def _find_duplicates(where: str, names: Iterable[str]) -> Found:
     for name in names:
         if names.count(name) > 1:
             yield where, f"has {name} twice", "once is enough"
+
+
+#: Tables of variables that every linkage has.
+_RESERVED = ("initial", "solver", "energy", "assembly")
+
+
+def _names(d: Description, owners: Mapping[str, set[str]]) -> Found:
+    for table in ("bodies", "slides", "slots", "gears", "racks", "springs", "freedoms"):
+        for name in getattr(d, table):
+            if name in _RESERVED:
+                yield f"{table}.{name}", "has a name that is taken", f"no entry may be called {', '.join(_RESERVED)}"
+    for table in ("slides", "slots"):
+        for name in getattr(d, table):
+            if name in owners:
+                yield f"{table}.{name}", "has the name of a point", "it must have another"
+
+
+def _bodies_without_length(d: Description, owners: Mapping[str, set[str]]) -> Found:
+    """Yield bodies whose pins are all at one place; a block that slides may have several rods on one axis."""
+    sliding = {body for slide in d.slides.values() for body in (slide.body, slide.on)}
+    for name, body in d.bodies.items():
+        pins = {own: place for own, place in body.all_points.items() if len(owners[own]) > 1}
+        if len(pins) > 1 and len(set(pins.values())) == 1 and name not in sliding:
+            one, other = list(pins)[:2]
+            yield f"bodies.{name}.points.{other}", f"is where {one} is", "the body must have a length between its pins"
 
 
 def _bodies(d: Description) -> Found:
@@ -104,9 +137,17 @@ def _springs(d: Description, owners: Mapping[str, set[str]]) -> Found:
 
 
 def _freedoms(d: Description, owners: Mapping[str, set[str]]) -> Found:
+    taken: dict[str, str] = {}
     for name, freedom in d.freedoms.items():
         slide = d.slides.get(freedom.joint)
         joined = owners.get(freedom.joint, set()) if slide is None else {slide.on, slide.body}
+        if freedom.joint in taken and len(joined) <= 2:
+            yield (
+                f"freedoms.{name}",
+                f"is of {freedom.joint}, as {taken[freedom.joint]} is",
+                "it must be of another joint",
+            )
+        taken[freedom.joint] = name
         if name in d.bodies and len(joined) == 2 and name not in joined:
             pair = " and ".join(sorted(joined))
             yield f"freedoms.{name}", f"is of {freedom.joint}, which joins {pair}", f"it must not be called {name}"

@@ -8,7 +8,7 @@ from typing import NamedTuple
 from .description import is_given
 from .dynamics import Motion
 from .parameters import spring_angle_name
-from .structure import Pin, Slider, sliders
+from .structure import Dyad, Pin, Slider, sliders
 from .symbols import symbol
 from .variables import display_argument
 from .writing import function, quote
@@ -39,6 +39,10 @@ class Outputs:
     def __init__(self, motion: Motion) -> None:
         self.motion, self.description = motion, motion.description
         self.structure, self.interface = motion.structure, motion.interface
+
+    def names(self) -> list[str]:
+        """Return the names of the outputs, without the energies."""
+        return [output.name for output in self._outputs()]
 
     def variables(self) -> Iterator[str]:
         """Yield the source texts of the output variables, in their order."""
@@ -93,12 +97,9 @@ class Outputs:
                 text = f"Angle by which {name} is twisted"
                 yield Output(f"{name}.turn", "rad", text, "*POSITION", f"s.{name}_stretch")
         for dyad in self.structure.dyads:
-            if dyad.kind == "RRR":
-                p, q = (side.joint.name for side in dyad.sides)
-                c, (one, other) = dyad.inner.name, (side.body for side in dyad.sides)
-                rest = f'*POSITION, minimum=0.0, maximum=pi, {_DEGREES}, role="transmission"'
-                text, value = f"Angle between {one} and {other} at {c}", f"transmission(b.at_{p}, b.at_{c}, b.at_{q})"
-                yield Output(f"{c}.transmission_angle", "rad", text, rest, value)
+            rest = f'*POSITION, minimum=0.0, maximum=pi, {_DEGREES}, role="transmission"'
+            text, value = self._transmission(dyad)
+            yield Output(f"{dyad.inner.name}.transmission_angle", "rad", text, rest, value)
         if self.structure.dyads:
             text = (
                 "Clearance to the limit of assembly: least sine of the transmission angles of all dyads, 0 at the limit"
@@ -113,6 +114,26 @@ class Outputs:
                 role = f'role="spring force", of="{name}"'
                 yield Output(f"{name}.exerted_{what}", unit, text, role, self.motion.tension(name, spring))
         yield from self._joint_forces()
+
+    def _transmission(self, dyad: Dyad) -> tuple[str, str]:
+        """Return description and expression of a dyad's transmission angle; at 0 and at 180 deg its bodies lock."""
+        c, (one, other) = dyad.inner.name, (side.body for side in dyad.sides)
+        pins = [f"b.at_{side.joint.name}" for side in dyad.sides if isinstance(side.joint, Pin)]
+        lines = [f"b.{side.joint.name}_line" for side in dyad.sides if isinstance(side.joint, Slider)]
+        if dyad.kind == "RRR":
+            return f"Angle between {one} and {other} at {c}", f"transmission({pins[0]}, b.at_{c}, {pins[1]})"
+        if dyad.kind == "RRP":
+            text = f"Angle between the {one} and the normal of the line of {dyad.sides[1].joint.name}"
+            return text, f"transmission_to_normal({pins[0]}, b.at_{c}, {lines[0]})"
+        if dyad.kind == "RPR":
+            text = f"Angle between the line of {c} and the normal of that from pin to pin"
+            return text, f"transmission_to_normal({pins[0]}, {pins[1]}, b.{c}_line)"
+        if isinstance(dyad.inner, Slider):
+            lines.append(f"b.{c}_line")
+        names = [
+            joint.name for joint in (*(side.joint for side in dyad.sides), dyad.inner) if isinstance(joint, Slider)
+        ]
+        return f"Angle between the lines of {' and '.join(names)}", f"transmission_between_lines({', '.join(lines)})"
 
     def _joint_forces(self) -> Iterator[Output]:
         for r in self.motion.reactions:
@@ -129,6 +150,11 @@ class Outputs:
             block = r.joint.bodies[1]
             text = f"Moment {of} in {joint}, about the origin of the {block}"
             yield Output(f"{r.name}.moment", "N.m", text, "", f"wrench_moment(f.in_{r.name}, b.{block}_frame.origin)")
+        for pair in self.motion.geared:
+            for axis in "xy":
+                text = f"Force of the {pair.mate} on the {pair.body} in the pitch point of {pair.gear}, {axis}"
+                role = f'role="joint force", of="{pair.gear}"'
+                yield Output(f"{pair.gear}.f{axis}", "N", text, role, f"f.in_{pair.gear}.{axis}")
         for rack in self.motion.racked:
             line = f"b.{rack.slide.name}_line"
             sign, gear, bar = ("-", rack.body, rack.mate) if rack.turns else ("", rack.mate, rack.body)

@@ -204,6 +204,9 @@ class Package:
             return known
         if known is not None and not hasattr(sys.modules[str(known.modules[-1].__package__)], "equations"):
             raise LinkageError(f"linkage.name is {name}: it must not be that of a mechanism of Linkwork")
+        for other in MECHANISMS.values():
+            if other.name != name and name in other.published:
+                raise LinkageError(f"linkage.name is {name}: it must not be that of a published set of {other.name}")
         place = code_folder("linkages") if folder is None else Path(folder)
         own = place / self.name
         own.mkdir(parents=True, exist_ok=True)
@@ -214,6 +217,10 @@ class Package:
             sys.path.append(str(place))
         importlib.invalidate_caches()
         made: Mechanism = importlib.import_module(self.name).MECHANISM
+        for other in MECHANISMS.values():
+            if other.name != name and other.fmu == made.fmu:
+                of = f"its FMU would be called {made.fmu}, as that of {other.name}"
+                raise LinkageError(f"linkage.name is {name}: {of}; it must have another name")
         start = made.published[name]
         try:
             made.check_assembly(start.parameters, made.state(start.initial))
@@ -247,7 +254,9 @@ class Package:
                 sizes = f", {one:.6g} m and {other:.6g} m long between pins that are {apart:.6g} m apart"
             for dyad in self.structure.dyads:
                 if any(f"margin_{dyad.inner.name} =" in line for line in lines):
-                    bodies = " and ".join(f"linkage.bodies.{side.body}" for side in dyad.sides)
+                    slots = self.description.slots
+                    tables = ("slots" if side.body in slots else "bodies" for side in dyad.sides)
+                    bodies = " and ".join(f"linkage.{t}.{side.body}" for t, side in zip(tables, dyad.sides))
                     return f", {bodies}, joined at {dyad.inner.name}{sizes}"
         return ""
 
@@ -261,15 +270,33 @@ class Package:
         except (ValueError, TypeError, ArithmeticError):
             pass
         springs = self.description.springs.items()
-        laws = [f"the law of linkage.springs.{name}" for name, s in springs if s.law]
         places = made.modules[-1].places(x, p)
+        laws = [
+            f"the law of linkage.springs.{name}" for name, s in springs if s.law and not self._has_force(made, name)
+        ]
         for name, spring in springs:
             if spring.between:
                 (one, other) = (getattr(places, f"at_{own}") for own in spring.between)
                 if one.x == other.x and one.y == other.y:
                     laws.append(f"the length of linkage.springs.{name}, which has no direction at 0 m,")
-        causes = " or ".join((*laws, "a mass or inertia in linkage.bodies"))
+        bodies = self.description.bodies.items()
+        light = [name for name, body in bodies if not (body.mass or body.section)]
+        light = light or [name for name, body in bodies if not (body.inertia or body.section or body.bar)]
+        masses = f"the mass or inertia of {' or '.join(f'linkage.bodies.{name}' for name in light) or 'a body'}"
+        causes = " or ".join(laws or (masses,))
         raise LinkageError(f"the accelerations at the start are no finite numbers: {causes} must be another")
+
+    def _has_force(self, made: Mechanism, name: str) -> bool:
+        """Return whether the law of a spring has a finite value at the start."""
+        start = made.published[made.name]
+        x, p, module = made.state(start.initial), start.parameters.constants(), made.modules[-1]
+        try:
+            s = module.springs(module.places(x, p), x, p)
+            stretch, rate = getattr(s, f"{name}_stretch"), getattr(s, f"{name}_rate")
+            constants = (p,) if self.description.springs[name].constants else ()
+            return isfinite(getattr(module, f"{name}_law")(stretch, rate, *constants))
+        except (ValueError, TypeError, ArithmeticError):
+            return False
 
     def _check_twists(self, made: Mechanism) -> None:
         """Raise LinkageError if a torsion spring is twisted by more than half a turn and no freedom counts its turns."""
@@ -298,6 +325,13 @@ class Package:
         blocks += Contacts(motion).blocks() if self.description.friction else ()
         # only now it is known which joint forces there are
         self.outputs = Outputs(motion)
+        names = [*(p.name for p in self.interface.parameters), *self.outputs.names()]
+        for name in names:
+            if names.count(name) > 1:
+                of = name.partition(".")[0]
+                raise LinkageError(
+                    f"two variables would be called {name}: one of the entries {of} must have another name"
+                )
         scale = _error_scale(self.interface.drives, *length_and_mass(self.interface))
         body = "\n\n\n".join([*blocks, self.outputs.function(), scale, self.picture.positions()])
         return _EQUATIONS.format(

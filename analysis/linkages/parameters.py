@@ -369,7 +369,10 @@ def _mass(name: str, body: Body) -> _Mass | None:
             )
         if not body.bar and not body.section.corners:
             raise LinkageError(f"{where}.section is none of a plate: the body must have a bar and its length")
-        mass, centre, inertia = body.section.properties(body.length)
+        try:
+            mass, centre, inertia = body.section.properties(body.length)
+        except ParameterError as error:
+            raise ParameterError(f"{where}.section.corners", error.value, error.requirement) from None
         x, y = (0 if abs(c) < 1e-12 else float(c) for c in centre)
         # a mass given beside a section was weighed; the radius of gyration remains that of the section
         own = mass if body.mass is None else body.mass

@@ -51,14 +51,16 @@ def reach(mechanism: Mechanism, freedom: int = 0, *, most: float | None = None, 
     mechanism : Mechanism
     freedom : int
     most : float, optional
-        Greatest distance from the start that is searched: by default half the period, or half a turn; for a slide 1 m.
+        Greatest distance from the start that is searched: by default half the period, or four turns if there is none; for a
+        slide 1 m.
     samples : int
-        Number of positions that are tried on either side.
+        Number of positions that are tried on either side, for each half turn.
     """
     coordinate, period = mechanism.freedoms[freedom].coordinate, mechanism.freedoms[freedom].period
     unit = next(v.unit for v in mechanism.variables if v.name == coordinate)
     if most is None:
-        most = 0.5 * period or (pi if unit == "rad" else 1.0)
+        most = 0.5 * period or (8.0 * pi if unit == "rad" else 1.0)
+    samples *= max(round(most / pi), 1) if unit == "rad" else 1
     known = mechanism.first_set
     p = known.parameters.constants()
     acting, x = mechanism.idle_inputs(p), list(mechanism.state(known.initial))
@@ -97,8 +99,7 @@ def reach(mechanism: Mechanism, freedom: int = 0, *, most: float | None = None, 
         else:
             free.append(True)
             ends.append(places[samples + 1])
-    turn = period or (2.0 * pi if unit == "rad" else 0.0)
-    whole = bool(turn) and ends[1] - ends[0] > turn * (1.0 - 1e-9)
+    whole = ends[1] - ends[0] > period * (1.0 - 1e-9) if period else unit == "rad" and all(free)
     return Reach(freedom, unit, ends[0], ends[1], (free[0], free[1]), whole, least + LIMIT_SINE)
 
 

@@ -267,6 +267,7 @@ def _count_freedoms(description: Description) -> int:
 
 def _removal_hint(description: Description) -> str:
     """Return a hint that names an entry whose removal would let an immobile linkage move; empty if there is none."""
+    hints = []
     for table in ("racks", "gears", "slots", "slides", "bodies"):
         entries = getattr(description, table)
         for name in reversed(entries):
@@ -276,8 +277,22 @@ def _removal_hint(description: Description) -> str:
             except LinkworkError:  # something else needs it
                 continue
             if 1 <= count <= MOST_FREEDOMS:
-                return f"; without linkage.{table}.{name} it has {count}"
-    return ""
+                hints.append((count, f"; without linkage.{table}.{name} it has {count}"))
+    return min(hints, key=lambda hint: hint[0], default=(0, ""))[1]
+
+
+def _check_pairs(found: Mapping[str, Joint]) -> None:
+    """Raise LinkageError if two joints hold the same two bodies together."""
+    joined: dict[tuple[str, ...], str] = {}
+    for name, joint in found.items():
+        for pair in combinations(sorted(joint.bodies), 2):
+            if pair in joined:
+                one, other = sorted(pair, key=lambda body: body == GROUND)
+                raise LinkageError(
+                    f"linkage.bodies.{one} is joined to {other} twice, by {joined[pair]} and by {name}: then neither moves "
+                    "against the other; one of these joints must go"
+                )
+            joined[pair] = name
 
 
 def analyse(description: Description) -> Structure:
@@ -306,6 +321,7 @@ def analyse(description: Description) -> Structure:
             else "; more joints in linkage.slides or common points take some away"
         )
         raise LinkageError(f"{says}: it must have 1 to {MOST_FREEDOMS}{hint}")
+    _check_pairs(found)
     if not freedoms:
         freedoms = _propose_freedoms(description, found, count)
     if len(freedoms) != count:

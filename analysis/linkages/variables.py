@@ -119,7 +119,9 @@ class Variables:
     # Inputs
 
     def _argument(self, drive: Drive, name: str) -> str:
-        return f"{drive.name}_{name}" if self.several or not drive.table else name
+        argument = f"{drive.name}_{name}" if self.several or not drive.table else name
+        taken = any(argument == load.field for load in self.interface.loads)
+        return f"{drive.name}_drive_{name}" if taken else argument
 
     def commanded_rates(self) -> str:
         """Return the source of the entries of the published set's ``drive``: the commanded rates."""

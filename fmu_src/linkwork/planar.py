@@ -610,6 +610,17 @@ def transmission(p: Vector, c: Vector, q: Vector) -> float:
     return atan2(fabs(ux * wy - uy * wx), ux * wx + uy * wy)
 
 
+def transmission_to_normal(p: Vector, q: Vector, t: Turn) -> float:
+    """Return the angle between the direction from p to q and the normal of a line of direction t, in [0, pi]."""
+    ux, uy = q.x - p.x, q.y - p.y
+    return atan2(fabs(ux * t.c + uy * t.s), uy * t.c - ux * t.s)
+
+
+def transmission_between_lines(t: Turn, r: Turn) -> float:
+    """Return the angle between two lines of directions t and r, in [0, pi]."""
+    return atan2(fabs(t.c * r.s - t.s * r.c), t.c * r.c + t.s * r.s)
+
+
 def block_position(f: Frame, x: float, y: float, t: Turn, block: Frame) -> tuple[float, float]:
     """Return position and velocity of a block's origin along a line of direction t of body f, from the point (x, y) of f."""
     start = point(f, x, y)

@@ -17,7 +17,7 @@ import pytest
 
 from analysis.files import entry_names
 from analysis.linear import linearise
-from analysis.linkages import Dyad, Package, RackStep, laws, linkage, load_linkage, read_description
+from analysis.linkages import Dyad, Package, RackStep, laws, linkage, load_linkage, reach, read_description
 from analysis.linkages.builder import Builder
 from analysis.linkages.description import Body, FreedomTable, Gear, Rack, Slide, Slot, Spring
 from analysis.linkages.structure import Pin, Slider
@@ -402,7 +402,14 @@ MISTAKES = [
         "linkage.springs.k.free is -150 deg, and the angle at",
     ),
     ("gears/C", {"bodies": ["crank", "rocker"], "ratio": -1}, "linkage.gears.C has the name of a point"),
-]
+    ("slides/B", {"body": "rocker", "through": "A"}, "linkage.slides.B has the name of a point"),
+    ("springs/energy", {"at": "D", "stiffness": 1.0}, "linkage.springs.energy has a name that is taken"),
+    ("bodies/rocker/section", {"kind": "tube", "outer": "5 mm", "inner": "6 mm", "material": "steel"},
+     "linkage.bodies.rocker.section.inner is 0.006"),
+    ("freedoms/again", {"joint": "A"}, "linkage.freedoms.again is of A"),
+    ("name", "rahman-ideal", "linkage.name is rahman-ideal: it must not be that of a published set of slider-crank"),
+    ("name", "five-bar-slider", "linkage.name is five-bar-slider: its FMU would be called FiveBarSlider, as that of five-bar"),
+]  # fmt: skip
 
 
 @pytest.mark.parametrize(("path", "value", "named"), MISTAKES, ids=[f"{n}-{m[0]}" for n, m in enumerate(MISTAKES)])
@@ -433,8 +440,125 @@ def test_a_free_body_without_mass_is_named(tmp_path):
     data["freedoms"] |= {"x": {"joint": "Cx", "driven": False}}
     data["bodies"]["rocker"]["points"] = {"Cx": [0.05, 0]}
     data["bodies"]["x"]["bar"] = ["Cx", "Q"]
-    with pytest.raises(LinkworkError, match=r"a mass or inertia in linkage\.bodies"):
+    with pytest.raises(LinkworkError, match=r"the mass or inertia of linkage\.bodies\.x must be"):
         Package(read_description(data)).mechanism(tmp_path)
+
+
+def test_corners_in_no_order_are_named() -> None:
+    plate = {"kind": "plate", "thickness": 0.005, "material": "steel", "corners": [[0, 0], [1, 1], [1, 0], [0, 1]]}
+    built = (
+        linkage("bow", ground={"A": (0, 0)}).body("sheet", points={"A": (0, 0)}, section=plate).freedom("sheet", "A")
+    )
+    with pytest.raises(ParameterError, match=r"linkage\.bodies\.sheet\.section\.corners is .*: its edges cross"):
+        built.mechanism()
+
+
+def test_every_dyad_has_a_transmission_angle() -> None:
+    """At whose sine zero it locks: of a slider-crank from rod and guide, of a rod in a swivel from rod and line of pins."""
+    built = linkage("crosshead", ground={"A": (0, 0), "O": (0, 0.02), "S": (0.25, 0)})
+    built.body("crank", bar=("A", "B"), length=0.05, mass=1.0).body("rod", bar=("B", "C"), length=0.15, mass=1.0)
+    built.body("block", points={"C": (0, 0)}, mass=1.0).slide("G", body="block", through="O")
+    built.body("swivel", points={"S": (0, 0)}, mass=1.0, inertia=1e-3).body(
+        "arm", points={"B": (0, 0)}, mass=1.0, inertia=1e-3
+    )
+    built.slide("E", body="arm", on="swivel", through="S").freedom("crank", "A", start="40 deg").mechanism()
+    run = simulate("crosshead", Inputs(speed=10.0), stop_time=0.5, step=0.01)
+    rise = 0.02 - 0.05 * np.sin(run["crank.angle"])
+    assert np.sin(run["C.transmission_angle"]) == pytest.approx(np.sqrt(0.15**2 - rise**2) / 0.15, rel=1e-9)
+    assert run["E.transmission_angle"] == pytest.approx(np.full(len(run), 0.5 * math.pi), abs=1e-9)
+    least = np.minimum(np.sin(run["C.transmission_angle"]), np.sin(run["E.transmission_angle"]))
+    assert run["assembly.clearance"] == pytest.approx(least, rel=1e-9)
+
+
+def test_a_rack_ends_what_a_wheel_can_turn() -> None:
+    """A wheel never brings its rack back, and its range is that of what the rack moves."""
+    built = linkage("rack-end", ground={"A": (0, 0), "O": (0, -0.02), "Q": (0.1, 0.1)})
+    built.body("wheel", points={"A": (0, 0)}, mass=1.0, inertia=1e-3)
+    built.body("bar", points={"P": (0, 0)}, mass=1.0).slide("way", body="bar", through="O")
+    built.rack("teeth", gear="wheel", rack="bar", radius=0.02)
+    built.body("one", bar=("P", "R"), length=0.2, mass=1.0).body("two", bar=("Q", "R"), length=0.15, mass=1.0)
+    found = reach(built.freedom("wheel", "A").mechanism())
+    assert not found.turns
+    assert found.open == (False, False)
+    # the pins are sqrt(0.35^2 - 0.12^2) apart along the rack at most
+    assert found.high - found.low == pytest.approx(2.0 * math.sqrt(0.35**2 - 0.12**2) / 0.02, rel=1e-2)
+
+
+def test_two_joints_between_two_bodies_are_named() -> None:
+    built = linkage("held", ground={"A": (0, 0), "O": (0.2, 0)}).body("arm", bar=("A", "B"), length=0.1, mass=1.0)
+    built.body("block", points={"F": (0, 0)}, mass=1.0).slide("one", body="block", through="O").slide(
+        "two", body="block", through="O"
+    )
+    built.body("tip", bar=("B", "C"), length=0.1, mass=1.0).body("end", bar=("C", "D"), length=0.1, mass=1.0)
+    with pytest.raises(LinkworkError, match=r"linkage\.bodies\.block is joined to ground twice, by one and by two"):
+        built.mechanism()
+
+
+def test_a_body_of_no_length_is_named() -> None:
+    built = linkage("pointed", ground={"A": (0, 0), "D": (0.15, 0)}).body(
+        "crank", points={"A": (0, 0), "B": (0, 0)}, mass=1.0, inertia=1e-3
+    )
+    built.body("coupler", bar=("B", "C"), length=0.15, mass=1.0).body("rocker", bar=("D", "C"), length=0.1, mass=1.0)
+    with pytest.raises(LinkworkError, match=r"linkage\.bodies\.crank\.points\.B is where A is"):
+        built.freedom("crank", "A").mechanism()
+
+
+def test_a_mate_for_each_surplus_is_the_smallest() -> None:
+    """Of a parallelogram with a third crank, the crank is named, not the coupler."""
+    built = linkage("third", ground={"A": (0, 0), "D": (0.15, 0), "E": (0.075, 0)})
+    for name, bar in (("a", ("A", "B")), ("d", ("D", "C")), ("e", ("E", "M"))):
+        built.body(name, bar=bar, length=0.05, mass=1.0)
+    built.body("c", points={"B": (0, 0), "C": (0.15, 0), "M": (0.075, 0)}, mass=1.0, inertia=1e-3)
+    with pytest.raises(LinkworkError, match=r"without linkage\.bodies\.e it has 1"):
+        built.freedom("a", "A").mechanism()
+
+
+def test_only_what_fails_is_blamed_for_accelerations() -> None:
+    """The massless body, not the sound law beside it."""
+    built = linkage("massless", ground={"A": (0, 0)}).body("crank", bar=("A", "B"), length=0.05, mass=1.0, inertia=1e-3)
+    built.body("pendulum", bar=("B", "Q"), length=0.1).freedom("crank", "A", speed="100 rpm").freedom("pendulum", "B")
+    built.spring("wind", at="A", law="2*sin(x)")
+    with pytest.raises(
+        LinkworkError, match=r"numbers: the mass or inertia of linkage\.bodies\.pendulum must be another"
+    ):
+        built.mechanism()
+
+
+def test_a_slot_out_of_reach_is_called_a_slot() -> None:
+    built = linkage("short", ground={"A": (0, 0), "E": (0.3, 0)}).body("crank", bar=("A", "B"), length=0.05, mass=1.0)
+    built.body("lever", bar=("E", "F"), length=0.1, mass=1.0).slot(
+        "S", pin="F", on="crank", through="A", direction="90 deg"
+    )
+    with pytest.raises(LinkworkError, match=r"linkage\.slots\.S"):
+        built.freedom("crank", "A").mechanism()
+
+
+def test_an_input_of_a_body_and_a_freedom_of_its_name_have_arguments_of_their_own() -> None:
+    built = linkage("pair", ground={"A": (0, 0), "D": (0.15, 0)}, torques=["right"])
+    built.body("left", bar=("A", "B"), length=0.05, mass=1.0).body("right", bar=("D", "C"), length=0.05, mass=1.0)
+    made = built.freedom("left", "A", driven=True).freedom("right", "D", driven=True).mechanism()
+    assert {c.name: c.argument for c in made.channels if c.name.endswith("torque")} == {
+        "leftDrive.torque": "left_torque",
+        "rightDrive.torque": "right_drive_torque",
+        "right.torque": "right_torque",
+    }
+    run = simulate("pair", Inputs(right_torque=0.2, right_drive_torque=0.3), stop_time=0.01, step=1e-3)
+    assert run["right.acceleration"][0] == pytest.approx(0.5 / 0.025**2, rel=1e-9)
+
+
+def test_the_force_of_teeth_turns_the_driven_gear() -> None:
+    """At the pitch point, 0.1 m from its pin: it carries inertia and load."""
+    built = linkage("wheels", ground={"A": (0, 0), "B": (0.15, 0)}, torques=["big"])
+    built.body("small", points={"A": (0, 0)}, mass=1.0, inertia=1e-3).body(
+        "big", points={"B": (0, 0)}, mass=2.0, inertia=8e-3
+    )
+    built.gear("pair", bodies=("small", "big"), ratio=-0.5).freedom("small", "A").mechanism()
+    run = simulate("wheels", Inputs(torque=3.0, big_torque=-2.0), stop_time=0.01, step=1e-3)
+    turned = 8e-3 * -0.5 * run["small.acceleration"] + 2.0
+    assert run["small.acceleration"] == pytest.approx((3.0 + 1.0) / (1e-3 + 0.25 * 8e-3), rel=1e-9)
+    # the driven wheel is on the right: an upward force at its left turns it clockwise
+    assert run["pair.fy"] * -0.1 == pytest.approx(turned, rel=1e-9)
+    assert abs(run["pair.fx"]).max() < 1e-9
 
 
 def test_other_freedoms_are_proposed(tmp_path):

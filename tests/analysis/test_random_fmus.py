@@ -8,13 +8,15 @@ import numpy as np
 import pytest
 
 from analysis.export import NATIVE_FMI3, build, build_native
+from analysis.linkages import LinkageError
 from analysis.run import Inputs, cosimulate
 from linkwork.mechanism import Mechanism
 from linkwork.plant import Plant
 from tests.fmu.runner import run_in_process
 from tests.fmu.test_plant_in_fmu import START, outputs_of_fmus, outputs_of_plant
+from tests.random_linkages import KINDS
 
-from .test_linkages import assembled
+from .test_linkages import assembled, rough
 
 pytestmark = [pytest.mark.usefixtures("own_linkages"), pytest.mark.slow, pytest.mark.fmu]
 
@@ -23,9 +25,15 @@ SIZES = [1e-6, 1.2345e-5, 3e-4, 1e-3, 2.5e-3]
 
 
 def made(seed: int, folder: Any) -> Mechanism:
-    """A random linkage; every third has four or five dyads."""
-    few = {} if seed % 3 else {"dyads": (4, 6)}
-    package, _ = assembled(seed, folder, name=f"random-{seed}", **few)
+    """A random linkage; every third has four or five dyads, every fourth racks, every fifth friction in its joints."""
+    options: dict[str, Any] = {"name": f"random-{seed}", **({} if seed % 3 else {"dyads": (4, 6)})}
+    options |= {} if seed % 4 else {"kinds": (*KINDS, "rack")}
+    package, _ = assembled(seed, folder, **options)
+    if seed % 5 == 0:
+        try:
+            return assembled(seed, folder, friction=rough(package), **options)[0].mechanism(folder)
+        except LinkageError:  # it may jam
+            pass
     return package.mechanism(folder)
 
 
@@ -45,7 +53,8 @@ def test_the_python_fmus_are_the_plants(first, tmp_path, monkeypatch):
         expected, times = outputs_of_plant(
             Plant.from_values(mechanism, starts, tolerance=1e-9, time=START), loads, SIZES
         )
-        assert len(times) == len(SIZES)
+        # friction may jam a linkage: both then refuse the step in the same words
+        assert len(times) == len(SIZES) or (seed % 5 == 0 and "jam" in expected[-2])
         assert abs(expected[-1]["energy.residual"]) < 1e-7 * (1.0 + expected[-1]["energy.kinetic"])
         wanted.append(expected)
         cases.append((str(build(mechanism, tmp_path)), str(tmp_path / f"{seed}"), {}, loads, times, SIZES))
