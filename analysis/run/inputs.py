@@ -208,8 +208,9 @@ def _check_channel(name: str, value: Any) -> None:
     kinds = _SIGNALS if name in on_shafts else _SIGNALS[:-2]
     for part in parts:
         if not isinstance(part, kinds):
+            also = "; a motor drives a freedom that turns" if isinstance(part, _SIGNALS) else ""
             raise InputError(
-                f"{name} is {part!r}: it must be a number, a signal of analysis.run.signals, or a Function"
+                f"{name} is {part!r}: it must be a number, a signal of analysis.run.signals, or a Function{also}"
             )
         if isinstance(part, (Piecewise, Harmonics)) and part.unit not in ("", *(units := _all_units(name))):
             raise InputError(f"{name} is a signal in {part.unit}: it must be in {' or '.join(units)}")
