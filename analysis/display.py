@@ -17,7 +17,7 @@ PICTURES = "analysis.figures:plot"
 DOTS_PER_INCH = 80
 
 
-class Shown:
+class NotebookResult:
     """Base class of results; a notebook shows their `repr`, and a picture below it if there is one."""
 
     __slots__ = ()

@@ -46,10 +46,10 @@ def require(*libraries: str) -> None:
 
 def lazy(library: str) -> Any:
     """Return an object that imports a library when it is first used, and raises `MissingLibraryError` then if it is missing."""
-    return _Lazy(library)
+    return _LazyLibrary(library)
 
 
-class _Lazy(ModuleType):
+class _LazyLibrary(ModuleType):
     def __getattr__(self, name: str) -> Any:
         require(self.__name__)
         return getattr(import_module(self.__name__), name)

@@ -181,7 +181,7 @@ def _faults_of_drawing(m: Mechanism) -> Iterator[str]:
             yield f"its picture has no joint {name!r}"
 
 
-class _Published(Mapping[str, Any]):
+class _PublishedSets(Mapping[str, Any]):
     def __repr__(self) -> str:
         return f"<published sets: {', '.join(self)}>"
 
@@ -199,7 +199,7 @@ class _Published(Mapping[str, Any]):
 
 
 #: The published sets of every mechanism, by name: each has parameters, initial, drive and source.
-PUBLISHED: Mapping[str, Any] = _Published()
+PUBLISHED: Mapping[str, Any] = _PublishedSets()
 
 #: Parameters of a mechanism and its state at the start: instances of `Mechanism.parameters` and `Mechanism.initial`.
 Parameters = Any

@@ -30,7 +30,7 @@ class Choice(NamedTuple):
 
 
 def loosest_setting(error: Callable[[float], float], settings: Iterable[float]) -> Choice:
-    """Find the first of the settings, from loose to tight, that reaches the accuracy; if none does, return the most accurate.
+    """Return the first of the settings, from loose to tight, that reaches `ACCURACY`; if none does, the most accurate.
 
     A setting counts only if the next tighter one reaches the accuracy as well, to exclude lucky cancellation.
     """

@@ -166,7 +166,7 @@ class BlackBox:
         return charged
 
     def penalised_quality(self, x: FloatArray) -> float:
-        """Return `penalised_qualities` for one linkage."""
+        """Return the penalised quality of one linkage, see `penalised_qualities`."""
         return float(self.penalised_qualities(x[None, :])[0])
 
     def violations(self, x: FloatArray) -> FloatArray:
@@ -220,7 +220,7 @@ class BlackBox:
         # if B is on D, take any direction
         return np.nan_to_num(coupler, nan=1.0), np.nan_to_num(rocker, nan=1.0)
 
-    def _traced(self, q: FloatArray, rotation: FloatArray, coupler: ComplexArray) -> ComplexArray:
+    def _coupler_points(self, q: FloatArray, rotation: FloatArray, coupler: ComplexArray) -> ComplexArray:
         turn = np.exp(1j * q[:, 7])
         point = q[:, 6] * np.exp(1j * q[:, 9])
         crank = q[:, 3, None] * np.exp(1j * (rotation + q[:, 8, None]))
@@ -232,14 +232,14 @@ class BlackBox:
         coupler, rocker = self._directions(q, rotation)
         squares: FloatArray = np.zeros(rotation.shape)
         if normal.points is not None:
-            squares = np.abs(self._traced(q, rotation, coupler) - normal.points) ** 2
+            squares = np.abs(self._coupler_points(q, rotation, coupler) - normal.points) ** 2
         if normal.angle is not None:
-            squares = squares + self._turned(q, rotation, coupler, rocker, normal.angle) ** 2
+            squares = squares + self._angle_errors(q, rotation, coupler, rocker, normal.angle) ** 2
         weighted = squares * normal.weights
         errors: FloatArray = np.sqrt(weighted.max(axis=1)) if normal.quality == "worst" else weighted.sum(axis=1)
         return errors
 
-    def _turned(
+    def _angle_errors(
         self, q: FloatArray, rotation: FloatArray, coupler: ComplexArray, rocker: ComplexArray, angle: FloatArray
     ) -> FloatArray:
         """Return the errors of an angle, converted to lengths; for a stretched link those of its direction."""
@@ -252,11 +252,11 @@ class BlackBox:
         if self.normal.rotation is not None:
             return np.broadcast_to(self.normal.rotation, (len(q), self.normal.n))
         span = x[:, -1] if self._open else np.full(len(q), 2.0 * pi)
-        found = [self._paired(q, way * span) for way in (1.0, -1.0)]
+        found = [self._paired_rotations(q, way * span) for way in (1.0, -1.0)]
         forward = self._errors(q, found[0]) <= self._errors(q, found[1])
         return np.where(forward[:, None], *found)
 
-    def _paired(self, q: FloatArray, span: FloatArray) -> FloatArray:
+    def _paired_rotations(self, q: FloatArray, span: FloatArray) -> FloatArray:
         """Return the crank rotations that pair points of each coupler curve with the stations by arc length, shape (m, n).
 
         At each rotation the coupler curve has covered the same fraction of its length as the target has at the station. ``q``
@@ -267,7 +267,7 @@ class BlackBox:
         steps = np.abs(np.diff(np.append(normal.points, normal.points[0]) if normal.closed else normal.points))
         shares = (np.concatenate([[0.0], np.cumsum(steps)]) / steps.sum())[: normal.n]
         rotation = span[:, None] * np.linspace(0.0, 1.0, CURVE + 1)
-        curve = self._traced(q, rotation, self._directions(q, rotation)[0])
+        curve = self._coupler_points(q, rotation, self._directions(q, rotation)[0])
         length = np.hstack([np.zeros((len(q), 1)), np.cumsum(np.abs(np.diff(curve, axis=1)), axis=1)])
         return np.array([np.interp(shares * s[-1], s, r) for s, r in zip(length, rotation)])
 
@@ -301,7 +301,7 @@ class BlackBox:
             found.append(("crank rotation of the straight part", spent - straight.rotation))
             if straight.flatness is not None:
                 line = normal.points[straight.end] - normal.points[straight.start]
-                traced = self._traced(q, rotation, self._directions(q, rotation)[0])
+                traced = self._coupler_points(q, rotation, self._directions(q, rotation)[0])
                 off = (traced[:, straight.start : straight.end + 1] * line.conjugate()).imag / abs(line)
                 found.append(("flatness of the straight part", np.ptp(off, axis=1) - straight.flatness))
         return found

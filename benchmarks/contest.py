@@ -123,12 +123,12 @@ class Contest:
         plain = self.plain[box.branch]
         answer = plain.answer(SimpleNamespace(x=x, success=True, message="", nit=0))
         linkage = make_linkage(answer.start, self.normal)
-        if not answer.feasible or (self.normal.straight is not None and not packs(linkage)):
+        if not answer.feasible or (self.normal.straight is not None and not meets_packaging(linkage)):
             return inf
         return self.problem.convert(evaluate(self.problem.task, linkage).error)
 
 
-def packs(linkage: Linkage) -> bool:
+def meets_packaging(linkage: Linkage) -> bool:
     """Return whether the coupler point has the required travel and flatness within the required crank rotation, to a degree."""
     x, y = linkage.path(turn(360)).T
     window = (np.arange(360)[:, None] + np.arange(round(degrees(PACKAGING_ROTATION)) + 1)) % 360
@@ -193,7 +193,7 @@ class Trace:
             raise TimeUp
 
     def watch(self, box: BlackBox, score: Score) -> Score:
-        """Wrap a function to be minimised so that each improvement by `SLIGHT` is offered."""
+        """Wrap a function to be minimised so that each improvement by `SLIGHT` is recorded."""
         least = inf
 
         def value(x: FloatArray) -> float:

@@ -22,7 +22,7 @@ from rich.console import Console
 from rich.table import Table
 
 from analysis import figures
-from analysis.systems import Convergence, Joined, convergence, library, load_system, write_ssp
+from analysis.systems import Convergence, JoinedSystem, convergence, library, load_system, write_ssp
 from tests.fmu.runner import run_in_process
 from tests.systems import masters
 from tests.systems.conftest import started_in_its_modes
@@ -73,7 +73,7 @@ def measure_other_masters(steps: Sequence[float], stop_time: float, out: Path) -
     """Measure the other masters on the system motor-crank with inputs held."""
     system = load_system(library()["motor-crank"]).without_rates()
     name = "linkage.crank.speed"
-    right = Joined(system).run(stop_time, stop_time)[name][-1]
+    right = JoinedSystem(system).run(stop_time, stop_time)[name][-1]
     errors = {}
     with tempfile.TemporaryDirectory() as folder:
         plain = write_ssp(system.wiring(), Path(folder, "plain.ssp"))

@@ -62,7 +62,7 @@ def measure_waiting(arguments: tuple[str, ...], folder: str) -> tuple[str, str, 
 
 
 def measure_first(arguments: tuple[str, ...], *, carried: bool) -> tuple[str, str, str]:
-    """Measure as `measure_waiting` with an empty cache, with or without the kernels that the installation carries."""
+    """Return what `measure_waiting` does, for an empty cache; ``carried``: with the kernels that the installation carries."""
     code, *others = arguments
     with tempfile.TemporaryDirectory() as folder:
         return measure_waiting((code if carried else WITHOUT + code, *others), folder)

@@ -35,7 +35,8 @@ YES, NO, NONE = "yes", "no", "-"
 class Run(NamedTuple):
     """A run of a master on a `material`.
 
-    ``label`` is the option that it has, ``fails`` a part of what it says where it must fail.
+    ``on`` names the `material`, ``by`` is the function that runs the master. ``label`` names the option of the master that is
+    used, `YES` without one; ``fails`` is a part of its message if the run must fail.
     """
 
     on: str

@@ -170,7 +170,7 @@ def run_missing(
 
 
 def last_time(rows: Iterable[Row]) -> float:
-    """Return the last time at which all rows have an error (s)."""
+    """Return the last of `TIMES` at which all rows have an error (s)."""
     return max(seconds for k, seconds in enumerate(TIMES) if not any(np.isnan(row.errors[k]) for row in rows))
 
 
@@ -194,7 +194,7 @@ def is_ahead(of: Mapping[str, Row], seconds: float) -> bool:
 
 
 def is_level(of: Mapping[str, Row], seconds: float) -> bool:
-    """Return whether our search is ahead, but another one is as good within `LEVEL`."""
+    """Return whether our search is ahead and another one is equal to it within `LEVEL`."""
     return is_ahead(of, seconds) and rival_error(of, seconds) <= (1.0 + LEVEL) * of[OURS].least_error(seconds)
 
 

@@ -22,8 +22,8 @@ from analysis.studio import PAGE
 
 
 class Figures(NamedTuple):
-    """In ms: first sight, verdicts after changes (median and greatest), frames of a drag and the processor time of the page's
-    own thread for one, whatever else the machine does (each median, p95, greatest); the share of frames that came late.
+    """Times in ms: first sight; verdicts after changes (median, greatest); frames of a drag, and the page's own processor time
+    for each, whatever else the machine does (both median, p95, greatest). ``late`` is the share of late frames.
     """
 
     first: float
@@ -119,7 +119,7 @@ def _work(events: list[dict[str, Any]]) -> np.ndarray:
 
 
 def figures_in_words(found: Figures) -> str:
-    """Write the figures as a sentence."""
+    """Return the measured times as one sentence."""
     return (
         f"first sight {found.first:.0f} ms; Floquet verdict {found.verdict[0]:.1f} ms after a change (greatest "
         f"{found.verdict[1]:.1f}); frames of a drag {found.frame[0]:.1f} ms, p95 {found.frame[1]:.1f}, greatest "

@@ -89,7 +89,7 @@ def polygon_points(corners: ArrayLike, n: int = CURVE) -> FloatArray:
 
 
 def hand_drawn(seed: int) -> TargetPath:
-    """Draw a closed curve of random harmonics with a tremor, and smooth it."""
+    """Return a closed path as if drawn by hand: random harmonics with noise of size `TREMOR`, smoothed."""
     random = np.random.default_rng(seed)
     t, order = turn(120), np.array([-3, -2, -1, 2, 3])
     wave = random.normal(size=(5, 2)) @ [1.0, 1j] * 0.5 / np.abs(order) ** 1.5
@@ -109,7 +109,7 @@ def random_waves(seed: int) -> RockerFunction:
 
 
 def function_target(function: Any, low: float, high: float, output_deg: float = 60.0) -> RockerFunction:
-    """Return y = f(x) as a function of the rocker: 90 degrees of the crank, both scales linear, zeros free."""
+    """Return the task that the rocker angle is y = f(x) over 90 degrees of the crank, both scales linear, both zeros free."""
     x = np.linspace(low, high, 31)
     y = function(x)
     return RockerFunction(

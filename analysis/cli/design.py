@@ -51,7 +51,7 @@ def read_settings(settings: Sequence[str]) -> dict[str, Any]:
 
 
 def leave_if_stopped(stopped: Interrupted | None, kept: str) -> None:
-    """Exit with the code for an interruption, if there was one, and say in ``kept`` which results are kept."""
+    """Exit with the code for an interruption if ``stopped`` is one; the sentence ``kept`` says which results are kept."""
     if stopped is not None:
         print_error(f"{stopped}; {kept}")
         sys.exit(INTERRUPTED)
@@ -137,7 +137,7 @@ def write_described(best: Assessment, folder: Path, title: str, *, curve: str, t
 
 
 def write_linkages(solutions: Sequence[Solution], folder: Path, title: str, *, make: MachineSpec) -> list[Path]:
-    """Write the first linkage, and the sound ones of the others, as case files that run; return the paths."""
+    """Write the first linkage, and those of the others that have no defect, as case files for runs; return the paths."""
     from ..files import write_tables
 
     names = [(s, "linkage.toml" if rank == 1 else f"linkage-{rank}.toml") for rank, s in enumerate(solutions, start=1)]

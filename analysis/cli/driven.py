@@ -29,7 +29,7 @@ from .common import (
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Chosen:
+class CaseChoice:
     """The case of a command, with options on its drive.
 
     ``stem`` is the first part of the names of files, ``speed`` and ``guess_speed`` are texts of the options or None, ``folder``
@@ -86,7 +86,7 @@ class Chosen:
 
 
 def add_case_options(command: Callable[..., None]) -> Callable[..., None]:
-    """Add the options that select a case and its drive to a command, which receives them as one `Chosen`."""
+    """Add the options that select a case and its drive to a command, which receives them as one `CaseChoice`."""
 
     @report_errors
     @wraps(command)
@@ -101,7 +101,7 @@ def add_case_options(command: Callable[..., None]) -> Callable[..., None]:
     ) -> None:
         chosen = chosen_case(case, published, settings)
         stem = Path(case).stem if case else str(published)
-        command(Chosen(case=chosen, stem=stem, speed=speed, guess_speed=guess_speed, folder=Path(out)), **options)
+        command(CaseChoice(case=chosen, stem=stem, speed=speed, guess_speed=guess_speed, folder=Path(out)), **options)
 
     for option in (
         out_option(help="Folder for the results."),

@@ -10,7 +10,7 @@ import click
 from ..display import format_count, format_rounds
 from ..mechanisms import mechanism_of
 from .common import console, html_option, output_folder, quantity, save_picture, say, show_table, workers_options
-from .driven import Chosen, add_case_options, swing_unit
+from .driven import CaseChoice, add_case_options, swing_unit
 
 if TYPE_CHECKING:
     from ..periodic import Orbits
@@ -35,7 +35,7 @@ if TYPE_CHECKING:
 @workers_options(default=-1)
 @html_option
 def basins(
-    chosen: Chosen,
+    chosen: CaseChoice,
     turns: int,
     points: int,
     position: tuple[str, str] | None,
@@ -93,7 +93,7 @@ def basins(
 def _motions(title: str, found: Sequence[Orbits], common: int) -> None:
     """Print a table of all motions found at one speed, and whether there may be others.
 
-    ``found`` has the motions of 1, 2, ... common periods, each of ``common`` turns.
+    ``found[n - 1]`` has the motions whose period is n times ``common`` turns of the crank.
     """
     from ..periodic import Stability
 

@@ -161,7 +161,7 @@ def _parameter_file(mechanism: Mechanism) -> Iterator[str]:
 
 
 def _run_case(mechanism: Mechanism, file: str) -> Iterator[str]:
-    """Yield the lines of a run of the first published set at its speed, or of one second if it has no drive."""
+    """Yield the lines of a new case file: a run of the first published set, for three turns, or 1 s if it has no drive."""
     from ..files import entries, in_words, line
     from ..run import RunTable, case_inputs, signal_kinds
 
@@ -208,7 +208,7 @@ def _tuning_case(file: str) -> Iterator[str]:
 
 
 def _synthesis_case(kind: str, file: str) -> Iterator[str]:
-    """Yield the lines of a synthesis task, or of a task and the motion of its slider."""
+    """Yield the lines of a new case file: a synthesis task, for `SLIDER_MOTION` with the motion of the slider."""
     from ..files import Quantity, entries, line
     from ..slider import TABLES as MOTION
     from ..synthesis import ANGLES, BOUNDS, KINDS, LENGTHS, TABLES

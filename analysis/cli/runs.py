@@ -50,7 +50,7 @@ _ROUNDING = 1e-12
 DEFAULT_FOLDER = Path("build")
 
 
-class Given(TypedDict):
+class CaseChanges(TypedDict):
     """Options that replace entries of a case; None if not given."""
 
     stop_time: str | None
@@ -89,7 +89,7 @@ def run(
     method: str,
     out: str,
     plot: bool,
-    **given: Unpack[Given],
+    **given: Unpack[CaseChanges],
 ) -> None:
     """Run a CASE file (TOML or JSON) or a published set, and write CSV and a plot.
 

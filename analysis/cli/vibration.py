@@ -26,7 +26,7 @@ from .common import (
     show_table,
     workers_options,
 )
-from .driven import Chosen, add_case_options, swing_unit
+from .driven import CaseChoice, add_case_options, swing_unit
 from .sensitivity import report_sensitivity
 
 #: Default range of speeds relative to the natural frequency; it contains 2, near which parametric resonance begins.
@@ -82,7 +82,7 @@ def _require_range(parameters: Any, low: float, high: float, name: str, first: s
 @html_option
 @click.option("--sensitivity", is_flag=True, help="Report the parameters that move each maximum, fold and so on most.")
 def resonance(
-    chosen: Chosen,
+    chosen: CaseChoice,
     vary: str | None,
     low: str | None,
     high: str | None,
@@ -317,7 +317,7 @@ def _print_ranges_to_avoid(response: Any, factor: float, unit: str) -> None:
 )
 @html_option
 def stability(
-    chosen: Chosen,
+    chosen: CaseChoice,
     x: str | None,
     x_range: tuple[str, str] | None,
     y: str | None,
@@ -470,7 +470,7 @@ def _print_regions(found: Any) -> None:
 
 
 def _headings(*axes: Any) -> list[str]:
-    """Return the names of axes with units, in words, between which a narrow terminal can break lines."""
+    """Return the names of axes with their units; dots become spaces, at which a narrow terminal can break the line."""
     return [f"{axis.name.replace('.', ' ')} [{axis.unit}]" for axis in axes]
 
 

@@ -48,7 +48,7 @@ class BuildError(LinkworkError):
 
 
 def write(entries: Mapping[str, bytes], target: Path) -> Path:
-    """Write an FMU, compressed, in a fixed order and with fixed times, and return its path.
+    """Write an FMU, compressed, in a fixed order and with fixed time stamps, and return its path.
 
     Raises BuildError, and leaves an older file in place, if the FMU is not valid.
     """

@@ -114,12 +114,12 @@ _PRIMITIVE = {"bool", "string", "f32", "f64", *(f"{sign}{bits}" for sign in "su"
 
 
 def component(module: bytes) -> bytes:
-    """Return the component around the core module of an FMU.
+    """Wrap the core WebAssembly module of an FMU as a WebAssembly component, and return it.
 
     Raises
     ------
     MissingLibraryError
-        If wasmtime is not installed, which turns the frame's text into bytes.
+        If wasmtime, which assembles the component's text to binary, is not installed.
     """
     frame = _frame()
     # replace the second core module of the frame, an empty one; a section is a number, a length and a content
@@ -142,7 +142,7 @@ def manifest() -> bytes:
 
 
 def _length(data: bytes, place: int) -> tuple[int, int]:
-    """Read a number with seven bits in each byte, from an index on; return the number and the index after it."""
+    """Read a LEB128 number, seven bits in each byte, that begins at index ``place``; return it and the index after it."""
     value = shift = 0
     while True:
         byte = data[place]
@@ -195,7 +195,7 @@ class _Types:
         return self.known[text]
 
     def define_named(self, text: str) -> str:
-        """Return the name of a type; a primitive type is given a name, too."""
+        """Return the name of a type, as `define` does, but define a primitive type under a name as well."""
         if text in _PRIMITIVE:
             self.lines.append(f"(type $t{len(self.lines)} {text})")
             return f"$t{len(self.lines) - 1}"

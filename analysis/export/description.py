@@ -298,7 +298,7 @@ def start_plant(mechanism: Mechanism) -> Plant:
 
 
 def _index_or_reference(kind: Kind, reference: int) -> str:
-    """Return the number by which the model structure names a variable: its index, in FMI 3.0 its value reference."""
+    """Return how the model structure refers to a variable: by its index in FMI 2.0, by its value reference in FMI 3.0."""
     return str(reference + 1 if kind.fmi == 2 else reference)
 
 
@@ -337,7 +337,7 @@ def _structure(mechanism: Mechanism, kind: Kind, entries: Sequence[Entry]) -> El
 
 
 def _declared_dependencies(mechanism: Mechanism) -> dict[int, References]:
-    """Return the inputs on which each output depends according to the table of variables, as value references."""
+    """Return, by output, the inputs on which it depends by the mechanism's table of variables; all are value references."""
     reference = {entry.variable.name: entry.reference for entry in interface(mechanism)}
     inputs = {
         "state": frozenset[int](),
@@ -349,7 +349,7 @@ def _declared_dependencies(mechanism: Mechanism) -> dict[int, References]:
 
 @cache
 def traced_dependencies(mechanism: Mechanism) -> dict[int, References]:
-    """Return the states and inputs on which outputs, derivatives and event indicator depend, as value references.
+    """Return, by output, derivative or event indicator, the states and inputs on which it depends; all are value references.
 
     The dependencies follow from the equations: direct ones, and those through the jump of a commanded rate.
     """

@@ -77,9 +77,9 @@ def write_c_functions(functions: Iterable[Any], file: str) -> str:
 
 
 def _switched_calls(mechanism: Mechanism, numbers: int) -> str:
-    """Return C functions that call the version traced with the mechanism's switch on or off, depending on the constants.
+    """Return C functions that call, depending on the constants, the version with the mechanism's switch on or that with it off.
 
-    With the switch on, the solution that the equations contain, an array of ``numbers``, is computed once and passed to the
+    With the switch on, the solution of the contact forces, an array of length ``numbers``, is computed once and passed to the
     function that needs it. Derivatives are always those with the switch on, because the constants may change too.
     """
     on = f"arg[3][{mechanism.switch_index}] != 0.0"
@@ -185,7 +185,7 @@ def _table(mechanism: Mechanism, switched: bool) -> dict[str, tuple[list[Any], l
 
 
 def _unjoined_numbers(mechanism: Mechanism, x: Any, p: Any) -> Any:
-    """Return the numbers in the message that the links cannot be joined; a zero if there are none."""
+    """Return the values that the message on links that cannot be joined quotes; a zero if it quotes none."""
     casadi = symbolic.library()
     if mechanism.unjoined is None or mechanism.unjoined.reach is None:
         return casadi.SX(0.0)
@@ -218,10 +218,10 @@ def _state_slope(mechanism: Mechanism, trace: equations.TracedEquations, rates: 
 def _with_solution(
     mechanism: Mechanism, s: equations.Symbols, switched: bool, *, smooth: bool
 ) -> tuple[list[Any], Any, Any]:
-    """Return outputs, derivative and clearance with symbols for the solution of the contact forces; the symbols; the solution.
+    """Return [outputs, derivative, clearance] as functions of symbols for the contact forces, these symbols, and the forces.
 
-    The expressions apply one more sweep of Newton's method to the symbols, so that their derivatives are those of the
-    solution. If ``smooth``, for differentiation, the root of a sum of squares has the derivative 0 at 0, instead of 0/0.
+    The expressions apply one more sweep of Newton's method to the symbols, so that their derivatives are those at the
+    solved forces. If ``smooth``, for differentiation, the root of a sum of squares has the derivative 0 at 0, instead of 0/0.
     """
     casadi = symbolic.library()
     found: dict[str, tuple[Any, Any]] = {}
@@ -258,9 +258,10 @@ def _with_solution(
 
 
 def trace_start(mechanism: Mechanism, modes: Any, u: Any) -> tuple[Any, ...]:
-    """Trace the start of a run; return symbols of the parameters and of the given state, and four expressions of them.
+    """Trace the start of a run.
 
-    These are the constants followed by the start energy, the initial state, its error scale, and lower bounds of parameters.
+    Return the symbols of the parameters and of the given state, then four expressions of them: the constants with the start
+    energy appended, the initial state, its error scale, and the lower bounds of parameters.
     """
     casadi = symbolic.library()
     own, parameters, functions = equations.parameter_symbols(mechanism)
@@ -422,7 +423,7 @@ def _row(mechanism: Mechanism, entry: Entry) -> str:
 
 
 def _c_index(mechanism: Mechanism, entry: Entry) -> str:
-    """Return as C the row of a computed variable or the number of an input; -1 for any other variable."""
+    """Return as C the row of a computed variable or the index of an input; -1 for any other variable."""
     if entry.role == "input":
         return str(mechanism.input_names.index(entry.variable.name))
     if entry.role == "output":
@@ -456,8 +457,8 @@ def _rule(mechanism: Mechanism, entry: Entry) -> tuple[str, float, float, str]:
 def _commands(mechanism: Mechanism) -> list[str]:
     """Return a C row of `Command` for each channel that commands a rate.
 
-    A row has the number of the channel, the index of its rate in the state, the number of the mode (-1 without one), the value
-    of the mode at which the command is in force, and the number of the channel that gives the command's time derivative.
+    A row has the index of the channel, the index of its rate in the state, the index of the mode (-1 without one), the value
+    of the mode at which the command is in force, and the index of the channel that gives the command's time derivative.
     """
     rows = []
     for number, channel in enumerate(mechanism.channels):

@@ -58,7 +58,7 @@ def experiments(mechanism: Mechanism) -> dict[str, bytes]:
         constant = all(row[1:] == stimuli[0][1:] for row in stimuli)
         rows = [stimuli[0], stimuli[-1]] if constant else stimuli
         files[f"{name}-in.csv"] = format_csv(["time", *mechanism.input_names], rows).encode()
-        results = [mechanism.output_names[place] for place in _result_places(mechanism)]
+        results = [mechanism.output_names[place] for place in _result_indices(mechanism)]
         files[f"{name}-ref.csv"] = format_csv(["time", *results], reference).encode()
         SubElement(node, "Stimuli", {"source": f"{name}-in.csv"})
         SubElement(node, "References", {"source": f"{name}-ref.csv"})
@@ -107,7 +107,7 @@ def _values(mechanism: Mechanism, case: Case) -> dict[str, Any]:
     return values | case.inputs.modes(mechanism)
 
 
-def _result_places(mechanism: Mechanism) -> list[int]:
+def _result_indices(mechanism: Mechanism) -> list[int]:
     """Return the indices of the outputs that are results: all but residuals, which another solver does not reproduce."""
     return [n for n, name in enumerate(mechanism.output_names) if not name.endswith(".residual")]
 
@@ -115,9 +115,9 @@ def _result_places(mechanism: Mechanism) -> list[int]:
 def _reference(
     mechanism: Mechanism, values: Mapping[str, Any], times: Sequence[float], inputs: _Inputs
 ) -> tuple[list[list[float]], list[list[float]]]:
-    """Return rows of the inputs of all steps, and rows of the results at the end of some; each row begins with the time.
+    """Return the rows of inputs, one for each step, and `ROWS` rows of results; each row begins with the time.
 
-    The results are those before the next inputs are set.
+    Results are taken before the inputs of the next step are set.
     """
 
     def rounded_inputs(number: int, outputs: Sequence[float] | None) -> dict[str, float]:
@@ -128,7 +128,7 @@ def _reference(
     plant = Plant.from_values(mechanism, {**starts, **values, **first}, tolerance=REFERENCE, time=times[0])
     stimuli = [[times[0], *(first[name] for name in mechanism.input_names)]]
     outputs = list(plant.outputs())
-    places = _result_places(mechanism)
+    places = _result_indices(mechanism)
     rows = [[times[0], *(outputs[place] for place in places)]]
     for n, time in enumerate(times[1:], start=1):
         plant.step(times[n - 1], time - times[n - 1])
@@ -145,7 +145,7 @@ def _reference(
 def _round_results(mechanism: Mechanism, rows: list[list[float]]) -> list[list[float]]:
     """Round results to `DIGITS` digits of the largest value of their unit, so that another C library gives the same texts."""
     units = [v.unit for v in mechanism.variables if v.name in mechanism.output_names]
-    units = ["", *(units[place] for place in _result_places(mechanism))]
+    units = ["", *(units[place] for place in _result_indices(mechanism))]
     largest: dict[str, float] = {}
     for unit, column in zip(units, zip(*rows)):
         largest[unit] = max(*map(abs, column), largest.get(unit, 0.0))

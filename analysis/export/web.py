@@ -59,7 +59,7 @@ def web_sources(mechanism: Mechanism) -> dict[str, str]:
 
 
 def crank_index(mechanism: Mechanism) -> int:
-    """Return the number of the first freedom that turns; -1 if there is none."""
+    """Return the index of the first freedom that turns; -1 if there is none."""
     return next(iter(mechanism.cyclic_freedoms), -1)
 
 
@@ -100,7 +100,7 @@ def _header(mechanism: Mechanism) -> str:
 
 
 def _torque_input(mechanism: Mechanism, crank: int) -> int:
-    """Return the number of the input that is the torque on the freedom ``crank``; -1 if there is none."""
+    """Return the index of the input that is the torque on the freedom with index ``crank``; -1 if there is none."""
     return next((n for n, c in enumerate(mechanism.channels) if c.kind == "force" and c.freedom == crank >= 0), -1)
 
 
@@ -127,7 +127,11 @@ def _drawing(mechanism: Mechanism) -> str:
 
 
 def _motor_functions(mechanism: Mechanism) -> list[tuple[Any, ...]]:
-    """Return functions, each as name, arguments and results: motor torque, derivatives with a motor, matrices at rest."""
+    """Return the functions of the page's motor, each as (name, arguments, *results).
+
+    They are the motor torque and its derivative, the derivative of the state and of the accelerations with the motor, and, for
+    the natural frequency, inertia and stiffness of the freedom beside the crank, at rest.
+    """
     casadi = symbolic.library()
     join, sx, freedoms = casadi.vertcat, casadi.SX, len(mechanism.freedoms)
     motor, speed, d_motor, d_speed = (sx.sym(n, size) for n, size in zip("mvde", (len(MOTOR), 1, len(MOTOR), 1)))

@@ -60,7 +60,7 @@ def plot_bode(
             phase -= 360.0 * round(phase[0] / 360.0)
             words = label
             if margins:
-                found = _Margins.of_loop(system)
+                found = _Margins.from_loop(system)
                 words = ": ".join(text for text in (label, found.report()) if text)
                 _mark_margins(above, below, found, response.omega, phase, look["color"])
             above.loglog(response.omega, np.abs(value), label=words or None, **look)
@@ -91,7 +91,7 @@ class _Margins(NamedTuple):
     stable: bool = True
 
     @classmethod
-    def of_loop(cls, system: Any) -> _Margins:
+    def from_loop(cls, system: Any) -> _Margins:
         """Find the nearest gain factors and the smallest change of phase with which the closed loop becomes unstable."""
         poles = control.feedback(system, 1).poles()
         if not np.all(np.abs(poles) < 1.0 if system.isdtime(strict=True) else poles.real < 0.0):

@@ -177,7 +177,7 @@ def _has_planar_drawing(parameters: object) -> bool:
 
 
 def last_samples(run: Trajectory) -> tuple[slice, str]:
-    """Return the samples of a run over which paths are drawn (of a long run only the last ones), and words for them."""
+    """Return the samples of a run over which paths are drawn, the last ones of a long run, and a phrase that names them."""
     if len(run) <= _TRACED:
         return slice(None), "over the run"
     return slice(-_TRACED, None), f"over the last {run.time[-1] - run.time[-_TRACED]:.3g} s"

@@ -86,7 +86,7 @@ class _Scene:
     arrows: Sequence[Path]
 
     @classmethod
-    def of_axes(cls, axis: Axes) -> _Scene:
+    def from_axes(cls, axis: Axes) -> _Scene:
         legend = axis.get_legend()
         marks = [line for line in axis.lines if line.get_gid() == _GID]
         curves = [
@@ -161,7 +161,7 @@ def _make_room(axis: Axes) -> None:
     if legend is None or axis.get_aspect() != "auto":
         return
     box, inside = legend.get_window_extent(), axis.get_window_extent()
-    hidden = _Scene.of_axes(axis).count_hidden_curves(box)
+    hidden = _Scene.from_axes(axis).count_hidden_curves(box)
     share = (box.height + 2.0 * _GAP) / inside.height
     if not hidden or not inside.overlaps(box) or box.y0 > inside.y1 - _GAP or share > _ROOM:
         return
@@ -170,7 +170,7 @@ def _make_room(axis: Axes) -> None:
     ticks = axis.get_yticks()
     axis.set_ylim(before[0], float(scale.inverted().transform(low + (high - low) / (1.0 - share))))
     legend.set_loc("best")
-    if _Scene.of_axes(axis).count_hidden_curves(legend.get_window_extent()) >= hidden:
+    if _Scene.from_axes(axis).count_hidden_curves(legend.get_window_extent()) >= hidden:
         axis.set_ylim(before)
     else:
         # no numbers in the added room: they might be wider than the layout allows
@@ -186,7 +186,7 @@ def place_marks(figure: Figure) -> Figure:
         moved = [(text, _MOVES[gid]) for gid in _MOVES for text in texts if text.get_gid() == gid]
         if not moved:
             continue
-        scene = _Scene.of_axes(axis)
+        scene = _Scene.from_axes(axis)
         placed: dict[Annotation, Bbox] = {}
         leaders: dict[Annotation, Path] = {}
         # twice, as the first texts may have to make way for later ones

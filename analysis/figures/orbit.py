@@ -64,7 +64,7 @@ def plot_orbit(orbit: PeriodicOrbit, *, title: str = "") -> Figure:
 
 
 def _output_over_turn(turn: Turn, name: str) -> np.ndarray:
-    """Return an output over the period with its value at the end, which of an angle may be whole turns on."""
+    """Return an output over the period with its value at the end appended: that at the start, plus whole turns of an angle."""
     values = turn[name]
     whole = 2.0 * np.pi * np.round((values[-1] - values[0]) / (2.0 * np.pi)) if name in turn.angles else 0.0
     return np.append(values, values[0] + whole)

@@ -66,8 +66,8 @@ _RISKS = tuple(Risk)
 class _Scale:
     """How parameter and amplitude are shown.
 
-    ``factor`` and ``unit`` are the parameter's factor from SI and display unit; ``scale``, ``shown``, ``what`` and ``name`` are
-    the amplitude's factor, unit, short name and long name.
+    Of the parameter: ``factor`` from SI to its display ``unit``. Of the amplitude: ``scale`` from SI to its display unit
+    ``shown``, and its short name ``what`` and long name ``name``.
     """
 
     family: Family
@@ -103,8 +103,8 @@ def plot_branches(
 ) -> Figure:
     """Plot amplitude, harmonics, crank torque and pin force along branches, stable parts solid, unstable ones dashed.
 
-    At folds an arrow leads to the motion that the machine jumps to. Approximations have a panel of their relative errors; those
-    whose curve is hidden under the true motion are drawn only there.
+    At folds an arrow leads to the motion that the machine jumps to. Approximations have a panel of their relative errors;
+    those that cannot be told apart from the true motion are drawn in that panel only.
 
     Parameters
     ----------
@@ -115,7 +115,8 @@ def plot_branches(
         Whether a speed in rad/s is drawn in rpm.
     beside : callable, optional
         ``beside(values)`` returns the amplitudes (m) of approximations by name, at values (m,) of the parameter, each of shape
-        (m,). Their errors are relative to the stable motions of one turn.
+        (m,). Their errors are relative to the stable motions with a
+        period of one crank turn.
     avoid : sequence of Avoided
         Ranges of the parameter to shade.
     """
@@ -195,7 +196,7 @@ def _amplitudes(
 
 
 def _jump(jump: FoldJump, look: _Scale) -> str:
-    """Return the text at a fold: on which side the motion exists, and where the machine jumps."""
+    """Return the text at a fold: on which side of it the motion exists, and to which amplitude the machine jumps."""
     side, change = ("below", "rising") if jump.direction > 0 else ("above", "falling")
     there = f"{look.size(jump.before)} {look.shown} only {side} {look.place(jump.parameter)};\n{change}, it "
     if not jump.after:
@@ -255,7 +256,10 @@ def _is_reachable(branch: Branch, special: SpecialPoint) -> bool:
 
 
 def _stability_curves(branch: Branch, number: int, look: _Scale, y: FloatArray, **options: Any) -> list[Curve]:
-    """Return the curves of a quantity ``y`` (display units) along a branch, one per stability; the colour shows the period."""
+    """Return the curves of a quantity ``y`` (display units) along a branch, one per stability; the colour shows the period.
+
+    ``number`` is the index of the branch.
+    """
     words = _stability_words(branch)
     order = branch.periods.bit_length() - 1
     style: dict[str, Any] = {"colour": COLOURS[order % len(COLOURS)], "order": 2.0 + 0.1 * order}
@@ -274,7 +278,7 @@ def _stability_curves(branch: Branch, number: int, look: _Scale, y: FloatArray, 
 
 
 def _hover_values(branch: Branch, number: int) -> Mapping[str, ArrayLike]:
-    """Return what a page shows under the pointer at the points of a branch: values by name."""
+    """Return what a page shows under the pointer along the branch with index ``number``: arrays of values by name."""
     table, torque = branch.columns(), "greatest crank torque [N.m]"
     return {
         "branch": np.full(len(branch), number + 1),

@@ -126,13 +126,13 @@ def plot_outputs(
 
 
 def _column_grid(count: int, columns: int) -> NDArray[np.int64]:
-    """Return the grid of panel numbers row by row, shape (rows, columns); cells without a panel have greater numbers."""
+    """Return the grid of panel indices row by row, shape (rows, columns); cells without a panel have greater indices."""
     rows = ceil(count / columns)
     return np.arange(rows * columns).reshape(rows, columns)
 
 
 def _picture_grid(count: int) -> NDArray[np.int64]:
-    """Return the grid of panel numbers in two columns; the picture of the mechanism is at the top of the left one."""
+    """Return the grid of panel indices in two columns; the picture of the mechanism is at the top of the left one."""
     rows = max(2, ceil((count + 2) / 2))
     right = [min(n, count - 1) for n in range(rows)]
     below = list(range(rows, count))

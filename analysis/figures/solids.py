@@ -23,7 +23,11 @@ _LIGHT = np.array([-0.25, 0.75, 0.61])
 
 
 def cylinder(start: FloatArray, end: FloatArray, radius: float, *, pieces: int = 1, sides: int = 16) -> FloatArray:
-    """Return a cylinder with closed ends; it is divided along its length into pieces, which are painted by depth."""
+    """Return a cylinder with closed ends from ``start`` to ``end``.
+
+    It is divided along its length into ``pieces``, because `paint` orders faces by depth; ``sides`` is the number of faces
+    around it.
+    """
     way = (end - start) / np.linalg.norm(end - start)
     first = np.cross(way, np.eye(3)[np.argmin(np.abs(way))])
     first /= np.linalg.norm(first)

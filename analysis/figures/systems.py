@@ -79,7 +79,7 @@ def _path(
 ) -> list[tuple[float, float]]:
     """Return the corners of a connection: directly to a part on the right, otherwise round below all parts.
 
-    ``number`` is that of the connection, which gives it a lane of its own; ``lowest`` is the lower edge of the parts (mm).
+    ``number`` is the index of the connection, which gives it a lane of its own; ``lowest`` is the lower edge of the parts (mm).
     """
     lane = _CLEAR + _LANE * (number % 9)
     if end[0] > start[0]:

@@ -27,6 +27,7 @@ from .reader import Range as Range
 from .reader import Reader as Reader
 from .reader import Table as Table
 from .reader import Whole as Whole
+from .reader import any_value as any_value
 from .reader import as_table as as_table
 from .reader import check_names as check_names
 from .reader import entry as entry
@@ -34,7 +35,6 @@ from .reader import entry_names as entry_names
 from .reader import flag as flag
 from .reader import read as read
 from .reader import text as text
-from .reader import unchanged as unchanged
 from .reader import unknown_name as unknown_name
 from .structured import flatten as flatten
 from .structured import override as override

@@ -161,7 +161,7 @@ def entries(
         if not said:
             function = read.func if isinstance(read, partial) else read
             words = (inspect.getdoc(function) or "") if inspect.isfunction(function) else ""
-            said = [] if function is reader.unchanged else [words.partition("\n")[0].removesuffix(".").replace("`", "")]
+            said = [] if function is reader.any_value else [words.partition("\n")[0].removesuffix(".").replace("`", "")]
         value = given.get(name, _default(default, read))
         value = example(read) if value is None else value
         yield line(name, value, "; ".join(said), active=active and name in given)

@@ -210,10 +210,10 @@ class Spring:
     between: tuple[str, ...] = entry(Many(_name, length=2), ())
     at: str = entry(_name, "")
     bodies: tuple[str, ...] = entry(Many(_name, length=2), ())
-    stiffness: Any = entry(files.unchanged, 0)
-    damping: Any = entry(files.unchanged, 0)
-    free: Any = entry(files.unchanged, 0)
-    friction: Any = entry(files.unchanged, 0)
+    stiffness: Any = entry(files.any_value, 0)
+    damping: Any = entry(files.any_value, 0)
+    free: Any = entry(files.any_value, 0)
+    friction: Any = entry(files.any_value, 0)
     law: Law = entry(law, "")
     constants: Mapping[str, tuple[float, str]] = entry(constants, factory=dict)
     driven: bool = entry(files.flag, False)
@@ -258,8 +258,8 @@ class FreedomTable:
     """
 
     joint: str = entry(_name)
-    start: Any = entry(files.unchanged, 0)
-    speed: Any = entry(files.unchanged, 0)
+    start: Any = entry(files.any_value, 0)
+    speed: Any = entry(files.any_value, 0)
     driven: bool | None = entry(files.flag, None)
 
 
@@ -311,7 +311,7 @@ class Description:
     springs: Mapping[str, Spring] = entry(_named_entries(Table(Spring)), factory=dict)
     freedoms: Mapping[str, FreedomTable] = entry(_named_entries(_freedom), factory=dict)
     assembly: Mapping[str, int] = entry(_named_entries(files.Whole()), factory=dict)
-    friction: Mapping[str, Any] = entry(_named_entries(files.unchanged), factory=dict)
+    friction: Mapping[str, Any] = entry(_named_entries(files.any_value), factory=dict)
     loads: tuple[PointLoad, ...] = entry(Many(_load), ())
     torques: tuple[str, ...] = entry(Many(_name), ())
     gravity: float = entry(Quantity("m/s2", least=0.0), 0.0)

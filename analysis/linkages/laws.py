@@ -12,7 +12,7 @@ from typing import Any, TypeAlias
 
 from linkwork.errors import ParameterError
 
-from ..files import Many, as_table, unchanged
+from ..files import Many, any_value, as_table
 from ..units import quantity
 
 #: A formula, or the rows (x, force) of a table as they were given.
@@ -23,7 +23,7 @@ WRITTEN = ("sin", "cos", "tan", "atan", "tanh", "exp", "log", "sqrt", "fabs", "p
 #: Functions that formulas may use, with the number of their arguments.
 FUNCTIONS = {**dict.fromkeys((*WRITTEN[:-1], "abs"), 1), "max": 2, "min": 2}
 _NODES = (ast.Expression, ast.BinOp, ast.UnaryOp, ast.Add, ast.Sub, ast.Mult, ast.Div, ast.Pow, ast.USub, ast.UAdd)
-_ROWS = Many(Many(unchanged, length=2), least=2)
+_ROWS = Many(Many(any_value, length=2), least=2)
 _WANTED = f"be a formula in x, v and the constants with + - * / ** and {', '.join(FUNCTIONS)}, or a table of [x, force]"
 #: Units that a constant of a law may have.
 _UNITS = (

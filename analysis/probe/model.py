@@ -108,7 +108,7 @@ class Model:
     dependencies: tuple[tuple[Variable, tuple[Variable, ...]], ...] = field(repr=False)
 
     def select_variables(self, group: str, condition: str = "x") -> list[Variable]:
-        """Return the variables of a group of functions that meet one of `CONDITIONS`."""
+        """Return the variables of a ``group``, such as Real, that meet a ``condition``, a key of `CONDITIONS`."""
         meets = CONDITIONS[condition]
         if condition == "2":
             return [v for v in self.variables if v.group == group and (meets(v) or v.name in self.initial_unknowns)]

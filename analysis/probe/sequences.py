@@ -36,7 +36,7 @@ def run_legal_calls(context: Context, case: int) -> None:
 
 
 class ForbiddenCalls:
-    """A case of lives of instances with one forbidden call each: the faults of the catalogue in turn."""
+    """Check of forbidden calls: each case is the life of one instance with one fault of the catalogue, all faults in turn."""
 
     def __init__(self, context: Context) -> None:
         self.context = context
@@ -48,7 +48,7 @@ class ForbiddenCalls:
 
     @property
     def least(self) -> int:
-        """Return the least number of cases, with which each fault is tried once, whatever number of calls was requested."""
+        """Return the least number of cases: each fault is tried once, even if fewer calls were requested."""
         return len(self.faults)
 
     def __call__(self, context: Context, case: int) -> None:

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from linkwork.errors import InputError
 
-from ..display import Shown, format_count, format_range
+from ..display import NotebookResult, format_count, format_range
 from ..files import unknown_name
 from ..libraries import require
 from ..mechanisms import MECHANISMS, Parameters, output_units
@@ -36,7 +36,7 @@ class Occurrence:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Trajectory(Shown):
+class Trajectory(NotebookResult):
     """Result of a run: times and outputs, how it ended, and how it was computed.
 
     Attributes

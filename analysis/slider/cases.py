@@ -20,6 +20,7 @@ from ..files import (
     Range,
     Table,
     Whole,
+    any_value,
     as_table,
     check_names,
     entry,
@@ -30,7 +31,6 @@ from ..files import (
     read_rows,
     read_tables,
     text,
-    unchanged,
 )
 from ..linear import Design, design_pid, linearise_along
 from ..numerics.fourier import FourierSeries
@@ -106,7 +106,7 @@ class SliderTable:
 class StrategyTable:
     """The table ``[strategy]``: arguments of `simplest_mechanism`."""
 
-    tolerance: float = entry(unchanged)
+    tolerance: float = entry(any_value)
     criterion: Criterion = entry(Choice(get_args(Criterion)), "worst")
     harmonics: int = entry(Whole(1), 3)
     ratios: tuple[int, ...] = entry(Many(Whole()), RATIOS)
@@ -183,10 +183,10 @@ class SliderCase:
         Force at the coupler point.
     """
 
-    synthesis: SynthesisCase = entry(unchanged)
-    linkage: Linkage | None = entry(unchanged, None)
+    synthesis: SynthesisCase = entry(any_value)
+    linkage: Linkage | None = entry(any_value, None)
     slider: SliderTable = entry(Table(SliderTable), SliderTable())
-    strategy: StrategyTable | None = entry(unchanged, None)
+    strategy: StrategyTable | None = entry(any_value, None)
     drive: DriveTable | None = entry(Table(DriveTable), None)
     load: Load | None = entry(Table(Load), None)
     tracking: TrackingTable | None = entry(Table(TrackingTable), None)

@@ -156,7 +156,7 @@ def planar_loops(p: SliderCrankParameters, th: Array, s1: Array) -> Loops:
 
 
 def _start_nearby(start: Closure, th: Array, s1: Array) -> Loops:
-    """Return a start from closed loops nearby, one or one for each point: the rod keeps its orientation in space."""
+    """Return loops to start from, made of closed loops nearby, one or one for each point: the rod keeps its orientation."""
     if start.crank_angle.size not in (1, th.size):
         raise InputError(
             f"start has {start.crank_angle.size} loops for {th.size} points: it must have one, or one for each point"

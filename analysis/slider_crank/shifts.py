@@ -51,7 +51,7 @@ class ShiftLaw(Protocol):
         """Return shift and rates at crank angles (rad), speeds (rad/s) and accelerations (rad/s2) of equal shape."""
 
     def periodic_shift(self, parameters: SliderCrankParameters) -> mobility.PeriodicShift | None:
-        """Return the law in the form for `mobility`; None if it is not known to repeat after whole turns."""
+        """Return the law as `mobility.PeriodicShift`; None if it is not known to repeat after whole turns."""
 
 
 @in_si(value="m")

@@ -205,7 +205,7 @@ class PerturbedTurn:
 
 
 def perturb(turn: ForceTurn, at: Any, errors: Mapping[str, Any]) -> PerturbedTurn:
-    """Return the mechanism with errors, arrays or dual numbers by name, at the points ``at`` of the turn."""
+    """Add ``errors``, arrays or dual numbers by name, to the mechanism at the points of the turn with the indices ``at``."""
     nominal = {field.name: getattr(turn.parameters, field.name) for field in fields(turn.parameters)}
     changed = {
         field_name(name): nominal[field_name(name)] + x for name, x in errors.items() if name not in (ANGLE, SHIFT)
@@ -220,7 +220,8 @@ def perturb(turn: ForceTurn, at: Any, errors: Mapping[str, Any]) -> PerturbedTur
 
 
 def error_variables(names: Sequence[str], n: int, moved: int = 0, step: float = 0.0) -> dict[str, Dual]:
-    """Return errors at n points as independent dual variables by name, all zero except number ``moved``, which is ``step``."""
+    """Return errors at n points as independent dual variables by name, all zero except that
+    with index ``moved``, which is ``step``."""
     values = np.zeros((len(names), n))
     values[moved] = step
     return dict(zip(names, independent(*values)))

@@ -160,7 +160,10 @@ def _motor(mechanism: Mechanism, crank: int) -> list[dict[str, Any]]:
 
 
 def _stiffness_reference(mechanism: Mechanism, reference: dict[str, int], crank: int) -> int | None:
-    """Return the reference of the stiffness for the natural frequency; -1 if it is in the energy, None without a frequency."""
+    """Return the value reference of the stiffness from which the page computes the natural frequency.
+
+    It is -1 if no single parameter is this stiffness, so that it follows from the energy; None if there is no such frequency.
+    """
     if crank < 0 or len(mechanism.cyclic_freedoms) == len(mechanism.freedoms):
         return None
     return reference.get(stiffness_name(mechanism), -1)
@@ -204,9 +207,9 @@ def _outputs_with_rates(mechanism: Mechanism) -> list[str]:
 
 
 def _charts(mechanism: Mechanism) -> list[dict[str, Any]]:
-    """Return the charts of the page; ``of`` lists the number of the output of a curve, or of those whose magnitude it shows.
+    """Return the charts of the page; ``of`` lists the index of the output of a curve, or of those whose magnitude it shows.
 
-    Powers are numbered after the outputs and the coordinates of the joints: see studio.c.
+    The indices of powers follow the outputs and the coordinates of the joints: see studio.c.
     """
     names, variables = list(mechanism.output_names), {v.name: v for v in mechanism.variables}
     power = len(names) + 3 * len(mechanism.drawing.joints if mechanism.drawing else ())

@@ -8,7 +8,7 @@ from .description import library as library
 from .description import load_system as load_system
 from .embedded import build_host as build_host
 from .embedded import write_host as write_host
-from .joined import Joined as Joined
+from .joined import JoinedSystem as JoinedSystem
 from .layout import Box as Box
 from .layout import boxes as boxes
 from .many import SystemRuns as SystemRuns

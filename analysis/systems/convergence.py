@@ -14,7 +14,7 @@ from linkwork.errors import InputError
 from ..files import unknown_name
 from ..run import show_progress
 from .description import System
-from .joined import Joined
+from .joined import JoinedSystem
 from .master import SystemRun, run_system
 
 
@@ -123,7 +123,7 @@ def convergence(
             raise InputError(
                 f"a step of {part:g} s does not divide {whole:g} s: it must, so that the runs have common points"
             )
-    right = Joined(system).run(stop_time, steps[0])
+    right = JoinedSystem(system).run(stop_time, steps[0])
     wirings = {way: (system if WAYS[way].rates else system.without_rates()).wiring(fmi=WAYS[way].fmi) for way in ways}
     # accelerations jump where a controller takes a sample
     ports = next(iter(wirings.values()))

@@ -102,7 +102,7 @@ class System:
     parts: Mapping[str, PartTable] = entry(_parts)
     connections: Mapping[End, End] = entry(_connections, factory=dict)
     run: RunTable = entry(Table(RunTable), factory=RunTable)
-    folder: Path = entry(files.unchanged, Path())
+    folder: Path = entry(files.any_value, Path())
 
     @cached_property
     def members(self) -> dict[str, Member]:
@@ -177,7 +177,9 @@ class System:
             If a connection is not valid.
         """
         place = code_folder("systems") if folder is None else Path(folder)
-        parts = {name: Part.of(name, member.build(place, fmi), member.values) for name, member in self.members.items()}
+        parts = {
+            name: Part.from_fmu(name, member.build(place, fmi), member.values) for name, member in self.members.items()
+        }
         return Wiring(
             title=self.title,
             parts=parts,
@@ -209,7 +211,7 @@ class Member:
     fmu: Path | None = None
 
     def build(self, folder: Path, fmi: int = 2) -> Path:
-        """Return the path of its FMU, which is built below ``folder`` if it is not there."""
+        """Build the FMU of the part below ``folder`` unless it exists; return its path. A part that is an FMU is not built."""
         kinds = {2: NATIVE, 3: NATIVE_FMI3}
         if fmi not in kinds:
             raise ParameterError("fmi", fmi, "be 2 or 3")

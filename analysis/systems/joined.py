@@ -55,8 +55,8 @@ class _Model:
         return {channel.freedom: channel.name for channel in commands}
 
 
-class Joined:
-    """One set of equations for the whole system.
+class JoinedSystem:
+    """A system as one set of equations.
 
     Parameters
     ----------

@@ -50,7 +50,7 @@ class SystemRuns:
     lengths : (N,) int array
         Number of samples of each run; 0 if it has not begun or could not begin.
     messages : mapping of int to str
-        Message of the part that ended a run early or could not begin, by the number of the run.
+        Message of the part that ended a run early or could not begin, by the index of the run.
     """
 
     time: NDArray[Any]
@@ -214,7 +214,7 @@ def _key(task: _Task) -> str:
 
 @lru_cache(maxsize=4)
 def _parts(parts: tuple[tuple[str, Path, tuple[tuple[str, float], ...]], ...]) -> dict[str, Part]:
-    return {name: Part.of(name, fmu, dict(values)) for name, fmu, values in parts}
+    return {name: Part.from_fmu(name, fmu, dict(values)) for name, fmu, values in parts}
 
 
 def _batch(task: _Task) -> list[tuple[NDArray[np.float64], str]]:

@@ -206,11 +206,11 @@ def read_ssp(path: str | Path) -> Wiring:
             texts = _start_values(
                 archive.unpacked_path, bindings, element.name, own=len(element.parameter_bindings or ())
             )
-            part = Part.of(element.name, fmu, {})
+            part = Part.from_fmu(element.name, fmu, {})
             values = {
                 key: _as_number(text, part.ports.get(key), f"{element.name}.{key}") for key, text in texts.items()
             }
-            parts[element.name] = Part.of(element.name, fmu, values)
+            parts[element.name] = Part.from_fmu(element.name, fmu, values)
         connections = {
             End(c.end_element, c.end_connector): End(c.start_element, c.start_connector)
             for c in system.connections

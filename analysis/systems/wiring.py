@@ -76,7 +76,7 @@ class Part:
     description: Any
 
     @classmethod
-    def of(cls, name: str, fmu: str | Path, values: Mapping[str, float]) -> Part:
+    def from_fmu(cls, name: str, fmu: str | Path, values: Mapping[str, float]) -> Part:
         """Read a part from its FMU.
 
         Raises

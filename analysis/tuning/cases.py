@@ -10,7 +10,7 @@ from typing import Any
 
 from linkwork.errors import InputError, MissingParameterError, ParameterError
 
-from ..files import Many, Quantity, Table, Whole, as_table, entry, flag, override, read, read_tables, text, unchanged
+from ..files import Many, Quantity, Table, Whole, any_value, as_table, entry, flag, override, read, read_tables, text
 from ..linkages import with_linkage
 from ..mechanisms import mechanism_of, name_in_files
 from ..periodic import default_variable, parameter_unit, rest_guess, steady_drive
@@ -50,14 +50,14 @@ class TuneTable:
     change: Mapping[str, Any] = entry(as_table)
     speeds: tuple[float, float] | None = entry(Many(Quantity("rad/s", above=0.0), length=2), None)
     over: str = entry(text, "")
-    between: tuple[Any, Any] | None = entry(Many(unchanged, length=2), None)
+    between: tuple[Any, Any] | None = entry(Many(any_value, length=2), None)
     turns: int = entry(Whole(least=1), 1)
     no_resonance: bool = entry(flag, False)
     resonance_margin: float = entry(Quantity("1", least=0.0), 0.02)
     no_jump: bool = entry(flag, False)
     no_unstable: bool = entry(flag, False)
     least_margin: float = entry(Quantity("1", least=0.0), 0.0)
-    peak: tuple[Limit, ...] = entry(Many(Table(Limit, {"output": text, "below": unchanged}), single=True), ())
+    peak: tuple[Limit, ...] = entry(Many(Table(Limit, {"output": text, "below": any_value}), single=True), ())
     objective: str = entry(_objective, _LEAST_CHANGE)
 
 

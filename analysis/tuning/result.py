@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from ..display import Shown, format_count
+from ..display import NotebookResult, format_count
 from ..mechanisms import Parameters
 from ..run import parameter_tables
 from ..units import display_text
@@ -171,7 +171,7 @@ class Verification:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Tuned(Shown):
+class Tuned(NotebookResult):
     """The least change that meets a wish; if there is none, the change that misses it least.
 
     Attributes

@@ -62,7 +62,7 @@ class HarmonicMotion:
     @property
     def amplitude(self) -> float:
         """Half the distance between the least and the greatest position."""
-        return float(_swings(self.series.cos[None, :], self.series.sin[None, :])[0])
+        return float(_half_ranges(self.series.cos[None, :], self.series.sin[None, :])[0])
 
     def harmonic(self, n: int) -> float:
         """Return the amplitude of the n-th harmonic, the mean with its sign for n = 0, and 0 beyond the order."""
@@ -172,7 +172,7 @@ def harmonic_amplitudes(
             f"the linear balance of order {order} is singular at a speed from {w.min():.6g} to {w.max():.6g} rad/s: "
             "a resonance without damping"
         ) from None
-    return (parameters.rocker_length * _swings(*_coefficients(z))).reshape(np.shape(speeds))
+    return (parameters.rocker_length * _half_ranges(*_coefficients(z))).reshape(np.shape(speeds))
 
 
 def _coefficients(z: NDArray[Any]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
@@ -183,7 +183,7 @@ def _coefficients(z: NDArray[Any]) -> tuple[NDArray[np.float64], NDArray[np.floa
     return cos, -2.0 * np.imag(half)
 
 
-def _swings(cos: NDArray[np.float64], sin: NDArray[np.float64]) -> NDArray[np.float64]:
+def _half_ranges(cos: NDArray[np.float64], sin: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return half the range of each of m Fourier series, shape (m,), from cosines and sines of shape (m, n + 1)."""
     n = np.arange(cos.shape[-1])
     angle = np.linspace(0.0, 2.0 * pi, 32 * len(n), endpoint=False)

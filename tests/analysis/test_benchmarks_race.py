@@ -108,7 +108,7 @@ def test_results_are_kept_when_a_run_is_stopped(tmp_path: Path, monkeypatch: pyt
         return Row(target.kind, target.name, search, 1e-12, tuple(0.5 if t <= budget else nan for t in TIMES))
 
     monkeypatch.setattr(race, "run", run)
-    monkeypatch.setattr(race, "prepared", lambda: None)
+    monkeypatch.setattr(race, "prepare_searches", lambda: None)
     two, searches = [target("polygonal", "square"), target("timed", "eight")], [OURS, "CMA-ES"]
     with pytest.raises(KeyboardInterrupt):
         race.run_missing(path, two, searches, 1.0, lambda text: None)

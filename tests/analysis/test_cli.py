@@ -128,7 +128,7 @@ def test_a_large_result_is_announced_and_what_is_interrupted_is_not_written(link
     def interrupted(*words):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(tables, "_bar", interrupted)
+    monkeypatch.setattr(tables, "_progress_bar", interrupted)
     result = linkwork("run", "--published", "table-3.1", "--no-plot", "--out", "other")
     assert result.exit_code == cli.INTERRUPTED
     assert "interrupted: other/table-3.1.csv is not written" in result.stderr

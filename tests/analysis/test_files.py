@@ -306,7 +306,7 @@ def test_a_file_that_was_there_stays_where_writing_is_interrupted(tmp_path, monk
     write_csv(tmp_path / "x.csv", {"a": [1.0]})
     monkeypatch.setattr(tables, "_BLOCK", 0)
     monkeypatch.setattr(tables, "LARGE", 1)
-    monkeypatch.setattr(tables, "_bar", interrupted)
+    monkeypatch.setattr(tables, "_progress_bar", interrupted)
     with pytest.raises(Interrupted):
         write_csv(tmp_path / "x.csv", {"a": [1.0, 2.0]})
     assert read_csv(tmp_path / "x.csv").tolist() == [[1.0]]

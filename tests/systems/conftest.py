@@ -27,5 +27,5 @@ def started_in_its_modes(name: str, folder: Path) -> Wiring:
     for part, member in system_of(name).members.items():
         assert member.mechanism is not None
         fmu = build_native(with_starts(member.mechanism, member.values), NATIVE, folder)
-        parts[part] = Part.of(part, fmu, member.values)
+        parts[part] = Part.from_fmu(part, fmu, member.values)
     return replace(wiring, parts=parts)

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from analysis import InductionMotor, Inputs, figures, simulate, variant
 from analysis.linkages import linkage
-from analysis.systems import COUPLINGS, End, Joined, System, SystemRun, convergence, library, run_system
+from analysis.systems import COUPLINGS, End, JoinedSystem, System, SystemRun, convergence, library, run_system
 from analysis.systems.description import PartTable
 from linkwork.errors import InputError, UnknownNameError
 
@@ -48,7 +48,7 @@ def test_the_joined_model_is_the_motor_and_shaft_of_a_hand_written_run() -> None
     system = system_of("motor-crank")
     rigid = {"rotor.inertia": 1e-6, "shaft.stiffness": 1e5, "shaft.damping": 0.5, "airGap.breakdown_torque": 1.0}
     parts = {**system.parts, "motor": replace(system.parts["motor"], values=rigid)}
-    joined = Joined(replace(system, parts=parts)).run(0.1, 1e-2, tolerance=1e-10)
+    joined = JoinedSystem(replace(system, parts=parts)).run(0.1, 1e-2, tolerance=1e-10)
     motor = InductionMotor(breakdown_torque=1.0, breakdown_slip=322.8 / 1076.0, synchronous_speed=1076.0 * pi / 30.0)
     inertia = 1e-6 + system.members["linkage"].values["crank.inertia"]
     rig = variant("rig-2-spring-d", slider_damping=3.0, crank_inertia=inertia)
@@ -168,7 +168,7 @@ def test_the_step_that_is_advised_brings_in_what_was_asked_for() -> None:
 
 def test_parts_of_fmi_3_have_lines_by_their_middle_and_updates_within_long_steps() -> None:
     system = system_of("motor-crank")
-    wiring, right = system.wiring(fmi=3), Joined(system).run(0.05, 1e-3)
+    wiring, right = system.wiring(fmi=3), JoinedSystem(system).run(0.05, 1e-3)
 
     def error(coupling: str, step: float) -> float:
         run = run_system(wiring, coupling=coupling, step=step, stop_time=0.05)

@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 from scipy.interpolate import CubicSpline
 
-from analysis.systems import Joined, run_system, write_ssp
+from analysis.systems import JoinedSystem, run_system, write_ssp
 from benchmarks.masters import RESULTS, RUNS, find, read
 
 from ..fmu.runner import run_in_process
@@ -67,7 +67,7 @@ def test_ecco_keeps_its_tolerance_on_the_bond(archive: Path, tolerance: float) -
     brought = np.abs(effort * flow_to - flow * effort_to)[1:] * np.diff(time)
     assert np.median(brought) == pytest.approx(0.8 ** (1.0 / 0.15) * tolerance, rel=0.1)
     assert brought.max() < 2.0 * tolerance
-    joined = Joined(system).run(0.1, 1e-4)
+    joined = JoinedSystem(system).run(0.1, 1e-4)
     right = CubicSpline(joined.time, joined[supplied])(time)
     assert np.abs(found[supplied] - right).max() < len(time) * tolerance < 0.1 * right[-1]
 

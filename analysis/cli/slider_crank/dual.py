@@ -14,7 +14,7 @@ from linkwork.slider_crank.assembly import check_assembly
 
 from ... import slider_crank as sc
 from ..common import CHECK_FAILED, console, output_folder, print_error, print_written, say, show_table, tolerance_option
-from .options import Chosen, Problem, add_mechanism_options, out_option, problem_options
+from .options import MechanismChoice, Problem, add_mechanism_options, out_option, problem_options
 
 
 @click.command(short_help="Compare the thesis's dual-number method with vector mechanics.")
@@ -23,7 +23,7 @@ from .options import Chosen, Problem, add_mechanism_options, out_option, problem
 @tolerance_option(default=1e-9, help="Largest relative difference that passes.")
 @click.option("--two-rotations", is_flag=True, help="Show instead the closure error of the thesis's own method.")
 @out_option
-def dual(chosen: Chosen, problem: Problem, tolerance: float, two_rotations: bool, out: str) -> None:
+def dual(chosen: MechanismChoice, problem: Problem, tolerance: float, two_rotations: bool, out: str) -> None:
     """Compare the thesis's dual-number method with vector mechanics, quantity by quantity.
 
     Dual matrices with true ball joints close the loop, and dual momenta give the forces. Differences are relative to the
@@ -74,7 +74,7 @@ def dual(chosen: Chosen, problem: Problem, tolerance: float, two_rotations: bool
     console.print("the two agree", style="green")
 
 
-def _show_two_rotations(chosen: Chosen, points: int, folder: Path) -> None:
+def _show_two_rotations(chosen: MechanismChoice, points: int, folder: Path) -> None:
     """Print and write the closure errors with which the thesis's iteration ends over the turn."""
     from ...files import write_csv
 

@@ -12,7 +12,16 @@ import numpy as np
 from ... import figures
 from ... import slider_crank as sc
 from ..common import output_folder, print_written, say, show_table
-from .options import Chosen, Problem, Units, add_mechanism_options, angle_text, out_option, plot_option, problem_options
+from .options import (
+    MechanismChoice,
+    Problem,
+    Units,
+    add_mechanism_options,
+    angle_text,
+    out_option,
+    plot_option,
+    problem_options,
+)
 
 if TYPE_CHECKING:
     from ...slider_crank import ForceTurn
@@ -32,7 +41,7 @@ if TYPE_CHECKING:
 )
 @out_option
 @plot_option
-def forces(chosen: Chosen, problem: Problem, frames: Sequence[int], out: str, plot: bool) -> None:
+def forces(chosen: MechanismChoice, problem: Problem, frames: Sequence[int], out: str, plot: bool) -> None:
     """Find all joint forces over a turn, and the slider force if the torque is given, or the torque if the load is given.
 
     If the torque is given, there is no finite slider force at the dead centres. If the crank cannot turn fully, all forces grow

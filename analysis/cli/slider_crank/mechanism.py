@@ -11,12 +11,12 @@ import click
 from ... import figures
 from ... import slider_crank as sc
 from ..common import console, print_written, quantity, say, show_table
-from .options import Chosen, add_mechanism_options, angle_text, out_option
+from .options import MechanismChoice, add_mechanism_options, angle_text, out_option
 
 
 @click.command(short_help="Report assembly, dead centres and stroke.")
 @add_mechanism_options
-def info(chosen: Chosen) -> None:
+def info(chosen: MechanismChoice) -> None:
     """Report where the mechanism can be assembled, its dead centres, its stroke, and the greatest shift of its crank.
 
     \b
@@ -80,7 +80,7 @@ def info(chosen: Chosen) -> None:
 )
 @out_option
 def picture(
-    chosen: Chosen,
+    chosen: MechanismChoice,
     angle: str,
     view: tuple[str, str] | None,
     with_range: bool,

@@ -73,7 +73,7 @@ class Units:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Chosen:
+class MechanismChoice:
     """The mechanism of a command.
 
     ``name`` is for files; ``shift`` (m) is constant unless there is a ``groove``, "shaft" or "apart"; ``speed`` is in rad/s.
@@ -121,7 +121,7 @@ class _MechanismOptions:
     units: str
     speed: str | None = None
 
-    def choose(self, *, paced: bool) -> Chosen:
+    def choose(self, *, paced: bool) -> MechanismChoice:
         """Return the chosen mechanism; ``paced`` says whether the speed has an effect.
 
         Raises LinkworkError if a file, a name or a value is wrong.
@@ -168,7 +168,7 @@ class _MechanismOptions:
             self._note_defaults(parameters, units.length(start), speed if paced else None)
         elif values or self.shift is not None or self.groove is not None:
             name, title = "slider-crank", _title(units, parameters, start, self.groove)
-        return Chosen(
+        return MechanismChoice(
             name=name, title=title, parameters=parameters, shift=start, groove=self.groove, speed=speed, units=units
         )
 
@@ -212,7 +212,7 @@ class Problem:
     given: Mapping[str, float]
     points: int
 
-    def turn(self, chosen: Chosen, *, at: float | None = None) -> ForceTurn:
+    def turn(self, chosen: MechanismChoice, *, at: float | None = None) -> ForceTurn:
         """Solve the problem over a turn, and ``at`` one more crank angle (rad), wherever the mechanism can be assembled."""
         angles = np.linspace(0.0, tau, self.points)
         if at is not None and np.abs(angles - at).min() > 1e-9:

@@ -14,7 +14,16 @@ from linkwork.errors import InputError
 from ... import figures
 from ... import slider_crank as sc
 from ..common import console, output_folder, print_written, quantity, show_table, workers_options
-from .options import Chosen, Problem, Units, add_mechanism_options, note, out_option, plot_option, problem_options
+from .options import (
+    MechanismChoice,
+    Problem,
+    Units,
+    add_mechanism_options,
+    note,
+    out_option,
+    plot_option,
+    problem_options,
+)
 
 if TYPE_CHECKING:
     from ...slider_crank import ForceTurn, MonteCarlo, Sensitivities, Tolerance
@@ -70,7 +79,7 @@ class Sampling(TypedDict):
 @out_option
 @plot_option
 def tolerances(
-    chosen: Chosen,
+    chosen: MechanismChoice,
     problem: Problem,
     widths: Sequence[str],
     distribution: str,
@@ -131,7 +140,7 @@ def _degrees(turn: ForceTurn, i: int) -> float:
     return degrees(float(turn.angle[i]))
 
 
-def _reduce_to_turn(angle: float, chosen: Chosen) -> float:
+def _reduce_to_turn(angle: float, chosen: MechanismChoice) -> float:
     """Return the same crank angle (rad) between 0 and 2 pi.
 
     Raises InputError if it is outside of this turn and the shift there differs from that in this turn.

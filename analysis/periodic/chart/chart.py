@@ -18,7 +18,7 @@ from numpy.typing import ArrayLike, NDArray
 from linkwork.errors import InputError, LinkworkError, ParameterError
 from linkwork.mechanism import Mechanism
 
-from ...display import Shown, format_count, format_range
+from ...display import NotebookResult, format_count, format_range
 from ...files import Whole, write_csv
 from ...mechanisms import Parameters, mechanism_of
 from ...numerics.boundaries import Box, chart
@@ -138,7 +138,7 @@ class Run:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class StabilityChart(Shown):
+class StabilityChart(NotebookResult):
     """The stability of the periodic motion of one turn over two parameters.
 
     Attributes

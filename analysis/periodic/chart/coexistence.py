@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from linkwork.errors import InputError
 
-from ...display import Shown, format_count, format_turns
+from ...display import NotebookResult, format_count, format_turns
 from ...files import Whole, write_csv
 from ...mechanisms import Parameters, mechanism_of
 from ...run import takes_published
@@ -195,7 +195,7 @@ def _compute_motions(guesses: FloatArray, row: PointRow) -> FloatArray:
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
-class Basins(Shown):
+class Basins(NotebookResult):
     """Basins of attraction: the motion on which each start at crank angle 0 settles.
 
     Attributes

@@ -19,7 +19,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from linkwork.errors import AssemblyError, InputError, LinkworkError
 
-from ...display import Shown, format_count, format_rounds
+from ...display import NotebookResult, format_count, format_rounds
 from ...files import unknown_name
 from ...mechanisms import Parameters, mechanism_of
 from ...numerics.continuation import Evaluation
@@ -187,7 +187,7 @@ def _time(speed: FloatArray, way: float) -> tuple[FloatArray, float]:
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
-class PeriodicOrbit(Shown):
+class PeriodicOrbit(NotebookResult):
     """A periodic motion of the full nonlinear mechanism.
 
     Attributes

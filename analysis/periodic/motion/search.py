@@ -21,7 +21,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from linkwork.errors import InputError
 
-from ...display import Shown, format_count
+from ...display import NotebookResult, format_count
 from ...mechanisms import InitialState, Parameters, mechanism_of
 from ...run import Inputs, complete_initial_state, complete_inputs, takes_published
 from ...units import Amount, in_si
@@ -261,7 +261,7 @@ _ARRIVED = 1e-2
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
-class Orbits(Shown):
+class Orbits(NotebookResult):
     """The periodic motions at a point.
 
     Attributes

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from linkwork.errors import InputError
 
-from ...display import Shown, format_count, format_range
+from ...display import NotebookResult, format_count, format_range
 from ...files import write_csv
 from ...mechanisms import mechanism_of
 from ...numerics.continuation import ContinuationError, Curve, Follower, Point, Reason, Settings
@@ -41,7 +41,7 @@ LEAST_SINE, GREATEST_MULTIPLIER = 1e-3, 1e8
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
-class Branch(Shown):
+class Branch(NotebookResult):
     """A branch: periodic orbits along a curve, in order.
 
     Attributes

@@ -21,7 +21,7 @@ from linkwork.errors import InputError, Interrupted, ParameterError
 from linkwork.mechanism import Mechanism
 from linkwork.parameters import field_name
 
-from ...display import Shown, format_count
+from ...display import NotebookResult, format_count
 from ...files import write_csv
 from ...mechanisms import Parameters, mechanism_of
 from ...numerics import symbolic
@@ -149,7 +149,7 @@ UNSOUGHT = "motions that no branch leads to were not sought"
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
-class Response(Shown):
+class Response(NotebookResult):
     """The periodic motions over a range of one parameter.
 
     Attributes

@@ -21,6 +21,7 @@ from ...files import (
     Range,
     Table,
     Whole,
+    any_value,
     as_table,
     entry,
     flag,
@@ -28,7 +29,6 @@ from ...files import (
     read,
     read_tables,
     text,
-    unchanged,
 )
 from ...units import quantity
 from ..exact.quick_return import QuickReturn, QuickSwing
@@ -194,7 +194,7 @@ class TradeOffTable:
     """The table ``[trade_off]``: arguments of `trade_off`."""
 
     over: Any = entry(Choice(OVER))
-    limits: tuple[float, ...] = entry(Many(unchanged, least=2))
+    limits: tuple[float, ...] = entry(Many(any_value, least=2))
     starts: int = entry(Whole(1), 12)
 
 
@@ -227,7 +227,7 @@ class SynthesisCase:
     """A synthesis as a case file describes it."""
 
     title: str = entry(text)
-    task: Task = entry(unchanged)
+    task: Task = entry(any_value)
     bounds: Mapping[str, tuple[float, float]] = entry(BOUNDS, factory=dict)
     constraints: tuple[Constraint | Stroke, ...] = entry(_constraints, USUAL)
     search: SearchTable = entry(Table(SearchTable), SearchTable())

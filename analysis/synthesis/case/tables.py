@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from linkwork.errors import InputError, MissingParameterError, ParameterError
 
-from ...files import Choice, Kinds, Many, Quantity, Table, Whole, entry, flag, read, read_points, text, unchanged
+from ...files import Choice, Kinds, Many, Quantity, Table, Whole, any_value, entry, flag, read, read_points, text
 from ...units import quantity
 from ..exact.quick_return import QuickReturn, QuickSwing
 from ..task.formula import function_from_formula, path_from_formula
@@ -132,7 +132,7 @@ def _weights(value: Any, rotation: FloatArray | None, n: int = 0) -> FloatArray 
     if value is None:
         return None
     name = "task.weights"
-    rows = Many(unchanged)(value, name)
+    rows = Many(any_value)(value, name)
     if not any(isinstance(row, Mapping) for row in rows):
         return np.array(Many(Quantity("1"))(value, name))
     at = np.arange(n, dtype=float) if rotation is None else rotation
@@ -186,7 +186,7 @@ class _ObjectiveAndRange:
 class _Curve(_ObjectiveAndRange):
     """Entries for the points of a target: a list, a file or formulas, which can be scaled, rotated and shifted."""
 
-    points: Any = entry(unchanged, None)
+    points: Any = entry(any_value, None)
     file: str | None = entry(text, None)
     name: str | None = entry(text, None)
     closed: bool | None = entry(flag, None)
@@ -195,7 +195,7 @@ class _Curve(_ObjectiveAndRange):
     y: str | None = entry(text, None)
     scale: float | None = entry(Quantity("1", above=0.0), None)
     turn: float | None = entry(Quantity("rad"), None)
-    shift: Any = entry(unchanged, None)
+    shift: Any = entry(any_value, None)
 
     def _target_points(self, folder: Path) -> tuple[FloatArray, bool]:
         """Return the points in m, and whether their curve is closed."""
@@ -224,7 +224,7 @@ class TimedPathTable(_Curve):
     """The table of a `TimedPath`."""
 
     rotation: Any = entry(_steps_or_list, None)
-    weights: Any = entry(unchanged, None)
+    weights: Any = entry(any_value, None)
 
     def task(self, folder: Path) -> Task:
         points, _ = self._target_points(folder)
@@ -241,7 +241,7 @@ class UntimedPathTable(_Curve):
     samples: int = entry(Whole(8), 72)
     smoothing: Smoothing | None = entry(_smoothing, None)
     straight: Straight | None = entry(_STRAIGHT, None)
-    weights: Any = entry(unchanged, None)
+    weights: Any = entry(any_value, None)
 
     def task(self, folder: Path) -> Task:
         points, closed = self._target_points(folder)
@@ -266,7 +266,7 @@ class UntimedPathTable(_Curve):
 class PrecisionPointsTable(_Curve):
     """The table of a `PrecisionPoints`."""
 
-    angle: Any = entry(unchanged, None)
+    angle: Any = entry(any_value, None)
     angle_unit: str | None = entry(_angle_unit, None)
     rotation: Any = entry(_steps_or_list, None)
     length: float | None = entry(Quantity("m"), None)
@@ -291,7 +291,7 @@ class PrecisionPointsTable(_Curve):
 class MotionTable(PrecisionPointsTable):
     """The table of a `Motion`."""
 
-    weights: Any = entry(unchanged, None)
+    weights: Any = entry(any_value, None)
 
     def task(self, folder: Path) -> Task:
         body = self._body(folder)
@@ -304,11 +304,11 @@ class MotionTable(PrecisionPointsTable):
 class RockerFunctionTable(_ObjectiveAndRange):
     """The table of a `RockerFunction`."""
 
-    angle: Any = entry(unchanged, None)
+    angle: Any = entry(any_value, None)
     angle_unit: str | None = entry(_angle_unit, None)
     file: str | None = entry(text, None)
     rotation: Any = entry(_steps_or_list, None)
-    weights: Any = entry(unchanged, None)
+    weights: Any = entry(any_value, None)
     mounting: bool = entry(flag, False)
     spacing: Any = entry(Choice(("even", "chebyshev")), "even")
 
@@ -339,10 +339,10 @@ class RockerFunctionTable(_ObjectiveAndRange):
 class SliderFunctionTable(_ObjectiveAndRange):
     """The table of a `SliderFunction`."""
 
-    position: Any = entry(unchanged)
+    position: Any = entry(any_value)
     unit: str | None = entry(_length_unit, None)
     rotation: Any = entry(_steps_or_list, None)
-    weights: Any = entry(unchanged, None)
+    weights: Any = entry(any_value, None)
 
     def task(self, folder: Path) -> Task:
         if isinstance(self.position, str):

@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 
 from linkwork.errors import InputError
 
-from ...display import Shown, format_count
+from ...display import NotebookResult, format_count
 from ..linkage.linkage import Linkage
 from ..result.solution import Solution, evaluate, judge, rank_solutions
 from ..task.task import Motion, PrecisionPoints, Task, normal_form
@@ -62,7 +62,7 @@ class Dyad:
         return abs(self.point - self.pivot)
 
 
-class Exact(Shown):
+class Exact(NotebookResult):
     """Linkages found in closed form, with and without defects."""
 
     __slots__ = ()
@@ -119,7 +119,7 @@ class Guidance(Exact):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class GuidanceMap(Shown):
+class GuidanceMap(NotebookResult):
     """Four-bars that carry a body exactly through four poses: each consists of two dyads from a curve of dyads.
 
     Attributes

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from linkwork.errors import InputError
 from linkwork.five_bar.parameters import FiveBarParameters
 
-from ...display import Shown
+from ...display import NotebookResult
 from ...files import write_csv
 from ...run import parameter_tables
 from ...units import with_unit
@@ -260,7 +260,7 @@ class StraightPart:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Solution(Shown):
+class Solution(NotebookResult):
     """A linkage for a task, with its errors and verdicts.
 
     Attributes

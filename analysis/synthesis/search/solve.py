@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from linkwork.errors import InputError, Interrupted
 
-from ...display import Shown, format_count
+from ...display import NotebookResult, format_count
 from ...files import write_csv
 from ...units import Amount, in_si
 from ..exact.quick_return import QuickReturn, QuickSwing, quick_returns
@@ -56,7 +56,7 @@ MOST_EXACT, AGAIN = 9, 4
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Synthesis(Shown):
+class Synthesis(NotebookResult):
     """Ranked solutions of a task.
 
     Attributes
