@@ -218,7 +218,7 @@ def name_in_files(mechanism: Mechanism, channel: Channel) -> str:
     return leaf if table in tables and bare.count(leaf) == 1 else channel.name
 
 
-def mechanism_of(parameters: Parameters) -> Mechanism:
+def find_mechanism(parameters: Parameters) -> Mechanism:
     """Return the mechanism to which parameters belong.
 
     Raises

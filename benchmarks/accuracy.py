@@ -10,7 +10,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from analysis.mechanisms import Parameters, mechanism_of
+from analysis.mechanisms import Parameters, find_mechanism
 from analysis.numerics.codegen import evaluate
 from analysis.run import Inputs, encode, machine
 from analysis.run.equations import DERIVATIVE
@@ -68,7 +68,7 @@ def _evaluate_in_turn(equation, modes, constants, states, forces):
 
 def right_hand_side_time(parameters: Parameters, inputs: Inputs, states: NDArray[np.float64]) -> float:
     """Return the time of one compiled right-hand side (s), evaluated at states without forces one after the other."""
-    mechanism = mechanism_of(parameters)
+    mechanism = find_mechanism(parameters)
     p = parameters.constants()
     equation = machine(mechanism, mechanism.is_switched_on(p)).addresses[DERIVATIVE]
     modes = np.array([*encode(inputs, mechanism).modes.values()], dtype=float)

@@ -130,9 +130,9 @@ def probe(of: str, page: str) -> str:
 
 def accuracy(of: str, page: str) -> str:
     """Return the table of work and precision of a mechanism's FMUs."""
-    from analysis.export.accuracy import HEADINGS, known, texts
+    from analysis.export.accuracy import HEADINGS, format_row, stored_rows
 
-    return _markdown(f"| {' | '.join(HEADINGS)} |", (tuple(texts(row)) for row in known(MECHANISMS[of])))
+    return _markdown(f"| {' | '.join(HEADINGS)} |", (tuple(format_row(row)) for row in stored_rows(MECHANISMS[of])))
 
 
 def race(of: str, page: str) -> str:

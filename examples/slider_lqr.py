@@ -31,7 +31,7 @@ from analysis.linear import (
     find_equilibria,
     largest_difference,
     linearise,
-    linearise_along,
+    linearise_orbit,
     predict_loop,
     settled_motion,
 )
@@ -52,7 +52,7 @@ def turning(parameters: FiveBarParameters, speed: float) -> tuple[PeriodicModel,
     motion = settled_motion(parameters, inputs)
     th2, u, w2, v = motion[0, :4].tolist()
     start = InitialState(crank_angle=th2, crank_speed=w2, slider_position=u, slider_velocity=v)
-    return linearise_along(parameters, motion, inputs), start
+    return linearise_orbit(parameters, motion, inputs), start
 
 
 def describe(design: Design) -> str:

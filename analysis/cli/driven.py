@@ -13,7 +13,7 @@ import click
 
 from linkwork.errors import InputError
 
-from ..mechanisms import PUBLISHED, mechanism_of
+from ..mechanisms import PUBLISHED, find_mechanism
 from ..units import display_scale
 from .common import (
     ENDED_EARLY,
@@ -53,7 +53,7 @@ class CaseChoice:
         try:
             drive = steady_drive(self.case.parameters, self.case.inputs, self.case.initial, speed=value)
             # raises an error if nothing is free
-            drive.flow(mechanism_of(self.case.parameters))
+            drive.flow(find_mechanism(self.case.parameters))
             return drive
         except NothingFreeError as error:
             one = error.force and f"; --set {error.force}=0 leaves one free, --set {error.force}=VALUE drives it so"

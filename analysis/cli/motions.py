@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from ..display import format_count, format_rounds
-from ..mechanisms import mechanism_of
+from ..mechanisms import find_mechanism
 from .common import console, html_option, output_folder, quantity, save_picture, say, show_table, workers_options
 from .driven import CaseChoice, add_case_options, swing_unit
 
@@ -59,7 +59,7 @@ def basins(
 
     parameters, drive = chosen.case.parameters, chosen.drive()
     start = chosen.start(drive)
-    flow = drive.flow(mechanism_of(parameters))
+    flow = drive.flow(find_mechanism(parameters))
     units = (flow.components[0][1], flow.components[flow.size // 2][1])
     spans: list[Any] = [
         None if texts is None else tuple(quantity(text, unit, option) for text in texts)

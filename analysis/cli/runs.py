@@ -159,14 +159,14 @@ def run(
 def _bare_speeds(file: str | None, settings: Sequence[str], case: Any) -> list[str]:
     """Return a note for each speed given as a number without unit, which asks whether rpm was meant instead of rad/s."""
     from ..files import flatten, read_tables
-    from ..mechanisms import mechanism_of
+    from ..mechanisms import find_mechanism
     from ..run import case_inputs
 
     given = {
         **flatten(read_tables(file) if file else {}),
         **changes(settings, number_or_text, "drive.speed='420 rpm'"),
     }
-    speeds = [name for name, acting in case_inputs(mechanism_of(case.parameters)).items() if acting.unit == "rad/s"]
+    speeds = [name for name, acting in case_inputs(find_mechanism(case.parameters)).items() if acting.unit == "rad/s"]
     return [
         f"{name} = {given[name]:g} has no unit and is taken in rad/s, as {given[name] / RAD_S_PER_RPM:.6g} rpm: "
         f"was '{given[name]:g} rpm' meant?"
@@ -201,9 +201,9 @@ def _with_magnitudes(result: Any) -> Iterator[tuple[str, Any, str]]:
     """Yield name, values and SI unit of each output of a run; after the force components of a joint yield their magnitude."""
     import numpy as np
 
-    from ..mechanisms import mechanism_of
+    from ..mechanisms import find_mechanism
 
-    joints = {} if result.parameters is None else mechanism_of(result.parameters).joints
+    joints = {} if result.parameters is None else find_mechanism(result.parameters).joints
     last = {names[-1]: (joint, names) for joint, names in joints.items() if set(names) <= set(result.names)}
     for name in result.names:
         yield name, result[name], result.units[name]
@@ -256,12 +256,12 @@ def check(
       linkwork check --method compiled --method Radau
       linkwork check speed-jump examples/torsion-bar.toml --fmu build/FiveBarSlider-native.fmu
     """
-    from ..mechanisms import mechanism_of
+    from ..mechanisms import find_mechanism
     from ..run import check as compare_case
 
     failed, count = [], 0
     for name, case in _find_cases(cases, fmu, everything):
-        model = mechanism_of(case.parameters).fmu
+        model = find_mechanism(case.parameters).fmu
         runs = [
             (path, interface, words, method)
             for path, interface, words in _find_fmus(model, fmu, only)
@@ -323,12 +323,12 @@ def _find_cases(names: Sequence[str], fmu: str | None, everything: bool) -> list
 
     If an FMU is given, the standard cases are those of its mechanism.
     """
-    from ..mechanisms import mechanism_of
+    from ..mechanisms import find_mechanism
     from ..run import CASES, load_case
 
     if not names or everything:
         model = None if fmu is None else _model_name(Path(fmu))
-        of_model = [(name, mechanism_of(case.parameters).fmu) for name, case in CASES.items()]
+        of_model = [(name, find_mechanism(case.parameters).fmu) for name, case in CASES.items()]
         of_model = [(name, its_model) for name, its_model in of_model if model in (None, its_model)]
         first = {its_model: name for name, its_model in reversed(of_model)}
         names = [name for name, its_model in of_model if everything or first[its_model] == name]
@@ -361,11 +361,11 @@ def _write_comparison(stem: Path, case: Any, in_process: Any, through_fmu: Any) 
     """Write both runs of a check as CSV and their comparison as a plot; report runs that ended early."""
     from .. import figures
     from ..files import save_figure
-    from ..mechanisms import mechanism_of
+    from ..mechanisms import find_mechanism
 
     in_process.to_csv(f"{stem}-in-process.csv")
     through_fmu.to_csv(f"{stem}-fmu.csv")
-    mechanism = mechanism_of(case.parameters)
+    mechanism = find_mechanism(case.parameters)
     freedoms, joints = mechanism.freedoms, list(mechanism.joints.values())
     of_freedoms = [name for f in (freedoms[1:] or freedoms) for name in (f.coordinate, f.rate)]
     figure = figures.plot_comparison(
@@ -465,9 +465,9 @@ def _print_parameters(title: str, parameters: Any) -> None:
     from linkwork.five_bar.kinematics import assembly_square
     from linkwork.parameters import field_name
 
-    from ..mechanisms import FIVE_BAR, SLIDER_CRANK, mechanism_of
+    from ..mechanisms import FIVE_BAR, SLIDER_CRANK, find_mechanism
 
-    mechanism = mechanism_of(parameters)
+    mechanism = find_mechanism(parameters)
     values = [(v, getattr(parameters, field_name(v.name))) for v in mechanism.mechanism_variables.values()]
     rows = [(v.name, f"{value:.9g}", v.unit, v.description) for v, value in values]
     show_table(title, ("parameter", "value", "unit", "meaning"), rows, words=("parameter", "unit", "meaning"))

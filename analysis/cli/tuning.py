@@ -79,7 +79,7 @@ def tune(case: str, settings: Sequence[str], as_json: bool, plot: bool, out: str
 
 
 def _print(title: str, tuned: Any) -> None:
-    from ..mechanisms import mechanism_of
+    from ..mechanisms import find_mechanism
     from ..periodic import parameter_unit
     from ..units import display_scale
 
@@ -87,7 +87,7 @@ def _print(title: str, tuned: Any) -> None:
     rows = []
     for name, before, after in zip(wish.names, wish.present.tolist(), tuned.values.tolist()):
         # a change from zero has no percentage
-        unit, factor = display_scale(parameter_unit(mechanism_of(wish.parameters), name))
+        unit, factor = display_scale(parameter_unit(find_mechanism(wish.parameters), name))
         change = f"{100.0 * (after / before - 1.0):+.4g} %" if before else f"{factor * after:+.4g} {unit}"
         changed = change if after != before else "none"
         rows.append((name, unit, f"{factor * before:.7g}", f"{factor * after:.7g}", changed))

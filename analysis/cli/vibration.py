@@ -11,7 +11,7 @@ from linkwork.errors import InputError, LinkworkError, ParameterError
 from linkwork.parameters import field_name
 
 from ..display import format_rounds
-from ..mechanisms import FIVE_BAR, mechanism_of
+from ..mechanisms import FIVE_BAR, find_mechanism
 from ..units import RAD_S_PER_RPM, display_scale
 from .common import (
     console,
@@ -37,12 +37,12 @@ def _require_range(parameters: Any, low: float, high: float, name: str, first: s
     """Raise a usage error if a range does not increase, or if speeds in it are not above zero; it names the options."""
     from ..periodic import format_value, parameter_unit, speed_names
 
-    unit = parameter_unit(mechanism_of(parameters), name)
+    unit = parameter_unit(find_mechanism(parameters), name)
     options = first if first == last else f"{first} and {last}"
     if not low < high:
         span = f"from {format_value(name, low, unit)} to {format_value(name, high, unit)}"
         raise click.UsageError(f"{options}: {span}: it must increase")
-    if name in speed_names(mechanism_of(parameters)) and low <= 0.0:
+    if name in speed_names(find_mechanism(parameters)) and low <= 0.0:
         raise click.UsageError(f"{options}: it begins at {format_value(name, low, unit)}: speeds must be above zero")
 
 
@@ -121,7 +121,7 @@ def resonance(
     from ..youssef import approximations
 
     parameters, title = chosen.case.parameters, chosen.case.title
-    mechanism = mechanism_of(parameters)
+    mechanism = find_mechanism(parameters)
     # if there are several cranks, the case says which are commanded; the ratios of their speeds are kept
     vary = vary or default_variable(mechanism, chosen.drive() if len(mechanism.cyclic_freedoms) > 1 else None)
     over_speed = vary in speed_names(mechanism)
@@ -181,9 +181,9 @@ def _range_ends(
     """Return the ends of the range to follow in SI, by default about the natural frequency (rad/s)."""
     from ..periodic import parameter_unit, speed_names
 
-    unit = parameter_unit(mechanism_of(parameters), vary)
+    unit = parameter_unit(find_mechanism(parameters), vary)
     if natural is None and (low is None or high is None):
-        speed = vary in speed_names(mechanism_of(parameters))
+        speed = vary in speed_names(find_mechanism(parameters))
         why = "without a spring there is no natural frequency to begin with" if speed else "it has no range of its own"
         raise click.UsageError(f"--from and --to are needed for {vary}: {why}")
     ends = [
@@ -212,7 +212,7 @@ def _print_branches(title: str, response: Any, factor: float, unit: str) -> None
         ends = "closed" if branch.closed else ends
         rows.append((str(number), str(branch.crank_turns), str(len(branch)), begins, ends, shares, "; ".join(events)))
     family = response.family
-    over = "speed" if speed_names(mechanism_of(family.parameters)) == (family.name,) else family.name
+    over = "speed" if speed_names(find_mechanism(family.parameters)) == (family.name,) else family.name
     table = (
         f"{title}: how it moves at each {over}, and where that jumps or becomes unstable (branches of periodic motions)"
     )
@@ -231,7 +231,7 @@ def _normal_form_in_words(family: Any, special: Any) -> str:
 
 def _has_dry_friction(parameters: Any) -> bool:
     """Return whether the mechanism has friction that is not viscous."""
-    return any(getattr(parameters, field_name(name)) for name in mechanism_of(parameters).names("friction"))
+    return any(getattr(parameters, field_name(name)) for name in find_mechanism(parameters).names("friction"))
 
 
 def _print_extrema(response: Any, factor: float, unit: str, table: Any) -> None:
@@ -347,7 +347,7 @@ def stability(
 
     parameters, drive = chosen.case.parameters, chosen.drive()
     start = chosen.start(drive)
-    mechanism = mechanism_of(parameters)
+    mechanism = find_mechanism(parameters)
     names = (x or default_variable(mechanism, drive), y or damping_name(mechanism))
     for name in (x, y):
         if name is not None:
@@ -381,7 +381,7 @@ def stability(
         (ranges[0], ranges[1]),
         points=points,
         start=start,
-        beside=linear_motion(parameters, drive, names) if mechanism_of(parameters) is FIVE_BAR else None,
+        beside=linear_motion(parameters, drive, names) if find_mechanism(parameters) is FIVE_BAR else None,
         coexisting=coexisting,
         n_jobs=jobs,
         progress=console.is_terminal,
@@ -407,7 +407,7 @@ def _axis_range(
 
     if texts is None:
         return default_range(parameters, drive, name)
-    low, high = (quantity(text, parameter_unit(mechanism_of(parameters), name), option) for text in texts)
+    low, high = (quantity(text, parameter_unit(find_mechanism(parameters), name), option) for text in texts)
     _require_range(parameters, low, high, name, option, option)
     return low, high
 
@@ -427,7 +427,7 @@ def _report_verdict(title: str, parameters: Any, drive: Any, start: Any) -> None
         f"Floquet multipliers {values}; amplitude {size * turn.amplitude:.5g} {unit}",
     ]
     friction = _has_dry_friction(parameters)
-    if drive.speed_drive and not friction and mechanism_of(parameters) is FIVE_BAR:
+    if drive.speed_drive and not friction and find_mechanism(parameters) is FIVE_BAR:
         lines.append(f"by the linear equation about u = 0, as in the thesis: {linear_verdict(parameters, drive)}")
     console.print("\n".join(lines), highlight=False, soft_wrap=True)
     if friction:

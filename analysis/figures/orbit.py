@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..display import format_turns
-from ..mechanisms import mechanism_of
+from ..mechanisms import find_mechanism
 from ..periodic import Orbits, PeriodicOrbit, Turn
 from ..units import RAD_S_PER_RPM
 from .curves import Curve, Panel, plot_curves
@@ -29,7 +29,7 @@ def plot_orbit(orbit: PeriodicOrbit, *, title: str = "") -> Figure:
     title : str
         By default the speed, the period and the stability.
     """
-    turn, mechanism = orbit.turn(_SAMPLES), mechanism_of(orbit.parameters)
+    turn, mechanism = orbit.turn(_SAMPLES), find_mechanism(orbit.parameters)
     variables = {v.name: v for v in mechanism.variables}
     rates = {freedom.coordinate: freedom.rate for freedom in mechanism.freedoms}
     free = [mechanism.freedoms[n] for n in orbit.flow.free]
@@ -97,7 +97,7 @@ def plot_orbits(found: Orbits, *, title: str = "") -> Figure:
     curves, label = [], "first free coordinate"
     for orbit in found.orbits:
         turn = orbit.turn(_SAMPLES)
-        variable = next(v for v in mechanism_of(orbit.parameters).variables if v.name == turn.swing)
+        variable = next(v for v in find_mechanism(orbit.parameters).variables if v.name == turn.swing)
         unit, factor = display_unit(variable)
         label = f"{name_in_words(turn.swing)} [{unit}]"
         stable = orbit in found.stable

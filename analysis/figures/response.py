@@ -14,7 +14,7 @@ from shapely import LineString, distance
 from shapely import points as make_points
 
 from ..display import format_turns
-from ..mechanisms import mechanism_of
+from ..mechanisms import find_mechanism
 from ..periodic import (
     FORCE,
     TOLERANCE,
@@ -136,7 +136,7 @@ def describe_branches(
     family, (what, si) = branches[0].family, branches[0].orbits[0].swing
     unit, factor = display_scale(family.unit) if rpm or family.unit != "rad/s" else (family.unit, 1.0)
     shown, scale = display_scale(si)
-    outputs = (v for v in mechanism_of(family.parameters).variables if v.causality == "output")
+    outputs = (v for v in find_mechanism(family.parameters).variables if v.causality == "output")
     name = next((name_in_words(v.name) for v in outputs if v.symbol == what), name_in_words(what))
     look = _Scale(family=family, factor=factor, unit=unit, scale=scale, shown=shown, what=what, name=name)
     others = [] if beside is None else _evaluate_approximations(branches, beside)

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from linkwork.mechanism import Mechanism
 from linkwork.variables import UNITS, Variable
 
-from ..mechanisms import MECHANISMS, mechanism_of
+from ..mechanisms import MECHANISMS, find_mechanism
 from ..run import Trajectory
 from .dispatch import draw_mechanism, has_picture, plot
 from .style import (
@@ -188,7 +188,7 @@ def _oscillations(values: FloatArray) -> int:
 def _mechanism(run: Trajectory) -> Mechanism:
     """Return the mechanism of a run; if the run has no parameters, the one with most outputs in common."""
     if run.parameters is not None:
-        return mechanism_of(run.parameters)
+        return find_mechanism(run.parameters)
     return max(MECHANISMS.values(), key=lambda m: len(set(m.output_names) & set(run.names)))
 
 

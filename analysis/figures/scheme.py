@@ -16,7 +16,7 @@ from linkwork.mechanism import Mechanism, Part
 from linkwork.parameters import field_name
 
 from ..linkages import Reach, reach
-from ..mechanisms import mechanism_of
+from ..mechanisms import find_mechanism
 from ..run import Trajectory
 from .animation import check_frames, gif
 from .dispatch import animate, last_samples, plot
@@ -153,7 +153,7 @@ def _sort_by_angle(points: Sequence[Array]) -> Array:
 
 def draw_run(parameters: Any, axis: Axes, run: Trajectory) -> str:
     """Draw a mechanism at the start of a run with the paths of its points, and return the caption."""
-    mechanism = mechanism_of(parameters)
+    mechanism = find_mechanism(parameters)
     samples, words = last_samples(run)
     names = [freedom.coordinate for freedom in mechanism.freedoms]
     coordinates = np.column_stack([run[name][samples] for name in names])

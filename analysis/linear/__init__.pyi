@@ -28,5 +28,5 @@ from .model import signal_name as signal_name
 from .periodic import LEAST_SAMPLES as LEAST_SAMPLES
 from .periodic import Orbit as Orbit
 from .periodic import PeriodicModel as PeriodicModel
-from .periodic import linearise_along as linearise_along
+from .periodic import linearise_orbit as linearise_orbit
 from .periodic import settled_motion as settled_motion

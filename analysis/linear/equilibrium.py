@@ -22,7 +22,7 @@ from linkwork.mechanism import Mechanism
 from linkwork.parameters import fmi_name
 
 from ..files import unknown_name
-from ..mechanisms import InitialState, Parameters, mechanism_of, variable_units
+from ..mechanisms import InitialState, Parameters, find_mechanism, variable_units
 from ..numerics import symbolic
 from ..run import Inputs, check_run, expressions, takes_published
 from ..units import Amount, in_si
@@ -102,10 +102,10 @@ class Equilibrium:
     iterations: int
 
     def __repr__(self) -> str:
-        return f"<Equilibrium: {mechanism_of(self.parameters).describe_state(self.coordinates.tolist())}>"
+        return f"<Equilibrium: {find_mechanism(self.parameters).describe_state(self.coordinates.tolist())}>"
 
     def __getitem__(self, name: str) -> float:
-        mechanism, p = mechanism_of(self.parameters), self.parameters.constants()
+        mechanism, p = find_mechanism(self.parameters), self.parameters.constants()
         if name not in mechanism.output_names:
             raise unknown_name(name, mechanism.output_names, f"output {name!r}")
         modes, channels = sample_channels(mechanism, self.inputs, np.zeros(1), np.array([self.state]))
@@ -116,12 +116,12 @@ class Equilibrium:
     @property
     def state(self) -> tuple[float, ...]:
         """State of the plant in this configuration."""
-        return mechanism_of(self.parameters).state(self.initial)
+        return find_mechanism(self.parameters).state(self.initial)
 
     @property
     def initial(self) -> InitialState:
         """Initial state of a run that starts in this configuration."""
-        mechanism = mechanism_of(self.parameters)
+        mechanism = find_mechanism(self.parameters)
         names = [freedom.initial[0] for freedom in mechanism.freedoms]
         return mechanism.initial(**dict(zip(names, self.coordinates.tolist())))
 
@@ -136,7 +136,7 @@ class Equilibrium:
     @property
     def potential(self) -> float:
         """Potential energy (J) of springs, gravity and the constant forces; that of a force is zero at displacement 0."""
-        mechanism = mechanism_of(self.parameters)
+        mechanism = find_mechanism(self.parameters)
         work = 0.0
         for channel in mechanism.channels:
             force = getattr(self.inputs, channel.argument) if channel.kind == "force" else None
@@ -173,7 +173,7 @@ class _Balance:
 
     @classmethod
     def build(cls, parameters: Parameters, inputs: Inputs) -> _Balance:
-        mechanism = mechanism_of(parameters)
+        mechanism = find_mechanism(parameters)
         check_run(mechanism, inputs, None)
         if not inputs.held_exactly:
             raise InputError(f"{inputs}: at an equilibrium all of them must be constant")
@@ -297,7 +297,7 @@ def _balance_with_held(
     parameters: Parameters, inputs: Inputs | None, held: Mapping[str, float] | None
 ) -> tuple[_Balance, FloatArray]:
     """Return the equations of rest, and all coordinates, with the given values for held freedoms and zero elsewhere."""
-    mechanism = mechanism_of(parameters)
+    mechanism = find_mechanism(parameters)
     inputs, _ = check_run(mechanism, inputs, None)
     coordinates = np.zeros(len(mechanism.freedoms))
     commands = {mechanism.freedoms[c.freedom].coordinate: c for c in mechanism.channels if c.kind == "command"}

@@ -19,7 +19,7 @@ from linkwork.errors import AssemblyError, InputError, IntegrationError
 from linkwork.mechanism import Channel, Mechanism
 from linkwork.plant import Plant
 
-from ..mechanisms import InitialState, Parameters, mechanism_of
+from ..mechanisms import InitialState, Parameters, find_mechanism
 from ..run import (
     FmuRun,
     Inputs,
@@ -426,7 +426,7 @@ def control_loop(
     AssemblyError
         If the links cannot be joined at the start.
     """
-    mechanism = mechanism_of(parameters)
+    mechanism = find_mechanism(parameters)
     inputs, initial = check_run(mechanism, inputs, initial)
     channel = _channel(mechanism, controller.channel)
     if channel.argument in inputs:

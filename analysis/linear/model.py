@@ -25,7 +25,7 @@ from linkwork.mechanism import Mechanism
 
 from ..files import unknown_name
 from ..libraries import lazy
-from ..mechanisms import Parameters, mechanism_of
+from ..mechanisms import Parameters, find_mechanism
 from ..numerics import symbolic
 from ..run import Inputs, check_run, encode, expressions, sample, takes_published
 
@@ -216,7 +216,7 @@ class Matrices:
     @property
     def mechanism(self) -> Mechanism:
         """Mechanism of the parameters."""
-        return mechanism_of(self.parameters)
+        return find_mechanism(self.parameters)
 
     @property
     def layout(self) -> Layout:
@@ -384,7 +384,7 @@ def evaluate(parameters: Parameters, modes: Modes, states: FloatArray, channels:
     Raises InputError if a state or a channel is not finite, or nothing is free; AssemblyError if the links cannot be joined at
     a state.
     """
-    mechanism = mechanism_of(parameters)
+    mechanism = find_mechanism(parameters)
     its, p, n = layout(mechanism, modes), parameters.constants(), len(states)
     if not its.free:
         names = " and ".join(mechanism.freedoms[number].rate for number in its.commanded)
@@ -484,10 +484,10 @@ def linearise(parameters: Parameters, state: ArrayLike, inputs: Inputs | None = 
     >>> model.K.shape
     (1, 1)
     """
-    mechanism = mechanism_of(parameters)
+    mechanism = find_mechanism(parameters)
     states = full_states(mechanism, np.atleast_2d(np.asarray(state, dtype=float)))
     if len(states) != 1:
-        raise InputError(f"{len(states)} states: one is linearised about here, many by linearise_along")
+        raise InputError(f"{len(states)} states: one is linearised about here, many by linearise_orbit")
     modes, channels = sample_channels(mechanism, inputs, np.zeros(1), states)
     arrays = evaluate(parameters, modes, states, channels)
     return LinearModel(

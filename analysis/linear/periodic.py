@@ -15,7 +15,7 @@ from scipy.integrate import solve_ivp
 from linkwork.errors import InputError
 from linkwork.mechanism import Mechanism
 
-from ..mechanisms import InitialState, Parameters, mechanism_of
+from ..mechanisms import InitialState, Parameters, find_mechanism
 from ..numerics.fourier import trigonometric
 from ..run import Inputs, check_run, complete_initial_state, complete_inputs, simulate, speed_ratio, takes_published
 from ..units import Amount, in_si
@@ -191,7 +191,7 @@ class PeriodicModel(Matrices):
 
 @takes_published()
 @in_si(period="s")
-def linearise_along(
+def linearise_orbit(
     parameters: Parameters,
     motion: ArrayLike | Orbit,
     inputs: Inputs | None = None,
@@ -224,7 +224,7 @@ def linearise_along(
     AssemblyError
         If the links cannot be joined at one of the samples.
     """
-    mechanism = mechanism_of(parameters)
+    mechanism = find_mechanism(parameters)
     if isinstance(motion, Orbit):
         if inputs is not None or period is not None:
             raise InputError("an orbit has its own inputs and period: they cannot be given beside it")
@@ -330,7 +330,7 @@ def settled_motion(
     LinearModelError
         If the run ends early, or the last two turns differ by more than 1e-7 of the mechanism's scales.
     """
-    mechanism = mechanism_of(parameters)
+    mechanism = find_mechanism(parameters)
     inputs, initial = check_run(mechanism, inputs, initial)
     modes, n = tuple(inputs.modes(mechanism).values()), len(mechanism.freedoms)
     its = layout(mechanism, modes)

@@ -383,7 +383,7 @@ class Chart:
     boundaries: tuple[Boundary, ...]
     gaps: tuple[Gap, ...]
 
-    def across(self, y: float, *, samples: int = 200) -> Line:
+    def scan_line(self, y: float, *, samples: int = 200) -> Line:
         """Scan the line at this y: return where it crosses boundaries, and its intervals of instability."""
         return scan(lambda x: self.test(x, y), *self.box.x, samples=samples)
 

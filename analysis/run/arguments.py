@@ -12,7 +12,7 @@ from linkwork.errors import InputError
 from linkwork.mechanism import Mechanism, PublishedSet
 
 from .. import files
-from ..mechanisms import MECHANISMS, PUBLISHED, Parameters, mechanism_of
+from ..mechanisms import MECHANISMS, PUBLISHED, Parameters, find_mechanism
 from ..units import Amount
 from .inputs import Inputs, parameter_readers, read_start
 
@@ -111,7 +111,7 @@ def complete_inputs(known: PublishedSet, inputs: Any) -> Any:
 
 def _without_drives(known: PublishedSet, names: Iterable[str]) -> PublishedSet:
     """Return a published set without the drives of freedoms that inputs with these names (in `Inputs` or FMI) drive."""
-    mechanism, names = mechanism_of(known.parameters), {*names}
+    mechanism, names = find_mechanism(known.parameters), {*names}
     given = names | {channel.argument for channel in mechanism.channels if channel.name in names}
     modes = [mode.arguments for mode in mechanism.modes]
     rivals = {name: next((own for own in modes if name in own), (name,)) for name in known.drive}
@@ -121,7 +121,7 @@ def _without_drives(known: PublishedSet, names: Iterable[str]) -> PublishedSet:
 def complete_initial_state(known: PublishedSet, initial: Any) -> Any:
     """Complete the initial state: None becomes that of the published set, a mapping is completed from it."""
     if isinstance(initial, Mapping):
-        return read_start(mechanism_of(known.parameters), initial, known.initial)
+        return read_start(find_mechanism(known.parameters), initial, known.initial)
     return known.initial if initial is None else initial
 
 
@@ -159,7 +159,7 @@ def usual_times(
     """
     if stop_time is not None:
         return stop_time, 1e-3 if step is None else step
-    turn = turn_durations(inputs, mechanism_of(parameters)) if isinstance(inputs, Inputs) else None
+    turn = turn_durations(inputs, find_mechanism(parameters)) if isinstance(inputs, Inputs) else None
     if turn is None:
         raise InputError(
             "stop_time is missing: a run has three turns by default only where the crank has a constant speed"
@@ -205,7 +205,7 @@ def variant(of: Any, /, **changes: Amount) -> Any:
             raise InputError(f"{base.__name__} has no variants: it must be one of {kinds}")
         base = None
     else:
-        mechanism = mechanism_of(base)
+        mechanism = find_mechanism(base)
     made = files.read(mechanism.parameters, changes, "", readers=parameter_readers(mechanism), base=base)
     if known is None:
         return made

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
-from ..mechanisms import InitialState, Parameters, mechanism_of
+from ..mechanisms import InitialState, Parameters, find_mechanism
 from .arguments import complete_inputs, published_set, turn_durations
 from .inputs import Inputs, check_run
 from .masses import Mass, mass_origins
@@ -39,7 +39,7 @@ class Case:
 
     def __post_init__(self) -> None:
         # inputs and start of another mechanism are refused here, not when it is run
-        _, initial = check_run(mechanism_of(self.parameters), self.inputs, self.initial)
+        _, initial = check_run(find_mechanism(self.parameters), self.inputs, self.initial)
         object.__setattr__(self, "initial", initial)
 
 
@@ -55,7 +55,7 @@ def published_case(name: str, *, revolutions: float = 3.0, steps_per_revolution:
         If there is no set of that name.
     """
     entry = published_set(name)
-    mechanism, inputs = mechanism_of(entry.parameters), complete_inputs(entry, None)
+    mechanism, inputs = find_mechanism(entry.parameters), complete_inputs(entry, None)
     turn = turn_durations(inputs, mechanism)
     _, stop_time, step, _ = mechanism.experiment
     if turn is not None:

@@ -20,7 +20,7 @@ from linkwork.parameters import field_name
 from .. import files
 from ..files import Choice, Kinds, Many, Quantity, Reader, Table, entry
 from ..linkages import with_linkage
-from ..mechanisms import MECHANISMS, PUBLISHED, Parameters, mechanism_of, name_in_files
+from ..mechanisms import MECHANISMS, PUBLISHED, Parameters, find_mechanism, name_in_files
 from ..units import with_unit
 from .arguments import complete_inputs, turn_durations
 from .case import Case
@@ -51,7 +51,7 @@ def read_parameters(
         If a name is unknown, a value is wrong, or, without ``base``, a value is missing.
     """
     if mechanism is None:
-        mechanism = _find_mechanism(data) if base is None else mechanism_of(base)
+        mechanism = _find_mechanism(data) if base is None else find_mechanism(base)
     if data.get("mechanism", mechanism.name) != mechanism.name:
         raise ParameterError("mechanism", data["mechanism"], f"be {mechanism.name}")
     data = {name: value for name, value in data.items() if name != "mechanism"}
@@ -72,7 +72,7 @@ def read_parameters(
 
 def parameter_tables(parameters: Parameters) -> dict[str, Any]:
     """Return parameters as nested tables of texts with SI units and all digits, with the name of the ``mechanism``."""
-    mechanism = mechanism_of(parameters)
+    mechanism = find_mechanism(parameters)
     data: dict[str, Any] = {"mechanism": mechanism.name}
     for name, variable in mechanism.mechanism_variables.items():
         value = getattr(parameters, field_name(name))
@@ -122,7 +122,7 @@ def _find_mechanism(data: Mapping[str, Any]) -> Mechanism:
 def case_mechanism(data: Mapping[str, Any]) -> Mechanism:
     """Return the mechanism of a case: that of its published set, else the one that the file names or has parameters of."""
     if "published" in data:
-        return mechanism_of(PUBLISHED[Choice(PUBLISHED)(data["published"], "published")].parameters)
+        return find_mechanism(PUBLISHED[Choice(PUBLISHED)(data["published"], "published")].parameters)
     return _find_mechanism(data)
 
 

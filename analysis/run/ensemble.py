@@ -23,7 +23,7 @@ from linkwork.mechanism import Mechanism
 
 from ..display import format_count
 from ..files import unknown_name
-from ..mechanisms import InitialState, Parameters, mechanism_of
+from ..mechanisms import InitialState, Parameters, find_mechanism
 from ..numerics.workers import WorkersLost, check_jobs, record_interrupts, run_in_parallel, share_memory
 from ..units import Amount, in_si
 from .arguments import complete_initial_state, complete_inputs, takes_options, takes_published
@@ -100,7 +100,7 @@ class Ensemble:
         if self.values is not None:
             values = self.values[index, :n]
         else:
-            mechanism = mechanism_of(self.parameters[index])
+            mechanism = find_mechanism(self.parameters[index])
             p = np.array([*self.parameters[index].constants(), self.energies[index]])
             values = compute_outputs(mechanism, self.modes, p, self.states[index, :n], self.forces[index, :n])
         return Trajectory(
@@ -241,8 +241,8 @@ def simulate_many(
     if batch is not None and batch < 1:
         raise InputError(f"batch is {batch}: it must be at least 1")
     check_jobs(n_jobs)
-    mechanism = mechanism_of(parameters[0])
-    if any(mechanism_of(p) is not mechanism for p in distinct_objects(parameters)):
+    mechanism = find_mechanism(parameters[0])
+    if any(find_mechanism(p) is not mechanism for p in distinct_objects(parameters)):
         raise InputError("an ensemble's parameters must all be of one mechanism")
     if isinstance(outputs, str):
         raise InputError(f"outputs is {outputs!r}: it must be a list of names, such as [{outputs!r}]")

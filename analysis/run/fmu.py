@@ -26,7 +26,7 @@ from linkwork.errors import InputError, LinkworkError
 from linkwork.parameters import fmi_name
 
 from ..files import check_fmu
-from ..mechanisms import InitialState, Parameters, mechanism_of
+from ..mechanisms import InitialState, Parameters, find_mechanism
 from .component import ComponentModel, ComponentSlave, component_path
 
 
@@ -147,7 +147,7 @@ class _Instance:
         start_time: float,
         inputs: dict[str, float],
     ) -> None:
-        mechanism = mechanism_of(parameters)
+        mechanism = find_mechanism(parameters)
         self.input_names = mechanism.input_names
         self.output_names = mechanism.output_names
         self.name = Path(fmu).name

@@ -14,7 +14,7 @@ from linkwork.parameters import field_name
 
 from ..files import Kinds, Quantity, unknown_name
 from ..linkages import SECTIONS, LinkBody, format_millimetres
-from ..mechanisms import Parameters, mechanism_of
+from ..mechanisms import Parameters, find_mechanism
 from ..sections import Section
 from .arguments import takes_published
 
@@ -77,7 +77,7 @@ def with_sections(parameters: Parameters, **sections: Section) -> Parameters:
     UnknownNameError
         If the mechanism has no such link.
     """
-    mechanism = mechanism_of(parameters)
+    mechanism = find_mechanism(parameters)
     links = {link.name: link for link in mechanism.links}
     units = {v.name: v.unit for v in mechanism.mechanism_variables.values()}
     for name, section in sections.items():
@@ -145,7 +145,7 @@ def mass_origins(
     source : str
         Name of the set.
     """
-    mechanism = mechanism_of(parameters)
+    mechanism = find_mechanism(parameters)
     links = {link.mass: link for link in mechanism.links}
     base = None if known is None else known.parameters
     get = partial(getattr, parameters)
@@ -182,7 +182,7 @@ def trace_masses(parameters: Parameters) -> tuple[Mass, ...]:
     InputError
         If the parameters are not those of a mechanism.
     """
-    mechanism = mechanism_of(parameters)
+    mechanism = find_mechanism(parameters)
     own = {name: getattr(parameters, field_name(name)) for name in mechanism.mechanism_variables}
 
     def others(known: PublishedSet) -> dict[str, Any]:

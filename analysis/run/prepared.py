@@ -15,7 +15,7 @@ from linkwork.errors import InputError
 from linkwork.limits import ASSEMBLY
 from linkwork.mechanism import Mechanism
 
-from ..mechanisms import InitialState, Parameters, mechanism_of
+from ..mechanisms import InitialState, Parameters, find_mechanism
 from ..numerics.workers import record_interrupts
 from .angles import WholeTurns
 from .cautions import MANY_STEPS, disturbance_rates, energy_balance, is_too_slow, stiffness
@@ -75,7 +75,7 @@ class Run:
     modes: tuple[float, ...] = field(init=False)
 
     def __post_init__(self) -> None:
-        self.mechanism = mechanism_of(self.parameters)
+        self.mechanism = find_mechanism(self.parameters)
         self.inputs, self.initial = check_run(self.mechanism, self.inputs, self.initial)
         self.encoded = align(encode(self.inputs, self.mechanism), self.settings.times)
         self.p = self.parameters.constants()

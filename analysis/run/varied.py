@@ -18,7 +18,7 @@ from linkwork.mechanism import Mechanism
 from linkwork.parameters import Rules, field_name, fmi_name
 
 from .. import files
-from ..mechanisms import Parameters, mechanism_of
+from ..mechanisms import Parameters, find_mechanism
 from ..numerics.symbolic import ELEMENTARY
 from ..numerics.tracing import ReboundFunctions, rebind_functions
 from .arguments import variant
@@ -74,7 +74,7 @@ def vary(parameters: Parameters, inputs: Any, values: Mapping[str, Any]) -> tupl
     InputError, ParameterError
         If a name is unknown, lengths differ, or a value is wrong; the message names the set.
     """
-    mechanism = mechanism_of(parameters)
+    mechanism = find_mechanism(parameters)
     own = {field.name for field in fields(mechanism.parameters)}
     channels = {name: c.argument for c in mechanism.channels if c.kind != "rate" for name in (c.name, c.argument)}
     if not isinstance(inputs, Inputs | None):

@@ -15,7 +15,7 @@ from linkwork.errors import InputError
 
 from ..export import KINDS, NATIVE, PLATFORMS, PYTHON, build, build_native, kinds_here, this_platform, with_starts
 from ..files import Choice, Many, Quantity, Whole, entry, flag, read, text
-from ..mechanisms import mechanism_of
+from ..mechanisms import find_mechanism
 from ..periodic import motor_parameters, steady_drive
 from ..run import Case, cosimulate
 from ..studio import given_values, page_case, page_state, shown_unit
@@ -82,7 +82,7 @@ def _tuned(case: Case, wanted: _Tuning) -> Answer:
         no_unstable=wanted.no_unstable,
     )
     tuned = tune(wish)
-    mechanism = mechanism_of(case.parameters)
+    mechanism = find_mechanism(case.parameters)
     rows = []
     variables = {variable.name: variable for variable in mechanism.variables}
     for name, before, after in zip(wish.names, wish.present.tolist(), tuned.values.tolist()):
@@ -104,7 +104,7 @@ def _run(case: Case, wanted: _Run) -> Answer:
     """Run the native FMU, or without Zig the Python FMU, and return its outputs at the samples of the page."""
     if wanted.rows > _ROWS:
         raise InputError(f"{wanted.rows} rows are more than {_ROWS}: ask for less")
-    mechanism = mechanism_of(case.parameters)
+    mechanism = find_mechanism(case.parameters)
     with folder() as place:
         native = "native" in kinds_here()
         fmu = build_native(mechanism, NATIVE, place) if native else build(mechanism, place)
@@ -132,7 +132,7 @@ def _run(case: Case, wanted: _Run) -> Answer:
 
 def _exported(case: Case, wanted: _Export) -> Answer:
     """Build a native FMU with the values of the page as start values."""
-    mechanism = mechanism_of(case.parameters)
+    mechanism = find_mechanism(case.parameters)
     values = given_values(mechanism, page_state(case)["values"])
     motor = motor_parameters(mechanism)
     if any(values[name] != 0.0 for name, (field, _) in motor.items() if field == "breakdown_torque"):

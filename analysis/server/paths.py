@@ -13,7 +13,7 @@ from linkwork.errors import ParameterError
 
 from ..display import format_count
 from ..files import Choice, Many, Quantity, Whole, entry, flag, save_drawing, write_csv, write_tables
-from ..mechanisms import mechanism_of
+from ..mechanisms import find_mechanism
 from ..periodic import default_variable
 from ..run import Case, read_case
 from ..slider import inverse_dynamics, motion_of_plant, slider_motion
@@ -151,7 +151,7 @@ def linkages(case: Case, wanted: Linkages) -> Answer:
 
 def _state(solution: Solution, title: str) -> Answer:
     case = read_case(solution.run_case(MachineSpec(), title), folder=Path(), title=title)
-    state, speed = page_state(case), default_variable(mechanism_of(case.parameters))
+    state, speed = page_state(case), default_variable(find_mechanism(case.parameters))
     # the path does not say in which direction the crank turns; the page seeks periodic motions with positive speed
     state["values"][speed] = abs(state["values"][speed])
     return state

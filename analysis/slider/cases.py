@@ -32,7 +32,7 @@ from ..files import (
     read_tables,
     text,
 )
-from ..linear import Design, design_pid, linearise_along
+from ..linear import Design, design_pid, linearise_orbit
 from ..numerics.fourier import FourierSeries
 from ..run import parameter_tables
 from ..synthesis import (
@@ -310,7 +310,7 @@ class SliderCase:
         """Design the feedback of the tracking controller; return None if its bandwidth is zero."""
         bandwidth = 10.0 * abs(drive.crank_speed) if wanted.bandwidth is None else wanted.bandwidth
         return (
-            design_pid(linearise_along(drive.parameters, drive).mean(), bandwidth=bandwidth)
+            design_pid(linearise_orbit(drive.parameters, drive).mean(), bandwidth=bandwidth)
             if bandwidth > 0.0
             else None
         )

@@ -86,7 +86,7 @@ class SliderDrive:
 
     Notes
     -----
-    ``drive["pin.C.fx"]`` is an output over the turn, shape (n,). Peaks are taken over the samples. `linear.linearise_along`
+    ``drive["pin.C.fx"]`` is an output over the turn, shape (n,). Peaks are taken over the samples. `linear.linearise_orbit`
     takes a drive as the motion to linearise about.
     """
 

@@ -215,7 +215,7 @@ def track(
     ----------
     controller : TrackingController
         Controller with the reference; its feedback is designed by `analysis.linear` on a model in speed drive, such as the mean
-        model along the reference: ``linearise_along(parameters, inverse_dynamics(...)).mean()``.
+        model along the reference: ``linearise_orbit(parameters, inverse_dynamics(...)).mean()``.
     crank_speed : float
         Constant prescribed speed (rad/s).
     revolutions : float

@@ -120,6 +120,6 @@ def padded(columns: Mapping[str, ArrayLike]) -> dict[str, NDArray[np.float64]]:
     return {name: np.append(v, np.full(length - len(v), np.nan)) for name, v in arrays.items()}
 
 
-def curves_of(result: StudyResult, x: str, names: Mapping[str, str]) -> list[Curve]:
+def result_curves(result: StudyResult, x: str, names: Mapping[str, str]) -> list[Curve]:
     """Return columns of a result as curves over the column ``x``; ``names`` maps each column to its label."""
     return [Curve(x=result.columns[x], y=result.columns[name], label=label) for name, label in names.items()]

@@ -15,7 +15,7 @@ from typing import Any, NamedTuple, ParamSpec, TypeVar
 
 from linkwork.parameters import field_name
 
-from ..mechanisms import mechanism_of
+from ..mechanisms import find_mechanism
 from ..units import quantity
 
 P = ParamSpec("P")
@@ -50,7 +50,7 @@ def varied(changes: Mapping[str, Any]) -> Iterator[set[str]]:
 def vary(parameters: T) -> T:
     """Return the parameters of a study's mechanism with the reader's changes made."""
     changes, known = _current()
-    variables = mechanism_of(parameters).mechanism_variables
+    variables = find_mechanism(parameters).mechanism_variables
     known.update(variables)
     values = {}
     for name, value in changes:

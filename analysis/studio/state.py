@@ -13,7 +13,7 @@ from linkwork.mechanism import Mechanism
 from linkwork.parameters import field_name
 
 from ..files import unknown_name
-from ..mechanisms import FIVE_BAR, MECHANISMS, mechanism_of
+from ..mechanisms import FIVE_BAR, MECHANISMS, find_mechanism
 from ..periodic import motor_parameters
 from ..run import Case, InductionMotor, Inputs
 from .tables import NO_MOTOR, fmi_starts, given_entries, published_values
@@ -40,7 +40,7 @@ def page_state(case: Case) -> dict[str, Any]:
     InputError
         If an input varies with time: the page has only constant inputs and a motor.
     """
-    mechanism = mechanism_of(case.parameters)
+    mechanism = find_mechanism(case.parameters)
     values = fmi_starts(mechanism, case.parameters, case.initial)
     values |= {name: float(value) for name, value in case.inputs.modes(mechanism).items()}
     for channel in (channel for channel in mechanism.channels if channel.kind != "rate"):

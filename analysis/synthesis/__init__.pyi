@@ -101,10 +101,10 @@ from .task.limit_position import toggles as toggles
 from .task.limits import GEARS as GEARS
 from .task.target import Straightness as Straightness
 from .task.target import TargetPath as TargetPath
-from .task.target import area_between as area_between
-from .task.target import distance_to as distance_to
+from .task.target import area_difference as area_difference
+from .task.target import curve_distance as curve_distance
 from .task.target import hausdorff as hausdorff
-from .task.target import parts_of as parts_of
+from .task.target import straight_parts as straight_parts
 from .task.target import straightest_part as straightest_part
 from .task.target import straightness as straightness
 from .task.task import Motion as Motion

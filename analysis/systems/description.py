@@ -21,7 +21,7 @@ from ..export import NATIVE, NATIVE_FMI3, SOURCES, build_controller, build_nativ
 from ..export.controllers import CONTROLLERS, UNITS
 from ..files import Quantity, Table, entry, unknown_name
 from ..linkages import load_linkage
-from ..mechanisms import mechanism_of
+from ..mechanisms import find_mechanism
 from ..numerics.cache import code_folder
 from ..run import published_case, read_case
 from ..units import quantity
@@ -122,7 +122,7 @@ class System:
             rows = {row.name: row.unit for row in CONTROLLERS[table.controller].rows} | {"sample_time": "s"}
             return Member(name=name, values=_read_values(table.values, rows, where), controller=table.controller)
         parameters, initial, inputs = self._case(table)
-        mechanism = mechanism_of(parameters)
+        mechanism = find_mechanism(parameters)
         values = {fmi_name(key): float(value) for key, value in asdict(parameters).items()}
         values |= {f"initial.{key}": float(value) for key, value in asdict(initial).items()}
         units = {v.name: v.unit or "1" for v in mechanism.variables if v.causality in ("parameter", "input")}
@@ -143,7 +143,7 @@ class System:
             case = read_case(tables, folder=(self.folder / table.case).parent)
         else:
             case = published_case(table.case)
-        mechanism = mechanism_of(case.parameters)
+        mechanism = find_mechanism(case.parameters)
         given = {c.name: getattr(case.inputs, c.argument, None) for c in mechanism.channels if c.kind == "command"}
         return case.parameters, case.initial, {k: float(v) for k, v in given.items() if isinstance(v, int | float)}
 

@@ -12,7 +12,7 @@ from linkwork.errors import InputError, MissingParameterError, ParameterError
 
 from ..files import Many, Quantity, Table, Whole, any_value, as_table, entry, flag, override, read, read_tables, text
 from ..linkages import with_linkage
-from ..mechanisms import mechanism_of, name_in_files
+from ..mechanisms import find_mechanism, name_in_files
 from ..periodic import default_variable, parameter_unit, rest_guess, steady_drive
 from ..run import case_mechanism, read_case, with_case_file_names
 from ..units import with_unit
@@ -82,7 +82,7 @@ class TuningCase:
 
     def tuned_tables(self, tuned: Tuned, folder: str | Path) -> dict[str, Any]:
         """Return the tables of a case with the tuned values, for a file in ``folder``."""
-        mechanism = mechanism_of(self.wish.parameters)
+        mechanism = find_mechanism(self.wish.parameters)
         inputs = {channel.name: name_in_files(mechanism, channel) for channel in mechanism.channels}
         values = zip(self.wish.names, tuned.values.tolist())
         changes = {inputs.get(name, name): with_unit(value, parameter_unit(mechanism, name)) for name, value in values}

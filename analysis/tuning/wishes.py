@@ -15,7 +15,7 @@ from linkwork.mechanism import Mechanism, PublishedSet
 from linkwork.parameters import field_name
 
 from ..files import Quantity, Range, check_names, unknown_name
-from ..mechanisms import Parameters, mechanism_of
+from ..mechanisms import Parameters, find_mechanism
 from ..periodic import (
     Drive,
     Operation,
@@ -259,7 +259,7 @@ class Wish:
     @property
     def mechanism(self) -> Mechanism:
         """Mechanism of the parameters."""
-        return mechanism_of(self.parameters)
+        return find_mechanism(self.parameters)
 
     @property
     def judges_stability(self) -> bool:
@@ -345,7 +345,7 @@ def _changes(operation: Operation, over: str, given: Any) -> tuple[Change, ...]:
         changes = tuple(given)
     else:
         changes = tuple(
-            _change(operation, n, value) for n, value in _flatten_names(given, mechanism_of(operation[0])).items()
+            _change(operation, n, value) for n, value in _flatten_names(given, find_mechanism(operation[0])).items()
         )
     if not changes:
         raise InputError("nothing may be changed: name at least one parameter in change")
@@ -371,7 +371,7 @@ def _flatten_names(given: Mapping[str, Any], mechanism: Mechanism, prefix: str =
 
 def _change(operation: Operation, name: str, value: Any) -> Change:
     require_variable(*operation, name)
-    unit = parameter_unit(mechanism_of(operation[0]), name)
+    unit = parameter_unit(find_mechanism(operation[0]), name)
     now, what = parameter_value(*operation, name), f"change.{name}"
     given: Mapping[str, Any]
     if isinstance(value, Mapping):

@@ -16,8 +16,8 @@ from scipy.spatial.distance import directed_hausdorff
 
 from analysis.synthesis import (
     TargetPath,
-    area_between,
-    distance_to,
+    area_difference,
+    curve_distance,
     hausdorff,
     path_from_formula,
     straightest_part,
@@ -50,23 +50,23 @@ def closed_target(points: FloatArray) -> TargetPath:
 
 
 def test_area_between_circles() -> None:
-    assert area_between(circle(1.0), closed_target(circle(2.0))) == pytest.approx(3.0 * pi, rel=1e-4)
+    assert area_difference(circle(1.0), closed_target(circle(2.0))) == pytest.approx(3.0 * pi, rel=1e-4)
     # the lens of two unit circles a distance 1 apart
     lens = 2.0 * pi / 3.0 - 3.0**0.5 / 2.0
     moved = closed_target(circle(1.0, centre=(1.0, 0.0)))
-    assert area_between(circle(1.0), moved) == pytest.approx(2.0 * (pi - lens), rel=1e-4)
-    assert area_between(circle(1.0), moved) == pytest.approx(
-        area_between(moved.points, closed_target(circle(1.0))), rel=1e-12
+    assert area_difference(circle(1.0), moved) == pytest.approx(2.0 * (pi - lens), rel=1e-4)
+    assert area_difference(circle(1.0), moved) == pytest.approx(
+        area_difference(moved.points, closed_target(circle(1.0))), rel=1e-12
     )
     apart = closed_target(circle(1.0, centre=(5.0, 0.0)))
-    assert area_between(circle(1.0), apart) == pytest.approx(2.0 * pi, rel=1e-4)
+    assert area_difference(circle(1.0), apart) == pytest.approx(2.0 * pi, rel=1e-4)
 
 
 def test_area_between_a_curve_and_itself_is_none() -> None:
     points = circle(0.3, 72, centre=(20.0, -7.0))
-    assert area_between(points, closed_target(points)) < 1e-15
-    assert area_between(np.roll(points[::-1], 5, axis=0), closed_target(points)) < 1e-15
-    assert area_between(points[:50], open_target(*points[:50].tolist()), closed=False) < 1e-12
+    assert area_difference(points, closed_target(points)) < 1e-15
+    assert area_difference(np.roll(points[::-1], 5, axis=0), closed_target(points)) < 1e-15
+    assert area_difference(points[:50], open_target(*points[:50].tolist()), closed=False) < 1e-12
 
 
 @settings(max_examples=30, deadline=None)
@@ -77,24 +77,26 @@ def test_area_between_polygons_is_that_of_shapelys_overlay(first: list[float], s
         for r, shift in ((first, 0.0), (second, 0.1))
     )
     expected = shapely.symmetric_difference(shapely.Polygon(a), shapely.Polygon(b)).area
-    assert area_between(a, closed_target(b)) == pytest.approx(expected, rel=1e-9, abs=1e-12)
+    assert area_difference(a, closed_target(b)) == pytest.approx(expected, rel=1e-9, abs=1e-12)
 
 
 def test_area_from_a_figure_eight() -> None:
     """A circle round a figure-eight of lobe area 4/3: the even-odd rule takes both lobes out."""
     eight = path_from_formula("sin(t)", "sin(2*t)", n=2000)
-    assert area_between(circle(2.0, 2000), eight) == pytest.approx(4.0 * pi - 8.0 / 3.0, rel=1e-4)
-    assert area_between(eight.points, closed_target(circle(2.0, 2000))) == pytest.approx(4.0 * pi - 8.0 / 3.0, rel=1e-4)
+    assert area_difference(circle(2.0, 2000), eight) == pytest.approx(4.0 * pi - 8.0 / 3.0, rel=1e-4)
+    assert area_difference(eight.points, closed_target(circle(2.0, 2000))) == pytest.approx(
+        4.0 * pi - 8.0 / 3.0, rel=1e-4
+    )
 
 
 @pytest.mark.parametrize("scale", [1e-3, 1e3])
 def test_area_does_not_depend_on_place_and_scale(scale: float) -> None:
     first, second = circle(1.0), circle(1.0, centre=(0.3, 0.1)) * [1.0, 0.7]
-    area = area_between(first, closed_target(second))
-    moved = area_between(scale * (first + 1e4), closed_target(scale * (second + 1e4)))
+    area = area_difference(first, closed_target(second))
+    moved = area_difference(scale * (first + 1e4), closed_target(scale * (second + 1e4)))
     assert moved == pytest.approx(scale**2 * area, rel=1e-7)
-    swept = area_between(first[:300], open_target(*second[:300].tolist()), closed=False)
-    moved = area_between(
+    swept = area_difference(first[:300], open_target(*second[:300].tolist()), closed=False)
+    moved = area_difference(
         scale * (first[:300] + 1e4), open_target(*(scale * (second[:300] + 1e4)).tolist()), closed=False
     )
     assert moved == pytest.approx(scale**2 * swept, rel=1e-7)
@@ -102,36 +104,36 @@ def test_area_does_not_depend_on_place_and_scale(scale: float) -> None:
 
 def test_area_between_parallel_open_curves_is_that_of_the_strip() -> None:
     flat = open_target((0.0, 0.0), (2.0, 0.0))
-    assert area_between([[2.0, 0.1], [0.0, 0.1]], flat, closed=False) == pytest.approx(0.2)
+    assert area_difference([[2.0, 0.1], [0.0, 0.1]], flat, closed=False) == pytest.approx(0.2)
     inner = TargetPath(points=arc(1.0, 0.3, 2.5), closed=False)
     sector = 0.5 * 2.2 * (1.1**2 - 1.0)
-    assert area_between(arc(1.1, 0.3, 2.5), inner, closed=False) == pytest.approx(sector, rel=1e-5)
+    assert area_difference(arc(1.1, 0.3, 2.5), inner, closed=False) == pytest.approx(sector, rel=1e-5)
 
 
 def test_area_between_open_curves_is_symmetric_and_sees_missing_and_spare_length() -> None:
     flat, half = open_target((0.0, 0.0), (1.0, 0.0)), np.array([[0.0, 0.0], [0.5, 0.0]])
     # half of the integral of s ds from 0 to 1/2 that is missed
-    assert area_between(half, flat, closed=False) == pytest.approx(0.0625, rel=1e-5)
-    assert area_between(flat.points, TargetPath(points=half, closed=False), closed=False) == pytest.approx(
+    assert area_difference(half, flat, closed=False) == pytest.approx(0.0625, rel=1e-5)
+    assert area_difference(flat.points, TargetPath(points=half, closed=False), closed=False) == pytest.approx(
         0.0625, rel=1e-5
     )
     wave = path_from_formula("t", "0.2*sin(t)", n=300, end=5.0)
     other = path_from_formula("t + 0.1", "0.3*sin(t) + 0.05", n=200, end=4.5)
-    assert area_between(wave.points, other, closed=False) == pytest.approx(
-        area_between(other.points, wave, closed=False), rel=1e-12
+    assert area_difference(wave.points, other, closed=False) == pytest.approx(
+        area_difference(other.points, wave, closed=False), rel=1e-12
     )
-    assert area_between(wave.points[::-1], other, closed=False) == pytest.approx(
-        area_between(wave.points, other, closed=False), rel=1e-9
+    assert area_difference(wave.points[::-1], other, closed=False) == pytest.approx(
+        area_difference(wave.points, other, closed=False), rel=1e-9
     )
 
 
 def test_a_closed_curve_may_trace_an_open_target_on_part_of_its_way() -> None:
     target = TargetPath(points=arc(1.1, 0.0, pi), closed=False)
-    assert area_between(circle(1.0), target) == pytest.approx(0.1 * 1.1 * pi, rel=1e-4)
+    assert area_difference(circle(1.0), target) == pytest.approx(0.1 * 1.1 * pi, rel=1e-4)
     # and an open curve of a closed target: both integrals
     part = arc(1.0, 0.0, pi)
-    both = area_between(part, closed_target(circle(1.0)), closed=False)
-    missed = area_between(circle(1.0), TargetPath(points=part, closed=False))
+    both = area_difference(part, closed_target(circle(1.0)), closed=False)
+    missed = area_difference(circle(1.0), TargetPath(points=part, closed=False))
     assert missed == pytest.approx(0.0, abs=1e-4)
     # the lower half is 2 sin(phi / 2) from the nearer end, phi from 0 to pi/2 twice
     assert both == pytest.approx(0.5 * 2.0 * 4.0 * (1.0 - cos(pi / 4)), rel=1e-4)
@@ -150,8 +152,8 @@ def test_distance_is_that_to_the_nearest_segment() -> None:
         for a, b in zip(starts, ends):
             s = np.clip((points - a) @ (b - a) / ((b - a) @ (b - a)), 0.0, 1.0)
             expected = np.minimum(expected, np.linalg.norm(points - a - s[:, None] * (b - a), axis=1))
-        assert distance_to(curve, points, closed=closed) == pytest.approx(expected, abs=1e-13)
-    assert distance_to(curve, np.empty((0, 2))).shape == (0,)
+        assert curve_distance(curve, points, closed=closed) == pytest.approx(expected, abs=1e-13)
+    assert curve_distance(curve, np.empty((0, 2))).shape == (0,)
 
 
 def test_hausdorff_distance() -> None:
@@ -236,9 +238,9 @@ def test_bad_curves_are_refused(call: str) -> None:
     target = closed_target(circle(1.0))
     with pytest.raises(InputError, match="index 1"):
         {
-            "area": lambda: area_between(bad, target),
+            "area": lambda: area_difference(bad, target),
             "hausdorff": lambda: hausdorff(bad, target),
-            "distance": lambda: distance_to(target.points, bad),
+            "distance": lambda: curve_distance(target.points, bad),
             "straightness": lambda: straightness(bad),
             "straightest": lambda: straightest_part(bad, 2),
         }[call]()
@@ -246,9 +248,9 @@ def test_bad_curves_are_refused(call: str) -> None:
 
 def test_bad_requests_are_refused() -> None:
     with pytest.raises(InputError, match="2 points: it needs at least 3"):
-        area_between([[0.0, 0.0], [1.0, 1.0]], closed_target(circle(1.0)))
+        area_difference([[0.0, 0.0], [1.0, 1.0]], closed_target(circle(1.0)))
     with pytest.raises(InputError, match="shape"):
-        distance_to(circle(1.0), [0.0, 1.0])
+        curve_distance(circle(1.0), [0.0, 1.0])
     with pytest.raises(InputError, match="the same one"):
         straightness([[1.0, 2.0]] * 3)
     with pytest.raises(InputError, match="direction is nan"):

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from analysis import simulate
-from analysis.mechanisms import FIVE_BAR, PUBLISHED, mechanism_of
+from analysis.mechanisms import FIVE_BAR, PUBLISHED, find_mechanism
 from analysis.run import (
     Harmonics,
     Piecewise,
@@ -44,7 +44,7 @@ def test_a_saved_mechanism_comes_back_digit_for_digit(tmp_path, ending, paramete
 def test_every_parameter_has_its_place_in_a_file(parameters):
     data = parameter_tables(parameters)
     named = data.pop("mechanism", "five-bar")
-    assert named == mechanism_of(parameters).name
+    assert named == find_mechanism(parameters).name
     assert sum(len(v) if isinstance(v, dict) else 1 for v in data.values()) == len(fields(parameters))
     assert json.loads(json.dumps(data)) == data
 

@@ -18,7 +18,7 @@ import analysis.synthesis as syn
 from analysis.export import NATIVE, NATIVE_FMI3, build, build_native
 from analysis.linkages import Package, dead_centres, linkage, load_linkage, load_package, reach, read_description
 from analysis.linkages.structure import Pin
-from analysis.mechanisms import mechanism_of
+from analysis.mechanisms import find_mechanism
 from analysis.numerics.fourier import FourierSeries
 from analysis.periodic import Drive, frequency_response, newton_orbit
 from analysis.periodic.motion.discretisation import operating_point
@@ -525,7 +525,7 @@ def test_a_geared_five_bar_that_was_found_becomes_an_fmu_and_a_page(browser, tmp
     )  # fmt: skip
     tables = {"linkage": description(found, syn.MachineSpec(speed=20.0)), "run": {"revolutions": 1.0}}
     case = read_case(tables, folder=FOLDER)
-    file = build_native(mechanism_of(case.parameters), NATIVE, tmp_path)
+    file = build_native(find_mechanism(case.parameters), NATIVE, tmp_path)
     fmu = cosimulate(
         file, case.parameters, case.inputs, initial=case.initial, stop_time=0.3, step=0.01, tolerance=1e-11
     )

@@ -25,7 +25,7 @@ from analysis.linear import (
     find_equilibrium,
     linear_outputs,
     linearise,
-    linearise_along,
+    linearise_orbit,
     settled_motion,
 )
 from analysis.mechanisms import FIVE_BAR
@@ -343,13 +343,13 @@ def test_crank_motion_acts_on_the_slider_by_its_three_inputs() -> None:
 
 @pytest.fixture(scope="module")
 def turning():
-    return linearise_along(TABLE_3_1, settled_motion(TABLE_3_1, TURNING), TURNING)
+    return linearise_orbit(TABLE_3_1, settled_motion(TABLE_3_1, TURNING), TURNING)
 
 
 def test_monodromy_is_that_of_the_variational_equations(turning) -> None:
     orbit = find_orbit(TABLE_3_1, speed=SPEED)
     assert turning.monodromy() == pytest.approx(orbit.monodromy, rel=1e-7)
-    along = linearise_along(TABLE_3_1, orbit)
+    along = linearise_orbit(TABLE_3_1, orbit)
     assert along.monodromy() == pytest.approx(orbit.monodromy, rel=1e-7)
     assert along.period == pytest.approx(turning.period, rel=1e-12)
     assert along.states[:, :4] == pytest.approx(turning.states[:, :4], abs=1e-7)
@@ -359,7 +359,7 @@ def test_multipliers_of_a_motor_drive() -> None:
     """The crank's speed varies: equal angles are no equal times, and the motor's slope is a feedback of the speed."""
     motor = InductionMotor(breakdown_torque=6.0, breakdown_slip=0.2, synchronous_speed=40.0)
     orbit = find_orbit(TABLE_3_1, torque=motor)
-    along = linearise_along(TABLE_3_1, orbit, samples=256)
+    along = linearise_orbit(TABLE_3_1, orbit, samples=256)
     assert np.ptp(along.states[:, 2]) > 1.0
 
     def torque(w2: complex) -> complex:
@@ -423,22 +423,22 @@ def test_bad_states_are_reported() -> None:
         linearise(TABLE_3_1, (0.0, 0.0, 0.0, 0.0), Inputs(axial_force=1.0))
     with pytest.raises(AssemblyError):
         linearise(TABLE_3_1, (0.0, 1.0, 0.0, 0.0))
-    with pytest.raises(InputError, match="linearise_along"):
+    with pytest.raises(InputError, match="linearise_orbit"):
         linearise(TABLE_3_1, np.zeros((2, 4)))
 
 
 def test_bad_motions_are_reported(turning) -> None:
     states = turning.states
     with pytest.raises(InputError, match=f"at least {LEAST_SAMPLES}"):
-        linearise_along(TABLE_3_1, states[:5], TURNING)
+        linearise_orbit(TABLE_3_1, states[:5], TURNING)
     with pytest.raises(InputError, match="evenly spaced"):
-        linearise_along(TABLE_3_1, np.vstack([states, states[:1]]), TURNING)
+        linearise_orbit(TABLE_3_1, np.vstack([states, states[:1]]), TURNING)
     with pytest.raises(InputError, match="evenly spaced"):
-        linearise_along(TABLE_3_1, states, TURNING, period=2.0 * turning.period)
+        linearise_orbit(TABLE_3_1, states, TURNING, period=2.0 * turning.period)
     with pytest.raises(InputError, match="period must be given"):
-        linearise_along(TABLE_3_1, states)
+        linearise_orbit(TABLE_3_1, states)
     with pytest.raises(InputError, match=r"period is -1\.0 s"):
-        linearise_along(TABLE_3_1, states, TURNING, period=-1.0)
+        linearise_orbit(TABLE_3_1, states, TURNING, period=-1.0)
     with pytest.raises(InputError, match="speed is 0"):
         settled_motion(TABLE_3_1, Inputs(speed=0.0))
     with pytest.raises(InputError, match="constant"):

@@ -30,7 +30,7 @@ from analysis.linear import (
     find_equilibrium,
     largest_difference,
     linearise,
-    linearise_along,
+    linearise_orbit,
     predict_loop,
     settled_motion,
 )
@@ -231,7 +231,7 @@ def test_torque_balances_the_pendulum_upside_down() -> None:
 def test_cart_is_held_in_process_and_through_the_fmu(fmus: dict[str, Path]) -> None:
     """The rotor shakes it: far less with control than without."""
     published, turning = demo(ROTOR), Inputs(speed=20.0)
-    models = linearise_along(published.parameters, settled_motion(published.parameters, turning), turning)
+    models = linearise_orbit(published.parameters, settled_motion(published.parameters, turning), turning)
     controller = SampledController(design_pid(models.mean(), bandwidth=300.0), 1e-3)
     options: dict[str, Any] = {"initial": published.initial, "stop_time": 0.5}
     loop = control_loop(published.parameters, controller, 0.0, turning, **options)
@@ -243,11 +243,11 @@ def test_cart_is_held_in_process_and_through_the_fmu(fmus: dict[str, Path]) -> N
 
 def test_cart_about_its_shaken_motion_is_time_invariant() -> None:
     published, turning = demo(ROTOR), Inputs(speed=20.0)
-    models = linearise_along(published.parameters, settled_motion(published.parameters, turning), turning)
+    models = linearise_orbit(published.parameters, settled_motion(published.parameters, turning), turning)
     assert models.period == pytest.approx(pi / 10.0)
     np.testing.assert_allclose(models.monodromy(), expm(models.mean().A * models.period), atol=1e-8)
     wrong = {"speed": 20.0, "force": 5.0}
-    assert linearise_along(published.parameters, models.states, Inputs(**wrong)).mean().inputs == Inputs(**wrong)
+    assert linearise_orbit(published.parameters, models.states, Inputs(**wrong)).mean().inputs == Inputs(**wrong)
 
 
 #: The slider-crank of the FMU with a spring and a damper along the crank's axis.

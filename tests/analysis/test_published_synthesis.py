@@ -170,10 +170,10 @@ def test_the_printed_packaging_machine() -> None:
     part = syn.straightest_part(curve, 25, direction=0.0, least_travel=PACKAGING_TRAVEL)
     assert 100.0 * part.travel == pytest.approx(travel, abs=0.05)
     assert 100.0 * part.flatness == pytest.approx(flatness, abs=5e-3)
-    assert 1e4 * syn.area_between(curve, packaging_path()) == pytest.approx(area, abs=0.5)
+    assert 1e4 * syn.area_difference(curve, packaging_path()) == pytest.approx(area, abs=0.5)
     # the points that the task has in place of two of the ten leave the polygon what it is
     assert isinstance(p.task, syn.UntimedPath)
-    assert syn.area_between(packaging_path().points, p.task.path) == pytest.approx(0.0, abs=1e-12)
+    assert syn.area_difference(packaging_path().points, p.task.path) == pytest.approx(0.0, abs=1e-12)
     assert degrees(p.linkage.least_transmission) == pytest.approx(transmission, abs=0.05)
     assert p.linkage.pivot_y < PACKAGING_OFFSET_CM[1] / 100.0
 

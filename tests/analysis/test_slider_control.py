@@ -24,7 +24,7 @@ from analysis.linear import (
     find_equilibrium,
     largest_difference,
     linearise,
-    linearise_along,
+    linearise_orbit,
     predict_loop,
     settled_motion,
 )
@@ -312,7 +312,7 @@ def resonant():
     speed = 585.0 * RAD_S_PER_RPM
     p = SETS["rig-2-spring-c"].parameters
     turning = Inputs(speed=speed)
-    return p, turning, linearise_along(p, settled_motion(p, turning), turning)
+    return p, turning, linearise_orbit(p, settled_motion(p, turning), turning)
 
 
 def test_the_slider_is_kept_still_at_resonance(resonant) -> None:

@@ -17,7 +17,7 @@ import numpy as np
 import pytest
 from click.testing import Result
 
-from analysis.mechanisms import MECHANISMS, PUBLISHED, MechanismError, check, mechanism_of, register
+from analysis.mechanisms import MECHANISMS, PUBLISHED, MechanismError, check, find_mechanism, register
 from analysis.periodic import Drive, newton_orbit
 from analysis.run import Case, Inputs, read_case, simulate
 from analysis.studio import PAGE, is_current, make_page, opening_state, page_state
@@ -201,7 +201,7 @@ def _random_slider_crank(seed: int) -> Case:
 @pytest.mark.parametrize("random", [_random_five_bar, _random_slider_crank])
 def test_every_number_of_a_run_is_pythons(page: Page, random: Callable[[int], Case], seed: int) -> None:
     case = random(seed)
-    mechanism = mechanism_of(case.parameters)
+    mechanism = find_mechanism(case.parameters)
     found = _load(page, page_state(case) | {"source": "run"})
     columns, count = found["columns"], found["rows"]["count"]
     wanted = simulate(case.parameters, case.inputs, initial=case.initial, stop_time=0.02, **_HELD)
@@ -238,7 +238,7 @@ def _varied(seed: int) -> tuple[Any, Drive]:
 @pytest.mark.parametrize("seed", range(4))
 def test_the_periodic_motion_and_its_multipliers_are_pythons(page: Page, seed: int) -> None:
     parameters, drive = _varied(seed)
-    mechanism = mechanism_of(parameters)
+    mechanism = find_mechanism(parameters)
     case = Case(title="", parameters=parameters, inputs=drive.inputs(mechanism), stop_time=1.0)
     found = _load(page, page_state(case))
     orbit = newton_orbit(parameters, drive)
@@ -369,7 +369,7 @@ def _saved(page: Page, form: str) -> Path:
 def test_a_case_that_is_saved_is_the_case(page: Page, case: Case) -> None:
     _load(page, page_state(case) | {"source": "run"})
     read = read_case(tomllib.loads(_saved(page, "case").read_text(encoding="utf-8")), folder=Path())
-    mechanism = mechanism_of(case.parameters)
+    mechanism = find_mechanism(case.parameters)
     assert read.parameters == case.parameters
     assert read.inputs.modes(mechanism) == case.inputs.modes(mechanism)
     wanted, found = page_state(case), page_state(read)

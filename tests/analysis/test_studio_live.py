@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from analysis.mechanisms import PUBLISHED, mechanism_of
+from analysis.mechanisms import PUBLISHED, find_mechanism
 from analysis.periodic import Drive, frequency_response, natural_frequency, newton_orbit, steady_drive
 from analysis.run import Case, InductionMotor, Inputs, read_case, simulate
 from analysis.studio import PAGE, page_case, page_state
@@ -32,7 +32,7 @@ def page(browser: Any) -> Iterator[Any]:
 
 
 def _state(speed: float) -> dict[str, Any]:
-    mechanism = mechanism_of(RIG.parameters)
+    mechanism = find_mechanism(RIG.parameters)
     inputs = Drive(speed=speed * RPM).inputs(mechanism)
     return page_state(Case(title="", parameters=RIG.parameters, inputs=inputs, stop_time=1.0))
 
@@ -105,7 +105,7 @@ def test_the_ranges_to_avoid_are_pythons(
     """The page's own search for ranges is the twin of `analysis.periodic.response.advice`, for motions of one turn."""
     known = PUBLISHED[name]
     parameters = replace(known.parameters, **change)
-    inputs = Drive(speed=0.5 * (low + high) * RPM).inputs(mechanism_of(parameters))
+    inputs = Drive(speed=0.5 * (low + high) * RPM).inputs(find_mechanism(parameters))
     _load(page, page_state(Case(title="", parameters=parameters, inputs=inputs, stop_time=1.0)))
     _explored(page, "response", {"What varies": (low, high)})
     found = page.evaluate("window.studio.charts.response.avoided")
@@ -148,7 +148,7 @@ def test_every_square_of_the_stability_chart_has_the_verdict_of_its_motion(page:
 @in_browser
 def test_a_motor_drives_the_crank_as_in_python(page: Any) -> None:
     parameters, _ = _varied(2)
-    mechanism = mechanism_of(parameters)
+    mechanism = find_mechanism(parameters)
     inputs = Inputs(torque=(0.2, MOTOR), force=3.0)
     case = Case(title="motor", parameters=parameters, inputs=inputs, stop_time=0.02)
     run = _load(page, page_state(case) | {"source": "run"})
@@ -185,7 +185,7 @@ def test_a_motor_drives_the_crank_as_in_python(page: Any) -> None:
 @in_browser
 def test_powers_are_those_of_the_equations_and_the_envelope_has_the_greatest_force(page: Any) -> None:
     parameters, drive = _varied(1)
-    mechanism = mechanism_of(parameters)
+    mechanism = find_mechanism(parameters)
     found = _load(
         page, page_state(Case(title="", parameters=parameters, inputs=drive.inputs(mechanism), stop_time=1.0))
     )

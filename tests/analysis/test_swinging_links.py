@@ -14,7 +14,7 @@ import pytest
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
-from analysis.linear import find_equilibria, find_equilibrium, linearise_along
+from analysis.linear import find_equilibria, find_equilibrium, linearise_orbit
 from analysis.linkages import linkage, load_linkage
 from analysis.mechanisms import PUBLISHED
 from analysis.periodic import (
@@ -313,7 +313,7 @@ def test_a_pendulum_that_goes_round_with_the_crank_is_found() -> None:
         assert orbit.amplitude == pytest.approx(0.5 * np.ptp(away), rel=1e-3)
         # the angle of the body jumps by a whole turn, where that of the pin goes on
         assert turn.harmonic("pendulum.angle", 1) == pytest.approx(turn.harmonic("swing.angle", 1), rel=1e-9)
-        along = linearise_along(parameters, orbit).monodromy()
+        along = linearise_orbit(parameters, orbit).monodromy()
         np.testing.assert_allclose(along, orbit.monodromy, rtol=1e-6)
 
 

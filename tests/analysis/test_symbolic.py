@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from analysis.mechanisms import FIVE_BAR, mechanism_of
+from analysis.mechanisms import FIVE_BAR, find_mechanism
 from analysis.numerics.symbolic import ELEMENTARY
 from analysis.numerics.tracing import rebind_functions
 from analysis.run import symbolic_equations
@@ -40,7 +40,7 @@ COMPLEX = {
 def test_derivatives_are_exact(kind: Any, seed: int) -> None:
     """Against a complex step of 1e-30, which subtracts nothing: the same functions by another differentiation."""
     case = kind.seeded(seed)
-    mechanism, p = mechanism_of(case.parameters), case.parameters.constants()
+    mechanism, p = find_mechanism(case.parameters), case.parameters.constants()
     x = np.array(case.state, float)
     u = np.random.default_rng(seed).normal(size=len(mechanism.channels))
     flags = (0.0,) * len(mechanism.modes)

@@ -181,7 +181,7 @@ def best_circle(path: syn.TargetPath) -> float:
     centres = (path.centroid, 0.5 * (path.points.min(axis=0) + path.points.max(axis=0)))
     size = float(np.hypot(*np.ptp(path.points, axis=0)))
     return min(
-        syn.area_between(circle(radius, centre).path(syn.turn(360)), path)
+        syn.area_difference(circle(radius, centre).path(syn.turn(360)), path)
         for centre in centres
         for radius in np.linspace(0.1, 0.7, 61) * size
     )
@@ -192,7 +192,7 @@ def test_a_square_is_traced_better_than_by_a_circle() -> None:
     path = syn.TargetPath(points=SQUARE, closed=True)
     best = traced("square")
     assert best.error < 0.1575 < best_circle(path)
-    assert best.error == pytest.approx(syn.area_between(best.curve(), path), rel=1e-9)
+    assert best.error == pytest.approx(syn.area_difference(best.curve(), path), rel=1e-9)
     assert best.verdicts.sound
     assert best.linkage.least_transmission >= np.radians(40.0) - 1e-6
 
@@ -201,7 +201,7 @@ def test_a_square_is_traced_better_than_by_a_circle() -> None:
 @pytest.mark.parametrize("name", POLYGONS)
 def test_a_polygon_is_traced_no_worse_than_by_a_circle_or_the_distance(name: str) -> None:
     path = syn.TargetPath(points=POLYGONS[name], closed=True)
-    by_distance = syn.area_between(traced(name, "distance").curve(), path)
+    by_distance = syn.area_difference(traced(name, "distance").curve(), path)
     assert traced(name).error <= min(best_circle(path), by_distance) * (1.0 + 1e-9)
 
 
@@ -209,7 +209,7 @@ def test_a_polygon_is_traced_no_worse_than_by_a_circle_or_the_distance(name: str
 def test_an_open_corner_is_no_worse_by_area_than_by_distance() -> None:
     path = syn.TargetPath(points=np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 0.8]]), closed=False)
     found = {m: syn.synthesize(syn.UntimedPath(path=path, measure=m), search=QUICK).best for m in get_args(Measure)}
-    assert found["area"].error <= syn.area_between(found["distance"].curve(), path, closed=False)
+    assert found["area"].error <= syn.area_difference(found["distance"].curve(), path, closed=False)
 
 
 # What is given comes back

@@ -127,10 +127,10 @@ class TestShapes:
         solution = best(task)
         assert solution.error < 0.05
         # nearer to what was meant than what was drawn is
-        from analysis.synthesis import area_between
+        from analysis.synthesis import area_difference
 
         meant = syn.TargetPath(points=clean, closed=True)
-        assert area_between(solution.curve(), meant) < 1.5 * area_between(noisy, meant)
+        assert area_difference(solution.curve(), meant) < 1.5 * area_difference(noisy, meant)
 
 
 def transformed(points: FloatArray, scale: float, turned: float, moved: complex) -> FloatArray:

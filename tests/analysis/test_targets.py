@@ -13,7 +13,7 @@ from scipy.integrate import quad
 from scipy.special import ellipe
 
 from analysis.files import read_points, write_csv
-from analysis.synthesis import TargetPath, distance_to, function_from_formula, path_from_formula
+from analysis.synthesis import TargetPath, curve_distance, function_from_formula, path_from_formula
 from analysis.synthesis.task.formula import formula
 from analysis.synthesis.task.target import even_odd_area
 from linkwork.errors import InputError, ParameterError, UnknownNameError
@@ -104,7 +104,7 @@ def test_normal_displacement_changes_the_area_by_length() -> None:
 def test_resampled_points_are_equally_far_along_the_polyline(path: TargetPath) -> None:
     again = path.resample(840)
     assert again.points[0] == pytest.approx(path.points[0])
-    assert distance_to(path.points, again.points, closed=path.closed) == pytest.approx(np.zeros(840), abs=1e-12)
+    assert curve_distance(path.points, again.points, closed=path.closed) == pytest.approx(np.zeros(840), abs=1e-12)
     steps = np.hypot(*np.diff(again.points, axis=0).T)
     step = path.length / (840 if path.closed else 839)
     # equal along the way; across a corner the chord is shorter
@@ -216,7 +216,7 @@ def test_smoothing_takes_most_of_the_noise_away(true: TargetPath) -> None:
     smooth = noisy(true, sd).smooth(200)
     assert smooth.closed == true.closed
     assert len(smooth.points) == 200
-    rms = float(np.sqrt(np.mean(distance_to(true.points, smooth.points, closed=true.closed) ** 2)))
+    rms = float(np.sqrt(np.mean(curve_distance(true.points, smooth.points, closed=true.closed) ** 2)))
     assert rms < 0.5 * sd
     assert smooth.length == pytest.approx(true.length, rel=0.02)
 
@@ -224,7 +224,7 @@ def test_smoothing_takes_most_of_the_noise_away(true: TargetPath) -> None:
 def test_smoothing_leaves_a_curve_without_noise() -> None:
     for true in (ellipse(0.3, 0.15, 60), OPEN):
         smooth = true.smooth(300)
-        assert distance_to(true.points, smooth.points, closed=true.closed).max() < 3e-4 * true.length
+        assert curve_distance(true.points, smooth.points, closed=true.closed).max() < 3e-4 * true.length
 
 
 @pytest.mark.parametrize("path", [ellipse(0.3, 0.15, 9), OPEN.resample(7)], ids=["closed", "open"])
@@ -236,7 +236,7 @@ def test_without_deviation_smoothing_is_the_interpolating_spline(path: TargetPat
     spline = CubicSpline(u, points, bc_type="periodic" if path.closed else "natural")
     exact = spline(np.linspace(0.0, u[-1], 500))
     smooth = path.smooth(3000, deviation=1e-9)
-    assert distance_to(smooth.points, exact, closed=path.closed).max() < 1e-6
+    assert curve_distance(smooth.points, exact, closed=path.closed).max() < 1e-6
 
 
 def test_smoothing_to_a_known_deviation() -> None:
@@ -484,7 +484,7 @@ def test_named_curves_of_svg(tmp_path: Path) -> None:
     assert not closed
     s = np.linspace(0.0, 1.0, 500)
     exact = np.column_stack([30.0 * s, -30.0 * s * (1 - s) * (1 - 2 * s)])
-    assert distance_to(wave, exact, closed=False).max() < 30.0 * 1e-4
+    assert curve_distance(wave, exact, closed=False).max() < 30.0 * 1e-4
     assert len(wave) < 200
     with pytest.raises(UnknownNameError, match="did you mean wave"):
         read_points(path, name="waves")

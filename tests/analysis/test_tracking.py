@@ -16,7 +16,7 @@ from analysis.linear import (
     design_pid,
     find_equilibrium,
     linearise,
-    linearise_along,
+    linearise_orbit,
 )
 from analysis.numerics.fourier import FourierSeries
 from analysis.slider import TrackingController, inverse_dynamics, track
@@ -42,7 +42,7 @@ def load(th2: float) -> tuple[float, float]:
 @pytest.fixture(scope="module")
 def model():
     """The mean linear model along the reference."""
-    return linearise_along(RIG, inverse_dynamics(RIG, MOTION, SPEED)).mean()
+    return linearise_orbit(RIG, inverse_dynamics(RIG, MOTION, SPEED)).mean()
 
 
 @pytest.fixture(scope="module")

@@ -32,7 +32,7 @@ from analysis import (
 )
 from analysis.cli.vibration import _report_verdict
 from analysis.export import NATIVE, NATIVE_FMI3, build, build_native
-from analysis.linear import find_equilibrium, linearise, linearise_along, settled_motion
+from analysis.linear import find_equilibrium, linearise, linearise_orbit, settled_motion
 from analysis.mechanisms import MECHANISMS, register
 from analysis.periodic import (
     Drive,
@@ -141,7 +141,7 @@ def test_linear_models_along_a_motion_go_through_the_common_period_of_both_crank
         newton_orbit(P, _drive(speed, ratio)),
         newton_orbit(P, Drive(speed=30.0, crank="right.speed", ratios={"left.angle": 1 / ratio})),
     ):
-        model = linearise_along(P, orbit, samples=64)
+        model = linearise_orbit(P, orbit, samples=64)
         assert model.period == pytest.approx(period)
         np.testing.assert_allclose(model.states[:, place], wanted, atol=1e-8 * np.abs(wanted).max())
         angles = model.states[:, :2] - model.states[0, :2]

@@ -13,7 +13,7 @@ import pytest
 from fmpy import extract, simulate_fmu
 
 from analysis import CosimulationError, Function, Harmonics, InductionMotor, Inputs, cosimulate, simulate
-from analysis.mechanisms import mechanism_of
+from analysis.mechanisms import find_mechanism
 from analysis.run import CASES
 from linkwork.errors import InputError
 from linkwork.five_bar.published import SETS, TABLE_3_1
@@ -136,7 +136,7 @@ def test_random_mechanisms(fmu: str, fmus: dict[str, Path], natives: dict[str, P
 
 @pytest.mark.parametrize("fmu", ["FiveBarSlider", "SliderCrank"])
 def test_standard_cases(fmu: str, fmus: dict[str, Path], natives: dict[str, Path]) -> None:
-    names = [name for name, case in CASES.items() if mechanism_of(case.parameters).fmu == fmu]
+    names = [name for name, case in CASES.items() if find_mechanism(case.parameters).fmu == fmu]
     files = files_of(fmu, fmus, natives)
     found = run_in_process(run_cases, ROOT, {kind: str(path) for kind, path in files.items()}, names, timeout=120.0)
     assert len(found) == 5 * len(names)

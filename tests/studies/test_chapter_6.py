@@ -15,7 +15,7 @@ from analysis.studies.youssef.chapter_6 import best, half_units, pairing_area, r
 from analysis.studies.youssef.packaging import TRAVEL_CM, nineteen_points, straightest
 from analysis.studies.youssef.problems import PROBLEMS, packaging_path
 from analysis.studies.youssef.quality import arguments, both, linkages
-from analysis.synthesis import Linkage, distance_to, evaluate, turn
+from analysis.synthesis import Linkage, curve_distance, evaluate, turn
 from tests import published
 
 from .results import check, every
@@ -76,7 +76,7 @@ class TestPairingArea:
 def test_nineteen_points_on_the_desired_path() -> None:
     points = nineteen_points()
     assert len(points) == 19
-    assert distance_to(packaging_path().points, points).max() < 1e-12
+    assert curve_distance(packaging_path().points, points).max() < 1e-12
 
 
 def test_the_straightest_travel_of_the_printed_packaging_machine() -> None:
@@ -109,7 +109,7 @@ def test_no_other_digit_in_a_single_place_gives_the_stated_error(name: str) -> N
             values = [float(x) for x in printed]
             values[k] = float(number[:place] + digit + number[place + 1 :])
             if values[k]:
-                found = p.error_of(Linkage.from_vector(np.array(values) * unit, 1))
+                found = p.linkage_error(Linkage.from_vector(np.array(values) * unit, 1))
                 assert abs(found - p.error) > tolerance, (k, values[k], found)
 
 
@@ -152,7 +152,7 @@ class TestSearch:
 
     def test_its_rocker_error_is_that_of_the_package(self) -> None:
         p = PROBLEMS["rocker"]
-        assert search.rocker_error(self.vector(p.linkage)) == pytest.approx(p.error_of(p.linkage), rel=1e-9)
+        assert search.rocker_error(self.vector(p.linkage)) == pytest.approx(p.linkage_error(p.linkage), rel=1e-9)
 
     def test_sets_are_within_their_bounds_and_close(self) -> None:
         sets = search.starting_sets(np.random.default_rng(1), [])

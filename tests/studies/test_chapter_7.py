@@ -17,7 +17,7 @@ from analysis.studies.youssef.series_2 import (
     PATH,
     PATH_SEARCHES,
     ROCKER,
-    error_of,
+    linkage_error,
     mended,
     out_of_reach,
     over_rounding,
@@ -125,7 +125,7 @@ class TestGoals:
     """What is to be reached with the printed links kept."""
 
     def test_the_angle_with_two_harmonics(self) -> None:
-        error = error_of(ROCKER, rocker_motion(2).linkage)
+        error = linkage_error(ROCKER, rocker_motion(2).linkage)
         assert error <= ROCKER_GOAL[2]
         assert weighted_error(rocker_motion(2).linkage) == pytest.approx(error, rel=1e-9)
 
@@ -143,7 +143,7 @@ class TestGoals:
 
     @pytest.mark.parametrize("harmonics", PATH_GOAL)
     def test_the_path(self, harmonics: int) -> None:
-        error = error_of(PATH, path_motion(harmonics).linkage)
+        error = linkage_error(PATH, path_motion(harmonics).linkage)
         assert error <= PATH_GOAL[harmonics]
         # the study's curve is a 360-gon, this one a 720-gon
         assert area(path_motion(harmonics).linkage) == pytest.approx(error, abs=0.03)
@@ -191,7 +191,7 @@ class TestPrintedSeries:
     def test_no_reading_of_the_rockers_comes_near_to_its_error(self) -> None:
         best = readings(ROCKER)[0]
         least, greatest = over_rounding(ROCKER, best)
-        assert 8.0 * 4.8 < least < error_of(ROCKER, best) < greatest
+        assert 8.0 * 4.8 < least < linkage_error(ROCKER, best) < greatest
 
 
 class TestSeries1:

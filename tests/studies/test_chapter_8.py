@@ -132,7 +132,7 @@ class TestRig1:
     def test_rise_over_the_next_minimum(self) -> None:
         """With spring B: 0.4189 cm at 378 rpm and 0.2890 at 426, read off runs from rest."""
         top, low = (steady_turn(rigs.rig("B"), speed).amplitude for speed in (378.1, 426.2))
-        assert rigs.rise_at("B", 3) == pytest.approx(top / low - 1.0, rel=1e-3)
+        assert rigs.peak_rise("B", 3) == pytest.approx(top / low - 1.0, rel=1e-3)
 
     def test_motions_of_spring_a_do_not_depend_on_the_history(self) -> None:
         up, down = (rig_1.swept("A", rising).amplitude for rising in (True, False))
@@ -212,7 +212,7 @@ class TestFriction:
         sizes = [rigs.over_speed(spring, c).max() for c in rig_1.COEFFICIENTS]
         assert (np.diff(sizes) < 0.0).all()
         rises = [rigs.rise(spring, c, 3) for c in rig_1.COEFFICIENTS]
-        assert rises[0] == pytest.approx(rigs.rise_at(spring, 3), abs=1e-2)
+        assert rises[0] == pytest.approx(rigs.peak_rise(spring, 3), abs=1e-2)
         assert (np.diff(rises) <= 0.0).all()
         assert rises[-1] < rigs.NOTICED < rises[0]
 
@@ -316,7 +316,7 @@ class TestRig2:
 
 
 def test_the_parts_of_a_branch_meet() -> None:
-    columns = rigs.columns_of(rigs.resonant_b().branches[0], "x")
+    columns = rigs.branch_columns(rigs.resonant_b().branches[0], "x")
     stable, unstable = (np.isfinite(columns[f"{part}; x [cm]"]) for part in ("stable", "unstable"))
     assert (stable | unstable).all()
     assert (stable & unstable).sum() == 1

@@ -20,7 +20,7 @@ from linkwork.mechanism import Mechanism
 
 from ...display import NotebookResult, format_count, format_range
 from ...files import Whole, write_csv
-from ...mechanisms import Parameters, mechanism_of
+from ...mechanisms import Parameters, find_mechanism
 from ...numerics.boundaries import Box, chart
 from ...numerics.continuation import ContinuationError, End, Reason
 from ...run import show_progress, takes_published
@@ -276,7 +276,7 @@ def stability_chart(
     >>> float(chart.grid.largest.max()) < 1.0, chart.boundaries
     (True, ())
     """
-    mechanism = mechanism_of(parameters)
+    mechanism = find_mechanism(parameters)
     drive = require_drive(drive)
     names = names or (default_variable(mechanism, drive), damping_name(mechanism))
     for what, given in (("names", names), ("ranges", ranges)):
@@ -570,7 +570,7 @@ def default_range(parameters: Parameters, drive: Drive, name: str) -> tuple[floa
         If the present value is not above zero, or the parameter cannot vary in this drive.
     """
     require_variable(parameters, drive, name)
-    if name in speed_names(mechanism_of(parameters)):
+    if name in speed_names(find_mechanism(parameters)):
         try:
             natural = natural_frequency(parameters)
         except ParameterError:

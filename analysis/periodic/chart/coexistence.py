@@ -15,7 +15,7 @@ from linkwork.errors import InputError
 
 from ...display import NotebookResult, format_count, format_turns
 from ...files import Whole, write_csv
-from ...mechanisms import Parameters, mechanism_of
+from ...mechanisms import Parameters, find_mechanism
 from ...run import takes_published
 from ...units import Amount, pair
 from ..motion.discretisation import OperatingPoint, operating_point
@@ -316,7 +316,7 @@ def basins(
         found = search_orbits(parameters, drive, turns=range(1, turns + 1), start=start)
     motions = found.stable
     if not motions:
-        of, also = describe_turns(drive.flow(mechanism_of(parameters)), turns), unsought_hint(parameters, drive)
+        of, also = describe_turns(drive.flow(find_mechanism(parameters)), turns), unsought_hint(parameters, drive)
         raise InputError(f"there is no stable motion of {of} here: no start ends in one{also}")
     first = motions[0].start
     low, high = (side[0] for side in assembly_ranges(parameters, drive, first))

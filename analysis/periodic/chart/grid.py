@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 from linkwork.errors import InputError, Interrupted
 
 from ...files import load_array, save_array
-from ...mechanisms import Parameters, mechanism_of
+from ...mechanisms import Parameters, find_mechanism
 from ...numerics.cache import cache_root
 from ...numerics.codegen import fingerprint
 from ...numerics.workers import check_jobs, record_interrupts, run_in_parallel
@@ -241,7 +241,7 @@ def grid_points(
     Raises InputError if an axis is empty or not finite, ParameterError if a text on an axis is no quantity.
     """
     if isinstance(operation, NamedPlane):
-        mechanism = mechanism_of(operation.parameters)
+        mechanism = find_mechanism(operation.parameters)
         x, y = (si(axis, parameter_unit(mechanism, name), name) for axis, name in ((x, operation.x), (y, operation.y)))
     xs, ys = _axis("x", x), _axis("y", y)
     first = operating_point(*operation(float(xs[0]), float(ys[0])))

@@ -29,7 +29,7 @@ from linkwork.errors import AssemblyError, InputError, LinkworkError
 from linkwork.mechanism import Mechanism
 from linkwork.parameters import field_name
 
-from ...mechanisms import MECHANISMS, Parameters, mechanism_of
+from ...mechanisms import MECHANISMS, Parameters, find_mechanism
 from ...run import repeats, takes_published
 from . import collocation, kernels
 from .drive import Direction, Drive, flow_scales, is_smooth, require_drive
@@ -211,7 +211,7 @@ def operating_point(parameters: Parameters, drive: Drive) -> OperatingPoint:
     is another.
     """
     require_drive(drive)
-    mechanism = mechanism_of(parameters)
+    mechanism = find_mechanism(parameters)
     constants = np.array(parameters.constants())
     point = OperatingPoint(parameters, drive, mechanism, drive.flow(mechanism), drive.vector(mechanism), constants)
     known, names = mechanism.first_set.parameters, (*mechanism.names("ratio"), *mechanism.names("law"))
@@ -291,7 +291,7 @@ def collocation_serves(drives: Iterable[Drive], mechanisms: Iterable[Parameters]
     def follows(drive: Drive) -> bool:
         if not (drive.speed_drive and drive.ratios):
             return drive.speed_drive
-        mechanism = mechanism_of(mechanisms[0])
+        mechanism = find_mechanism(mechanisms[0])
         return not {*drive.flow(mechanism).free} & {*drive.ratios_by_freedom(mechanism)}
 
     return all(map(follows, drives)) and all(map(is_smooth, mechanisms))

@@ -17,7 +17,7 @@ from linkwork.mechanism import Channel, Freedom, Mechanism, Mode, PublishedSet
 from linkwork.parameters import field_name
 
 from ...files import unknown_name
-from ...mechanisms import InitialState, Parameters, mechanism_of, variable_units
+from ...mechanisms import InitialState, Parameters, find_mechanism, variable_units
 from ...run import (
     InductionMotor,
     Inputs,
@@ -406,7 +406,7 @@ def steady_drive(
     InputError
         If nothing drives the crank, or another freedom is commanded to move without end.
     """
-    mechanism = mechanism_of(parameters)
+    mechanism = find_mechanism(parameters)
     inputs, initial = check_run(mechanism, inputs, initial)
     modes = inputs.modes(mechanism)
     crank, ratios = _choose_crank(mechanism, inputs, initial, modes)
@@ -499,7 +499,7 @@ _SPEEDS = (0.25, 1.5)
 @takes_published()
 def motion_scales(parameters: Parameters, drive: Drive, start: ArrayLike) -> NDArray[np.float64]:
     """Return the scales of y: for a five-bar the crank length, the speed of the crank pin, and the crank speed."""
-    mechanism = mechanism_of(parameters)
+    mechanism = find_mechanism(parameters)
     return flow_scales(drive.flow(mechanism), parameters, drive.vector(mechanism), np.asarray(start, dtype=float))
 
 
@@ -516,7 +516,7 @@ def is_smooth(parameters: Parameters) -> bool:
 
     Friction changes fast when a motion reverses, which only an integrator with step size control resolves reliably.
     """
-    mechanism = mechanism_of(parameters)
+    mechanism = find_mechanism(parameters)
     rough = mechanism.names("friction")
     return not any(getattr(parameters, field_name(name)) for name in rough) and not mechanism.is_switched_on(
         parameters.constants()
@@ -531,7 +531,7 @@ def assembly_ranges(
     Each coordinate is moved away from its default in steps that grow, while the others stay as in ``guess``; a bound may lie
     one step too far. Both arrays have the shape (free,).
     """
-    mechanism = mechanism_of(parameters)
+    mechanism = find_mechanism(parameters)
     flow, vector, scale = drive.flow(mechanism), drive.vector(mechanism), motion_scales(parameters, drive, guess)
     sides = []
     for sign in (-1.0, 1.0):
@@ -577,7 +577,7 @@ def spread_starts(
     """
     from scipy.stats import qmc  # takes half a second
 
-    flow, scale = drive.flow(mechanism_of(parameters)), motion_scales(parameters, drive, guess)
+    flow, scale = drive.flow(find_mechanism(parameters)), motion_scales(parameters, drive, guess)
     half = flow.size // 2
     low, high = assembly_ranges(parameters, drive, guess)
     sequence = qmc.Sobol(flow.size, rng=number).random(count)

@@ -21,7 +21,7 @@ from linkwork.errors import AssemblyError, InputError, LinkworkError
 
 from ...display import NotebookResult, format_count, format_rounds
 from ...files import unknown_name
-from ...mechanisms import Parameters, mechanism_of
+from ...mechanisms import Parameters, find_mechanism
 from ...numerics.continuation import Evaluation
 from ...run import compute_outputs, takes_published
 from ...units import RAD_S_PER_RPM
@@ -588,7 +588,7 @@ def rest_guess(
 
     Raises InputError if there is none of these speeds; ``other`` is appended to the message: where else one can be given.
     """
-    mechanism = mechanism_of(parameters)
+    mechanism = find_mechanism(parameters)
     flow, ratios, state = drive.flow(mechanism), drive.ratios_by_freedom(mechanism), mechanism.state(initial)
     if flow.torque and speed is None:
         begins = state[flow.places[-1]]
@@ -714,7 +714,7 @@ class OrbitEquations:
         self.family, self.turns, self.low, self.high = family, turns, low, high
         self._bounds = [family.operation(value) for value in (low, high)]
         (mechanism, drive), (other, last) = self._bounds
-        flow = drive.flow(mechanism_of(mechanism))
+        flow = drive.flow(find_mechanism(mechanism))
         self.angles = np.array([0.0, flow.period * turns]) if angles is None else angles
         self._shape = len(self.angles) - 1, flow.size
         self._discretised = Discretisation(self.angles, collocation_serves((drive, last), (mechanism, other)))

@@ -22,7 +22,7 @@ from numpy.typing import ArrayLike, NDArray
 from linkwork.errors import InputError
 
 from ...display import NotebookResult, format_count
-from ...mechanisms import InitialState, Parameters, mechanism_of
+from ...mechanisms import InitialState, Parameters, find_mechanism
 from ...run import Inputs, complete_initial_state, complete_inputs, takes_published
 from ...units import Amount, in_si
 from .discretisation import OperatingPoint, OrbitError, operating_point, orbit_error
@@ -149,7 +149,7 @@ def sweep(
     jumps: list[Jump] = []
     drive = drive or Drive(speed=float(grid[0]))
     first = _with_speed(drive, float(grid[0]))
-    state = first_guess(first.flow(mechanism_of(parameters)), first, start)
+    state = first_guess(first.flow(find_mechanism(parameters)), first, start)
     last: PeriodicOrbit | None = None
     for speed in grid.tolist():
         orbit = None if last is None else _follow(parameters, speed, last)
@@ -303,7 +303,7 @@ class Orbits(NotebookResult):
 @takes_published()
 def unsought_hint(parameters: Parameters, drive: Drive) -> str:
     """Return a hint for an error message: which motions of links that go round were not sought; empty without such links."""
-    names = list(drive.flow(mechanism_of(parameters)).swinging)
+    names = list(drive.flow(find_mechanism(parameters)).swinging)
     if not names:
         return ""
     also = " or in which several of them go round" if len(names) > 1 else ""
@@ -456,7 +456,7 @@ def search_orbits(
         return join_orbits(
             [search_orbits(parameters, drive, turns=number, start=start) for number in sorted(set(turns))]
         )
-    mechanism, known = mechanism_of(parameters), list(known)
+    mechanism, known = find_mechanism(parameters), list(known)
     flow = drive.flow(mechanism)
     drives = [(drive, turns), *((orbit.drive, orbit.turns) for orbit in known)]
     drives += [

@@ -15,7 +15,7 @@ from linkwork.mechanism import Mechanism
 from linkwork.parameters import field_name, fmi_name
 
 from ...files import unknown_name
-from ...mechanisms import Parameters, mechanism_of
+from ...mechanisms import Parameters, find_mechanism
 from ...numerics import symbolic
 from ...run import InductionMotor, parameter_symbols, takes_published
 from ...units import RAD_S_PER_RPM
@@ -96,7 +96,7 @@ def require_variable(parameters: Parameters, drive: Drive, name: str) -> None:
         motor.
     """
     require_drive(drive)
-    mechanism = mechanism_of(parameters)
+    mechanism = find_mechanism(parameters)
     parameter_unit(mechanism, name)
     what, freedom = _crank_inputs(mechanism).get(name, ("", -1))
     if what == "speed" or freedom == drive.reference(mechanism).freedom:
@@ -150,7 +150,7 @@ def parameter_unit(mechanism: Mechanism, name: str) -> str:
 @takes_published()
 def parameter_value(parameters: Parameters, drive: Drive, name: str) -> float:
     """Return the value of a parameter; NaN for a speed under a torque drive, or for a missing motor."""
-    mechanism = mechanism_of(parameters)
+    mechanism = find_mechanism(parameters)
     what, freedom = _crank_inputs(mechanism).get(name, ("", -1))
     if what == "speed":
         return float("nan") if drive.speed is None else float(drive.speed) * _crank_ratio(mechanism, drive, freedom)
@@ -178,7 +178,7 @@ def _replace_parameters(parameters: Parameters, *values: tuple[str, float]) -> P
 @takes_published()
 def with_values(parameters: Parameters, drive: Drive, values: Mapping[str, float]) -> Operation:
     """Return the mechanism and drive with new values of parameters, by FMI name."""
-    mechanism = mechanism_of(parameters)
+    mechanism = find_mechanism(parameters)
     of_cranks, of_motor, forces = _crank_inputs(mechanism), motor_parameters(mechanism), force_inputs(mechanism)
     own = drive.reference(mechanism).freedom
     of_drive: dict[str, Any] = {}
@@ -251,7 +251,7 @@ def plane(parameters: Parameters, drive: Drive, x: str, y: str) -> Plane:
         raise InputError(f"both axes are {x!r}: a chart needs two parameters")
     for name in (x, y):
         require_variable(parameters, drive, name)
-    if {x, y} <= set(speed_names(mechanism_of(parameters))):
+    if {x, y} <= set(speed_names(find_mechanism(parameters))):
         raise InputError(f"{x} and {y} keep their ratio: one of them can be an axis")
     return NamedPlane(parameters, drive, x, y)
 
@@ -295,11 +295,11 @@ class Family:
         if callable(self.vary):
             object.__setattr__(self, "name", self.name or "parameter")
             return
-        vary = self.vary or default_variable(mechanism_of(self.parameters), self.drive)
+        vary = self.vary or default_variable(find_mechanism(self.parameters), self.drive)
         object.__setattr__(self, "vary", vary)
         require_variable(self.parameters, self.drive, vary)
         object.__setattr__(self, "name", self.name or vary)
-        object.__setattr__(self, "unit", self.unit or parameter_unit(mechanism_of(self.parameters), vary))
+        object.__setattr__(self, "unit", self.unit or parameter_unit(find_mechanism(self.parameters), vary))
 
     def operation(self, value: float) -> Operation:
         """Return the mechanism and drive at a value of the parameter."""
@@ -324,7 +324,7 @@ class Family:
         """Differentiate the drive vector and the constants by the parameter, by finite differences in its range."""
         step = _DIFFERENCE * max(abs(value), 1e-3 * (high - low))
         a, b = max(value - step, low), min(value + step, high)
-        mechanism = mechanism_of(self.parameters)
+        mechanism = find_mechanism(self.parameters)
         vectors, numbers = zip(
             *((d.vector(mechanism), np.array(p.constants())) for p, d in (self.operation(a), self.operation(b)))
         )
@@ -347,7 +347,7 @@ def gradient_names(parameters: Parameters, drive: Drive) -> tuple[str, ...]:
     A parameter at zero that would switch on further equations, such as friction by contact forces, is left out; it can be
     named explicitly.
     """
-    mechanism, acting = mechanism_of(parameters), []
+    mechanism, acting = find_mechanism(parameters), []
     for name in variable_names(mechanism):
         try:
             require_variable(parameters, drive, name)
@@ -372,7 +372,7 @@ def differentiate_constants(parameters: Parameters, names: Sequence[str], along:
 
     ``along`` is the FMI name of the further parameter for the second derivatives.
     """
-    mechanism = mechanism_of(parameters)
+    mechanism = find_mechanism(parameters)
     own = [float(getattr(parameters, field.name)) for field in fields(parameters)]
     known = {fmi_name(field.name): number for number, field in enumerate(fields(parameters))}
     direction = np.zeros(len(own))

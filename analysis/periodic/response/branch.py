@@ -21,7 +21,7 @@ from linkwork.errors import InputError
 
 from ...display import NotebookResult, format_count, format_range
 from ...files import write_csv
-from ...mechanisms import mechanism_of
+from ...mechanisms import find_mechanism
 from ...numerics.continuation import ContinuationError, Curve, Follower, Point, Reason, Settings
 from ..motion.discretisation import AIM, GROWTH, PLACES, OrbitError, choose_pieces
 from ..motion.floquet import TOLERANCE, Crossing, Stability, crossing_test
@@ -136,7 +136,7 @@ FORCE = "greatest force in "
 
 def _turn_columns(orbit: PeriodicOrbit, first: Turn) -> dict[str, Callable[[Turn], float]]:
     """Return the functions that compute columns from the outputs over a period, by the names of the columns."""
-    mechanism = mechanism_of(orbit.parameters)
+    mechanism = find_mechanism(orbit.parameters)
     rate = next(v for v in mechanism.variables if v.name == mechanism.freedoms[orbit.flow.crank].rate)
     swing, what = first.swing, "{} [{}]".format(*orbit.swing)
     columns: dict[str, Callable[[Turn], float]] = {

@@ -23,7 +23,7 @@ from linkwork.parameters import field_name
 
 from ...display import NotebookResult, format_count
 from ...files import write_csv
-from ...mechanisms import Parameters, mechanism_of
+from ...mechanisms import Parameters, find_mechanism
 from ...numerics import symbolic
 from ...numerics.continuation import ContinuationError
 from ...numerics.workers import record_interrupts
@@ -74,7 +74,7 @@ def stiffness_name(mechanism: Mechanism) -> str:
 
 def _mean_mass_and_stiffness(parameters: Parameters) -> tuple[float, float]:
     """Return the effective mass (kg) and stiffness (N/m) of the first freedom at its zero position, averaged over a turn."""
-    mechanism = mechanism_of(parameters)
+    mechanism = find_mechanism(parameters)
     cranks, freedom = find_cranks(mechanism), first_freedom(mechanism)
     if not cranks:
         raise InputError(f"a {mechanism.name} has no freedom that turns: it has no mean over a turn")
@@ -127,7 +127,7 @@ def natural_frequency(parameters: Parameters) -> float:
     >>> round(natural_frequency("rig-1-spring-a") * 30.0 / pi, 1)
     591.9
     """
-    mechanism = mechanism_of(parameters)
+    mechanism = find_mechanism(parameters)
     name = stiffness_name(mechanism)
     spring = getattr(parameters, field_name(name), None)
     if spring is not None and spring <= 0.0:
@@ -305,7 +305,7 @@ def frequency_response(
     >>> [f"{100.0 * peak.amplitude:.3f} cm" for peak in response.maxima()]
     ['1.715 cm']
     """
-    mechanism = mechanism_of(parameters)
+    mechanism = find_mechanism(parameters)
     vary = vary or default_variable(mechanism, drive)
     unit = parameter_unit(mechanism, vary)
     low, high = float(si(low, unit, "low")), float(si(high, unit, "high"))

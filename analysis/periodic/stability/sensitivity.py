@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from linkwork.errors import InputError, LinkworkError
 
 from ...files import unknown_name
-from ...mechanisms import mechanism_of
+from ...mechanisms import find_mechanism
 from ..motion.discretisation import operating_point
 from ..motion.floquet import Crossing
 from ..motion.orbit import PeriodicOrbit, newton_orbit, trial_orbit
@@ -132,7 +132,7 @@ class MotionGradient:
         self.values = np.array([parameter_value(parameters, drive, name) for name in self.names])
         own = differentiate_constants(parameters, self.names)
         self.along = stack_derivatives(orbit.drive, orbit.flow, self.names, own.p)
-        mechanism = mechanism_of(parameters)
+        mechanism = find_mechanism(parameters)
         place = mechanism.switch_index
         self._switched = mechanism.is_switched_on(parameters.constants()) or (place >= 0 and bool(np.any(own.p[place])))
 

@@ -126,7 +126,7 @@ def dead_centres_deg(case: Case) -> FloatArray:
     return np.degrees([centre.crank_angle for centre in turn(case).dead_centres])
 
 
-def component_of(found: ForceTurn, component: Component) -> FloatArray:
+def force_component(found: ForceTurn, component: Component) -> FloatArray:
     """Return a component over a turn in the printed unit, NaN at a dead centre."""
     if component.source in ("axial_force", "slider_force"):
         si = getattr(found, component.source)
@@ -137,7 +137,7 @@ def component_of(found: ForceTurn, component: Component) -> FloatArray:
 
 def values(case: Case, component: Component) -> FloatArray:
     """Return a component over the turn with the torque given, in the printed unit, NaN at a dead centre."""
-    return component_of(turn(case), component)
+    return force_component(turn(case), component)
 
 
 def position(case: Case) -> FloatArray:
@@ -241,7 +241,7 @@ def _stroke(case: Case) -> float:
 
 def offsets_peaks(component: Component, load_lb: float | None = None) -> list[float]:
     """Return a component's greatest magnitude for each offset, the ideal case first, with a load or with the torque given."""
-    return [greatest(case, component_of(turn(case, load_lb), component)) for case in (IDEAL, *OFFSETS)]
+    return [greatest(case, force_component(turn(case, load_lb), component)) for case in (IDEAL, *OFFSETS)]
 
 
 def _forces() -> tuple[Statement, ...]:

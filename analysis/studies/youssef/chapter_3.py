@@ -17,7 +17,7 @@ from ...units import CM_PER_METRE, RAD_S_PER_RPM
 from ...youssef import balance
 from ..rules import ABOUT, ABOUT_DEG, ALIKE, READ_DEG, SLIGHTLY
 from ..statements import Case, Statement, at_least, at_most, near, text
-from ..study import Study, StudyResult, curves_of, padded
+from ..study import Study, StudyResult, padded, result_curves
 from ..variation import cache, compared
 from . import free_crank
 from .runs import (
@@ -134,9 +134,9 @@ class Drift:
     @property
     def bend(self) -> float:
         """Greatest distance of the slider at the ends of turns from the least-squares line, relative to the drift over them."""
-        return self.bend_over(DRAWN_TURNS)
+        return self.bend_until_turn(DRAWN_TURNS)
 
-    def bend_over(self, last: int) -> float:
+    def bend_until_turn(self, last: int) -> float:
         """Return `bend` over the turns up to the ``last``."""
         turns, ends = self._ends(last)
         return float(np.abs(ends - np.polyval(np.polyfit(turns, ends, 1), turns)).max() / np.ptp(ends))
@@ -234,8 +234,8 @@ def drift_result() -> StudyResult:
                     at_least("M depending on mu", ALIKE, 1.0 - other_rate / rate),
                     at_least("u0 depending on mu", ALIKE, 1.0 - other_start / start),
                 ),
-                f"over 5 cycles {_mu(1e5)} is straight too ({runs[1e5].bend_over(5):.3f}), over 20 {_mu(5e5)} no longer is "
-                f"({runs[5e5].bend_over(20):.3f})",
+                f"over 5 cycles {_mu(1e5)} is straight too ({runs[1e5].bend_until_turn(5):.3f}), over 20 {_mu(5e5)} no longer "
+                f"is ({runs[5e5].bend_until_turn(20):.3f})",
             ),
             Statement(
                 "This indicates that for a small viscous force the linkage tends to collapse quickly into a collinear "
@@ -499,7 +499,7 @@ def draw_steady(result: StudyResult) -> Figure:
     first = Panel(
         x_label="turns of the crank",
         y_label="slider position u [cm]",
-        curves=curves_of(result, TURNS, dict.fromkeys(from_start, "")),
+        curves=result_curves(result, TURNS, dict.fromkeys(from_start, "")),
         x_range=(0.0, 3.0),
         title="from the start",
     )
@@ -507,7 +507,7 @@ def draw_steady(result: StudyResult) -> Figure:
         x_label="crank angle [deg]",
         y_label="slider position u [cm]",
         curves=[
-            *curves_of(result, ANGLE, dict(zip(names, from_start.values()))),
+            *result_curves(result, ANGLE, dict(zip(names, from_start.values()))),
             *crosses,
             Curve(x=[], y=[], colour="0.3", line="", marker="x", label="least"),
         ],
@@ -739,7 +739,7 @@ def draw_torque(result: StudyResult) -> Figure:
     panel = Panel(
         x_label="crank angle [deg]",
         y_label="crank torque [N m]",
-        curves=curves_of(result, ANGLE, {f"crank torque; {_k(k)} [N.m]": scientific(k) for k in STIFFNESSES}),
+        curves=result_curves(result, ANGLE, {f"crank torque; {_k(k)} [N.m]": scientific(k) for k in STIFFNESSES}),
         legend=STIFFNESS_LEGEND,
         legend_at="upper center",
         x_range=(0.0, 360.0),

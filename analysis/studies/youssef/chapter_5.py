@@ -509,9 +509,9 @@ def removing(motion: str, inertia_ratio: float) -> RemovingDamping:
     return removing_damping(test, BOX.x, RANGE, samples=12)
 
 
-def width_at(found: Chart, value: float) -> float:
+def region_width(found: Chart, value: float) -> float:
     """Return the width of a chart's region in lambda_k^2 at an I4, zero if there is no region."""
-    roots = found.across(value, samples=100).roots
+    roots = found.scan_line(value, samples=100).roots
     return float(np.ptp(roots)) if len(roots) else 0.0
 
 
@@ -556,7 +556,7 @@ def shifts() -> tuple[Case, ...]:
 
 def narrowing(charts: Mapping[float, Chart], inertia_ratio: float) -> float:
     """Return the greatest growth of the region's width from one damper to the next, as far as there is a region."""
-    at = np.array([width_at(found, inertia_ratio) for found in charts.values()])
+    at = np.array([region_width(found, inertia_ratio) for found in charts.values()])
     return float(np.diff(at)[at[:-1] > 0.0].max())
 
 

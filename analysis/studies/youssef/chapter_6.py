@@ -105,7 +105,7 @@ def best(name: str) -> Solution:
 
 def printed_error(name: str) -> float:
     """Return the error of the printed linkage with its misprint mended, in the unit of print."""
-    return PROBLEMS[name].error_of(PROBLEMS[name].linkage)
+    return PROBLEMS[name].linkage_error(PROBLEMS[name].linkage)
 
 
 def share_of_stated(name: str) -> float:
@@ -140,7 +140,7 @@ NUMBERS = tuple(n for n in range(18, 361) if 720 % n == 0)
 def by_readings(name: str, linkage: Linkage) -> dict[str, float]:
     """Return the error of a linkage (unit of print) by reading of the text; only the rocker functions have several readings."""
     if not isinstance(PROBLEMS[name].task, RockerFunction):
-        return {"": PROBLEMS[name].error_of(linkage)}
+        return {"": PROBLEMS[name].linkage_error(linkage)}
     found: dict[str, float] = {}
     for n in NUMBERS:
         squares = DEG2_PER_RAD2 * evaluate(rocker_function(n), linkage).errors ** 2
@@ -268,7 +268,7 @@ def _bounded() -> tuple[Statement, ...]:
             f"{ROUNDED}; increase over that of Fig 6.4, the nearest likewise",
             HALF,
             (
-                near("as printed", "53.6", p.error_of(p.printed), unit="cm2", why=BESIDE),
+                near("as printed", "53.6", p.linkage_error(p.printed), unit="cm2", why=BESIDE),
                 as_stated("a1 = -93.8 deg", "53.6", "ellipse-a-bounded", NO_DIGIT),
                 near(
                     f"increase, a1 = -93.8 deg; over the rounding {increases[0]:.2f} to {increases[1]:.2f}",
@@ -372,9 +372,9 @@ def _paths() -> tuple[Statement, ...]:
             f"area between the curves of the printed linkages: as printed and, with a digit mended, {ROUNDED}",
             f"0.05 cm2, {HALF}",
             (
-                near("(a) as printed", "2.3", a.error_of(a.printed), unit="cm2", why=BESIDE),
+                near("(a) as printed", "2.3", a.linkage_error(a.printed), unit="cm2", why=BESIDE),
                 as_stated("(a) X0 = 15.485 cm", "2.3", "path-a", NO_DIGIT),
-                near("(b) as printed", "12.6", b.error_of(b.printed), unit="cm2", why="l4 is misprinted"),
+                near("(b) as printed", "12.6", b.linkage_error(b.printed), unit="cm2", why="l4 is misprinted"),
                 as_stated("(b) l4 = 184.443 cm", "12.6", "path-b"),
             ),
             "X0 = 154.85 cm has the decimal point one place too far right, and l4 = 183.443 cm a digit too low; with the "
@@ -473,7 +473,7 @@ def path_columns(name: str) -> dict[str, FloatArray]:
     return columns | {"place on the target [deg]": stations_deg} | distances
 
 
-def curve_of(result: StudyResult, shape: str, **look: str | float | None) -> Curve:
+def shape_curve(result: StudyResult, shape: str, **look: str | float | None) -> Curve:
     """Return a shape of `path_columns` as a curve."""
     return Curve(x=result.columns[f"{shape} x [cm]"], y=result.columns[f"{shape} y [cm]"], **look)  # type: ignore[arg-type]
 
@@ -489,8 +489,8 @@ def curves_panel(result: StudyResult, *more: Curve, marks: bool) -> Panel:
         title="coupler curves",
         curves=[
             Curve(x=x, y=y, label="target", **look),
-            curve_of(result, "printed curve", label="printed linkage", colour=PRINTED),
-            curve_of(result, "ours curve", label="our linkage", colour=FOUND),
+            shape_curve(result, "printed curve", label="printed linkage", colour=PRINTED),
+            shape_curve(result, "ours curve", label="our linkage", colour=FOUND),
             *more,
         ],
         equal=True,
@@ -506,7 +506,7 @@ def linkages_panel(result: StudyResult) -> Panel:
         "curve": {"width": 0.9},
     }
     curves = [
-        curve_of(result, f"{who} {part}", colour=colour, **look)
+        shape_curve(result, f"{who} {part}", colour=colour, **look)
         for who, colour in (("printed", PRINTED), ("ours", FOUND))
         for part, look in parts.items()
     ]

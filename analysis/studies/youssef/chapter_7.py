@@ -222,7 +222,7 @@ def xy(name: str, z: ComplexArray) -> dict[str, FloatArray]:
     return {f"{name} x [l3]": z.real, f"{name} y [l3]": z.imag}
 
 
-def curve_of(result: StudyResult, name: str, label: str = "", **look: object) -> Curve:
+def path_curve(result: StudyResult, name: str, label: str = "", **look: object) -> Curve:
     """Return two columns of `xy` as a curve."""
     c = result.columns
     return Curve(x=c[f"{name} x [l3]"], y=c[f"{name} y [l3]"], label=label, **look)  # type: ignore[arg-type]
@@ -344,13 +344,13 @@ def draw_family(result: StudyResult) -> Figure:
     """Draw coupler curves with marks every 30 degrees, isochronous curves dotted, and the accessible area shaded."""
     c = result.columns
     every = slice(None, None, 60)
-    curves = [curve_of(result, f"U = {u:g}", f"U = {u:g}", colour=colour) for u, colour in zip(FAMILY, COLOURS)]
+    curves = [path_curve(result, f"U = {u:g}", f"U = {u:g}", colour=colour) for u, colour in zip(FAMILY, COLOURS)]
     for u, colour in zip(FAMILY, COLOURS):
         x, y = c[f"U = {u:g} x [l3]"][: TURN.size][every], c[f"U = {u:g} y [l3]"][: TURN.size][every]
         curves.append(Curve(x=x, y=y, line="", marker=".", colour=colour))
     for angle in ISOCHRONES:
         label = "isochronous" if angle == 0 else ""
-        curves.append(curve_of(result, f"th2 = {angle} deg", label, colour=TARGET, line=":", width=1.0))
+        curves.append(path_curve(result, f"th2 = {angle} deg", label, colour=TARGET, line=":", width=1.0))
     names = [name.removesuffix(" x [l3]") for name in c if name.startswith("boundary") and name.endswith("x [l3]")]
     rings = [np.column_stack([c[f"{name} {axis} [l3]"] for axis in "xy"]) for name in names]
     filled = [[ring[np.isfinite(ring[:, 0])] for ring in rings]]
@@ -388,10 +388,10 @@ def draw_wanted(result: StudyResult) -> Figure:
     z = desired()
     marks = {"p1": int(np.argmax(WITHIN)), "p2": int(np.nonzero(WITHIN)[0][-1])}
     curves = [
-        curve_of(result, f"U = {u:g}", f"U = {u:g}", colour=colour, width=0.9)
+        path_curve(result, f"U = {u:g}", f"U = {u:g}", colour=colour, width=0.9)
         for u, colour in zip((FAMILY[0], FAMILY[-1]), (COLOURS[0], COLOURS[4]))
     ]
-    curves.append(curve_of(result, "desired", "desired", colour=TARGET, line="", marker="."))
+    curves.append(path_curve(result, "desired", "desired", colour=TARGET, line="", marker="."))
     for (name, k), marker in zip(marks.items(), "os"):
         curves.append(Curve(x=[z[k].real], y=[z[k].imag], label=name, line="", marker=marker, colour=COLOURS[1]))
     return plot_curves([plane(curves)], title=result.heading, size=(6.6, 4.4))
@@ -500,10 +500,10 @@ def draw_positions(result: StudyResult) -> Figure:
     reach = [result.columns[f"{name} x [l3]"][1] for name in ("U1", "U2")]
     curves = [
         Curve(x=[min(0.0, *reach) - 0.1, max(reach) + 0.1], y=[0.0, 0.0], colour="0.6", line=":"),
-        curve_of(result, "links", "crank and coupler", colour="0.25", marker="o"),
-        curve_of(result, "U1", "rocker at U1", colour=COLOURS[0], marker="o"),
-        curve_of(result, "U2", "rocker at U2", colour=COLOURS[1], marker="o", line="--"),
-        curve_of(result, "desired", "desired point", colour=COLOURS[2], marker="s", line=""),
+        path_curve(result, "links", "crank and coupler", colour="0.25", marker="o"),
+        path_curve(result, "U1", "rocker at U1", colour=COLOURS[0], marker="o"),
+        path_curve(result, "U2", "rocker at U2", colour=COLOURS[1], marker="o", line="--"),
+        path_curve(result, "desired", "desired point", colour=COLOURS[2], marker="s", line=""),
     ]
     return plot_curves([plane(curves)], title=result.heading, size=(6.6, 3.6))
 
@@ -638,8 +638,8 @@ def draw_motions(result: StudyResult, names: tuple[str, ...], what: str) -> Figu
     c = result.columns
     look = {name: {"label": MOTIONS[name], "colour": colour} for name, colour in zip(MOTIONS, COLOURS)}
     if what == "paths":
-        target = curve_of(result, "desired", "desired", colour=TARGET, line="", marker=".")
-        curves = [target, *(curve_of(result, name, **look[name]) for name in names)]
+        target = path_curve(result, "desired", "desired", colour=TARGET, line="", marker=".")
+        curves = [target, *(path_curve(result, name, **look[name]) for name in names)]
         ends = np.nonzero(WITHIN)[0][[0, -1]]
         z = desired()[ends]
         curves.append(Curve(x=z.real, y=z.imag, label="p1 and p2", line="", marker="s", colour=COLOURS[3]))

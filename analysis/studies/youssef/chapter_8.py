@@ -20,7 +20,7 @@ from ...periodic import Turn
 from ...units import CM_PER_METRE, RAD_S_PER_RPM
 from ..rules import ABOUT, ABOUT_DEG, ALIKE, READ, SMALL
 from ..statements import Statement, at_least, at_most, near, text
-from ..study import Study, StudyResult, curves_of, padded
+from ..study import Study, StudyResult, padded, result_curves
 from . import rig_1
 from .rigs import (
     FRICTION,
@@ -42,10 +42,10 @@ from .rigs import (
     near_fraction,
     orbit,
     overtones,
+    peak_rise,
     peaks,
     rig,
     rise,
-    rise_at,
     slider,
     speed_of_fewer_peaks,
     turn,
@@ -244,7 +244,7 @@ def draw_decay(result: StudyResult) -> Figure:
     panels = []
     for number, (_, spring) in FOUND.items():
         names = [name for name in result.columns if f"spring {spring}" in name]
-        curves = curves_of(
+        curves = result_curves(
             result, "time [s]", {n: f"{DRY:g} N of dry friction" if "dry" in n else "damper alone" for n in names}
         )
         title = f"rig {number}, spring {spring}"
@@ -530,7 +530,7 @@ def _fig_8_16() -> tuple[Statement, ...]:
     of_greatest = ", ".join(
         f"{near_fraction(s, n)[1] * risen / (1.0 + risen) / greatest[s]:.2f} ({s}, {part})"
         for s, n, part in fractions
-        if (risen := rise_at(s, n)) > NOTICED
+        if (risen := peak_rise(s, n)) > NOTICED
     )
     return (
         Statement(
@@ -571,7 +571,7 @@ def _fig_8_16() -> tuple[Statement, ...]:
             "found in the steps of the curve",
             SEEN_IN_RECORDS,
             tuple(
-                at_most(f"spring {s}, {part}, {natural_speed(s) / n:.0f} rpm", NOTICED, rise_at(s, n), why=meets[n])
+                at_most(f"spring {s}, {part}, {natural_speed(s) / n:.0f} rpm", NOTICED, peak_rise(s, n), why=meets[n])
                 for s, n, part in fractions
             ),
             f"relative to the greatest amplitude of the figures with the spring, these rises are {of_greatest}; "

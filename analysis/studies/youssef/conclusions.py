@@ -31,14 +31,14 @@ from .chapter_4 import DAMPERS
 from .chapter_5 import closed, held
 from .chapter_6 import TABLE, our_error, over_least, printed_error, share_of_stated
 from .formulation import STEPS, integrated, multipliers
-from .free_crank import TORQUES, Turns, accelerated, launch, peak_of
+from .free_crank import TORQUES, Turns, accelerated, launch, run_peak
 from .linearised import with_crank
 from .problems import AREA_N, PROBLEMS
 from .regions import axis, hill, removing_estimate
 from .rig_2 import RANGE, length, linear_motion
 from .rigs import LOST, amplitude, overtones, turn
 from .runs import SPEED, STIFFNESSES, plain, steady_turn, table_3_1
-from .series_2 import error_of, out_of_reach, path_motion, reduced, reduced_further, shares_of_stated
+from .series_2 import linkage_error, out_of_reach, path_motion, reduced, reduced_further, shares_of_stated
 
 NUMBER = "conclusions"
 OMEGA_K = sqrt(SQUARE_OF_OMEGA_K)
@@ -279,7 +279,7 @@ def kinematics() -> tuple[Statement, ...]:
                 at_least(
                     "area with five harmonics, relative",
                     1.0,
-                    error_of("path-b", path_motion(5).linkage) / out_of_reach(),
+                    linkage_error("path-b", path_motion(5).linkage) / out_of_reach(),
                 ),
             ),
         ),
@@ -447,7 +447,7 @@ def dynamics() -> tuple[Statement, ...]:
                 at_most(
                     "crank angle of the greatest speed, the most",
                     1.0,
-                    max(peak_of(run).angle for run in fastest),
+                    max(run_peak(run).angle for run in fastest),
                     "rad",
                 ),
                 *(

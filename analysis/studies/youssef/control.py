@@ -22,7 +22,7 @@ from scipy.optimize import minimize
 from linkwork.five_bar.parameters import FiveBarParameters
 
 from ...figures import COLOURS, Curve, Figure, Panel, plot_curves
-from ...linear import Design, design_pid, linearise_along
+from ...linear import Design, design_pid, linearise_orbit
 from ...numerics.fourier import FourierSeries
 from ...slider import TrackingController, TrackingResult, best_spring, inverse_dynamics, motion_of_plant, track
 from ...synthesis import Linkage, turn
@@ -33,7 +33,7 @@ from ..study import Study, StudyResult, padded
 from .chapter_6 import over_least
 from .chapter_7 import slider
 from .problems import PROBLEMS
-from .series_2 import PATH, ROCKER, STATED, error_of, mended, path_motion, readings, rocker_motion
+from .series_2 import PATH, ROCKER, STATED, linkage_error, mended, path_motion, readings, rocker_motion
 
 NUMBER = "control"
 #: Crank speed (rad/s).
@@ -78,7 +78,7 @@ def machine() -> Machine:
         slider_mass=1.1 * model.slider_mass,
         coupler_mass=1.1 * model.coupler_mass,
     )
-    mean = linearise_along(model, inverse_dynamics(model, motion, SPEED)).mean()
+    mean = linearise_orbit(model, inverse_dynamics(model, motion, SPEED)).mean()
     return Machine(model, plant, motion, design_pid(mean, bandwidth=BANDWIDTH))
 
 
@@ -109,7 +109,7 @@ def trials(harmonics: int) -> tuple[NDArray[np.float64], ...]:
     return tuple(deviations)
 
 
-def moved_by(series: FourierSeries) -> Linkage:
+def move_slider(series: FourierSeries) -> Linkage:
     """Return the printed links of the rocker function with another motion of the slider along the best guide."""
     linkage = rocker_motion(2).linkage
     return replace(linkage, pivot=replace(slider(linkage), series=series))
@@ -120,7 +120,7 @@ def error_on_machine(stored: FourierSeries, load: tuple[float, float] = LOAD, sp
     turns = round(2.0 * pi / (speed * PERIOD))
     position = run(stored, load=load, speed=speed).loop.position[-turns - 1 : -1]
     found = FourierSeries.from_samples(position, max(HARMONICS))(turn(72) + rocker_motion(2).linkage.crank_phase)
-    return error_of(ROCKER, moved_by(FourierSeries.from_samples(found, max(HARMONICS))))
+    return linkage_error(ROCKER, move_slider(FourierSeries.from_samples(found, max(HARMONICS))))
 
 
 def searched() -> tuple[float, float, float]:
@@ -131,7 +131,7 @@ def searched() -> tuple[float, float, float]:
     """
 
     def error(c: NDArray[np.float64], load: tuple[float, float]) -> float:
-        return error_on_machine(motion_of_plant(moved_by(FourierSeries(c[:3], np.append(0.0, c[3:])))), load)
+        return error_on_machine(motion_of_plant(move_slider(FourierSeries(c[:3], np.append(0.0, c[3:])))), load)
 
     start = np.zeros(5)
     errors = [error(start, LOAD)]
@@ -210,8 +210,8 @@ def compute() -> StudyResult:
     stroke = float(np.ptp(m.motion(np.linspace(0.0, 2.0 * pi, 721))))
     run_for = open_loop.loop.time[-1] * SPEED / (2.0 * pi)
     missed, kept = (rms(found.error) / stroke for found in (open_loop, closed))
-    fixed, least = error_of(ROCKER, PROBLEMS[ROCKER].linkage), error_of(ROCKER, rocker_motion(2).linkage)
-    fixed_path, least_path = error_of(PATH, PROBLEMS[PATH].linkage), error_of(PATH, path_motion(2).linkage)
+    fixed, least = linkage_error(ROCKER, PROBLEMS[ROCKER].linkage), linkage_error(ROCKER, rocker_motion(2).linkage)
+    fixed_path, least_path = linkage_error(PATH, PROBLEMS[PATH].linkage), linkage_error(PATH, path_motion(2).linkage)
     at_rest, first, second = searched()
     kept_motion = error_on_machine(m.motion)
     changes = {
@@ -223,7 +223,7 @@ def compute() -> StudyResult:
         )
     }
     faster_error = changes.pop("twice the speed")
-    by_print, by_print_path = error_of(ROCKER, readings(ROCKER)[0]), error_of(PATH, mended())
+    by_print, by_print_path = linkage_error(ROCKER, readings(ROCKER)[0]), linkage_error(PATH, mended())
     left = " and ".join(f"{error[-1] / error[0]:.2f} ({n} harmonics)" for n, error in errors.items())
     hollow = " and ".join(
         f"that of {n} is hollow over {c.hollow_deg:.0f} deg, with a radius of {c.hollow_curvature:.0f} cm at least"
@@ -254,7 +254,7 @@ def compute() -> StudyResult:
                         at_least(f"cam of {n}, base radius {c.base:.1f} cm", ROLLER, c.curvature, "cm")
                         for n, c in cams.items()
                     ),
-                    at_most("Scotch yoke", 1.0 - ALIKE, error_of(ROCKER, rocker_motion(1).linkage) / fixed),
+                    at_most("Scotch yoke", 1.0 - ALIKE, linkage_error(ROCKER, rocker_motion(1).linkage) / fixed),
                     Case(label="latch", computed=None, why="no example is given, and our machine has none"),
                     Case(
                         label="simple, limited adaptability, complications",

@@ -22,7 +22,7 @@ from ...run import Hamming, Inputs, TorsionBar, simulate
 from ...units import CM_PER_METRE, RAD_S_PER_RPM
 from ..rules import SMALL
 from ..statements import Case, Statement, at_least, at_most, near, text
-from ..study import Study, StudyResult, curves_of
+from ..study import Study, StudyResult, result_curves
 from .runs import SPEED, table_3_1
 
 #: The mechanism, its speed (rad/s), the time that is integrated (s), and the steps (s); appendix 1 begins with 1e-3 s.
@@ -206,7 +206,7 @@ def by_runge_kutta(
     return runge_kutta(f, start, STOP / n, n, stages).states
 
 
-def error_of(u: NDArray[np.float64]) -> float:
+def integration_error(u: NDArray[np.float64]) -> float:
     """Return the greatest error (cm) of u (m) at evenly spaced times from 0 to `STOP`."""
     return CM_PER_METRE * float(np.abs(u - exact()(np.linspace(0.0, STOP, len(u)))[0]).max())
 
@@ -217,14 +217,14 @@ def of_runge_kutta(step: float) -> float:
     The estimate is the greatest change of u divided by 1 - 1/16.
     """
     u, halved = by_runge_kutta(step)[:, 0], by_runge_kutta(0.5 * step)[::2, 0]
-    return error_of(u) / (CM_PER_METRE * float(np.abs(u - halved).max()) / (1.0 - 2.0**-4))
+    return integration_error(u) / (CM_PER_METRE * float(np.abs(u - halved).max()) / (1.0 - 2.0**-4))
 
 
 def with_slip(step: float) -> float:
     """Return the greatest failure of closure relative to the greatest error of u, by the first approach with a slip."""
     states = by_runge_kutta(step, True, SLIP)
     crank = OMEGA * np.linspace(0.0, STOP, len(states))
-    return float(opening(np.array([crank, *states[:, :3].T])).max()) / error_of(states[:, 2])
+    return float(opening(np.array([crank, *states[:, :3].T])).max()) / integration_error(states[:, 2])
 
 
 def stable_steps(rate: complex, steps: int = 400) -> tuple[float, float]:
@@ -332,7 +332,7 @@ def compute() -> StudyResult:
     stable = {"y' = -y": stable_steps(-1.0), "y'' = -y": stable_steps(1j)}
     # as many evaluations: twice the step, with four a step instead of two
     dearer = {
-        f"{approach} approach, Hamming's {label}": error_of(by_runge_kutta(2.0 * step, i == 0)[:, 2 - 2 * i])
+        f"{approach} approach, Hamming's {label}": integration_error(by_runge_kutta(2.0 * step, i == 0)[:, 2 - 2 * i])
         / run.errors[i]
         for i, approach in enumerate(("first", "second"))
         for (label, run), step in zip(found.items(), STEPS)
@@ -535,7 +535,7 @@ def compute() -> StudyResult:
 def draw(result: StudyResult) -> Figure:
     """Draw the failure of closure over the time."""
     time, *names = result.columns
-    curves = curves_of(result, time, {name: name.partition("; ")[2].partition(" [")[0] for name in names})
+    curves = result_curves(result, time, {name: name.partition("; ")[2].partition(" [")[0] for name in names})
     panel = Panel(
         x_label=time,
         y_label="failure of closure [cm]",

@@ -260,7 +260,7 @@ def _rise_cases(runs: Mapping[str, Trajectory]) -> tuple[Case, ...]:
     bows = [
         at_most(f"distance from a line; {label}", ALIKE, from_line(*_rise_to_peak(run))) for label, run in runs.items()
     ]
-    angle = max(peak_of(run).angle for run in runs.values())
+    angle = max(run_peak(run).angle for run in runs.values())
     return (*bows, at_most("crank angle of the peak, greatest", "1", angle, "rad"))
 
 
@@ -272,7 +272,7 @@ class Peak(NamedTuple):
     speed: float
 
 
-def peak_of(run: Trajectory) -> Peak:
+def run_peak(run: Trajectory) -> Peak:
     """Return the greatest crank speed, between the samples."""
     time, speed = greatest(run.time, run["crank.speed"])
     return Peak(time, float(np.interp(time, run.time, run["crank.angle"])), speed)
@@ -280,7 +280,7 @@ def peak_of(run: Trajectory) -> Peak:
 
 def _rise_to_peak(run: Trajectory) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Return time and crank speed up to the peak of the speed, relative to their values there."""
-    peak = peak_of(run)
+    peak = run_peak(run)
     before = run.time < peak.time
     return np.append(run.time[before] / peak.time, 1.0), np.append(run["crank.speed"][before] / peak.speed, 1.0)
 
@@ -288,7 +288,7 @@ def _rise_to_peak(run: Trajectory) -> tuple[NDArray[np.float64], NDArray[np.floa
 def _rise_words(runs: Mapping[str, Trajectory]) -> str:
     """Return words on the greatest distance of the crank speed from its least-squares line, and on its fall after the peak."""
     off = [np.abs(w - np.polynomial.Polynomial.fit(t, w, 1)(t)).max() for t, w in map(_rise_to_peak, runs.values())]
-    fall = min(1.0 - run["crank.speed"][-1] / peak_of(run).speed for run in runs.values())
+    fall = min(1.0 - run["crank.speed"][-1] / run_peak(run).speed for run in runs.values())
     return (
         f"from the peak to 1 rad the speed falls by {100 * fall:.1f} % at least; there is a line within {ALIKE:g}, though from "
         f"that of least squares the greatest distance is {max(off):.3f}, at the peak"

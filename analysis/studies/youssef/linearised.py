@@ -21,7 +21,7 @@ from ...youssef import Form, SliderEquation, Variant, slider_equation, two_harmo
 from ...youssef.printed_coefficients import DATUM, Coefficients, Datum, convert, listed, printed, ratios
 from ..rules import SMALL
 from ..statements import Case, Statement, at_least, at_most, near, text
-from ..study import Study, StudyResult, curves_of
+from ..study import Study, StudyResult, result_curves
 from .runs import SPEED, table_3_1
 
 #: Greatest rounding error, crank lengths sigma2 from which an order is computed, and tolerance of a limit at the shorter one.
@@ -406,7 +406,9 @@ def draw(result: StudyResult) -> Figure:
     panels: list[Panel] = []
     for name in dict.fromkeys(column.partition(";")[0] for column in names):
         chosen = {c: "" if panels else c.partition("; ")[2].partition(" [")[0] for c in names if c.startswith(name)}
-        curves = [replace(curve, line=line) for curve, line in zip(curves_of(result, angle, chosen), ("-", "--", ":"))]
+        curves = [
+            replace(curve, line=line) for curve, line in zip(result_curves(result, angle, chosen), ("-", "--", ":"))
+        ]
         panels.append(
             Panel(
                 x_label=angle, y_label=f"{name}, I4 = 1", curves=curves, x_range=(0.0, 360.0), x_ticks=range(0, 361, 90)

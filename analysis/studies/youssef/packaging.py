@@ -14,7 +14,7 @@ from math import degrees, pi
 import numpy as np
 
 from ...figures import Curve, Figure, Panel, plot_curves
-from ...synthesis import Straightness, area_between, hausdorff, parts_of, turn
+from ...synthesis import Straightness, area_difference, hausdorff, straight_parts, turn
 from ...units import CM_PER_METRE
 from ..rules import ALIKE
 from ..statements import Statement, at_most, text
@@ -25,11 +25,11 @@ from .chapter_6 import (
     TARGET,
     FloatArray,
     best,
-    curve_of,
     curves_panel,
     linkages_panel,
     pairing_area,
     path_columns,
+    shape_curve,
 )
 from .problems import (
     CM2_PER_M2,
@@ -73,7 +73,7 @@ def straightest(curve: FloatArray) -> tuple[Straightness, int]:
     The parts compared lie within 120 degrees of rotation and are at least as long as AB, along the line.
     """
     greatest = round(N * PACKAGING_ROTATION / (2.0 * pi)) + 1
-    parts = ((part, count) for count in range(2, greatest + 1) for part in parts_of(curve, count, direction=0.0))
+    parts = ((part, count) for count in range(2, greatest + 1) for part in straight_parts(curve, count, direction=0.0))
     long_enough = (found for found in parts if CM_PER_METRE * found[0].travel >= TRAVEL_CM)
     return min(long_enough, key=lambda found: found[0].flatness / found[0].travel)
 
@@ -99,7 +99,7 @@ def compute() -> StudyResult:
     for name, points in parts.items():
         columns |= {f"{name} {axis} [cm]": CM_PER_METRE * points[:, k] for k, axis in enumerate("xy")}
     line, above = PACKAGING_OFFSET_CM[1], CM_PER_METRE * p.linkage.pivot_y
-    exact = CM2_PER_M2 * area_between(curves["printed"], packaging_path())
+    exact = CM2_PER_M2 * area_difference(curves["printed"], packaging_path())
     return StudyResult(
         number=NUMBER,
         claim=(
@@ -154,8 +154,8 @@ def compute() -> StudyResult:
 
 def draw(result: StudyResult) -> Figure:
     """Draw region, points and curves (a), the straight parts with y enlarged, and the linkages (b)."""
-    bounds = [curve_of(result, f"{name} bound", colour="0.55", line="--", width=0.8) for name in ("outer", "inner")]
-    points = curve_of(result, "nineteen points", label="nineteen points", colour=TARGET, line="", marker="o")
+    bounds = [shape_curve(result, f"{name} bound", colour="0.55", line="--", width=0.8) for name in ("outer", "inner")]
+    points = shape_curve(result, "nineteen points", label="nineteen points", colour=TARGET, line="", marker="o")
     line = Curve(
         x=np.array([10.0, 164.0]) + PACKAGING_OFFSET_CM[0],
         y=np.full(2, PACKAGING_OFFSET_CM[1]),
@@ -168,8 +168,8 @@ def draw(result: StudyResult) -> Figure:
         title="straight parts, y enlarged",
         curves=[
             line,
-            curve_of(result, "printed straight", colour=PRINTED),
-            curve_of(result, "ours straight", colour=FOUND),
+            shape_curve(result, "printed straight", colour=PRINTED),
+            shape_curve(result, "ours straight", colour=FOUND),
         ],
     )
     panels = [

@@ -6,7 +6,7 @@ of the printed linkage, and with a least transmission angle of 40 degrees, or, f
 this angle, with a fully turning crank.
 
 >>> problem = PROBLEMS["ellipse-a"]
->>> round(problem.error_of(problem.linkage), 2)
+>>> round(problem.linkage_error(problem.linkage), 2)
 5.64
 """
 
@@ -32,7 +32,7 @@ from ...synthesis import (
     Task,
     TimedPath,
     UntimedPath,
-    area_between,
+    area_difference,
     evaluate,
     path_from_formula,
     turn,
@@ -95,11 +95,11 @@ class PublishedProblem:
         """Convert an error from SI to the unit of print."""
         return self.per_si * error
 
-    def error_of(self, linkage: Linkage) -> float:
+    def linkage_error(self, linkage: Linkage) -> float:
         """Return the error of a linkage in the unit of print, infinite if its links cannot be joined."""
         if isinstance(self.task, UntimedPath):
             curve = linkage.path(turn(AREA_N))
-            return self.convert(area_between(curve, self.task.path)) if np.isfinite(curve).all() else np.inf
+            return self.convert(area_difference(curve, self.task.path)) if np.isfinite(curve).all() else np.inf
         return self.convert(evaluate(self.task, linkage).error)
 
 

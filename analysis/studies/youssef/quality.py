@@ -18,7 +18,7 @@ from scipy.optimize import minimize, minimize_scalar
 
 from ...figures import COLOURS, Curve, Figure, Panel, plot_curves
 from ...figures.curves import Label
-from ...synthesis import LINKS, USUAL, LargestLink, Linkage, UntimedPath, area_between, evaluate, synthesize, turn
+from ...synthesis import LINKS, USUAL, LargestLink, Linkage, UntimedPath, area_difference, evaluate, synthesize, turn
 from ...units import CM_PER_METRE
 from ..rules import ALIKE
 from ..statements import Case, Statement, at_least, at_most, near, text
@@ -54,7 +54,7 @@ class Quality(NamedTuple):
 def both(linkage: Linkage) -> Quality:
     """Return both quality functions of a linkage for ellipse (a)."""
     assert isinstance(PATH.task, UntimedPath)
-    area = area_between(linkage.path(turn(AREA_N)), PATH.task.path)
+    area = area_difference(linkage.path(turn(AREA_N)), PATH.task.path)
     return Quality(TIMED.convert(evaluate(TIMED.task, linkage).error), CM2_PER_M2 * area)
 
 
@@ -101,7 +101,7 @@ def below(name: str) -> float:
     first = printed_error(name)
 
     def error(x: FloatArray) -> float:
-        found = p.error_of(Linkage.from_vector(x * unit, p.linkage.branch)) / first
+        found = p.linkage_error(Linkage.from_vector(x * unit, p.linkage.branch)) / first
         return found if np.isfinite(found) else REFUSED
 
     options = {"ftol": 1e-9, "maxiter": STEPS}

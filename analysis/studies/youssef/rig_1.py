@@ -11,7 +11,7 @@ from ...periodic import PeriodicOrbit, SpecialPoint, Sweep, Turn, sweep
 from ...units import CM_PER_METRE, RAD_S_PER_RPM
 from ..rules import ABOUT, ABOUT_DEG, ALIKE, SLIGHTLY
 from ..statements import Statement, at_least, at_most, text
-from ..study import Study, StudyResult, curves_of, padded
+from ..study import Study, StudyResult, padded, result_curves
 from ..variation import cache
 from .rigs import (
     FASTEST,
@@ -20,7 +20,7 @@ from .rigs import (
     SLOWEST,
     SPLIT,
     amplitude,
-    columns_of,
+    branch_columns,
     curves_over_speed,
     marks,
     motions,
@@ -66,9 +66,9 @@ def upper_orbit(speed: float) -> PeriodicOrbit:
 
 def compute_rig_1() -> StudyResult:
     """Compute branches of periodic motions, and sweeps with rising and falling speed."""
-    columns = columns_of(motions("A").branches[0], "spring A")
+    columns = branch_columns(motions("A").branches[0], "spring A")
     for name, branch in zip(NAMES, motions("B").branches + resonant_b().branches):
-        columns |= columns_of(branch, f"spring B; {name}")
+        columns |= branch_columns(branch, f"spring B; {name}")
     for name, rising in (("rising speed", True), ("falling speed", False)):
         found = swept("B", rising)
         columns[f"speed; {name} [rpm]"] = found.speed / RAD_S_PER_RPM
@@ -347,7 +347,7 @@ def draw_friction(result: StudyResult) -> Figure:
                     x_label=x_label,
                     y_label="slider amplitude [cm]" if lines else "slider position u [cm]",
                     title=title,
-                    curves=curves_of(result, x, names),
+                    curves=result_curves(result, x, names),
                     verticals=lines,
                     legend="coefficient",
                     legend_at="outside",

@@ -34,9 +34,9 @@ from .rigs import (
     motions,
     natural_speed,
     near_fraction,
+    peak_rise,
     rig,
     rise,
-    rise_at,
     rpm,
     turn,
 )
@@ -290,7 +290,7 @@ def compute_harmonics() -> StudyResult:
             first, second = (_greatest(way, spring, n) for n in (1, 2))
             ratios.append(near(f"{name}, {way}", "50", first / second, ABOUT * 50.0))
         for n, part in ((4, "quarter"), (3, "third"), (2, "half")):
-            above = rise_at(spring, n)
+            above = peak_rise(spring, n)
             size = f"{10.0 * near_fraction(spring, n)[1]:.1f}" if above > NOTICED else ""
             cases.append(at_most(f"{name}, {part}", NOTICED, above, why=f"the amplitude there is {size} mm"))
         left.append(f"{rise(spring, SLIGHT, 2):.2f}")

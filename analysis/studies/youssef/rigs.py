@@ -173,7 +173,7 @@ def near_fraction(spring: str, order: int) -> tuple[float, float]:
     return between(motions(spring).maxima(), 0.9 * place, 1.1 * place)
 
 
-def rise_at(spring: str, order: int) -> float:
+def peak_rise(spring: str, order: int) -> float:
     """Return the relative rise of the maximum near 1/order of the natural frequency over the next minimum; 0 without one."""
     tops = [
         e
@@ -207,7 +207,7 @@ def follow(spring: str, speeds: Sequence[float], **changes: float) -> NDArray[np
 
 
 def rise(spring: str, coefficient: float, order: int) -> float:
-    """Return the rise of `rise_at` with a coefficient of friction in the guide; 0 without a maximum."""
+    """Return the rise of `peak_rise` with a coefficient of friction in the guide; 0 without a maximum."""
     size, speeds = over_speed(spring, coefficient), GRID[spring]
     tops = np.flatnonzero((size[1:-1] > size[:-2]) & (size[1:-1] > size[2:])) + 1
     lows = np.flatnonzero((size[1:-1] < size[:-2]) & (size[1:-1] < size[2:])) + 1
@@ -216,7 +216,7 @@ def rise(spring: str, coefficient: float, order: int) -> float:
     return 0.0
 
 
-def columns_of(branch: Branch, name: str) -> dict[str, NDArray[np.float64]]:
+def branch_columns(branch: Branch, name: str) -> dict[str, NDArray[np.float64]]:
     """Return the amplitude along a branch as columns for its stable and unstable parts; see `curves_over_speed`."""
     amplitude = CM_PER_METRE * branch.amplitude
     stable = np.array([verdict is Stability.STABLE for verdict in branch.stability()])

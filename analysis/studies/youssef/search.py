@@ -20,7 +20,7 @@ from scipy.optimize import least_squares
 from scipy.stats import mannwhitneyu
 
 from ...figures import COLOURS, Curve, Figure, Panel, plot_curves
-from ...synthesis import UntimedPath, area_between, turn
+from ...synthesis import UntimedPath, area_difference, turn
 from ...units import CM_PER_METRE
 from ..rules import ALIKE, SMALL
 from ..statements import Case, Statement, at_least, at_most, near, text
@@ -436,7 +436,7 @@ def compute_closures() -> StudyResult:
         p = PROBLEMS[name]
         # the points of the program, whose polygon is that of the task
         right, other = (
-            p.error_of(replace(p.linkage, branch=branch)) for branch in (p.linkage.branch, -p.linkage.branch)
+            p.linkage_error(replace(p.linkage, branch=branch)) for branch in (p.linkage.branch, -p.linkage.branch)
         )
         ratios.append(at_least(name, 1.0 + ALIKE, other / right))
     for name in ("path-a", "path-b"):
@@ -444,9 +444,9 @@ def compute_closures() -> StudyResult:
         assert isinstance(p.task, UntimedPath)
         points = np.asarray(p.task.path.points)
         curve, finer = (p.linkage.path(turn(n * len(points))) for n in (1, 2))
-        area = area_between(curve, p.task.path)
+        area = area_difference(curve, p.task.path)
         moved = replace(p.linkage, crank_phase=p.linkage.crank_phase + PHASE)
-        phases.append(near(name, 1.0, area_between(moved.path(turn(len(points))), p.task.path) / area, ALIKE))
+        phases.append(near(name, 1.0, area_difference(moved.path(turn(len(points))), p.task.path) / area, ALIKE))
         steps = range(0, len(points), len(points) // FIRST)
         for how, actual in (("chosen", finer), ("in order", curve)):
             shares = [pairing_area(np.roll(points, -k, axis=0), actual, window=2) / area for k in steps]

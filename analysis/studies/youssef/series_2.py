@@ -83,9 +83,9 @@ def path_motion(harmonics: int) -> Solution:
     return slider_motion(p.task, p.linkage, unknown, search=Search(starts=starts)).best
 
 
-def error_of(name: str, linkage: Linkage) -> float:
+def linkage_error(name: str, linkage: Linkage) -> float:
     """Return the error of a linkage in the unit of print."""
-    return PROBLEMS[name].error_of(linkage)
+    return PROBLEMS[name].linkage_error(linkage)
 
 
 def printed(
@@ -126,7 +126,7 @@ def readings(name: str) -> list[Linkage]:
         printed(name, mean=mean, sines=sines, sign=sign, turned=turned, along=along)
         for mean, sines, sign, turned, along in product((1.0, 0.1, 0.0), signs, signs, (0.0, k.crank_phase), signs)
     ]
-    return sorted((one for one in found if np.isfinite(error_of(name, one))), key=partial(error_of, name))
+    return sorted((one for one in found if np.isfinite(linkage_error(name, one))), key=partial(linkage_error, name))
 
 
 def in_window(linkage: Linkage) -> float:
@@ -181,8 +181,8 @@ def by_both_methods() -> tuple[float, float]:
 
     steepest = least_squares(lambda x: root * evaluate(task, moved(x)).errors, np.zeros(6))
     options = {"maxfev": 4000, "xatol": 1e-6, "fatol": 1e-8, "initial_simplex": np.eye(7, 6, -1)}
-    simplex = minimize(lambda x: error_of(ROCKER, moved(x)), np.zeros(6), method="Nelder-Mead", options=options)
-    return error_of(ROCKER, moved(steepest.x)), error_of(ROCKER, moved(simplex.x))
+    simplex = minimize(lambda x: linkage_error(ROCKER, moved(x)), np.zeros(6), method="Nelder-Mead", options=options)
+    return linkage_error(ROCKER, moved(steepest.x)), linkage_error(ROCKER, moved(simplex.x))
 
 
 def moved_rocker() -> StudyResult:
@@ -190,7 +190,7 @@ def moved_rocker() -> StudyResult:
     p = PROBLEMS[ROCKER]
     assert isinstance(p.task, RockerFunction)
     found = {n: rocker_motion(n) for n in (1, 2, 3)}
-    errors = {n: error_of(ROCKER, s.linkage) for n, s in found.items()}
+    errors = {n: linkage_error(ROCKER, s.linkage) for n, s in found.items()}
     columns = {"crank rotation [deg]": np.degrees(TURN), "target angle [deg]": wanted_angle()}
     columns["angle; fixed [deg]"] = np.degrees(p.linkage.rocker_angle(TURN))
     columns["error; fixed [deg]"] = angle_error(p.linkage)
@@ -205,8 +205,8 @@ def moved_rocker() -> StudyResult:
     still = by_readings(ROCKER, p.linkage)
     raised = min(error / still[reading] for found_by in by_number for reading, error in found_by.items())
     least_read, span = min(min(found_by.values()) for found_by in by_number), over_rounding(ROCKER, best_reading)
-    nearest, kept = error_of(ROCKER, best_reading), error_of(ROCKER, p.linkage)
-    whole, kept_path = error_of(PATH, printed(PATH)), error_of(PATH, PROBLEMS[PATH].linkage)
+    nearest, kept = linkage_error(ROCKER, best_reading), linkage_error(ROCKER, p.linkage)
+    whole, kept_path = linkage_error(PATH, printed(PATH)), linkage_error(PATH, PROBLEMS[PATH].linkage)
     weights = np.asarray(p.task.weights)
     heavy = int((weights == WEIGHT).sum())
     # the most that (7.18) has: A0, A1, A2, B1, B2 and the guide's angle
@@ -255,7 +255,7 @@ def moved_rocker() -> StudyResult:
                     at_most(
                         "path-b, printed series, A0 read as 0.31",
                         1.0 - ALIKE,
-                        error_of(PATH, mended()) / kept_path,
+                        linkage_error(PATH, mended()) / kept_path,
                     ),
                     *(at_most(name, 1.0 - ALIKE, share) for name, share in reduced().items()),
                 ),
@@ -368,7 +368,7 @@ def mended() -> Linkage:
 def shares_of_stated() -> dict[str, float]:
     """Return the error with each printed series, in its best reading or mended, divided by the stated error."""
     linkages = {ROCKER: readings(ROCKER)[0], PATH: mended()}
-    return {name: error_of(name, linkage) / STATED[name] for name, linkage in linkages.items()}
+    return {name: linkage_error(name, linkage) / STATED[name] for name, linkage in linkages.items()}
 
 
 def over_rounding(name: str, found: Linkage) -> tuple[float, float]:
@@ -384,7 +384,7 @@ def over_rounding(name: str, found: Linkage) -> tuple[float, float]:
             motion.series.cos + change[n : n + 3], motion.series.sin + np.append(0.0, change[n + 3 : n + 5])
         )
         moved = SliderMotion(series, motion.guide_angle + change[-1])
-        return error_of(name, replace(Linkage.from_vector(found.vector + change[:n], 1), pivot=moved))
+        return linkage_error(name, replace(Linkage.from_vector(found.vector + change[:n], 1), pivot=moved))
 
     corner = off * np.sign([error(step) - error(-step) for step in np.diag(off)])
     return error(-corner), error(corner)
@@ -395,7 +395,7 @@ def moved_path() -> StudyResult:
     p = PROBLEMS[PATH]
     assert isinstance(p.task, UntimedPath)
     found = {n: path_motion(n) for n in PATH_SEARCHES}
-    errors = {n: error_of(PATH, s.linkage) for n, s in found.items()}
+    errors = {n: linkage_error(PATH, s.linkage) for n, s in found.items()}
     linkages = {"fixed": p.linkage, "printed": mended()} | {f"{n}": s.linkage for n, s in found.items()}
     points = np.asarray(p.task.path.points)
     columns = {
@@ -426,8 +426,8 @@ def moved_path() -> StudyResult:
                 f"besides, {ROUNDED}, series and guide",
                 "0.05 cm2, half a unit of the last digit",
                 (
-                    near("as printed", "4.3", error_of(PATH, to_the_letter), unit="cm2", why=misread),
-                    near("l4 = 184.443 cm", "4.3", error_of(PATH, printed(PATH)), unit="cm2", why=misread),
+                    near("as printed", "4.3", linkage_error(PATH, to_the_letter), unit="cm2", why=misread),
+                    near("l4 = 184.443 cm", "4.3", linkage_error(PATH, printed(PATH)), unit="cm2", why=misread),
                     near(
                         f"l4 = 184.443 cm, A0 = 0.31 cm; over the rounding {span[0]:.2f} to {span[1]:.2f}",
                         "4.3",
@@ -435,8 +435,8 @@ def moved_path() -> StudyResult:
                         unit="cm2",
                     ),
                 ),
-                f"with the other digits as printed it is {error_of(PATH, mended()):.2f} cm2; with these links, l4 mended, two "
-                f"harmonics can reach {errors[2]:.2f} cm2, three {errors[3]:.2f} and five {errors[5]:.2f}",
+                f"with the other digits as printed it is {linkage_error(PATH, mended()):.2f} cm2; with these links, l4 mended, "
+                f"two harmonics can reach {errors[2]:.2f} cm2, three {errors[3]:.2f} and five {errors[5]:.2f}",
             ),
             Statement(
                 "Subject to the constraint that [theta2] increases at a constant rate, a coupler-point path may thus be "

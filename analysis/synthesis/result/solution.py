@@ -21,7 +21,7 @@ from ...units import with_unit
 from ..linkage.kernels import PLACES
 from ..linkage.linkage import Linkage, SliderCrank, wrap_angles
 from ..linkage.machine import MachineSpec
-from ..task.target import area_between, distance_to, half_lengths, hausdorff, straightness
+from ..task.target import area_difference, curve_distance, half_lengths, hausdorff, straightness
 from ..task.task import PrecisionPoints, RockerFunction, Task, TimedPath, UntimedPath, covers_turn, normal_form
 from .described import description, drives, loads
 
@@ -138,22 +138,22 @@ def _evaluate_path(task: UntimedPath, linkage: Linkage, rotation: FloatArray | N
     points = np.asarray(path.points)
     if not np.isfinite(curve).all():
         return Evaluation(error=inf, value=inf, errors=np.full(len(points), inf), angle_errors=None, rotation=rotation)
-    distance = distance_to(curve, points, closed=path.closed)
+    distance = curve_distance(curve, points, closed=path.closed)
     weights = np.asarray(task.weights)
     normal = normal_form(task)
     stations = normal.places
-    apart = distance_to(curve, np.column_stack([stations.real, stations.imag]), closed=path.closed)
+    apart = curve_distance(curve, np.column_stack([stations.real, stations.imag]), closed=path.closed)
     if task.measure == "distance":
         error = float(normal.weights @ apart**2)
     elif (weights == weights[0]).all():
-        error = float(weights[0]) * area_between(curve, path, closed=path.closed)
+        error = float(weights[0]) * area_difference(curve, path, closed=path.closed)
     else:
         # a weighted area: half the integral along the target with its weights, half that along the curve with the weights of
         # the nearest stations
         traced = curve @ np.array([1.0, 1j])
         steps = np.abs(np.diff(np.append(traced, traced[0]) if path.closed else traced))
         nearest = np.abs(traced[:, None] - stations[None, :]).argmin(axis=1)
-        back = half_lengths(steps, path.closed) * distance_to(points, curve, closed=path.closed)
+        back = half_lengths(steps, path.closed) * curve_distance(points, curve, closed=path.closed)
         error = 0.5 * float(normal.weights @ (normal.unit * normal.arc * apart) + normal.weights[nearest] @ back)
     value = error if task.objective == "error" else hausdorff(curve, path, closed=path.closed)
     return Evaluation(error=error, value=value, errors=distance, angle_errors=None, rotation=rotation)

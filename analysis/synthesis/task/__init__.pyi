@@ -3,7 +3,7 @@ from .constraint import InfeasibleError as InfeasibleError
 from .limits import Limits as Limits
 from .limits import limits_by_kind as limits_by_kind
 from .target import TargetPath as TargetPath
-from .target import area_between as area_between
+from .target import area_difference as area_difference
 from .task import Task as Task
 from .task import TimedPath as TimedPath
 from .task import UntimedPath as UntimedPath

@@ -378,7 +378,7 @@ def _bending(h: FloatArray, closed: bool) -> FloatArray:
 PIECES = 2000
 
 
-def distance_to(curve: ArrayLike, points: ArrayLike, *, closed: bool = True) -> FloatArray:
+def curve_distance(curve: ArrayLike, points: ArrayLike, *, closed: bool = True) -> FloatArray:
     """Compute the distance of each point from a curve of straight segments, exactly (m), shape (m,).
 
     Parameters
@@ -408,7 +408,7 @@ def _cut_into_pieces(vertices: FloatArray) -> tuple[FloatArray, float]:
     return interpolate_polyline(vertices, (np.arange(PIECES) + 0.5) * (length / PIECES)), length
 
 
-def area_between(curve: ArrayLike, target: TargetPath, *, closed: bool = True) -> float:
+def area_difference(curve: ArrayLike, target: TargetPath, *, closed: bool = True) -> float:
     """Compute the area between a traced curve and its target (m2).
 
     If both are closed it is the area of the symmetric difference of the enclosed areas, by the even-odd rule
@@ -443,36 +443,36 @@ def area_between(curve: ArrayLike, target: TargetPath, *, closed: bool = True) -
     if closed and target.closed:
         return even_odd_area(target.points, points)
     middles, length = _cut_into_pieces(closed_vertices(target.points, target.closed))
-    missed = length * float(distance_to(points, middles, closed=closed).mean())
+    missed = length * float(curve_distance(points, middles, closed=closed).mean())
     if closed:
         return missed
     middles, length = _cut_into_pieces(points)
-    return 0.5 * (missed + length * float(distance_to(target.points, middles, closed=target.closed).mean()))
+    return 0.5 * (missed + length * float(curve_distance(target.points, middles, closed=target.closed).mean()))
 
 
 def hausdorff(curve: ArrayLike, target: TargetPath, *, closed: bool = True) -> float:
     """Compute the Hausdorff distance of a traced curve from its target (m).
 
-    For an open target and a closed curve only the target's points count, as in `area_between`. Distances are computed at the
+    For an open target and a closed curve only the target's points count, as in `area_difference`. Distances are computed at the
     vertices and at `PIECES` points at equal arc lengths: the result is below the true one by at most half their spacing.
 
     Parameters
     ----------
     curve, target, closed
-        As for `area_between`.
+        As for `area_difference`.
 
     Raises
     ------
     InputError
-        As for `area_between`.
+        As for `area_difference`.
     """
     points = plane_points(curve, "the curve", 3 if closed else 2)
     seen = np.vstack([target.points, _cut_into_pieces(closed_vertices(target.points, target.closed))[0]])
-    largest = float(distance_to(points, seen, closed=closed).max())
+    largest = float(curve_distance(points, seen, closed=closed).max())
     if closed and not target.closed:
         return largest
     seen = np.vstack([points, _cut_into_pieces(closed_vertices(points, closed))[0]])
-    return max(largest, float(distance_to(target.points, seen, closed=target.closed).max()))
+    return max(largest, float(curve_distance(target.points, seen, closed=target.closed).max()))
 
 
 # Straight parts
@@ -578,7 +578,7 @@ def straightest_part(
     InputError
         If the curve has fewer points, or no part has the least travel.
     """
-    parts = parts_of(curve, count, direction=direction, closed=closed)
+    parts = straight_parts(curve, count, direction=direction, closed=closed)
     longest = max(part.travel for part in parts)
     if not longest >= least_travel:
         raise InputError(
@@ -587,7 +587,7 @@ def straightest_part(
     return min((part for part in parts if part.travel >= least_travel), key=lambda part: part.flatness)
 
 
-def parts_of(
+def straight_parts(
     curve: ArrayLike, count: int, *, direction: float | None = None, closed: bool = True
 ) -> list[Straightness]:
     """Return travel and flatness of every part of ``count`` successive points in a curve: see `straightest_part`."""
