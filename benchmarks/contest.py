@@ -70,8 +70,8 @@ class TimeUp(Exception):
 class Contest:
     """A problem in the form that all searches share.
 
-    It has a `BlackBox` for each assembly, and a plain one without requirements for a straight part: a `BlackBox` has its
-    stations at equal shares of the length, where these requirements are stricter than the task's.
+    For each assembly it has two `BlackBox`: one of the task (``boxes``), and one without the requirements for a straight part
+    (``plain``), because at the stations of a `BlackBox`, equal shares of the length, these are stricter than the task's.
 
     With ``on_area``, searches for a path whose measure is the area first use stations at equal shares of the length, and then
     minimise the area itself.

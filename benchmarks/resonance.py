@@ -40,7 +40,7 @@ def parts(name: str, folder: str) -> dict[str, float]:
     """Measure the processor time of each part of the command (s)."""
     times: dict[str, float] = {}
 
-    def timed(what: str, does: Callable[[], Any]) -> Any:
+    def time_part(what: str, does: Callable[[], Any]) -> Any:
         begin = time.process_time()
         result = does()
         times[what] = time.process_time() - begin
@@ -53,7 +53,7 @@ def parts(name: str, folder: str) -> dict[str, float]:
 
         _ = figures.plot, periodic.frequency_response, youssef.approximations
 
-    timed("imports", imports)
+    time_part("imports", imports)
     from analysis import figures
     from analysis.files import save_figure
     from analysis.periodic import frequency_response, natural_frequency, with_isolas
@@ -62,16 +62,16 @@ def parts(name: str, folder: str) -> dict[str, float]:
 
     rig = SETS[name].parameters
     low, high = (factor * natural_frequency(rig) for factor in RANGE)
-    response = timed("motions followed", lambda: frequency_response(rig, low, high, doublings=DOUBLINGS))
-    response = timed("all motions sought at five speeds", lambda: with_isolas(response))
+    response = time_part("motions followed", lambda: frequency_response(rig, low, high, doublings=DOUBLINGS))
+    response = time_part("all motions sought at five speeds", lambda: with_isolas(response))
     points = sum(map(len, response.branches))
-    timed(f"outputs over a turn of {points} points", lambda: response.to_csv(Path(folder) / "response.csv"))
-    timed(
+    time_part(f"outputs over a turn of {points} points", lambda: response.to_csv(Path(folder) / "response.csv"))
+    time_part(
         "maxima and minima, speeds to avoid", lambda: (response.maxima(), response.minima(), response.speeds_to_avoid)
     )
-    beside = timed("classical approximations", lambda: approximations(response))
-    picture = timed("figure", lambda: figures.plot(response, title=name, beside=beside))
-    timed("picture written", lambda: save_figure(picture, Path(folder) / "response.png"))
+    beside = time_part("classical approximations", lambda: approximations(response))
+    picture = time_part("figure", lambda: figures.plot(response, title=name, beside=beside))
+    time_part("picture written", lambda: save_figure(picture, Path(folder) / "response.png"))
     return times
 
 

@@ -122,10 +122,10 @@ def run_multipliers(case: Case, rtol: float) -> np.ndarray:
     """Compute the slider position (m) by the multiplier form under SciPy's DOP853."""
 
     def run(start: InitialState, torque: float, times: np.ndarray, **drive: Any) -> Any:
-        def applied(t: float, q: np.ndarray, qd: np.ndarray) -> tuple[float, ...]:
+        def applied_forces(t: float, q: np.ndarray, qd: np.ndarray) -> tuple[float, ...]:
             return (torque * (1.0 - q[0] / case.switch_angle), 0.0, 0.0, 0.0)
 
-        return simulate_redundant(case.parameters, start, applied, times, rtol=rtol, atol=rtol * 1e-2, **drive)
+        return simulate_redundant(case.parameters, start, applied_forces, times, rtol=rtol, atol=rtol * 1e-2, **drive)
 
     start = InitialState(crank_speed=case.start_speed)
     if case.crank_speed:

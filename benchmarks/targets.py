@@ -125,16 +125,16 @@ def rise_and_dwell() -> RockerFunction:
 
 
 def _all() -> list[Target]:
-    def published(kind: str, *names: str) -> list[Target]:
+    def published_targets(kind: str, *names: str) -> list[Target]:
         chosen = ((name, PROBLEMS[name]) for name in names)
         return [
             Target(kind=kind, name=name, task=p.task, bounds=p.bounds, constraints=p.constraints) for name, p in chosen
         ]
 
-    def usual(kind: str, tasks: Mapping[str, Task]) -> list[Target]:
+    def usual_targets(kind: str, tasks: Mapping[str, Task]) -> list[Target]:
         return [Target(kind=kind, name=name, task=task) for name, task in tasks.items()]
 
-    def traced(points: ArrayLike) -> UntimedPath:
+    def untimed_path(points: ArrayLike) -> UntimedPath:
         return UntimedPath(path=TargetPath(points=np.asarray(points, dtype=float), closed=True))
 
     timed, smooth = curves(TIMED), curves(CURVE)
@@ -143,9 +143,9 @@ def _all() -> list[Target]:
     half = np.linspace(0.0, pi, 37)
     foot = np.column_stack([np.cos(half), 0.5 * np.sin(half)])
     return [
-        *published("timed", "ellipse-a", "ellipse-b", "ellipse-a-bounded"),
+        *published_targets("timed", "ellipse-a", "ellipse-b", "ellipse-a-bounded"),
         Target(kind="timed", name="vertical line", task=vertical, constraints=(FullTurn(), LargestLink(length=60.0))),
-        *usual(
+        *usual_targets(
             "timed",
             {
                 "18 points": TimedPath(points=EIGHTEEN, rotation=radians(20.0) * np.arange(18)),
@@ -154,19 +154,19 @@ def _all() -> list[Target]:
                 **{name: TimedPath(points=timed[name]) for name in ("bean", "teardrop", "eight")},
             },
         ),
-        *published("untimed", "path-a", "path-b"),
-        *usual("untimed", {name: traced(smooth[name]) for name in smooth}),
-        Target(kind="untimed", name="foot", task=traced(polygon_points(foot))),
-        *usual("polygonal", {name: traced(points) for name, points in POLYGONS.items()}),
+        *published_targets("untimed", "path-a", "path-b"),
+        *usual_targets("untimed", {name: untimed_path(smooth[name]) for name in smooth}),
+        Target(kind="untimed", name="foot", task=untimed_path(polygon_points(foot))),
+        *usual_targets("polygonal", {name: untimed_path(points) for name, points in POLYGONS.items()}),
         Target(
             kind="drawn",
             name="example",
             task=UntimedPath(path=TargetPath.from_file(HAND_DRAWN).smooth(CURVE)),
             constraints=(LargestLink(length=0.3), *USUAL),
         ),
-        *usual("drawn", {f"seed {seed}": UntimedPath(path=hand_drawn(seed)) for seed in range(1, 10)}),
-        *published("function", "rocker", "rocker-weighted"),
-        *usual(
+        *usual_targets("drawn", {f"seed {seed}": UntimedPath(path=hand_drawn(seed)) for seed in range(1, 10)}),
+        *published_targets("function", "rocker", "rocker-weighted"),
+        *usual_targets(
             "function",
             {
                 "sine": function_target(np.sin, 0.0, 0.5 * pi),

@@ -63,7 +63,7 @@ def print_error(text: str, style: str = "yellow") -> None:
     errors.print(escape_controls(text), style=style, markup=False, highlight=False, soft_wrap=True)
 
 
-def print_written(paths: Iterable[Path]) -> None:
+def print_paths(paths: Iterable[Path]) -> None:
     """Print the names of the files that were written."""
     for path in paths:
         say(f"wrote {path}")

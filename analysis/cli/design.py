@@ -23,7 +23,7 @@ from .common import (
     output_folder,
     plots_option,
     print_error,
-    print_written,
+    print_paths,
     report_errors,
     save_plot,
     set_option,
@@ -125,7 +125,9 @@ def print_best(best: Assessment) -> None:
     console.print(best.rounding, highlight=False, soft_wrap=True)
 
 
-def write_described(best: Assessment, folder: Path, title: str, *, curve: str, text: str, drawn: str) -> list[Path]:
+def write_description_files(
+    best: Assessment, folder: Path, title: str, *, curve: str, text: str, drawn: str
+) -> list[Path]:
     """Write curve, report and drawing (DXF and SVG) of a solution to files with these stems; return the paths."""
     from ..files import save_drawing, write_text
     from ..synthesis import drawing
@@ -157,7 +159,7 @@ def write_solution(
     from ..run import save_parameters
     from ..synthesis import plates
 
-    written = write_described(best, folder, title, curve="best-curve", text="best-report", drawn="best")
+    written = write_description_files(best, folder, title, curve="best-curve", text="best-report", drawn="best")
     solution = best.solution
     linkage = solution.linkage
     if linkage.kind == "four-bar":
@@ -256,7 +258,7 @@ def synthesize(
     written += write_solution(best, folder, chosen.title, make=chosen.make, plots=plots, animate=animate)
     written += write_linkages(result.solutions, folder, chosen.title, make=chosen.make)
     written += save_plot(plots, result, folder / "alternatives.png", title=chosen.title)
-    print_written(written)
+    print_paths(written)
     if best.poor:
         print_error(f"note: {best.poor}")
     if not result.best.verdicts.sound:
@@ -267,7 +269,7 @@ def synthesize(
     except TradeOffInterrupted as error:
         traded, stopped = error.trade_off, error
     if traded is not None:
-        print_written(_trade_off(traded, chosen.title, folder, plots))
+        print_paths(_trade_off(traded, chosen.title, folder, plots))
     leave_if_stopped(stopped, "what there is is kept")
 
 

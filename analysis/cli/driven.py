@@ -22,7 +22,7 @@ from .common import (
     chosen_case,
     out_option,
     print_error,
-    print_written,
+    print_paths,
     quantity,
     report_errors,
 )
@@ -78,7 +78,7 @@ class CaseChoice:
 
     def finish(self, written: Sequence[Path], problems: Sequence[str], *, interrupted: bool = False) -> None:
         """Report written files and problems; exit with an error code if there are problems or the command was interrupted."""
-        print_written(written)
+        print_paths(written)
         for problem in problems:
             print_error(f"note: {problem}")
         if interrupted or problems:

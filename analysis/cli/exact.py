@@ -16,12 +16,12 @@ from .common import (
     output_folder,
     plots_option,
     print_error,
-    print_written,
+    print_paths,
     report_errors,
     save_plot,
     set_option,
 )
-from .design import print_best, print_solutions, read_overrides, write_described, write_linkages
+from .design import print_best, print_solutions, read_overrides, write_description_files, write_linkages
 
 
 @click.command()
@@ -78,7 +78,7 @@ def exact(case: str, settings: Sequence[str], crank_phase: str | None, count: in
         if best.verdicts.sound:
             assessment = assess(best)
             print_best(assessment)
-            written += write_described(
+            written += write_description_files(
                 assessment, folder, chosen.title, curve="best-curve", text="best-report", drawn="best"
             )
             written += write_linkages(found.solutions, folder, chosen.title, make=chosen.make)
@@ -86,7 +86,7 @@ def exact(case: str, settings: Sequence[str], crank_phase: str | None, count: in
         written += save_plot(plots, found, folder / "poses.png", title=chosen.title)
     if found.solutions:
         written += save_plot(plots, found.solutions[0], folder / "best-linkage.png", title=chosen.title)
-    print_written(written)
+    print_paths(written)
     if not any(s.verdicts.sound for s in found.solutions):
         print_error(f"note: {found.describe()}")
         sys.exit(ENDED_EARLY)

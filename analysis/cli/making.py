@@ -66,7 +66,7 @@ def build(
       linkwork build --kinds native,native-fmi3 --platforms all
       linkwork build press.toml
     """
-    from ..export import KINDS, build_all, kinds_here
+    from ..export import KINDS, available_kinds, build_all
     from ..linkages import load_linkage
 
     models = [load_linkage(name).fmu if Path(name).suffix in (".toml", ".json") else name for name in models]
@@ -74,7 +74,7 @@ def build(
         for fmu, for_platforms in build_all(models, dest, kinds, platforms, publish_to=publish):
             made = f", {' '.join(for_platforms)}" if for_platforms else ""
             say(f"{fmu}: valid, {fmu.stat().st_size / 1024:.0f} KiB{made}")
-    if not kinds and set(kinds_here()) != set(KINDS):
+    if not kinds and set(available_kinds()) != set(KINDS):
         print_error(f"note: no native FMUs, which Zig compiles: {MissingLibraryError('ziglang')}")
 
 

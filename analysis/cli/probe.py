@@ -17,7 +17,7 @@ from .common import (
     console,
     force_option,
     print_error,
-    print_written,
+    print_paths,
     report_errors,
     say,
     show_table,
@@ -101,7 +101,7 @@ def probe(
             )  # fmt: skip
         findings = report.findings
         if out is not None:
-            print_written([_write(report, Path(out))])
+            print_paths([_write(report, Path(out))])
         rows = [(o.check, o.interface, str(o.cases), str(o.calls), f"{o.seconds:.1f}", o.said) for o in report.outcomes]
         show_table(
             f"Probe of {report.fmu}",
@@ -133,7 +133,7 @@ def _show(findings: Sequence[Finding]) -> None:
     rows = []
     for (severity, kind), members in kinds.items():
         about = (
-            members[0].text if len(members) == 1 else f"{kind}: {', '.join(dict.fromkeys(m.about for m in members))}"
+            members[0].text if len(members) == 1 else f"{kind}: {', '.join(dict.fromkeys(m.subject for m in members))}"
         )
         rows.append((severity, str(len(members)), about, members[0].replay))
     if rows:

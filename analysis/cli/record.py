@@ -9,7 +9,7 @@ import click
 import numpy as np
 
 from ..units import RAD_S_PER_RPM
-from .common import console, out_option, output_folder, plot_option, print_written, quantity, report_errors, show_table
+from .common import console, out_option, output_folder, plot_option, print_paths, quantity, report_errors, show_table
 
 
 @click.command()
@@ -83,7 +83,7 @@ def decrement(
     if plot:
         drawn = figures.plot(decay, (t[kept], x[kept]), unit=options["unit"], title=Path(record).name)
         written.append(save_figure(drawn, f"{stem}.png"))
-    print_written(written)
+    print_paths(written)
 
 
 def _result_rows(decay: Any, kg: float | None, metre: float | None, unit: str) -> list[tuple[str, float, float, str]]:

@@ -34,7 +34,7 @@ from .common import (
     output_folder,
     plot_option,
     print_error,
-    print_written,
+    print_paths,
     quantity,
     report_errors,
     say,
@@ -138,7 +138,7 @@ def run(
         written.append(save_figure(figures.plot(result, title=chosen.title), f"{stem}.png"))
     _print_extremes(chosen.title, result)
     say(describe_masses(chosen.masses)[0])
-    print_written(written)
+    print_paths(written)
     if fmu is not None and interface in (None, "co-simulation") and not chosen.inputs.held_exactly:
         print_error(
             f"note: inputs that vary over a step are sampled and held over it ({chosen.step:.3g} s), as any master does; "

@@ -20,13 +20,13 @@ from .common import (
     console,
     output_folder,
     print_error,
-    print_written,
+    print_paths,
     report_errors,
     save_plot,
     set_option,
     show_table,
 )
-from .design import leave_if_stopped, read_overrides, search_options, write_described, write_linkages
+from .design import leave_if_stopped, read_overrides, search_options, write_description_files, write_linkages
 
 if TYPE_CHECKING:
     from ..numerics.fourier import FourierSeries
@@ -85,7 +85,7 @@ def slider_motion(
     elif isinstance(pivot, SliderMotion):
         turn = np.linspace(0.0, 2.0 * np.pi, 720, endpoint=False)
         written.append(write_csv(folder / "motion.csv", _motion_columns(pivot.series, turn)))
-    print_written(written)
+    print_paths(written)
     leave_if_stopped(stopped, "the best so far is kept")
 
 
@@ -172,7 +172,7 @@ def _write_solution(solution: Solution, folder: Path, case: SliderCase, plots: b
     title, make = case.synthesis.title, case.synthesis.make
     if case.drive is not None:
         make = replace(make, speed=case.drive.speed)
-    written = write_described(assess(solution), folder, title, curve="curve", text="report", drawn="linkage")
+    written = write_description_files(assess(solution), folder, title, curve="curve", text="report", drawn="linkage")
     written += write_linkages([solution], folder, title, make=make)
     return written + save_plot(plots, solution, folder / "linkage.png", title=title)
 

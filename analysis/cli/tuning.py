@@ -18,7 +18,7 @@ from .common import (
     output_folder,
     plot_option,
     print_error,
-    print_written,
+    print_paths,
     report_errors,
     save_plot,
     say,
@@ -71,7 +71,7 @@ def tune(case: str, settings: Sequence[str], as_json: bool, plot: bool, out: str
     ]
     written += save_plot(plot, tuned, f"{stem}.png", title=chosen.title)
     if not as_json:
-        print_written(written)
+        print_paths(written)
     for sentence in tuned.missed:
         print_error(f"note: {sentence}")
     if not tuned.met:

@@ -19,7 +19,7 @@ from .common import (
     output_folder,
     plot_option,
     print_error,
-    print_written,
+    print_paths,
     quantity,
     save_picture,
     say,
@@ -369,9 +369,9 @@ def stability(
         return
     stem = output_folder(chosen.folder) / f"{chosen.stem}-stability"
 
-    def picture_first(found: Any) -> None:
+    def write_first_picture(found: Any) -> None:
         """Write the picture of the grid without its boundaries, which take longer."""
-        print_written(save_picture(figures.picture(found, title=chosen.case.title), stem, html=html))
+        print_paths(save_picture(figures.picture(found, title=chosen.case.title), stem, html=html))
         say("its boundaries follow; after Ctrl-C the picture stays without them")
 
     found = stability_chart(
@@ -385,7 +385,7 @@ def stability(
         coexisting=coexisting,
         n_jobs=jobs,
         progress=console.is_terminal,
-        first=picture_first,
+        first=write_first_picture,
     )
     _print_regions(found)
     _print_runs(found)

@@ -19,7 +19,7 @@ _MAKERS = {"python": ("pythonfmu", "fmpy"), "native": ("casadi", "ziglang", "fmp
 
 
 def add_bill(name: str, entries: Mapping[str, bytes], *, native: bool, fmi: int) -> dict[str, bytes]:
-    """Return the files of an FMU with their bill of materials.
+    """Add the bill of materials to the files of an FMU; return all files by path.
 
     Parameters
     ----------

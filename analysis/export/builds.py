@@ -26,7 +26,7 @@ class BuiltFmu(NamedTuple):
     platforms: tuple[str, ...]
 
 
-def kinds_here() -> tuple[str, ...]:
+def available_kinds() -> tuple[str, ...]:
     """Return the kinds of FMU that can be built here: without Zig only those in Python."""
     zig = importlib.util.find_spec("ziglang") is not None
     return tuple(name for name, kind in KINDS.items() if zig or kind is PYTHON)
@@ -76,7 +76,7 @@ def build_all(
         for name in names:
             if name not in there:
                 raise unknown_name(name, there, f"{what} {name!r}")
-    chosen = [KINDS[name] for name in kinds or kinds_here()]
+    chosen = [KINDS[name] for name in kinds or available_kinds()]
     here = this_platform() if any(kind is not PYTHON for kind in chosen) else ""
     every = [*PLATFORMS, *(name for name in platforms if name == WASM)]
     asked = tuple(every) if ALL in platforms else tuple(platforms) or (here,)

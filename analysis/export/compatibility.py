@@ -57,7 +57,7 @@ def publish(mechanism: Mechanism, kind: Kind, fmu: Path, folder: Path | str) -> 
     }
     for suffix, text in written.items():
         (place / f"{fmu.stem}{suffix}").write_text(text, encoding="utf-8")
-    (place / "Readme.txt").write_text(write_readme(mechanism, kind), encoding="utf-8")
+    (place / "Readme.txt").write_text(readme_text(mechanism, kind), encoding="utf-8")
     run_trial(place / fmu.name, _COMPARISON, *map(str, (start, stop, step, RELATIVE, ABSOLUTE)))
     return place
 
@@ -110,7 +110,7 @@ def format_csv(names: Sequence[str], rows: Sequence[Sequence[float]]) -> str:
 
 
 def format_options(mechanism: Mechanism) -> str:
-    """Return the options of the reference and the tolerance for an importer."""
+    """Format the options of the reference and the tolerances for an importer, as lines of comma-separated values."""
     start, stop, step, _ = mechanism.experiment
     values: Mapping[str, float | str] = {
         "StartTime": start,
@@ -124,7 +124,7 @@ def format_options(mechanism: Mechanism) -> str:
     return "".join(f"{name}, {value}\n" for name, value in values.items())
 
 
-def write_readme(mechanism: Mechanism, kind: Kind) -> str:
+def readme_text(mechanism: Mechanism, kind: Kind) -> str:
     """Return a text on the FMU, the parts of FMI that it tests, and its importers."""
     features = {
         2: "saved and serialised states, directional derivatives, derivatives of inputs and outputs over time, a state event",

@@ -206,13 +206,13 @@ def _state_slope(mechanism: Mechanism, trace: equations.TracedEquations, rates: 
         if channel.kind == "command":
             moving[number] = rates[n + channel.freedom]
 
-    def along(change: Any) -> Any:
+    def apply_jump(change: Any) -> Any:
         return casadi.jtimes(trace.jump, casadi.vertcat(s.x, s.u), casadi.vertcat(change, moving))
 
     free = casadi.diag(casadi.jacobian(trace.jump, s.x))[n : 2 * n]  # 1 for a freedom that nothing commands, else 0
     kept = casadi.vertcat(rates[: 2 * n], 0.0, 0.0)
-    result = casadi.vertcat(rates[:n], rates[n : 2 * n] - free * (along(kept) - kept)[n : 2 * n], 0.0, 0.0)
-    return casadi.vertcat(result[: 2 * n], (rates - along(result))[2 * n :])
+    result = casadi.vertcat(rates[:n], rates[n : 2 * n] - free * (apply_jump(kept) - kept)[n : 2 * n], 0.0, 0.0)
+    return casadi.vertcat(result[: 2 * n], (rates - apply_jump(result))[2 * n :])
 
 
 def _with_solution(

@@ -105,7 +105,7 @@ class {name}(LinkworkSlave):
 """
 
 
-class _Staged(NamedTuple):
+class _StagedFiles(NamedTuple):
     """Files inside an FMU: script of its slave, package of the plant, module that all slaves share; name of the mechanism."""
 
     script: Path
@@ -114,7 +114,7 @@ class _Staged(NamedTuple):
     mechanism: str
 
 
-def _stage(mechanism: Mechanism, sources: Path, stage: Path) -> _Staged:
+def _stage(mechanism: Mechanism, sources: Path, stage: Path) -> _StagedFiles:
     """Copy plant and slave under names with a hash of their content; a mechanism of another package is put into the plant's."""
     shared = sources / "linkwork"
     package = str(mechanism.modules[-1].__package__)
@@ -141,7 +141,7 @@ def _stage(mechanism: Mechanism, sources: Path, stage: Path) -> _Staged:
         target = stage.joinpath(f"linkwork_{tag}", *parts[1:]) if inside else stage / f"{Path(name).stem}_{tag}.py"
         target.parent.mkdir(parents=True, exist_ok=True)
         target.write_text(text, encoding="utf-8")
-    return _Staged(
+    return _StagedFiles(
         stage / f"{folder}_slave_{tag}.py",
         stage / f"linkwork_{tag}",
         stage / f"slave_{tag}.py",
@@ -149,7 +149,7 @@ def _stage(mechanism: Mechanism, sources: Path, stage: Path) -> _Staged:
     )
 
 
-def _describe(staged: _Staged) -> bytes:
+def _describe(staged: _StagedFiles) -> bytes:
     """Return the model description of the staged files, not of the modules imported here, and give its slave the GUID."""
     sys.path.insert(0, str(staged.script.parent))
     mechanism = import_module(staged.mechanism).MECHANISM

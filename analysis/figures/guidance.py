@@ -57,7 +57,7 @@ def plot_guidance(found: Guidance, *, title: str = "") -> Figure:
         _draw_poses(poses, found, numbered=True)
         poses.margins(0.15)
         poses.set_title("the poses: a long arm along the body, a short one across")
-        _to_scale(poses)
+        _set_equal_scale(poses)
         _draw_poses(axis, found)
         for dyad, colour in zip(found.dyads, COLOURS):
             x, y = _parts(MM_PER_METRE * np.array([dyad.pivot, dyad.point], dtype=complex))
@@ -65,7 +65,7 @@ def plot_guidance(found: Guidance, *, title: str = "") -> Figure:
             axis.plot(x[0], y[0], "^", markersize=7.0, zorder=5, color=colour)
             axis.plot(x[1], y[1], "o", markersize=DOT, zorder=5, color=colour, markerfacecolor="white")
         axis.set_title("links between a fixed pivot (triangle)\nand a point of the body (circle), in pose 1")
-        _to_scale(axis)
+        _set_equal_scale(axis)
         if rows:
             panels = parts[1].subplots(rows, columns, squeeze=False).ravel()
             for panel, (number, solution) in zip(panels, enumerate(found.solutions, start=1)):
@@ -197,7 +197,7 @@ def _verdict(solution: Solution) -> str:
     return f"{v.grashof}\n" + (f"defects: {wrong}" if wrong else f"sound, {angle:.0f} deg from a dead centre")
 
 
-def _to_scale(axis: Axes) -> None:
+def _set_equal_scale(axis: Axes) -> None:
     axis.set_aspect("equal", adjustable="datalim")
     axis.set_xlabel("x [mm]")
     axis.set_ylabel("y [mm]")

@@ -71,7 +71,7 @@ def _output_over_turn(turn: Turn, name: str) -> np.ndarray:
 
 
 def _multipliers(orbit: PeriodicOrbit) -> Panel:
-    """Return the panel of the Floquet multipliers and the unit circle; multipliers outside of it mean growing deviations."""
+    """Return the panel of the Floquet multipliers and the unit circle; a multiplier outside the circle means instability."""
     circle = np.exp(1j * np.linspace(0.0, 2.0 * np.pi, 181))
     return Panel(
         x_label="real part",

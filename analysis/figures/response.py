@@ -374,7 +374,7 @@ class _Approximation:
 def _evaluate_approximations(
     branches: Sequence[Branch], beside: Callable[[FloatArray], Mapping[str, FloatArray]]
 ) -> list[_Approximation]:
-    """Evaluate the approximations at stable motions of one turn, and evenly over the range of the parameter."""
+    """Evaluate the approximations at stable motions of one crank turn, and evenly over the range of the parameter."""
     chosen = [(branch, _comparison_points(branch)) for branch in branches if branch.periods == 1]
     every = np.concatenate([branch.parameter for branch, _ in chosen])
     spread = np.linspace(every.min(), every.max(), _BESIDE)
@@ -483,7 +483,7 @@ def _harmonics(branches: Sequence[Branch], look: _Scale, shades: Sequence[Shade]
 def _without_overlaps(letters: Sequence[Curve], width: float, ratio: float) -> list[Curve]:
     """Return letters without those that overlap others.
 
-    ``width`` is the range of the panel's x axis, ``ratio`` that of its logarithmic y axis.
+    ``width`` is the length of the panel's x axis, ``ratio`` the quotient of the ends of its logarithmic y axis.
     """
     points = 72.0 * 0.85 * np.array([_SIZE[0], 0.75 * _HARMONICS * _SIZE[1]]) / (width or 1.0, np.log(ratio))
     taken: list[FloatArray] = []

@@ -184,7 +184,7 @@ def random_inputs(rng: random.Random, run_model: Any, count: int) -> list[dict[V
 
 
 def step_size(model: Any) -> float:
-    """Return the step size of a run (s): that of the model, or a tenth of it if the probe integrates by Euler's method."""
+    """Return the step size of a run (s): the model's step, or a tenth of it for Euler's method in model exchange."""
     return float(model.step if model.interface == "cs" else model.step / 10)
 
 

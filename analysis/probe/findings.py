@@ -44,7 +44,7 @@ class Finding:
     count: int = 1
 
     @property
-    def about(self) -> str:
+    def subject(self) -> str:
         """Return the function, variable or folder concerned: the first part of the key after the interface."""
         return self.key.split(": ")[1] if self.key.count(": ") > 1 else ""
 

@@ -13,7 +13,7 @@ from typing import Any
 
 from linkwork.errors import InputError
 
-from ..export import KINDS, NATIVE, PLATFORMS, PYTHON, build, build_native, kinds_here, this_platform, with_starts
+from ..export import KINDS, NATIVE, PLATFORMS, PYTHON, available_kinds, build, build_native, this_platform, with_starts
 from ..files import Choice, Many, Quantity, Whole, entry, flag, read, text
 from ..mechanisms import find_mechanism
 from ..periodic import motor_parameters, steady_drive
@@ -106,7 +106,7 @@ def _run(case: Case, wanted: _Run) -> Answer:
         raise InputError(f"{wanted.rows} rows are more than {_ROWS}: ask for less")
     mechanism = find_mechanism(case.parameters)
     with folder() as place:
-        native = "native" in kinds_here()
+        native = "native" in available_kinds()
         fmu = build_native(mechanism, NATIVE, place) if native else build(mechanism, place)
         run = cosimulate(
             fmu,

@@ -136,7 +136,7 @@ def planar_loops(p: SliderCrankParameters, th: Array, s1: Array) -> Loops:
     """Return the start of the iteration: the planar slider-crank of section 2.6.2.
 
     The planar mechanism lies in the plane through the crank pin that is parallel to the common normal i and the guide. With
-    alpha4 = 270 deg and S1 = 0 it is that of the thesis, and exact.
+    alpha4 = 270 deg and S1 = 0 this is the thesis's planar slider-crank, and exact.
     """
     guide = about_i(-Dual(p.guide_twist, p.guide_offset))
     pin = (origin(_pin_frame(p, th, s1)) - origin(guide)) @ guide.real

@@ -243,10 +243,10 @@ def _read_values(values: Mapping[str, Any], units: Mapping[str, str], where: str
     for key in values:
         if key not in units:
             raise unknown_name(key, units, f"variable {key}, of {where}")
-    return {key: _in_unit(value, units[key], f"{where}.{key}") for key, value in values.items()}
+    return {key: _convert_to_unit(value, units[key], f"{where}.{key}") for key, value in values.items()}
 
 
-def _in_unit(value: Any, unit: str, name: str) -> float:
+def _convert_to_unit(value: Any, unit: str, name: str) -> float:
     # values with other than mechanical units, which controllers have, are given in SI
     return (
         quantity(value, unit, name) if not {"A", "N/(m.s)"} & set(UNITS.get(unit, {unit: 1})) else _number(value, name)

@@ -163,7 +163,7 @@ def test_an_fmu_of_others_is_probed(tmp_path):
     slave = Path(find_spec("pythonfmu").origin).parent / "tests" / "slaves" / "pythonslave.py"
     made = FmuBuilder.build_FMU(slave, dest=tmp_path)
     report = probe.probe(made, checks=["repeat", "split", "places", "legal"], calls=2000)
-    crashed = {finding.about for finding in report.with_severity(probe.CRASH)}
+    crashed = {finding.subject for finding in report.with_severity(probe.CRASH)}
     assert {"'Müller'", "'(a)'", "'100%'", "file:/path"} <= crashed
     assert "'with space'" not in crashed
     assert not [finding for finding in report.findings if "/repeat/" in finding.replay]
@@ -187,7 +187,7 @@ def test_a_reference_fmu_is_probed(tmp_path, name):
         fmu, checks=["starts", "repeat", "restore", "derivatives", "leaks", "forbidden"], calls=2000, hang=2.0
     )
     assert not [f for f in report.findings if "/forbidden/" not in f.replay]
-    crashed = " ".join(finding.about for finding in report.with_severity(probe.CRASH))
+    crashed = " ".join(finding.subject for finding in report.with_severity(probe.CRASH))
     assert "SerializeFMU" in crashed
 
 

@@ -13,7 +13,7 @@ from click.core import ParameterSource
 from linkwork.slider_crank.assembly import check_assembly
 
 from ... import slider_crank as sc
-from ..common import CHECK_FAILED, console, output_folder, print_error, print_written, say, show_table, tolerance_option
+from ..common import CHECK_FAILED, console, output_folder, print_error, print_paths, say, show_table, tolerance_option
 from .options import MechanismChoice, Problem, add_mechanism_options, out_option, problem_options
 
 
@@ -110,4 +110,4 @@ def _show_two_rotations(chosen: MechanismChoice, points: int, folder: Path) -> N
         f"{chosen.units.length(float(end.position_error.max()))}; the steps become small at {int(end.settled.sum())} of "
         f"{len(end.settled)} crank angles"
     )
-    print_written([write_csv(output_folder(folder) / f"{chosen.name}-two-rotations.csv", columns)])
+    print_paths([write_csv(output_folder(folder) / f"{chosen.name}-two-rotations.csv", columns)])

@@ -11,7 +11,7 @@ import numpy as np
 
 from ... import figures
 from ... import slider_crank as sc
-from ..common import output_folder, print_written, say, show_table
+from ..common import output_folder, print_paths, say, show_table
 from .options import (
     MechanismChoice,
     Problem,
@@ -73,7 +73,7 @@ def forces(chosen: MechanismChoice, problem: Problem, frames: Sequence[int], out
             title = f"{chosen.title}: joint forces in frame {frame}"
             figure = figures.plot(turn, frame, units=units.system, title=title)
             written.append(save_figure(figure, f"{stem}-frame-{frame}.png"))
-    print_written(written)
+    print_paths(written)
 
 
 def _extremes(turn: ForceTurn, frames: Sequence[int], units: Units) -> Sequence[Sequence[str]]:

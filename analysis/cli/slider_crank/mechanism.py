@@ -10,7 +10,7 @@ import click
 
 from ... import figures
 from ... import slider_crank as sc
-from ..common import console, print_written, quantity, say, show_table
+from ..common import console, print_paths, quantity, say, show_table
 from .options import MechanismChoice, add_mechanism_options, angle_text, out_option
 
 
@@ -114,4 +114,4 @@ def picture(
     if animate:
         with console.status(f"drawing {frames} pictures"):
             written.append(figures.animate(p, f"{stem}.gif", frames=frames, **seen))
-    print_written(written)
+    print_paths(written)

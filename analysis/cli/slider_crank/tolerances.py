@@ -13,7 +13,7 @@ from linkwork.errors import InputError
 
 from ... import figures
 from ... import slider_crank as sc
-from ..common import console, output_folder, print_written, quantity, show_table, workers_options
+from ..common import console, output_folder, print_paths, quantity, show_table, workers_options
 from .options import (
     MechanismChoice,
     Problem,
@@ -133,7 +133,7 @@ def tolerances(
                 found, name, at, units=units.system, title=f"{chosen.title}: {name.replace('.', ' ')}"
             )
             files.append(save_figure(figure, f"{stem}-tolerances-{name}.png"))
-    print_written(files)
+    print_paths(files)
 
 
 def _degrees(turn: ForceTurn, i: int) -> float:
