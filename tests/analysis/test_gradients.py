@@ -466,6 +466,6 @@ def test_the_greatest_value_is_found_wherever_in_a_panel_it_lies(panel: int, pla
     values = np.full((6, len(x)), -1.0)
     # above the others next to its place alone
     values[panel] = 0.1 - 20.0 * (x - place) ** 2
-    value, found = Variations.greatest(SimpleNamespace(h=np.ones(6)), values)  # type: ignore[arg-type]
+    value, found = Variations.greatest_value(SimpleNamespace(h=np.ones(6)), values)  # type: ignore[arg-type]
     assert (value, found.panel, found.position) == pytest.approx((0.1, panel, place), abs=1e-12)
     assert found.weights @ values[panel] == pytest.approx(value, abs=1e-12)

@@ -321,7 +321,7 @@ def test_a_full_disk_names_the_file_and_leaves_what_was_there(tmp_path, monkeypa
 
 
 def test_a_part_of_a_file_does_not_stay(tmp_path):
-    with pytest.raises(UnicodeEncodeError), paths.whole(tmp_path / "x") as part:
+    with pytest.raises(UnicodeEncodeError), paths.write_completely(tmp_path / "x") as part:
         part.write_text("half \ud800", encoding="utf-8")
     assert not list(tmp_path.iterdir())
 

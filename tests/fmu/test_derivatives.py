@@ -95,7 +95,7 @@ class Oracle:
         self.mechanism = mechanism
         trace = expressions(mechanism, bool(mechanism.switch))
         s = trace.symbols
-        own, state, p, x, *_ = equations_c.beginning(mechanism, s.modes, s.u)
+        own, state, p, x, *_ = equations_c.trace_start(mechanism, s.modes, s.u)
         rows = casadi.vertcat(trace.outputs, s.x, trace.derivative, trace.clearance)
         at = casadi.vertcat(s.x, s.u, s.p)
         run = [s.x, s.modes, s.u, s.p]
