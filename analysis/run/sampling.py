@@ -48,14 +48,17 @@ def sample(
     NotFiniteError
         If a channel is not a finite number.
     """
-    from .sources import channels
-
     x = np.ascontiguousarray(x)
     if ahead > t:
         release(encoded, x, laws)
     source = encoded.source._replace(laws=laws)
     u = np.zeros(len(encoded.mechanism.channels))
-    channels(t, ahead, left, x, source, encoded.commands, u, np.empty_like(u))
+    if source.is_constant:
+        u[source.places[:, 0]] = source.coefficients[0, :, 0]
+    else:
+        from .sources import channels  # compiled on its first call
+
+        channels(t, ahead, left, x, source, encoded.commands, u, np.empty_like(u))
     here = np.zeros_like(u)
     if any(chain.from_iterable(encoded.functions)):
         here = function_values(encoded, t, x)

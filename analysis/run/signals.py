@@ -278,3 +278,9 @@ class Source(NamedTuple):
     laws: NDArray[np.float64]
     law_places: NDArray[np.int64]
     functions: NDArray[np.int64]
+
+    @property
+    def is_constant(self) -> bool:
+        """Whether all signals are constant, apart from the users' functions, and no torque law acts."""
+        varies = self.coefficients[:, :, 1:].any() or len(self.harmonics) or self.laws[:, 2:4].any()
+        return len(self.coefficients) == 1 and not varies

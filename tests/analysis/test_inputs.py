@@ -14,7 +14,8 @@ from analysis.linkages import linkage
 from analysis.mechanisms import FIVE_BAR
 from analysis.run import Function, Harmonics, InductionMotor, Inputs, Piecewise, TorsionBar, ramp, steps, table
 from analysis.run.inputs import align, encode
-from analysis.run.sampling import release, sample
+from analysis.run.sampling import function_values, release, sample
+from analysis.run.sources import channels
 from linkwork.errors import InputError
 
 REST = np.zeros(4)
@@ -329,3 +330,28 @@ def test_another_mechanism_does_not_change_what_an_input_may_be() -> None:
         simulate("lone-cart", Inputs(speed=0.1, force=1.0), stop_time=0.1)
     run = simulate("lone-cart", Inputs(speed="100 mm/s"), stop_time=0.1)
     assert run["cart.position"][-1] == pytest.approx(0.01)
+
+
+@pytest.mark.parametrize(
+    ("inputs", "constant"),
+    [
+        (Inputs(speed=40.0, force=-3.0), True),
+        (Inputs(torque=2.0), True),
+        (Inputs(force=Function(lambda t, th2, u, w2, v: 5.0 * u)), True),
+        (Inputs(speed=ramp(0.0, 40.0, 0.0, 1.0)), False),
+        (Inputs(force=Harmonics(1.0, [2.0], [30.0], [0.0])), False),
+        (Inputs(torque=TorsionBar(torque=10.0, release_angle=2.0)), False),
+        (Inputs(torque=InductionMotor(breakdown_torque=10.0, breakdown_slip=0.2, synchronous_speed=50.0)), False),
+    ],
+)
+@pytest.mark.parametrize("ahead", [-inf, 0.35])
+def test_constant_inputs_are_those_of_the_compiled_code(inputs: Inputs, constant: bool, ahead: float) -> None:
+    """To the last bit; they are not sent there."""
+    encoded = encode(inputs, FIVE_BAR)
+    source, x = encoded.source, np.array([0.3, 0.002, 41.0, -0.1])
+    assert source.is_constant is constant
+    compiled = np.zeros(len(FIVE_BAR.channels))
+    channels(0.25, ahead, False, x, source, encoded.commands, compiled, np.empty_like(compiled))
+    if constant:
+        by_function = function_values(encoded, 0.25, x)
+        assert (sample(encoded, 0.25, x, source.laws, ahead=ahead) == compiled + by_function).all()
