@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict
 from functools import cache
-from math import floor, log10
+from math import ceil, floor, inf, log2, log10
 from typing import Any
 from xml.etree.ElementTree import Element, SubElement
 
@@ -25,6 +25,8 @@ from .description import layered_standard, to_xml_bytes
 
 #: Communication steps of an experiment, rows of its reference, and digits of its numbers.
 STEPS, ROWS, DIGITS = 100, 10, 12
+#: Greatest number of the plant's steps in a default experiment: more take plain Python seconds.
+LONGEST = 200
 #: Tolerances of the reference and of the experiment; the greatest relative difference that is allowed between them.
 REFERENCE, TOLERANCE, DIFFERENCE = 1e-12, 1e-10, 1e-6
 _SSV = "http://ssp-standard.org/SSP1/SystemStructureParameterValues"
@@ -37,19 +39,22 @@ _EXPERIMENTS = ("smoke-tests.exp", "application/x-ma-hs-experiments")
 def experiments(mechanism: Mechanism) -> dict[str, bytes]:
     """Return the files of a mechanism's experiments and their manifest, by their places in the archive.
 
-    An unregistered mechanism, or one without cases, has only its default experiment; if this meets the limit of assembly, it is
-    halved until it does not.
+    An unregistered mechanism, or one without cases, has only its default experiment; this is halved until it does not meet the
+    limit of assembly, and the plant takes at most `LONGEST` steps.
     """
     cases = standard_cases(mechanism) if mechanism.cases and mechanism.name in MECHANISMS else {}
     root = Element("Experiments", {"name": mechanism.fmu, "description": "Standard cases of Linkwork"})
     files: dict[str, bytes] = {}
 
-    def add(name: str, title: str, values: Mapping[str, Any], end: float, inputs: _Inputs) -> None:
+    def add(
+        name: str, title: str, values: Mapping[str, Any], end: float, inputs: _Inputs, longest: float = inf
+    ) -> None:
         start, step = mechanism.experiment[0], (end - mechanism.experiment[0]) / STEPS
-        stimuli, reference = _reference(mechanism, values, [start + n * step for n in range(STEPS + 1)], inputs)
+        times = [start + n * step for n in range(STEPS + 1)]
+        stimuli, reference = _reference(mechanism, values, times, inputs, longest)
         node = SubElement(root, "Experiment", {"name": name, "description": title, "tolerance": repr(TOLERANCE)})
-        times = {"startTime": start, "stopTime": end, "stepSize": step}
-        SubElement(node, "TransientSimulation", {key: repr(value) for key, value in times.items()})
+        span = {"startTime": start, "stopTime": end, "stepSize": step}
+        SubElement(node, "TransientSimulation", {key: repr(value) for key, value in span.items()})
         starts = {v.name: v.start for v in mechanism.variables if v.causality == "parameter"}
         changed = {key: value for key, value in values.items() if key in starts and value != starts[key]}
         if changed:
@@ -70,15 +75,18 @@ def experiments(mechanism: Mechanism) -> dict[str, bytes]:
     if not cases:
         starts = {v.name: v.start for v in mechanism.variables}
         constant = {name: float(starts[name]) for name in mechanism.input_names}
-        length, refused = mechanism.experiment[1] - mechanism.experiment[0], None
-        # an experiment that meets the limit of assembly is shortened
-        for halved in range(10):
-            end = mechanism.experiment[0] + length * 0.5**halved
+        start, end = mechanism.experiment[:2]
+        halved, refused = 0, None
+        while halved < 10:
             try:
-                add("default", "default experiment", starts, end, lambda number, outputs: constant)
+                now = start + (end - start) * 0.5**halved
+                longest = LONGEST if halved < 9 else inf
+                add("default", "default experiment", starts, now, lambda number, outputs: constant, longest)
                 break
+            except _TooLongError as error:
+                halved = max(halved + 1, ceil(log2((end - start) / (error.time - start))))
             except AssemblyError as error:
-                refused = refused or error
+                halved, refused = halved + 1, refused or error
         else:
             assert refused is not None
             raise refused
@@ -112,12 +120,20 @@ def _result_indices(mechanism: Mechanism) -> list[int]:
     return [n for n, name in enumerate(mechanism.output_names) if not name.endswith(".residual")]
 
 
+class _TooLongError(Exception):
+    """The plant has taken too many steps at a ``time`` (s)."""
+
+    def __init__(self, time: float) -> None:
+        self.time = time
+
+
 def _reference(
-    mechanism: Mechanism, values: Mapping[str, Any], times: Sequence[float], inputs: _Inputs
+    mechanism: Mechanism, values: Mapping[str, Any], times: Sequence[float], inputs: _Inputs, longest: float
 ) -> tuple[list[list[float]], list[list[float]]]:
     """Return the rows of inputs, one for each step, and `ROWS` rows of results; each row begins with the time.
 
-    Results are taken before the inputs of the next step are set.
+    Results are taken before the inputs of the next step are set. Raises `_TooLongError` after about ``longest`` steps of the
+    plant's solver.
     """
 
     def rounded_inputs(number: int, outputs: Sequence[float] | None) -> dict[str, float]:
@@ -130,8 +146,12 @@ def _reference(
     outputs = list(plant.outputs())
     places = _result_indices(mechanism)
     rows = [[times[0], *(outputs[place] for place in places)]]
+    taken = 0.0
     for n, time in enumerate(times[1:], start=1):
         plant.step(times[n - 1], time - times[n - 1])
+        taken += max(1.0, (time - times[n - 1]) / plant.next_step)
+        if taken > longest:
+            raise _TooLongError(time)
         outputs = list(plant.outputs())
         if n * ROWS % STEPS == 0:
             rows.append([time, *(outputs[place] for place in places)])

@@ -241,6 +241,11 @@ class Plant:
 
     # Steps
 
+    @property
+    def next_step(self) -> float:
+        """Step that the solver will try first in the next interval (s); 0 before the first one."""
+        return self._step_size
+
     def step(self, time: float, step: float) -> None:
         """Advance from ``time`` by ``step`` seconds under the inputs in force.
 

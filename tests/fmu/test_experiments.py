@@ -13,8 +13,10 @@ from click.testing import CliRunner, Result
 
 from analysis import cli
 from analysis.cli import CHECK_FAILED
+from analysis.export.experiments import experiments
 from analysis.mechanisms import MECHANISMS
 from analysis.run import EXPERIMENTS, MANIFEST, ExperimentError, verify
+from tests.mechanisms import pendulum
 
 from .models import MODELS, Changes, Model
 from .runner import run_in_process
@@ -71,6 +73,20 @@ def test_every_native_fmu_passes_its_own_experiments(natives: dict[str, Path]) -
         assert sum(file.compress_size for file in files) < 50_000
         # inputs that do not change stand at the start and at the end alone, below their names
         assert rows == ([3] if mechanism is None else [])
+
+
+def test_an_experiment_of_many_steps_is_shortened(monkeypatch: pytest.MonkeyPatch) -> None:
+    """So that a description with friction waits seconds for its FMU; nine halvings at most."""
+
+    def end(longest: float) -> float:
+        monkeypatch.setattr("analysis.export.experiments.LONGEST", longest)
+        files = experiments.__wrapped__(pendulum.MECHANISM)
+        root = ElementTree.fromstring(next(text for name, text in files.items() if name.endswith(".exp")))
+        return float(next(node.get("stopTime") for node in root.iter("TransientSimulation")))
+
+    whole = pendulum.MECHANISM.experiment[1]
+    assert end(1e6) == whole
+    assert end(60.0) == whole * 0.5**9
 
 
 @pytest.mark.slow
