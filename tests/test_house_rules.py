@@ -1,4 +1,4 @@
-"""Only `files` and the command line write files, beside a few modules that make files of their own kind."""
+"""Rules for all code of the package: which modules write files, and how functions are called."""
 
 from __future__ import annotations
 
@@ -38,3 +38,17 @@ def test_only_some_modules_write_files() -> None:
         if any(isinstance(node, ast.Call) and writes(node) for node in ast.walk(ast.parse(path.read_text("utf-8")))):
             found.add(place if place in WRITERS else place.partition("/")[0])
     assert found == set(WRITERS)
+
+
+#: What a name does not end in; those of CasADi, and a state, do.
+PREPOSITIONS = "of in on at by with from to for between under over into beside along after before through until within about"
+ALLOWED = {"get_n_in", "get_sparsity_in", "is_switched_on", "_is_switched_on"}
+
+
+def test_no_function_ends_in_a_preposition() -> None:
+    ends, found = tuple(f"_{word}" for word in PREPOSITIONS.split()), set()
+    for folder in ("analysis", "fmu_src", "benchmarks"):
+        for path in (PACKAGE.parent / folder).rglob("*.py"):
+            nodes = ast.walk(ast.parse(path.read_text("utf-8")))
+            found |= {node.name for node in nodes if isinstance(node, ast.FunctionDef) and node.name.endswith(ends)}
+    assert found == ALLOWED
