@@ -41,7 +41,9 @@ def test_only_some_modules_write_files() -> None:
 
 
 #: What a name does not end in; those of CasADi, and a state, do.
-PREPOSITIONS = "of in on at by with from to for between under over into beside along after before through until within about"
+PREPOSITIONS = (
+    "of in on at by with from to for between under over into beside along after before through until within about"
+)
 ALLOWED = {"get_n_in", "get_sparsity_in", "is_switched_on", "_is_switched_on"}
 
 

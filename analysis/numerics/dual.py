@@ -270,17 +270,17 @@ def apply(m: Any, a: Any) -> Dual:
 
 def about_i(angle: Any) -> Dual:
     """Return the matrix of a screw displacement about and along the i axis by a dual angle (eq 2)."""
-    return _about(angle, 0)
+    return _rotation_about_axis(angle, 0)
 
 
 def about_j(angle: Any) -> Dual:
     """Return the matrix of a screw displacement about and along the j axis by a dual angle."""
-    return _about(angle, 1)
+    return _rotation_about_axis(angle, 1)
 
 
 def about_k(angle: Any) -> Dual:
     """Return the matrix of a screw displacement about and along the k axis by a dual angle (eq 1)."""
-    return _about(angle, 2)
+    return _rotation_about_axis(angle, 2)
 
 
 def origin(m: Dual) -> Array:
@@ -288,7 +288,7 @@ def origin(m: Dual) -> Array:
     return _axial(m.dual @ np.swapaxes(m.real, -1, -2))
 
 
-def _about(angle: Any, axis: int) -> Dual:
+def _rotation_about_axis(angle: Any, axis: int) -> Dual:
     c, s = np.cos(dual(angle)), np.sin(dual(angle))
     i, j = (axis + 1) % 3, (axis + 2) % 3
     rows: list[list[Any]] = [[0.0] * 3 for _ in range(3)]

@@ -450,16 +450,16 @@ class PeakBeyond:
         self.group, self.level, self._share = group, level, side / wish.size
         self._wish, self._last = wish, spot
 
-    def _at(self, x: FloatArray) -> Gradient:
+    def _gradient(self, x: FloatArray) -> Gradient:
         place, spot = find_resonance(self._wish, x, self._last)
         self._last = spot
         return place
 
     def value(self, x: FloatArray) -> float:
-        return self._share * (self._at(x).value - self.level)
+        return self._share * (self._gradient(x).value - self.level)
 
     def slopes(self, x: FloatArray) -> FloatArray:
-        return self._share * self._at(x).by * self._wish.tolerance
+        return self._share * self._gradient(x).by * self._wish.tolerance
 
 
 def find_resonance(wish: Wish, x: FloatArray, near: Spot) -> tuple[Gradient, Spot]:
@@ -482,7 +482,7 @@ class OutputBelow:
         self._wish, self._last = wish, spot
         self._known: tuple[bytes, PickedMotion, Turn] | None = None
 
-    def _at(self, x: FloatArray) -> tuple[PickedMotion, Turn]:
+    def _motion_and_turn(self, x: FloatArray) -> tuple[PickedMotion, Turn]:
         """Find the motion with the greatest output by parabolas through the output at three levels."""
         if self._known is not None and self._known[0] == x.tobytes():
             return self._known[1:]
@@ -520,10 +520,10 @@ class OutputBelow:
         return found, value_at_angles(turn, self.limit, peak_angles(turn, self.limit, self.angles))
 
     def value(self, x: FloatArray) -> float:
-        return 1.0 - value_at_angles(self._at(x)[1], self.limit, self.angles) / float(self.limit.below)
+        return 1.0 - value_at_angles(self._motion_and_turn(x)[1], self.limit, self.angles) / float(self.limit.below)
 
     def slopes(self, x: FloatArray) -> FloatArray:
-        (found, turn), names = self._at(x), self._wish.mechanism.output_names
+        (found, turn), names = self._motion_and_turn(x), self._wish.mechanism.output_names
         total, parts = np.zeros(len(x)), self.limit.parts
         for angle, sign in zip(self.angles, (1.0, -1.0)):
             values = [float(series(turn, turn.oscillation(part))(angle)) for part in parts]
