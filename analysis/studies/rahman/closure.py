@@ -58,6 +58,11 @@ from .table import IDEAL, TWISTS_REACHED_DEG, Case
 
 #: Rows and columns of the entries 21, 31 and 32, the right sides of eqs 20.
 _BELOW = ([1, 2, 2], [0, 0, 1])
+#: Runs that do not settle, one for each offset of L1121.
+UNSETTLED = tuple(
+    Case(f"a4 = {a4:g} in at S1 = {shift:g} in", a4, shift, IDEAL.twist_deg)
+    for a4, shift in ((0.0, 2.5), (10.0, 6.0), (20.0, 7.0), (30.0, 11.0))
+)
 #: Differential operator of a rotation about k, eqs 2a and 3a.
 _ABOUT = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 0.0]])
 
@@ -400,9 +405,28 @@ def _system(case: Case, unknowns: FloatArray) -> tuple[FloatArray, FloatArray]:
 
 
 def _condition(case: Case) -> float:
-    """Return A's least singular value relative to its greatest where the iteration ends, least over the turn."""
-    singular = np.linalg.svd(_system(case, followed(case).unknowns[:, 0])[0], compute_uv=False)
-    return float(np.min(singular[:, -1] / singular[:, 0]))
+    """Return A's least singular value relative to its greatest, least over the corrections of a turn.
+
+    The corrections are those of `turn`, up to the first angle at which they do not become small.
+    """
+    p, shift, unit = (
+        parameters(case.offset_in, case.twist_deg),
+        np.array([case.shift_in * INCH]),
+        np.array([1.0] * 4 + [INCH]),
+    )
+    unknowns, least = planar(p, np.radians(GRID_DEG[:1])), np.inf
+    for angle in np.radians(GRID_DEG):
+        for _ in range(MAX_STEPS):
+            matrix, right = equations(*chain(p, np.array([angle]), shift, unknowns), INCH, "printed")
+            singular = np.linalg.svd(matrix[0], compute_uv=False)
+            least = min(least, float(singular[-1] / singular[0]))
+            step = np.linalg.pinv(matrix[0]) @ right[0]
+            unknowns = unknowns + step * unit
+            if np.abs(step).max() <= STEP:
+                break
+        else:
+            break
+    return least
 
 
 def _first_correction(case: Case) -> tuple[float, float]:
@@ -461,6 +485,7 @@ def closure() -> StudyResult:
     outside = np.concatenate([_steps_from_near(case) for case in OPEN])
     (settled, on_it), (settled_out, _) = _poor_starts(planes), _poor_starts(OPEN)
     within = "; ".join(case.name for case in OPEN)
+    failing = "; ".join(case.name for case in UNSETTLED)
     conclusions = text("section 3.3, L1131")
     statements = (
         Statement(
@@ -518,10 +543,11 @@ def closure() -> StudyResult:
             "by Hall, Root & Sandgren (1977). This algorithm is the combination of Davidon-Fletcher-Powell optimization "
             "routine with the Newton-Raphson method as applied to kinematics by Uicker, Denavit and Hartenberg (1964).",
             text("section 2.6.1, L366; abstract, L45"),
-            why="the thesis prints the Newton-Raphson half alone (eqs 7 to 26), and its program is missing. As we read the "
-            "reference, a step by eq 23a is taken where it halves the sum of squares of eq 25, and a step of Davidon, Fletcher "
-            "and Powell down that sum where it does not. It leaves a rotation round the loop and an error of S4, greatest of "
-            f"the turn, of {', '.join(combined)}. Out of the plane the loop of eqs 2 and 3 cannot close (erratum 1)",
+            why="the thesis prints the Newton-Raphson half alone (eqs 7 to 26), and its program is missing. The reference "
+            "was not at hand; ours: a step by eq 23a is taken where it halves the sum of squares of eq 25, and a step of "
+            "Davidon, Fletcher and Powell down that sum where it does not. It leaves a rotation round the loop and an error of "
+            f"S4, greatest of the turn, of {', '.join(combined)}. Out of the plane the loop of eqs 2 and 3 cannot close "
+            "(erratum 1)",
         ),
         Statement(
             "So from equation (19a) nine dual equations can be written from this matrix equation, out of which only three are "
@@ -556,16 +582,17 @@ def closure() -> StudyResult:
             "Hence the modified form of equation (23) is as follows: [Delta = (A'A)^-1 A'V] which is exactly same as [Delta = "
             "A^-1 V].",
             text("section 2.6.1, eq 23a, L457-463"),
-            "difference of the two sides, A^-1 being the name that L457 gives to (A'A)^-1 A'; whether Delta so found solves eq "
-            "23, A Delta = V, as it would by an inverse of A: greatest entry of A Delta - V; each at the first correction from "
-            "the angle before, greatest of the turn, lengths in inches",
+            "difference of the two sides, A^-1 being the name that L457 gives to (A'A)^-1 A'; *form of equation (23)* is read, "
+            "by us, as meeting it, A Delta = V, as Delta would by an inverse of A: greatest entry of A Delta - V; each at the "
+            "first correction from the angle before, greatest of the turn, lengths in inches",
             ROUNDING,
             (
                 nothing("the two sides, with A^-1 as L457 has it", by_name.max()),
                 *(nothing(f"as a form of eq 23; {case.name}", entry) for case, entry in zip((PLANE, *OPEN), unmet)),
             ),
             "the same by the name that L457 gives; six rows for five unknowns: in the plane eq 23 is met only once the loop is "
-            "closed, out of it never (erratum 1)",
+            f"closed, before that to second order in the step of the crank, here {STEP_DEG:g} deg, ours; out of it never "
+            "(erratum 1)",
         ),
         Statement(
             "The iterative process is continued until the absolute values of all error terms are less than or equal "
@@ -626,8 +653,8 @@ def closure() -> StudyResult:
             "Another great disadvantage is that matrix A may become singular. Fortunately it never happened while "
             "running the program.",
             conclusions,
-            "least singular value of A relative to its greatest, lengths in inches, where the iteration ends, least of the "
-            "turn",
+            "least singular value of A relative to its greatest, lengths in inches, at every correction, least of the turn; "
+            "runs that do not settle, which the thesis made too (L1121), up to the angle at which they do not",
             ROUNDING,
             (
                 nothing(
@@ -635,7 +662,9 @@ def closure() -> StudyResult:
                     _right_angle_condition(),
                 ),
                 *(at_least(f"never: {full_name(case)}", NOTHING, _condition(case)) for case in (IDEAL, *ALL)),
+                at_least(f"never, though not settling: {failing}", NOTHING, min(map(_condition, UNSETTLED))),
             ),
+            "in the runs that do not settle its size depends on rounding",
         ),
     )
     return StudyResult(

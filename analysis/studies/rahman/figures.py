@@ -68,7 +68,7 @@ its forces agree with Newton and Euler.
 Out of the plane the method fails at its root. A ball joint has three rotations, and eqs 2 and 3 give it two (erratum 1):
 the chain has one freedom, so that crank angle and shift cannot both be given. The iteration stops where its steps become
 small, on loops that are open by up to 38 deg, with the slider wrong by up to 6 in; with Davidon, Fletcher and Powell's
-steps, which the thesis names and does not print, as we read them, it ends on other loops, which are open as well. The limits
+steps, which the thesis names and does not print, joined in our way, it ends on other loops, which are open as well. The limits
 of S1 and alpha4 within which "the program converges" are, but for a4 = 20 in, those of this iteration. The mechanism works
 far beyond them, and its greatest shift falls with the offset, where the thesis infers that it rises. The axial force on the
 crank, which the thesis puts to zero, is an unknown (erratum 7), so that 2F2k is not zero and the bearing moments 1T1i and

@@ -279,7 +279,8 @@ def _momenta() -> tuple[Statement, ...]:
             "equations are obtained respectively:",
             text("section 2.8, eqs 54 to 56, L754-846"),
             "difference from the rates of eqs 49a to 51a, the last with cos eta3 for cos theta3, in a general position "
-            f"{AT_RATES}, g3 = {G3:g} in; {DOTS}, as are one bracket inside 56d and one inside 56e, and the last of 56c to 56f",
+            f"{AT_RATES}, g3 = {G3:g} in; {DOTS}; so may the brackets that are added, one inside 56d, one inside 56e, and the "
+            "last of 56c to 56f",
             ROUNDING,
             tuple(nothing(label, difference(rate, turned(h)), "lb") for label, (rate, h) in forward.items()),
             "56 has cos eta3 where 51a has cos theta3 (erratum 9)",

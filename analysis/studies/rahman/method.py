@@ -41,7 +41,7 @@ AWAY = f"where theta2 is over {ABOUT_DEG:g} deg from 0 and half a turn, the rule
 #: Motion in which second rates are judged: the crank accelerates (rad/s2), the shift has a rate (in/s) and accelerates (in/s2).
 MOVING = CRANK_AT_SPEED._replace(shift_rate=1.3, acceleration=3.0, shift_acceleration=0.7)
 AT_RATES = "with S1' = 1.3 in/s, theta1'' = 3 rad/s2 and S1'' = 0.7 in/s2"
-DOTS = "second dots lost in the scan are restored"
+DOTS = "where a second rate has one dot in our scan, two are read; the print may have them"
 #: Words on a slip of one character.
 MAYBE = "so in our scan; the print may be right"
 #: Step of difference quotients, and their largest relative error.

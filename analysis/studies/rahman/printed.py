@@ -1,7 +1,7 @@
 """Rahman's equations as printed, in pounds, inches and seconds: the iteration of section 2.6.1, and eqs 37 to 43, 46 to 69.
 
-They are kept to the letter with their errors, to be compared with correct values; second dots that the scan has lost are
-restored: each term of a second rate has one second rate or two first ones. A switch ``erratum_N`` mends the erratum of
+They are kept to the letter with their errors, to be compared with correct values; where a second rate has one dot in our scan,
+two are read: each term of a second rate has one second rate or two first ones. A switch ``erratum_N`` mends the erratum of
 that number in docs/rahman.md. The suffix ``_t`` of an angle's name is its rate, ``_tt`` its second rate.
 """
 
@@ -74,9 +74,9 @@ def turn(p: SliderCrankParameters, shift_in: ArrayLike, rows: Rows = "printed", 
 
 
 def dependable(p: SliderCrankParameters, shift_in: float) -> tuple[FloatArray, FloatArray, bool]:
-    """Close the loop at every other angle by Newton-Raphson and Davidon-Fletcher-Powell steps, as in reference 12.
+    """Close the loop at every other angle by Newton-Raphson and Davidon-Fletcher-Powell steps, joined in our way.
 
-    The thesis prints the Newton-Raphson steps only (eqs 7 to 26). As we read the reference, a step by eq 23a is taken if it
+    The thesis prints the Newton-Raphson steps only (eqs 7 to 26). Reference 12 was not at hand. A step by eq 23a is taken if it
     halves the sum of squares of eq 25, lengths in inches; otherwise a Davidon-Fletcher-Powell step reduces that sum. The start
     is the planar estimate, then the solution at the previous angle. Returns the rotation by which the loop is open (deg) and
     the error of S4 (in) at each angle, and whether the last step was small at every angle.

@@ -29,7 +29,6 @@ from .method import (
     AT_RATES,
     AWAY,
     CLEAR_SINE,
-    DOTS,
     MAYBE,
     MOVING,
     PLANE,
@@ -225,9 +224,9 @@ def _printed_rates() -> tuple[Statement, ...]:
             "equations (38) through (42) with respect to time. Hence the five acceleration equations are as follows:",
             text("section 2.8, eqs 38a to 42a, L1035-1045"),
             "greatest difference from the rates of eqs 39 to 43, which this sentence calls 38 to 42, in a general position "
-            f"{AT_RATES}; {DOTS}",
+            f"{AT_RATES}; S1'' has one dot in our scan, once in each equation: two are read, and the print may have them",
             ROUNDING,
-            (nothing("eqs 38a to 42a", rough, "rad/s2"),),
+            (nothing("eqs 38a to 42a", rough, "rad/s2 or in/s2"),),
             "as a derivative; 38a is the rate of eq 39 as printed and has its erratum 4. That accelerations enter 69a to 69q, "
             "by f1, f2 and f3, is plain",
         ),

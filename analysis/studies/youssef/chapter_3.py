@@ -73,6 +73,8 @@ SAMPLES_PER_DRIFT_TURN = 120
 NEAR_LINEAR = (5e5, 1e6)
 #: Turns of the transient, as the thesis has it, and last of the turns over which the drift is compared with a line.
 TRANSIENT_TURNS, DRAWN_TURNS = 2, 10
+#: Fewest turns that show the motion after the transient: two more.
+FEWEST_TURNS = TRANSIENT_TURNS + 2
 
 TURNS, ANGLE = "turns of the crank [1]", "crank angle [deg]"
 DAMPING_LEGEND, STIFFNESS_LEGEND = r"damping $\mu$ [dyn s/cm]", "stiffness k [dyn/cm]"
@@ -181,6 +183,13 @@ def drift_result() -> StudyResult:
     """Compute the drift with the five dampers, its departure from a line, and when the links become collinear."""
     runs = {mu: drift(mu) for mu in DAMPINGS}
     accelerates = "the drift accelerates, and the swing about it grows"
+    none = at_least(
+        f"{_mu(DAMPINGS[0])}, cycles until collinear",
+        FEWEST_TURNS,
+        runs[DAMPINGS[0]].collinear_turn,
+        "cycles",
+        why="there is no second region",
+    )
     shapes = [at_most(_mu(mu), ALIKE, run.unsteadiest, why=accelerates) for mu, run in runs.items() if mu > DAMPINGS[0]]
     bends = [at_most(_mu(mu), ALIKE, run.bend, why=accelerates) for mu, run in runs.items() if mu > DAMPINGS[0]]
     folds = {mu: run.collinear_turn for mu, run in runs.items()}
@@ -217,8 +226,8 @@ def drift_result() -> StudyResult:
                 "greatest change from a cycle to the next, relative to its range, of the motion less the line from end to end "
                 f"of the cycle; from the third cycle on, over {DRAWN_TURNS} cycles, ours, or until the links are collinear, as "
                 "with the weakest damper they are in the third; the drift is judged in the next row",
-                ALIKE_WORDS,
-                tuple(shapes),
+                f"{ALIKE_WORDS}; {FEWEST_TURNS} cycles, two of the transient and two to compare",
+                (none, *shapes),
             ),
             Statement(
                 "The drift is linear with crank angle and may be described by the equation u = M[.theta2 + u0] where [M] and "
@@ -226,10 +235,12 @@ def drift_result() -> StudyResult:
                 text("3.2.1, L1911-1917"),
                 f"greatest distance of u at the ends of cycles {TRANSIENT_TURNS} to {DRAWN_TURNS}, or of those before the "
                 f"links are collinear, from their best line, relative to the drift over them; {DRAWN_TURNS} cycles are ours, "
-                "the text does not say how many are drawn; with the weakest damper none is left; fall in size of M and of u0 "
+                "the text does not say how many are drawn; fall in size of M and of u0 "
                 f"from {_mu(5e5)} to 1e6, relative",
-                f"{ALIKE_WORDS}; *depending* by more than that",
+                f"{ALIKE_WORDS}; *depending* by more than that; {FEWEST_TURNS} cycles, two of the transient and two, the "
+                "fewest ends for a line",
                 (
+                    none,
                     *bends,
                     at_least("M depending on mu", ALIKE, 1.0 - other_rate / rate),
                     at_least("u0 depending on mu", ALIKE, 1.0 - other_start / start),

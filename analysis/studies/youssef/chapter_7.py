@@ -442,8 +442,8 @@ def two_positions() -> StudyResult:
     return StudyResult(
         number="7.5",
         claim="The coupler points at the desired point, the rocker in either of two positions; else the rocker is upright.",
-        assignment=f"{SERIES_1} The crank stands at {degrees(ROTATION[k]):.0f} deg. The statements are judged with random "
-        "points.",
+        assignment=f"{SERIES_1} The figure is drawn with the crank at {degrees(ROTATION[k]):.0f} deg. The statements are "
+        f"judged with {ROTATION.size} random points, one at each crank angle by {360 / ROTATION.size:g} deg.",
         columns=padded(columns),
         statements=(
             Statement(

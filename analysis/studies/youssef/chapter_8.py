@@ -532,6 +532,7 @@ def _fig_8_16() -> tuple[Statement, ...]:
         for s, n, part in fractions
         if (risen := peak_rise(s, n)) > NOTICED
     )
+    shoulder = amplitude(turn("A", 152.0)) / amplitude(turn("A", 156.0)) - 1.0
     return (
         Statement(
             "As in the case of spring A the oscillations are periodic and each oscillation has four peaks.",
@@ -568,12 +569,13 @@ def _fig_8_16() -> tuple[Statement, ...]:
             "were observed at [w = wn/4, wn/3], where wn is the natural frequency.",
             text("8.4.1.2, L6770"),
             "rise of the amplitude at the maximum there over the next minimum, relative to this minimum; 0 where no maximum is "
-            "found in the steps of the curve",
+            "found in the steps of the curve, there 2 to 3 rpm",
             SEEN_IN_RECORDS,
             tuple(
                 at_most(f"spring {s}, {part}, {natural_speed(s) / n:.0f} rpm", NOTICED, peak_rise(s, n), why=meets[n])
                 for s, n, part in fractions
             ),
+            f"by steps of 1 rpm the quarter of spring A is a shoulder with a rise of {shoulder:.3f}, at 152 over 156 rpm; "
             f"relative to the greatest amplitude of the figures with the spring, these rises are {of_greatest}; "
             f"with a coefficient of friction of {rig_1.STRONG:g} in the guide none of them exceeds "
             f"{np.ceil(100.0 * hidden) / 100.0:g}, but so much friction changes the amplitudes more than slightly: see "

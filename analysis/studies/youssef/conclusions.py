@@ -26,7 +26,7 @@ from ...youssef import HarmonicMotion, harmonic_balance, resonance, slider_equat
 from ..rules import ABOUT, ABOUT_DEG, ALIKE, SEEN_FALL, SMALL
 from ..statements import Case, Statement, at_least, at_most, near, text
 from ..study import Study, StudyResult
-from .chapter_3 import COLLINEAR_SINE, DAMPINGS, DRAWN_TURNS, apart_on_the_graph, drift, from_rest
+from .chapter_3 import COLLINEAR_SINE, DAMPINGS, DRAWN_TURNS, FEWEST_TURNS, apart_on_the_graph, drift, from_rest
 from .chapter_4 import DAMPERS
 from .chapter_5 import closed, held
 from .chapter_6 import TABLE, our_error, over_least, printed_error, share_of_stated
@@ -49,7 +49,7 @@ SPEEDS = np.arange(10.0, 45.0, 0.05)
 #: Lengths of crank and coupler relative to the rocker's, in the ranges of Fig 5.2 and 5.3.
 CRANKS, COUPLERS = (0.01, 0.03, 0.05, 0.07, 0.1), (0.8, 0.9, 1.0, 1.1, 1.2)
 #: Amplitude u/l4 above which a speed counts as resonant.
-LARGE = 0.1
+LARGE = 0.05
 #: Words for the equation behind the numbers of chapters IV and V, and for the speeds.
 RIGHT = "by the right linear equation"
 SPEEDS_WORDS = "10 to 45 rad/s in steps of 0.05 (our choice: a third to nearly one and a half of omega_k = 31.6 rad/s)"
@@ -106,6 +106,11 @@ def unlike_oscillator(inertia_ratio: float, *, fitted: bool = True) -> float:
         float(minimize_scalar(spread, bounds=(0.998, 1.002), args=(damper,), method="bounded").fun)
         for damper in (WEAK, STRONG)
     )
+
+
+def unfitted() -> float:
+    """Return the greatest spread of `unlike_oscillator` with the mean effective mass."""
+    return max(unlike_oscillator(i, fitted=False) for i in RESONANT)
 
 
 def width(parameters: FiveBarParameters, number: int = 1) -> float:
@@ -199,7 +204,7 @@ def introduction() -> tuple[Statement, ...]:
             f"V (L3886); {RIGHT}",
             f"{ABOUT:g}, the rule for *similar*, and of 2 the rule for *near*, for *vicinity* too; {SMALL:g}, for *negligible*",
             (
-                at_most("unlike a second order system", ABOUT, max(map(unlike_oscillator, RESONANT))),
+                at_most("first harmonic unlike a second order system", ABOUT, max(map(unlike_oscillator, RESONANT))),
                 near("twice the natural frequency", 2.0, twice_natural(), 2.0 * ABOUT),
                 at_most(
                     "region at the natural frequency",
@@ -208,6 +213,8 @@ def introduction() -> tuple[Statement, ...]:
                     why=f"undamped, there is one too; as a range of speed its width is {of_speed:.3f} of the first's",
                 ),
             ),
+            f"with the mean effective mass itself the first harmonic is unlike by up to {unfitted():.2f}, and the second has a "
+            "peak of its own at half the natural frequency, see L7102",
         ),
         Statement(
             "The instability, however, disappeared completely by addition of a small value of damping.",
@@ -416,8 +423,16 @@ def dynamics() -> tuple[Statement, ...]:
             f"the ends of turns 2 to {DRAWN_TURNS}, or of those before the links are collinear, relative to the drift over "
             "them, as at Fig 3.2 (L1911); turns until they are collinear: "
             f"abs(sin(th4 - th3)) < {COLLINEAR_SINE:g}, our choice, as at Fig 3.2",
-            f"{ALIKE:g}, the rule for *steady* and *linear*; {MOST_TURNS}, the turns that were run: collinear at all",
+            f"{ALIKE:g}, the rule for *steady* and *linear*; {MOST_TURNS}, the turns that were run: collinear at all; "
+            f"{FEWEST_TURNS} turns, two of the transient and two to compare",
             (
+                at_least(
+                    f"oscillation and line; mu = {plain(DAMPINGS[0])} dyn.s/cm, turns until collinear",
+                    FEWEST_TURNS,
+                    drift(DAMPINGS[0]).collinear_turn,
+                    "turns",
+                    why="there is none",
+                ),
                 *(
                     at_most(f"oscillation; mu = {plain(x)} dyn.s/cm", ALIKE, drift(x).unsteadiness(3), why="it grows")
                     for x in DAMPINGS[1:]
@@ -431,8 +446,7 @@ def dynamics() -> tuple[Statement, ...]:
                     for x in DAMPINGS
                 ),
             ),
-            "with and without the transient of two turns the verdicts are the same; with the weakest damper, mu = 1e4 "
-            "dyn.s/cm, the links are collinear in the turn after it, so that no more of its motion is judged",
+            "with and without the transient of two turns the verdicts are the same",
         ),
         Statement(
             "For a forced input (torsion bar input applied to the crank) it was found that the linkage accelerated until "
@@ -508,7 +522,7 @@ def linearised() -> tuple[Statement, ...]:
             f"{OSCILLATOR}; {RIGHT}",
             f"{ABOUT:g}, the rule for *similar*",
             tuple(at_most(f"I4 = {i:g}", ABOUT, unlike_oscillator(i)) for i in RESONANT),
-            f"with the mean effective mass itself it is up to {max(unlike_oscillator(i, fitted=False) for i in RESONANT):.2f}, "
+            f"with the mean effective mass itself it is up to {unfitted():.2f}, "
             "since the narrow peak of the weakest damper is then off by up to 0.025 rad/s; the second harmonic, judged next, "
             "has a peak of its own at half the natural frequency",
         ),
@@ -548,7 +562,8 @@ def linearised() -> tuple[Statement, ...]:
             text("9.1, L7110"),
             "distance of the resonant speeds without a damper for I4 = 0.25 to 2 from a line, relative to their range, and "
             "their greatest growth; the least growth, from I4 = 0.5 to 1 and 1.5, of the greatest amplitude and of the range "
-            f"of speeds with u/l4 above {LARGE:g} (our choice, as at Fig 4.3), with {DAMPERS_WORDS}; {RIGHT}",
+            f"of speeds with u/l4 above {LARGE:g} (our choice, below every peak), with {DAMPERS_WORDS}; "
+            f"{RIGHT}",
             f"{ALIKE:g}, the rule for *linear*; {SIGN}",
             (
                 at_most("distance from a line", ALIKE, bend),

@@ -380,7 +380,7 @@ def compute() -> StudyResult:
                 f"{solution}; with a damper of omega_c = 1.2 1/s, the greatest of appendix 2",
                 f"{ROUNDING:g}, above rounding errors",
                 (at_most("", ROUNDING, balanced(1.2)),),
-                "2 lambda_c and 4 lambda_c stand for 2 lambda_c k0 and 4 lambda_c k0, in the listing too (L8489, L8501)",
+                "2 lambda_c and 4 lambda_c stand for 2 lambda_c k0 and 4 lambda_c k0, in the listing too (L8488, L8492, L8501)",
             ),
         ),
     )

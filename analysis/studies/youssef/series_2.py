@@ -436,7 +436,8 @@ def moved_path() -> StudyResult:
                     ),
                 ),
                 f"with the other digits as printed it is {linkage_error(PATH, mended()):.2f} cm2; with these links, l4 mended, "
-                f"two harmonics can reach {errors[2]:.2f} cm2, three {errors[3]:.2f} and five {errors[5]:.2f}",
+                f"two harmonics can reach {errors[2]:.2f} cm2, three {errors[3]:.2f} and five {errors[5]:.2f}; the 12.6 cm2 "
+                "are judged at L5051, Fig 6.9",
             ),
             Statement(
                 "Subject to the constraint that [theta2] increases at a constant rate, a coupler-point path may thus be "
