@@ -182,6 +182,42 @@ class TestSearch:
         v = self.vector(best(search.PROBLEM).linkage)
         assert search.bottom(search.Found(v, 0.0, 0)) == pytest.approx(search.error(v), rel=1e-3)
 
+    def test_a_descent_has_no_bounds_of_angles(self) -> None:
+        """Angles are periodic: from beyond half a turn a descent leads to the same minimum."""
+        v = self.vector(best(search.PROBLEM).linkage)
+        side = int(np.argmin([away @ away for away in search.residuals(v)]))
+        for k in (7, 8, 9):
+            begun = v.copy()
+            begun[k] += 0.05 - 2.0 * np.pi * np.sign(begun[k])
+            assert search.descended(begun, side)[1] == pytest.approx(search.error(v), rel=1e-3)
+
+    @pytest.mark.long
+    @pytest.mark.parametrize("angles", ["0 to 360 deg", "free"])
+    def test_fewer_points_first_lower_the_errors_whatever_bounds_the_angles(
+        self, angles: str, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        low, high = search.LOW.copy(), search.HIGH.copy()
+        if angles == "free":
+            low[7:], high[7:] = -1e3, 1e3
+        else:
+            low[7:], high[7:] = 0.0, 2.0 * np.pi
+            monkeypatch.setattr(search, "LOW", low)
+            monkeypatch.setattr(search, "HIGH", high)
+
+        def admitted(v: np.ndarray, towards: np.ndarray) -> np.ndarray:
+            v = np.clip(v, low, high)
+            while not search.closes(v):
+                v = np.clip(0.75 * v + 0.25 * towards, low, high)
+            return v
+
+        monkeypatch.setattr(search, "admitted", admitted)
+        search.ranked.cache_clear()
+        plain, points, _ = search.ranked()
+        search.ranked.cache_clear()
+        for of in ("error", "evaluations"):
+            ends = ([getattr(end, of) for end in ends] for ends in (points, plain))
+            assert mannwhitneyu(*ends, alternative="less").pvalue < search.CHANCE
+
     @pytest.mark.long
     def test_which_parameters_come_first_decides_whether_the_errors_are_lower(self) -> None:
         """All but l1 and l4 first: lower errors for 1.6 times the evaluations; X0, Y0, l2, a1 and th20 first: not lower."""

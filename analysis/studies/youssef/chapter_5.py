@@ -366,10 +366,12 @@ def judge_coupler(found: Mapping[str, Sequence[Region]]) -> tuple[Statement, ...
     listed, moving = (axis(of(held(0.8, 0.5))) for of in (appendix_3, right))
     at_half = f"at I4 = 0.5, its value there (L8641), the listing has {listed:.4f}, the true motion {moving:.4f}"
     both = {"angles held": found["true orbit"], "same ground link": found[SAME_GROUND]}
-    seconds, ranges = {}, []
+    seconds, ranges, by_listing = {}, [], []
     for number in SWEEPS:
-        mechanisms = map(SWEEPS[number].mechanism, SWEEPS[number].values)
+        mechanisms = [SWEEPS[number].mechanism(x) for x in SWEEPS[number].values]
         pairs = [(hill(p), hill(p, 2)) for p in mechanisms]
+        thesis = (hill_regions(equation(p, Variant.APPENDIX_3, Form.SERIES), 2) for p in mechanisms)
+        by_listing.append(max(of[2].width / of[1].width for of in thesis))
         seconds[number] = max(second.width / first.width for first, second in pairs)
         ranges.append(max(np.divide(*(of.low**-0.5 - of.high**-0.5 for of in pair[::-1])) for pair in pairs))
     return (
@@ -417,7 +419,10 @@ def judge_coupler(found: Mapping[str, Sequence[Region]]) -> tuple[Statement, ...
             f"{SMALL:g}, the rule for *negligible*",
             tuple(at_most(f"Fig {number}", SMALL, x) for number, x in seconds.items()),
             "the terms of first order largely cancel in the width of the first; as ranges of speed the quotients are "
-            + ", ".join(f"{x:.3f}" for x in ranges),
+            + ", ".join(f"{x:.3f}" for x in ranges)
+            + "; by the coefficients of appendix 3 those of the widths are "
+            + ", ".join(f"{x:.3f}" for x in by_listing)
+            + ", negligible as the thesis says: the first region is too wide by them, the second too narrow",
         ),
     )
 

@@ -580,10 +580,10 @@ def _unweighted() -> tuple[Statement, ...]:
             "By studying curve (a) of Fig. (7.6) we find it very difficult, if not impossible, to accomplish at high speeds "
             "while curve (b) of the same figure is a more feasible task.",
             text("7.3.1, L5789"),
-            why=f"{LOST}; with ours U has a vertical tangent in (a) at {' and '.join(vertical)} deg, where even its velocity "
-            f"has no bound: by differences over 0.5 deg |U'| is at most {slopes[0]:.1f} l3/rad, over 0.125 deg "
-            f"{slopes[1]:.1f}, in (b) {smooth[0]:.1f}; the second derivative is {bends[0]:.0f} and {bends[1]:.0f} times the "
-            "greatest of (b)",
+            why=f"{LOST}; with ours U of the variational method, (a), has a vertical tangent at {' and '.join(vertical)} deg, "
+            f"where even its velocity has no bound: by differences over 0.5 deg |U'| is at most {slopes[0]:.1f} l3/rad, over "
+            f"0.125 deg {slopes[1]:.1f}, in that of the direct search, (b), {smooth[0]:.1f}; the second derivative is "
+            f"{bends[0]:.0f} and {bends[1]:.0f} times the greatest of (b)",
         ),
         Statement(
             "The variational method requires the solution of (n+m) non-linear equations. In many cases this entails a far "
