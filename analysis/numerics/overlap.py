@@ -13,8 +13,6 @@ from numba import boolean, float64, int64, void
 
 from .codegen import MATRIX, VECTOR, inner, kernel, part
 
-#: Limit of the number of crossings of one segment; further crossings are ignored.
-CROSSINGS = 64
 #: Segments coincide up to this sine of the angle between them and this distance, as a fraction of the extent of the curves.
 PARALLEL = 1e-12
 #: Number of horizontal bands into which segments are sorted: a segment is compared with those in its own bands only.
@@ -82,9 +80,11 @@ def _cut(i, ends, box, bands, near, cuts, twins, spans):
         for k in members[begin[band] : begin[band + 1]]:
             # compare two segments once, in the first band that both are in
             apart = (high_x[k] < left) | (low_x[k] > right) | (high_y[k] < low) | (low_y[k] > high)
-            if apart or k == i or band != max(first[i], first[k]) or count >= CROSSINGS:
+            if apart or k == i or band != max(first[i], first[k]):
                 continue
             ex, ey = ends[2, k] - ends[0, k], ends[3, k] - ends[1, k]
+            if ex == 0.0 and ey == 0.0:  # a point, which bounds nothing
+                continue
             cross = dx * ey - dy * ex
             wx, wy = ends[0, k] - ends[0, i], ends[1, k] - ends[1, i]
             if abs(cross) <= PARALLEL * size * (abs(ex) + abs(ey)):
@@ -124,10 +124,12 @@ def symmetric_difference(curve, target, gradient):
     bands = _sort_into_bands(box, floor, scale)
     _, _, begin, members = bands
     area = 0.0
-    cuts, twins, spans = np.empty(CROSSINGS + 2), np.empty(CROSSINGS, np.int64), np.empty((2, CROSSINGS))
+    # each other segment cuts a segment twice at most
+    total = ends.shape[1]
+    cuts, twins, spans = np.empty(2 * total + 2), np.empty(total, np.int64), np.empty((2, total))
     # number of the last piece with which each segment coincides
-    covered, number = np.full(ends.shape[1], -1), 0
-    for i in range(ends.shape[1]):
+    covered, number = np.full(total, -1), 0
+    for i in range(total):
         count, like = _cut(i, ends, box, bands, near, cuts, twins, spans)
         cuts[: count + 1].sort()
         xi, yi = xa[i], ya[i]

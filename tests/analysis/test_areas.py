@@ -80,6 +80,17 @@ def test_area_between_polygons_is_that_of_shapelys_overlay(first: list[float], s
     assert area_difference(a, closed_target(b)) == pytest.approx(expected, rel=1e-9, abs=1e-12)
 
 
+@pytest.mark.parametrize("repeats", [70, 71, 300])
+def test_a_curve_may_rest_and_go_to_and_fro(repeats: int) -> None:
+    """Many points at one place, or many times along one side: both bound nothing, or one side; no memory is overwritten."""
+    square = closed_target(np.array([(0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0)]))
+    resting = np.array([(0.25, 0.0)] * repeats + [(1.0, 0.0), (1.0, 2.0), (0.0, 2.0)])
+    expected = shapely.symmetric_difference(shapely.Polygon(resting), shapely.Polygon(square.points)).area
+    assert area_difference(resting, square) == pytest.approx(expected, rel=1e-12)
+    to_and_fro = np.array([(0.0, 0.0), (1.0, 0.0)] * repeats + [(1.0, 2.0), (0.0, 2.0)])
+    assert area_difference(to_and_fro, square) == pytest.approx(1.0, rel=1e-12)
+
+
 def test_area_from_a_figure_eight() -> None:
     """A circle round a figure-eight of lobe area 4/3: the even-odd rule takes both lobes out."""
     eight = path_from_formula("sin(t)", "sin(2*t)", n=2000)
