@@ -258,8 +258,9 @@ def _convert(text: str, unit: str, spelled: str, name: str, wanted: str) -> floa
         return number
     if unit == "m" and of in LENGTHS:
         return number * LENGTHS[of]
-    if of == display_scale(unit)[0]:
-        return number * (1.0 / display_scale(unit)[1])
+    shown, factor = display_scale(unit)
+    if of == shown:
+        return number * (1.0 / factor)
     import pint
 
     try:

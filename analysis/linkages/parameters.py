@@ -259,7 +259,6 @@ def interface(description: Description, structure: Structure) -> Interface:
         direction = description.gravity_direction
         found.append(Parameter("ground.gravity_direction", "rad", "Direction of gravity", direction, "free", "gravity"))
     found += _assemblies(description, structure)
-    _check_names(found)
     loads = tuple(_loads(description, structure, points))
     inputs = [*(f"{drive.table or drive.name}.{drive.load}" for drive in drives), *(load.name for load in loads)]
     for name in inputs:
@@ -431,16 +430,6 @@ def _spring(name: str, description: Description, structure: Structure, drive: Dr
     for own, (number, in_unit) in spring.constants.items():
         text = f"Constant {own.replace('_', ' ')} of the law of {name}"
         yield Parameter(f"{name}.{own}", in_unit, text, number, "free", "law")
-
-
-def _check_names(found: list[Parameter]) -> None:
-    """Raise LinkageError if two parameters have the same name."""
-    names = [parameter.name for parameter in found]
-    for name in names:
-        if names.count(name) > 1:
-            raise LinkageError(
-                f"two parameters are called {name}: bodies, joints and springs must have names of their own"
-            )
 
 
 def length_and_mass(found: Interface) -> tuple[float, float]:
