@@ -46,8 +46,8 @@ fails within half a turn, and feedback holds the motion to a quarter of a per ce
 what it encloses, by the limits of U; between the widest within which the crank turns fully, -1.5 and 1.5, it reaches all.
 If the coupler cannot point at the desired point the rocker need not stand upright: for places below the slider's line it
 hangs. The printed series for the rocker function gives the stated 4.8 deg2 in none of the readings tried (of its signs, of
-A0 and of its argument): as printed the links cannot be joined, and at best it has 47 deg2, more than with the pivot fixed;
-the best that we find has 0.72. That for path (b) is within 5 % of the best that we find.
+A0 and of its argument): as printed the links cannot be joined, and where they can the error is more than with the pivot
+fixed; the best that we find has 0.72. That for path (b) is within 5 % of the best that we find.
 
 *What cannot be told.* Series 1 (Fig 7.4 to 7.10) stands on a desired curve that is lost. With a curve of ours most of what
 the thesis says of it comes out alike, and the numbers are given, but none of it is counted as holding. Of a mechanism that
@@ -68,8 +68,8 @@ LINKAGE = Linkage(ground_length=1.0, crank_length=0.5, coupler_length=1.0, rocke
 FAMILY = (0.6, 0.8, 1.0, 1.2, 1.4)
 #: Crank angles of the isochronous curves (deg).
 ISOCHRONES = range(0, 360, 30)
-#: Random guesses of the downhill simplex.
-GUESSES = 6
+#: Random guesses of the downhill simplex, and the standard deviation of their coefficients (l3).
+GUESSES, SPREAD = 6, 0.1
 #: Crank angles of the desired points, and which of them lie on p1 p2.
 ROTATION = turn(72)
 P1, P2 = radians(150.0), radians(210.0)
@@ -86,6 +86,8 @@ LIMITS = ((0.9, 1.1), (0.8, 1.2), (FAMILY[0], FAMILY[-1]), (0.501, 1.499), (-1.4
 ALONG = np.linspace(0.501, 1.499, 101) - 1.0
 #: Slider positions u of Fig 7.5 (l3).
 POSITIONS = np.linspace(-3.0, 3.0, 24001)
+#: Least sine of the angle of a rocker that is called upright.
+UPRIGHT = 0.999
 #: Number of precision points, and amplitudes of the slider between them.
 PRECISION, BETWEEN = 5, (-0.4, -0.2, 0.2, 0.4)
 
@@ -150,7 +152,7 @@ def ends_of_simplex(starts: int = GUESSES, seed: int = 7) -> list[tuple[float, f
         off = missed(c)
         return float(off @ off) if np.isfinite(off).all() else NO_LINKAGE
 
-    guesses = 0.1 * random.normal(size=(starts, 2 * HARMONICS + 1))
+    guesses = SPREAD * random.normal(size=(starts, 2 * HARMONICS + 1))
     options = {"maxfev": 40000, "xatol": 1e-6, "fatol": 1e-9}
     ends = [minimize(error, c, method="Nelder-Mead", options=options) for c in guesses]
     # none is cut off by the limit
@@ -196,17 +198,17 @@ def vertical_tangents() -> list[float]:
     ]
 
 
-def by_equations(rotation: FloatArray, target: ComplexArray) -> tuple[FloatArray, NDArray[np.bool_]]:
+def by_equations(rotation: FloatArray, target: ComplexArray, side: int = 1) -> tuple[FloatArray, NDArray[np.bool_]]:
     """Solve eq (7.14) for U, with both signs of its root, or (7.15) if (7.14) has no root.
 
-    Returns U, shape (n, 2), and a mask of the points that use (7.15).
+    In (7.15) the rocker is upright, or hangs if ``side`` is -1. Returns U, shape (n, 2), and a mask of the points that use it.
     """
     l2, l3, l4 = LINKAGE.crank_length, LINKAGE.coupler_length, LINKAGE.rocker_length
     first, square = in_line(rotation, target)
     upright = square < 0.0
-    # (7.15), the rocker at th4 = 90 deg
+    # (7.15), the rocker at th4 = 90 deg, or -90 deg
     second = l2 * np.cos(rotation)
-    other = second**2 - (l2**2 + l4**2 - l3**2 - 2.0 * l2 * l4 * np.sin(rotation))
+    other = second**2 - (l2**2 + l4**2 - l3**2 - 2.0 * side * l2 * l4 * np.sin(rotation))
     centre, root = np.where(upright, second, first), np.sqrt(np.where(upright, other, square))
     return np.column_stack([centre + root, centre - root]), upright
 
@@ -254,9 +256,10 @@ def family() -> StudyResult:
                 "If, however, a second input is established to which a controller is attached the output may be modified, "
                 "anywhere in an infinite variety, yet still prescribing the same originally desired precision points.",
                 text("7.0, L5203"),
-                f"distance of P from the path at U = 1 with u = a sin^2({PRECISION} th2 / 2), a = "
-                f"{', '.join(f'{a:g}' for a in BETWEEN)} l3, ours: the greatest at the {PRECISION} crank angles where u = 0, "
-                f"of all a; the greatest in each of the {PRECISION} parts between them, of all a, and of the parts the least",
+                f"distance of P from its place at U = 1 and the same crank angle, {TURN.size - 1} of them, with u = a "
+                f"sin^2({PRECISION} th2 / 2), a = {', '.join(f'{a:g}' for a in BETWEEN)} l3, ours: the greatest at the "
+                f"{PRECISION} crank angles where u = 0, of all a; the greatest in each of the {PRECISION} parts between them, "
+                "of all a, and of the parts the least",
                 f"1e-12 l3, the rounding; more than {READ:g} l3, what a graph can be read to",
                 (
                     at_most("at the precision points", 1e-12, kept, "l3"),
@@ -269,7 +272,8 @@ def family() -> StudyResult:
                 "First, any point lying on or within the outer boundaries of the family is accessible to the chosen "
                 "coupler-point by suitable combination of [theta2] and U.",
                 text("7.0, L5242"),
-                "area that P reaches over the area within the outer boundary of the family, for several limits of U",
+                "area that P reaches over the area within the outer boundary of the family, for several limits of U, the links "
+                "assembled as in the plot",
                 "1 %, far more than the error of the areas",
                 tuple(
                     near(
@@ -430,14 +434,19 @@ def two_positions() -> StudyResult:
     least, moved = np.transpose([nearest(*at) for at in zip(ROTATION[~missing].tolist(), places[~missing].tolist())])
     anywhere = variational_motion(LINKAGE, ROTATION, targets, assemblies=(1, -1), closed=False)
     outside = anywhere.kind == "perpendicular"
-    above, standing = targets[outside, 1] > 0.0, np.sin(anywhere.rocker_angle[outside]) > 0.999
+    above, standing = targets[outside, 1] > 0.0, np.sin(anywhere.rocker_angle[outside]) > UPRIGHT
     phi, pins, wanted = ROTATION[outside], crank_pins[outside][:, None], places[outside]
-    # (7.15) has no real U where the rocker hangs
-    with np.errstate(invalid="ignore"):
-        arms = by_equations(phi, wanted)[0] + 1j * LINKAGE.rocker_length - pins
-    reached = pins + LINKAGE.point_distance / LINKAGE.coupler_length * arms
     least_there, moved_there = np.transpose([nearest(*at) for at in zip(phi.tolist(), wanted.tolist())])
-    by_7_15 = np.abs(reached - wanted[:, None]).min(axis=1) - least_there
+
+    def excess(side: int) -> FloatArray:
+        # (7.15) has a real U with the rocker on one side only
+        with np.errstate(invalid="ignore"):
+            arms = by_equations(phi, wanted, side)[0] + side * 1j * LINKAGE.rocker_length - pins
+        reached = pins + LINKAGE.point_distance / LINKAGE.coupler_length * arms
+        return np.asarray(np.abs(reached - wanted[:, None]).min(axis=1) - least_there)
+
+    by_7_15 = excess(1)
+    by_either = np.fmin(by_7_15, excess(-1))
     fine = "1e-3 l3: where the error is least, P moves by at most {:.2g} l3 from one position to the next"
     return StudyResult(
         number="7.5",
@@ -452,7 +461,8 @@ def two_positions() -> StudyResult:
                 text("7.3.1, L5628"),
                 f"error with the coupler pointing at the point less the least of {POSITIONS.size} slider positions, u from "
                 f"{POSITIONS[0]:g} to {POSITIONS[-1]:g} l3, and both assemblies, the greatest over the {least.size} of "
-                f"{ROTATION.size} random points, no farther from A than l3 along either axis, where (7.14) has a root",
+                f"{ROTATION.size} random points, no farther from A than l3 along either axis, where (7.14) has a root; for "
+                "the others see L5685",
                 fine.format(moved.max()),
                 (at_most("greatest difference", 1e-3, float((pointing[~missing] - least).max()), "l3"),),
             ),
@@ -460,9 +470,9 @@ def two_positions() -> StudyResult:
                 "In these circumstances the optimum condition must surely be when the rocker CD is upright, i.e. [theta4 = "
                 "pi/2] and the value of U is recomputed from (7.7) to give [(7.15)].",
                 text("7.3.1, L5685"),
-                f"share of upright rockers at the least error, of the {standing.size} points of {ROTATION.size} random "
-                "ones, no farther from A than l3 along either axis, where (7.14) has no root; error with U by (7.15), th4 = "
-                f"pi/2, less the least of the slider positions above, greatest",
+                f"share of upright rockers, sin th4 > {UPRIGHT:g}, at the least error, of the {standing.size} points of "
+                f"{ROTATION.size} random ones, no farther from A than l3 along either axis, where (7.14) has no root; error "
+                f"with U by (7.15), th4 = pi/2, less the least of the slider positions above, greatest",
                 f"none: *must surely be*; {fine.format(moved_there.max())}",
                 (
                     near(
@@ -479,17 +489,20 @@ def two_positions() -> StudyResult:
                 "argue the philosophy behind the use of any other method.",
                 text("7.3.1, L5772-5776"),
                 "share of the same points at which U by (7.14), solved once, the arctangent taken towards the point, or by "
-                "(7.15) where (7.14) has no root, gives the least error of the slider positions above",
+                "(7.15) where (7.14) has no root, gives the least error of the slider positions above; (7.15) with th4 = 90 "
+                "deg, as the thesis has it, and with the better of both roots of (7.11b)",
                 f"{fine.format(max(moved.max(), moved_there.max()))}; none of the share",
                 (
                     at_least(f"(7.14), {least.size} points", 1.0, np.mean(pointing[~missing] - least <= 1e-3)),
                     at_least(
-                        f"(7.15), {standing.size} points",
+                        f"(7.15), th4 = 90 deg, {standing.size} points",
                         1.0,
                         np.mean(by_7_15 <= 1e-3),
-                        why="below the slider's line (7.15) has no real U: there the rocker hangs",
+                        why="with th4 = 90 deg (7.15) has no real U below the slider's line",
                     ),
+                    at_least("(7.15), th4 = 90 or -90 deg", 1.0, np.mean(by_either <= 1e-3)),
                 ),
+                "that one may argue claims nothing",
             ),
         ),
     )
@@ -552,9 +565,10 @@ def _unweighted() -> tuple[Statement, ...]:
         Statement(
             "Different initial guesses of the coefficients produced different optima.",
             text("7.3.1, L5743"),
-            why=f"{LOST}; with ours the simplex ends from {format_count(GUESSES, 'random guess')}, {GUESSES - len(ends)} of "
-            f"which cannot be assembled, at {distinct} different errors, more than 1 % apart; {optimal} of the {len(ends)} "
-            "ends are the optimum, and a descent from each of the others leads to it too: there the simplex stops before it",
+            why=f"{LOST}; with ours the simplex ends from {format_count(GUESSES, 'random guess')}, of "
+            f"{SPREAD:g} l3 (rms), {GUESSES - len(ends)} of which cannot be assembled, at {distinct} different errors, more "
+            f"than 1 % apart; {optimal} of the {len(ends)} ends are the optimum, and a descent from each of the others leads "
+            "to it too: there the simplex stops before it",
         ),
         Statement(
             "The variational method located the true global optimum which the direct search located as best as an "
@@ -605,8 +619,8 @@ def _unweighted() -> tuple[Statement, ...]:
 def _weighted() -> tuple[Statement, ...]:
     """Return the statements on Fig 7.9 and 7.10."""
     inside, outside = (new / old for new, old in zip(squared_errors(direct(inside=WEIGHT)), squared_errors(direct())))
-    strict, _ = squared_errors(direct(inside=WEIGHT, acceleration=1.0))
     bounds = (1.0, 0.9)
+    strict, _ = squared_errors(direct(inside=WEIGHT, acceleration=bounds[0]))
     relaxed = [squared_errors(direct(inside=WEIGHT, outside=0.01, acceleration=bound))[0] for bound in bounds]
     return (
         Statement(
@@ -627,8 +641,8 @@ def _weighted() -> tuple[Statement, ...]:
             "Another interesting point is that if the requirements outside [p1p2] are very relaxed the controller motion U "
             "involved there, may be modified further to give a more favourable dynamic condition.",
             text("7.3.1, L5838"),
-            why=f"{LOST}; with ours the same squared error on p1 p2 needs {np.interp(strict, relaxed, bounds):.2f} of the "
-            "greatest second derivative of U where the rest has a weight of 0.01 instead of 1",
+            why=f"{LOST}; with ours the squared error on p1 p2 that a second derivative of U of at most {bounds[0]:g} l3/rad2 "
+            f"allows needs {np.interp(strict, relaxed, bounds):.2f} of it where the rest has a weight of 0.01 instead of 1",
         ),
     )
 
@@ -676,7 +690,7 @@ TABLE = {
     ),
     "7.7": Motions("The error of the variational motion is least.", ("variational", "direct"), "error", see="7.6"),
     "7.8": Motions(
-        "Both motions bring P nearer to the desired curve than a fixed U.",
+        "The output curves of both methods, superimposed on the desired curve.",
         ("variational", "direct"),
         "paths",
         see="7.6",

@@ -166,8 +166,9 @@ def compute() -> StudyResult:
                 "specified times.",
                 text("6.2.2, L4205"),
                 "area between curve and ellipse (a) of the linkage with the least error (6.6) at the given times "
-                "over that of the linkage with the least area, both with no link longer than "
-                f"{CM_PER_METRE * LONGEST:.2f} cm, the longest of the two printed linkages",
+                f"over that of the linkage with the least area, the least that we find with a transmission angle of at least "
+                f"{TRANSMISSION:g} deg and no link longer than {CM_PER_METRE * LONGEST:.2f} cm, the longest of the two printed "
+                "linkages",
                 f"above {1.0 + ALIKE:g}, the rule for *the same*: a condition that costs nothing would leave it",
                 (at_least("area", 1.0 + ALIKE, timed.area / path.area),),
                 "the first sentence says no more than that the error is minimised",
@@ -183,8 +184,10 @@ def compute() -> StudyResult:
                     at_most("error in time", 1.0, found.timed / printed_in_time),
                     at_most("area", 1.0, found.area / printed_path),
                 ),
-                f"its error in time is {found.timed / timed.timed:.1f} times, its area {found.area / path.area:.1f} times "
-                "the least that we find with no longer link",
+                f"over the stated errors, {TIMED.error:g} and {PATH.error:g} cm2, they are "
+                f"{found.timed / TIMED.error:.2f} and {found.area / PATH.error:.2f}; its error in time is "
+                f"{found.timed / timed.timed:.1f} times, its area {found.area / path.area:.1f} times the least that we find "
+                "with no longer link",
             ),
             Statement(
                 "The minimum occurs when either Coswt = [+-1] whichever yields the least value [...].",
@@ -216,7 +219,7 @@ def compute() -> StudyResult:
                 "planar linkage yielding in all cases a minimum.",
                 text("6.5, L5136"),
                 "error of the printed linkages, mended where they are misprinted, over that to which a descent towards the "
-                f"minimum next to each leads in at most {STEPS} steps, with no longer link",
+                f"minimum next to each leads in at most {STEPS} steps, with no longer link, that of Fig 6.6 within its bounds",
                 f"{1.0 + ALIKE:g}, the rule for *the same*: at a minimum there is no descent",
                 (
                     *(at_most(name, 1.0 + ALIKE, ratio, why="it is no minimum") for name, ratio in ratios.items()),
@@ -229,7 +232,7 @@ def compute() -> StudyResult:
                 "It [the method] can be made to follow a logical process in the choice of the type of linkage until it finds a "
                 "satisfactory result.",
                 text("6.5, L5140"),
-                why="no example is given; `linkwork slider-motion` with a `[strategy]` does so",
+                why="no example is given; the strategy of 7.4 is judged at L6026",
             ),
         ),
     )
