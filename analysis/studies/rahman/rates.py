@@ -155,8 +155,8 @@ def _printed_rates() -> tuple[Statement, ...]:
             "where symbols [eta2'] and [theta2'] denote rotational velocities about the [j2] and [k2] axes at joint 2 "
             "respectively.",
             text("section 2.7, eqs 30, 31, L503-509"),
-            "angular velocity by eq 30 less that of the matrix Z(theta) Y(eta) of eq 2, at theta = 0.8, eta = 0.3 "
-            "rad, with rates of 1.7 and -2.1 rad/s",
+            "angular velocity by eq 30, whose form eq 31 has, less that of the matrix Z(theta) Y(eta) of eq 2, at theta = "
+            "0.8, eta = 0.3 rad, with rates of 1.7 and -2.1 rad/s",
             ROUNDING,
             (nothing("angular velocity", _angular_velocity(), "rad/s"),),
             "erratum 2: eta turns about the axis j that theta has turned",
@@ -200,7 +200,7 @@ def _printed_rates() -> tuple[Statement, ...]:
             "The final solutions for all the unknowns are as follows:",
             text("section 2.7, eqs 39 to 43, L563-573"),
             "difference from the solution of eqs 37a to 37e in a general position with S1' = 1.3 in/s, and what "
-            f"remains of eq 37f over the turn, {AWAY}",
+            f"remains of eq 37f with the joints at which the printed iteration ends at every fifth degree, {AWAY}",
             ROUNDING,
             (*errors, *unsolved),
         ),
@@ -215,7 +215,8 @@ def _printed_rates() -> tuple[Statement, ...]:
         Statement(
             "S1'' = alpha S_S1 [cos(alpha theta1) theta1'' - alpha sin(alpha theta1) theta1'^2] (28b)",
             text("section 2.8, eq 28b, L955; L957, in brackets, says what it is the derivative of"),
-            "S1'' by eq 28b less the rate of eq 28a with its amplitude mended, with a crank acceleration of 3 rad/s2",
+            "S1'' by eq 28b less the rate of eq 28a with its amplitude mended, angle and amplitude as in the row before, with "
+            "a crank acceleration of 3 rad/s2",
             ROUNDING,
             tuple(nothing(f"alpha = {ratio:g}", slip, "in/s2") for ratio, (_, slip) in slips.items()),
         ),
@@ -360,8 +361,9 @@ def _dead_centres() -> tuple[Statement, ...]:
             ),
             "theta2 is 0 or half a turn at the dead centres, which the offset and the twist move, and the shifts of the graphs "
             f"by at most {by_shift:.1f} deg; where the printed iteration ends with a twist, sin theta2 vanishes at "
-            f"{' and at '.join(by_iteration)}. Sin theta3 does not vanish, so that 39a and 42a stay finite. Out of the plane "
-            "40a and 41a are unbounded, and with them 38a, because eq 41 divides by sin theta2 and row 37f is left out "
+            f"{' and at '.join(by_iteration)}, none of them near. "
+            "Sin theta3 does not vanish, so that 39a and 42a stay finite. Out of the plane 40a and 41a are unbounded, and with "
+            "them 38a, because eq 41 divides by sin theta2 and row 37f is left out "
             "(erratum 3); in the plane 40a and 41a are zero",
         ),
         Statement(
@@ -385,9 +387,9 @@ def _dead_centres() -> tuple[Statement, ...]:
             ),
             "at the second spike theta2 is half a turn. Out of the plane 40a and 41a grow without bound there, and with them "
             "38a, but not by roundoff, here in double precision (the thesis does not say which it used): eq 41 divides by sin "
-            "theta2, and row 37f is left out (erratum 3); at whole degrees 38a is abnormal with a4 = 10 in alone "
-            f"({whole[0]:.1f}; {whole[1]:.2f} and {whole[2]:.2f} with 20 and 30 in). 39a and 42a stay finite, as all five are "
-            "in the plane: the spikes of the forces come from the torque, which has no lever on the slider there",
+            "theta2, and row 37f is left out (erratum 3); at whole degrees 38a is abnormal with a4 = 10 in alone of these "
+            f"three ({whole[0]:.1f}; {whole[1]:.2f} and {whole[2]:.2f} with 20 and 30 in). 39a and 42a stay finite, as all "
+            "five are in the plane: the spikes of the forces come from the torque, which has no lever on the slider there",
         ),
     )
 
