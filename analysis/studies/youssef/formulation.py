@@ -353,10 +353,10 @@ def compute() -> StudyResult:
                 "[T]he multipliers are equal to the internal forces components and the input torque.",
                 text("2.3.1, L1143-1145; for C, L1848-1852 and L2042-2046"),
                 "solution of (3.1) with the matrices (3.8) and (3.10) as printed (the minus of l2 cos theta2, which our scan "
-                "of (3.8) lacks, by (4.10)), those of 3.2.2 for a torque, less torque, force of the rocker on the coupler and "
-                "accelerations by our equations of motion, which have no multipliers, relative to the greatest of each; Table "
-                "3.1, k = 1e6 dyn/cm, mu = 3e4 dyn.s/cm, every 3 ms of 0.3 s from theta2 = u = u' = 0, at 420 rpm and from "
-                "rest with T0 = 1e8 dyn.cm",
+                "of (3.8) lacks, by (4.10); k u for k2 u in that of (3.10)), those of 3.2.2 for a torque, less torque, force "
+                "of the rocker on the coupler and accelerations by our equations of motion, which have no multipliers, "
+                "relative to the greatest of each; Table 3.1, k = 1e6 dyn/cm, mu = 3e4 dyn.s/cm, every 3 ms of 0.3 s from "
+                "theta2 = u = u' = 0, at 420 rpm and from rest with T0 = 1e8 dyn.cm",
                 f"{ROUNDING:g}, above rounding errors",
                 multipliers(),
             ),
@@ -453,7 +453,7 @@ def compute() -> StudyResult:
                 "time involved in computation of the function [Phi].",
                 text("2.4, L1340-1356"),
                 "evaluations of Phi that a step of the classical method takes; its greatest error of u, by each of the two "
-                "approaches of 3.1, over that of Hamming's with half the step (4 ms beside 8.06, 62 in 0.5 s), which takes two "
+                "approaches of 3.1, over that of Hamming's with half the step (for 4 ms 62 steps of 8.06 ms), which takes two "
                 "evaluations a step and so as many in all, and as much time for them",
                 "none of a count; more than 1, the sign, as *unfavourable* says",
                 (
