@@ -62,10 +62,10 @@ cancel in the first, so that the second is half as wide, and with the longest cr
 are not those of I4 = 1 and 2, which the text has: 1.96 is what the listing gives at its I4 = 0.5 (1.9649; the true motion
 1.9655), and 1.968 lies near the axis of I4 = 0.5 (1.967; by the listing 1.964). Fig 5.3 varies the coupler with the
 angles held, to which another ground link belongs at each length; on one ground link the region is narrowest near equal
-links. Nor is the region of Fig 5.3 narrower than those of Fig 5.1 and 5.2. Cut after nine terms, the determinant gives
-two regions, not all, and without a damper (5.35) is met at every stable speed, not at the boundaries alone. The zeroth
-boundary does not part two stable regions: beyond it, at a thousand rad/s or so, the slider falls away, and no damper
-stops it."""
+links. Nor is the region of Fig 5.3 narrower than that of Fig 5.2. Cut after nine terms, the determinant gives two regions,
+not all, and without a damper (5.35) is met at every stable speed, not at the boundaries alone. The zeroth boundary does
+not part two stable regions: beyond it, from 1565 rad/s at I4 = 0.5 and 908 rad/s at 1.5, the slider falls away, and a
+damper only slows it."""
 
 #: omega_c (1/s) that removes the region up to I4 = 1.5, as stated.
 STATED = 0.45
@@ -182,7 +182,7 @@ def judge_inertia(found: Mapping[str, Sequence[Region]]) -> tuple[Statement, ...
             text("5.3.1, L3762-3764; the same in L3944-3946"),
             "width of the region of the true periodic motion relative to its middle, greatest; growth of the width "
             "with I4, least",
-            f"{SMALL:g}, the rule for *small*; {SIGN}",
+            f"{SMALL:g}, the rule for *small*, for *narrow* too; {SIGN}",
             (
                 at_most("width", SMALL, (widths(true) / (middles + 0.25)).max()),
                 at_least("growth", 0.0, np.diff(widths(true)).min()),
@@ -192,9 +192,9 @@ def judge_inertia(found: Mapping[str, Sequence[Region]]) -> tuple[Statement, ...
             "The region in [lambda_k^2] as a band also increases linearly with [I4] indicating that [insta]bility occurs "
             "when [omega]=A.[omega_k] with A=2 when [I4]=0 and decreasing with increase of I4.",
             text("5.3.1, L3764-3770; the same in L3946-3950"),
-            "distance of the middle of the region of the true periodic motion from the straight line through 1/4 at I4 = 0 and "
-            "its value at I4 = 2, relative to the line's rise; A = omega/omega_k in the middle, at I4 = 0, where the region "
-            "has no width, by the right linear equation; growth of A with I4",
+            "distance of the middle of the region of the true periodic motion, which is read, by us, as what increases, from "
+            "the straight line through 1/4 at I4 = 0 and its value at I4 = 2, relative to the line's rise; A = omega/omega_k "
+            "in the middle, at I4 = 0, where the region has no width, by the right linear equation; growth of A with I4",
             f"{ALIKE_WORDS}; 1e-5 for A = 2, above rounding errors; {SIGN}",
             (
                 at_most("distance from the line", ALIKE, bent),
@@ -219,9 +219,8 @@ def judge_inertia(found: Mapping[str, Sequence[Region]]) -> tuple[Statement, ...
             text("5.1.1, eqs (5.13), (5.16), (5.26), L3404-3416, L3446-3464, L3555-3575"),
             "boundaries by the formulas less those by the determinant (5.35), for the printed equation (4.29) at I4 = 0.5, 1 "
             "and 1.5, relative to the width of the region, and (5.13) to the boundary itself, greatest; h0 = 0, as G1 "
-            "vanishes; lost in the scan are the minus of (5.12), which (5.11) gives, and the 1/ of the 1/k0 before the braces "
-            "of (5.16), by (5.2); under the root of (5.26) stands (P - R)^2, as (5.23) gives, where our scan has P + R in "
-            "(5.25) and in a line of (5.26)",
+            "vanishes; read, by us, where our scan has other or no signs: the factor -1/2 of (5.12), by (5.11), 1/k0 before "
+            "the braces of (5.16), by (5.2), and (P - R)^2 under the root of (5.26), by (5.23)",
             f"{SMALL:g}, the rule for *small*: the next order",
             formulas(),
         ),
@@ -313,7 +312,8 @@ def judge_crank(found: Mapping[str, Sequence[Region]]) -> tuple[Statement, ...]:
             text("5.3.1, L3878-3882"),
             "axis A = omega/omega_k in the middle of the region of the true periodic motion, at sigma2 = 0.01, and its growth "
             "up to 0.1; that the region diverges is the sentence before",
-            f"{ABOUT:g} of the stated 2 - A, the rule for *approximately*, as A = 2 at I4 = 0; {SIGN}",
+            f"{ABOUT:g} of the stated 2 - A, the rule for *approximately*, as A = 2 at I4 = 0 (within {ABOUT:g} of A itself "
+            f"lies any axis of these figures); {SIGN}",
             (
                 near(
                     "A",
@@ -360,8 +360,9 @@ SAME_GROUND = "true orbit on the same ground link"
 
 def judge_coupler(found: Mapping[str, Sequence[Region]]) -> tuple[Statement, ...]:
     """Judge Fig 5.3, with constant angles as in the thesis, and with a constant ground link."""
-    others = {f"Fig 5.1 up to I4 = {most:g}": x for most, x in widest_by_inertia().items()}
-    others["Fig 5.2"] = float(widths(regions("5.2")["true orbit"]).max())
+    widest = float(widths(found["true orbit"]).max())
+    over_crank = widest / float(widths(regions("5.2")["true orbit"]).max())
+    over_inertia = " and ".join(f"{widest / x:.2f} up to I4 = {most:g}" for most, x in widest_by_inertia().items())
     follow = "the angles follow the coupler"
     listed, moving = (axis(of(held(0.8, 0.5))) for of in (appendix_3, right))
     at_half = f"at I4 = 0.5, its value there (L8641), the listing has {listed:.4f}, the true motion {moving:.4f}"
@@ -378,7 +379,8 @@ def judge_coupler(found: Mapping[str, Sequence[Region]]) -> tuple[Statement, ...
         Statement(
             "The width of the region decreases with increase of [sigma3].",
             text("5.3.1, L3892; the same in L3938-3942"),
-            "growth of the width from one sigma3 to the next, greatest; true periodic motion, sigma3 = 0.8 to 1.2",
+            "growth of the width from one sigma3 to the next, greatest; true periodic motion, sigma3 = 0.8 to 1.2 in steps of "
+            "0.025",
             SIGN,
             tuple(at_most(words, 0.0, np.diff(widths(of)).max()) for words, of in both.items()),
             "on the same ground link the angles follow the coupler: the region narrows up to about equal links and "
@@ -390,7 +392,8 @@ def judge_coupler(found: Mapping[str, Sequence[Region]]) -> tuple[Statement, ...
             text("5.3.1, L3892-3898"),
             "axis A of the true periodic motion at sigma3 = 0.8; its range over sigma3 = 0.8 to 1.2 relative to 2 - A at 0.8; "
             "that the region converges is the sentence before",
-            f"half a unit of the last digit; {ABOUT:g}, the rule for *approximately*, of 2 - A as A = 2 at I4 = 0",
+            f"half a unit of the last digit; {ABOUT:g}, the rule for *approximately*, of 2 - A as A = 2 at I4 = 0 (within "
+            f"{ABOUT:g} of A itself lies any axis of these figures)",
             tuple(
                 case
                 for (words, of), why in zip(both.items(), (at_half, follow))
@@ -404,11 +407,16 @@ def judge_coupler(found: Mapping[str, Sequence[Region]]) -> tuple[Statement, ...
             "This region is narrower than both regions of Figs. (5.1[)] and (5.2).",
             text("5.3.1, L3898-3900"),
             "greatest width of the region of the true periodic motion, angles held, relative to that of each; on the "
-            f"same ground link it is {widths(found[SAME_GROUND]).max() / widths(found['true orbit']).max():.1f} times "
-            "as great; the range of I4 in Fig 5.1 is not said",
+            f"same ground link it is {widths(found[SAME_GROUND]).max() / widest:.1f} times as great",
             SIGN,
-            tuple(at_most(name, 1.0, widths(found["true orbit"]).max() / x) for name, x in others.items()),
-            "with the angles held it is so at I4 = 0.5, which the listing has (L8641)",
+            (
+                Case(
+                    label="Fig 5.1",
+                    computed=None,
+                    why=f"the range of I4 there is not said: it would be {over_inertia}",
+                ),
+                at_most("Fig 5.2", 1.0, over_crank, why="at I4 = 0.5, which the listing has (L8641), it is narrower"),
+            ),
         ),
         Statement(
             "In all the above examples the second region of instability was so small within the values of [sigma2], "
@@ -438,7 +446,8 @@ SWEEPS = {
             mechanism=chapter_4,
             claim="The first region of instability in lambda_k^2 over I4; sigma2 = 0.05.",
             judge=judge_inertia,
-            assignment="The range of I4 is ours. The true periodic motion is that of the mechanism itself; by the right linear "
+            assignment="I4 = 0.25 to 2 in steps of 0.25 is our choice; stability in the remarks a and b (L3938-3946) is read, "
+            "by us, as the width of the region. The true periodic motion is that of the mechanism itself; by the right linear "
             "equation the verdicts of Fig 5.1 to 5.3 are the same.",
         ),
         Sweep(
@@ -609,6 +618,9 @@ def damped_statements(charts: Mapping[float, Chart]) -> tuple[Statement, ...]:
         )
         for end in ("low", "high")
     }
+    by_both = [(appendix_3(p), hill(p, variant=Variant.FORTRAN)) for p in mechanisms]
+    off = [(abs(getattr(a, end) - getattr(b, end)), a) for a, b in by_both for end in ("low", "high")]
+    listed, parts = max(x / a.width for x, a in off), max(x / a.low for x, a in off)
     narrowed = {ratio: narrowing(charts, ratio) for ratio in (*COMPARED, 2.0)}
     crank, coupler = (0.001, *SWEEPS["5.2"].values), SWEEPS["5.3"].values
     zeroth = boundary_stiffnesses(equation(mechanisms[-1]), 1, count=1)[0].real
@@ -644,8 +656,8 @@ def damped_statements(charts: Mapping[float, Chart]) -> tuple[Statement, ...]:
             "It is also shifted to the right with increase of [omega_c] and is completely eliminated anywhere within "
             "[I4 = 0] to 1.5 for the value of [omega_c] = 0.45.",
             text("5.3.2, L3917-3921"),
-            "growth with omega_c of the I4 at which the region begins, least; omega_c that removes the region, the most up to "
-            "I4 = 1.5; true periodic motion",
+            "growth of the I4 at which the region begins, from one damper to the next, least, as *to the right* is read, by "
+            "us, on a plot over I4 (L3910); omega_c that removes the region, the most up to I4 = 1.5; true periodic motion",
             "none: the sign decides, and whether the region is removed",
             (
                 at_least("growth", 0.0, np.diff(tips).min()),
@@ -656,8 +668,8 @@ def damped_statements(charts: Mapping[float, Chart]) -> tuple[Statement, ...]:
             "The instability regions shown in figs. (5.2) and (5.3) were also completely eliminated for the values "
             "of [omega_c] = 0.45 anywhere within [sigma2] = [0.]001 to 0.1 and [sigma3] = 0.8 to 1.2 respectively.",
             text("5.3.2, L3923-3929"),
-            "omega_c that removes the region, the most over sigma2 = 0.001 to 0.1 and over sigma3 = 0.8 to 1.2; by the right "
-            "linear equation, estimated from the width without a damper",
+            "omega_c that removes the region, the most over sigma2 = 0.001 and 0.01 to 0.1 in steps of 0.01 and over sigma3 = "
+            "0.8 to 1.2 in steps of 0.025; by the right linear equation, estimated from the width without a damper",
             "none: it is removed or it is not",
             (
                 at_most("Fig 5.2", "0.45", max(removing_estimate(with_crank(x)) for x in crank), "1/s"),
@@ -677,12 +689,12 @@ def damped_statements(charts: Mapping[float, Chart]) -> tuple[Statement, ...]:
             text("5.3.3 c, L3952-3958"),
             "growth of the width of the first region from one damper to the next, greatest, as above; omega_c that removes "
             "regions 1 to 4, those of higher number needing less, estimated by the right linear equation from their widths "
-            f"without a damper; greatest multiplier of this equation with {STATED:g} 1/s and a thousand times as much beyond "
-            f"the zeroth boundary, at {crank_speed(0.5 * zeroth):.0f} rad/s; all at I4 = 1.5",
+            f"without a damper; greatest multiplier of this equation with {STATED:g} 1/s (L3921) and a thousand times as much "
+            f"beyond the zeroth boundary, at {crank_speed(0.5 * zeroth):.0f} rad/s; all at I4 = 1.5",
             "none: the sign and the stability decide",
             (
                 at_most("growth of the width", 0.0, narrowed[1.5]),
-                at_most("omega_c", "0.45", max(removing_estimate(mechanisms[-1], n) for n in range(1, 5)), "1/s"),
+                at_most("omega_c", STATED, max(removing_estimate(mechanisms[-1], n) for n in range(1, 5)), "1/s"),
                 *(
                     at_most(
                         f"multiplier; {omega_c:g} 1/s",
@@ -743,12 +755,14 @@ def damped_statements(charts: Mapping[float, Chart]) -> tuple[Statement, ...]:
             "relative to the width; greatest of I4 = 0.5, 1 and 1.5",
             f"{SMALL:g}, the rule for *small*: the next order",
             tuple(at_most(end, SMALL, x) for end, x in apart.items()),
+            f"by the coefficients of the listings (errata 18, 19) they are up to {listed:.2f} of the width, "
+            f"{100.0 * parts:.1f} % of lambda_k^2, apart",
         ),
         Statement(
             "THIS PROG. INV[E]STIGATES STABILITY IN PRESENCE [O]F DAMPING",
             listing("appendix 4, L8698"),
-            "omega_c that removes the first region up to I4 = 1.5: by the listing, run, and by the true periodic "
-            "motion",
+            "omega_c that removes the first region up to I4 = 1.5: by the equation of the listing, solved without its cut "
+            "after nine terms, and by the true periodic motion",
             "0.0005 1/s, to which the listing's value is found",
             (near("", f"{by_listing:.3f}", worst["true orbit"], unit="1/s"),),
             "its regions are too wide (errata 2, 17, 18, 21)",
@@ -769,7 +783,8 @@ def compute_damped() -> StudyResult:
     return StudyResult(
         number="5.4",
         claim="omega_c = mu/(m4 + m5) narrows the region, and 0.45 1/s removes it up to I4 = 1.5.",
-        assignment="The dampers below 0.45 1/s are ours.",
+        assignment="The dampers of the regions, 0, 0.05, 0.1 and 0.15 1/s, are ours; the damper that removes the region is "
+        "found at I4 = 0.25 to 2 in steps of 0.25.",
         columns=padded(columns),
         statements=damped_statements(charts),
     )
