@@ -42,8 +42,8 @@ series with enough terms reaches what the variational method does. Cams of a few
 machine with twice the friction of the model, coupler and slider a tenth heavier and a load of 6 N a drive without feedback
 fails within half a turn, and feedback holds the motion to a quarter of a per cent of the stroke.
 
-*What does not.* The envelope has a hole where all curves of the family go round the same place: P reaches 24 to 89 % of
-what it encloses, by the limits of U; between the widest within which the crank turns fully, -1.5 and 1.5, it reaches all.
+*What does not.* The envelope has a hole where all curves of the family go round the same place: by four limits of U P
+reaches 24 to 89 % of what it encloses; between -1.5 and 1.5, where the crank turns fully but at +-0.5, it reaches all.
 If the coupler cannot point at the desired point the rocker need not stand upright: for places below the slider's line it
 hangs. The printed series for the rocker function gives the stated 4.8 deg2 in none of the readings tried (of its signs, of
 A0 and of its argument): as printed the links cannot be joined, and where they can the error is more than with the pivot
@@ -700,7 +700,8 @@ TABLE = {
         ("direct", "weighted"),
         "U",
         _weighted,
-        assignment=f'{SERIES_1} The weight reads "=. 5w 2" in the scan (L5815): {WEIGHT:g} is taken.',
+        assignment=f'{SERIES_1} The weight reads "=. 5w 2" in the scan (L5815): {WEIGHT:g} is taken, as p1 p2 is to be '
+        "the closer part (L5807).",
     ),
     "7.10": Motions(
         "The weighted part p1 p2 is traced more closely, the rest less so.",

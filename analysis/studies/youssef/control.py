@@ -367,9 +367,9 @@ def compute() -> StudyResult:
                 "The computer program shown in Appendix[] 5, can cope with the above defined strategy producing optimum "
                 "results in each case.",
                 text("7.4, L6026"),
-                "*optimum* is read as within our limits: first step, the four-bar: error of the 7 printed linkages with a "
-                "stated error, mended, over the least that we find, as at L7026; second, the slider: error of the two printed "
-                "series, as at L5935, over the least that we find with as many harmonics and the same links",
+                "*optimum* is read, by us, as the least within our limits: first step, the four-bar: error of the 7 printed "
+                "linkages with a stated error, mended, over the least that we find, as at L7026; second, the slider: error of "
+                "the two printed series, as at L5935, over the least that we find with as many harmonics and the same links",
                 f"{1.0 + ALIKE:g}, the rule for *the same*",
                 (
                     *(at_most(name, 1.0 + ALIKE, ratio, why="not an optimum") for name, ratio in over_least().items()),

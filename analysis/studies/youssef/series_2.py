@@ -445,8 +445,8 @@ def moved_path() -> StudyResult:
                 "suitable control of U than could otherwise be obtained.",
                 text("7.0, L5248"),
                 "area that P reaches over that within the envelope of Fig 7.2; area between the path and the curve with our "
-                "best of two harmonics of the slider over that with the pivot fixed, as at L5935: *otherwise* is read as with "
-                "the same links, those printed, mended",
+                "best of two harmonics of the slider over that with the pivot fixed, as at L5935: *otherwise* is read, by us, "
+                "as with the same links, those printed, mended",
                 f"1 %, as at Fig 7.2; {SEEN_FALL}",
                 (
                     near(
