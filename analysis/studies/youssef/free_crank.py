@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
-from math import pi
+from math import ceil, pi
 from typing import NamedTuple
 
 import numpy as np
@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 from scipy.interpolate import CubicSpline
 
+from linkwork.errors import AssemblyError
 from linkwork.five_bar import dynamics, kinematics
 from linkwork.five_bar.parameters import InitialState
 from linkwork.five_bar.published import DYN_CM_PER_NEWTON_METRE
@@ -158,31 +159,45 @@ class Turns:
         )
 
     @property
-    def transient(self) -> int:
-        """Number of turns until the mean slider position is furthest from its start, after which it decays."""
-        return int(np.abs(self.slider).argmax())
-
-    @property
     def shown(self) -> int:
         """Number of turns until the mean crank speed falls below `HARMONIC_SPEED`."""
         return 1 + int(np.argmax(self.speed < HARMONIC_SPEED))
 
 
-def transient(stiffness: float) -> NDArray[np.float64]:
-    """Return the distance of u, in each turn after a launch with 1e8 dyn.cm, from the steady decay of a free crank.
+class Settling(NamedTuple):
+    """How a launch comes to the steady decay of a free crank.
 
-    It is the greatest over the turn, at the same mean speed, relative to the range of u in the decay.
+    Turns and time (s) from the end of the torque until u stays within `ALIKE` of it; greatest distance of u from it in the
+    first and in the last whole turn, relative to its range; greatest ratio of the mean of u to that of the turn before, after
+    that.
     """
-    launched, steady = launch(1e8, stiffness), coast(stiffness, rpm=RELEASED[stiffness])
-    (speeds, turns), (known, waves) = (
-        (Turns.of(run, 1.0).speed, turn_by_turn(run, "slider.position", 1.0)) for run in (launched, steady)
+
+    turns: float
+    time: float
+    first: float
+    last: float
+    decay: float
+
+
+@cache
+def settling(torque: float, stiffness: float) -> Settling:
+    """Compare u after a launch with that of a free crank at the same crank angle and mean speed of the turn."""
+    launched, steady = launch(torque, stiffness), coast(stiffness, rpm=RELEASED[stiffness])
+    (after, turns), (known, waves) = (
+        (Turns.of(run, 1.0), turn_by_turn(run, "slider.position", 1.0)) for run in (launched, steady)
     )
     found = []
-    for speed, turn in zip(speeds, turns):
+    for speed, turn in zip(after.speed, turns):
         # the speed of the steady decay falls
-        wave = np.array([np.interp(-speed, -known, column) for column in waves.T])
-        found.append(np.abs(turn - wave).max() / np.ptp(wave))
-    return np.array(found)
+        wave = np.array([np.interp(-speed, -known.speed, column) for column in waves.T])
+        found.append(np.abs(turn - wave) / np.ptp(wave))
+    distances = np.array(found)
+    count = float(np.append(0, 1 + np.flatnonzero(distances > ALIKE))[-1]) / SAMPLES
+    end = float(np.interp(1.0 + 2.0 * pi * count, launched["crank.angle"], launched.time))
+    decaying = after.slider[min(ceil(count), len(after.slider) - 2) :]
+    return Settling(
+        count, end - launched.events[0].time, distances[0].max(), distances[-1].max(), greatest_ratio(decaying)
+    )
 
 
 def turn_by_turn(run: Trajectory, output: str, start: float) -> NDArray[np.float64]:
@@ -261,7 +276,7 @@ def _rise_cases(runs: Mapping[str, Trajectory]) -> tuple[Case, ...]:
         at_most(f"distance from a line; {label}", ALIKE, from_line(*_rise_to_peak(run))) for label, run in runs.items()
     ]
     angle = max(run_peak(run).angle for run in runs.values())
-    return (*bows, at_most("crank angle of the peak, greatest", "1", angle, "rad"))
+    return (*bows, at_most("crank angle of the peak, greatest", 1.0, angle, "rad"))
 
 
 class Peak(NamedTuple):
@@ -323,23 +338,41 @@ def _launches(torque: float, stiffness: float) -> tuple[Trajectory, Trajectory]:
 
 
 #: What is measured by `_swing_cases` and `_damper_cases`.
-SWINGS = "range of the crank speed in a turn over its mean; its mean relative to that of the turn before; in the free motions"
+SWINGS = (
+    "range of the crank speed in a turn over its mean; its mean, by which we judge the decay, relative to that of the turn "
+    "before; in the free motions"
+)
 UNDAMPED = (
     "greatest mean crank speed of a turn in the second half of the free motion, relative to that of its first turn, without "
-    "the damper and with it, over the same turns; without it crank and slider exchange energy, so that the mean speed falls "
-    "and rises again: judged is whether it comes back"
+    "the damper and with it, over the same turns; the greatest, since without it the mean speed swings: crank and slider "
+    "exchange energy"
 )
 
 
-def _turns(runs: Mapping[str, Trajectory]) -> list[Turns]:
-    """Return the turns after the torque has ended."""
-    return [Turns.of(run, start=1.0) for run in runs.values()]
+#: Label of the case on `Settling.decay`.
+DECAY = "mean of u relative to the turn before, greatest"
 
 
-def _decay_case(turns: Sequence[Turns]) -> Case:
-    """Judge whether the mean slider position decays after the transient."""
-    decay = max(greatest_ratio(t.slider[t.transient :]) for t in turns)
-    return at_most("mean of u relative to the turn before, after the transient, greatest", 1.0, decay)
+def _settled() -> tuple[Case, ...]:
+    """Judge whether the launch with the greatest torque takes the longest to come to a decay, and whether it decays."""
+    try:
+        *sooner, last = (settling(torque, 1e6) for torque in TORQUES)
+    except AssemblyError:
+        return tuple(
+            Case(label=label, computed=None, why="the steady motion of a free crank does not stay assembled")
+            for label in ("turns", "time", DECAY)
+        )
+    return (
+        at_least("turns", 1.0, last.turns / max(x.turns for x in sooner)),
+        at_least("time", 1.0, last.time / max(x.time for x in sooner)),
+        at_most(DECAY, 1.0, last.decay),
+    )
+
+
+def _swing_growth(runs: Mapping[str, Trajectory]) -> str:
+    """Return words on how much the range of the crank speed grows from a turn to the next."""
+    most = max(greatest_ratio(Turns.of(run, 1.0).speed_range) for run in runs.values())
+    return f"the range of the speed itself grows at first, by up to {100 * (most - 1):.0f} %" if most > 1.0 else ""
 
 
 def launch_speeds() -> StudyResult:
@@ -368,6 +401,7 @@ def launch_speeds() -> StudyResult:
             f"{SWINGS} after all three torques, up to 1 s; no torque acts there by the thesis's own definition",
             f"{ALIKE:g}, the rule for *steady*; {SIGN}",
             _swing_cases(runs, 1.0),
+            _swing_growth(runs),
         ),
         Statement(
             "The decaying aspect is due to the energy dissipation in the slider guide and will be studied in the "
@@ -401,7 +435,13 @@ def torque_over_time() -> StudyResult:
                 f"relative to that at {plain(TORQUES[0])}",
                 f"{ALIKE_WORDS}; asymptotes to {SMALL:g}, the rule for *small*",
                 (
-                    near("exponent, -1 in a hyperbola", -1.0, slope, ALIKE, why="T0 t^2 is nearly constant, not T0 t"),
+                    near(
+                        "exponent, -1 in a hyperbola with these asymptotes",
+                        -1.0,
+                        slope,
+                        ALIKE,
+                        why="T0 t^2 is nearly constant, not T0 t",
+                    ),
                     at_most("least T0", SMALL, low / scale),
                     at_most("least time", SMALL, release_time(1e12) / release_time(TORQUES[0])),
                 ),
@@ -429,14 +469,8 @@ def draw_torque_over_time(result: StudyResult) -> Figure:
 def launch_positions() -> StudyResult:
     """Compute the slider position after launches with the three torques."""
     runs = _torque_runs()
-    turns = _turns(runs)
     largest = max(float(np.abs(run["slider.position"]).max()) for run in runs.values())
-    later = turns[2].transient - max(t.transient for t in turns[:2])
-    *sooner, last = (
-        np.interp(t.transient, np.arange(len(t.ends) + 1), [run.events[0].time, *t.ends]) - run.events[0].time
-        for t, run in zip(turns, runs.values())
-    )
-    *lesser, shift = (abs(t.slider.mean()) for t in turns)
+    *lesser, shift = (abs(Turns.of(run, 1.0).slider.mean()) for run in runs.values())
     shaft = -CM_PER_METRE * table_3_1(0.0).ground_length
     return _launch_result(
         "3.8",
@@ -447,14 +481,11 @@ def launch_positions() -> StudyResult:
             "As would be expected the response for [T0 = 2 x 10^8] takes longer before it settles and then starts a "
             "steady state decay.",
             text("3.2.2, L2155-2159"),
-            "turns, and time from the end of the torque, until the mean of u is farthest from the start, with T0 = 2e8 dyn.cm "
-            "less the greater of the others; mean of u relative to the turn before, from then on",
+            f"turns, and time, from the end of the torque until u stays within {ALIKE:g} of the steady decay, as at Fig 3.10, "
+            "relative to the longest of the other torques; mean of u relative to the turn before, in the turns of the first "
+            "second that begin after that",
             SIGN,
-            (
-                at_least("turns longer", 1.0, later),
-                at_least("time longer", 0.0, last - max(sooner), "s"),
-                _decay_case(turns[-1:]),
-            ),
+            _settled(),
         ),
         Statement(
             "The three responses show the slider oscillates between its initial position and the crank shaft and as "
@@ -513,6 +544,7 @@ def launch_speeds_by_spring() -> StudyResult:
                 *_swing_cases(_spring_runs(), 1.0),
                 *_damper_cases({label: _launches(1e8, k) for label, k in zip(rises, STIFFNESSES)}, 1.0),
             ),
+            _swing_growth(_spring_runs()),
         ),
         Statement(
             "Because the speed response is the same throughout the time region in which the torque acts, it suggests "
@@ -535,10 +567,9 @@ def launch_positions_by_spring() -> StudyResult:
     runs = _spring_runs()
     apart = np.ptp([accelerated(1e8, k)["slider.position"] for k in STIFFNESSES], axis=0).max()
     apart /= np.ptp([accelerated(1e8, k)["slider.position"] for k in STIFFNESSES])
-    distances = [transient(k) for k in STIFFNESSES]
-    spread = {
-        name: np.ptp([t.transient for t in _turns(of)]) for name, of in (("springs", runs), ("torques", _torque_runs()))
-    }
+    settled, by_torque = [settling(1e8, k) for k in STIFFNESSES], [settling(torque, 1e6) for torque in TORQUES]
+    counts = {name: [x.turns for x in of] for name, of in (("springs", settled), ("torques", by_torque))}
+    of_springs, of_torques = (" and ".join([", ".join(few), last]) for *few, last in map(_rounded, counts.values()))
     return _launch_result(
         "3.10",
         "The slider moves alike with all springs while the torque acts; a transient follows, whose duration depends "
@@ -558,34 +589,39 @@ def launch_positions_by_spring() -> StudyResult:
             "Fig. (3.10) also shows that as the torque is [r]emoved a transient free motion response prevails after "
             "which occurs a free motion steady state decay which is studied in the next section.",
             text("3.2.2, L2195-2201"),
-            "greatest distance of u over a turn from that of a free crank of the same mean speed, released from its steady "
-            f"motion at {RELEASED[STIFF]:g} rpm, and at {RELEASED[SOFT]:g} rpm with k = 5e5 dyn/cm, with which the links come "
-            f"collinear at {RELEASED[STIFF]:g}, relative to its range; mean of u relative to the turn before, once it is "
-            "farthest from the start",
+            "distance of u from a steady decay: from u of a free crank at the same crank angle and mean speed of the turn, "
+            f"released from its steady motion at {RELEASED[STIFF]:g} rpm, and at {RELEASED[SOFT]:g} rpm with k = 5e5 dyn/cm, "
+            f"with which the links come collinear at {RELEASED[STIFF]:g}; relative to its range in a turn; greatest of the "
+            "first turn after the torque and of the last whole one in 1 s; mean of u relative to the turn before, in the turns "
+            f"that begin once u stays within {ALIKE:g} of that decay",
             f"{ALIKE_WORDS}; {SIGN}",
             (
                 *(
                     case
-                    for label, left in zip(runs, distances)
+                    for label, x in zip(runs, settled)
                     for case in (
-                        at_least(f"{label}, first turn", ALIKE, left[0]),
-                        at_most(f"{label}, ninth turn", ALIKE, left[8]),
+                        at_least(f"{label}, first turn", ALIKE, x.first),
+                        at_most(f"{label}, last turn", ALIKE, x.last),
                     )
                 ),
-                _decay_case(_turns(runs)),
+                at_most(DECAY, 1.0, max(x.decay for x in settled)),
             ),
         ),
         Statement(
             "The duration of the transient free motion stage depends on the stiffness k and the initial input torque "
             "values.",
             text("3.2.2, L2201-2205"),
-            "turns until the mean of u is farthest from the start, which we take for the duration, longest less shortest",
-            SIGN,
-            tuple(at_least(f"of the three {name}", 1.0, x) for name, x in spread.items()),
-            f"from the steady decay, as in the row before, u is within {ALIKE:g} after "
-            f"{', '.join(str((left > ALIKE).sum()) for left in distances)} turns with k = 5e5, 1e6 and 2e6 dyn/cm",
+            f"turns from the end of the torque until u stays within {ALIKE:g} of the steady decay, as in the row before, "
+            "longest over shortest",
+            f"more than {1.0 + ALIKE:g}, the rule for *the same*",
+            tuple(at_least(f"of the three {name}", 1.0 + ALIKE, max(x) / min(x)) for name, x in counts.items()),
+            f"they are {of_springs} with k = 5e5, 1e6 and 2e6 dyn/cm, and {of_torques} with T0 = 1e7, 1e8 and 2e8 dyn.cm",
         ),
     )
+
+
+def _rounded(values: Sequence[float]) -> list[str]:
+    return [f"{value:.1f}" for value in values]
 
 
 # --- Free motion: 3.11 to 3.14
@@ -662,7 +698,8 @@ def _free_causes() -> Statement:
         text("3.3, L2253-2259"),
         "relative range of the kinetic energy in a turn over that of the crank speed squared, greatest down to "
         f"{HARMONIC_SPEED:g} rad/s: where this energy does not change, the inertia's change with the position alone swings "
-        f"the speed; {UNDAMPED}; runs of 4 s, ours",
+        "the speed, for which we take *the non-linearities* here; at Fig 3.13 they are those in u; "
+        f"{UNDAMPED}; runs of 4 s, ours",
         f"less than half, as *due to* says; {ALIKE_WORDS}",
         (*swings, *_damper_cases({label: (coast(k, 0.0), coast(k)) for label, k in BOTH.items()}, 0.0)),
     )
@@ -707,6 +744,9 @@ def soft_phase_plane() -> StudyResult:
     drift, distance = (
         a / b for a, b in zip(*((np.ptp(t.slider[: t.shown]), abs(t.slider[0])) for t in turns.values()))
     )
+    rise = max(
+        greatest_ratio(np.abs(x[:3])) for t in turns.values() for x in (t.slider_range, t.slider, t.velocity_range)
+    )
     tending = [
         at_most(f"{name}; {label}", 1.0, greatest_ratio(np.abs(x[2 : t.shown])))
         for label, t in turns.items()
@@ -739,15 +779,17 @@ def soft_phase_plane() -> StudyResult:
             text("3.3, L2276-2287"),
             "range and distance of the mean of u from 0, and range of u', relative to the turn before, from the fourth turn "
             "on, ours, since the first are the transient of the release; greatest; drift of the mean of u over the turns that "
-            "are drawn, relative to the range of u in them",
+            "are drawn, relative to the greatest range of u in one of them",
             f"{SIGN}; more than {ALIKE:g}, the rule for what is seen on a graph",
             (*tending, *drifts),
+            f"in the first three turns some of them grow, by up to {100 * (rise - 1):.0f} % from one to the next",
         ),
         Statement(
             "Th[e] drift is greater in Fig. (3.13) due to the value of k being smaller which puts the mean position "
             "of oscillation further away from u=[0].",
             text("3.3, L2287-2293"),
-            "drift of the mean of u, and its distance from 0 at the start, relative to those with k = 2e6 dyn/cm",
+            "drift of the mean of u over the turns that are drawn, and its distance from 0 in the first, relative to those "
+            "with k = 2e6 dyn/cm; the runs differ in k alone, and in what follows from it",
             SIGN,
             (at_least("drift", 1.0, drift), at_least("distance", 1.0, distance)),
         ),
@@ -755,7 +797,8 @@ def soft_phase_plane() -> StudyResult:
             "Non-linear effects leading to higher harmonics in the slider motion are clearly shown in both figures.",
             text("3.3, L2293-2297"),
             "higher harmonics of u, root of the sum of their squares, relative to the first, least of the turns that are "
-            "drawn; this ratio over that by the equation linear in u with the same motion of the crank, greatest of the turns",
+            "drawn; this ratio over that by the equation linear in u with the same motion of the crank, greatest of the turns: "
+            "*non-linear* is read, by us, as non-linear in u",
             f"more than {SMALL:g}, the rule for *small*; more than {1.0 + ALIKE:g}, the rule for *the same*, for a non-linear "
             "effect",
             (
@@ -764,7 +807,8 @@ def soft_phase_plane() -> StudyResult:
             ),
             "the equation linear in u has these harmonics too: the geometry of the linkage forces them, also at a constant "
             f"crank speed: at {HARMONIC_SPEED:g} rad/s its second harmonic is "
-            f"{' and '.join(f'{linear_ratio(k):.2f}' for k in BOTH.values())} of the first",
+            f"{' and '.join(f'{linear_ratio(k):.2f}' for k in BOTH.values())} of the first; with what is "
+            "non-linear in the crank angle, as at Fig 3.12, it would hold",
         ),
     )
 
@@ -852,7 +896,7 @@ def stiff_phase_plane() -> StudyResult:
             text("3.3, L2297-2301"),
             "second harmonic over the first, ours, by which the phase plane departs from an ellipse, at a mean crank speed of "
             "27 rad/s, relative to that with k = 5e5 dyn/cm; "
-            "speed at which it is greatest, the motion followed beyond the plot, down to "
+            "speed at which it is greatest, as we read *around*, the motion followed beyond the plot, down to "
             f"{stiff.speed[-1]:.1f} rad/s",
             f"{SIGN}; {100 * ABOUT:g} %, the rule for *around*",
             (
@@ -867,7 +911,7 @@ def stiff_phase_plane() -> StudyResult:
                 ),
             ),
             "the second harmonic over the speed squared, to which its force is proportional, is greatest at "
-            f"{resonance:.0f} rad/s",
+            f"{resonance:.1f} rad/s, by which it would hold",
         ),
         Statement(
             "This speed is in fact an approximation to half the natural frequency of the system.",
@@ -887,7 +931,7 @@ def stiff_phase_plane() -> StudyResult:
             text("3.3, L2305-2307"),
             "mean crank speed at which the second harmonic over the speed squared, to which its force is "
             "proportional, is greatest, relative to half the natural frequency with the mean mass; higher harmonics over "
-            "the first, relative to those by the equation linear in u, as at Fig 3.13",
+            "the first, relative to those by the equation linear in u, as at Fig 3.13, *non-linearity* read as there",
             f"{lowered:.3f} below 1, by which the damper of the thesis lowers the peak of an oscillator; more than "
             f"{1.0 + ALIKE:g}, the rule for *the same*, for a non-linearity",
             (
@@ -901,8 +945,8 @@ def stiff_phase_plane() -> StudyResult:
             "value but extends over a range. This is due to the variable mass and inertia of the mechanism "
             "experienced by the slider.",
             text("3.3, L2307-2317"),
-            "natural frequency with the least over that with the greatest effective mass of a turn, which alone differ; k = "
-            "2e6 dyn/cm",
+            "natural frequency with the least over that with the greatest effective mass of a turn, at u = 0, which alone "
+            "differ; k = 2e6 dyn/cm",
             f"more than {ALIKE:g}, the rule for *the same*",
             (at_least("", 1.0 + ALIKE, over_turn.max() / over_turn.min()),),
         ),

@@ -274,8 +274,8 @@ def compute() -> StudyResult:
                         f"{degrees(x):.0f}",
                         degrees(y),
                         unit="deg",
-                        why="it follows from alpha4 that was rounded to 120 deg before (4.6) was solved: alpha3 = "
-                        f"{coupler:.2f}, alpha = {crank:.2f} deg",
+                        why="with alpha4 rounded to 120 deg before (4.6) is solved, alpha3 is "
+                        f"{coupler:.2f} and alpha {crank:.2f} deg",
                     )
                     for name, x, y in zip(("alpha", "alpha3", "alpha4"), DATUM, own)
                 ),
@@ -283,9 +283,10 @@ def compute() -> StudyResult:
             Statement(
                 "Substituting equations (4.6[)] into equations (4.5) we obtain: [(4.7)] and hence [(4.8)]",
                 text("4.1, eqs (4.2) to (4.8), L2459-2477"),
-                "residuals of (4.5) and (4.7), relative to sigma2, with xi3 and xi4 by (4.8); order in the crank's length of "
-                f"the errors of xi3 and xi4 against the closed linkage, from sigma2 = {SHORT[0]:g} to {SHORT[1]:g}; greatest "
-                f"over a turn, at zeta = sigma2/2, sigma = 1 and sigma3 = {COUPLER:g}, which are ours",
+                f"residuals of (4.5) and (4.7) at sigma2 = {SHORT[0]:g}, relative to it, with xi3 and xi4 by (4.8); order in "
+                "the crank's length of the errors of xi3 and xi4 against the closed linkage, from sigma2 = "
+                f"{SHORT[0]:g} to {SHORT[1]:g}; greatest over a turn, at zeta = sigma2/2, sigma = 1 and sigma3 = "
+                f"{COUPLER:g}, which are ours",
                 f"{ROUNDING:g}, above rounding errors; 2, the first order that is neglected in (4.4), and 0.05, as an order is "
                 "a whole number",
                 (
@@ -314,7 +315,7 @@ def compute() -> StudyResult:
                 f"those of the right equation, at I4 = 1 and sigma2 = {SHORT[1]:g}, about the datum by (4.1) and (4.6), with "
                 "massless coupler and centre of mass of the rocker on the slider as in 4.5; the factor of zeta' without a "
                 "damper relative to M'",
-                f"{LIMIT:g}, more than the terms of second order, which are about sigma2 times as large",
+                f"{LIMIT:g}, more than the terms of second order, which are a few sigma2",
                 (
                     *(
                         Case(label=name, computed=None, why="its sign cannot be read, its size is right")
@@ -327,8 +328,7 @@ def compute() -> StudyResult:
                 "R1 and S1 are read from U and V of appendix 2 (L8449-8450): the scan's lines of them (L2786-2794) are not "
                 "whole and have terms in r4 and mr3 only, which vanish under these conditions. G1 vanishes too; Q1 in the "
                 "scan has a term in I4 (L2781), where the right equation has none of first order and the programs have no "
-                "mean of the force: it is not judged, nor are the terms with the coupler's mass and with r4, which no result "
-                "of chapters IV and V needs",
+                "mean of the force: it is not judged, nor are the terms with the coupler's mass and with r4",
             ),
             Statement(
                 "The coefficients B1, C1, H1, P1, [Q1], E1 and F1 are much smaller than those of A1 a[nd] D1 by at "
@@ -341,8 +341,8 @@ def compute() -> StudyResult:
                 "Therefore we may write : [(4.22)] where [epsilon] is a small parameter and [h0], g0 << k0.",
                 text("4.3, eq (4.22), L2801-2837"),
                 "means of K and F of the right linear equation, in size, over that of the spring's factor, which is 1: G1 and "
-                "Q1 over A1; at the ends of Fig 5.1 to 5.3, with sigma2 = 0.05 and sigma3 = 1 unless another is named, and for "
-                "rig 2, whose coupler has mass",
+                "Q1 over A1; at that end of each of Figs 5.1 to 5.3 where they are greatest, with sigma2 = 0.05 and sigma3 = 1 "
+                "unless another is named, and for rig 2, whose coupler has mass",
                 f"{SMALL:g}, the rule for *small*, as *<<* says",
                 tuple(at_most(name, SMALL, x) for name, x in constant_parts().items()),
                 "G1 as printed vanishes with a massless coupler; in the scan Q1 has a term in I4 (L2781), by which g0 would be "
@@ -354,9 +354,10 @@ def compute() -> StudyResult:
                 "[(4.23)] ... Similarly the stiffness term may be written : [(4.25)] ... In a similar manner the right hand "
                 "side may be written : [(4.27)]",
                 text("4.3, eqs (4.22) to (4.28), L2853-2916"),
-                "order in the crank's length of what (4.23) to (4.28) leave out of S, the factor of damper and spring, and of "
-                f"K and F, each a quotient of the printed coefficients, from sigma2 = {SHORT[0]:g} to {SHORT[1]:g}; I4 = 1; b4 "
-                "of (4.26) with k3 k6 + k4 k5, as the listing has it (L8448), where the scan has k3 k5 + k4 k5",
+                "order in sigma2, to which we take epsilon to be proportional, of what (4.23) to (4.28) leave out of S, the "
+                "factor of damper and spring, and of K and F, each a quotient of the printed coefficients, from sigma2 = "
+                f"{SHORT[0]:g} to {SHORT[1]:g}; I4 = 1; b4 of (4.26) with k3 k6 + k4 k5, as the listing has it (L8448), where "
+                "the scan has k3 k5 + k4 k5",
                 "3; 0.05, as an order is a whole number",
                 tuple(
                     at_least(f"{part}; {name}", 2.95, x, why="the mean has a part of second order too")
