@@ -715,8 +715,8 @@ def torque_result() -> StudyResult:
                 "geometry which leads to changes in inertial loads.",
                 text("3.2.1, L2005-2013"),
                 f"share of the inertial loads, all but the weight, in the difference of the torque between {_k(5e5)} and 2e6, "
-                "at the extremes; share of the slider's position alone, mean of the two in which it changes before its "
-                "rates and after them; spread of u between the springs, greatest of the turn, over the "
+                "at the extremes as above; share of the slider's position alone, mean of the two in which it changes before "
+                "its rates and after them; spread of u between the springs, greatest of the turn, over the "
                 f"{to_shaft:.2f} cm from the start to the shaft",
                 f"{ALIKE:g}, the rule for *the same*, as *only* says; {ALIKE:g} to {SLIGHTLY:g}, the rule for *slight*",
                 (
@@ -755,7 +755,7 @@ def torque_result() -> StudyResult:
                 "share of the crank angles at which the torques of the three springs differ by more than *the same*, relative "
                 f"to the size of the least with {_k(1e6)}, where the slider's accelerations differ by more than that too, "
                 "relative to the greatest; for *leading to different inertial loads* the greatest difference in the turn of "
-                "the acceleration's part of the torque, relative to the same",
+                "the acceleration's part of the torque, relative to that torque",
                 f"all; {ALIKE_WORDS}",
                 (
                     near("torques differ where accelerations do", 1.0, np.mean(both), 0.0),
