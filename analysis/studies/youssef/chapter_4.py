@@ -507,12 +507,13 @@ def _curves() -> tuple[Statement, ...]:
         Statement(
             "The resonance curves are similar to a second order linear system",
             text("4.5.3 d, L3206-3208"),
+            "*the resonance curves* are read, by us, as those of Figs 4.6 and 4.7; "
             "greatest distance of the first harmonic from the amplitude of one mass on a spring, with the means of M and K and "
             "the first harmonic of F, relative to the peak; right equation, 27 to 35 rad/s in steps of 0.02, ours, greatest of "
             f"omega_c = {DAMPERS[0]:g} to {STRONGEST:g} 1/s",
             f"{ABOUT:g}, the rule for *similar*",
             tuple(at_most(label, ABOUT, found["one mass"]) for label, found in both.items()),
-            "the second harmonic has a peak of its own at half the natural frequency, see L3162",
+            "near half the natural frequency the second harmonic has its own resonance, see L7102",
         ),
     )
 
