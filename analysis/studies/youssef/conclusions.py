@@ -264,8 +264,8 @@ def kinematics() -> tuple[Statement, ...]:
             "our choices",
             f"{ALIKE:g}, the rule for *the same*, as at Fig 6.9 (L5043)",
             tuple(at_most(name, ALIKE, of_ellipse(axis_cm, 5)) for name, axis_cm in ELLIPSES.items()),
-            "with two harmonics, as many as the printed series have (7.3.2), path (a) has "
-            f"{of_ellipse(ELLIPSES['path (a), 10 cm'], 2):.2f}, with the pivot fixed "
+            "with two harmonics, as many as the printed series have (7.3.2), the least that we find for path (a) is "
+            f"{of_ellipse(ELLIPSES['path (a), 10 cm'], 2):.2f}, with the pivot fixed it is "
             f"{of_ellipse(ELLIPSES['path (a), 10 cm'], 0):.2f}",
         ),
         Statement(
