@@ -199,7 +199,7 @@ class TestFriction:
         of = rigs.turn("A", 420.0, slider_friction_coefficient=0.1)
         damper = rigs.rig("A").slider_damping * np.mean(of["slider.velocity"] ** 2)
         supplied = of["drive.applied_torque"].mean() * 420.0 * published.RPM
-        assert rig_1.lost_to_friction("A", 420.0, 0.1) == pytest.approx(supplied / damper - 1.0, rel=2e-3)
+        assert rig_1.over_damper("A", 420.0, 0.1)[0] == pytest.approx(supplied / damper - 1.0, rel=2e-3)
 
     def test_amplitudes_without_friction_are_those_of_the_branch(self) -> None:
         branch = rigs.motions("A").branches[0]

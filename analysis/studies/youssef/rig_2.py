@@ -14,7 +14,7 @@ from scipy.optimize import minimize_scalar
 from ...figures import COLOURS, Curve, Figure, Panel, plot_curves
 from ...units import CM_PER_METRE, RAD_S_PER_RPM
 from ...youssef import HarmonicMotion, Variant, slider_equation, two_harmonics
-from ..rules import ABOUT, ALIKE, SMALL
+from ..rules import ABOUT, ALIKE, READ, SMALL
 from ..statements import Case, Statement, at_least, at_most, near, text
 from ..study import Study, StudyResult, padded
 from ..variation import cache
@@ -136,7 +136,7 @@ def _resonance() -> tuple[Statement, ...]:
             "(4.23) to (4.28) have it, and to first: the greatest of these ratios",
             larger,
             tuple(at_least(label, 1.0, max(ratios)) for label, ratios in over.items()),
-            "what is ignored lowers the amplitude and narrows the resonance, by at most "
+            "what is ignored lowers the amplitude and narrows the resonance, at these speeds by at most "
             f"{1.0 - min(map(min, over.values())):.1%}",
         ),
         Statement(
@@ -146,8 +146,8 @@ def _resonance() -> tuple[Statement, ...]:
             text(f"{section}, L6853"),
             f"amplitude, the least of the same speeds, and width as before, by the full equations: with friction by {SLIGHT:g} "
             f"of the guide's force or a friction radius of {1e3 * PIN_RADIUS:g} mm in the pins, as in {FRICTION}, and with a "
-            f"damper {' or '.join(f'{d:g}' for d in DAMPERS)} times as strong (ours: no scatter is printed), over those "
-            "without",
+            f"damper {' or '.join(f'{d:g}' for d in DAMPERS)} times as strong (ours: no scatter is printed), each alone, "
+            "over those without",
             larger,
             _factors(),
             "friction and a stronger damper widen the resonance and lower the amplitude beyond it, a weaker damper the "
@@ -194,7 +194,7 @@ def _resonance() -> tuple[Statement, ...]:
             "the theory that the second and higher orders of [xi3] and [xi4] and their derivatives are negligible is "
             "a reasonable assumption.",
             text(f"{section}, L6974"),
-            "error of the amplitude by the linear equation of chapter IV, corrected, the most from "
+            "error of the amplitude by the linear equation of chapter IV, corrected, to second order of sigma2, the most from "
             f"{RANGE[0]:g} to {RANGE[-1]:g} rpm in tens, relative",
             f"{SMALL:g}, the rule for *negligible*",
             (
@@ -306,15 +306,15 @@ def compute_harmonics() -> StudyResult:
                 "There were no experimentally observable changes in the amplitude of oscillations at quarter, third and "
                 "half the natural frequency, which again indicated a slider motion based on the first harmonic.",
                 text("8.4.2.2, L6871"),
-                "rise of the amplitude at the maximum there over the next minimum, relative to this minimum; 0 where there is "
-                "no maximum",
+                "rise of the amplitude at the maximum there over the next minimum, relative to this minimum; 0 where no "
+                "maximum is found in the steps of the curve, at most 6 rpm",
                 SEEN_IN_RECORDS,
                 tuple(cases),
                 f"of these places only half with D, at {natural_speed('D') / 2.0:.0f} rpm, lies within the "
                 f"{RANGE[0]:g} to {RANGE[-1]:g} rpm that were run (L6808); with friction by {SLIGHT:g} of the guide's "
                 f"force {' and '.join(left)} are left at half; relative to the greatest amplitude of the curve the rises "
-                f"there are {' and '.join(part_of_all)}, which a graph of it does not show; that the motion is based on the "
-                "first harmonic is judged at L6814",
+                f"there are {' and '.join(part_of_all)}, below the {READ:g} that can be read from a graph; that the motion is "
+                "based on the first harmonic is judged at L6814",
             ),
             Statement(
                 "The theoretical resonance curves corresponding to the second harmonic for both springs C and D are shown in "

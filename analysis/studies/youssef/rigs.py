@@ -244,7 +244,8 @@ def marks(spring: str, *orders: int) -> Mapping[str, float]:
 
 
 def largest_multiplier(spring: str, low: float, high: float) -> float:
-    """Return the largest Floquet multiplier over a range of speeds (rpm)."""
+    """Return the largest Floquet multiplier over a range of speeds (rpm), its ends included."""
     (branch,) = motions(spring).branches
     within = (rpm(branch) >= low) & (rpm(branch) <= high)
-    return float(branch.largest_multiplier[within].max())
+    ends = (orbit(rig(spring), speed).largest for speed in (low, high))
+    return max(float(branch.largest_multiplier[within].max()), *ends)
