@@ -81,6 +81,7 @@ def compute_rig_1() -> StudyResult:
     # at the last speed the guide was too short
     accommodated = {s: max([amplitude(of) for of in _turns_to_stop(s).values()][:-1]) for s in "AB"}
     reached = {s: _displacements(s) for s in "AB"}
+    by_amplitude = [amplitude(turn(s, float(STOPPED[s]))) / accommodated[s] for s in "AB"]
     why = (
         f"with spring B it is {reached['B'][0]:.2f} cm at {STOPPED['B']} rpm, and {reached['B'][1]:.2f} cm at "
         f"{reached['B'][2]:.0f} rpm, near half the natural frequency, where the rig did run (Fig 8.16)"
@@ -114,6 +115,7 @@ def compute_rig_1() -> StudyResult:
                 tuple(
                     at_least(f"spring {s}, {STOPPED[s]} rpm", 1.0, a / b, why=why) for s, (a, b, _) in reached.items()
                 ),
+                f"by half the range the two are {' and '.join(f'{ratio:.2f}' for ratio in by_amplitude)}",
             ),
         ),
     )
