@@ -39,7 +39,7 @@ from ...units import CM_PER_METRE
 from ..rules import ALIKE
 from ..statements import Case, Statement, at_least, at_most, near, text
 from ..study import Study, StudyResult, padded
-from .problems import DEG2_PER_RAD2, PROBLEMS, WEIGHT, N, ellipse, rocker_function
+from .problems import AREA_N, DEG2_PER_RAD2, PROBLEMS, WEIGHT, N, ellipse, rocker_function
 
 FINDINGS = """\
 The chapter claims that the downhill simplex, begun at many random sets of lengths and angles, finds the four-bar of least
@@ -51,7 +51,7 @@ partners are chosen, the crank's phase does not change it, both closures of the 
 assembly by its two extremes is exact. Weights do what they are said to do. Ellipse and path (b) are harder than (a); the
 curves for both (a) are as close as the thesis says. The printed linkage for path (b) has the stated area once a digit is
 mended, and the packaging machine's push is straight to 3 % of its length. Searches that include known minima take half the
-work, and those that begin with fewer points reach lower errors for 0.77 of it.
+work, and those that begin with 12 of the 72 points reach lower errors for 0.77 of it.
 
 *What does not.* Six of the seven errors are not those of the printed linkages, with the misprints mended that we found and
 each number rounded up or down: the linkage for ellipse (a) has 4.86 to 6.54 cm2, not 0.889. Those of the two rocker
@@ -59,10 +59,11 @@ functions are missed by 0.3 to 0.4 % in the nearest of many readings. Nor are th
 a descent of at most 60 steps brings their errors down to 0.08 to 0.51 of what they are, and within our limits there are
 linkages with a fortieth to a fifth of them; the two rocker functions are within 5 % of the optimum. The search itself,
 repeated from the program, is stopped by its criterion each time before it is at a minimum, none of its techniques reached
-the least error, and to begin with five of the ten parameters leads to no lower errors than to begin at random.
+the least error; to begin with five of the ten parameters leads to no lower errors than to begin at random, and with nine to
+lower ones for 1.6 times the work.
 
 *Our limits.* No link is longer than the longest of the printed linkage (Fig 6.6: its printed bounds, and r at most 30 cm),
-and the transmission angle is at least 40 deg, which the printed linkages for ellipse and path (a) and the packaging machine
+and the transmission angle is at least 40 deg, which the printed linkages of Fig 6.4, 6.6 and 6.9 and the packaging machine
 do not keep; for the rocker functions the crank turns fully instead.
 
 *Why.* The downhill simplex stops before it is at the minimum, in ten dimensions each time. And without bounds the problem has
@@ -187,7 +188,7 @@ def as_stated(label: str, stated: str, name: str, why: str = "no rounding gives 
     reading = min(near_by, key=lambda r: abs(near_by[r] - wanted))
     least, greatest = ranges[reading]
     return near(
-        f"{label}{reading}; over the rounding {least:.2f} to {greatest:.2f}",
+        f"{label}{reading}; rounded up or down {least:.2f} to {greatest:.2f}",
         stated,
         near_by[reading],
         unit=PROBLEMS[name].unit,
@@ -208,8 +209,8 @@ def _ellipse_a() -> tuple[Statement, ...]:
             "It may be seen from fig. (6.4) that the [four] bar output compares favourably with the desired output and in "
             "fact has an error value [E1p] of 0.889 cm2.",
             text("6.4.2 A, L4864"),
-            f"sum of the squared distances of the printed linkage at {N} crank angles, {ROUNDED}; rms distance over the "
-            "ellipse's longer semi-axis",
+            f"sum of the squared distances of the printed linkage at {N} crank angles, {ROUNDED}; *favourably* is read, by us, "
+            "as the rms distance over the ellipse's longer semi-axis",
             f"{HALF}; {ALIKE:g}, the rule for *the same*",
             (as_stated("error", "0.889", "ellipse-a", NO_DIGIT), at_most("rms distance", ALIKE, rms)),
             f"with the digits as printed it is {printed_error('ellipse-a'):.2f} cm2; {best_known('ellipse-a')}",
@@ -264,18 +265,18 @@ def _bounded() -> tuple[Statement, ...]:
             "The resulting minimum error is now 53.6 cm2 which when compared with the error resulting from the "
             "unconstrained case gives an increase of 52.7 cm2.",
             text("6.4.2 A, L4931"),
-            "sum of the squared distances of the printed linkage, as printed and, with a1 = -93.8 deg, "
+            f"sum of the squared distances of the printed linkage at {N} crank angles, as printed and, with a1 = -93.8 deg, "
             f"{ROUNDED}; increase over that of Fig 6.4, the nearest likewise",
             HALF,
             (
                 near("as printed, by the better closure", "53.6", min(by_closures), unit="cm2", why=BESIDE),
                 as_stated("a1 = -93.8 deg", "53.6", "ellipse-a-bounded", NO_DIGIT),
                 near(
-                    f"increase, a1 = -93.8 deg; over the rounding {increases[0]:.2f} to {increases[1]:.2f}",
+                    f"increase, a1 = -93.8 deg; rounded up or down {increases[0]:.2f} to {increases[1]:.2f}",
                     "52.7",
                     np.clip(52.7, *increases),
                     unit="cm2",
-                    why="neither error is as stated",
+                    why="neither error is as stated; the stated ones differ by it",
                 ),
             ),
             f"with a1 = -93.8 deg and the other digits as printed it is {printed_error('ellipse-a-bounded'):.2f} cm2; "
@@ -320,29 +321,27 @@ def _weighted() -> tuple[Statement, ...]:
     inside, outside = window_sums(PROBLEMS["rocker-weighted"].linkage)
     within = np.asarray(rocker_function(N, weighted=True).weights) > 1.0
     even_inside, even_outside = window_sums(PROBLEMS["rocker"].linkage)
-    free, _ = window_sums(mounted().linkage, mounting=True)
     return (
         Statement(
             "It is clearly seen from the figures that by weighting a portion of the output it is generated closely but at "
             "the expense of the remaining portions of the output.",
             text("6.4.2 B, L4973; also 6.2.2, L4247"),
-            "rms error of the weighted printed linkage within the window over the function's range of 100 deg; its squared "
-            f"errors over those of the unweighted one, within the window and out of it; {N} crank angles",
+            "*closely* is read, by us, as the rms error of the weighted printed linkage within the window over the function's "
+            "range of 100 deg; its squared errors over those of the unweighted one, within the window and out of it; "
+            f"{N} crank angles",
             f"{ALIKE:g}, the rule for *the same*; at most 1, since it gains there; at least 1, the rule for *greater*",
             (
                 at_most("rms within the window", ALIKE, np.sqrt(inside / within.sum()) / 100.0),
                 at_most("within the window", 1.0, inside / even_inside),
                 at_least("out of it", 1.0, outside / even_outside),
             ),
-            f"with the output at a free angle to the rocker our linkage has {free:.1f} deg2 within the window, the printed one "
-            f"{inside:.1f}",
         ),
         Statement(
             "This procedure of weighting factors may be used when outputs in the form of straight lines are required by "
             "giving the straight line portion of the output a weighting of unity and the remainder a weighting of zero.",
             text("6.4.2 B, L4981"),
             "rms distance of our best linkage from 13 points of a line of 100 mm, passed within 60 deg of crank rotation, "
-            "all others weighted zero: an example of ours, the thesis gives none",
+            "all others weighted zero: an example of ours, as the thesis gives none, within our limits for ellipse (a), timed",
             f"{100.0 * ALIKE:g} mm, {ALIKE:g} of its length: the rule for *straight*",
             (at_most("distance", 100.0 * ALIKE, straight_error(), "mm"),),
         ),
@@ -361,8 +360,9 @@ def _paths() -> tuple[Statement, ...]:
             "As shown in fig. (6.9) the four bar is able to generate the desired output (a) to within tolerable errors but "
             "as shown in fig. (6.10) it is unable to generate the desired output (b) as accurately.",
             text("6.4.3, L5043"),
-            "area of (a) over that of its ellipse, of the printed linkage, mended; area of (b) over that of (a): of the "
-            "printed linkages, mended, and the least that we find, each with no link longer than the longest printed one",
+            "*tolerable* is read, by us, as the area of (a) over that of its ellipse, of the printed linkage, mended; area of "
+            "(b) over that of (a): of the printed linkages, mended, and the least that we find, each with no link longer than "
+            "the longest printed one",
             f"{ALIKE:g}, the rule for *the same*; at least 1, the rule for *greater*",
             (
                 at_most("(a) over its ellipse", ALIKE, printed_error("path-a") / ellipse_cm2),
@@ -373,7 +373,8 @@ def _paths() -> tuple[Statement, ...]:
         Statement(
             "The error values involved in the output generation of outputs (a) and (b) are 2.3 and 12.6 [cm2] respectively.",
             text("6.4.3, L5051"),
-            f"area between the curves of the printed linkages: as printed and, with a digit mended, {ROUNDED}",
+            f"area between the curves of the printed linkages, {AREA_N} points on each: as printed and, with a digit mended, "
+            f"{ROUNDED}",
             f"0.05 cm2, {HALF}",
             (
                 near(
@@ -388,8 +389,8 @@ def _paths() -> tuple[Statement, ...]:
                 near("(b) as printed", "12.6", b.linkage_error(b.printed), unit="cm2", why="l4 is misprinted"),
                 as_stated("(b) l4 = 184.443 cm", "12.6", "path-b"),
             ),
-            "X0 = 154.85 cm has the decimal point one place too far right, and l4 = 183.443 cm a digit too low; with the "
-            f"other digits as printed (a) has {printed_error('path-a'):.2f} and (b) {printed_error('path-b'):.2f} cm2; "
+            "read, by us, as misprints: the decimal point of X0 = 154.85 cm, and a digit of l4 = 183.443 cm; with the other "
+            f"digits as printed (a) has {printed_error('path-a'):.2f} and (b) {printed_error('path-b'):.2f} cm2; "
             f"{best_known('path-a', 'path-b')}",
         ),
     )
@@ -547,9 +548,9 @@ def draw_path(result: StudyResult, *, timed: bool) -> Figure:
 # Rocker functions
 
 
-def window_sums(linkage: Linkage, *, mounting: bool = False) -> tuple[float, float]:
+def window_sums(linkage: Linkage) -> tuple[float, float]:
     """Return the sums of the squared errors inside and outside the weighted window, at 72 crank angles (deg2)."""
-    task = rocker_function(N, weighted=True, mounting=mounting)
+    task = rocker_function(N, weighted=True)
     within, squares = np.asarray(task.weights) > 1.0, DEG2_PER_RAD2 * evaluate(task, linkage).errors ** 2
     return float(squares[within].sum()), float(squares[~within].sum())
 

@@ -107,8 +107,9 @@ def compute() -> StudyResult:
             "region: nineteen desired points, 72 actual ones."
         ),
         assignment=(
-            "Region and points are lost. The points are our choice: the ten of the program in appendix 5 (L9021) and the "
-            "middles of all sides but the one of 4 cm. The region drawn is the narrowest that our linkage keeps to."
+            "The figure with region and points is missing in our copy. The points are our choice: the ten of the program in "
+            "appendix 5 (L9021) and the middles of all sides but the one of 4 cm. The region drawn is the narrowest that our "
+            "linkage keeps to."
         ),
         columns=padded(columns),
         statements=(
@@ -116,7 +117,7 @@ def compute() -> StudyResult:
                 "A packaging machine in the form of a four bar is required to generate a path which is acceptable anywhere "
                 "within the region bound by the dashed lines shown in Fig. (6.11a).",
                 text("6.4.3, L5097"),
-                why="the bounds of the region are lost",
+                why="the figure with the bounds is missing in our copy",
             ),
             Statement(
                 "The constraints are (1) the straight line travel AB should be achieved within the first 120° rotation of "
@@ -124,7 +125,7 @@ def compute() -> StudyResult:
                 text("6.4.3, L5103"),
                 "straightest travel of the printed linkage within 120 deg of crank rotation that is at least as long "
                 f"as AB, read as the program's points (10, 0) and (164, 0), {TRAVEL_CM:g} cm apart: how far it is off "
-                "straight, relative to its length; height of the crank shaft",
+                f"straight, its extent in y over that in x between two of {N} crank angles; height of the crank shaft",
                 f"{ALIKE:g}, the rule for *straight*; [{line:g}] cm, the height of the program's line (L9022, its last digit "
                 "illegible)",
                 (
@@ -143,7 +144,7 @@ def compute() -> StudyResult:
                 "Optimisation is then performed to find the optimum linkage from which 72 actual output points are "
                 "calculated.",
                 text("6.4.3, L5113"),
-                why="the nineteen points are lost; with points of ours the printed linkage has "
+                why="the figure with the nineteen points is missing in our copy; with points of ours the printed linkage has "
                 f"{areas['printed'] / areas['ours']:.2f} times the error of our linkage, whose straight travel, "
                 f"{CM_PER_METRE * part.travel:.0f} cm, is less than AB; with the ten points of the program "
                 f"{exact / p.convert(ours.error):.2f} times",
