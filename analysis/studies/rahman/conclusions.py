@@ -21,6 +21,7 @@ def conclusions() -> StudyResult:
         f"the {len(ended)} cases of the figures that are out of the plane whose loop the printed iteration closes, from the "
         "planar estimate at every 30 deg"
     )
+    all_closed = f"all of them; {ROUNDING}, of a closed loop"
     closed = float(np.mean([found.rotation_residual.max() < NOTHING for found in ended]))
     numbers = float(np.mean([np.isfinite(found.unknowns).all() for found in ended]))
     right = {symbol: values(PLANE, COMPONENTS[symbol]) for symbol in PLANAR}
@@ -49,7 +50,7 @@ def conclusions() -> StudyResult:
                 "This [agreement in the plane] verifies the feasibility of the method.",
                 text("section 3.2, L1111"),
                 f"share of {cases}",
-                f"all of them; {ROUNDING}, of a closed loop",
+                all_closed,
                 (at_least("cases closed", 1.0, closed),),
                 "the plane, in which eta2 = eta3 = 0, does not show erratum 1",
             ),
@@ -90,7 +91,7 @@ def conclusions() -> StudyResult:
                 "analytical tool.",
                 last,
                 f"share of {cases}",
-                "all of them",
+                all_closed,
                 (at_least("cases closed", 1.0, closed),),
                 "it does not analyse its own mechanism out of the plane (erratum 1); the next row judges the computation",
             ),
@@ -98,8 +99,8 @@ def conclusions() -> StudyResult:
                 "The main advantages of this method are its generality and that all calculations can be performed on "
                 "digital computer.",
                 last,
-                f"generality: share of {cases}; calculations: share of them in which it ends with numbers all over the turn",
-                "all of them",
+                f"generality: share of {cases}; calculations: share of them in which it ends with numbers at these angles",
+                all_closed,
                 (at_least("generality", 1.0, closed), at_least("calculations", 1.0, numbers)),
                 "it is not general (erratum 1)",
             ),

@@ -65,23 +65,22 @@ algebra, most of it is right: the matrices and operators, the accelerations but 
 rates, the inertia forces, the acceleration of a sinusoidal shift; and in the plane, with the signs of errata 5 and 6 mended,
 its forces agree with Newton and Euler.
 
-Out of the plane the method fails at its root. A ball joint has three rotations, and eqs 2 and 3 give it two (erratum 1):
-the chain has one freedom, so that crank angle and shift cannot both be given. The iteration stops where its steps become
-small, on loops that are open by up to 38 deg, with the slider wrong by up to 6 in; with Davidon, Fletcher and Powell's
-steps, which the thesis names and does not print, joined in our way, it ends on other loops, which are open as well. The limits
-of S1 and alpha4 within which "the program converges" are, but for a4 = 20 in, those of this iteration. The mechanism works
-far beyond them, and its greatest shift falls with the offset, where the thesis infers that it rises. The axial force on the
-crank, which the thesis puts to zero, is an unknown (erratum 7), so that 2F2k is not zero and the bearing moments 1T1i and
-1T1j lack a part.
+Out of the plane the method fails at its root. A ball joint has three rotations, and eqs 2 and 3 give it two (erratum 1): the
+chain has one freedom, so that crank angle and shift cannot both be given. The iteration stops where its steps become small, on
+loops that are open by up to 38 deg, with the slider wrong by up to 6 in; with Davidon, Fletcher and Powell's steps, which the
+thesis names and does not print, joined in our way, the loops stay open as well. The limits of S1 and alpha4 within which "the
+program converges" are, but for a4 = 20 in, those of this iteration. The mechanism works far beyond them, and its greatest
+shift falls with the offset, where the thesis infers that it rises. The axial force on the crank, which the thesis puts to
+zero, is an unknown (erratum 7), so that 2F2k is not zero and the bearing moments 1T1i and 1T1j lack a part.
 
 Of the conclusions on the engine, the displacements are almost sinusoidal, and a shift does load the bearing by two more
 moments. The offset lengthens the stroke and does not reduce it, and saves no power. At a given distance from a dead centre
 most forces do not grow at every step of the offset. The spikes near 100 and 300 deg are no roundoff: they are the dead
-centres, where a given torque has no lever on the slider, and lie within 10 deg of these angles for a4 = 20 in with alpha4 =
-270 deg alone. There the printed eqs 40a and 41a, and 38a with them, are unbounded out of the plane, since eq 41 divides by
-sin theta2 and row 37f is left out. Without a load on the slider, in place of the torque, there are no spikes, and every
-force but that load grows with the offset; with a load given not all do: with 10 lb towards the crank 1F1j falls from 57.85
-to 57.52 lb between a4 = 10 and 20 in."""
+centres, where a given torque has no lever on the slider, and lie within 10 deg of these angles, of the graphs' cases, for a4 =
+20 in with alpha4 = 270 deg alone. There the printed eqs 40a and 41a, and 38a with them, are unbounded out of the plane, since
+eq 41 divides by sin theta2 and row 37f is left out. Without a load on the slider, in place of the torque, there are no spikes,
+and every force but that load grows with the offset; with a load given not all do: with 10 lb towards the crank 1F1j falls from
+57.85 to 57.52 lb between a4 = 10 and 20 in."""
 
 #: Crank angles of the curves (deg), in half degrees.
 ANGLES_DEG = np.linspace(0.0, 360.0, 721)

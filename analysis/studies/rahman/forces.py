@@ -26,7 +26,6 @@ from .figures import (
     ROUNDING,
     TORQUE,
     clear,
-    dead_centres_deg,
     nothing,
     values,
 )
@@ -54,6 +53,7 @@ from .printed import (
     GENERAL,
     ROD_X_SQUARE,
     SLIDER_SQUARE,
+    STEP_DEG,
     Crank,
     Joints,
     bodies,
@@ -79,6 +79,8 @@ from .table import COMPONENTS, Case
 
 #: Distance g3 (in) at which the terms of the slider's moment of mass count; the thesis computes with 0.
 G3 = 2.0
+#: Where the two paths are compared.
+ENDED = f"where the printed iteration ends, over the turn by {STEP_DEG:g} deg"
 #: Weight of water (lb/in3), the reference of specific gravities.
 WATER = 62.43 / 12.0**3
 #: Components of the joint forces in the plane.
@@ -205,6 +207,8 @@ def _momenta() -> tuple[Statement, ...]:
     slider = forward_slider_momentum(MOVING, b, GENERAL, r, G3, slip=True)
     wrong = slider - at_g3.momentum(forward_slider_velocity(MOVING, GENERAL, r))
     as_printed = momenta(MOVING, b, GENERAL, r, slip=True)
+    # the term of eq 53a in g3, which `momenta` leaves out
+    slider_53a = as_printed[2] + Dual(np.zeros(3), np.array([0.0, b.masses[2] * G3 * float(r.s4), 0.0]))
     # the rates of eqs 54 to 56, and the momenta whose rates they should be, a moment later
     seconds = joint_accelerations(MOVING, GENERAL, r)
     of_rates = Crank(CRANK, ROD, MOVING.acceleration, MOVING.shift_acceleration)
@@ -253,13 +257,14 @@ def _momenta() -> tuple[Statement, ...]:
         Statement(
             "Now, alternative expressions for (50a) and (51a) using the backward path are respectively",
             text("section 2.8, eqs 52a, 53a, L744-748"),
-            "difference from the binors times the velocities of eqs 36 and 32a, in a general position",
+            f"difference from the binors times the velocities of eqs 36 and 32a, in a general position; g3 = {G3:g} in in 53a, "
+            "and 0 in 52a (L1089)",
             ROUNDING,
             (
                 nothing("eq 52a", difference(as_printed[1], of_rod.momentum(moving[1])), "lb.s"),
-                nothing("eq 53a", difference(as_printed[2], of_slider.momentum(moving[2])), "lb.s"),
+                nothing("eq 53a", difference(slider_53a, at_g3.momentum(moving[2])), "lb.s"),
             ),
-            f"erratum 9: g3, which is 0, for g2 in 52a, {MAYBE}",
+            f"erratum 9: g3 for g2 in 52a, {MAYBE}",
         ),
         Statement(
             "In either case [all by the forward path, or some by the backward path], the same numerical results are "
@@ -267,12 +272,12 @@ def _momenta() -> tuple[Statement, ...]:
             "sets were tested by the program for a number of cases and resulted in same outcome.",
             text("section 2.8, L637-639, L750"),
             "greatest difference of the force part of the rod's momentum by the forward path (eqs 35, 50) from that "
-            f"by the mixed path (eqs 36, 52 with g2), over the turn, {AWAY}",
+            f"by the mixed path (eqs 36, 52 with g2), {ENDED}, {AWAY}",
             ROUNDING,
             tuple(velocity_paths()),
             "errata 3, 4: out of the plane the paths differ by the unsolved row 37f and the theta2' of eq 39; so do the "
-            "moments, which agree in the plane. That the mixed set is simpler is plain. The slider's momentum is judged by its "
-            "rate, in the row on eqs 57 and 58",
+            "moments, which agree in the plane. That the mixed set is simpler, as a look at 50a to 53a shows, is not measured. "
+            "The slider's momentum is judged by its rate, in the row on eqs 57 and 58",
         ),
         Statement(
             "Differentiating forward path equations (49a), (50a) and (51a) with respect to time the following "
@@ -290,7 +295,7 @@ def _momenta() -> tuple[Statement, ...]:
             "equations are replacements for equations (55) and (56) respectively.",
             text("section 2.8, eqs 57, 58, L848-857"),
             "difference from the rates of eqs 52a, with g2 for g3, and 53a in a general position, speed and shift constant, "
-            f"g3 = 0; greatest difference of the force parts of 57 from 55 and of 58 from 56 over the turn, {AWAY}; {DOTS}",
+            f"g3 = 0; greatest difference of the force parts of 57 from 55 and of 58 from 56 {ENDED}, {AWAY}; {DOTS}",
             ROUNDING,
             (
                 *(
@@ -304,9 +309,9 @@ def _momenta() -> tuple[Statement, ...]:
         Statement(
             "Finally the second set [the mixed path's] is used in the program to have better accuracy.",
             text("section 2.8, L750; L730, L859"),
-            "greatest roundoff of the momenta over a turn, by single precision less double from the same joints, eq 50a over "
-            "52a for the rod, 51a over 53a for the slider, of the components that by 52a and 53a have any; in the plane, "
-            "a4 = 10 in",
+            "greatest roundoff of the momenta over a turn by half degrees, by single precision less double from the same "
+            "joints, eq 50a over 52a for the rod, 51a over 53a for the slider, of the components that by 52a and 53a have any; "
+            "in the plane, a4 = 10 in",
             "none, the sign decides",
             tuple(_roundoffs()),
             "component i of the rod is one product in either, by 52a with the roundoff of S4' as well; the others are by 50a "
@@ -318,7 +323,7 @@ def _momenta() -> tuple[Statement, ...]:
             "frame {4} are derived.",
             text("section 2.8, eqs 59 to 61, L863-881"),
             "difference from the rate of momentum in a frame at rest, by the binors, in a general position at constant speed "
-            "and shift, by 52a with g2 for g3; the sign with which it enters is judged at eqs 62 to 64",
+            "and shift, g3 = 0, by 52a with g2 for g3; the sign with which it enters is judged at eqs 62 to 64",
             ROUNDING,
             tuple(nothing(label, size, "lb") for label, size in zip(("eq 59", "eq 60", "eq 61"), inertia)),
         ),
@@ -388,9 +393,11 @@ def _slips(right: dict[str, FloatArray]) -> tuple[Statement, ...]:
         off = i * c + j * s + wrong["2F2i"] + inertia
         wrong["2F2i"] = -i * c - j * s - inertia
     left = float(np.abs(wrong["2F2i"] - right["2F2i"])[at].max())
+    th2 = planar(parameters(PLANE.offset_in), angle)[:, 0]
+    near_zero, near_half_turn = (np.abs(np.sin(0.5 * (th2 - about))) for about in (0.0, np.pi))
     high = [
-        np.abs(right["2F2i"][np.abs(ANGLES_DEG - centre) < VERY_CLOSE_DEG]).max() / np.abs(right["2F2i"][at]).max()
-        for centre in dead_centres_deg(PLANE)
+        np.abs(right["2F2i"][off < np.sin(0.5 * np.radians(VERY_CLOSE_DEG))]).max() / np.abs(right["2F2i"][at]).max()
+        for off in (near_zero, near_half_turn)
     ]
     of_rod = (velocities(crank, GENERAL, r), momenta(crank, b, GENERAL, r, slip=True), momentum_rates(b, GENERAL, r, a))
     slip = float(inertia_force(*(vectors[1] for vectors in of_rod)).dual[0])
@@ -418,7 +425,7 @@ def _slips(right: dict[str, FloatArray]) -> tuple[Statement, ...]:
             "f2xd by eqs 52a, with g2 for g3 (erratum 9), 57 and 60 in a general position",
             ROUNDING,
             (nothing("f2xd", general["f2xd"], "lb.in"),),
-            f"with the g3 of our scan it would be {slip:.2g} lb.in; that the program found 0 speaks for a slip of the scan",
+            f"with the g3 of our scan it would be {slip:.2g} lb.in",
         ),
         Statement(
             "The details of the solution procedure are as follows:",
@@ -440,8 +447,8 @@ def _slips(right: dict[str, FloatArray]) -> tuple[Statement, ...]:
             "This [division by sin theta2], in fact, resulted in some abnormal outcomes when values of angle [theta2] were "
             "very close to zero, while running the program.",
             text("section 2.8, eq 69h, L995"),
-            f"greatest 2F2i by eq 69h, at half degrees of the crank, within {VERY_CLOSE_DEG:g} deg of the dead centre at which "
-            f"theta2 is 0, relative to that {FROM_DEAD}; in the plane, a4 = 10 in, errata 5 and 6 mended",
+            f"greatest 2F2i by eq 69h, at half degrees of the crank, where theta2 is within {VERY_CLOSE_DEG:g} deg of 0, "
+            f"relative to that {FROM_DEAD}; in the plane, a4 = 10 in, errata 5 and 6 mended",
             f"{VERY_CLOSE_DEG:g} deg, the rule for *very close*; {ABNORMAL:g} times, the rule for *abnormally*",
             (at_least("2F2i", ABNORMAL, high[0]),),
             "it grows without bound, and the outcome is right: the force that a torque calls forth is infinite there. At the "
@@ -553,7 +560,7 @@ def forces() -> StudyResult:
                 f"{worst}, by the printed equations with erratum 5 mended",
                 ROUNDING,
                 (nothing("joint forces", wrong["erratum 5 mended"], "lb"),),
-                "erratum 6: from the distal joints both are negative",
+                "erratum 6: from the distal joints (L601) both are negative along i; as lengths they are right",
             ),
             *_slips(mended),
         ),

@@ -47,10 +47,18 @@ class Turn(NamedTuple):
     settled: NDArray[np.bool_]
 
 
-def turn(p: SliderCrankParameters, shift_in: ArrayLike, rows: Rows = "printed", *, from_before: bool = True) -> Turn:
+def turn(
+    p: SliderCrankParameters,
+    shift_in: ArrayLike,
+    rows: Rows = "printed",
+    *,
+    from_before: bool = True,
+    small: float = STEP,
+) -> Turn:
     """Run the iteration over a turn for given shifts (in), from the planar estimate at theta1 = 0.
 
-    At later angles it starts from the solution at the previous angle (``from_before``), otherwise from the planar estimate.
+    At later angles it starts from the solution at the previous angle (``from_before``), otherwise from the planar estimate. A
+    step below ``small`` (rad, in) ends it.
     """
     shifts = np.atleast_1d(np.asarray(shift_in, dtype=float))
     shape = (GRID_DEG.size, shifts.size)
@@ -59,7 +67,8 @@ def turn(p: SliderCrankParameters, shift_in: ArrayLike, rows: Rows = "printed", 
     going = np.arange(shifts.size)
     start = None
     for k, angle in enumerate(np.radians(GRID_DEG)):
-        ended = settle(p, np.full(going.size, angle), shifts[going] * INCH, rows=rows, start=start, max_steps=MAX_STEPS)
+        angles, shift = np.full(going.size, angle), shifts[going] * INCH
+        ended = settle(p, angles, shift, rows=rows, start=start, step_tolerance=small, max_steps=MAX_STEPS)
         found.settled[going[~ended.settled]] = False
         going = going[ended.settled]
         if not going.size:
