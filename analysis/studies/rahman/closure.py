@@ -612,7 +612,8 @@ def closure() -> StudyResult:
             "to the desired accuracy limits. At this point the displacements are determined only for the first "
             "position of the input link.",
             text("section 2.6.1, L465"),
-            "rotation round the loop and error of S4 where the printed iteration ends, greatest of the turn",
+            "rotation round the loop and error of S4 where the printed iteration ends, greatest of the turn, through which "
+            "L465 goes on in the same way",
             ROUNDING,
             tuple(determined),
             "erratum 1: small steps are no closed loop; at the first position, theta1 = 0, the loop is already open by "
