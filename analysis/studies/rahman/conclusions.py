@@ -61,7 +61,8 @@ def conclusions() -> StudyResult:
                 place,
                 f"{kinds}, of the five by which section 3.1 gives the mechanism: a1, a2, a4, S1, alpha4; greatest error "
                 f"by the printed equations in the plane, a4 = 10 in, {FROM_DEAD}: for sizing, of a joint force relative to its "
-                "greatest value, for balancing, of the force on the crank's bearing relative to the greatest part of it that inertia has",
+                "greatest value, for balancing, of the force on the crank's bearing relative to the greatest part of it that "
+                "inertia has",
                 f"none of a count; {ROUNDING}",
                 (
                     near(kinds, 5.0, varied, 0.0),
