@@ -103,7 +103,7 @@ class LazyCommand(click.Command):
 @click.group(
     cls=Commands,
     commands=[LazyCommand(name, short_help=line) for name, (_, line) in COMMANDS.items()],
-    context_settings={"help_option_names": ["-h", "--help"]},
+    context_settings={"help_option_names": ["-h", "--help"], "show_default": True},
 )
 @click.version_option(__version__, prog_name="linkwork")
 def main() -> None:

@@ -116,14 +116,7 @@ def check_tolerance(context: click.Context, parameter: click.Parameter, value: f
 
 def tolerance_option(*names: str, default: float | None = None, help: str) -> Callable[..., Any]:
     """Return an option for a tolerance between 0 and 1."""
-    return click.option(
-        *(names or ["--tolerance"]),
-        type=float,
-        callback=check_tolerance,
-        default=default,
-        show_default=default is not None,
-        help=help,
-    )
+    return click.option(*(names or ["--tolerance"]), type=float, callback=check_tolerance, default=default, help=help)
 
 
 def check_place(context: click.Context, parameter: click.Parameter, value: str | None) -> str | None:
@@ -143,7 +136,7 @@ def check_place(context: click.Context, parameter: click.Parameter, value: str |
 def out_option(default: str = "out", help: str = "Folder for CSV and plots.") -> Callable[..., Any]:
     """Return a decorator that adds the options --out and --force."""
     kind = click.Path(file_okay=False)
-    out = click.option("--out", default=default, show_default=True, type=kind, callback=check_place, help=help)
+    out = click.option("--out", default=default, type=kind, callback=check_place, help=help)
     return lambda command: out(force_option(command))
 
 
@@ -194,7 +187,6 @@ def workers_options(default: int | None = None) -> Callable[..., Any]:
         "jobs",
         type=int,
         default=default,
-        show_default=default is not None,
         callback=_number_of_jobs,
         help="Processes on this machine; -1 for one per core.",
     )
@@ -263,11 +255,9 @@ def save_plot(wanted: bool, result: Any, path: str | Path, **options: Any) -> li
     return [save_figure(figures.plot(result, **options), path)] if wanted else []
 
 
-plot_option = click.option("--plot/--no-plot", default=True, show_default=True, help="Whether to write a plot.")
+plot_option = click.option("--plot/--no-plot", default=True, help="Whether to write a plot.")
 #: Option of commands that write several plots.
-plots_option = click.option(
-    "--plots/--no-plots", "--plot/--no-plot", default=True, show_default=True, help="Whether to write plots."
-)
+plots_option = click.option("--plots/--no-plots", "--plot/--no-plot", default=True, help="Whether to write plots.")
 
 
 def case_options(published: Iterable[str]) -> Callable[..., Any]:

@@ -30,9 +30,7 @@ from .design import print_best, print_solutions, read_overrides, write_descripti
 @click.option(
     "--crank-phase", metavar="ANGLE", help="For a function: the crank's angle from the ground link at rotation 0."
 )
-@click.option(
-    "--count", type=click.IntRange(1), default=6, show_default=True, help="Number of linkages to report for four poses."
-)
+@click.option("--count", type=click.IntRange(1), default=6, help="Number of linkages to report for four poses.")
 @plots_option
 @out_option(help="Folder for the results.")
 @report_errors

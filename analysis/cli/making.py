@@ -24,12 +24,7 @@ def _split_values(context: click.Context, parameter: click.Parameter, values: Se
 @click.command()
 @click.argument("models", nargs=-1, metavar="[MODEL]...")
 @click.option(
-    "--dest",
-    default="build",
-    show_default=True,
-    type=click.Path(file_okay=False),
-    callback=check_place,
-    help="Folder for the FMUs.",
+    "--dest", default="build", type=click.Path(file_okay=False), callback=check_place, help="Folder for the FMUs."
 )
 @click.option(
     "--kinds",
@@ -79,9 +74,7 @@ def build(
 
 
 @click.command()
-@click.option(
-    "--dest", default="examples", show_default=True, type=click.Path(file_okay=False), help="Folder for the examples."
-)
+@click.option("--dest", default="examples", type=click.Path(file_okay=False), help="Folder for the examples.")
 @click.option("--force", is_flag=True, help="Overwrite files of the same name.")
 @report_errors
 def examples(dest: str, force: bool) -> None:

@@ -21,13 +21,10 @@ if TYPE_CHECKING:
 @click.option(
     "--turns",
     default=4,
-    show_default=True,
     type=click.IntRange(1, 16),
     help="Greatest number of turns in a period of the motions sought; of gears or several cranks, of common periods.",
 )
-@click.option(
-    "--points", default=200, show_default=True, type=click.IntRange(2, 4000), help="Number of starts along each axis."
-)
+@click.option("--points", default=200, type=click.IntRange(2, 4000), help="Number of starts along each axis.")
 @click.option(
     "--position", nargs=2, metavar="FROM TO", help="Range of the first free coordinate, such as '-5 cm' '5 cm'."
 )

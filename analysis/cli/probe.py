@@ -26,19 +26,12 @@ from .common import (
 
 @click.command()
 @click.argument("fmu", type=click.Path(exists=True, dir_okay=False))
-@click.option(
-    "--calls",
-    default=20_000,
-    show_default=True,
-    type=click.IntRange(1),
-    help="Number of random calls for each interface.",
-)
-@click.option("--seed", default=0, show_default=True, help="The same seed makes the same calls.")
+@click.option("--calls", default=20_000, type=click.IntRange(1), help="Number of random calls for each interface.")
+@click.option("--seed", default=0, help="The same seed makes the same calls.")
 @click.option(
     "--time",
     "seconds",
     default=600.0,
-    show_default=True,
     type=click.FloatRange(0.0),
     help="Start no new random calls after this time (s).",
 )
@@ -48,11 +41,7 @@ from .common import (
     help="Probe only this interface: co-simulation (cs) or model exchange (me).",
 )
 @click.option(
-    "--hang",
-    default=10.0,
-    show_default=True,
-    type=click.FloatRange(0.1),
-    help="A call that takes longer than this (s) counts as hanging.",
+    "--hang", default=10.0, type=click.FloatRange(0.1), help="A call that takes longer than this (s) counts as hanging."
 )
 @click.option(
     "--check", "checks", multiple=True, metavar="CHECK", help="Run only this check; can be given several times."

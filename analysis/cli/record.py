@@ -16,8 +16,8 @@ from .common import console, out_option, output_folder, plot_option, print_paths
 @click.argument("record", type=click.Path(exists=True, dir_okay=False))
 @click.option("--time", "time", metavar="NAME", help="Column of the times; by default the first.")
 @click.option("--position", metavar="NAME", help="Column of the positions; by default the second.")
-@click.option("--time-unit", default="s", show_default=True, help="Unit of the times.")
-@click.option("--unit", default="m", show_default=True, help="Unit of the positions, needed for the force of friction.")
+@click.option("--time-unit", default="s", help="Unit of the times.")
+@click.option("--unit", default="m", help="Unit of the positions, needed for the force of friction.")
 @click.option("--from", "first", metavar="TIME", help="Ignore samples before this time, such as '0.2 s': the impulse.")
 @click.option("--to", "last", metavar="TIME", help="Ignore samples after this time.")
 @click.option(

@@ -68,12 +68,7 @@ class CaseChanges(TypedDict):
     help="How the FMU is run: co-simulation (the default) with inputs held over each step, linear-co-simulation with linear "
     "inputs over each step, or model-exchange under CVode.",
 )
-@click.option(
-    "--method",
-    default="compiled",
-    show_default=True,
-    help="compiled, balanced, Hamming, or a method of SciPy's solve_ivp.",
-)
+@click.option("--method", default="compiled", help="compiled, balanced, Hamming, or a method of SciPy's solve_ivp.")
 @click.option("--stop-time", metavar="TIME", help="End of the run, such as '2 s'.")
 @click.option("--step", metavar="TIME", help="Step of the samples and of the co-simulation, such as '0.1 ms'.")
 @tolerance_option(help="Tolerance of the solver; 1e-9 by default.")
@@ -228,7 +223,6 @@ def _with_magnitudes(result: Any) -> Iterator[tuple[str, Any, str]]:
     "methods",
     multiple=True,
     default=("compiled",),
-    show_default=True,
     help="In-process method: compiled, Hamming, or one of SciPy's solve_ivp; can be given several times. Model exchange, which "
     "uses CVode, is compared with the first one only.",
 )

@@ -40,9 +40,13 @@ _SCREENS = ("DISPLAY", "WAYLAND_DISPLAY", "BROWSER")
     callback=check_place,
     help="Write the page to this file, and serve nothing.",
 )
-@click.option("--browser/--no-browser", default=True, show_default=True, help="Whether to open a browser.")
+@click.option("--browser/--no-browser", default=True, help="Whether to open a browser.")
 @click.option(
-    "--port", type=click.IntRange(0, 65535), default=0, help="Port on which the page is served; by default a free one."
+    "--port",
+    type=click.IntRange(0, 65535),
+    default=0,
+    show_default=False,
+    help="Port on which the page is served; by default a free one.",
 )
 @set_option("slider.stiffness='2e6 dyn/cm' or drive.speed='300 rpm'; bare numbers are in SI")
 @force_option

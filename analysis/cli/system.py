@@ -14,6 +14,7 @@ from .common import (
     output_folder,
     plot_option,
     print_error,
+    print_paths,
     quantity,
     report_errors,
     save_plot,
@@ -49,7 +50,6 @@ _FMI = click.option(
     "--fmi",
     type=click.Choice(["2", "3"]),
     default="2",
-    show_default=True,
     help="FMI version of the mechanisms' FMUs; has no effect on an SSP file.",
 )
 
@@ -101,10 +101,7 @@ def build(file: str, fmi: str, out: str) -> None:
 @click.option("--step", help="Communication step, such as '1 ms'.")
 @click.option("--stop", help="End of the run, such as '3 s'.")
 @click.option(
-    "--coupling",
-    default="hold",
-    show_default=True,
-    help="How inputs are continued over a step: hold, derivatives, updates, rollback.",
+    "--coupling", default="hold", help="How inputs are continued over a step: hold, derivatives, updates, rollback."
 )
 @click.option(
     "--share",
@@ -157,8 +154,7 @@ def run(
     folder, stem = output_folder(out), Path(file).stem
     residuals = {f"power residual of {name}": power for name, power in found.powers.items()}
     say(f"wrote {write_csv(folder / f'{stem}.csv', {'time': found.time, **found.values, **residuals})}")
-    for path in save_plot(plot, found, folder / f"{stem}.png"):
-        say(f"wrote {path}")
+    print_paths(save_plot(plot, found, folder / f"{stem}.png"))
     if found.status:
         print_error(found.message)
         raise SystemExit(ENDED_EARLY)
@@ -167,9 +163,7 @@ def run(
 @system.command()
 @_FILE
 @click.option("--stop", help="End of the runs, such as '0.2 s'.")
-@click.option(
-    "--decades", type=click.IntRange(1, 4), default=2, show_default=True, help="Decades of communication steps."
-)
+@click.option("--decades", type=click.IntRange(1, 4), default=2, help="Decades of communication steps.")
 @out_option(help="Folder for the plot.")
 @plot_option
 @report_errors
@@ -213,8 +207,7 @@ def check(file: str, stop: str | None, decades: int, out: str, plot: bool) -> No
                    ("step [ms]", *found.powers), rows)  # fmt: skip
     for when, message in found.messages.items():
         print_error(f"note: {when}: {message}")
-    for path in save_plot(plot, found, output_folder(out) / f"{Path(file).stem}-check.png"):
-        say(f"wrote {path}")
+    print_paths(save_plot(plot, found, output_folder(out) / f"{Path(file).stem}-check.png"))
 
 
 @system.command()
@@ -223,8 +216,7 @@ def check(file: str, stop: str | None, decades: int, out: str, plot: bool) -> No
 @report_errors
 def draw(file: str, out: str) -> None:
     """Draw the parts of a system and their connections."""
-    for path in save_plot(True, _wiring(file), output_folder(out) / f"{Path(file).stem}-diagram.png"):
-        say(f"wrote {path}")
+    print_paths(save_plot(True, _wiring(file), output_folder(out) / f"{Path(file).stem}-diagram.png"))
 
 
 @system.command()

@@ -58,23 +58,17 @@ def _require_range(parameters: Any, low: float, high: float, name: str, first: s
 )
 @click.option("--to", "high", metavar="VALUE", help="End of the range.")
 @click.option(
-    "--doublings",
-    default=3,
-    show_default=True,
-    type=click.IntRange(0, 6),
-    help="Number of successive period doublings that are followed.",
+    "--doublings", default=3, type=click.IntRange(0, 6), help="Number of successive period doublings that are followed."
 )
 @click.option(
     "--places",
     default=5,
-    show_default=True,
     type=click.IntRange(min=0),
     help="Number of values in the range at which all motions are sought, to find those that no branch leads to.",
 )
 @click.option(
     "--turns",
     default=1,
-    show_default=True,
     type=click.IntRange(1, 16),
     help="Greatest number of turns, or common periods, of the motions sought there; for more than one take some 24 places.",
 )
@@ -301,15 +295,9 @@ def _print_ranges_to_avoid(response: Any, factor: float, unit: str) -> None:
     "--y", "y", metavar="NAME", help="Parameter along y; by default the damping of the first freedom beside the crank."
 )
 @click.option("--y-range", nargs=2, metavar="FROM TO", help="Range of y, such as 0 '2e4 dyn.s/cm'.")
-@click.option("--points", default=80, show_default=True, type=click.IntRange(2, 2000), help="Points along each axis.")
+@click.option("--points", default=80, type=click.IntRange(2, 2000), help="Points along each axis.")
 @workers_options(default=-1)
-@click.option(
-    "--chart/--no-chart",
-    "charted",
-    default=True,
-    show_default=True,
-    help="Whether to compute the chart, not only the verdict.",
-)
+@click.option("--chart/--no-chart", "charted", default=True, help="Whether to compute the chart, not only the verdict.")
 @click.option(
     "--coexisting",
     is_flag=True,

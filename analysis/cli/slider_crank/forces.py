@@ -36,7 +36,6 @@ if TYPE_CHECKING:
     type=click.IntRange(1, 4),
     multiple=True,
     default=(1,),
-    show_default=True,
     help="Frame of the components shown: 1 ground, 2 crank, 3 rod, 4 guide; can be given several times.",
 )
 @out_option

@@ -71,13 +71,11 @@ def info(chosen: MechanismChoice) -> None:
 
 @click.command(short_help="Draw the mechanism in space.")
 @add_mechanism_options
-@click.option("--angle", default="30 deg", show_default=True, metavar="ANGLE", help="Crank angle of the picture.")
+@click.option("--angle", default="30 deg", metavar="ANGLE", help="Crank angle of the picture.")
 @click.option("--view", nargs=2, metavar="ELEVATION AZIMUTH", help="Direction of the eye, such as '22 deg' '-112 deg'.")
 @click.option("--range", "with_range", is_flag=True, help="Draw also the range of assembly.")
 @click.option("--animate", is_flag=True, help="Write also an animation (GIF).")
-@click.option(
-    "--frames", type=click.IntRange(2), default=48, show_default=True, help="Number of frames of the animation."
-)
+@click.option("--frames", type=click.IntRange(2), default=48, help="Number of frames of the animation.")
 @out_option
 def picture(
     chosen: MechanismChoice,

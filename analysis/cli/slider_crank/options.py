@@ -255,14 +255,13 @@ _MECHANISM_OPTIONS = (
         "--units",
         type=click.Choice(["SI", "inch"]),
         default="SI",
-        show_default=True,
         help="Units of the output. SI: millimetres in tables, pictures and errors, metres in CSV files, as in those of a run; "
         "inch: inches, pounds force and degrees.",
     ),
 )
 speed_option = click.option("--speed", metavar="SPEED", help="Crank speed, such as '50 rpm'.")
 out_option = common.out_option(help="Folder for the results.")
-plot_option = click.option("--plot/--no-plot", default=True, show_default=True, help="Whether to write plots.")
+plot_option = click.option("--plot/--no-plot", default=True, help="Whether to write plots.")
 
 
 def add_mechanism_options(command: Command) -> Command:
@@ -298,11 +297,7 @@ def problem_options(points: int) -> Callable[[Command], Command]:
 
         for option in (
             click.option(
-                "--points",
-                type=click.IntRange(2),
-                default=points,
-                show_default=True,
-                help="Number of crank angles over the turn.",
+                "--points", type=click.IntRange(2), default=points, help="Number of crank angles over the turn."
             ),
             click.option(
                 "--load", metavar="FORCE", help="Load on the slider; the crank torque is sought. 0 by default."

@@ -56,7 +56,6 @@ class Sampling(TypedDict):
     "--distribution",
     type=click.Choice(["normal", "uniform", "triangular"]),
     default="normal",
-    show_default=True,
     help="Distribution of the errors; for a normal one the half width is three standard deviations.",
 )
 @click.option(
@@ -64,17 +63,12 @@ class Sampling(TypedDict):
     "quantities",
     multiple=True,
     default=("slider.position",),
-    show_default=True,
     metavar="NAME",
     help="An output of the FMU, such as crank_pin.fz, or slider.load; can be given several times.",
 )
-@click.option("--angle", default="30 deg", show_default=True, metavar="ANGLE", help="Crank angle of the histogram.")
-@click.option(
-    "--samples", type=click.IntRange(2), default=100_000, show_default=True, help="Number of Monte Carlo samples."
-)
-@click.option(
-    "--seed", type=click.IntRange(0), default=0, show_default=True, help="The same seed gives the same samples."
-)
+@click.option("--angle", default="30 deg", metavar="ANGLE", help="Crank angle of the histogram.")
+@click.option("--samples", type=click.IntRange(2), default=100_000, help="Number of Monte Carlo samples.")
+@click.option("--seed", type=click.IntRange(0), default=0, help="The same seed gives the same samples.")
 @workers_options()
 @out_option
 @plot_option
