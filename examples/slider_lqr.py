@@ -46,13 +46,18 @@ PERIOD = 1e-3
 WEIGHTS = {"slider.position": 1e6, "slider.velocity": 1e2}
 
 
-def turning(parameters: FiveBarParameters, speed: float) -> tuple[PeriodicModel, InitialState]:
-    """Linear models along the motion at a constant crank speed, and the start of that motion."""
+def turning(title: str, parameters: FiveBarParameters, speed: float) -> tuple[PeriodicModel, InitialState]:
+    """Linear models along the motion at a constant crank speed, and the start of that motion; print what they say of it."""
     inputs = Inputs(speed=speed)
     motion = settled_motion(parameters, inputs)
     th2, u, w2, v = motion[0, :4].tolist()
     start = InitialState(crank_angle=th2, crank_speed=w2, slider_position=u, slider_velocity=v)
-    return linearise_orbit(parameters, motion, inputs), start
+    models = linearise_orbit(parameters, motion, inputs)
+    mean, travel = models.mean(), models.states[:, 1]
+    print(title)
+    print(f"  mean model: M {mean.M[0, 0]:.4f} kg, C {mean.C[0, 0]:.3f} N.s/m, K {mean.K[0, 0]:.1f} N/m")
+    print(f"  without control: travel {1e3 * np.ptp(travel):.2f} mm, rms {1e3 * travel.std():.3f} mm")
+    return models, start
 
 
 def describe(design: Design) -> str:
@@ -67,16 +72,12 @@ def describe(design: Design) -> str:
 def still(fmu: Path | None) -> tuple[PeriodicModel, list[Design], LoopResult]:
     """Rig 2, spring C, at 585 rpm: the slider kept at the middle of its travel."""
     speed = 585.0 * RAD_S_PER_RPM
-    models, start = turning(RIG_2, speed)
+    models, start = turning("Rig 2, spring C, 585 rpm: keep the slider still", RIG_2, speed)
     mean = models.mean()
     middle = float(mean.state[1])
-    u = models.states[:, 1]
-    print("Rig 2, spring C, 585 rpm: keep the slider still")
-    print(f"  mean model: M {mean.M[0, 0]:.4f} kg, C {mean.C[0, 0]:.3f} N.s/m, K {mean.K[0, 0]:.1f} N/m")
     print(f"  natural frequency {mean.natural_frequencies[0] / RAD_S_PER_RPM:.1f} rpm, poles {mean.poles[0]:.4f} 1/s")
     truth, foretold = (np.abs(np.linalg.eigvals(models.monodromy())).max(), np.exp(mean.poles.real[0] * models.period))
     print(f"  largest Floquet multiplier {truth:.5f}, by the mean model {foretold:.5f}")
-    print(f"  without control: travel {1e3 * np.ptp(u):.2f} mm, rms {1e3 * u.std():.3f} mm")
     designs = [design_lqr(mean, WEIGHTS, 0.1, integral=1e9), design_pid(mean, bandwidth=150.0)]
     for design in designs:
         print(f"  {describe(design)}")
@@ -100,13 +101,10 @@ def still(fmu: Path | None) -> tuple[PeriodicModel, list[Design], LoopResult]:
 def steps(fmu: Path | None) -> None:
     """Table 3.1 at 420 rpm: reference steps of four sizes."""
     speed = SETS["table-3.1"].crank_speed
-    models, start = turning(TABLE_3_1, speed)
+    title = "Table 3.1, 420 rpm: steps of the reference from the middle of the travel after 1 s, force up to 400 N"
+    models, start = turning(title, TABLE_3_1, speed)
     mean = models.mean()
     low = float(mean.state[1])
-    u = models.states[:, 1]
-    print("Table 3.1, 420 rpm: steps of the reference from the middle of the travel after 1 s, force up to 400 N")
-    print(f"  mean model: M {mean.M[0, 0]:.4f} kg, C {mean.C[0, 0]:.3f} N.s/m, K {mean.K[0, 0]:.1f} N/m")
-    print(f"  without control: travel {1e3 * np.ptp(u):.2f} mm, rms {1e3 * u.std():.3f} mm")
     for design in (design_pi(mean, bandwidth=10.0), design_pid(mean, bandwidth=150.0)):
         print(f"  {describe(design)}")
         controller = SampledController(design, PERIOD, limit=400.0)

@@ -20,7 +20,6 @@ from analysis.files import (
     Circle,
     Dimension,
     Drawing,
-    Layer,
     Line,
     Polyline,
     Text,
@@ -30,20 +29,12 @@ from analysis.files import (
     to_svg,
 )  # fmt: skip
 from analysis.files.drawings import UNITS
+from analysis.synthesis.result.drawing import LAYERS
 from linkwork.errors import InputError, LinkworkError, ParameterError, UnknownNameError
 
 RNG = np.random.default_rng(4)
 CURVE = RNG.normal(size=(72, 2)) * 0.1 + [0.3, -0.2]
 TARGET = RNG.normal(size=(9, 2)) * 0.1
-LAYERS = {
-    "ground": Layer(colour=0x404040, width=0.35e-3, foreground=True),
-    "crank": Layer(colour=0xC0392B, width=0.5e-3),
-    "slider": Layer(colour=0x8E44AD, width=0.35e-3),
-    "coupler-curve": Layer(colour=0x1F6FB4, width=0.25e-3),
-    "target": Layer(colour=0xD35400, width=0.25e-3),
-    "dimension": Layer(colour=0x1F6FB4, width=0.18e-3),
-    "text": Layer(colour=0x202020, width=0.18e-3, foreground=True),
-}
 DRAWING = Drawing(
     layers=LAYERS,
     title="Four-bar <a & b>, ø 5",
