@@ -84,12 +84,8 @@ def plot_charts(
     Parameters
     ----------
     charts : sequence of Panel or HeatMap
-    title : str
-        Title of the figure; for a figure of the thesis its number.
-    columns : int
-        Charts side by side.
-    size : (float, float)
-        Width and height of a chart (inches).
+    title, columns, size
+        See `Picture`.
     """
     return draw(Picture(parts=charts, title=title, columns=columns, size=size))
 

@@ -183,14 +183,8 @@ def plot_curves(
     Parameters
     ----------
     panels : sequence of Panel
-    title : str
-        Title of the figure; for a figure of the thesis its number.
-    columns : int
-        Panels side by side.
-    size : (float, float)
-        Width and height of a panel (inches).
-    notes : sequence of str
-        Sentences at the foot.
+    title, columns, size, notes
+        See `Picture`.
     """
     return draw(Picture(parts=panels, title=title, columns=columns, size=size, notes=notes))
 
