@@ -308,24 +308,22 @@ class _LimitPosition(Demand):
         Whether one link extends the other, or lies over it.
     """
 
+    _name: ClassVar[str]
+
     at: Amount
     position: InLine = "stretched"
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "at", _rotations(self.at, f"rotation of a {self._name()}", pi))
+        object.__setattr__(self, "at", _rotations(self.at, f"rotation of a {self._name}", pi))
         if self.position not in get_args(InLine):
             raise ParameterError("position", self.position, f"be one of {', '.join(get_args(InLine))}")
 
-    @classmethod
-    def _name(cls) -> str:
-        raise NotImplementedError
-
     def _require(self, function: Callable[[Any], Any], *, equal: bool = False) -> Require:
-        return Require(function=function, equal=equal, name=f"{self.position} {self._name()}", symbolic=True)
+        return Require(function=function, equal=equal, name=f"{self.position} {self._name}", symbolic=True)
 
     def _require_sign_change(self, way: RotationRange, distance: Callable[[Any, float], Any]) -> tuple[Require, ...]:
         """Require that a function changes its sign within the range, so that its zero, the limit position, lies there."""
-        way.timed(f"a {self._name()} at crank rotations")
+        way.timed(f"a {self._name} at crank rotations")
         low, high = self.at
         if low == high:
             return (self._require(lambda d: distance(d, low), equal=True),)
@@ -344,10 +342,7 @@ class DeadCentre(_LimitPosition):
     """
 
     __slots__ = ()
-
-    @classmethod
-    def _name(cls) -> str:
-        return "dead centre"
+    _name: ClassVar[str] = "dead centre"
 
     def requires(self, way: RotationRange) -> tuple[Require, ...]:
         """Return the required functions of the dimensions."""
@@ -381,11 +376,8 @@ class Toggle(_LimitPosition):
     """
 
     __slots__ = ()
+    _name: ClassVar[str] = "toggle"
     stops: ClassVar[bool] = True
-
-    @classmethod
-    def _name(cls) -> str:
-        return "toggle"
 
     def requires(self, way: RotationRange) -> tuple[Require, ...]:
         """Return the required functions of the dimensions."""
