@@ -432,8 +432,7 @@ def load_slider_case(path: str | Path, overrides: Mapping[str, Any] | None = Non
     InfeasibleError
         If bounds and constraints contradict one another.
     """
-    path = Path(path)
-    return read_slider_case(read_tables(path), folder=path.parent, title=path.stem, overrides=overrides)
+    return read_slider_case(read_tables(path), folder=Path(path).parent, title=Path(path).stem, overrides=overrides)
 
 
 def read_slider_case(

@@ -99,8 +99,7 @@ def load_tuning_case(path: str | Path, overrides: Mapping[str, Any] | None = Non
     InputError, ParameterError
         If the file cannot be read, or an entry is not usable.
     """
-    path = Path(path)
-    return read_tuning_case(read_tables(path), folder=path.parent, title=path.stem, overrides=overrides)
+    return read_tuning_case(read_tables(path), folder=Path(path).parent, title=Path(path).stem, overrides=overrides)
 
 
 def read_tuning_case(

@@ -274,17 +274,7 @@ class RemovalError(LinkworkError):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RemovingDamping:
-    """The damping at which a region vanishes, and the point at which it vanishes last.
-
-    Attributes
-    ----------
-    damping : float
-        In the unit of the range given.
-    x : float
-        The other parameter at the tip of the region.
-    residual : float
-        Value of the test function at the tip.
-    """
+    """The damping at which a region vanishes, the other parameter x at its tip, and the value of the test function there."""
 
     damping: float
     x: float

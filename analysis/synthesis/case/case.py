@@ -295,8 +295,7 @@ def load_synthesis_case(path: str | Path, overrides: Mapping[str, Any] | None = 
     InfeasibleError
         If bounds and constraints contradict one another.
     """
-    path = Path(path)
-    return read_synthesis_case(read_tables(path), folder=path.parent, title=path.stem, overrides=overrides)
+    return read_synthesis_case(read_tables(path), folder=Path(path).parent, title=Path(path).stem, overrides=overrides)
 
 
 def read_synthesis_case(
