@@ -39,7 +39,7 @@ test-long: $(DEV)
 lint: $(DEV)
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
-	$(BIN)/clang-format --dry-run --Werror fmu_src/native/*.[ch] analysis/export/browser/*.[ch] analysis/systems/*.[ch]
+	$(BIN)/clang-format --dry-run --Werror fmu_src/*.c fmu_src/native/*.[ch] analysis/export/browser/*.[ch] analysis/systems/*.[ch]
 	$(BIN)/mypy
 	$(BIN)/lint-imports
 	$(BIN)/python docs/generate.py --check

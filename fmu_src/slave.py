@@ -69,7 +69,7 @@ def _guarded(call: Callable[..., Any]) -> Callable[..., Any]:
             return call(self, *arguments)
         except BaseException as error:
             if not isinstance(error, LinkworkError):
-                self._say(f"internal error in {call.__name__}: {error!r}", Fmi2Status.fatal)
+                self.log(f"internal error in {call.__name__}: {error!r}", Fmi2Status.fatal)
             if self._wrapped:
                 outlive_exception(self)
             raise
@@ -98,7 +98,7 @@ class LinkworkSlave(Fmi2Slave):
         super().__init__(**kwargs)
         self._wrapped = "logger" in kwargs
         if self._wrapped:
-            end_library_in_order(self.resources, type(self).__name__)
+            end_library_in_order(self.resources)
             # put there by the wrapper at each instantiation; everything is imported by now
             if self.resources in sys.path:
                 sys.path.remove(self.resources)
@@ -202,19 +202,15 @@ class LinkworkSlave(Fmi2Slave):
     def _refuse(self, status: int, sentence: str) -> bool:
         self._values[self._status_at] = status
         self._values[self._message_at] = sentence
-        self._say(sentence, Fmi2Status.discard)
+        self.log(sentence, Fmi2Status.discard)
         return False
-
-    def _say(self, sentence: str, status: Fmi2Status) -> None:
-        # the wrapper hands messages on as printf formats
-        self.log(sentence.replace("%", "%%"), status)
 
     def _fail(self, error: LinkworkError) -> LinkworkError:
         """Log the sentence of an error that must be raised, for the wrapper's own message may leave it out."""
         said = self._values[self._status_at], self._values[self._message_at] = (_status(error), str(error))
         if not isinstance(error, StepError):
             self._cause = said
-        self._say(str(error), Fmi2Status.error)
+        self.log(str(error), Fmi2Status.error)
         return error
 
     def _refresh(self) -> LinkworkError | None:

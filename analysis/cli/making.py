@@ -8,8 +8,7 @@ from pathlib import Path
 
 import click
 
-from ..libraries import MissingLibraryError
-from .common import check_place, console, print_error, report_errors, say
+from .common import check_place, console, report_errors, say
 
 PACKAGE = Path(__file__).resolve().parents[1]
 #: The examples: beside the package in a checkout, inside it where Linkwork is installed as a wheel.
@@ -61,7 +60,7 @@ def build(
       linkwork build --kinds native,native-fmi3 --platforms all
       linkwork build press.toml
     """
-    from ..export import KINDS, available_kinds, build_all
+    from ..export import build_all
     from ..linkages import load_linkage
 
     models = [load_linkage(name).fmu if Path(name).suffix in (".toml", ".json") else name for name in models]
@@ -69,8 +68,6 @@ def build(
         for fmu, for_platforms in build_all(models, dest, kinds, platforms, publish_to=publish):
             made = f", {' '.join(for_platforms)}" if for_platforms else ""
             say(f"{fmu}: valid, {fmu.stat().st_size / 1024:.0f} KiB{made}")
-    if not kinds and set(available_kinds()) != set(KINDS):
-        print_error(f"note: no native FMUs, which Zig compiles: {MissingLibraryError('ziglang')}")
 
 
 @click.command()

@@ -1,7 +1,7 @@
 """Build FMUs of the mechanisms."""
 
 from .archive import SOURCES, BuildError, run_trial
-from .builds import BuiltFmu, available_kinds, build_all
+from .builds import BuiltFmu, build_all
 from .compatibility import publish
 from .description import KINDS, NATIVE, NATIVE_FMI3, PYTHON, Kind
 from .interface import Entry, interface, with_starts
@@ -23,7 +23,6 @@ __all__ = [
     "Comparison",
     "Entry",
     "Kind",
-    "available_kinds",
     "build",
     "build_all",
     "build_controller",

@@ -17,7 +17,6 @@ from linkwork.errors import LinkworkError
 from linkwork.mechanism import Mechanism
 from linkwork.variables import Variable
 
-from ..run import unpacking_folder
 from .accuracy import to_html
 
 PACKAGE = Path(__file__).resolve().parents[1]
@@ -154,8 +153,6 @@ def run_trial(fmu: Path, script: str = _TRIAL, *arguments: str) -> None:
         text=True,
         timeout=120,
         check=False,
-        # where FMPy unpacks it
-        env=os.environ | dict.fromkeys(("TMPDIR", "TEMP", "TMP"), unpacking_folder()),
     )
     if done.returncode != 0:
         raise BuildError(f"{fmu.name} was built but does not run as it should:\n{done.stdout}{done.stderr}")

@@ -15,7 +15,7 @@ import linkwork
 BILL = "extra/org.cyclonedx/bom.json"
 TYPE = "application/vnd.cyclonedx+json"
 #: Programs that determine the bytes of an FMU, by its kind.
-_MAKERS = {"python": ("pythonfmu", "fmpy"), "native": ("casadi", "ziglang", "fmpy")}
+_MAKERS = {"python": ("pythonfmu", "ziglang", "fmpy"), "native": ("casadi", "ziglang", "fmpy")}
 
 
 def add_bill(name: str, entries: Mapping[str, bytes], *, native: bool, fmi: int) -> dict[str, bytes]:
@@ -44,7 +44,7 @@ def add_bill(name: str, entries: Mapping[str, bytes], *, native: bool, fmi: int)
             _component("zig", metadata.version("ziglang"), "MIT", text=runtime, index=""),
         ]
     else:
-        text = "the library that runs Python, and its modules"
+        text = "the library that runs Python, behind the guard, and its modules"
         inside.append(_component("pythonfmu", metadata.version("pythonfmu"), "MIT", text=text))
     listed = [
         {"type": "file", "bom-ref": place, "name": place, "hashes": [{"alg": "SHA-256", "content": digest}]}

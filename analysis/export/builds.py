@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import importlib.util
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import NamedTuple
@@ -26,12 +25,6 @@ class BuiltFmu(NamedTuple):
     platforms: tuple[str, ...]
 
 
-def available_kinds() -> tuple[str, ...]:
-    """Return the kinds of FMU that can be built here: without Zig only those in Python."""
-    zig = importlib.util.find_spec("ziglang") is not None
-    return tuple(name for name, kind in KINDS.items() if zig or kind is PYTHON)
-
-
 def build_all(
     models: Sequence[str] = (),
     dest: Path | str = "build",
@@ -49,7 +42,7 @@ def build_all(
     dest : path
         Folder for the FMUs; made if it is not there.
     kinds : sequence of str, optional
-        Of `KINDS`; by default all that can be built here.
+        Of `KINDS`; by default all.
     platforms : sequence of str, optional
         Platforms for which native FMUs are compiled: names in `PLATFORMS`, or ``all``; by default this platform. `WASM` is
         for FMUs of FMI 3.0 only and left out of the others.
@@ -76,7 +69,7 @@ def build_all(
         for name in names:
             if name not in there:
                 raise unknown_name(name, there, f"{what} {name!r}")
-    chosen = [KINDS[name] for name in kinds or available_kinds()]
+    chosen = [KINDS[name] for name in kinds or KINDS]
     here = this_platform() if any(kind is not PYTHON for kind in chosen) else ""
     every = [*PLATFORMS, *(name for name in platforms if name == WASM)]
     asked = tuple(every) if ALL in platforms else tuple(platforms) or (here,)

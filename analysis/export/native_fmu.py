@@ -72,7 +72,8 @@ WASM = "wasm32-wasip2"
 EVERYWHERE = PLATFORMS | {WASM: Platform("wasm32-wasi", "wasm", "", WASM)}
 
 _SHELL = ("face.h", "model.h", "plant.h", "step.h", "plant.c", "instance.h", "instance.c", "saved.c")
-_HEADERS = {
+#: Headers of the standard, by its major version.
+HEADERS = {
     2: ("fmi2Functions.h", "fmi2FunctionTypes.h", "fmi2TypesPlatform.h"),
     3: ("fmi3Functions.h", "fmi3FunctionTypes.h", "fmi3PlatformTypes.h"),
 }
@@ -166,7 +167,7 @@ def source_files(mechanism: Mechanism, kind: Kind, *, web: bool = False) -> dict
     headers = resources.files("fmpy") / "c-code"
     own = [f"fmi{kind.fmi}.c", *_SHELL, *(["component.c"] if web else [])]
     files = {name: (shell / name).read_text(encoding="utf-8") for name in own}
-    files |= {name: (headers / name).read_text(encoding="utf-8") for name in _HEADERS[kind.fmi]}
+    files |= {name: (headers / name).read_text(encoding="utf-8") for name in HEADERS[kind.fmi]}
     if kind.fmi == 2:
         files["fmi2Functions.h"] = _with_prefix(files["fmi2Functions.h"], (headers / "fmi3Functions.h").read_text())
     files |= generated_files(mechanism, kind)
@@ -218,6 +219,7 @@ def compile_library(
         If Zig is not installed.
     """
     require("ziglang")
+    libraries = () if "-nostdlib" in options else ("-lm",)
     cache = code_folder(f"zig-{target}")
     known = cache / "hashes"
     with lock_folder(cache), tempfile.TemporaryDirectory(prefix="linkwork-zig-") as own:
@@ -229,7 +231,7 @@ def compile_library(
         if not known.is_file():
             sys.stderr.write(f"linkwork: Zig compiles what it needs itself for {target}, once on this machine ...\n")
         done = subprocess.run(
-            [sys.executable, "-m", "ziglang", "cc", "-target", target, *options, "-o", library, *files, "-lm"],
+            [sys.executable, "-m", "ziglang", "cc", "-target", target, *options, "-o", library, *files, *libraries],
             cwd=folder,
             env=os.environ | {"ZIG_GLOBAL_CACHE_DIR": str(cache), "ZIG_LOCAL_CACHE_DIR": own},
             capture_output=True,

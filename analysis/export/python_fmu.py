@@ -24,12 +24,12 @@ from linkwork import wrapper
 from linkwork.mechanism import Mechanism
 
 from ..mechanisms import check
-from ..numerics.cache import store_file
 from . import controllers
 from .archive import SOURCES, BuildError, documentation, write
 from .bill import add_bill
 from .description import PYTHON, description, token
 from .experiments import experiments
+from .guard import add_guard
 
 #: The oldest Python on which the modules in the FMUs run.
 OLDEST = (3, 10)
@@ -61,7 +61,7 @@ def build(mechanism: Mechanism, dest: Path | str = "build", sources: Path | str 
     check(mechanism)
     name = mechanism.fmu
     sources = Path(sources)
-    for needed in ("slave.py", "linkwork/__init__.py"):
+    for needed in ("slave.py", "guard.c", "linkwork/__init__.py"):
         if not (sources / needed).is_file():
             raise BuildError(f"{sources} holds no {needed}: FMUs are built from a checkout of the project")
     dest = Path(dest)
@@ -73,21 +73,23 @@ def build(mechanism: Mechanism, dest: Path | str = "build", sources: Path | str 
         with _import_state():
             try:
                 described = _describe(staged)
-                raw = FmuBuilder.build_FMU(
-                    staged.script,
-                    dest=Path(folder) / "raw",
-                    project_files=[staged.package, staged.slave],
-                )
+                raw = _run_builder(staged.script, [staged.package, staged.slave])
             except Exception as error:  # the sources run here, and may raise anything
                 raise BuildError(f"{name}.fmu cannot be built from {sources}: {error!r}") from error
-        with zipfile.ZipFile(raw) as archive:
-            entries = {entry.replace("\\", "/"): archive.read(entry) for entry in archive.namelist()}
+    entries = add_guard(raw, name, (sources / "guard.c").read_bytes())
     entries["modelDescription.xml"] = described
     made = f"FMI 2.0 co-simulation, made with {PYTHON.tool}"
     entries |= documentation(mechanism, mechanism.variables, mechanism.title, made, (_NEEDS_PYTHON,))
     entries |= experiments(mechanism)
     target = dest / PYTHON.file_name(mechanism)
     return write(add_bill(target.stem, entries, native=False, fmi=2), target)
+
+
+def _run_builder(script: Path, files: list[Path], **options: str) -> dict[str, bytes]:
+    """Run PythonFMU's builder on a script and the files that it imports; return the files of its archive by path."""
+    raw = FmuBuilder.build_FMU(script, dest=script.parent / "raw", project_files=files, **options)
+    with zipfile.ZipFile(raw) as archive:
+        return {entry.replace("\\", "/"): archive.read(entry) for entry in archive.namelist()}
 
 
 _SLAVE = """import sys
@@ -173,7 +175,9 @@ def build_controller(name: str, dest: Path | str = "build") -> Path:
         Folder of the subfolder; if it already has the FMU of the same content, this is kept.
     """
     text, shared = (Path(str(module.__file__)).read_text(encoding="utf-8") for module in (controllers, wrapper))
-    kind, tag = controllers.CONTROLLERS[name].__name__, hashlib.sha256(f"{text}\0{shared}".encode()).hexdigest()[:8]
+    guard = (SOURCES / "guard.c").read_bytes()
+    content = f"{text}\0{shared}\0".encode() + guard
+    kind, tag = controllers.CONTROLLERS[name].__name__, hashlib.sha256(content).hexdigest()[:8]
     target = Path(dest) / tag / f"{kind}Controller.fmu"
     if target.is_file():
         return target
@@ -187,8 +191,8 @@ def build_controller(name: str, dest: Path | str = "build") -> Path:
         script = Path(stage) / f"{kind.lower()}_{tag}.py"
         script.write_text(_CONTROLLER.format(module=module.stem, kind=kind), encoding="utf-8")
         options = {"canGetAndSetFMUstate": "true", "canHandleVariableCommunicationStepSize": "true"}
-        made = FmuBuilder.build_FMU(script, dest=Path(stage) / "made", project_files=[package, module], **options)
-        store_file(target, made.read_bytes())
+        entries = _run_builder(script, [package, module], **options)
+        write(add_guard(entries, target.stem, guard), target)
     return target
 
 

@@ -15,6 +15,8 @@ from ..files import check_fmu, first_line
 from .archive import BuildError
 from .bill import BILL
 from .description import NATIVE, NATIVE_FMI3
+from .guard import PYTHONFMU, compile_guard
+from .guard import SOURCE as GUARD
 from .native_fmu import EVERYWHERE, compile_binaries
 
 _FAT, _X86, _ARM = b"\xca\xfe\xba\xbe", b"\x07\x00\x00\x01", b"\x0c\x00\x00\x01"
@@ -31,8 +33,9 @@ class Comparison(NamedTuple):
 def rebuild(fmu: Path | str) -> Iterator[Comparison]:
     """Compare an FMU with its bill of materials, and its libraries with those that its sources give here.
 
-    The libraries of a native FMU are compiled again; library and modules of PythonFMU in a Python FMU are compared with the
-    installed package. They have the same bytes if the programs have the versions that the bill names.
+    The libraries of a native FMU are compiled again, and so is the guard of a Python FMU, whose library and modules of
+    PythonFMU are compared with the installed package. They have the same bytes if the programs have the versions that the
+    bill names.
 
     Yields
     ------
@@ -60,7 +63,7 @@ def rebuild(fmu: Path | str) -> Iterator[Comparison]:
     wrong = sorted(name for name in {*stated, *found} if stated.get(name) != found.get(name))
     text = "SHA-256 of every file" if not wrong else f"differing, missing or not listed: {', '.join(wrong[:5])}"
     yield Comparison(f"{len(found)} files, with the bill of materials", not wrong, text)
-    yield from _compare_libraries(files, tools) if "ziglang" in tools else _compare_pythonfmu(files, tools)
+    yield from _compare_libraries(files, tools) if "casadi" in tools else _compare_pythonfmu(files, tools)
 
 
 def _versions(tools: dict[str, str], name: str) -> str:
@@ -97,15 +100,15 @@ def _compare_libraries(files: dict[str, bytes], tools: dict[str, str]) -> Iterat
 
 
 def _compare_pythonfmu(files: dict[str, bytes], tools: dict[str, str]) -> Iterator[Comparison]:
-    """Compare library and modules of PythonFMU with those of the installed package."""
+    """Compare library and modules of PythonFMU with those of the installed package, and compile the guard again."""
     package: Any = resources.files("pythonfmu")
-    for folder, suffix, name in (
-        ("linux64", ".so", "libpythonfmu-export.so"),
-        ("win64", ".dll", "pythonfmu-export.dll"),
-    ):
+    for folder, name in PYTHONFMU.items():
         content = (package / "resources" / "binaries" / folder / name).read_bytes()
-        for place in (p for p in files if p.startswith(f"binaries/{folder}/") and p.endswith(suffix)):
-            yield Comparison(place, files[place] == content, _versions(tools, "pythonfmu"))
+        place = f"binaries/{folder}/{name}"
+        yield Comparison(place, files.get(place) == content, _versions(tools, "pythonfmu"))
+    guards = compile_guard(files[GUARD]) if GUARD in files else {}
+    for place in (p for p in files if p.startswith("binaries/") and Path(p).name not in PYTHONFMU.values()):
+        yield Comparison(place, files[place] == guards.get(place.split("/")[1]), _versions(tools, "ziglang"))
     prefix = "resources/pythonfmu/"
     modules = {place.removeprefix(prefix): text for place, text in files.items() if place.startswith(prefix)}
     same = all((package / name).is_file() and (package / name).read_bytes() == text for name, text in modules.items())

@@ -48,13 +48,13 @@ from .experiments import EXPERIMENTS as EXPERIMENTS
 from .experiments import MANIFEST as MANIFEST
 from .experiments import STANDARD as STANDARD
 from .experiments import ExperimentError as ExperimentError
+from .experiments import unpacking_folder as unpacking_folder
 from .experiments import verify as verify
 from .fmu import CosimulationError as CosimulationError
 from .fmu import FmuModel as FmuModel
 from .fmu import FmuRun as FmuRun
 from .fmu import list_interfaces as list_interfaces
 from .fmu import read_description as read_description
-from .fmu import unpacking_folder as unpacking_folder
 from .hamming import Hamming as Hamming
 from .inputs import Inputs as Inputs
 from .inputs import align as align

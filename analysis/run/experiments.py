@@ -7,7 +7,9 @@ In the layered standard FMI-LS-REF (https://github.com/modelica/fmi-ls-ref, tag 
 from __future__ import annotations
 
 import csv
+import os
 import posixpath
+import re
 import shutil
 import tempfile
 from collections.abc import Iterator, Mapping
@@ -25,7 +27,7 @@ from linkwork.errors import LinkworkError
 
 from ..files import check_fmu, first_line
 from .component import FOLDER
-from .fmu import read_description, unpacking_folder
+from .fmu import CosimulationError, read_description
 
 STANDARD = "org.fmi-standard.fmi-ls-ref"
 EXPERIMENTS = f"extra/{STANDARD}"
@@ -40,6 +42,28 @@ _LEAST_SCALE = 1e-3
 
 class ExperimentError(LinkworkError):
     """The experiments in an FMU cannot be read or run."""
+
+
+def unpacking_folder() -> str:
+    """Return a folder in which to unpack any FMU: the temporary folder, or another if PythonFMU cannot read that one.
+
+    An FMU receives the URI of its folder. PythonFMU's library decodes only "%20" in the URI; if it then does not find its
+    files, it ends the process. Linkwork's own Python FMUs have a guard against this.
+
+    Raises
+    ------
+    CosimulationError
+        If there is no such folder.
+    """
+    here = tempfile.gettempdir()
+    others = ("/tmp", "/var/tmp") if os.name == "posix" else (os.environ.get("PUBLIC"), "C:/Windows/Temp")
+    for folder in (here, *others):
+        if folder and os.access(folder, os.W_OK) and not re.search("%(?!20)", Path(folder).absolute().as_uri()):
+            return folder
+    raise CosimulationError(
+        f"an FMU cannot be unpacked in {here}: of the characters in the folder's name PythonFMU's library reads letters from a "
+        "to z, digits, spaces and - . _ ~ alone; set TMPDIR to another folder"
+    )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

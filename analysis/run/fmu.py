@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import os
-import re
 import shutil
 import tempfile
 from collections.abc import Mapping
@@ -32,28 +30,6 @@ from .component import ComponentModel, ComponentSlave, component_path
 
 class CosimulationError(LinkworkError):
     """An FMU could not be loaded or initialised; the message is the FMU's own if it gave one."""
-
-
-def unpacking_folder() -> str:
-    """Return a folder in which to unpack an FMU: the temporary folder, or another if a Python FMU cannot read that one.
-
-    An FMU receives the URI of its folder. PythonFMU's wrapper decodes only "%20" in the URI; if it then does not find its
-    files, it ends the process.
-
-    Raises
-    ------
-    CosimulationError
-        If there is no such folder.
-    """
-    here = tempfile.gettempdir()
-    others = ("/tmp", "/var/tmp") if os.name == "posix" else (os.environ.get("PUBLIC"), "C:/Windows/Temp")
-    for folder in (here, *others):
-        if folder and os.access(folder, os.W_OK) and not re.search("%(?!20)", Path(folder).absolute().as_uri()):
-            return folder
-    raise CosimulationError(
-        f"an FMU cannot be unpacked in {here}: of the characters in the folder's name PythonFMU's wrapper reads letters from a "
-        "to z, digits, spaces and - . _ ~ alone; set TMPDIR to another folder"
-    )
 
 
 def _description(fmu: str | Path) -> Any:
@@ -165,9 +141,7 @@ class _Instance:
                 f"{self.description.modelName}: it has no {named}"
             )
         try:
-            # only Python FMUs read files from their folder
-            wrapped = str(self.description.generationTool).startswith("PythonFMU")
-            self._folder = tempfile.mkdtemp(dir=unpacking_folder() if wrapped else None)
+            self._folder = tempfile.mkdtemp()
             extract(str(fmu), self._folder)
             with chdir("."):  # FMPy leaves the working folder changed if a library cannot be loaded
                 self._fmu = self._instance_class(described.modelIdentifier)(

@@ -13,7 +13,7 @@ from typing import Any
 
 from linkwork.errors import InputError
 
-from ..export import KINDS, NATIVE, PLATFORMS, PYTHON, available_kinds, build, build_native, this_platform, with_starts
+from ..export import KINDS, NATIVE, PLATFORMS, PYTHON, build_native, this_platform, with_starts
 from ..files import Choice, Many, Quantity, Whole, entry, flag, read, text
 from ..mechanisms import find_mechanism
 from ..periodic import motor_parameters, steady_drive
@@ -101,13 +101,12 @@ def _tuned(case: Case, wanted: _Tuning) -> Answer:
 
 
 def _run(case: Case, wanted: _Run) -> Answer:
-    """Run the native FMU, or without Zig the Python FMU, and return its outputs at the samples of the page."""
+    """Run the native FMU and return its outputs at the samples of the page."""
     if wanted.rows > _ROWS:
         raise InputError(f"{wanted.rows} rows are more than {_ROWS}: ask for less")
     mechanism = find_mechanism(case.parameters)
     with folder() as place:
-        native = "native" in available_kinds()
-        fmu = build_native(mechanism, NATIVE, place) if native else build(mechanism, place)
+        fmu = build_native(mechanism, NATIVE, place)
         run = cosimulate(
             fmu,
             case.parameters,

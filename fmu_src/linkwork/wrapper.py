@@ -20,14 +20,14 @@ INSTANTIATED, INITIALISING, RUNNING, TERMINATED = PHASES = (
 _libraries: set[Path] = set()
 
 
-def end_library_in_order(resources: str, model: str) -> None:
+def end_library_in_order(resources: str) -> None:
     """Make the wrapper's library release the interpreter when Python ends, not while the process is torn down.
 
-    ``resources`` is the FMU's folder of resources, ``model`` its model identifier. On Linux the library clears its pointer to
+    ``resources`` is the FMU's folder of resources. On Linux the library clears its pointer to
     the interpreter's state in a destructor that runs after the pointer itself was destroyed: a use after free, which sometimes
     aborts a process after a good run. If the pointer is cleared earlier, nothing happens.
     """
-    library = Path(resources).parent / "binaries" / "linux64" / f"{model}.so"
+    library = Path(resources).parent / "binaries" / "linux64" / "libpythonfmu-export.so"
     if not sys.platform.startswith("linux") or library in _libraries or not library.is_file():
         return
     _libraries.add(library)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import csv
-import importlib.util
 import re
 import shlex
 import shutil
@@ -316,14 +315,6 @@ def test_examples_are_copied_once(linkwork, tmp_path):
     assert linkwork("examples", "--dest", "mine", "--force").exit_code == 0
     for path in (path for path in (ROOT / "examples").rglob("*") if path.is_file()):
         assert (tmp_path / "mine" / path.relative_to(ROOT / "examples")).read_bytes() == path.read_bytes()
-
-
-def test_without_zig_what_can_be_built_is_and_a_note_says_what_is_missing(linkwork, monkeypatch):
-    monkeypatch.setattr(importlib.util, "find_spec", lambda name: None)
-    result = linkwork("build", "FiveBarSlider")
-    assert result.exit_code == 0
-    assert "FiveBarSlider.fmu: valid" in result.output
-    assert "pip install 'ziglang" in result.stderr
 
 
 def test_ctrl_c_is_clean(linkwork, monkeypatch):

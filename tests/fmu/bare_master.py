@@ -17,7 +17,8 @@ OK, WARNING, DISCARD, ERROR, FATAL = range(5)
 
 CO_SIMULATION = 1
 
-_LOGGER = ctypes.CFUNCTYPE(None, c_void_p, c_char_p, c_int, c_char_p, c_char_p)
+#: Of the arguments after the format one is read, which is all that the FMUs give.
+_LOGGER = ctypes.CFUNCTYPE(None, c_void_p, c_char_p, c_int, c_char_p, c_char_p, c_void_p)
 _ALLOCATE = ctypes.CFUNCTYPE(c_void_p, c_size_t, c_size_t)
 _FREE = ctypes.CFUNCTYPE(None, c_void_p)
 _STEP_FINISHED = ctypes.CFUNCTYPE(None, c_void_p, c_int)
@@ -94,10 +95,10 @@ class Instance:
             raise RuntimeError(f"not instantiated: {self.log}")
         self.component = c_void_p(component)
 
-    def _logged(self, environment, name, status, category, message):
+    def _logged(self, environment, name, status, category, message, argument):
         # as a master in C does it: the message is a printf format
         buffer = ctypes.create_string_buffer(4096)
-        _libc.snprintf(buffer, c_size_t(len(buffer)), message)
+        _libc.snprintf(buffer, c_size_t(len(buffer)), message, c_void_p(argument))
         self.log.append([status, (category or b"").decode(), buffer.value.decode()])
 
     def _call(self, function, *arguments):

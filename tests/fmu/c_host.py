@@ -5,6 +5,7 @@ from __future__ import annotations
 import ctypes
 import json
 import os
+import shutil
 import subprocess
 import sysconfig
 import tempfile
@@ -44,6 +45,24 @@ def libpython() -> str:
     except OSError:
         pytest.skip(f"there is no library {name} of this Python for a master in C to load")
     return name
+
+
+def emulator(platform: str) -> list[str]:
+    """The command that runs programs of a platform, or skip."""
+    if platform == this_platform():
+        return []
+    wine = next((p for p in (shutil.which("wine64"), "/usr/lib/wine/wine64") if p and Path(p).is_file()), None)
+    qemu, root = shutil.which("qemu-aarch64-static"), Path("/usr/aarch64-linux-gnu")
+    if platform == "x86_64-windows" and wine:
+        return [wine]
+    if platform == "aarch64-linux" and qemu and root.is_dir():
+        return [qemu, "-L", str(root)]
+    pytest.skip(f"no emulator of {platform}")
+
+
+def wine_settings(folder: Path) -> dict[str, str]:
+    """The environment of a Wine of its own, in a folder."""
+    return {"WINEPREFIX": str(folder / "wine"), "WINEDEBUG": "-all", "WINEDLLOVERRIDES": "mscoree,mshtml="}
 
 
 class Unpacked(NamedTuple):

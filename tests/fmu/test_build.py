@@ -53,8 +53,11 @@ def test_archive(fmu: Path, model: Model) -> None:
 
 def test_what_the_binaries_need_is_what_the_documentation_says(fmu: Path, model: Model) -> None:
     with ZipFile(fmu) as archive:
-        linux = archive.read(f"binaries/linux64/{model.name}.so")
-        windows = archive.read(f"binaries/win64/{model.name}.dll")
+        linux = archive.read("binaries/linux64/libpythonfmu-export.so")
+        windows = archive.read("binaries/win64/pythonfmu-export.dll")
+        guards = [
+            archive.read(f"binaries/{place}") for place in (f"linux64/{model.name}.so", f"win64/{model.name}.dll")
+        ]
     page = (Path(__file__).parents[2] / "docs" / "fmu.md").read_text(encoding="utf-8")
     # the names of symbols' versions and of libraries stand in the files as text
     newest = max(int(minor) for minor in re.findall(rb"\0GLIBC_2\.(\d+)", linux))
@@ -65,6 +68,10 @@ def test_what_the_binaries_need_is_what_the_documentation_says(fmu: Path, model:
     assert {b"python3.dll", b"MSVCP140.dll"} <= set(re.findall(rb"\w+\.dll", windows))
     assert not re.search(rb"python3\d+\.dll", windows)
     assert re.findall(rb"libpython3[\w.]*", linux) == []
+    # the guard needs less: the C library of RHEL 7, the system of Windows
+    assert max(int(minor) for minor in re.findall(rb"\0GLIBC_2\.(\d+)", guards[0])) <= 17
+    needed = set(re.findall(rb"[\w-]+\.dll", guards[1], re.IGNORECASE))
+    assert needed == {b"guard.dll", b"KERNEL32.dll"}
 
 
 def test_modules_inside_carry_the_hash_of_their_content(fmu: Path, model: Model, build_variant: Build) -> None:

@@ -1,7 +1,7 @@
 """The libraries of the native FMUs for every platform: what they export and import, their size; stepped where there is an
 emulator. Those of macOS are inspected only.
 
-Under an emulator: Wine for Windows (Debian: wine64), QEMU for 64-bit ARM (qemu-user-static, libc6-arm64-cross).
+The emulators are Wine for Windows (Debian: wine64) and QEMU for 64-bit ARM (qemu-user-static, libc6-arm64-cross).
 """
 
 from __future__ import annotations
@@ -18,10 +18,10 @@ from zipfile import ZipFile
 
 import pytest
 
-from analysis.export import KINDS, PLATFORMS, build_native, this_platform
+from analysis.export import KINDS, PLATFORMS, build_native
 from build_fmu import FMUS
 
-from .c_host import compile_host, run_host, unpack
+from .c_host import compile_host, emulator, run_host, unpack, wine_settings
 from .runner import run_in_process
 
 lief = pytest.importorskip("lief", reason="LIEF reads the libraries: pip install lief")
@@ -134,19 +134,6 @@ def test_libraries_for_all_platforms(everywhere: dict[str, Path], name: str) -> 
         INSPECT[path.rpartition(".")[2]](data, standard(fmi), most(name))
 
 
-def emulator(platform: str) -> list[str]:
-    """The command that runs programs of a platform, or skip."""
-    if platform == this_platform():
-        return []
-    wine = next((p for p in (shutil.which("wine64"), "/usr/lib/wine/wine64") if p and Path(p).is_file()), None)
-    qemu, root = shutil.which("qemu-aarch64-static"), Path("/usr/aarch64-linux-gnu")
-    if platform == "x86_64-windows" and wine:
-        return [wine]
-    if platform == "aarch64-linux" and qemu and root.is_dir():
-        return [qemu, "-L", str(root)]
-    pytest.skip(f"no emulator of {platform}")
-
-
 @pytest.mark.slow
 @pytest.mark.timeout(1200)
 @pytest.mark.parametrize("platform", [name for name in PLATFORMS if "darwin" not in name])
@@ -154,7 +141,7 @@ def test_the_same_results_on_every_platform(
     everywhere: dict[str, Path], natives: dict[str, Path], tmp_path: Path, platform: str
 ) -> None:
     command = emulator(platform)
-    wine = {"WINEPREFIX": str(tmp_path / "wine"), "WINEDEBUG": "-all", "WINEDLLOVERRIDES": "mscoree,mshtml="}
+    wine = wine_settings(tmp_path)
     for part in ("here", "there"):
         (tmp_path / part).mkdir()
     here, there = compile_host(tmp_path / "here"), compile_host(tmp_path / "there", platform)

@@ -66,8 +66,8 @@ def test_two_users_build_the_same_bytes_for_all_platforms(tmp_path: Path) -> Non
     for path in sorted((tmp_path / "one" / "fmus").iterdir()):
         parts = list(rebuild(path))
         assert all(part.same for part in parts), parts
-        # the files; then a library for each folder of platforms, or two of PythonFMU and its modules
-        assert len(parts) == 1 + {"SliderCrank.fmu": 3, "SliderCrank-native.fmu": 4}.get(path.name, 5)
+        # the files; then a library for each folder of platforms, or two of PythonFMU, two guards and modules
+        assert len(parts) == 1 + {"SliderCrank.fmu": 5, "SliderCrank-native.fmu": 4}.get(path.name, 5)
 
 
 def test_bill_of_materials(natives: dict[str, Path], fmus: dict[str, Path]) -> None:

@@ -72,17 +72,7 @@ def test_no_exception_escapes_from_a_read(slave: LinkworkSlave, monkeypatch: pyt
     assert "something" in value(slave, "solver.message")
 
 
-def test_percent_signs_are_doubled_for_the_wrapper(slave: LinkworkSlave) -> None:
-    slave._say("100 % of %s, %% and %n", Fmi2Status.warning)
-    (message,) = slave.log_queue
-    assert message.msg == "100 %% of %%s, %%%% and %%n"
-    assert message.status == Fmi2Status.warning
-    assert message.msg.replace("%%", "%") == "100 % of %s, %% and %n"
-
-
-def test_refusal_is_logged_once_and_readable_with_its_percent_signs(
-    slave: LinkworkSlave, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_refusal_is_logged_once_and_readable(slave: LinkworkSlave, monkeypatch: pytest.MonkeyPatch) -> None:
     def fail(time: float, step: float) -> None:
         raise RuntimeError("at 50 % of the way")
 
@@ -90,7 +80,7 @@ def test_refusal_is_logged_once_and_readable_with_its_percent_signs(
     slave.do_step(0.0, 1e-3)
     (message,) = slave.log_queue
     assert message.status == Fmi2Status.discard
-    assert "at 50 %% of the way" in message.msg
+    assert "at 50 % of the way" in message.msg
     assert "at 50 % of the way" in value(slave, "solver.message")
 
 

@@ -169,7 +169,7 @@ def test_two_instances_do_not_see_each_other(fmu: Path, model: Model, tmp_path: 
 
 def reset(fmu: str, folder: str, values: dict[str, float], force: str, too_much: float) -> list[Any]:
     """Outputs of a run, of the same after a reset, and of the defaults after another."""
-    from bare_master import FATAL, Fmu
+    from bare_master import ERROR, Fmu
 
     fmu = Fmu(fmu, folder)
     instance = fmu.instantiate()
@@ -191,7 +191,7 @@ def reset(fmu: str, folder: str, values: dict[str, float], force: str, too_much:
     assert instance.reset() == 0
     instance.set("crank.length", -1.0)
     assert instance.setup() == instance.enter() == 0
-    assert instance.exit() == FATAL
+    assert instance.exit() == ERROR
     assert instance.reset() == 0
     instance.start(values)
     instance.run([1e-3] * 20)
@@ -313,7 +313,7 @@ def test_damaged_state_is_refused(fmu: Path, model: Model, tmp_path: Path) -> No
         checked(whole | {"plant": whole["plant"] | {"parameters": {"crank_length": -1.0}}}),
     ]
     for status, log, same in run_in_process(damaged, fmu, tmp_path / "b", pieces):
-        assert status == 4
+        assert status == 3
         assert any("state" in sentence for _, _, sentence in log)
         assert same
 
@@ -333,7 +333,7 @@ def test_state_of_another_model_is_refused(fmus: dict[str, Path], model: Model, 
             continue
         data = run_in_process(state_of, other, tmp_path / "a")
         ((status, log, same),) = run_in_process(damaged, fmus[model.name], tmp_path / "b", [data])
-        assert status == 4
+        assert status == 3
         sentence = f"the saved state belongs to '{name}' with another interface, not to this {model.name}"
         assert [text for _, category, text in log if category == "logStatusError"] == [sentence]
         assert same
