@@ -66,6 +66,7 @@ from .masses import describe_masses as describe_masses
 from .masses import mass_origins as mass_origins
 from .masses import trace_masses as trace_masses
 from .masses import with_sections as with_sections
+from .messages import Messages as Messages
 from .prepared import compute_outputs as compute_outputs
 from .sampling import sample as sample
 from .signals import MOTOR as MOTOR

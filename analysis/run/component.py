@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Callable
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any, ClassVar
 
 from fmpy.fmi1 import FMICallException
@@ -57,7 +58,12 @@ class _Component:
             name = f"[{kind}]{self._interface}-instance.{method}"
             index = self._instance.get_export_index(self._store, name, self._interface_index)
             assert index is not None, name
-            self._functions[method] = self._instance.get_func(self._store, index)
+            function: Any = self._instance.get_func(self._store, index)
+            # wasmtime asks for the types of a function in every call, which takes a third of its time
+            kind_of = function.type(self._store)
+            kept = SimpleNamespace(params=kind_of.params, result=kind_of.result)
+            function.type = lambda store: kept
+            self._functions[method] = function
         own = (self.component,) if kind == "method" else ()
         found = self._functions[method](self._store, *own, *values)
         if isinstance(found, str) and found != "ok" and found != "warning":

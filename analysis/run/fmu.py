@@ -6,7 +6,6 @@ import shutil
 import tempfile
 from collections.abc import Mapping
 from contextlib import chdir
-from ctypes import byref
 from dataclasses import asdict
 from pathlib import Path
 from types import MappingProxyType
@@ -16,9 +15,8 @@ from zipfile import ZipFile
 
 from fmpy import extract, platform, platform_tuple, read_model_description
 from fmpy.fmi1 import FMICallException
-from fmpy.fmi2 import FMU2Model, FMU2Slave, fmi2CallbackFunctions, fmi2CallbackLoggerTYPE
+from fmpy.fmi2 import FMU2Model, FMU2Slave
 from fmpy.fmi3 import FMU3Model, FMU3Slave
-from fmpy.logging import addLoggerProxy
 
 from linkwork.errors import InputError, LinkworkError
 from linkwork.parameters import fmi_name
@@ -26,6 +24,7 @@ from linkwork.parameters import fmi_name
 from ..files import check_fmu
 from ..mechanisms import InitialState, Parameters, find_mechanism
 from .component import ComponentModel, ComponentSlave, component_path
+from .messages import Messages
 
 
 class CosimulationError(LinkworkError):
@@ -127,7 +126,7 @@ class _Instance:
         self.input_names = mechanism.input_names
         self.output_names = mechanism.output_names
         self.name = Path(fmu).name
-        self.messages: list[str] = []
+        self.messages = Messages()
         self._folder: str | None = None
         self.description = _description(fmu)
         self._variables = {v.name: v for v in self.description.modelVariables}
@@ -185,12 +184,9 @@ class _Instance:
 
     def _initialise(self, values: Mapping[str, float], tolerance: float, start_time: float) -> None:
         if self._fmi3:
-            self._fmu.instantiate(loggingOn=True, logMessage=self._log)
+            self._fmu.instantiate(loggingOn=True, logMessage=self.messages.receive)
         else:
-            self._callbacks = fmi2CallbackFunctions()
-            self._callbacks.logger = fmi2CallbackLoggerTYPE(self._log)
-            addLoggerProxy(byref(self._callbacks))
-            self._fmu.instantiate(callbacks=self._callbacks, loggingOn=True)
+            self._fmu.instantiate(callbacks=self.messages.callbacks(), loggingOn=True)
             self._fmu.setupExperiment(tolerance=tolerance, startTime=start_time)
         groups: dict[str, dict[int, float]] = {}
         for name, value in values.items():
@@ -204,10 +200,6 @@ class _Instance:
         else:
             self._fmu.enterInitializationMode()
         self._fmu.exitInitializationMode()
-
-    def _log(self, *arguments: Any) -> None:
-        """Record a log message, the last of the arguments in FMI 2.0 and in FMI 3.0."""
-        self.messages.append(arguments[-1].decode("utf-8", errors="replace"))
 
     def __enter__(self) -> Self:
         return self

@@ -4,19 +4,18 @@ from __future__ import annotations
 
 import tempfile
 from collections.abc import Sequence
-from ctypes import byref, c_void_p
+from ctypes import c_void_p
 from functools import lru_cache
 from pathlib import Path
 from typing import Any, TypeAlias
 
 import numpy as np
 from fmpy import extract
-from fmpy.fmi2 import FMU2Slave, fmi2CallbackFunctions, fmi2CallbackLoggerTYPE
+from fmpy.fmi2 import FMU2Slave
 from fmpy.fmi3 import FMU3Slave
-from fmpy.logging import addLoggerProxy
 from numpy.typing import NDArray
 
-from ..run import unpacking_folder
+from ..run import Messages, unpacking_folder
 from .wiring import Part
 
 Floats: TypeAlias = NDArray[np.float64]
@@ -47,7 +46,7 @@ class Instance:
 
     def __init__(self, part: Part) -> None:
         self.part = part
-        self.messages: list[str] = []
+        self.messages = Messages()
         self.outputs = part.real_variables("output")
         self._references = [part.ports[name].reference for name in self.outputs]
         interface = part.description.coSimulation
@@ -65,13 +64,7 @@ class Instance:
 
     def _instantiate(self, interface: Any) -> None:
         self._interpolates = bool(interface.canInterpolateInputs)
-        self._callbacks = fmi2CallbackFunctions()
-        self._callbacks.logger = fmi2CallbackLoggerTYPE(self._log)
-        addLoggerProxy(byref(self._callbacks))
-        self._fmu.instantiate(callbacks=self._callbacks, loggingOn=True)
-
-    def _log(self, *arguments: Any) -> None:
-        self.messages.append(arguments[-1].decode("utf-8", errors="replace"))
+        self._fmu.instantiate(callbacks=self.messages.callbacks(), loggingOn=True)
 
     def start_initialisation(self) -> None:
         """Set the start values and enter initialisation mode."""
@@ -159,7 +152,7 @@ class Instance3(Instance):
         self._begins, self._lines = 0.0, False
         self._references_set: list[int] = []
         update = self._update if interface.providesIntermediateUpdate else None
-        self._fmu.instantiate(loggingOn=True, logMessage=self._log, intermediateUpdate=update)
+        self._fmu.instantiate(loggingOn=True, logMessage=self.messages.receive, intermediateUpdate=update)
 
     def _update(self, environment: Any, time: float, setting: bool, *_: Any) -> None:
         if setting and self._lines:

@@ -264,3 +264,62 @@ def test_module_body_has_no_side_effects(fmu: Path, model: Model, tmp_path: Path
     assert outputs["crank.speed"] == pytest.approx(
         {"five_bar": 43.982297150257104, "slider_crank": 5.235987755983}[model.plant]
     )
+
+
+def mix_loggers(fmus: list[str], root: str) -> list[Any]:
+    """Errors of two instances of ours at a time, then, after both are gone, of one of FMPy with its own logger."""
+    import gc
+    import sys
+
+    sys.path.insert(0, root)
+    from fmpy import extract, instantiate_fmu, read_model_description
+
+    from analysis.run import FmuRun
+    from linkwork.five_bar import MECHANISM
+
+    entry = MECHANISM.published["table-3.1"]
+    found = []
+    modes = {"drive.mode": 1}
+    inputs = dict.fromkeys(MECHANISM.input_names, 0.0)
+    for fmu in fmus:
+        initial = entry.initial
+        given = {
+            "modes": modes,
+            "tolerance": 1e-9,
+            "start_time": 0.0,
+            "inputs": inputs | {"drive.speed": entry.crank_speed},
+        }
+        with (
+            FmuRun(fmu, entry.parameters, initial, **given) as one,
+            FmuRun(fmu, entry.parameters, initial, **given) as two,
+        ):
+            for run, step in ((one, -1.0), (two, -2.0)):
+                run.step(0.0, step)
+            found.append([run.messages for run in (one, two)])
+    gc.collect()
+    for fmu in fmus:
+        description = read_model_description(fmu)
+        slave = instantiate_fmu(extract(fmu), description, "CoSimulation")
+        slave.setupExperiment()
+        slave.enterInitializationMode()
+        slave.exitInitializationMode()
+        try:
+            slave.doStep(0.0, -3.0)
+        except Exception as error:
+            found.append(str(error))
+        slave.freeInstance()
+    return found
+
+
+def test_each_instance_has_its_own_log_and_none_calls_one_that_is_gone(
+    fmus: dict[str, Path], natives: dict[str, Path]
+) -> None:
+    paths = [str(fmus["FiveBarSlider"]), str(natives["FiveBarSlider-native"])]
+    root = Path(build_fmu.__file__).resolve().parent
+    *ours, python, native = run_in_process(mix_loggers, paths, root, options=())
+    for one, two in ours:
+        assert [len(one), len(two)] == [1, 1]
+        assert "-1" in one[0]
+        assert "-2" in two[0]
+    assert "fmi2DoStep" in python
+    assert "fmi2DoStep" in native
