@@ -112,9 +112,9 @@ def time_with_host(host: Path, fmu: Path, folder: Path) -> float:
     """Measure the time (s) of a step from the host in C, with inputs set and outputs read."""
     unpacked = unpack(fmu, folder / fmu.stem)
     inputs = {s.name: float(s.attributes["start"]) for s in unpacked.reals("input")}
-    native = (unpacked.folder / "sources").is_dir()
-    # PythonFMU's library expects Python's library in the process
-    preload = {} if native else {"LD_PRELOAD": str(sysconfig.get_config_var("INSTSONAME"))}
+    python = (unpacked.folder / "resources" / "slavemodule.txt").is_file()
+    # PythonFMU's library without our guard expects Python's library in the process
+    preload = {"LD_PRELOAD": str(sysconfig.get_config_var("INSTSONAME"))} if python else {}
 
     def measure() -> float:
         run = run_host(host, unpacked, {}, inputs=inputs, steps=STEPS, step=STEP, environment=preload)

@@ -78,6 +78,15 @@ int DllMain(void *module, uint32_t reason, void *process_ends) {
 #include <string.h>
 #include <unistd.h>
 
+/* Load Python's library, the newest that the system finds, into a host that has none. */
+static void load_python(void) {
+    char name[] = "libpython3.00.so.1.0";
+    for (int minor = 29; minor >= 10 && !dlsym(RTLD_DEFAULT, "Py_IsInitialized"); minor--) {
+        name[11] = (char)('0' + minor / 10), name[12] = (char)('0' + minor % 10);
+        dlopen(name, RTLD_NOW | RTLD_GLOBAL);
+    }
+}
+
 static void *load_next(void) {
     static const char name[] = "libpythonfmu-export.so";
     Dl_info own;
@@ -88,6 +97,7 @@ static void *load_next(void) {
     if (!path) return NULL;
     memcpy(path, own.dli_fname, folder);
     memcpy(path + folder, name, sizeof name);
+    load_python();
     void *handle = dlopen(path, RTLD_NOW | RTLD_LOCAL);
     free(path);
     return handle;
@@ -120,12 +130,12 @@ static void shorten(char *path, size_t size) {
     DO(SetDebugLogging)                                                                                                        \
     DO(Instantiate)                                                                                                            \
     DO(FreeInstance)                                                                                                           \
-    DO(SetupExperiment) DO(EnterInitializationMode) DO(ExitInitializationMode) DO(Terminate) DO(Reset) DO(GetReal)             \
-        DO(GetInteger) DO(GetBoolean) DO(GetString) DO(SetReal) DO(SetInteger) DO(SetBoolean) DO(SetString) DO(GetFMUstate)    \
-            DO(SetFMUstate) DO(FreeFMUstate) DO(SerializedFMUstateSize) DO(SerializeFMUstate) DO(DeSerializeFMUstate)          \
-                DO(GetDirectionalDerivative) DO(SetRealInputDerivatives) DO(GetRealOutputDerivatives) DO(DoStep)               \
-                    DO(CancelStep) DO(GetStatus) DO(GetRealStatus) DO(GetIntegerStatus) DO(GetBooleanStatus)                   \
-                        DO(GetStringStatus)
+    DO(SetupExperiment)                                                                                                        \
+    DO(EnterInitializationMode) DO(ExitInitializationMode) DO(Terminate) DO(Reset) DO(GetReal) DO(GetInteger) DO(GetBoolean)   \
+        DO(GetString) DO(SetReal) DO(SetInteger) DO(SetBoolean) DO(SetString) DO(GetFMUstate) DO(SetFMUstate) DO(FreeFMUstate) \
+            DO(SerializedFMUstateSize) DO(SerializeFMUstate) DO(DeSerializeFMUstate) DO(GetDirectionalDerivative)              \
+                DO(SetRealInputDerivatives) DO(GetRealOutputDerivatives) DO(DoStep) DO(CancelStep) DO(GetStatus)               \
+                    DO(GetRealStatus) DO(GetIntegerStatus) DO(GetBooleanStatus) DO(GetStringStatus)
 
 #define DECLARE(name) fmi2##name##TYPE *name;
 static struct {
@@ -272,7 +282,8 @@ fmi2Component fmi2Instantiate(fmi2String name, fmi2Type type, fmi2String guid, f
     else if (!resources || !read_uri(resources, c->resources, LONGEST_PATH))
         wrong = "the location of the resources is missing, too long, or not in UTF-8";
     else if (!load())
-        wrong = "PythonFMU's library cannot be loaded from the folder of this one: it needs the symbols of a running Python";
+        wrong =
+            "PythonFMU's library beside this one cannot be loaded: it needs Python's library, and on Linux glibc 2.32 or newer";
     if (!wrong) {
         shorten(c->resources, LONGEST_PATH);
         if (!holds_slave(c->resources)) wrong = "the resources of the FMU cannot be read where the master says they are";

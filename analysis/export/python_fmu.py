@@ -35,8 +35,8 @@ from .guard import add_guard
 OLDEST = (3, 10)
 
 _NEEDS_PYTHON = (
-    f"The importing process needs a Python {OLDEST[0]}.{OLDEST[1]} or newer whose symbols it exports. A master that is not "
-    "itself Python must preload the Python library (on Linux: LD_PRELOAD=libpython3.x.so)."
+    f"It needs a Python {OLDEST[0]}.{OLDEST[1]} or newer. A master that is not itself Python must find Python's library: on "
+    "Linux libpython3.x.so.1.0 where the system looks for libraries, on Windows python3.dll on the path."
 )
 
 

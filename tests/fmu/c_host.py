@@ -36,15 +36,15 @@ def compile_host(folder: Path, platform: str | None = None) -> Path:
     return folder / name
 
 
-def libpython() -> str:
-    """Name of Python's own library, which a master in C has to load before the Python FMU; a test that needs it is skipped
+def python_path() -> dict[str, str]:
+    """The environment in which a master in C finds this Python's library for the Python FMU; a test that needs it is skipped
     where there is none."""
     name = sysconfig.get_config_var("INSTSONAME") or ""
     try:
         ctypes.CDLL(name or "libpython3.so")
     except OSError:
         pytest.skip(f"there is no library {name} of this Python for a master in C to load")
-    return name
+    return {"LD_LIBRARY_PATH": str(sysconfig.get_config_var("LIBDIR"))}
 
 
 def emulator(platform: str) -> list[str]:

@@ -19,7 +19,7 @@ from typing import Any, NamedTuple
 import pytest
 
 from . import masters
-from .c_host import compile_host, libpython, run_host, unpack
+from .c_host import compile_host, python_path, run_host, unpack
 from .models import Model
 from .runner import run_in_process
 from .test_description import ROWS
@@ -193,10 +193,10 @@ def run(
         if row.master != "host":
             by = getattr(masters, f"by_{row.master}")
             return run_in_process(by, fmu, list(case[:4]), OUTPUTS[model.name], row.interface)
-        preload = {"LD_PRELOAD": libpython()} if row.kind == "python" else {}
+        there = python_path() if row.kind == "python" else {}
         interface = "me" if row.interface == STATES else "cs"
         start, change = case.reals | case.integers, (case.changed, case.later, 50)
-        found = run_host(host, unpack(fmu, tmp_path), start, change=change, interface=interface, environment=preload)
+        found = run_host(host, unpack(fmu, tmp_path), start, change=change, interface=interface, environment=there)
         assert found["python"] is (row.kind == "python"), "Python is in the process of the master in C"
         return found | {"said": [found["logged"]]}
 
