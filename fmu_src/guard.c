@@ -4,9 +4,12 @@
    On Windows it needs no C library, whose compilation would take a minute. */
 
 #define _GNU_SOURCE /* dladdr */
+#include <stdatomic.h>
 #include <stdbool.h>
 
 #include "fmi2Functions.h"
+
+enum { LONGEST_PATH = 4096 };
 
 #ifdef _WIN32
 
@@ -21,29 +24,16 @@ WINDOWS(void *) GetProcAddress(void *, const char *);
 WINDOWS(void *) GetProcessHeap(void);
 WINDOWS(void *) HeapAlloc(void *, uint32_t, size_t);
 WINDOWS(int) HeapFree(void *, uint32_t, void *);
-WINDOWS(uint32_t) GetFileAttributesA(const char *);
+WINDOWS(void *) CreateFileA(const char *, uint32_t, uint32_t, void *, uint32_t, uint32_t, void *);
+WINDOWS(int) ReadFile(void *, void *, uint32_t, uint32_t *, void *);
+WINDOWS(int) CloseHandle(void *);
 WINDOWS(uint32_t) GetShortPathNameW(const wchar_t *, wchar_t *, uint32_t);
 WINDOWS(int) MultiByteToWideChar(uint32_t, uint32_t, const char *, int, wchar_t *, int);
 WINDOWS(int) WideCharToMultiByte(uint32_t, uint32_t, const wchar_t *, int, char *, int, const char *, int *);
 
-enum { ADDRESS_OF_SAME_COUNT = 6, ZEROED = 8, UTF8 = 65001, LONGEST = 4096 };
+enum { ADDRESS_OF_SAME_COUNT = 6, ZEROED = 8, UTF8 = 65001, SHARE = 1, EXISTING = 3 };
+#define READ 0x80000000u
 static void *library;
-
-/* Load PythonFMU's library from the folder of this one. */
-static void *load_next(void) {
-    static wchar_t path[LONGEST];
-    static const wchar_t name[] = L"pythonfmu-export.dll";
-    void *own;
-    if (!GetModuleHandleExW(ADDRESS_OF_SAME_COUNT, (const void *)&load_next, &own)) return NULL;
-    uint32_t end = GetModuleFileNameW(own, path, LONGEST - sizeof name / sizeof *name);
-    while (end && path[end - 1] != L'\\' && path[end - 1] != L'/') end--;
-    for (size_t i = 0; i < sizeof name / sizeof *name; i++) path[end + i] = name[i];
-    return library = LoadLibraryW(path);
-}
-
-static void *find(void *handle, const char *name) {
-    return GetProcAddress(handle, name);
-}
 
 static void *allocate(size_t size) {
     return HeapAlloc(GetProcessHeap(), ZEROED, size);
@@ -53,15 +43,45 @@ static void release(void *block) {
     HeapFree(GetProcessHeap(), 0, block);
 }
 
-static bool exists(const char *path) {
-    return GetFileAttributesA(path) != UINT32_MAX;
+/* Load PythonFMU's library from the folder of this one. */
+static void *load_next(void) {
+    static const wchar_t name[] = L"pythonfmu-export.dll";
+    wchar_t *path = allocate(LONGEST_PATH * sizeof *path);
+    void *own;
+    if (!path || !GetModuleHandleExW(ADDRESS_OF_SAME_COUNT, (const void *)&load_next, &own)) return NULL;
+    uint32_t end = GetModuleFileNameW(own, path, LONGEST_PATH - sizeof name / sizeof *name);
+    while (end && path[end - 1] != L'\\' && path[end - 1] != L'/') end--;
+    for (size_t i = 0; i < sizeof name / sizeof *name; i++) path[end + i] = name[i];
+    library = LoadLibraryW(path);
+    release(path);
+    return library;
+}
+
+static void *find(void *handle, const char *name) {
+    return GetProcAddress(handle, name);
+}
+
+static void end_with_process(void *handle) {
+    (void)handle;
+}
+
+/* Read the first bytes of a file; return their number, or -1. */
+static int read_file(const char *path, char *text, int size) {
+    void *file = CreateFileA(path, READ, SHARE, NULL, EXISTING, 0, NULL);
+    uint32_t count = 0;
+    if (file == (void *)-1) return -1;
+    int good = ReadFile(file, text, (uint32_t)size, &count, NULL);
+    CloseHandle(file);
+    return good ? (int)count : -1;
 }
 
 /* PythonFMU reads paths of ASCII alone: put the short name of a folder, if the disk has one, in place of the path. */
-static void shorten(char *path, size_t size) {
-    static wchar_t wide[LONGEST];
-    if (MultiByteToWideChar(UTF8, 0, path, -1, wide, LONGEST) && GetShortPathNameW(wide, wide, LONGEST))
-        WideCharToMultiByte(UTF8, 0, wide, -1, path, (int)size, NULL, NULL);
+static void shorten(char *path) {
+    wchar_t *wide = allocate(LONGEST_PATH * sizeof *wide);
+    if (!wide) return;
+    if (MultiByteToWideChar(UTF8, 0, path, -1, wide, LONGEST_PATH) && GetShortPathNameW(wide, wide, LONGEST_PATH))
+        WideCharToMultiByte(UTF8, 0, wide, -1, path, LONGEST_PATH, NULL, NULL);
+    release(wide);
 }
 
 /* Let PythonFMU's library go with this one, whose files the master may delete; not where the process ends. */
@@ -74,37 +94,17 @@ int DllMain(void *module, uint32_t reason, void *process_ends) {
 #else
 
 #include <dlfcn.h>
+#include <fcntl.h>
 #include <stdlib.h>
 #include <string.h>
 #include <unistd.h>
 
-/* Load Python's library, the newest that the system finds, into a host that has none. */
-static void load_python(void) {
-    char name[] = "libpython3.00.so.1.0";
-    for (int minor = 29; minor >= 10 && !dlsym(RTLD_DEFAULT, "Py_IsInitialized"); minor--) {
-        name[11] = (char)('0' + minor / 10), name[12] = (char)('0' + minor % 10);
-        dlopen(name, RTLD_NOW | RTLD_GLOBAL);
-    }
-}
+static char folder[LONGEST_PATH]; /* of this library, with the slash; empty if it is not known */
 
-static void *load_next(void) {
-    static const char name[] = "libpythonfmu-export.so";
+/* Find the folder while the library is loaded: later a relative path may mean another one. */
+__attribute__((constructor)) static void find_folder(void) {
     Dl_info own;
-    if (!dladdr((void *)&load_next, &own)) return NULL;
-    const char *end = strrchr(own.dli_fname, '/');
-    size_t folder = end ? (size_t)(end + 1 - own.dli_fname) : 0;
-    char *path = malloc(folder + sizeof name);
-    if (!path) return NULL;
-    memcpy(path, own.dli_fname, folder);
-    memcpy(path + folder, name, sizeof name);
-    load_python();
-    void *handle = dlopen(path, RTLD_NOW | RTLD_LOCAL);
-    free(path);
-    return handle;
-}
-
-static void *find(void *handle, const char *name) {
-    return dlsym(handle, name);
+    if (dladdr((void *)&find_folder, &own) && realpath(own.dli_fname, folder)) *(strrchr(folder, '/') + 1) = 0;
 }
 
 static void *allocate(size_t size) {
@@ -115,67 +115,121 @@ static void release(void *block) {
     free(block);
 }
 
-static bool exists(const char *path) {
-    return access(path, R_OK) == 0;
+/* Give PythonFMU the symbols of Python: of that which the host has loaded, else of the newest that the system finds. */
+static void load_python(void) {
+    char name[] = "libpython3.00.so.1.0";
+    for (int way = 0; way < 2; way++)
+        for (int minor = 29; minor >= 10 && !dlsym(RTLD_DEFAULT, "Py_IsInitialized"); minor--) {
+            name[11] = (char)('0' + minor / 10), name[12] = (char)('0' + minor % 10);
+            dlopen(name, RTLD_NOW | RTLD_GLOBAL | (way ? 0 : RTLD_NOLOAD));
+        }
 }
 
-static void shorten(char *path, size_t size) {
-    (void)path, (void)size;
+static void *load_next(void) {
+    static const char name[] = "libpythonfmu-export.so";
+    char *path = allocate(strlen(folder) + sizeof name);
+    if (!path) return NULL;
+    load_python();
+    void *handle = dlopen(strcat(strcpy(path, folder), name), RTLD_NOW | RTLD_LOCAL);
+    release(path);
+    return handle;
+}
+
+static void *find(void *handle, const char *name) {
+    return dlsym(handle, name);
+}
+
+/* Let PythonFMU's library end Python before its own destructors run: these would use a pointer that they have destroyed. */
+static void end_with_process(void *handle) {
+    extern int __cxa_atexit(void (*)(void *), void *, void *);
+    void (*end)(void *) = (void (*)(void *))find(handle, "finalizePythonInterpreter");
+    if (end) __cxa_atexit(end, NULL, NULL);
+}
+
+static int read_file(const char *path, char *text, int size) {
+    int file = open(path, O_RDONLY | O_CLOEXEC);
+    if (file < 0) return -1;
+    ssize_t count = read(file, text, (size_t)size);
+    close(file);
+    return (int)count;
+}
+
+static void shorten(char *path) {
+    (void)path;
 }
 
 #endif
 
 /* PythonFMU's functions */
 #define EACH(DO)                                                                                                               \
-    DO(SetDebugLogging)                                                                                                        \
     DO(Instantiate)                                                                                                            \
-    DO(FreeInstance)                                                                                                           \
-    DO(SetupExperiment)                                                                                                        \
-    DO(EnterInitializationMode) DO(ExitInitializationMode) DO(Terminate) DO(Reset) DO(GetReal) DO(GetInteger) DO(GetBoolean)   \
-        DO(GetString) DO(SetReal) DO(SetInteger) DO(SetBoolean) DO(SetString) DO(GetFMUstate) DO(SetFMUstate) DO(FreeFMUstate) \
-            DO(SerializedFMUstateSize) DO(SerializeFMUstate) DO(DeSerializeFMUstate) DO(GetDirectionalDerivative)              \
-                DO(SetRealInputDerivatives) DO(GetRealOutputDerivatives) DO(DoStep) DO(CancelStep) DO(GetStatus)               \
-                    DO(GetRealStatus) DO(GetIntegerStatus) DO(GetBooleanStatus) DO(GetStringStatus)
+    DO(FreeInstance) DO(SetupExperiment) DO(EnterInitializationMode) DO(ExitInitializationMode) DO(Terminate) DO(Reset)        \
+        DO(GetReal) DO(GetInteger) DO(GetBoolean) DO(GetString) DO(SetReal) DO(SetInteger) DO(SetBoolean) DO(SetString)        \
+            DO(GetFMUstate) DO(SetFMUstate) DO(FreeFMUstate) DO(SerializedFMUstateSize) DO(SerializeFMUstate)                  \
+                DO(DeSerializeFMUstate) DO(GetDirectionalDerivative) DO(SetRealInputDerivatives) DO(GetRealOutputDerivatives)  \
+                    DO(DoStep) DO(CancelStep) DO(GetStatus) DO(GetRealStatus) DO(GetIntegerStatus) DO(GetBooleanStatus)        \
+                        DO(GetStringStatus)
 
 #define DECLARE(name) fmi2##name##TYPE *name;
 static struct {
     EACH(DECLARE)
 } next;
 
-static bool load(void) {
-    void *handle = load_next();
+static bool find_all(void *handle) {
     if (!handle) return false;
-#define LOAD(name)                                                                                                             \
+#define FIND(name)                                                                                                             \
     next.name = (fmi2##name##TYPE *)find(handle, "fmi2" #name);                                                                \
     if (!next.name) return false;
-    EACH(LOAD)
+    EACH(FIND)
+    end_with_process(handle);
     return true;
+}
+
+/* Load PythonFMU's library once, whichever thread comes first. */
+static bool load(void) {
+    static atomic_flag busy = ATOMIC_FLAG_INIT;
+    static bool loaded;
+    while (atomic_flag_test_and_set(&busy)) continue;
+    loaded = loaded || find_all(load_next());
+    bool found = loaded;
+    atomic_flag_clear(&busy);
+    return found;
 }
 
 /* Life and log */
 
-enum { LONGEST_PATH = 4096, LONGEST_NAME = 256 };
-
 typedef struct {
     fmi2Component slave;
-    const fmi2CallbackFunctions *master;
-    fmi2CallbackFunctions own;
-    bool logging, said; /* whether the slave has logged what is wrong, in the present call */
-    char name[LONGEST_NAME], resources[LONGEST_PATH];
+    fmi2CallbackFunctions master, own;
+    bool logging, said; /* said: the slave has logged what is wrong, in the present call */
+    char *name, resources[LONGEST_PATH];
 } Guard;
 
-/* Hand a message on: errors always, others if logging is on; as text, which is no format. PythonFMU's own message on an exception
-   is left out where the slave has said in a sentence what is wrong. */
+static bool same(const char *a, const char *b) {
+    while (*a && *a == *b) a++, b++;
+    return *a == *b;
+}
+
+static char *copy(const char *text) {
+    size_t n = 0;
+    while (text[n]) n++;
+    char *found = allocate(n + 1);
+    for (size_t i = 0; found && i < n; i++) found[i] = text[i];
+    return found;
+}
+
+/* Hand a message on: errors always, others if logging is on; as text, which is no format. PythonFMU's own message on an
+   exception is left out where the slave has said in a sentence what is wrong. */
 static void log_message(fmi2ComponentEnvironment environment, fmi2String name, fmi2Status status, fmi2String category,
                         fmi2String message, ...) {
     static const char *const categories[] = {NULL, "logStatusWarning", "logStatusDiscard", "logStatusError"};
     Guard *c = environment;
     (void)name;
-    if (!c->master->logger || (status == fmi2OK && !c->logging) || (status == fmi2Fatal && c->said)) return;
+    if (!c->master.logger || (status == fmi2OK && !c->logging) || (status == fmi2Fatal && c->said)) return;
     if (status == fmi2Fatal) status = fmi2Error;
     c->said |= status == fmi2Error;
-    c->master->logger(c->master->componentEnvironment, c->name, status,
-                      category || status > fmi2Error ? category : categories[status], "%s", message);
+    if (!category && status <= fmi2Error) category = categories[status];
+    c->master.logger(c->master.componentEnvironment, c->name, status, category, "%s", message);
 }
 
 /* Begin a call of PythonFMU: its component. */
@@ -213,45 +267,51 @@ static int hex(char digit) {
                                           : -1;
 }
 
+static bool starts(const char *text, const char *lower) {
+    for (; *lower; text++, lower++)
+        if ((*text >= 'A' && *text <= 'Z' ? *text - 'A' + 'a' : *text) != *lower) return false;
+    return true;
+}
+
 /* Write the path that a URI means (RFC 8089) to `path`; anything else than a URI of a file is taken for a path. */
-static bool read_uri(const char *uri, char *path, size_t size) {
-    static const char scheme[] = "file:", host[] = "//localhost/";
-    size_t i = 0, n = 0;
-    while (scheme[i] && uri[i] == scheme[i]) i++;
-    bool is_uri = !scheme[i];
-    const char *from = is_uri ? uri + i : uri;
-    if (is_uri) {
-        for (i = 0; host[i] && from[i] == host[i];) i++;
-        if (!host[i])
-            from += i - 1; /* file://localhost/path */
-        else if (from[0] == '/' && from[1] == '/' && from[2] == '/')
-            from += 2; /* file:///path */
+static bool read_uri(const char *uri, char *path) {
+    bool is_uri = starts(uri, "file:");
+    const char *from = is_uri ? uri + 5 : uri;
+    size_t n = 0;
+    if (is_uri && starts(from, "//localhost/"))
+        from += 11;
+    else if (is_uri && starts(from, "///"))
+        from += 2;
 #ifdef _WIN32
-        if (from[0] == '/' && from[1] && from[2] == ':') from++; /* /C:/path */
+    if (is_uri && from[0] == '/' && from[1] && from[2] == ':') from++; /* /C:/path */
 #endif
-    }
     for (; *from; from++) {
-        if (n + 1 >= size) return false;
         bool coded = is_uri && *from == '%' && hex(from[1]) >= 0 && hex(from[2]) >= 0;
-        path[n++] = coded ? (char)(16 * hex(from[1]) + hex(from[2])) : *from;
+        path[n] = coded ? (char)(16 * hex(from[1]) + hex(from[2])) : *from;
         if (coded) from += 2;
+        if (!path[n] || ++n == LONGEST_PATH) return false;
     }
     path[n] = 0;
     return is_utf8(path);
 }
 
-/* Whether PythonFMU will find the slave in the folder; it takes "%20" for a space. */
-static bool holds_slave(const char *resources) {
-    static const char file[] = "/slavemodule.txt";
-    static char path[LONGEST_PATH + sizeof file];
+/* Return what is wrong with the folder, as PythonFMU will read its name: it takes "%20" for a space. */
+static const char *check_resources(const char *resources, const char *guid) {
+    static const char file[] = "/guid.txt";
+    char *path = allocate(LONGEST_PATH + sizeof file), found[256];
     size_t n = 0;
+    if (!path) return "there is no memory";
     for (const char *s = resources; *s; s++) {
         bool space = s[0] == '%' && s[1] == '2' && s[2] == '0';
         path[n++] = space ? ' ' : *s;
         if (space) s += 2;
     }
     for (size_t i = 0; i < sizeof file; i++) path[n + i] = file[i];
-    return exists(path);
+    int count = read_file(path, found, sizeof found - 1);
+    release(path);
+    if (count < 0) return "the resources of the FMU cannot be read where the master says they are";
+    found[count] = 0;
+    return same(found, guid) ? NULL : "the GUID is not that of this FMU";
 }
 
 const char *fmi2GetTypesPlatform(void) {
@@ -262,37 +322,36 @@ const char *fmi2GetVersion(void) {
     return fmi2Version;
 }
 
+static const char *check_start(Guard *c, fmi2String name, fmi2Type type, fmi2String guid, fmi2String resources) {
+    if (!name || !is_utf8(name)) return "an instance must have a name, in UTF-8";
+    if (type != fmi2CoSimulation) return "the Python FMU is for co-simulation alone";
+    if (!guid) return "the GUID is missing";
+    if (!resources || !read_uri(resources, c->resources))
+        return "the location of the resources is missing, too long, or not in UTF-8";
+    shorten(c->resources);
+    const char *wrong = check_resources(c->resources, guid);
+    if (wrong) return wrong;
+    return load() ? NULL
+                  : "PythonFMU's library beside this one cannot be loaded: it needs Python's library, and on Linux glibc "
+                    "2.32 or newer";
+}
+
 fmi2Component fmi2Instantiate(fmi2String name, fmi2Type type, fmi2String guid, fmi2String resources,
                               const fmi2CallbackFunctions *functions, fmi2Boolean visible, fmi2Boolean logging) {
     Guard *c = functions ? allocate(sizeof *c) : NULL;
     if (!c) return NULL;
-    c->master = functions;
-    c->own = *functions;
+    c->master = c->own = *functions;
     c->own.logger = log_message;
     c->own.componentEnvironment = c;
     c->logging = logging;
-    for (size_t i = 0; name && name[i] && i + 1 < LONGEST_NAME; i++) c->name[i] = name[i];
-    const char *wrong = NULL;
-    if (!name || !is_utf8(name))
-        wrong = "an instance must have a name, in UTF-8";
-    else if (type != fmi2CoSimulation)
-        wrong = "the Python FMU is for co-simulation alone";
-    else if (!guid)
-        wrong = "the GUID is missing";
-    else if (!resources || !read_uri(resources, c->resources, LONGEST_PATH))
-        wrong = "the location of the resources is missing, too long, or not in UTF-8";
-    else if (!load())
-        wrong =
-            "PythonFMU's library beside this one cannot be loaded: it needs Python's library, and on Linux glibc 2.32 or newer";
-    if (!wrong) {
-        shorten(c->resources, LONGEST_PATH);
-        if (!holds_slave(c->resources)) wrong = "the resources of the FMU cannot be read where the master says they are";
-    }
+    c->name = copy(name ? name : "");
+    const char *wrong = c->name ? check_start(c, name, type, guid, resources) : "there is no memory";
     if (wrong)
         refuse(c, wrong);
     else
         c->slave = next.Instantiate(name, type, guid, c->resources, &c->own, visible, fmi2True);
     if (c->slave) return c;
+    release(c->name);
     release(c);
     return NULL;
 }
@@ -301,16 +360,21 @@ void fmi2FreeInstance(fmi2Component component) {
     Guard *c = component;
     if (!c) return;
     next.FreeInstance(c->slave);
+    release(c->name);
     release(c);
 }
 
 fmi2Status fmi2SetDebugLogging(fmi2Component component, fmi2Boolean on, size_t n, const fmi2String categories[]) {
+    static const char *const known[] = {"logAll", "logStatusWarning", "logStatusDiscard", "logStatusError", "logStatusFatal"};
     Guard *c = component;
     if (!c || (n && !categories)) return refuse(c, "fmi2SetDebugLogging: a null pointer");
-    for (size_t i = 0; i < n; i++)
-        if (!categories[i]) return refuse(c, "fmi2SetDebugLogging: a null pointer");
+    for (size_t i = 0; i < n; i++) {
+        bool found = false;
+        for (size_t k = 0; categories[i] && k < sizeof known / sizeof *known; k++) found |= same(categories[i], known[k]);
+        if (!found) return refuse(c, "fmi2SetDebugLogging: a category that the FMU does not have");
+    }
     c->logging = on;
-    return mild(next.SetDebugLogging(begin(c), fmi2True, on ? n : 0, categories));
+    return fmi2OK;
 }
 
 /* Calls handed on as they are, if no pointer is null */
@@ -362,8 +426,16 @@ fmi2Status fmi2GetFMUstate(fmi2Component component, fmi2FMUstate *state) {
 
 CALL(SetFMUstate, (fmi2Component component, fmi2FMUstate state), state, state)
 CALL(SerializedFMUstateSize, (fmi2Component component, fmi2FMUstate state, size_t *size), state &&size, state, size)
-CALL(SerializeFMUstate, (fmi2Component component, fmi2FMUstate state, fmi2Byte bytes[], size_t size), state &&bytes, state,
-     bytes, size)
+
+fmi2Status fmi2SerializeFMUstate(fmi2Component component, fmi2FMUstate state, fmi2Byte bytes[], size_t size) {
+    Guard *c = component;
+    size_t right = 0;
+    if (!c || !state || !bytes) return refuse(c, "fmi2SerializeFMUstate: a null pointer");
+    if (next.SerializedFMUstateSize(begin(c), state, &right) > fmi2Warning || right != size)
+        return refuse(c, "fmi2SerializeFMUstate: the size is not that of the state");
+    return mild(next.SerializeFMUstate(begin(c), state, bytes, size));
+}
+
 CALL(DeSerializeFMUstate, (fmi2Component component, const fmi2Byte bytes[], size_t size, fmi2FMUstate *state), bytes &&state,
      bytes, size, state)
 

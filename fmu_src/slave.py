@@ -35,7 +35,6 @@ from linkwork.wrapper import (
     RUNNING,
     TERMINATED,
     end_in_order,
-    end_library_in_order,
     keep_namespace,
     outlive_exception,
 )
@@ -98,7 +97,6 @@ class LinkworkSlave(Fmi2Slave):
         super().__init__(**kwargs)
         self._wrapped = "logger" in kwargs
         if self._wrapped:
-            end_library_in_order(self.resources)
             # put there by the wrapper at each instantiation; everything is imported by now
             if self.resources in sys.path:
                 sys.path.remove(self.resources)

@@ -22,7 +22,6 @@ from linkwork.wrapper import (
     RUNNING,
     TERMINATED,
     end_in_order,
-    end_library_in_order,
     keep_namespace,
     outlive_exception,
 )
@@ -92,7 +91,6 @@ class Controller(Fmi2Slave):  # type: ignore[misc]
         super().__init__(**keywords)
         self._wrapped = "logger" in keywords
         if self._wrapped:
-            end_library_in_order(self.resources)
             outlive_exception(self)
         self.description = (type(self).__doc__ or "").strip().partition("\n")[0]
         self.count = 0

@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from functools import cache
 from importlib import resources
 from pathlib import Path
+from xml.etree import ElementTree
 
 from .native_fmu import HEADERS, OPTIONS, PLATFORMS, compile_library
 
@@ -23,7 +24,9 @@ _OPTIONS = {
 
 
 def add_guard(entries: Mapping[str, bytes], model: str, source: bytes) -> dict[str, bytes]:
-    """Give PythonFMU's libraries in the files of an FMU their own names, and their places to the guard; add its source.
+    """Give PythonFMU's libraries in the files of an FMU their own names, and their places to the guard.
+
+    The source of the guard is added, and the GUID, which the guard compares with the master's.
 
     Parameters
     ----------
@@ -39,7 +42,8 @@ def add_guard(entries: Mapping[str, bytes], model: str, source: bytes) -> dict[s
     BuildError
         If the source does not compile.
     """
-    found = {**entries, SOURCE: source}
+    guid = ElementTree.fromstring(entries["modelDescription.xml"]).attrib["guid"]
+    found = {**entries, SOURCE: source, "resources/guid.txt": guid.encode()}
     for folder, library in compile_guard(source).items():
         place = f"binaries/{folder}/{model}.{PYTHONFMU[folder].rpartition('.')[2]}"
         found[f"binaries/{folder}/{PYTHONFMU[folder]}"] = found.pop(place)

@@ -76,8 +76,8 @@ def build(mechanism: Mechanism, dest: Path | str = "build", sources: Path | str 
                 raw = _run_builder(staged.script, [staged.package, staged.slave])
             except Exception as error:  # the sources run here, and may raise anything
                 raise BuildError(f"{name}.fmu cannot be built from {sources}: {error!r}") from error
+    raw["modelDescription.xml"] = described
     entries = add_guard(raw, name, (sources / "guard.c").read_bytes())
-    entries["modelDescription.xml"] = described
     made = f"FMI 2.0 co-simulation, made with {PYTHON.tool}"
     entries |= documentation(mechanism, mechanism.variables, mechanism.title, made, (_NEEDS_PYTHON,))
     entries |= experiments(mechanism)

@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import atexit
 import ctypes
 import sys
-from pathlib import Path
 from typing import Any
 
 #: The states of a run. FMI 2.0.4, 4.2.4, says which calls are allowed in each; the wrapper does not check this.
@@ -15,25 +13,6 @@ INSTANTIATED, INITIALISING, RUNNING, TERMINATED = PHASES = (
     "running",
     "terminated",
 )
-
-#: Libraries of FMUs that `end_library_in_order` has handled.
-_libraries: set[Path] = set()
-
-
-def end_library_in_order(resources: str) -> None:
-    """Make the wrapper's library release the interpreter when Python ends, not while the process is torn down.
-
-    ``resources`` is the FMU's folder of resources. On Linux the library clears its pointer to
-    the interpreter's state in a destructor that runs after the pointer itself was destroyed: a use after free, which sometimes
-    aborts a process after a good run. If the pointer is cleared earlier, nothing happens.
-    """
-    library = Path(resources).parent / "binaries" / "linux64" / "libpythonfmu-export.so"
-    if not sys.platform.startswith("linux") or library in _libraries or not library.is_file():
-        return
-    _libraries.add(library)
-    finalize = getattr(ctypes.CDLL(str(library)), "finalizePythonInterpreter", None)
-    if finalize is not None:
-        atexit.register(finalize)
 
 
 def keep_namespace(kind: type) -> None:

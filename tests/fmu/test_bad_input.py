@@ -520,31 +520,3 @@ def test_percent_signs_come_through_the_printf_of_the_master(
     assert status == 2
     assert message == f"a step of 0 s at t = 0 s: {sentence}"
     assert log == [[2, "logStatusDiscard", message]]
-
-
-def end_in_order(fmu: str, folder: str) -> int:
-    """How many calls at the end of Python many instances ask for together; the FMU is good after they were made."""
-    import atexit
-    import logging
-
-    from bare_master import Fmu
-
-    logging.getLogger()  # imported by the wrapper's package as well, and itself in need of an end
-    before = atexit._ncallbacks()
-    fmu = Fmu(fmu, folder)
-    for _ in range(5):
-        instance = fmu.instantiate().start()
-        instance.free()
-    asked = atexit._ncallbacks() - before
-    atexit._run_exitfuncs()
-    instance = fmu.instantiate().start()
-    instance.run([1e-3] * 5)
-    instance.free()
-    return asked
-
-
-@pytest.mark.skipif(
-    not sys.platform.startswith("linux"), reason="the wrapper's fault is in its library for Linux alone"
-)
-def test_library_lets_go_of_the_interpreter_before_the_process_ends(fmu: Path, tmp_path: Path) -> None:
-    assert run_in_process(end_in_order, fmu, tmp_path) == 1

@@ -6,6 +6,7 @@ import os
 import subprocess
 import sys
 import tempfile
+from importlib import resources
 from pathlib import Path
 from typing import Any
 from urllib.parse import quote
@@ -13,12 +14,12 @@ from urllib.parse import quote
 import pytest
 
 from analysis import CosimulationError
-from analysis.export import NATIVE, SOURCES, build_native, run_trial
+from analysis.export import NATIVE, PLATFORMS, SOURCES, build_native, compile_library, run_trial, this_platform
 from analysis.export.guard import PYTHONFMU, compile_guard
 from analysis.mechanisms import FIVE_BAR
 from analysis.run import cosimulation, unpacking_folder
 
-from .c_host import Unpacked, compile_host, emulator, run_host, unpack, wine_settings
+from .c_host import Unpacked, compile_host, emulator, python_path, run_host, unpack, wine_settings
 from .runner import HERE, run_in_process
 
 PLAIN = ["plain", "with space", "dots.-_~09"]
@@ -28,7 +29,7 @@ OTHERS = ["M\u00fcller", *(f"a{character}b" for character in "()#%+&@'")]
 _CALL = """
 import sys
 sys.path.insert(0, sys.argv[1])
-from ctypes import byref, c_char_p, c_int, c_size_t, c_uint, c_void_p
+from ctypes import byref, c_char, c_char_p, c_int, c_size_t, c_uint, c_void_p, memset
 from bare_master import Fmu
 fmu = Fmu(*sys.argv[2:4])
 uri = (fmu.folder / "resources").as_uri()
@@ -47,6 +48,9 @@ CALLS = {
     "three slashes": "fmu.instantiate().start()",
     "one slash": "fmu.instantiate(resources=uri.replace('file:///', 'file:/')).start()",
     "a host": "fmu.instantiate(resources=uri.replace('file:///', 'file://localhost/')).start()",
+    "capitals": "fmu.instantiate(resources=uri.replace('file://', 'FILE://LocalHost')).start()",
+    "an end in the middle": "refused('UTF-8', resources=uri + '%00')",
+    "another GUID": "refused('GUID', guid='{0}')",
     "a path": "fmu.instantiate(resources=str(fmu.folder / 'resources')).start()",
     "another host": "refused('resources', resources=uri.replace('file:///', 'file://elsewhere/'))",
     "another folder": "refused('resources', resources=fmu.folder.as_uri())",
@@ -71,6 +75,53 @@ kept, i.component = i.component, c_void_p()
 assert [i.setup(), i.enter(), i.exit(), i.step(0.0, 1e-3), i.terminate(), i.reset(), i.read(fmu.outputs)[0]] == [3] * 7
 i.component = kept
 i.run([1e-3])
+""",
+    "a size that is not the state's": """
+i = fmu.instantiate().start()
+s = i.save()
+size = c_size_t()
+assert i._call("SerializedFMUstateSize", s, byref(size)) == 0
+for other in (0, size.value - 1, size.value + 1, 50_000_000):
+    assert i._call("SerializeFMUstate", s, (c_char * (size.value + 1))(), c_size_t(other)) == 3
+    assert "size" in i.log[-1][2]
+assert i.restore(i.deserialize(i.serialize(s))[1]) == 0
+""",
+    "a long name": """
+i = fmu.instantiate(name=300 * "\\u00fc", logging=False)
+assert i.step(0.0, 1.0) == 2
+""",
+    "callbacks that are gone": """
+i = fmu.instantiate()
+memset(byref(i._callbacks), 0, 8)
+assert i.step(0.0, 1.0) == 2 and i.log[-1][1] == "logStatusDiscard"
+""",
+    "threads": """
+from threading import Thread
+found = []
+def run(k):
+    for n in range(10):
+        try:
+            found.append(k % 2 == 0 and fmu.instantiate().start() is not None)
+        except RuntimeError:
+            found.append("wrong")
+def run_wrong(k):
+    for n in range(10):
+        try:
+            fmu.instantiate(resources=uri + "x")
+        except RuntimeError:
+            found.append(True)
+threads = [Thread(target=(run, run_wrong)[k % 2], args=(k,)) for k in range(8)]
+for thread in threads: thread.start()
+for thread in threads: thread.join()
+assert found == [True] * 80
+""",
+    "a relative path": """
+import os
+from ctypes import CDLL
+os.chdir(fmu.folder / "binaries" / "linux64")
+fmu.library = CDLL(f"./{fmu.identifier}.so")
+os.chdir("/")
+fmu.instantiate().start()
 """,
     "no values": """
 i = fmu.instantiate().start()
@@ -99,6 +150,9 @@ i = fmu.instantiate(logging=False).start()
 assert i.step(0.0, -1.0) == 2
 assert [status for status, *_ in i.log] == [2]
 assert i._call("SetDebugLogging", c_int(1), c_size_t(1), c_void_p()) == 3
+assert i._call("SetDebugLogging", c_int(1), c_size_t(1), (c_char_p * 1)(b"nonsense")) == 3
+assert i._call("SetDebugLogging", c_int(1), c_size_t(1), (c_char_p * 1)(b"logStatusWarning")) == 0
+assert i.step(0.0, -1.0) == 2 and i.log[-1][0] == 2
 """,
 }
 
@@ -131,13 +185,54 @@ def test_calls_of_which_pythonfmu_would_die(five_bar: Path, tmp_path: Path, call
     end_of(five_bar, tmp_path, CALLS[call])
 
 
+_TWO = """
+#include <dlfcn.h>
+#include <stdarg.h>
+#include <stdio.h>
+#include "fmi2Functions.h"
+static void log(fmi2ComponentEnvironment e, fmi2String n, fmi2Status s, fmi2String c, fmi2String text, ...) {
+    va_list rest;
+    va_start(rest, text);
+    vfprintf(stderr, text, rest);
+    va_end(rest);
+}
+int main(int count, char **given) {
+    fmi2CallbackFunctions functions = {log, NULL, NULL, NULL, NULL};
+    for (int k = 1; k + 2 < count; k += 3) {
+        void *library = dlopen(given[k], RTLD_NOW | RTLD_LOCAL);
+        if (!library) return 2;
+        fmi2InstantiateTYPE *make = (fmi2InstantiateTYPE *)dlsym(library, "fmi2Instantiate");
+        fmi2FreeInstanceTYPE *drop = (fmi2FreeInstanceTYPE *)dlsym(library, "fmi2FreeInstance");
+        fmi2Component c = make("one", fmi2CoSimulation, given[k + 1], given[k + 2], &functions, 0, 0);
+        if (!c) return 3;
+        drop(c);
+    }
+    return 0;
+}
+"""
+
+
+@pytest.mark.skipif(not sys.platform.startswith("linux"), reason="PythonFMU's fault is in its library for Linux alone")
+def test_two_python_fmus_let_go_of_python_before_a_process_in_c_ends(fmus: dict[str, Path], tmp_path: Path) -> None:
+    # PythonFMU's library would use a pointer in a destructor that runs after the pointer was destroyed
+    (tmp_path / "two.c").write_text(_TWO)
+    options = ("-D_GNU_SOURCE", "-I", str(resources.files("fmpy") / "c-code"), "-ldl")
+    compile_library(tmp_path, ["two.c"], "two", PLATFORMS[this_platform()].target, options)
+    unpacked = [unpack(fmus[name], tmp_path / name) for name in ("FiveBarSlider", "SliderCrank")]
+    for order in (unpacked, unpacked[::-1]):
+        given = [str(part) for u in order for part in (u.library, u.token, (u.folder / "resources").as_uri())]
+        environment = os.environ | python_path()
+        done = subprocess.run([tmp_path / "two", *given], capture_output=True, check=False, env=environment, timeout=60)
+        assert done.returncode == 0, done.stderr
+
+
 def put_guard_before(fmu: Unpacked) -> None:
     """Put the guard before the library of a native FMU, in the place of PythonFMU's; it has the same functions."""
     place = fmu.library.parent.name
     fmu.library.rename(fmu.library.with_name(PYTHONFMU[place]))
     fmu.library.write_bytes(compile_guard((SOURCES / "guard.c").read_bytes())[place])
     (fmu.folder / "resources").mkdir()
-    (fmu.folder / "resources" / "slavemodule.txt").touch()
+    (fmu.folder / "resources" / "guid.txt").write_text(fmu.token)
 
 
 @pytest.mark.slow
