@@ -6,9 +6,7 @@ model description comes with the archive.
 
 from __future__ import annotations
 
-import json
 import sys
-import zlib
 from collections.abc import Callable
 from functools import wraps
 from typing import Any, ClassVar
@@ -37,6 +35,8 @@ from linkwork.wrapper import (
     end_in_order,
     keep_namespace,
     outlive_exception,
+    read_state,
+    write_state,
 )
 
 STATUS_GOOD = 0
@@ -362,23 +362,7 @@ class LinkworkSlave(Fmi2Slave):
         self._phase, self._stale = phase, stale
         self._start_time, self._stop_time, self._master_tolerance = start_time, stop_time, master_tolerance
 
-    @staticmethod
-    def _fmu_state_to_bytes(state: dict[str, Any]) -> bytes:
-        # repr of a float, as JSON writes it, comes back as the same float
-        text = json.dumps(state).encode("utf-8")
-        return text[:-1] + b', "check": "%08x"}' % zlib.crc32(text)
-
-    @staticmethod
-    def _fmu_state_from_bytes(state: bytes) -> dict[str, Any]:
-        # no exception may leave here, where there is no instance to keep: a damaged state is reported when it is set
-        text, _, check = state.rpartition(b', "check": "')
-        if check != b'%08x"}' % zlib.crc32(text + b"}"):
-            return {"damaged": "its checksum is not that of its text"}
-        try:
-            saved = json.loads(text.decode("utf-8") + "}")
-        except (ValueError, RecursionError) as error:
-            return {"damaged": repr(error)}
-        return saved if isinstance(saved, dict) else {"damaged": "it is not one of a Linkwork slave"}
+    _fmu_state_to_bytes, _fmu_state_from_bytes = staticmethod(write_state), staticmethod(read_state)
 
 
 def _status(error: LinkworkError) -> int:

@@ -24,6 +24,8 @@ from linkwork.wrapper import (
     end_in_order,
     keep_namespace,
     outlive_exception,
+    read_state,
+    write_state,
 )
 
 
@@ -79,7 +81,7 @@ class Controller(Fmi2Slave):  # type: ignore[misc]
 
     rows: ClassVar[tuple[Row, ...]]
     sample_time: float
-    #: Phase of the run, which is part of a saved state; start and stop time of the run (s).
+    #: Phase, start and stop time (s) of the run, which are part of a saved state.
     phase = INSTANTIATED
     start_time, stop_time = 0.0, inf
 
@@ -223,9 +225,21 @@ class Controller(Fmi2Slave):  # type: ignore[misc]
             end_in_order(self)
         self.phase = TERMINATED
 
+    _fmu_state_to_bytes, _fmu_state_from_bytes = staticmethod(write_state), staticmethod(read_state)
+
     def _get_fmu_state(self) -> dict[str, Any]:
         state: dict[str, Any] = super()._get_fmu_state()
-        return state | {"phase": self.phase}
+        times = {"start_time": self.start_time, "stop_time": self.stop_time}
+        return state | times | {"model": type(self).__name__, "phase": self.phase}
+
+    def _set_fmu_state(self, state: dict[str, Any]) -> None:
+        """Refuse a state that is damaged or of another controller."""
+        if "damaged" in state:
+            self._refuse(f"the serialised state is damaged: {state['damaged']}")
+        kind = type(self).__name__
+        if state.get("model") != kind or set(state) != set(self._get_fmu_state()):
+            self._refuse(f"the saved state belongs to {state.get('model')!r}, not to this {kind}")
+        super()._set_fmu_state({name: value for name, value in state.items() if name != "model"})
 
     def _sample_before_end(self, end: float) -> None:
         while (t := self.start_time + self.count * self.sample_time) < end - 1e-6 * self.sample_time:

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import ctypes
+import json
 import sys
+import zlib
 from typing import Any
 
 #: The states of a run. FMI 2.0.4, 4.2.4, says which calls are allowed in each; the wrapper does not check this.
@@ -47,3 +49,25 @@ def end_in_order(slave: Any) -> None:
 def _in_reserve(slave: Any) -> bool:
     # with a reserve the log has four references: of the slave, the wrapper, the reserve and this call
     return sys.getrefcount(slave.log_queue) >= 4
+
+
+def write_state(state: dict[str, Any]) -> bytes:
+    """Return a saved state as JSON with a checksum."""
+    # repr of a float, as JSON writes it, comes back as the same float
+    text = json.dumps(state).encode("utf-8")
+    return text[:-1] + b', "check": "%08x"}' % zlib.crc32(text)
+
+
+def read_state(state: bytes) -> dict[str, Any]:
+    """Return the state that `write_state` wrote; if it is damaged, a dictionary whose ``damaged`` says how.
+
+    No exception may leave here, where there is no instance to keep: a damaged state is refused when it is set.
+    """
+    text, _, check = state.rpartition(b', "check": "')
+    if check != b'%08x"}' % zlib.crc32(text + b"}"):
+        return {"damaged": "its checksum is not that of its text"}
+    try:
+        saved = json.loads(text.decode("utf-8") + "}")
+    except (ValueError, RecursionError) as error:
+        return {"damaged": repr(error)}
+    return saved if isinstance(saved, dict) else {"damaged": "it is not one of a Linkwork slave"}

@@ -279,6 +279,35 @@ def test_a_controller_lives_on_after_a_refusal(tmp_path: Path) -> None:
     slave.freeInstance()
 
 
+@pytest.mark.fmu
+def test_states_of_a_controller_that_are_damaged_or_of_another_are_refused(tmp_path: Path) -> None:
+    def start(name: str) -> Any:
+        fmu = build_controller(name, tmp_path)
+        description = read_model_description(str(fmu))
+        slave = instantiate_fmu(extract(str(fmu), str(tmp_path / name)), description, "CoSimulation")
+        slave.setupExperiment(stopTime=1.0)
+        slave.enterInitializationMode()
+        slave.exitInitializationMode()
+        return slave
+
+    slave, other = start("pid"), start("state-feedback")
+    slave.doStep(0.0, 2e-3)
+    good = slave.serializeFMUstate(slave.getFMUstate())
+    changed = [good[:k] + bytes([good[k] ^ 1]) + good[k + 1 :] for k, byte in enumerate(good) if 48 <= byte < 58]
+    assert len(changed) > 20
+    foreign = other.serializeFMUstate(other.getFMUstate())
+    before = slave.serializeFMUstate(slave.getFMUstate())
+    for text in (b"x", b"", b'{"phase": 7}', foreign, *changed):
+        with pytest.raises(FMICallException):
+            slave.setFMUstate(slave.deSerializeFMUstate(text))
+    assert slave.serializeFMUstate(slave.getFMUstate()) == before
+    slave.doStep(2e-3, 2e-3)
+    slave.setFMUstate(slave.deSerializeFMUstate(good))
+    slave.doStep(2e-3, 2e-3)
+    slave.freeInstance()
+    other.freeInstance()
+
+
 @pytest.mark.parametrize("name", PARTNERS)
 def test_the_balance_of_energy_of_a_partner_closes(name: str) -> None:
     run = simulate(
