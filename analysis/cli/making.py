@@ -30,7 +30,7 @@ def _split_values(context: click.Context, parameter: click.Parameter, values: Se
     multiple=True,
     callback=_split_values,
     metavar="KIND,...",
-    help="Kinds of FMU: python, native, native-fmi3; by default all that can be built here. The native ones need Zig.",
+    help="Kinds of FMU: python, native, native-fmi3; by default all.",
 )
 @click.option(
     "--platforms",

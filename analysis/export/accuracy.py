@@ -1,23 +1,30 @@
 """Compute work and precision for several tolerances, and write them as a table in the documentation of each FMU.
 
-``python -m analysis.export.accuracy`` rewrites `DATA` in some seconds; `tests/fmu/test_accuracy.py` checks that it is current.
+For a mechanism with standard cases the table is in `DATA`, which ``python -m analysis.export.accuracy`` rewrites in some
+seconds; `tests/fmu/test_accuracy.py` checks that it is current. For any other it is computed when the FMU is built.
 """
 
 from __future__ import annotations
 
+import csv
 import html
 import json
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import replace
+from functools import cache
+from itertools import pairwise
+from math import pi
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from linkwork.errors import LinkworkError
 from linkwork.mechanism import Mechanism
-from linkwork.plant import TOLERANCE_RANGE
+from linkwork.plant import TOLERANCE_RANGE, Plant
 
 from ..mechanisms import MECHANISMS, output_units
-from ..run import Case, compare, simulate, standard_cases
+from ..run import EXPERIMENTS, Case, compare, simulate, standard_cases
 
 DATA = Path(__file__).with_name("accuracy.json")
 TOLERANCES = (1e-3, 1e-5, 1e-7, 1e-9, 1e-11)
@@ -31,11 +38,13 @@ KINDS = {
 }
 HEADINGS = ("solver.tolerance", "evaluations per second", *KINDS)
 CAPTION = (
-    "Global error of the outputs on the standard cases, the largest of all cases and times, relative to the largest magnitude "
-    "of the output in the case; an output that is small beside its like is compared with a thousandth of these. "
-    "Evaluations of the equations are per second of simulated time, the most of all cases; shorter "
-    "communication steps need more, and err less."
+    "Global error of the outputs on {}, the largest of all times, relative to the largest magnitude of the output; an output "
+    "that is small beside its like is compared with a thousandth of these. Evaluations of the equations are per second of "
+    "simulated time{}; shorter communication steps need more, and err less."
 )
+#: The runs and the evaluations that the caption speaks of: for the standard cases, and for the default experiment.
+STANDARD_CASES = ("the standard cases, the largest of all", ", the most of all cases")
+DEFAULT = ("the default experiment in ten communication steps", "")
 
 
 def measure_work_and_errors(case: Case, tolerance: float) -> tuple[float, dict[str, float]]:
@@ -74,20 +83,82 @@ def stored_rows(mechanism: Mechanism) -> list[list[float]]:
     return found
 
 
+@cache
+def default_rows(mechanism: Mechanism, reference: str) -> list[list[float]]:
+    """Return the rows of the table for the default experiment of a mechanism, computed by the plant in plain Python.
+
+    A tolerance with which the run ends early has no row.
+
+    Parameters
+    ----------
+    mechanism : Mechanism
+    reference : str
+        Reference results as CSV: the times and all outputs but residuals, with a heading.
+    """
+    heading, *lines = csv.reader(reference.splitlines())
+    right = np.array(lines, dtype=float)
+    time, right = right[:, 0], right[:, 1:]
+    places = [mechanism.output_names.index(name) for name in heading[1:]]
+    unit_of = {v.name: v.unit for v in mechanism.variables}
+    units = np.array([unit_of[name] for name in heading[1:]])
+    starts = {v.name: v.start for v in mechanism.variables}
+    # as `compare` has it: angles by themselves, others by the output's largest magnitude or a thousandth of its like
+    largest = np.abs(right).max(axis=0)
+    like = np.array([largest[units == unit].max() for unit in units])
+    scale = np.where(
+        units == "rad", 1.0, np.maximum.reduce([largest, 1e-3 * like, np.full(len(like), np.finfo(float).tiny)])
+    )
+    found = []
+    for tolerance in TOLERANCES:
+        counted = Counted(mechanism.equations.derivative)
+        equations = mechanism.equations._replace(derivative=counted)
+        try:
+            plant = Plant.from_values(
+                replace(mechanism, equations=equations), starts, tolerance=tolerance, time=time[0]
+            )
+            values = [plant.outputs()]
+            counted.count = 0
+            for now, end in pairwise(time):
+                plant.step(now, end - now)
+                values.append(plant.outputs())
+        except LinkworkError:
+            continue
+        difference = np.abs(np.array(values)[:, places] - right)
+        # angles of bodies leap by a turn
+        angles = units == "rad"
+        difference[:, angles] = np.abs(np.remainder(difference[:, angles] + pi, 2.0 * pi) - pi)
+        worst = (difference / scale).max(axis=0)
+        errors = [max(worst[np.isin(units, of)], default=0.0) for of in KINDS.values()]
+        row = [counted.count / (time[-1] - time[0]), *errors]
+        found.append([tolerance, *(float(f"{value:.2g}") for value in row)])
+    return found
+
+
+class Counted:
+    """Function that counts its calls."""
+
+    def __init__(self, function: Callable[..., Any]) -> None:
+        self._function, self.count = function, 0
+
+    def __call__(self, *arguments: Any) -> Any:
+        self.count += 1
+        return self._function(*arguments)
+
+
 def format_row(row: list[float]) -> list[str]:
     """Return the numbers of a row as they are printed."""
     return [f"{row[0]:.0e}", f"{row[1]:.0f}", *(f"{value:.1e}" for value in row[2:])]
 
 
-def to_html(mechanism: Mechanism) -> str:
-    """Return the table for the page of an FMU; an empty text for a mechanism without data."""
-    body = [
-        "<tr>" + "".join(f"<td>{cell}</td>" for cell in format_row(row)) + "</tr>" for row in stored_rows(mechanism)
-    ]
-    if not body:
-        return ""
+def to_html(mechanism: Mechanism, files: Mapping[str, bytes]) -> str:
+    """Return the table for the page of an FMU, with the files of the FMU's experiments."""
+    rows, words = stored_rows(mechanism), STANDARD_CASES
+    if not rows:
+        rows, words = default_rows(mechanism, files[f"{EXPERIMENTS}/default-ref.csv"].decode()), DEFAULT
     head = "".join(f"<th>{html.escape(heading)}</th>" for heading in HEADINGS)
-    return "\n".join(["<h2>Accuracy</h2>", f"<p>{CAPTION}</p>", "<table>", f"<tr>{head}</tr>", *body, "</table>", ""])
+    body = ["<tr>" + "".join(f"<td>{cell}</td>" for cell in format_row(row)) + "</tr>" for row in rows]
+    caption = CAPTION.format(*words)
+    return "\n".join(["<h2>Accuracy</h2>", f"<p>{caption}</p>", "<table>", f"<tr>{head}</tr>", *body, "</table>", ""])
 
 
 def main() -> None:

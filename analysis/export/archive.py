@@ -18,6 +18,7 @@ from linkwork.mechanism import Mechanism
 from linkwork.variables import Variable
 
 from .accuracy import to_html
+from .experiments import experiments
 
 PACKAGE = Path(__file__).resolve().parents[1]
 #: The source root: beside the analysis package in a checkout, inside it where Linkwork is installed as a wheel.
@@ -78,10 +79,12 @@ def documentation(
     notes: Sequence[str],
     icon: str = "model.png",
 ) -> dict[str, bytes]:
-    """Return icon, licence and the HTML page of an FMU by path in the archive.
+    """Return experiments, icon, licence and the HTML page of an FMU by path in the archive.
 
-    The page describes the model and how the FMU is ``made``, and has a table of its variables. ``icon`` is the icon's path.
+    The page describes the model and how the FMU is ``made``, and has tables of its accuracy and its variables. ``icon`` is the
+    icon's path.
     """
+    files = experiments(mechanism)
     rows = []
     for variable in variables:
         bounds = [
@@ -110,7 +113,7 @@ td:first-child {{ font-family: monospace; white-space: nowrap; }}
 <h1><img src="../{icon}" alt="" height="60"> {html.escape(mechanism.title)}</h1>
 <p>{html.escape(made)}, Linkwork {linkwork.__version__}. MIT licence.</p>
 {paragraphs}
-{to_html(mechanism)}<h2>Variables</h2>
+{to_html(mechanism, files)}<h2>Variables</h2>
 <table>
 <tr><th>name</th><th>causality</th><th>unit</th><th>start</th><th>range</th><th>description</th></tr>
 {body}
@@ -118,7 +121,7 @@ td:first-child {{ font-family: monospace; white-space: nowrap; }}
 </body>
 </html>
 """
-    return {
+    return files | {
         icon: ICON.read_bytes(),
         "documentation/index.html": page.encode(),
         "documentation/licenses/license.txt": LICENSE.read_bytes(),

@@ -5,11 +5,9 @@ The files and their formats are those of "Compatibility information" in the cont
 
 from __future__ import annotations
 
-import csv
-import io
 import shutil
 import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from importlib import metadata
 from pathlib import Path
 
@@ -18,6 +16,7 @@ from linkwork.mechanism import Mechanism
 
 from .archive import run_trial
 from .description import NATIVE_FMI3, PYTHON, Kind, start_plant
+from .experiments import format_csv
 
 #: Importers in which the tests of Linkwork run the FMUs, by package: the kinds of FMU and the interfaces.
 IMPORTERS = {
@@ -99,14 +98,6 @@ def reference_results(mechanism: Mechanism) -> tuple[list[str], list[list[float]
         outputs = plant.outputs()
         rows.append([time, *(outputs[place] for place in places)])
     return ["time", *names], rows
-
-
-def format_csv(names: Sequence[str], rows: Sequence[Sequence[float]]) -> str:
-    """Return comma-separated values in the form of fmi-standard.org: names in quotes, numbers as in C."""
-    text = io.StringIO()
-    csv.writer(text, quoting=csv.QUOTE_ALL, lineterminator="\n").writerow(names)
-    csv.writer(text, lineterminator="\n").writerows([[repr(float(value)) for value in row] for row in rows])
-    return text.getvalue()
 
 
 def format_options(mechanism: Mechanism) -> str:

@@ -5,6 +5,8 @@ The files are those of the layered standard FMI-LS-REF; `analysis.run.experiment
 
 from __future__ import annotations
 
+import csv
+import io
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict
 from functools import cache
@@ -20,7 +22,6 @@ from linkwork.plant import Plant
 from ..mechanisms import MECHANISMS
 from ..run import ALLOWED, EXPERIMENTS, MANIFEST, STANDARD, Case, input_sampler, standard_cases
 from .bill import BILL, TYPE
-from .compatibility import format_csv
 from .description import layered_standard, to_xml_bytes
 
 #: Communication steps of an experiment, rows of its reference, and digits of its numbers.
@@ -92,6 +93,14 @@ def experiments(mechanism: Mechanism) -> dict[str, bytes]:
             raise refused
     files[_EXPERIMENTS[0]] = to_xml_bytes(root)
     return {f"{EXPERIMENTS}/{name}": content for name, content in files.items()} | {MANIFEST: _manifest()}
+
+
+def format_csv(names: Sequence[str], rows: Sequence[Sequence[float]]) -> str:
+    """Return comma-separated values in the form of fmi-standard.org: names in quotes, numbers as in C."""
+    text = io.StringIO()
+    csv.writer(text, quoting=csv.QUOTE_ALL, lineterminator="\n").writerow(names)
+    csv.writer(text, lineterminator="\n").writerows([[repr(float(value)) for value in row] for row in rows])
+    return text.getvalue()
 
 
 def _manifest() -> bytes:

@@ -29,7 +29,6 @@ from .bill import add_bill
 from .component import MANIFEST, MEMORY, component, manifest
 from .description import Kind, build_description, description
 from .equations_c import generated_files
-from .experiments import experiments
 from .interface import interface
 from .terminals import terminal_files
 
@@ -150,7 +149,6 @@ def build_native(
     variables = [entry.variable for entry in interface(mechanism)]
     icon = "model.png" if kind.fmi == 2 else "terminalsAndIcons/icon.png"
     entries |= documentation(mechanism, variables, mechanism.title, made, _NOTES, icon)
-    entries |= experiments(mechanism)
     target = dest / kind.file_name(mechanism)
     return write(add_bill(target.stem, entries, native=True, fmi=kind.fmi), target)
 

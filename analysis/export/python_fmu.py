@@ -28,7 +28,6 @@ from . import controllers
 from .archive import SOURCES, BuildError, documentation, write
 from .bill import add_bill
 from .description import PYTHON, description, token
-from .experiments import experiments
 from .guard import add_guard
 
 #: The oldest Python on which the modules in the FMUs run.
@@ -80,7 +79,6 @@ def build(mechanism: Mechanism, dest: Path | str = "build", sources: Path | str 
     entries = add_guard(raw, name, (sources / "guard.c").read_bytes())
     made = f"FMI 2.0 co-simulation, made with {PYTHON.tool}"
     entries |= documentation(mechanism, mechanism.variables, mechanism.title, made, (_NEEDS_PYTHON,))
-    entries |= experiments(mechanism)
     target = dest / PYTHON.file_name(mechanism)
     return write(add_bill(target.stem, entries, native=False, fmi=2), target)
 

@@ -2,18 +2,22 @@
 
 from __future__ import annotations
 
+import csv
 from collections.abc import Mapping
 from itertools import pairwise
 from pathlib import Path
 from zipfile import ZipFile
 
+import numpy as np
 import pytest
+from fmpy import simulate_fmu
 
 from analysis import cosimulate, simulate
-from analysis.export.accuracy import HEADINGS, TOLERANCES, format_row, rows, stored_rows
+from analysis.export.accuracy import HEADINGS, TOLERANCES, default_rows, format_row, rows, stored_rows
 from analysis.mechanisms import FIVE_BAR, MECHANISMS, SLIDER_CRANK
-from analysis.run import CASES
+from analysis.run import CASES, EXPERIMENTS
 from linkwork.mechanism import Mechanism
+from tests.mechanisms.pendulum import MECHANISM as PENDULUM
 
 
 @pytest.mark.parametrize("mechanism", MECHANISMS.values(), ids=list(MECHANISMS))
@@ -45,5 +49,27 @@ def test_the_table_is_in_the_documentation(natives: Mapping[str, Path]) -> None:
         page = archive.read("documentation/index.html").decode()
     for text in (*HEADINGS, *format_row(stored_rows(FIVE_BAR)[0])):
         assert f">{text}<" in page
-    with ZipFile(natives["Pendulum-native"]) as archive:
-        assert HEADINGS[1] not in archive.read("documentation/index.html").decode()
+
+
+@pytest.mark.parametrize("tolerance", [1e-5, 1e-7])
+def test_an_fmu_without_standard_cases_has_the_table_of_its_default_experiment(
+    natives: Mapping[str, Path], tolerance: float
+) -> None:
+    fmu = natives["Pendulum-native"]
+    with ZipFile(fmu) as archive:
+        page = archive.read("documentation/index.html").decode()
+        reference = archive.read(f"{EXPERIMENTS}/default-ref.csv").decode()
+    table = default_rows(PENDULUM, reference)
+    assert [row[0] for row in table] == list(TOLERANCES)
+    for text in (*HEADINGS, *(number for row in table for number in format_row(row))):
+        assert f">{text}<" in page
+    heading, *lines = csv.reader(reference.splitlines())
+    right = np.array(lines, dtype=float)
+    end = right[-1, 0]
+    found = simulate_fmu(
+        str(fmu), start_values={"solver.tolerance": tolerance}, stop_time=end, step_size=end / 10, output_interval=end / 10,
+        relative_tolerance=tolerance, output=heading[1:], fmi_type="CoSimulation",
+    )  # fmt: skip
+    row = next(row for row in table if row[0] == tolerance)
+    errors = np.abs(found["pendulum.angle"] - right[:, heading.index("pendulum.angle")])
+    assert 0.3 * row[2] < errors.max() < 1.1 * row[2]
