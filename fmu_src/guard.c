@@ -161,14 +161,15 @@ static void shorten(char *path) {
 #endif
 
 /* PythonFMU's functions */
-#define EACH(DO)                                                                                                               \
-    DO(Instantiate)                                                                                                            \
-    DO(FreeInstance) DO(SetupExperiment) DO(EnterInitializationMode) DO(ExitInitializationMode) DO(Terminate) DO(Reset)        \
-        DO(GetReal) DO(GetInteger) DO(GetBoolean) DO(GetString) DO(SetReal) DO(SetInteger) DO(SetBoolean) DO(SetString)        \
-            DO(GetFMUstate) DO(SetFMUstate) DO(FreeFMUstate) DO(SerializedFMUstateSize) DO(SerializeFMUstate)                  \
-                DO(DeSerializeFMUstate) DO(GetDirectionalDerivative) DO(SetRealInputDerivatives) DO(GetRealOutputDerivatives)  \
-                    DO(DoStep) DO(CancelStep) DO(GetStatus) DO(GetRealStatus) DO(GetIntegerStatus) DO(GetBooleanStatus)        \
-                        DO(GetStringStatus)
+/* clang-format off */
+#define EACH(DO) \
+    DO(Instantiate) DO(FreeInstance) DO(SetupExperiment) DO(EnterInitializationMode) DO(ExitInitializationMode) \
+    DO(Terminate) DO(Reset) DO(GetReal) DO(GetInteger) DO(GetBoolean) DO(GetString) DO(SetReal) DO(SetInteger) \
+    DO(SetBoolean) DO(SetString) DO(GetFMUstate) DO(SetFMUstate) DO(FreeFMUstate) DO(SerializedFMUstateSize) \
+    DO(SerializeFMUstate) DO(DeSerializeFMUstate) DO(GetDirectionalDerivative) DO(SetRealInputDerivatives) \
+    DO(GetRealOutputDerivatives) DO(DoStep) DO(CancelStep) DO(GetStatus) DO(GetRealStatus) DO(GetIntegerStatus) \
+    DO(GetBooleanStatus) DO(GetStringStatus)
+/* clang-format on */
 
 #define DECLARE(name) fmi2##name##TYPE *name;
 static struct {
