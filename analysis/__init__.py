@@ -8,10 +8,10 @@
 'stable'
 
 Numbers are in SI; a quantity with a unit may also be a text such as "420 rpm" or "5 cm". Instead of a mechanism's parameters a
-published set or its name may be given: `PUBLISHED` has the sets, `variant` changes values of one.
+published set or its name may be given: `PUBLISHED` has the sets, `variant` changes values of a set.
 
 ``__init__.pyi`` lists the public names; each is imported from its module when it is first used. ``dir`` lists the functions and
-classes to call, and the packages that have the rest; results and errors of a run can be imported from here as well.
+classes to call, and the packages; classes of results and errors can be imported from here as well.
 """
 
 from __future__ import annotations

@@ -49,7 +49,7 @@ def format_turns(turns: int) -> str:
 
 
 def format_rounds(rounds: Mapping[str, int], before: str) -> str:
-    """Format how often links go round, with ``before`` in front of each: ", swing.angle goes round +1"."""
+    """Format how often links go round; ``before`` precedes the text for each link: ", swing.angle goes round +1"."""
     return "".join(f"{before}{name} goes round {times:+d}" for name, times in rounds.items())
 
 

@@ -1,4 +1,4 @@
-"""Optional libraries: import them when they are used, and report a missing one with the command that installs it."""
+"""Import optional libraries when they are used, and report a missing library with the command that installs it."""
 
 from __future__ import annotations
 

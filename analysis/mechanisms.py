@@ -35,7 +35,7 @@ def check(mechanism: Mechanism) -> None:
     Raises
     ------
     MechanismError
-        If they are not; the message states the first fault.
+        If the parts are inconsistent; the message states the first fault.
     """
     # later checks assume that earlier ones found no fault
     for faults in (_faults_of_interface, _faults_of_drives, _faults_of_equations, _faults_of_drawing):
@@ -209,8 +209,8 @@ InitialState = Any
 def name_in_files(mechanism: Mechanism, channel: Channel) -> str:
     """Return the name of a channel in case files.
 
-    It is the name of the input; without its table if this table has parameters, and no other input of such a table has the
-    same last part.
+    The name is the FMI name of the input, such as ``slider.force``. The table in front is left out (``force``) if the table
+    also has parameters and no other input in such tables has the same last part.
     """
     tables = {name.partition(".")[0] for name in mechanism.mechanism_variables}
     bare = [c.name.rpartition(".")[2] for c in mechanism.channels if c.name.rpartition(".")[0] in tables]
@@ -224,7 +224,7 @@ def find_mechanism(parameters: Parameters) -> Mechanism:
     Raises
     ------
     InputError
-        If they belong to no known mechanism.
+        If the parameters belong to no known mechanism.
     """
     for mechanism in MECHANISMS.values():
         if isinstance(parameters, mechanism.parameters):
@@ -251,13 +251,13 @@ def wrapping_outputs() -> frozenset[str]:
 
 
 def residual_outputs() -> frozenset[str]:
-    """Return the names of the outputs that are residuals: zero but for numerical errors."""
+    """Return the names of the outputs that are residuals, which are zero except for numerical errors."""
     return frozenset(name for mechanism in MECHANISMS.values() for name in mechanism.names("residual"))
 
 
 @lru_cache(maxsize=64)
 def input_units(mechanism: Mechanism) -> Mapping[str, str]:
-    """Return the units of a mechanism's inputs by the names of their arguments, except those of rates."""
+    """Return the units of a mechanism's inputs, except rates, by the names of the arguments of `Inputs`."""
     units = {v.name: v.unit for v in mechanism.variables}
     return MappingProxyType({c.argument: units[c.name] for c in mechanism.channels if c.kind != "rate"})
 

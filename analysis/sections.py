@@ -52,7 +52,7 @@ def _check_length(value: Amount) -> float:
 
 @dataclass(frozen=True, slots=True)
 class _Section:
-    """Base of the sections, which converts their dimensions to SI and checks that they are positive."""
+    """Base class of the sections: converts dimensions to SI and checks that they are positive."""
 
     def __post_init__(self) -> None:
         for field in fields(self):
@@ -82,11 +82,11 @@ class Rod(_Section):
     density: Amount
 
     def mass(self, length: Amount) -> float:
-        """Return the mass (kg) of a length (m)."""
+        """Return the mass (kg) of a piece of given length (m)."""
         return float(0.25 * pi * self.diameter**2 * self.density * _check_length(length))
 
     def inertia(self, length: Amount) -> float:
-        """Return the moment of inertia (kg.m2) about the centre of mass, across the rod: m (3 r^2 + L^2)/12."""
+        """Return the moment of inertia (kg.m2) about a transverse axis through the centre of mass: m (3 r^2 + L^2)/12."""
         return float(self.mass(length) * (0.75 * self.diameter**2 + _check_length(length) ** 2) / 12.0)
 
 
@@ -117,11 +117,11 @@ class Tube(_Section):
             raise ParameterError("inner", self.inner, f"be less than the outer diameter of {self.outer:g} m")
 
     def mass(self, length: Amount) -> float:
-        """Return the mass (kg) of a length (m)."""
+        """Return the mass (kg) of a piece of given length (m)."""
         return float(0.25 * pi * (self.outer**2 - self.inner**2) * self.density * _check_length(length))
 
     def inertia(self, length: Amount) -> float:
-        """Return the moment of inertia (kg.m2) about the centre of mass, across the tube: m (3 (ro^2 + ri^2) + L^2)/12."""
+        """Return the inertia (kg.m2) about a transverse axis through the centre of mass: m (3 (ro^2 + ri^2) + L^2)/12."""
         across = 0.75 * (self.outer**2 + self.inner**2)
         return float(self.mass(length) * (across + _check_length(length) ** 2) / 12.0)
 
@@ -150,11 +150,11 @@ class Bar(_Section):
     density: Amount
 
     def mass(self, length: Amount) -> float:
-        """Return the mass (kg) of a length (m)."""
+        """Return the mass (kg) of a piece of given length (m)."""
         return float(self.width * self.thickness * self.density * _check_length(length))
 
     def inertia(self, length: Amount) -> float:
-        """Return the moment of inertia (kg.m2) about the centre of mass, normal to the plane of motion: m (L^2 + w^2)/12."""
+        """Return the moment of inertia (kg.m2) about a normal axis through the centre of mass: m (L^2 + w^2)/12."""
         return float(self.mass(length) * (self.width**2 + _check_length(length) ** 2) / 12.0)
 
 
@@ -163,7 +163,7 @@ Section = Rod | Tube | Bar
 
 
 class MassProperties(NamedTuple):
-    """Mass (kg), centre of mass (m, m), and moment of inertia (kg.m2) about an axis through it, normal to the plane."""
+    """Mass (kg), centre of mass (m, m), and moment of inertia (kg.m2) about the axis through the centre of mass."""
 
     mass: float
     centre: tuple[float, float]
@@ -193,7 +193,7 @@ class Plate(_Section):
     def properties(self, points: ArrayLike) -> MassProperties:
         """Return mass, centre of mass and moment of inertia of a plate with the given corners.
 
-        The integrals over the area are sums over its edges by Green's theorem: C. Steger, On the calculation of arbitrary
+        By Green's theorem the integrals over the area become sums over the edges: C. Steger, On the calculation of arbitrary
         moments of polygons, report FGBV-96-05, TU Munich, 1996.
 
         Parameters

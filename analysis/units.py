@@ -50,7 +50,7 @@ _PINT = {
 
 
 def display_scale(unit: str) -> tuple[str, float]:
-    """Return the unit in which tables and pictures show a quantity, such as mm for m, and the factor from SI to it."""
+    """Return the unit in which tables and pictures show a quantity, such as mm for m, and the factor from SI to this unit."""
     displays = UNITS[unit].displays if unit in UNITS else ()
     return displays[0] if displays else (unit, 1.0)
 
@@ -121,7 +121,7 @@ def pair(value: Any, unit: str, name: str) -> tuple[float, float]:
     Raises
     ------
     ParameterError
-        If there are not two of them; or as for `quantity`.
+        If there are not two values; or as for `quantity`.
     """
     ends: Any = () if isinstance(value, (str, Mapping)) else value
     try:

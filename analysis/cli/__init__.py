@@ -1,7 +1,7 @@
 """The ``linkwork`` command.
 
-Exit codes: 0 done; 1 an input was wrong, and a sentence says which; 2 the command line was wrong; 3 a run ended early (its data
-are kept); 4 a check failed; 130 interrupted from the keyboard (results so far are kept).
+Exit codes: 0 done; 1 an input was wrong (a message says which); 2 the command line was wrong; 3 a run ended early (the data so
+far are kept); 4 a check failed; 130 interrupted from the keyboard (the results so far are kept).
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from .codes import ENDED_EARLY as ENDED_EARLY
 from .codes import INTERRUPTED as INTERRUPTED
 from .codes import WRONG as WRONG
 
-#: Every command by name: the module of this package that defines it, and its line in ``linkwork --help``.
+#: Every command by name: the module of this package that defines the command, and the command's line in ``linkwork --help``.
 COMMANDS = {
     "basins": ("motions", "Find all periodic motions, and which start ends in which."),
     "build": ("making", "Build and validate the FMUs."),
@@ -47,7 +47,7 @@ COMMANDS = {
 
 
 class Commands(click.Group):
-    """A group of commands that reports errors as sentences, and suggests the nearest command for an unknown one."""
+    """A group of commands that reports errors as sentences, and suggests the most similar command for an unknown name."""
 
     def resolve_command(
         self, ctx: click.Context, args: list[str]
@@ -59,11 +59,11 @@ class Commands(click.Group):
         return super().resolve_command(ctx, args)
 
     def main(self, *arguments: Any, standalone_mode: bool = True, **extra: Any) -> Any:
-        """Run the command line; report errors of the command line in the style of all other errors."""
+        """Run the command line, report errors in it as sentences, and exit with the exit code."""
         plain: Any = super().main
         if not standalone_mode:
             return plain(*arguments, standalone_mode=False, **extra)
-        # imports and results are many long-lived objects: searching them for garbage takes a tenth of a command's time
+        # imports and results are many long-lived objects: garbage collection would take a tenth of a command's time
         gc.set_threshold(50_000, 20, 100)
         try:
             sys.exit(plain(*arguments, standalone_mode=False, **extra) or 0)
@@ -81,9 +81,9 @@ class Commands(click.Group):
 
 
 def _sentence(error: click.ClickException) -> str:
-    """Return Click's message as one sentence that starts in lower case, with a reference to the help."""
+    """Return the message of a Click error as one sentence that starts in lower case and refers to the help."""
     text = error.format_message().strip().removesuffix(".").replace(". Did you mean", "; did you mean")
-    # S1, a4 and the like stay as they are
+    # names such as S1 and a4 at the beginning keep their case
     if text[1:2].islower() or text[1:2] == " ":
         text = text[0].lower() + text[1:]
     context = error.ctx if isinstance(error, click.UsageError) else None
@@ -91,7 +91,7 @@ def _sentence(error: click.ClickException) -> str:
 
 
 class LazyCommand(click.Command):
-    """A command whose module is imported when it is called, because some modules take seconds to import."""
+    """A command whose module is imported only when the command is called, because some modules take seconds to import."""
 
     def make_context(self, *arguments: Any, **options: Any) -> click.Context:
         assert self.name is not None

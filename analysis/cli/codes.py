@@ -1,8 +1,8 @@
-"""Exit codes of the commands, beside 0 for done and Click's own 2 for a wrong command line."""
+"""Exit codes of the commands, in addition to 0 for done and Click's 2 for a wrong command line."""
 
-#: An input was wrong; one sentence says which.
+#: An input was wrong; a message says which.
 WRONG = 1
-#: A run ended early; its data are kept.
+#: A run ended early; the data so far are kept.
 ENDED_EARLY = 3
 #: A check failed.
 CHECK_FAILED = 4

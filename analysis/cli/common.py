@@ -26,30 +26,33 @@ from .codes import ENDED_EARLY as ENDED_EARLY
 from .codes import INTERRUPTED as INTERRUPTED
 from .codes import WRONG as WRONG
 
-#: If the output goes to a file or a pipe, the width is enough for the tables.
+#: Standard output; if it is a file or a pipe, its width is large enough for the tables.
 console = Console(emoji=False) if sys.stdout.isatty() else Console(emoji=False, width=120)
 errors = Console(emoji=False, stderr=True)
 
 
 def escape_controls(text: str) -> str:
-    """Return a text with a terminal's control characters escaped as Python writes them, such as \\x1b."""
+    """Return a text with control characters of a terminal escaped as in Python, such as \\x1b."""
     if text.isprintable():
         return text
     return "".join(c if c.isprintable() or c == "\n" else c.encode("unicode_escape").decode() for c in text)
 
 
 def plain_text(text: str) -> Text:
-    """Return a text for a table in which markup and emoji codes have no effect."""
+    """Return a text for a cell of a table; markup and emoji codes in the text have no effect."""
     return Text(escape_controls(text))
 
 
-#: Patterns of a number in a sentence, and of a number with a unit in SI; numbers in quotes are left out.
+#: Patterns of a number in a sentence, and of a number with a unit in SI; numbers in quotes do not match.
 NUMBER = r"-?\d+(?:\.\d+)?(?:e[-+]?\d+)?"
 _QUANTITY = re.compile(rf"(?<![-'\w.])({NUMBER}) (N\.m|N|m)(?!\w|[./](?!rad\b)\w)")
 
 
 def in_units(text: str, shown: Callable[[str], tuple[str, float]]) -> str:
-    """Return a sentence with its lengths, forces and torques in other units; ``shown`` maps a unit to (name, factor)."""
+    """Return a sentence with its lengths, forces and torques converted from SI to other units.
+
+    ``shown`` returns the name of the other unit and the factor to it, for an SI unit.
+    """
 
     def convert(found: re.Match[str]) -> str:
         unit, factor = shown(found[2])
@@ -59,7 +62,7 @@ def in_units(text: str, shown: Callable[[str], tuple[str, float]]) -> str:
 
 
 def print_error(text: str, style: str = "yellow") -> None:
-    """Print a sentence on standard error: a note in yellow, an error in red."""
+    """Print a sentence on standard error; the style is yellow for a note, red for an error."""
     errors.print(escape_controls(text), style=style, markup=False, highlight=False, soft_wrap=True)
 
 
@@ -70,7 +73,10 @@ def print_paths(paths: Iterable[Path]) -> None:
 
 
 def report_errors(command: Callable[..., Any]) -> Callable[..., Any]:
-    """Decorate a command: report errors as a sentence and an exit code, and protect files that the command did not write."""
+    """Decorate a command: report errors as a message and an exit code, and do not overwrite files of others.
+
+    Files that the command did not write itself are protected: see `analysis.files.outputs`.
+    """
 
     @wraps(command)
     def run(*arguments: Any, **options: Any) -> Any:
@@ -108,7 +114,7 @@ def report_errors(command: Callable[..., Any]) -> Callable[..., Any]:
 
 
 def check_tolerance(context: click.Context, parameter: click.Parameter, value: float | None) -> float | None:
-    """Check the value of a tolerance option (a callback of Click); NaN is refused too."""
+    """Return the value of a tolerance option, checked to be between 0 and 1 (a callback of Click)."""
     if value is not None and not 0.0 < value <= 1.0:
         raise click.BadParameter(f"{value} is not between 0 and 1")
     return value
@@ -120,11 +126,11 @@ def tolerance_option(*names: str, default: float | None = None, help: str) -> Ca
 
 
 def check_place(context: click.Context, parameter: click.Parameter, value: str | None) -> str | None:
-    """Check that the folder or file of an option can be written (a callback of Click), before anything is computed."""
+    """Check, before anything is computed, that the folder or file of an option can be written (a callback of Click)."""
     if value is None:
         return value
     place = Path(value)
-    # a file is replaced by a new one, for which its folder must be writable
+    # a file is replaced by a new file, for which its folder must be writable
     there = next(path for path in ((place, *place.parents) if place.is_dir() else place.parents) if path.exists())
     if not there.is_dir():
         raise click.BadParameter(f"{value} cannot be made: {there} is no folder")
@@ -166,7 +172,7 @@ def _join(context: click.Context, parameter: click.Parameter, address: str | Non
 
 @contextmanager
 def _cluster(address: str) -> Iterator[None]:
-    """Run the work inside this context on the workers of a Dask cluster."""
+    """Run the parallel work inside this context on the Dask cluster whose scheduler has this address."""
     _check_libraries("distributed")
     import joblib
     from distributed import Client
@@ -180,7 +186,7 @@ def _cluster(address: str) -> Iterator[None]:
 
 
 def workers_options(default: int | None = None) -> Callable[..., Any]:
-    """Return a decorator that adds the options --jobs and --scheduler: the cores or the cluster to compute on."""
+    """Return a decorator that adds the options --jobs and --scheduler, for the number of processes or a cluster."""
     jobs = click.option(
         "--jobs",
         "--cores",
@@ -208,14 +214,14 @@ def output_folder(out: str | Path) -> Path:
 
 
 def set_option(example: str) -> Callable[..., Any]:
-    """Return the repeatable option --set; ``example`` completes its help text "Change a value, such as"."""
+    """Return the option --set, which can be given several times; its help is "Change a value, such as" and ``example``."""
     return click.option(
         "--set", "settings", multiple=True, metavar="NAME=VALUE", help=f"Change a value, such as {example}."
     )
 
 
 def _check_libraries(*names: str) -> None:
-    """Raise Click's BadParameter if one of the libraries is not installed."""
+    """Raise Click's BadParameter if one of the named libraries is not installed."""
     try:
         require(*names)
     except MissingLibraryError as error:
@@ -237,7 +243,7 @@ html_option = click.option(
 
 
 def save_picture(picture: Any, path: str | Path, *, html: bool) -> list[Path]:
-    """Write a picture as PNG, and with ``html`` also as a page; ``path`` has no ending. Return the paths written."""
+    """Write a picture as PNG, and with ``html`` also as a web page, and return the paths; ``path`` is without ending."""
     from .. import figures
     from ..files import save_figure, write_text
 
@@ -248,7 +254,7 @@ def save_picture(picture: Any, path: str | Path, *, html: bool) -> list[Path]:
 
 
 def save_plot(wanted: bool, result: Any, path: str | Path, **options: Any) -> list[Path]:
-    """Plot a result to a file if plots are ``wanted``, and return the paths written."""
+    """Plot a result to a file if plots are ``wanted``, and return the paths of the files written."""
     from .. import figures
     from ..files import save_figure
 
@@ -261,7 +267,10 @@ plots_option = click.option("--plots/--no-plots", "--plot/--no-plot", default=Tr
 
 
 def case_options(published: Iterable[str]) -> Callable[..., Any]:
-    """Return a decorator that adds the argument CASE and the options --published and --set, see `chosen_case`."""
+    """Return a decorator that adds the argument CASE and the options --published and --set: see `chosen_case`.
+
+    ``published`` are the names of published sets for the help text.
+    """
     options = (
         click.argument("case", required=False, type=click.Path(exists=True, dir_okay=False)),
         click.option("--published", metavar="NAME", help=f"A published set instead of a case: {', '.join(published)}."),
@@ -271,7 +280,7 @@ def case_options(published: Iterable[str]) -> Callable[..., Any]:
 
 
 def number_or_text(text: str) -> bool | int | float | str:
-    """Read a value from the command line: true, false or a bare number (in SI); any other text is returned as it is."""
+    """Convert a text of the command line to a truth value or a number, if possible; return any other text unchanged."""
     if text in ("true", "false"):
         return text == "true"
     for kind in (int, float):
@@ -283,7 +292,10 @@ def number_or_text(text: str) -> bool | int | float | str:
 
 
 def unknown_name_error(name: str, known: Iterable[str], words: str) -> click.UsageError:
-    """Return the error for an unknown name on the command line, with the closest known names."""
+    """Return the error for an unknown name on the command line, with the most similar known names.
+
+    ``words`` stand for the name in the message.
+    """
     from ..files import unknown_name
 
     return click.UsageError(str(unknown_name(name, known, words)))
@@ -296,7 +308,7 @@ SYNTHESIS = "a synthesis case", "linkwork synthesize"
 SLIDER_MOTION = "a case of a slider's motion", "linkwork slider-motion"
 TUNING = "a case of a tuning", "linkwork tune"
 SYSTEM = "a system of parts", "linkwork system run"
-#: Descriptions of files that are no cases, by ending.
+#: Descriptions of files that are not cases, by ending.
 _OTHERS = {
     ".fmu": "an FMU: linkwork info {0} describes it, linkwork run CASE --fmu {0} runs it",
     ".csv": "a table of numbers: a case names it as the file of an input or a task",
@@ -307,7 +319,7 @@ _OTHERS = {
 
 
 def case_kind(tables: Mapping[str, Any]) -> tuple[str, str] | None:
-    """Return the kind of a case file, such as `RUN`, by the names of its tables; None if they do not tell."""
+    """Return the kind of a case file, such as `RUN`, by the names of its tables; None if the names do not tell."""
     from ..linkages import has_linkage
     from ..mechanisms import MECHANISMS
     from ..run import COMMON, case_inputs
@@ -331,7 +343,7 @@ def case_kind(tables: Mapping[str, Any]) -> tuple[str, str] | None:
 
 
 def check_kind(path: str, *wanted: tuple[str, str], settings: Iterable[str] = ()) -> None:
-    """Check that a file is of a kind that the command reads.
+    """Check that a file is of a kind that a command reads.
 
     Parameters
     ----------
@@ -339,12 +351,12 @@ def check_kind(path: str, *wanted: tuple[str, str], settings: Iterable[str] = ()
     *wanted : (str, str)
         The kinds that the command reads, such as `RUN`.
     settings : iterable of str
-        Dotted names of entries that the command line adds.
+        Dotted names of entries that options of the command line add to the file's entries.
 
     Raises
     ------
     InputError
-        If the file cannot be read, or is of another kind; the message names the command for it.
+        If the file cannot be read, or is of another kind; the message names the command for this kind.
     """
     from ..files import read_tables
 
@@ -358,14 +370,17 @@ def check_kind(path: str, *wanted: tuple[str, str], settings: Iterable[str] = ()
 
 
 def quantity(text: str, unit: str, option: str) -> float:
-    """Return the value of an option in SI, from a text with its unit or a bare number in SI."""
+    """Return the value of an option in SI, from a text such as "420 rpm" or a number without unit, which is in SI."""
     from .. import units
 
     return units.quantity(number_or_text(text), unit, option)
 
 
 def changes(settings: Sequence[str], read: Callable[[str], Any], example: str) -> dict[str, Any]:
-    """Return the values of the options ``--set NAME=VALUE`` by name; ``read`` converts the texts, ``example`` is for errors."""
+    """Return the values of the options ``--set NAME=VALUE`` by name.
+
+    ``read`` converts the text of a value; ``example`` is an example for error messages.
+    """
     values: dict[str, Any] = {}
     for setting in settings:
         name, equals, text = setting.partition("=")
@@ -376,7 +391,7 @@ def changes(settings: Sequence[str], read: Callable[[str], Any], example: str) -
 
 
 def chosen_case(file: str | None, published: str | None, settings: Sequence[str]) -> Any:
-    """Return the case of a file or of a published set with the changes of ``--set``, and print its warnings."""
+    """Return the case of a file or of a published set, with the changes by ``--set``; print warnings about its masses."""
     from ..run import describe_masses, load_case, published_case, read_case
 
     if (file is None) == (published is None):
@@ -414,19 +429,20 @@ def show_table(
     ----------
     title : str
     headings : sequence of str
-        Headings of the columns; none for a list of names and values.
+        Headings of the columns.
     rows : iterable of sequence of str
+        Cells of each row.
     words : collection of str
-        Headings of columns of words, which are aligned to the left; all other columns are numbers.
+        Headings of the columns that contain words and are aligned to the left; all other columns contain numbers.
     unwrapped : collection of str
-        Headings of columns that are not wrapped.
+        Headings of the columns whose cells are not wrapped.
     styles : iterable of str, optional
-        Styles of the rows, as rich names them.
+        Styles of the rows, by their names in the library rich.
     """
     grid = Table(title=plain_text(title), title_justify="left", show_header=bool(headings))
     for heading in headings:
         justify: Any = "left" if heading in words else "right"
-        # in a narrow terminal a long word is broken, not cut
+        # in a narrow terminal a long word is wrapped, not truncated
         grid.add_column(plain_text(heading), justify=justify, no_wrap=heading in unwrapped, overflow="fold")
     for row, style in zip(rows, styles):
         grid.add_row(*(plain_text(cell) for cell in row), style=style)

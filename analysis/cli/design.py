@@ -1,4 +1,4 @@
-"""The command that synthesizes linkages, and functions that commands about synthesis share."""
+"""`linkwork synthesize`: find linkages for a task; and functions that all commands about synthesis share."""
 
 from __future__ import annotations
 
@@ -34,12 +34,12 @@ from .common import (
 if TYPE_CHECKING:
     from ..synthesis import Assessment, MachineSpec, PinForces, Solution, TradeOff
 
-#: Number of further positions in a drawing.
+#: Number of further positions of the linkage that a drawing shows.
 POSES = 6
 
 
 def read_settings(settings: Sequence[str]) -> dict[str, Any]:
-    """Return the overrides of a case file given as NAME=VALUE; a value that is not TOML is a text with a unit."""
+    """Return the new values of entries of a case file, given as NAME=VALUE; a value that is not TOML is taken as text."""
 
     def value(text: str) -> Any:
         try:
@@ -51,14 +51,14 @@ def read_settings(settings: Sequence[str]) -> dict[str, Any]:
 
 
 def leave_if_stopped(stopped: Interrupted | None, kept: str) -> None:
-    """Exit with the code for an interruption if ``stopped`` is one; the sentence ``kept`` says which results are kept."""
+    """Exit with the code for an interruption, unless ``stopped`` is None; the sentence ``kept`` says what results are kept."""
     if stopped is not None:
         print_error(f"{stopped}; {kept}")
         sys.exit(INTERRUPTED)
 
 
 def search_options(command: Callable[..., Any]) -> Callable[..., Any]:
-    """Add the options that all commands with a search have."""
+    """Add to a command the options that all commands with a search have: plots, folder, workers, seed, objective."""
     for option in (
         plots_option,
         out_option(help="Folder for the results."),
@@ -77,7 +77,7 @@ def search_options(command: Callable[..., Any]) -> Callable[..., Any]:
 
 
 def read_overrides(settings: Sequence[str], **options: Any) -> dict[str, Any]:
-    """Return the overrides of a case file from ``--set`` and from other options, given as ``table__name=value``."""
+    """Return the new values of entries of a case file, from ``--set`` and from other options, ``table__name=value``."""
     given = {name.replace("__", "."): value for name, value in options.items() if value is not None}
     return read_settings(settings) | given
 
@@ -88,9 +88,9 @@ def print_solutions(
     forces: Sequence[PinForces] | None = None,
     violated: Callable[[Solution], str] | None = None,
 ) -> None:
-    """Print ranked solutions as a table, in mm and degrees, with their greatest pin forces if ``forces`` are given.
+    """Print a table of ranked solutions, in mm and degrees, with their greatest pin forces if ``forces`` are given.
 
-    ``violated`` returns the constraint that a linkage violates, or an empty text; such linkages are marked.
+    ``violated`` returns the constraint that a linkage violates, or an empty text; linkages that violate one are marked.
     """
     from ..synthesis import format_transmission, format_variants, quality_cells, quality_headings
 
@@ -119,7 +119,7 @@ def print_solutions(
 
 
 def print_best(best: Assessment) -> None:
-    """Print the dimensions of a solution, and the effect of an error in each of them."""
+    """Print the dimensions of a solution, and the effect of an error in each dimension."""
     head, *rows = best.dimensions
     show_table("the first of them", head, rows, words=head[:1])
     console.print(best.rounding, highlight=False, soft_wrap=True)
@@ -128,7 +128,10 @@ def print_best(best: Assessment) -> None:
 def write_description_files(
     best: Assessment, folder: Path, title: str, *, curve: str, text: str, drawn: str
 ) -> list[Path]:
-    """Write curve, report and drawing (DXF and SVG) of a solution to files with these stems; return the paths."""
+    """Write curve, report and drawing (DXF and SVG) of a solution to files, and return the paths.
+
+    ``curve``, ``text`` and ``drawn`` are the names of the files without ending; ``title`` is the title in report and drawing.
+    """
     from ..files import save_drawing, write_text
     from ..synthesis import drawing
 
@@ -139,7 +142,7 @@ def write_description_files(
 
 
 def write_linkages(solutions: Sequence[Solution], folder: Path, title: str, *, make: MachineSpec) -> list[Path]:
-    """Write the first linkage, and those of the others that have no defect, as case files for runs; return the paths."""
+    """Write the first linkage, and all others that have no defect, as case files for runs; return the paths."""
     from ..files import write_tables
 
     names = [(s, "linkage.toml" if rank == 1 else f"linkage-{rank}.toml") for rank, s in enumerate(solutions, start=1)]
@@ -153,7 +156,7 @@ def write_linkages(solutions: Sequence[Solution], folder: Path, title: str, *, m
 def write_solution(
     best: Assessment, folder: Path, title: str, *, make: MachineSpec, plots: bool, animate: bool
 ) -> list[Path]:
-    """Write all files of one solution: drawings, plates, curve, report, parameters, a case to run, plots; return the paths."""
+    """Write all files of one solution: drawings, plates, curve, report, parameters, case of a run, plots; return the paths."""
     from .. import figures
     from ..files import save_drawing, save_figure, write_tables
     from ..run import save_parameters
@@ -183,7 +186,10 @@ def write_solution(
 
 
 def _forces(solution: Solution, make: MachineSpec) -> PinForces | None:
-    """Return the pin forces at constant speed; None if the pivot is moved, or the linkage has a circuit or branch defect."""
+    """Return the pin forces at constant crank speed.
+
+    Return None if a slider moves the pivot, or if the linkage has a circuit or branch defect.
+    """
     from ..synthesis import pin_forces
 
     if solution.linkage.pivot is not None or not (solution.verdicts.circuit and solution.verdicts.branch):
@@ -209,9 +215,9 @@ def synthesize(
 ) -> None:
     """Find linkages for the task of a CASE file (TOML or JSON): a path, a function, a quick return or a motion.
 
-    search.kinds selects four-bars, slider-cranks and geared five-bars. The command writes the ranked linkages, and for the
-    first one drawing and plates (DXF, SVG), a sheet (PDF), curve, report, plots, the FMU's parameters, and a case for
-    'linkwork run'.
+    The entry search.kinds selects four-bars, slider-cranks and geared five-bars. The command writes the ranked linkages. For
+    the first of them it also writes drawing and plates (DXF, SVG), a sheet (PDF), curve, report, plots, the FMU's parameters,
+    and a case for 'linkwork run'.
 
     \b
     Examples:

@@ -1,4 +1,4 @@
-"""Options and functions that commands about the periodic motions of a case share."""
+"""Options and functions that all commands about the periodic motions of a case share."""
 
 from __future__ import annotations
 
@@ -30,10 +30,10 @@ from .common import (
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class CaseChoice:
-    """The case of a command, with options on its drive.
+    """The case of a command, with the options about its drive.
 
-    ``stem`` is the first part of the names of files, ``speed`` and ``guess_speed`` are texts of the options or None, ``folder``
-    is that of the results.
+    ``stem`` is the first part of the names of the files that are written, ``speed`` and ``guess_speed`` are the texts of the
+    options or None, ``folder`` is the folder of the results.
     """
 
     case: Any
@@ -43,7 +43,10 @@ class CaseChoice:
     folder: Path
 
     def drive(self, speed: str | None = None) -> Any:
-        """Return the drive of the case with its constant forces; a given speed, as text, replaces the drive of the crank."""
+        """Return the drive of the case with its constant forces.
+
+        If a speed is given as text, here or by --speed, it replaces the drive of the crank.
+        """
         from ..periodic import NothingFreeError, VaryingInputError, steady_drive
 
         speed = speed or self.speed
@@ -52,7 +55,7 @@ class CaseChoice:
             print_error("note: the speed is prescribed; the case's torque is left out")
         try:
             drive = steady_drive(self.case.parameters, self.case.inputs, self.case.initial, speed=value)
-            # raises an error if nothing is free
+            # raises an error if no degree of freedom is free
             drive.flow(find_mechanism(self.case.parameters))
             return drive
         except NothingFreeError as error:
@@ -67,7 +70,10 @@ class CaseChoice:
             raise InputError(f"{self.case.title}: {error}{hint}") from None
 
     def start(self, drive: Any) -> list[float]:
-        """Return a guess of the orbit's start: the case's coordinates at rest, and with a torque drive a crank speed."""
+        """Return a guess of the start of the orbit: the initial coordinates of the case, at rest.
+
+        If the crank is driven by a torque, the guess includes a crank speed.
+        """
         from ..periodic import rest_guess
 
         speed = None if self.guess_speed is None else quantity(self.guess_speed, "rad/s", "--guess-speed")
@@ -77,7 +83,7 @@ class CaseChoice:
         return rest_guess(self.case.parameters, drive, self.case.initial, speed, other=other)
 
     def finish(self, written: Sequence[Path], problems: Sequence[str], *, interrupted: bool = False) -> None:
-        """Report written files and problems; exit with an error code if there are problems or the command was interrupted."""
+        """Print written files and problems; exit with an error code if there are problems or the command was interrupted."""
         print_paths(written)
         for problem in problems:
             print_error(f"note: {problem}")
@@ -86,7 +92,7 @@ class CaseChoice:
 
 
 def add_case_options(command: Callable[..., None]) -> Callable[..., None]:
-    """Add the options that select a case and its drive to a command, which receives them as one `CaseChoice`."""
+    """Add to a command the options that select a case and its drive; the command receives them as one `CaseChoice`."""
 
     @report_errors
     @wraps(command)
@@ -114,7 +120,7 @@ def add_case_options(command: Callable[..., None]) -> Callable[..., None]:
 
 
 def swing_unit(orbit: Any) -> tuple[str, float, str]:
-    """Return the name of the coordinate whose amplitude is printed, the factor from SI to the printed unit, and this unit."""
+    """Return the name of the coordinate whose amplitude is printed, the factor from SI to its printed unit, and this unit."""
     what, si = orbit.swing
     unit, factor = display_scale(si)
     return what, factor, unit

@@ -1,4 +1,4 @@
-"""The command that finds all linkages of a task in closed form, or reports that there is none."""
+"""`linkwork exact`: find all linkages that do a task exactly, in closed form, or report that there is none."""
 
 from __future__ import annotations
 
@@ -37,9 +37,10 @@ from .design import print_best, print_solutions, read_overrides, write_descripti
 def exact(case: str, settings: Sequence[str], crank_phase: str | None, count: int, plots: bool, out: str) -> None:
     """Find every four-bar that does exactly what a CASE file (TOML or JSON) asks for at a few points.
 
-    Five poses of a body have up to six four-bars; four poses have a curve of dyads (Burmester). Three to five points of a
-    rocker function have up to four four-bars (Freudenstein). Each is checked for defects; if none is sound, no sound four-bar
-    exists. Bounds and constraints of the case are ignored. The exit code is 3 if no linkage is sound.
+    For five poses of a body there are up to six four-bars; for four poses there is a curve of dyads (Burmester). For three to
+    five points of a rocker function there are up to four four-bars (Freudenstein). Each linkage is checked for defects; if all
+    have a defect, no four-bar without defects exists for the task. Bounds and constraints of the case are ignored. The exit
+    code is 3 if no linkage is free of defects.
 
     \b
     Examples:

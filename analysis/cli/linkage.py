@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 @click.option("--animation", is_flag=True, help="Write also an animation.")
 @report_errors
 def linkage(file: str, equations: bool, out: str, animation: bool) -> None:
-    """Describe the linkage of a FILE: structure, freedoms, dyads in order, range of motion, dead centres; and draw it.
+    """Describe the linkage of a FILE and draw it: structure, freedoms, order of the dyads, range of motion, dead centres.
 
     \b
     Examples:
@@ -51,7 +51,7 @@ def linkage(file: str, equations: bool, out: str, animation: bool) -> None:
 
 
 def _print_structure(package: Package) -> None:
-    """Print the number of bodies, joints and freedoms, and the steps that give the positions of the bodies."""
+    """Print the number of bodies, joints and freedoms, and the steps by which the positions of the bodies are computed."""
     from ..linkages import Dyad, GearStep, RackStep
 
     d, structure = package.description, package.structure
@@ -80,7 +80,7 @@ def _print_structure(package: Package) -> None:
 
 
 def _print_reach(made: Mechanism) -> None:
-    """Print the range of each freedom, with the other freedoms at their start."""
+    """Print the range of motion of each freedom, with the other freedoms at their initial values."""
     from ..linkages import reach
 
     rows = []
@@ -99,7 +99,7 @@ def _print_reach(made: Mechanism) -> None:
 
 
 def _print_dead_centres(package: Package) -> None:
-    """Print the values of each freedom at which a body jointed to the ground is at rest."""
+    """Print the dead centres: the values of each freedom at which a body that is joined to the ground is at rest."""
     from ..linkages import dead_centres
     from ..units import display_scale
 

@@ -1,4 +1,4 @@
-"""Commands that build the FMUs and copy the examples."""
+"""`linkwork build` and `linkwork examples`: build the FMUs, and copy the examples to a folder."""
 
 from __future__ import annotations
 
@@ -11,12 +11,12 @@ import click
 from .common import check_place, console, report_errors, say
 
 PACKAGE = Path(__file__).resolve().parents[1]
-#: The examples: beside the package in a checkout, inside it where Linkwork is installed as a wheel.
+#: Folders of the examples: beside the package in a checkout, inside the package if Linkwork is installed as a wheel.
 EXAMPLES = (PACKAGE.parent / "examples", PACKAGE / "_examples")
 
 
 def _split_values(context: click.Context, parameter: click.Parameter, values: Sequence[str]) -> tuple[str, ...]:
-    """Read an option that can be given several times, or once with commas (a callback of Click)."""
+    """Return the values of an option that is given several times, or once with commas (a callback of Click)."""
     return tuple(name for value in values for name in value.split(",") if name)
 
 
@@ -51,7 +51,10 @@ def _split_values(context: click.Context, parameter: click.Parameter, values: Se
 def build(
     models: Sequence[str], dest: str, kinds: Sequence[str], platforms: Sequence[str], publish: str | None
 ) -> None:
-    """Build and validate the FMUs of all mechanisms, or of those named, such as FiveBarSlider, or described in a file.
+    """Build and validate the FMUs of all mechanisms.
+
+    MODEL is the name of a mechanism's FMU, such as FiveBarSlider, or a file that describes a linkage; if it is given, only its
+    FMUs are built.
 
     \b
     Examples:
@@ -75,7 +78,7 @@ def build(
 @click.option("--force", is_flag=True, help="Overwrite files of the same name.")
 @report_errors
 def examples(dest: str, force: bool) -> None:
-    """Copy the examples to a folder: case files of every kind, a drawn curve, scripts.
+    """Copy the examples to a folder: case files of every kind, a drawn curve, Python scripts.
 
     \b
     Examples:

@@ -1,4 +1,4 @@
-"""The command that finds all periodic motions at one speed, and their basins of attraction."""
+"""`linkwork basins`: find all periodic motions at one speed, and their basins of attraction."""
 
 from __future__ import annotations
 
@@ -40,10 +40,10 @@ def basins(
     jobs: int,
     html: bool,
 ) -> None:
-    """Report all periodic motions of a CASE file or a published set at one speed, and the motion to which each start leads.
+    """Report all periodic motions of a CASE file or a published set at one speed, and on which of them each start settles.
 
-    The axes of the picture are position and rate of the first free coordinate (the slider of a five-bar) at crank angle 0.
-    Computed rows are kept, so that an interrupted picture is continued.
+    A start is an initial state at crank angle 0. The axes of the picture are position and rate of the first free coordinate
+    (the slider of a five-bar). Computed rows are kept, so that after an interruption the same command continues.
 
     \b
     Examples:
@@ -88,7 +88,7 @@ def basins(
 
 
 def _motions(title: str, found: Sequence[Orbits], common: int) -> None:
-    """Print a table of all motions found at one speed, and whether there may be others.
+    """Print a table of all motions found at one speed, and whether there may be further motions.
 
     ``found[n - 1]`` has the motions whose period is n times ``common`` turns of the crank.
     """

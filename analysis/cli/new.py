@@ -1,4 +1,4 @@
-"""`linkwork new`: write case files to start from, generated from the tables that read them, so that no entry is missing."""
+"""`linkwork new`: write a case file to start from; its entries come from the code that reads it, so that none is missing."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ _HEAD = """\
 # Every quantity is a number in SI or a text with its unit, such as "5 cm" or "420 rpm". Entries behind a # may be left out:
 # they have their defaults, or examples of what may stand there.
 """
-#: Entries of an example task of each kind, which is solved within seconds; other entries are written from the table.
+#: Entries of an example task of each kind, which can be solved within seconds; all other entries get their defaults.
 _TASKS: Mapping[str, Mapping[str, Any]] = {
     "timed-path": {"x": "20 + 10*cos(t)", "y": "15 + 5*sin(t)", "unit": "cm", "n": 72},
     "untimed-path": {"x": "20 + 10*cos(t)", "y": "15 + 5*sin(t)", "unit": "cm", "n": 72},
@@ -55,7 +55,7 @@ _WISH: Mapping[str, Any] = {
 }
 
 
-#: Section of the links of a new case, from which their masses follow.
+#: Cross section of the links of a new case, from which the masses of the links follow.
 _SECTION = {"kind": "bar", "width": "30 mm", "thickness": "8 mm", "material": "steel"}
 _OF_SECTIONS = """\
 # Masses, centres of mass and moments of inertia of {links} follow from their lengths and sections: say
@@ -66,7 +66,7 @@ _OF_SECTIONS = """\
 
 
 def kinds() -> dict[str, str]:
-    """Return the kinds of files that `linkwork new` writes, each with the command that reads it."""
+    """Return the kinds of files that `linkwork new` writes, each with the command that reads such a file."""
     runs = dict.fromkeys(MECHANISMS, "linkwork run")
     return (
         runs
@@ -80,7 +80,10 @@ def kinds() -> dict[str, str]:
 
 
 def case_text(kind: str, file: str, *, parameters: bool = False) -> str:
-    """Return the text of a case file of a kind; with ``parameters`` it has only the parameters of a mechanism."""
+    """Return the text of a new case file of a kind; with ``parameters`` only the parameters of a mechanism.
+
+    ``file`` is the name of the file that will contain the text.
+    """
     if kind == LINKAGE:
         from ..linkages import TEXT
 
@@ -99,7 +102,7 @@ def case_text(kind: str, file: str, *, parameters: bool = False) -> str:
 
 
 def _group_by_table(rows: Mapping[str, str]) -> Iterator[str]:
-    """Yield lines grouped by the tables of their dotted names, lines without a table first."""
+    """Yield the lines ``rows`` grouped by table, with headings; lines whose names have no table come first."""
     for group in dict.fromkeys(sorted((name.rpartition(".")[0] for name in rows), key=bool)):
         if group:
             yield f"\n[{group}]"
@@ -115,7 +118,10 @@ def _value(variable: Any, value: Any) -> Any:
 
 
 def _parameter_rows(mechanism: Mechanism, *, sections: bool) -> dict[str, str]:
-    """Return the lines of the first published set's parameters by name; with ``sections`` masses follow from sections."""
+    """Return the lines of the parameters of a mechanism's first published set, by name.
+
+    With ``sections`` the masses of links are computed from their cross sections, and are only comments.
+    """
     from ..files import line
     from ..run import read_parameters
 
@@ -138,7 +144,7 @@ def _parameter_rows(mechanism: Mechanism, *, sections: bool) -> dict[str, str]:
 
 
 def _mass_comments(mechanism: Mechanism) -> str:
-    """Return comments on the sections of links, and on the source of the other numbers of a new case."""
+    """Return comments for a new case on the cross sections of the links, and on the source of the other numbers."""
     from ..linkages import SECTIONS
     from ..sections import DENSITIES
 
@@ -161,7 +167,7 @@ def _parameter_file(mechanism: Mechanism) -> Iterator[str]:
 
 
 def _run_case(mechanism: Mechanism, file: str) -> Iterator[str]:
-    """Yield the lines of a new case file: a run of the first published set, for three turns, or 1 s if it has no drive."""
+    """Yield the lines of a new case file: a run of the first published set, for three turns, or 1 s if the set has no drive."""
     from ..files import entries, in_words, line
     from ..run import RunTable, case_inputs, signal_kinds
 
@@ -208,7 +214,7 @@ def _tuning_case(file: str) -> Iterator[str]:
 
 
 def _synthesis_case(kind: str, file: str) -> Iterator[str]:
-    """Yield the lines of a new case file: a synthesis task, for `SLIDER_MOTION` with the motion of the slider."""
+    """Yield the lines of a new case file: a synthesis task; for the kind `SLIDER_MOTION` with a motion of the slider."""
     from ..files import Quantity, entries, line
     from ..slider import TABLES as MOTION
     from ..synthesis import ANGLES, BOUNDS, KINDS, LENGTHS, TABLES
@@ -246,7 +252,7 @@ def _synthesis_case(kind: str, file: str) -> Iterator[str]:
 @click.option("--force", is_flag=True, help="Overwrite a file of the same name.")
 @report_errors
 def new(kind: str | None, file: str | None, parameters: bool, force: bool) -> None:
-    """Write a case file to start from, with every entry explained, which runs as it is. Without KIND the kinds are listed.
+    """Write a case file to start from, with every entry explained. It runs without changes. Without KIND list the kinds.
 
     KIND is a mechanism (for a run), a synthesis task, "slider-motion", "tuning", or "linkage" (for a linkage of your own).
 

@@ -1,4 +1,4 @@
-"""The command that probes an FMU of any make."""
+"""`linkwork probe`: probe an FMU of any make."""
 
 from __future__ import annotations
 
@@ -70,7 +70,8 @@ def probe(
 ) -> None:
     """Probe an FMU of any make: random calls, legal and forbidden, saved states, derivatives, ranges, leaks, folders.
 
-    The FMU runs in separate processes, so that a crash is a finding. The exit code is 4 if something crashes or is wrong.
+    The FMU runs in separate processes, so that a crash is a finding. The exit code is 4 if the FMU crashes or does something
+    wrong.
 
     \b
     Examples:
@@ -115,7 +116,7 @@ def _write(report: Report, path: Path) -> Path:
 
 
 def _show(findings: Sequence[Finding]) -> None:
-    """Print a table of the findings, one row for each kind."""
+    """Print a table of the findings, with one row for each severity and kind."""
     kinds: dict[tuple[str, str], list[Finding]] = {}
     for finding in findings:
         kinds.setdefault((finding.severity, finding.kind), []).append(finding)

@@ -1,4 +1,4 @@
-"""The command that finds damping and natural frequency from a decaying record."""
+"""`linkwork decrement`: find damping and natural frequency from the record of a decaying vibration."""
 
 from __future__ import annotations
 
@@ -33,8 +33,9 @@ def decrement(
 ) -> None:
     """Find damping and natural frequency from the decaying record of a freedom on its spring, by the logarithmic decrement.
 
-    RECORD is a CSV file of times and positions after an impulse or a release. The turning points and the offset of the record
-    are fitted by least squares; +- is the standard error. With dry friction the decrement grows from cycle to cycle.
+    RECORD is a CSV file of times and positions after an impulse or a release. A decaying vibration with an offset is fitted to
+    the turning points of the record by least squares; +- is the standard error. With dry friction the decrement grows from
+    cycle to cycle.
 
     \b
     Examples:
@@ -87,9 +88,10 @@ def decrement(
 
 
 def _result_rows(decay: Any, kg: float | None, metre: float | None, unit: str) -> list[tuple[str, float, float, str]]:
-    """Return the rows of a fitted decay as (name, value, standard error, unit).
+    """Return the results of a fitted decay as rows (name, value, standard error, unit).
 
-    With a mass ``kg`` they have damping and stiffness; with ``metre``, the length of ``unit`` in m, they have friction.
+    With a mass ``kg`` there are rows of damping and stiffness. With ``metre``, the length of ``unit`` in m, there are rows of
+    dry friction.
     """
     natural, error = decay.natural_frequency, decay.natural_frequency_error
     rows = [

@@ -1,4 +1,4 @@
-"""Commands that run cases, check FMUs, describe both, and make the theses' figures."""
+"""Commands that run cases, check FMUs, describe mechanisms, cases and FMUs, and make the theses' figures."""
 
 from __future__ import annotations
 
@@ -44,14 +44,14 @@ from .common import (
     unknown_name_error,
 )
 
-#: A value below this share of the largest value in the same unit is rounding, and printed as zero.
+#: A value below this share of the largest value in the same unit is a rounding error, and is printed as zero.
 _ROUNDING = 1e-12
 #: Folder in which the FMUs of the mechanisms are looked for.
 DEFAULT_FOLDER = Path("build")
 
 
 class CaseChanges(TypedDict):
-    """Options that replace entries of a case; None if not given."""
+    """Options of the command line that replace entries of a case; None if an option is not given."""
 
     stop_time: str | None
     step: str | None
@@ -86,7 +86,7 @@ def run(
     plot: bool,
     **given: Unpack[CaseChanges],
 ) -> None:
-    """Run a CASE file (TOML or JSON) or a published set, and write CSV and a plot.
+    """Run a CASE file (TOML or JSON) or a published set, and write the results as CSV and a plot.
 
     \b
     Examples:
@@ -106,7 +106,7 @@ def run(
     if any(setting.startswith("run.revolutions=") for setting in settings) and "stop_time" in changed:
         raise click.UsageError("give --stop-time or --set run.revolutions, not both")
     if "stop_time" in changed and (case is not None or settings):
-        # it replaces the revolutions of the file
+        # the stop time replaces the number of revolutions in the file
         settings = (*settings, f"run.stop_time={changed['stop_time']!r}")
     chosen = chosen_case(case, published, settings)
     if fmu is not None and method != "compiled":
@@ -152,7 +152,7 @@ def run(
 
 
 def _bare_speeds(file: str | None, settings: Sequence[str], case: Any) -> list[str]:
-    """Return a note for each speed given as a number without unit, which asks whether rpm was meant instead of rad/s."""
+    """Return a note for each speed that was given without unit; the note asks whether rpm was meant instead of rad/s."""
     from ..files import flatten, read_tables
     from ..mechanisms import find_mechanism
     from ..run import case_inputs
@@ -193,7 +193,7 @@ def _print_extremes(title: str, result: Any) -> None:
 
 
 def _with_magnitudes(result: Any) -> Iterator[tuple[str, Any, str]]:
-    """Yield name, values and SI unit of each output of a run; after the force components of a joint yield their magnitude."""
+    """Yield name, values and SI unit of each output of a run; after the force components of a joint, the magnitude."""
     import numpy as np
 
     from ..mechanisms import find_mechanism
@@ -240,8 +240,8 @@ def check(
 ) -> None:
     """Compare FMUs with the in-process solver, output by output. CASES are names of standard cases or case files.
 
-    For several FMUs or interfaces one line each is printed, and all outputs of those that fail; for a single one all outputs
-    are printed.
+    If there are several FMUs or interfaces, the command prints one line for each, and all outputs of each that fails. If there
+    is only one, it prints all outputs.
 
     \b
     Examples:
@@ -296,7 +296,11 @@ def check(
 
 
 def _find_fmus(model: str, fmu: str | None, only: str | None) -> list[tuple[Path, str, str]]:
-    """Return the FMUs of a model, or the given one, with each interface to check: (path, interface, interface in words)."""
+    """Return what to check: (path of the FMU, interface, interface in words), for each interface of each FMU.
+
+    The FMUs are ``fmu`` if it is given, otherwise all FMUs of the model in the folder build. With ``only`` just this interface
+    is returned.
+    """
     from ..run import CHECKED, list_interfaces
 
     if only is not None and only not in CHECKED:
@@ -313,9 +317,10 @@ def _find_fmus(model: str, fmu: str | None, only: str | None) -> list[tuple[Path
 
 
 def _find_cases(names: Sequence[str], fmu: str | None, everything: bool) -> list[tuple[str, Any]]:
-    """Return names and cases: the named standard cases and case files, without names one standard case per mechanism or all.
+    """Return the cases to check, with their names: the standard cases and case files in ``names``.
 
-    If an FMU is given, the standard cases are those of its mechanism.
+    Without names they are one standard case for each mechanism, or all standard cases if ``everything``. If an FMU is given,
+    only standard cases of its mechanism are taken.
     """
     from ..mechanisms import find_mechanism
     from ..run import CASES, load_case
@@ -340,7 +345,7 @@ def _find_cases(names: Sequence[str], fmu: str | None, everything: bool) -> list
 
 
 def _model_name(path: Path) -> str | None:
-    """Return the name of the model in an FMU; None if the FMU cannot be read, which the check reports later."""
+    """Return the name of the model in an FMU; None if the FMU cannot be read (the check reports this later)."""
     from ..files import check_fmu
     from ..run import read_description
 
@@ -394,7 +399,9 @@ def _print_comparison(title: str, comparison: Any) -> None:
 @click.argument("what", required=False)
 @report_errors
 def info(what: str | None) -> None:
-    """Describe all mechanisms and published sets, or one of them, a parameter file, a case file or an FMU.
+    """Describe WHAT: a mechanism, a published set, a parameter file, a case file or an FMU.
+
+    Without WHAT list all mechanisms and published sets.
 
     \b
     Examples:
@@ -453,7 +460,7 @@ def _print_mechanism(mechanism: Any) -> None:
 
 
 def _print_parameters(title: str, parameters: Any) -> None:
-    """Print a table of parameters, and for a five-bar whether the crank turns fully."""
+    """Print a table of parameters, and for a five-bar whether the crank can make a full turn."""
     import numpy as np
 
     from linkwork.five_bar.kinematics import assembly_square
@@ -511,8 +518,10 @@ def _print_fmu(path: Path) -> None:
 @click.option("--list", "listing", is_flag=True, help="Only list the figures, with what each is about.")
 @report_errors
 def figures(numbers: Sequence[str], out: str, settings: Sequence[str], listing: bool) -> None:
-    """Make the theses' figures, a picture and an animation of the linkage: plots, CSV, and each statement with its verdict.
-    NUMBERS are such as 3.2 (Youssef) or R5 (Rahman's figure 5); all figures by default.
+    """Make the figures of the theses: plots, CSV, and each statement of the thesis with a verdict. Also draw the linkage.
+
+    NUMBERS of figures are such as 3.2 (Youssef) or R5 (Rahman's figure 5); all figures by default. The linkage is drawn as a
+    picture and an animation.
 
     \b
     Examples:

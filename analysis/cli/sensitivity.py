@@ -1,4 +1,4 @@
-"""Report which parameters move the special points of a response most, for the command line."""
+"""Report, for `linkwork resonance`, which parameters move the special points of a response most."""
 
 from __future__ import annotations
 
@@ -13,20 +13,25 @@ from linkwork.errors import LinkworkError
 from .common import console, print_error, show_table
 from .driven import swing_unit
 
-#: Number of parameters that are printed for each point.
+#: Greatest number of parameters that are printed for each point.
 _NAMED = 4
 
 
 def report_sensitivity(response: Any, factor: float, unit: str, path: str) -> list[Path]:
-    """Print the parameters that move each special point and its amplitude most; write all elasticities and return the paths.
+    """Print the parameters that move each special point and its amplitude most; write all elasticities to a table.
 
     Parameters
     ----------
     response : Response
     factor, unit
-        Factor from SI and unit in which the parameter of the response is printed.
+        Unit in which the parameter of the response is printed, and the factor from SI to this unit.
     path : str
-        Path of the table, with a row for each point in the order printed.
+        Path of the table. It has one row for each special point, in the order in which the points are printed.
+
+    Returns
+    -------
+    list of Path
+        The paths written; empty if there is no special point with a gradient.
     """
     from ..files import write_csv
     from ..periodic import gradient_names, parameter_value, special_gradient

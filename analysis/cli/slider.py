@@ -1,4 +1,4 @@
-"""The command that finds a slider motion for a linkage that does its task too badly, and the drive for this motion."""
+"""`linkwork slider-motion`: find a slider motion with which a linkage does its task better, and the drive of this motion."""
 
 from __future__ import annotations
 
@@ -54,9 +54,9 @@ def slider_motion(
 ) -> None:
     """Move the rocker pivot of a linkage with a slider, so that it does the task of a CASE file (TOML or JSON) better.
 
-    With a table [strategy] the simplest mechanism within a tolerance is sought, and each step is explained. With [drive] the
-    force, torque, power and pin forces of the motion are computed, and a case for 'linkwork run' is written; with [tracking]
-    the motion is run under control.
+    With a table [strategy] in the case, the command finds the simplest mechanism within a tolerance and explains each step.
+    With [drive] it computes force, torque, power and pin forces of the motion, and writes a case for 'linkwork run'. With
+    [tracking] it simulates the motion with a controller.
 
     \b
     Examples:
@@ -90,7 +90,7 @@ def slider_motion(
 
 
 def _find_strategy(chosen: SliderCase) -> tuple[Any, Interrupted | None]:
-    """Find the simplest mechanism within the tolerance; return its solution, and the interruption of the search or None."""
+    """Find the simplest mechanism within the tolerance; return its solution, and the interruption if there was one."""
     from ..slider import StrategyInterrupted
 
     stopped = None
@@ -110,7 +110,7 @@ def _find_strategy(chosen: SliderCase) -> tuple[Any, Interrupted | None]:
 
 
 def _find_motion(chosen: SliderCase) -> tuple[Any, Interrupted | None]:
-    """Find the best motion for each number of harmonics; return the best of all, and the interruption of the search or None."""
+    """Find the best motion for each number of harmonics; return the best of all, and the interruption if there was one."""
     from ..synthesis import SynthesisInterrupted
 
     stopped = None
@@ -132,7 +132,7 @@ def _find_motion(chosen: SliderCase) -> tuple[Any, Interrupted | None]:
 
 
 def _print_motions(title: str, solutions: Sequence[Solution]) -> None:
-    """Print the solutions with fixed pivot and with moved pivot, one row each, in mm and degrees."""
+    """Print a table of solutions with fixed and with moved rocker pivot, one row for each, in mm and degrees."""
     from ..slider import greatest_derivative
     from ..synthesis import SliderMotion, format_transmission, quality_cells, quality_headings, quality_name
 
@@ -178,7 +178,7 @@ def _write_solution(solution: Solution, folder: Path, case: SliderCase, plots: b
 
 
 def _motion_columns(series: FourierSeries, rotation: Any) -> dict[str, Any]:
-    """Return columns of the slider position and its derivatives by the crank rotation, by name with unit."""
+    """Return columns, by name with unit, of the slider position and its derivatives with respect to the crank rotation."""
     columns = {"crank rotation [rad]": rotation, "slider position [m]": series(rotation)}
     columns["du/dphi [m/rad]"] = series.derivative()(rotation)
     columns["d2u/dphi2 [m/rad2]"] = series.derivative().derivative()(rotation)
@@ -189,7 +189,10 @@ def _motion_columns(series: FourierSeries, rotation: Any) -> dict[str, Any]:
 
 
 def _dynamics(chosen: SliderCase, solution: Solution, folder: Path, plots: bool) -> list[Path]:
-    """Compute and write force, torque and pin forces, and a case to run; run it under control if requested; return paths."""
+    """Compute and write force, torque and pin forces of a slider motion, and a case of a run; return the paths.
+
+    If the case has a table [tracking], also simulate the motion with a controller.
+    """
     from ..files import write_csv, write_tables
     from ..run import save_parameters
     from ..slider import run_case

@@ -1,4 +1,4 @@
-"""`linkwork studio`: open the page on which a mechanism moves and can be dragged."""
+"""`linkwork studio`: open the web page on which a mechanism moves and can be dragged."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ from .common import (
     set_option,
 )
 
-#: Environment variables that are set if there is a screen, or if a browser was chosen.
+#: Environment variables; one of them is set if there is a screen or if the user has chosen a browser.
 _SCREENS = ("DISPLAY", "WAYLAND_DISPLAY", "BROWSER")
 
 
@@ -52,12 +52,12 @@ _SCREENS = ("DISPLAY", "WAYLAND_DISPLAY", "BROWSER")
 @force_option
 @report_errors
 def studio(what: str | None, out: str | None, browser: bool, port: int, settings: Sequence[str]) -> None:
-    """Open the page on which a mechanism moves and can be dragged.
+    """Open the web page on which a mechanism moves and can be dragged.
 
-    WHAT is a case file, a file of parameters such as linkwork synthesize writes, or the name of a published set; without it the
-    page opens with a five-bar. The page is served only to this machine, until Ctrl-C. Python finds linkages for a drawn path
-    and slider motions, tunes, runs the FMU and exports it. With --out the page is one file that needs neither network nor
-    Python, and can do everything else.
+    WHAT is a case file, a file of parameters such as linkwork synthesize writes, or the name of a published set; without WHAT
+    the page opens with a five-bar. The page is served only to this machine, until Ctrl-C. With --out the page is written to a
+    file instead, which needs neither network nor Python. The file can do everything except what Python does for the served
+    page: find linkages for a drawn path, find slider motions, tune, run the FMU and export the FMU.
 
     \b
     Examples:
@@ -80,14 +80,14 @@ def studio(what: str | None, out: str | None, browser: bool, port: int, settings
     say(f"the studio is at {server.address}")
     print_error("it is served to this machine alone; Ctrl-C stops it")
     if browser:
-        # a browser in the terminal returns only when it is closed, and the page must be served until then
+        # a browser in a terminal returns only when the user closes it, and the page must be served until then
         threading.Thread(target=_open, args=(server.address,), daemon=True).start()
     server.run()
     print_error("the studio is closed")
 
 
 def _open(address: str) -> None:
-    """Open a browser if there is a screen; otherwise print a note, as browsers in a terminal cannot show the page."""
+    """Open a browser at an address if there is a screen; otherwise print a note: terminal browsers cannot show the page."""
     screen = sys.platform in ("win32", "darwin") or any(os.environ.get(name) for name in _SCREENS)
     if not (screen and webbrowser.open(address)):
         print_error("note: there is no browser here: open the address in one, or write the page as a file with --out")

@@ -122,7 +122,7 @@ def run(
     out: str,
     plot: bool,
 ) -> None:
-    """Run a system: print a table of its connected outputs, write all outputs as CSV, and a plot."""
+    """Run a system: print a table of its connected outputs, and write all outputs as CSV and a plot."""
     from ..files import write_csv
     from ..systems import run_system
     from ..units import display_scale
@@ -168,9 +168,10 @@ def run(
 @plot_option
 @report_errors
 def check(file: str, stop: str | None, decades: int, out: str, plot: bool) -> None:
-    """Check the wiring of a system; for a description also measure the error of each coupling over the communication step.
+    """Check the connections of a system. For a description also measure how the error of each coupling depends on the step.
 
-    The reference for the errors is the system as one model, solved by SciPy with a tolerance of 1e-12.
+    The step is the communication step. The reference for the errors is the system as a single model, solved by SciPy with a
+    tolerance of 1e-12.
     """
     from ..systems import convergence, load_system
 
@@ -224,7 +225,10 @@ def draw(file: str, out: str) -> None:
 @out_option(help="Folder in which the host's folder is made.")
 @report_errors
 def host(file: str, out: str) -> None:
-    """Build a system as one C program for real-time targets, without heap or Python, with step times and missed deadlines."""
+    """Build a system as one C program for real-time targets, without heap and without Python.
+
+    The program reports the step times and the missed deadlines.
+    """
     from ..systems import build_host
 
     made = build_host(_wiring(file), output_folder(out) / f"{Path(file).stem}-host")

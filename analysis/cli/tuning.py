@@ -1,4 +1,4 @@
-"""The command that tunes parameters to a range of speeds."""
+"""`linkwork tune`: tune parameters so that a range of speeds has wanted properties."""
 
 from __future__ import annotations
 
@@ -38,10 +38,10 @@ from .design import read_settings
 def tune(case: str, settings: Sequence[str], as_json: bool, plot: bool, out: str) -> None:
     """Find the least change of parameters of a CASE file (TOML or JSON) that gives a range of speeds the properties in [tune].
 
-    These are: no resonance, jump or unstable motion in the range, outputs below their limits, or the least damping with which
-    this holds. The result is verified: the response is followed again, a row of a chart is computed, and all motions are
-    sought. The command writes a case with the changed parameters, the result as JSON, and a picture. If the requirements
-    cannot be met, it gives the nearest result, and the exit code is 4.
+    Possible properties are: no resonance, jump or unstable motion in the range; outputs below their limits; or the least
+    damping with which the other properties hold. The result is verified: the response is computed again, a row of a stability
+    chart is computed, and all periodic motions are sought. The command writes a case with the changed parameters, the result as
+    JSON, and a picture. If the requirements cannot be met, it writes the nearest result, and the exit code is 4.
 
     \b
     Examples:

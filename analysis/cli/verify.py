@@ -1,4 +1,4 @@
-"""The command that verifies an FMU by the experiments that it contains."""
+"""`linkwork verify`: verify an FMU by the experiments that the FMU contains."""
 
 from __future__ import annotations
 
@@ -17,11 +17,11 @@ from .common import CHECK_FAILED, console, print_error, report_errors, show_tabl
 def verify(fmu: str, tolerance: float | None, rebuild: bool) -> None:
     """Run the experiments that an FMU of any make contains (FMI-LS-REF), and compare with its reference results.
 
-    The largest difference of each experiment is shown, relative to the variable's scale. The exit code is 4 if a difference is
-    too large.
+    The command prints the largest difference in each experiment, relative to the variable's scale. The exit code is 4 if a
+    difference is too large.
 
-    With --rebuild the files of an FMU of Linkwork are compared with its bill of materials, and its libraries with those
-    compiled here from its sources.
+    With --rebuild, for an FMU built by Linkwork, the command compares the files of the FMU with its bill of materials, and its
+    libraries with libraries compiled here from its sources.
 
     \b
     Examples:
@@ -65,7 +65,7 @@ def verify(fmu: str, tolerance: float | None, rebuild: bool) -> None:
 
 
 def _rebuild(fmu: str) -> None:
-    """Print whether each part of an FMU can be rebuilt identically from its sources; exit with an error code if not."""
+    """Print for each part of an FMU whether a rebuild from its sources is identical; exit with an error code if one differs."""
     from ..export import rebuild as rebuild_fmu
 
     with console.status("building"):

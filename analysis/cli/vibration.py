@@ -1,4 +1,4 @@
-"""Commands about vibration: where a mechanism resonates, and where its periodic motion is unstable."""
+"""`linkwork resonance` and `linkwork stability`: where a mechanism resonates, and where its periodic motion is unstable."""
 
 from __future__ import annotations
 
@@ -34,7 +34,10 @@ _RANGE = (0.15, 2.3)
 
 
 def _require_range(parameters: Any, low: float, high: float, name: str, first: str, last: str) -> None:
-    """Raise a usage error if a range does not increase, or if speeds in it are not above zero; it names the options."""
+    """Raise a usage error if a range does not increase, or if it is a range of speeds that does not begin above zero.
+
+    ``first`` and ``last`` are the options that gave the ends of the range, for the message.
+    """
     from ..periodic import format_value, parameter_unit, speed_names
 
     unit = parameter_unit(find_mechanism(parameters), name)
@@ -89,10 +92,10 @@ def resonance(
 ) -> None:
     """Follow the periodic motions of a CASE file or a published set over the speed, or over another parameter.
 
-    A closed branch that is connected with no other is an isola; its end reads "closed".
+    The command writes amplitude, harmonics, crank torque and pin forces along the branches. It reports natural frequency,
+    maxima, folds, period doublings, the speeds to avoid, and the classical approximations next to the true motion.
 
-    The command writes amplitude, harmonics, crank torque and pin forces along the branches, and reports natural frequency,
-    maxima, folds, period doublings, the speeds to avoid, and the classical approximations beside the true motion.
+    An isola is a closed branch that is not connected with any other branch; in the table its end reads "closed".
 
     \b
     Examples:
@@ -116,7 +119,7 @@ def resonance(
 
     parameters, title = chosen.case.parameters, chosen.case.title
     mechanism = find_mechanism(parameters)
-    # if there are several cranks, the case says which are commanded; the ratios of their speeds are kept
+    # if there are several cranks, the case says which of them are commanded; the ratios of their speeds are kept
     vary = vary or default_variable(mechanism, chosen.drive() if len(mechanism.cyclic_freedoms) > 1 else None)
     over_speed = vary in speed_names(mechanism)
     if over_speed and chosen.speed is not None:
@@ -160,7 +163,7 @@ def resonance(
 
 
 def _natural_frequency(parameters: Any) -> float | None:
-    """Return the natural frequency (rad/s); None without a spring."""
+    """Return the natural frequency (rad/s); None if the mechanism has no spring."""
     from ..periodic import natural_frequency
 
     try:
@@ -172,7 +175,7 @@ def _natural_frequency(parameters: Any) -> float | None:
 def _range_ends(
     parameters: Any, vary: str, low: str | None, high: str | None, natural: float | None
 ) -> tuple[float, float]:
-    """Return the ends of the range to follow in SI, by default about the natural frequency (rad/s)."""
+    """Return the ends of the range to follow, in SI; by default a range around the natural frequency (rad/s)."""
     from ..periodic import parameter_unit, speed_names
 
     unit = parameter_unit(find_mechanism(parameters), vary)
@@ -214,7 +217,7 @@ def _print_branches(title: str, response: Any, factor: float, unit: str) -> None
 
 
 def _normal_form_in_words(family: Any, special: Any) -> str:
-    """Return in words whether stability is lost gently or with a jump at a special point."""
+    """Return in words whether the motion loses stability gently or with a jump at a special point of a branch."""
     from ..periodic import OrbitError, normal_form
 
     try:
@@ -224,7 +227,7 @@ def _normal_form_in_words(family: Any, special: Any) -> str:
 
 
 def _has_dry_friction(parameters: Any) -> bool:
-    """Return whether the mechanism has friction that is not viscous."""
+    """Return whether the mechanism has dry friction: whether any of its friction parameters is not zero."""
     return any(getattr(parameters, field_name(name)) for name in find_mechanism(parameters).names("friction"))
 
 
@@ -256,7 +259,7 @@ def _print_extrema(response: Any, factor: float, unit: str, table: Any) -> None:
 
 
 def _print_ranges_to_avoid(response: Any, factor: float, unit: str) -> None:
-    """Print the ranges of speed, or of the parameter, to avoid, and the jumps at folds."""
+    """Print the ranges to avoid, of the speed or another parameter, and the jumps at folds."""
     ranges = response.speeds_to_avoid
     words = "speeds" if response.family.unit == "rad/s" else f"values of {response.family.name}"
     if response.caution:
@@ -318,10 +321,10 @@ def stability(
 ) -> None:
     """Report whether the periodic motion of a CASE file or a published set is stable, and chart where it is unstable.
 
-    The verdict is on the motion at one speed, with its margin. The chart has the largest Floquet multiplier of the true orbit
-    at every point, the boundaries of instability, that of the linear equation for comparison, and three points confirmed by
-    long nonlinear runs. The picture of the grid is written first. Computed rows are kept, so that an interrupted chart is
-    continued.
+    The verdict is on the motion at one speed, with its margin. The chart shows the largest Floquet multiplier of the true orbit
+    at every point, the boundaries of instability, for comparison the boundaries by the linear equation, and three points
+    confirmed by long nonlinear runs. A picture without boundaries is written first. Computed rows are kept, so that after an
+    interruption the same command continues.
 
     \b
     Examples:
@@ -348,7 +351,7 @@ def stability(
             except LinkworkError as error:
                 if own is not None or texts is not None:
                     raise
-                # the user chose nothing on this axis: the verdict does not need it
+                # the user chose nothing on this axis, and the verdict does not need a range
                 missing = InputError(f"no chart over {name}, as {option} is not given: {error}")
     _report_verdict(chosen.case.title, parameters, drive, start)
     if missing is not None:
@@ -358,7 +361,7 @@ def stability(
     stem = output_folder(chosen.folder) / f"{chosen.stem}-stability"
 
     def write_first_picture(found: Any) -> None:
-        """Write the picture of the grid without its boundaries, which take longer."""
+        """Write the picture of a chart that has only its grid; its boundaries take longer."""
         print_paths(save_picture(figures.picture(found, title=chosen.case.title), stem, html=html))
         say("its boundaries follow; after Ctrl-C the picture stays without them")
 
@@ -401,14 +404,14 @@ def _axis_range(
 
 
 def _report_verdict(title: str, parameters: Any, drive: Any, start: Any) -> None:
-    """Print the verdict on the motion at one speed, and for a five-bar that of the linear equation."""
+    """Print the verdict on the stability of the motion at one speed, and for a five-bar the verdict by the linear equation."""
     from ..periodic import newton_orbit
     from ..youssef import linear_verdict
 
     orbit = newton_orbit(parameters, drive, start=start)
     turn, (_, size, unit) = orbit.turn(), swing_unit(orbit)
     values = ", ".join(f"{m.real:.6g}{m.imag:+.6g}i" if m.imag else f"{m.real:.6g}" for m in orbit.multipliers)
-    # other cranks in a ratio have a common period; a free crank has only a mean speed
+    # cranks with a ratio of speeds have a common period; a crank under a torque has only a mean speed
     rpm = drive.speed / RAD_S_PER_RPM if drive.speed_drive else 60.0 * turn.turns / turn.period
     lines = [
         f"{title} at {rpm:.6g} rpm: {orbit.verdict()}",
@@ -458,7 +461,7 @@ def _print_regions(found: Any) -> None:
 
 
 def _headings(*axes: Any) -> list[str]:
-    """Return the names of axes with their units; dots become spaces, at which a narrow terminal can break the line."""
+    """Return the names of axes with their units, as headings; dots become spaces, where a narrow terminal can wrap the line."""
     return [f"{axis.name.replace('.', ' ')} [{axis.unit}]" for axis in axes]
 
 

@@ -23,9 +23,9 @@ def check_frames(frames: int) -> None:
 
 @contextmanager
 def gif(figure: Figure, path: str | Path, frames_per_second: int) -> Iterator[tuple[Path, Callable[[], None]]]:
-    """Write a GIF: the context yields its path, and a function that adds the current state of the figure as a frame.
+    """Write a GIF; the context yields the path of the file, and a function that adds the current figure as a frame.
 
-    If the command may not overwrite the file, the GIF gets another name beside it. The figure is laid out once, for the first
+    If the current command may not overwrite the file, the GIF gets another name. The figure is laid out once, for the first
     frame, so that its panels do not move between frames.
     """
     path = free_path(path)

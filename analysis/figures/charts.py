@@ -57,11 +57,12 @@ class HeatMap:
     missing : str
         Name of masked points in the legend.
     classes : mapping
-        Names in the legend and colours of classes, if ``values`` are class numbers from 0; there is no colour scale then.
+        Colours of classes by their names in the legend, if ``values`` are class numbers from 0. Such a map has no colour scale.
     sides : (str, str), optional
-        Names in the legend of values below and above the middle; values above it are hatched.
+        Names in the legend of values below and above the middle; values above the middle are hatched.
     hover : mapping
-        Arrays of shape (ny, nx), by name with unit, that a page shows under the pointer beside x and y; by default ``values``.
+        Arrays of shape (ny, nx), by name with unit, that an HTML page shows under the pointer beside x and y; by default
+        ``values``.
     """
 
     panel: Panel
@@ -91,7 +92,7 @@ def plot_charts(
 
 
 def colour_scale(chart: HeatMap) -> tuple[Normalize, Colormap]:
-    """Return the scale from a map's values to [0, 1], and its colour map."""
+    """Return the normalisation of a heat map's values to [0, 1], and the colour map."""
     values = np.ma.masked_invalid(chart.values)
     if chart.classes:
         n = len(chart.classes)
@@ -99,7 +100,7 @@ def colour_scale(chart: HeatMap) -> tuple[Normalize, Colormap]:
     low, high = (float(v) for v in (values.min(), values.max())) if values.count() else (0.0, 1.0)
     if chart.middle is None:
         return Normalize(low, high), colormaps["viridis"]
-    # both sides of the middle in colours, however one-sided the values are
+    # the scale has colours on both sides of the middle, even if all values are on one side
     least = 1e-3 * max(abs(chart.middle), 1e-9)
     low, high = (low, high) if values.count() else (chart.middle, chart.middle)
     norm = TwoSlopeNorm(chart.middle, min(low, chart.middle - least), max(high, chart.middle + least))
@@ -107,7 +108,7 @@ def colour_scale(chart: HeatMap) -> tuple[Normalize, Colormap]:
 
 
 def legend_entries(chart: HeatMap) -> list[tuple[str, str, str]]:
-    """Return colour, hatching and name of each legend entry of a map; the entries of its curves are not among them."""
+    """Return colour, hatching and name of each legend entry of a heat map, without the entries of its curves."""
     keys = [(colour, hatch, name) for (name, colour), hatch in zip(chart.classes.items(), cycle(_HATCHES))]
     if chart.sides is not None:
         keys += [(_BELOW, "", chart.sides[0]), (_ABOVE, _UNSTABLE, chart.sides[1])]
@@ -124,14 +125,14 @@ def _(chart: HeatMap, figure: Figure, axis: Axes) -> None:
     mesh = axis.pcolormesh(chart.x, chart.y, values, shading="nearest", rasterized=True, norm=norm, cmap=colours)
     for of, hatch in _hatched_points(chart, values):
         if of.any() and min(of.shape) > 1:
-            # a boundary half a cell inside of its own points
+            # the level 0.5 lies halfway between hatched and other points
             area = axis.contourf(chart.x, chart.y, of, levels=[0.5, 1.5], colors="none", hatches=[hatch])
             # the hatching has the colour of the edge, which is not drawn
             area.set(edgecolor="0.45", linewidth=0.0)
     axis.grid(False)
     draw_panel(axis, chart.panel)
     if not chart.classes:
-        # the scale is part of the chart, and no axes of its own
+        # the colour scale is a part of the chart's axes
         scale = axis.inset_axes((1.03, 0.0, 0.05, 1.0))
         figure.colorbar(mesh, cax=scale, label=chart.label, ticks=_ticks(norm), format="%g")
         scale.grid(False)
@@ -144,13 +145,13 @@ def _(chart: HeatMap, figure: Figure, axis: Axes) -> None:
     if chart.panel.legend_at == "above":
         legend_above(axis, handles=handles, labels=labels, ncols=3 if len(handles) > 4 else 2)
     else:
-        # over the colours a legend needs a ground
+        # over colours a legend needs a background
         where: Any = chart.panel.legend_at if chart.panel.legend_at != "outside" else "best"
         axis.legend(handles, labels, loc=where, frameon=True, framealpha=0.9)
 
 
 def _ticks(norm: Normalize) -> list[float] | None:
-    """Return about four ticks on either side of the middle of a scale, and the middle; None if the scale has no middle."""
+    """Return about four ticks on each side of the middle of a scale, and the middle; None if the scale has no middle."""
     if not isinstance(norm, TwoSlopeNorm):
         return None
     least, middle, greatest = (float(value or 0.0) for value in (norm.vmin, norm.vcenter, norm.vmax))
@@ -161,7 +162,7 @@ def _ticks(norm: Normalize) -> list[float] | None:
 
 
 def _hatched_points(chart: HeatMap, values: _Masked) -> list[tuple[NDArray[np.float64], str]]:
-    """Return pairs of an array, which is 1 at the points to be hatched and 0 elsewhere, and the hatching."""
+    """Return, for each hatching, an array that is 1 at the points to be hatched and 0 elsewhere, and the hatching."""
     if chart.sides is not None and chart.middle is not None:
         return [(np.asarray(values.filled(-np.inf) > chart.middle + TOLERANCE, dtype=float), _UNSTABLE)]
     hatches = [_HATCHES[i % len(_HATCHES)] for i in range(len(chart.classes))]
@@ -172,7 +173,7 @@ def _hatched_points(chart: HeatMap, values: _Masked) -> list[tuple[NDArray[np.fl
 def plot_stability_chart(chart: StabilityChart, *, title: str = "") -> Picture:
     """Plot the largest Floquet multiplier in colours, the stability boundaries, and the outcomes of long runs.
 
-    If the chart has the coexisting motions, their number and amplitudes are plotted instead of the multiplier.
+    If coexisting motions were searched for, their number and amplitudes are plotted instead of the multiplier.
     """
     x, y = chart.axes
     looks = {
@@ -241,7 +242,7 @@ def plot_stability_chart(chart: StabilityChart, *, title: str = "") -> Picture:
 
 
 def _coexistence_picture(chart: StabilityChart, beside: Coexistence, panel: Panel, title: str) -> Picture:
-    """Describe maps of the number of stable motions, and of the least and greatest amplitude, with the boundaries."""
+    """Return the picture of three maps: number of stable motions, least and greatest amplitude, with the boundaries."""
     x, y = (axis.factor * values for axis, values in zip(chart.axes, (beside.x, beside.y)))
     what, unit = beside.swing
     shown, factor = display_scale(unit)
@@ -251,7 +252,7 @@ def _coexistence_picture(chart: StabilityChart, beside: Coexistence, panel: Pane
     }
     hover: dict[str, ArrayLike] = {"motions found": beside.count, "stable motions": beside.stable}
     hover |= {name: values.filled(np.nan) for name, values in sizes.items()}
-    # over amplitudes, which are dark where they are small, black is not seen
+    # black is not visible over small amplitudes, whose colours are dark
     light = {"0.1": "0.85"}
     curves = [replace(curve, label="", colour=light.get(str(curve.colour), curve.colour)) for curve in panel.curves]
     bare = replace(panel, curves=curves)

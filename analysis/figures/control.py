@@ -82,8 +82,9 @@ def plot_bode(
 class _Margins(NamedTuple):
     """Stability margins of an open loop.
 
-    ``gains`` has pairs (gain factor, frequency in rad/s): the nearest below 1 and the nearest above 1, as far as there are any;
-    ``phase`` is (phase margin in deg, frequency); ``stable`` says whether the closed loop is stable without changes.
+    ``gains`` has pairs (gain factor, frequency in rad/s) at which the closed loop becomes unstable: the nearest factor below 1
+    and the nearest above 1, if they exist. ``phase`` is (phase margin in deg, frequency). ``stable`` says whether the closed
+    loop is stable without changes.
     """
 
     gains: tuple[tuple[float, float], ...] = ()

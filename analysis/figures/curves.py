@@ -47,9 +47,9 @@ class Curve:
     """One curve of a panel.
 
     ``x`` and ``y`` are points (n,) in the units of the axes, ``label`` is the entry of the legend, ``order`` the drawing order
-    (Matplotlib's zorder); a look that is None is chosen by the panel. A marker between dollars, such as "$2$", is drawn as
-    these letters. With ``cut`` markers are cut at the edge of the axes. ``hover`` has arrays (n,), by name with unit, that a
-    page shows under the pointer beside x and y.
+    (Matplotlib's zorder); the panel chooses colour, width and order that are None. A marker between dollars, such as "$2$", is
+    drawn as these letters. With ``cut`` markers are cut at the edge of the axes. ``hover`` has arrays (n,), by name with unit,
+    that an HTML page shows under the pointer beside x and y.
     """
 
     x: ArrayLike
@@ -102,7 +102,7 @@ class Panel:
     x_label, y_label : str
         With units.
     curves : sequence of Curve
-        Drawn in the order of `COLOURS`.
+        Curves without a colour of their own get those of `COLOURS` in order.
     verticals : mapping
         Places along x of dotted vertical lines, by name; the names are written where they cover as little as possible.
     dashed : sequence of float
@@ -115,7 +115,7 @@ class Panel:
     logarithmic : str
         Axes on a logarithmic scale: "", "x", "y" or "xy".
     equal : bool
-        Whether both axes have one scale.
+        Whether both axes have the same scale.
     filled : sequence of sequence of ndarray, shape (n, 2)
         Areas to shade, each as the list of its closed boundaries; clockwise ones are holes.
     x_ticks : sequence of float, optional
@@ -153,7 +153,7 @@ class Picture:
     title : str
         Title of the figure; for a figure of the thesis its number.
     columns : int
-        Parts side by side.
+        Number of parts side by side.
     size : (float, float)
         Width and height of a part (inches).
     notes : sequence of str
@@ -192,7 +192,7 @@ def plot_curves(
 def register_picture(of: Callable[_Arguments, Picture]) -> Callable[_Arguments, Figure]:
     """Register a function that returns the picture of a result, and return a function that draws this picture as a figure.
 
-    Both are registered by the type of their first argument, with `dispatch.picture` and `dispatch.plot`.
+    The two functions are registered with `dispatch.picture` and `dispatch.plot`, by the type of their first argument.
     """
 
     @wraps(of)
@@ -258,7 +258,7 @@ def _name_few_decades(axis: Axis) -> None:
 
 def draw_panel(axis: Axes, panel: Panel) -> None:
     for boundaries in panel.filled:
-        # clockwise boundaries are holes in the other ones
+        # clockwise boundaries are holes in the areas of the others
         outline = Outline.make_compound_path(
             *(Outline(np.vstack([ring, ring[:1]]), closed=True) for ring in boundaries)
         )
@@ -324,7 +324,7 @@ def _draw_curve(axis: Axes, curve: Curve, colour: str) -> None:
         linewidth=curve.width,
         markeredgewidth=0.3 if letters else THIN if curve.hollow else LINE,
         zorder=curve.order or (3 if curve.marker else 2),
-        # letters on a line have a white outline, so that they can be read
         clip_on=curve.cut,
+        # letters on a line have a white outline, so that they can be read
         path_effects=[withStroke(linewidth=3.0, foreground="white")] if letters else None,
     )

@@ -1,4 +1,4 @@
-"""`plot` and `animate`: one name for the picture of any result.
+"""Provide `plot`, `picture` and `animate`, which draw or describe any result that has a picture.
 
 The module that draws a kind of result registers its function::
 
@@ -177,7 +177,7 @@ def _has_planar_drawing(parameters: object) -> bool:
 
 
 def last_samples(run: Trajectory) -> tuple[slice, str]:
-    """Return the samples of a run over which paths are drawn, the last ones of a long run, and a phrase that names them."""
+    """Return the samples over which paths are drawn, of a long run only the last, and a phrase that names the samples."""
     if len(run) <= _TRACED:
         return slice(None), "over the run"
     return slice(-_TRACED, None), f"over the last {run.time[-1] - run.time[-_TRACED]:.3g} s"

@@ -38,7 +38,7 @@ from .style import (
 MM_PER_METRE = 1e3
 #: Length of the long arm that marks a pose, relative to the size of the poses.
 ARM = 0.09
-#: Least length of this arm beside curves, relative to the width of the view.
+#: Least length of the long arm in a picture with curves, relative to the width of the view.
 _ARM_IN_VIEW = 0.045
 #: Width of the view about the poses, relative to their size.
 VIEW = 2.2
@@ -46,7 +46,7 @@ VIEW = 2.2
 
 @plot.register
 def plot_guidance(found: Guidance, *, title: str = "") -> Figure:
-    """Plot the poses, every dyad through them, and below each four-bar of two dyads with its defects."""
+    """Plot the poses, all dyads that guide the body through them, and below each four-bar of two dyads with its defects."""
     count = len(found.solutions)
     columns = 3
     rows = ceil(count / columns)
@@ -86,7 +86,7 @@ def plot_guidance(found: Guidance, *, title: str = "") -> Figure:
 def plot_guidance_map(found: GuidanceMap, *, title: str = "") -> Figure:
     """Plot the curves of fixed pivots and body points with the best linkage, and beside them the quality of each crank pivot.
 
-    The quality is the largest least transmission angle that any rocker gives with this crank.
+    The quality is the least transmission angle of the four-bar with this crank and the rocker that is best for it.
     """
     with figure_style():
         figure = Figure(figsize=(10.4, 5.4))
@@ -154,7 +154,7 @@ def _view(found: GuidanceMap) -> tuple[complex, complex]:
 
 
 def _draw_poses(axis: Axes, found: Guidance | GuidanceMap, *, numbered: bool = False, arm: float = 0.0) -> None:
-    """Draw each pose as an angle: a long arm along the body, at least ``arm`` mm long, and a short arm across."""
+    """Draw each pose as two arms at a right angle: a long arm along the body, at least ``arm`` mm long, and a short one."""
     places, angles, size = _poses(found)
     for number, (place, angle) in enumerate(zip(places, angles), start=1):
         along = max(arm, ARM * size) * np.exp(1j * angle)
@@ -175,7 +175,7 @@ def _pins(solution: Solution) -> dict[str, complex]:
 def _draw_links(axis: Axes, solution: Solution, dyads: Sequence[Dyad] = (), *, named: bool = False) -> None:
     """Draw the links in the first pose, the crank thick.
 
-    With ``dyads`` crank and rocker have the colours of their dyads; with ``named`` they have entries in the legend.
+    With ``dyads`` crank and rocker have the colours of their dyads; with ``named`` the links have entries in the legend.
     """
     names = ("crank", "rocker", "body with its point, pose 1", "fixed pivots") if named else (None,) * 4
     pins = _pins(solution)

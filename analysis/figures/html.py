@@ -141,7 +141,7 @@ class _Axes:
         figure.layout |= {f"xaxis{self.suffix}": self.x, f"yaxis{self.suffix}": self.y}
 
     def add_trace(self, **trace: Any) -> None:
-        """Add a trace."""
+        """Add a trace to the figure, in these axes."""
         self.figure.traces.append(trace | {"xaxis": f"x{self.suffix}", "yaxis": f"y{self.suffix}"})
 
     def legend_group(self, title: str) -> dict[str, Any]:
@@ -208,7 +208,7 @@ def _(panel: Panel, axes: _Axes) -> None:
     for number, curve in enumerate(panel.curves):
         trace = _trace(curve, _hex(curve.colour or COLOURS[number % len(COLOURS)]), panel)
         if trace["mode"] == "text" and trace["showlegend"]:
-            # Plotly's own key of a text is "Aa": a line takes its place
+            # in the legend Plotly shows a text as "Aa": a line is shown instead
             axes.add_trace(**trace | {"x": [None], "y": [None], "mode": "lines"}, **legend)
             trace["showlegend"] = False
         axes.add_trace(**trace, **legend)

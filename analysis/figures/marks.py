@@ -17,19 +17,19 @@ from numpy.typing import NDArray
 
 from .style import HAIR, MARK, MARKED, TINY, Figure
 
-#: Matplotlib's gid of the names of vertical lines and of these lines, and of the texts of points.
+#: Matplotlib's gid of vertical lines and their names, and of the texts of points.
 _GID, _LABEL = "mark", "label"
 #: Heights of a panel (0 to 1) for the top of a name, the best first; clearance (points) from its line and other things.
 _TOPS, _GAP = np.linspace(1.0, 0.2, 17), 2.0
 FloatArray: TypeAlias = NDArray[np.float64]
 _Side: TypeAlias = Literal["left", "right"]
 _SIDES: tuple[_Side, _Side] = ("right", "left")
-#: Distances (points) of a text from its point, the best first; and directions (rad) in which it may be.
+#: Distances (points) of a text from its point, the best first; and directions (rad) of the text from the point.
 _DISTANCES = (10.0, 20.0, 34.0, 52.0, 74.0, 100.0, 130.0)
 _DIRECTIONS = np.radians([30.0, -30.0, 150.0, -150.0, 0.0, 180.0, 90.0, 70.0, 110.0, -90.0, -70.0, -110.0])
 #: Largest share of the lengthened axis that may be added as room for a legend.
 _ROOM = 0.45
-#: If the added share is at least this, every other number of the axis is left out.
+#: If the added share is at least this, every other tick of the axis is left out.
 _CLOSE = 0.3
 #: Weight of a line that crosses a text, or of a text on another, relative to a text that covers a curve.
 _CROSSED = 3
@@ -75,8 +75,8 @@ def label_place(axis: Axes, place: tuple[float, float], text: str) -> None:
 class _Scene:
     """Things on laid-out axes that texts must not cover, in pixels.
 
-    Edges of the axes, legend, positions of vertical lines (``marks``), curves as (path, size of the markers, whether it has a
-    line), and arrows without a text.
+    These are the edges of the axes, the legend, vertical lines at ``marks``, curves as (path, size of the markers, whether the
+    curve has a line), and arrows without a text.
     """
 
     inside: Bbox
@@ -138,7 +138,7 @@ class _Scene:
 
 
 def settle(figure: Figure) -> Figure:
-    """Make room for legends, thin out ticks that touch, and place the texts of marks; the figure must be laid out."""
+    """Make room for legends, leave out ticks whose numbers touch, and place the texts; the figure must be laid out."""
     for axis in figure.axes:
         _thin_ticks(axis)
         _make_room(axis)
@@ -156,7 +156,7 @@ def _thin_ticks(axis: Axes) -> None:
 
 
 def _make_room(axis: Axes) -> None:
-    """Extend the y axis upwards by the height of the legend if it covers curves and the extension helps."""
+    """Extend the y axis upwards by the height of the legend if the legend then covers fewer curves."""
     legend = axis.get_legend()
     if legend is None or axis.get_aspect() != "auto":
         return
@@ -180,7 +180,7 @@ def _make_room(axis: Axes) -> None:
 
 
 def place_marks(figure: Figure) -> Figure:
-    """Move the texts of vertical lines and points to places where they cover least; the figure must be laid out."""
+    """Move the texts of vertical lines and points to where they cover as little as possible; the figure must be laid out."""
     for axis in figure.axes:
         texts = [text for text in axis.texts if isinstance(text, Annotation)]
         moved = [(text, _MOVES[gid]) for gid in _MOVES for text in texts if text.get_gid() == gid]
@@ -207,9 +207,10 @@ def _place(
     others: Sequence[Bbox],
     leaders: Sequence[Path],
 ) -> Bbox:
-    """Move a text to the first of the places where it and its leader cover least, and return its box there.
+    """Move a text to where the text and its leader line cover as little as possible, and return the box of the text.
 
-    ``move`` moves it to a place and returns its box; ``others`` and ``leaders`` are boxes and leaders already placed.
+    Of equally good ``places`` the first is taken. ``move`` moves the text and returns its box; ``others`` and ``leaders`` are
+    the boxes and leader lines of texts that are placed already.
     """
     least: tuple[int, tuple[float, Any]] | None = None
     for place in places:
@@ -251,7 +252,7 @@ def _move_label(label: Annotation, distance: float, direction: float) -> Bbox:
 
 
 def _leader(label: Annotation, box: Bbox) -> Path:
-    """Return the line from near the point of a text to the nearest place of the box of the text."""
+    """Return the leader line of a text: from near its point to the nearest position on its box."""
     point = label.axes.transData.transform(label.xy)  # type: ignore[union-attr]
     end = np.clip(point, (box.x0, box.y0), (box.x1, box.y1))
     return Path([point + 0.1 * (end - point), end])

@@ -64,7 +64,10 @@ def plot_orbit(orbit: PeriodicOrbit, *, title: str = "") -> Figure:
 
 
 def _output_over_turn(turn: Turn, name: str) -> np.ndarray:
-    """Return an output over the period with its value at the end appended: that at the start, plus whole turns of an angle."""
+    """Return an output over the period, with its value at the end of the period appended.
+
+    The appended value is the value at the start, for an angle plus whole turns.
+    """
     values = turn[name]
     whole = 2.0 * np.pi * np.round((values[-1] - values[0]) / (2.0 * np.pi)) if name in turn.angles else 0.0
     return np.append(values, values[0] + whole)

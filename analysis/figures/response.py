@@ -64,10 +64,10 @@ _RISKS = tuple(Risk)
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Scale:
-    """How parameter and amplitude are shown.
+    """Units and names with which parameter and amplitude are shown.
 
-    Of the parameter: ``factor`` from SI to its display ``unit``. Of the amplitude: ``scale`` from SI to its display unit
-    ``shown``, and its short name ``what`` and long name ``name``.
+    ``factor`` converts the parameter from SI to its display ``unit``. ``scale`` converts the amplitude from SI to its display
+    unit ``shown``; ``what`` is the short name of the amplitude, ``name`` the long name.
     """
 
     family: Family
@@ -103,8 +103,8 @@ def plot_branches(
 ) -> Figure:
     """Plot amplitude, harmonics, crank torque and pin force along branches, stable parts solid, unstable ones dashed.
 
-    At folds an arrow leads to the motion that the machine jumps to. Approximations have a panel of their relative errors;
-    those that cannot be told apart from the true motion are drawn in that panel only.
+    At folds an arrow leads to the motion that the machine jumps to. The relative errors of approximations have a
+    panel. An approximation that cannot be told apart from the true motion is drawn in that panel only.
 
     Parameters
     ----------
@@ -115,8 +115,7 @@ def plot_branches(
         Whether a speed in rad/s is drawn in rpm.
     beside : callable, optional
         ``beside(values)`` returns the amplitudes (m) of approximations by name, at values (m,) of the parameter, each of shape
-        (m,). Their errors are relative to the stable motions with a
-        period of one crank turn.
+        (m,). Their errors are relative to the stable motions with a period of one crank turn.
     avoid : sequence of Avoided
         Ranges of the parameter to shade.
     """
@@ -196,7 +195,7 @@ def _amplitudes(
 
 
 def _jump(jump: FoldJump, look: _Scale) -> str:
-    """Return the text at a fold: on which side of it the motion exists, and to which amplitude the machine jumps."""
+    """Return the text at a fold: on which side of the fold the motion exists, and to which amplitude the machine jumps."""
     side, change = ("below", "rising") if jump.direction > 0 else ("above", "falling")
     there = f"{look.size(jump.before)} {look.shown} only {side} {look.place(jump.parameter)};\n{change}, it "
     if not jump.after:
@@ -220,7 +219,7 @@ def _peaks(branch: Branch, look: _Scale, top: float) -> list[Label]:
 
 
 def _crossings(branches: Sequence[Branch], look: _Scale, top: float) -> list[Label]:
-    """Return labels for period doublings and tori that a machine reaches; points close together, as in a cascade, share one."""
+    """Return labels for period doublings and tori that a machine reaches; points close together share one label."""
     # a point on two branches, or passed twice, is named once
     met = {
         (special.kind, look.place(special.parameter)): special
@@ -256,9 +255,9 @@ def _is_reachable(branch: Branch, special: SpecialPoint) -> bool:
 
 
 def _stability_curves(branch: Branch, number: int, look: _Scale, y: FloatArray, **options: Any) -> list[Curve]:
-    """Return the curves of a quantity ``y`` (display units) along a branch, one per stability; the colour shows the period.
+    """Return the curves of a quantity ``y`` (display units) along a branch, one for each kind of stability.
 
-    ``number`` is the index of the branch.
+    The colour shows the period. ``number`` is the index of the branch.
     """
     words = _stability_words(branch)
     order = branch.periods.bit_length() - 1
@@ -278,7 +277,7 @@ def _stability_curves(branch: Branch, number: int, look: _Scale, y: FloatArray, 
 
 
 def _hover_values(branch: Branch, number: int) -> Mapping[str, ArrayLike]:
-    """Return what a page shows under the pointer along the branch with index ``number``: arrays of values by name."""
+    """Return the arrays, by name, that an HTML page shows under the pointer along the branch with index ``number``."""
     table, torque = branch.columns(), "greatest crank torque [N.m]"
     return {
         "branch": np.full(len(branch), number + 1),
@@ -289,7 +288,7 @@ def _hover_values(branch: Branch, number: int) -> Mapping[str, ArrayLike]:
 
 
 def _letters(x: FloatArray, y: FloatArray, text: str, *, shift: float = 0.0, **options: Any) -> Curve:
-    """Return letters at a few points of a curve, evenly along x; ``shift`` moves them by a share of their spacing."""
+    """Return letters at a few points of a curve, evenly along x; ``shift`` moves the letters by a share of their spacing."""
     finite = np.flatnonzero(np.isfinite(y))
     if len(finite):
         places = np.linspace(x[finite].min(), x[finite].max(), 2 * _LETTERS + 1)[1::2]
@@ -328,7 +327,7 @@ def _special_points(branches: Sequence[Branch], look: _Scale, found: Sequence[Fo
 
 
 def _legend_entries(branches: Sequence[Branch]) -> list[Curve]:
-    """Return the entries of the legend as curves without points: turns in a period, if they differ, and stability."""
+    """Return the legend entries of stability and, if the periods differ, of the period, as curves without points."""
     turns = sorted({(branch.periods, branch.crank_turns) for branch in branches})
     words = {str(word) for branch in branches for word in _stability_words(branch)}
     keys = []
@@ -354,9 +353,10 @@ def _legend_entries(branches: Sequence[Branch]) -> list[Curve]:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Approximation:
-    """Amplitude by an approximation over the parameter, both (m,), and its errors along each branch of one turn.
+    """Amplitude by an approximation over the parameter, both of shape (m,), and errors of the approximation.
 
-    Each item of ``errors`` has the rows parameter, relative error (%) and true amplitude, shape (3, n), with NaN at gaps.
+    ``errors`` has an array (3, n) for each branch of motions with a period of one turn; its rows are parameter, relative error
+    (%) and true amplitude, with NaN at gaps.
     """
 
     name: str
@@ -409,7 +409,7 @@ def _unstable_mask(branch: Branch) -> NDArray[np.bool_]:
 
 
 def _comparison_points(branch: Branch) -> NDArray[np.int64]:
-    """Return the indices of points of a branch, evenly along the drawn curve, whose motion is not unstable."""
+    """Return the indices of points at even distances along the drawn curve of a branch, without unstable motions."""
     steps = [np.diff(v, prepend=v[0]) / (float(np.ptp(v)) or 1.0) for v in (branch.parameter, branch.amplitude)]
     way = np.cumsum(np.hypot(*steps))
     chosen = np.unique(np.searchsorted(way, np.linspace(0.0, way[-1], _COMPARED)))
@@ -419,7 +419,7 @@ def _comparison_points(branch: Branch) -> NDArray[np.int64]:
 def _visible_approximations(
     others: Sequence[_Approximation], branches: Sequence[Branch], look: _Scale, top: float
 ) -> list[Curve]:
-    """Return the curves of the approximations that can be told apart from the true motion in a figure of usual size."""
+    """Return the curves of the approximations that differ visibly from the true motion in a figure of usual size."""
     if not others:
         return []
     x = look.factor * others[0].parameter

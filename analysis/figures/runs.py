@@ -126,7 +126,7 @@ def plot_outputs(
 
 
 def _column_grid(count: int, columns: int) -> NDArray[np.int64]:
-    """Return the grid of panel indices row by row, shape (rows, columns); cells without a panel have greater indices."""
+    """Return the grid of panel indices row by row, shape (rows, columns); indices from ``count`` on have no panel."""
     rows = ceil(count / columns)
     return np.arange(rows * columns).reshape(rows, columns)
 
@@ -177,7 +177,7 @@ def is_fast(values: FloatArray) -> bool:
 
 
 def _oscillations(values: FloatArray) -> int:
-    """Count the oscillations of a curve whose height is at least about a twentieth of its range."""
+    """Count those oscillations of a curve whose height is at least about a twentieth of the curve's range."""
     size = float(np.ptp(values)) if len(values) else 0.0
     if not size > 0.0:
         return 0
@@ -186,14 +186,14 @@ def _oscillations(values: FloatArray) -> int:
 
 
 def _mechanism(run: Trajectory) -> Mechanism:
-    """Return the mechanism of a run; if the run has no parameters, the one with most outputs in common."""
+    """Return the mechanism of a run; if the run has no parameters, the mechanism with most outputs in common."""
     if run.parameters is not None:
         return find_mechanism(run.parameters)
     return max(MECHANISMS.values(), key=lambda m: len(set(m.output_names) & set(run.names)))
 
 
 def _variables(run: Trajectory) -> dict[str, Variable]:
-    """Return the variables of a run's outputs by name; outputs of other mechanisms are included."""
+    """Return the variables of a run's outputs by name, also of outputs that belong to other mechanisms."""
     mechanisms = (*MECHANISMS.values(), _mechanism(run))
     return {v.name: v for m in mechanisms for v in m.variables if v.name in run.names}
 
@@ -273,7 +273,7 @@ def plot_comparison(
 ) -> Figure:
     """Plot outputs of two runs in one row each, and beside them the second run minus the first.
 
-    If a difference is only rounding, it is stated in words; if all are, they are stated at the foot.
+    A difference that is only rounding is stated in words; if all differences are only rounding, this is stated at the foot.
 
     Parameters
     ----------

@@ -47,7 +47,7 @@ _TRACED = 240
 def joint_positions(mechanism: Mechanism, parameters: Any, coordinates: Array) -> dict[str, Array]:
     """Return the positions (mm) of a drawing's joints by name, shape (n, 2), for ``coordinates`` of shape (n, freedoms).
 
-    They are NaN at configurations at which the mechanism cannot be assembled.
+    The positions are NaN at configurations at which the mechanism cannot be assembled.
     """
     drawing = mechanism.drawing
     assert drawing is not None
@@ -64,7 +64,10 @@ def joint_positions(mechanism: Mechanism, parameters: Any, coordinates: Array) -
 
 
 def draw(axis: Axes, mechanism: Mechanism, parameters: Any, at: dict[str, Array], *, letters: bool = True) -> None:
-    """Draw a mechanism at the first configuration, and the paths of its points over the others, of `joint_positions`."""
+    """Draw a mechanism at its first configuration, and the paths of its points over all other configurations.
+
+    ``at`` has the positions of the joints as `joint_positions` returns them.
+    """
     drawing = mechanism.drawing
     assert drawing is not None
     now = {name: path[0] for name, path in at.items()}
@@ -166,7 +169,7 @@ def draw_run(parameters: Any, axis: Axes, run: Trajectory) -> str:
 
 
 def _swept_coordinates(mechanism: Mechanism, found: Reach) -> Array:
-    """Return coordinates (n, freedoms): the start, then the range of the first freedom with the others at their start."""
+    """Return coordinates (n, freedoms): the start, then the range of the first freedom with all others at their start."""
     known = mechanism.first_set
     rows = np.tile(mechanism.state(known.initial)[: len(mechanism.freedoms)], (_TRACED + 1, 1))
     rows[1:, 0] = np.linspace(found.low, found.high, _TRACED)

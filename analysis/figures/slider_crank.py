@@ -99,7 +99,10 @@ def _largest(curves: Iterable[Any]) -> float:
 
 
 def _constant_text(curves: Mapping[str, Any], unit: str, one: float) -> str:
-    """Return a single constant curve's value as text in a unit, which is ``one`` in SI; empty if there is no such curve."""
+    """Return the value of a curve as text with unit if the curve is constant and the only one; otherwise an empty text.
+
+    ``one`` is the size of ``unit`` in SI.
+    """
     values = np.concatenate([np.array(np.ma.filled(given, np.nan)) for given in curves.values()])
     values = values[np.isfinite(values)]
     constant = len(curves) == 1 and len(values) and np.ptp(values) <= _ZERO * np.abs(values).max()
@@ -113,7 +116,10 @@ def _marked_angles(turn: ForceTurn) -> dict[str, float]:
 
 
 def _force_panel(turn: ForceTurn, title: str, si: str, unit: str, one: float, components: Mapping[str, Any]) -> Panel:
-    """Return a panel of curves over the turn, given in SI by label, in a unit that is ``one`` in SI."""
+    """Return a panel of the curves ``components``, given in SI by label, over the turn.
+
+    ``si`` is their unit in SI, ``unit`` the unit on the axis, and ``one`` the size of ``unit`` in SI.
+    """
     angle = np.degrees(turn.angle)
     grows = si != "m"
     poles = turn.singularities if grows and turn.sought == SLIDER_FORCE else ()
@@ -152,11 +158,12 @@ def plot_tolerances(
     units: str = "SI",
     title: str = "",
 ) -> Figure:
-    """Plot the errors by tolerances over the turn, and at one crank angle the samples and the share of each tolerance.
+    """Plot the errors that tolerances cause over the turn; at one crank angle, plot the samples and each tolerance's share.
 
-    Above, the linear estimate (three standard deviations filled, worst case dashed) and percentiles of the samples. Below, the
-    histogram of the samples with the normal distribution of the linear estimate, and the shares of the tolerances in the
-    variance. Notes at the foot state samples that cannot be assembled, and where the linear estimate is wrong.
+    The upper panel shows the linear estimate (three standard deviations filled, worst case dashed) and percentiles of the
+    samples. The lower panels show the histogram of the samples with the normal distribution of the linear estimate, and the
+    shares of the tolerances in the variance. Notes at the foot state samples that cannot be assembled, and where the linear
+    estimate is wrong.
 
     Parameters
     ----------
@@ -230,7 +237,7 @@ def _draw_band(axis: Axes, found: MonteCarlo, quantity: str, at: int, one: float
     axis.axvline(angle[at], color=MARK["color"], linewidth=THIN, linestyle="-.")
     for pole in found.poles(quantity):
         axis.axvline(np.degrees(pole), color=MARK["color"], linewidth=THIN, linestyle=":")
-    # the largest that is not NaN, if any
+    # at each angle the largest departure that is not NaN, if there is one
     departures = [low, lower, upper, high, linear.worst]
     reach = np.fmax.reduce([np.abs(np.ma.filled(values, np.nan)) for values in departures], axis=0) / one
     middle = float(np.nanmedian(reach))

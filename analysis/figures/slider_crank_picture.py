@@ -129,7 +129,7 @@ class _Part:
 
     @property
     def marks(self) -> tuple[tuple[Sequence[_Pose], str, str, str], ...]:
-        """Marked poses, as (poses, name, colour, marker): dead centres and limits of assembly."""
+        """Return the marked poses, dead centres and limits of assembly, as (poses, name, colour, marker)."""
         return (self.dead, "dead centre", _DEAD, "D"), (self.limits, "limit", _LIMIT, "s")
 
 
@@ -194,7 +194,7 @@ class _Scene:
         self.lines: list[FloatArray] = []
 
     def at(self, slide: float, x: float = 0.0, y: float = 0.0) -> FloatArray:
-        """Return the point at a slider position, displaced from the guide by x and y in frame 4 (ground frame, shape (3,))."""
+        """Return the point (3,), in the ground frame, at a slider position, displaced from the guide by x and y of frame 4."""
         return np.asarray(self.foot + np.array([x, y, -slide]) @ self.frame4)
 
     def page(self, points: ArrayLike) -> FloatArray:
@@ -277,7 +277,7 @@ class _Scene:
         self._line(axis, ring + pose.centre, color="0.6", linewidth=THIN, linestyle=":", zorder=1)
 
     def _paths(self, axis: Axes, pose: _Pose, letters: bool) -> None:
-        """Draw the paths of the pins; mark dead centres and limits. With ``letters`` crank and rod there are drawn as well."""
+        """Draw the paths of the pins, and mark dead centres and limits; with ``letters`` draw crank and rod there, too."""
         for part in self.parts:
             self._line(axis, part.crank_pins, color=TRACE, linewidth=BOLD, zorder=2)
             self._line(axis, part.slider_pins, color=TRACE, linewidth=3.0, zorder=2)
@@ -449,7 +449,7 @@ def animate_mechanism(
     frames_per_second: int = 20,
     title: str = "",
 ) -> Path:
-    """Write a GIF of the mechanism over all turns of its shift's law, with the slider position over the crank angle below it.
+    """Write a GIF of the mechanism over a period of the shift, with the slider position over the crank angle below it.
 
     If the crank cannot turn fully, it moves to and fro in the widest range of assembly.
 

@@ -127,7 +127,7 @@ def finish(figure: Figure) -> Figure:
 
 
 def align_labels(axes: Sequence[Axes]) -> None:
-    """Put the y labels of axes in one column at one distance from the axes, given by the widest tick labels.
+    """Put the y labels of axes in one column, at the distance from the axes that the widest tick labels need.
 
     `Figure.align_ylabels` is slower: for each label it measures the ticks of all axes, at every drawing and layout.
     """

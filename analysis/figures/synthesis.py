@@ -79,7 +79,7 @@ FRAMED = 72
 
 
 class _Frame:
-    """Axis limits that contain a linkage at all ``rotations`` (mm), and the size of its pins."""
+    """Axis limits (mm) that contain a linkage at all crank ``rotations``, and the size of its pins."""
 
     def __init__(self, scene: LinkageScene, rotations: FloatArray) -> None:
         places = [pins for phi in rotations if (pins := scene.pins(float(phi))) is not None]
@@ -222,7 +222,7 @@ def _start_position(scene: LinkageScene) -> tuple[float, Mapping[str, tuple[floa
 
 
 def _framed_rotations(scene: LinkageScene) -> FloatArray:
-    """Return crank rotations (rad), at which the links can be joined, whose positions must fit in the frame."""
+    """Return crank rotations (rad) at which the links can be joined; the linkage must fit in the frame at all of them."""
     rotation, angle = scene.transmission
     joined = rotation[np.isfinite(angle)]
     chosen: FloatArray = joined[np.linspace(0, len(joined) - 1, min(len(joined), FRAMED + 1)).round().astype(int)]
@@ -230,7 +230,7 @@ def _framed_rotations(scene: LinkageScene) -> FloatArray:
 
 
 def magnification(worst: float, extent: float) -> float:
-    """Return the magnification of errors, 1, 2 or 5 times a power of ten, with which the worst is at most `LONGEST` extents."""
+    """Return the greatest factor 1, 2 or 5 times a power of ten that magnifies the worst error to at most `LONGEST` extents."""
     if not (np.isfinite(worst) and worst > 1e-9 * extent):
         return 1.0
     most = LONGEST * extent / worst
@@ -264,7 +264,7 @@ def _plot_magnified_errors(axis: Axes, scene: LinkageScene) -> None:
 
 
 def _station_axis(scene: LinkageScene) -> tuple[FloatArray, str]:
-    """Return the values of the stations along the x axis, and the label of the axis."""
+    """Return the x coordinates of the stations (crank rotation or number), and the label of the x axis."""
     rotation = np.degrees(scene.stations["crank rotation [rad]"])
     if scene.timed:
         return rotation, "crank rotation [deg]"
@@ -291,7 +291,7 @@ def _is_met(scene: LinkageScene) -> bool:
 
 
 def _plot_errors(axis: Axes, scene: LinkageScene) -> None:
-    """Plot the errors, of position and of angle, at the stations."""
+    """Plot the errors of position and of angle at the stations."""
     x, words = _station_axis(scene)
     columns = scene.stations
     few: dict[str, Any] = {"marker": "o", "markersize": 3.0} if len(x) <= 100 else {}
@@ -452,7 +452,7 @@ def plot_sheet(
 
 
 def _plot_forces(axis: Axes, forces: PinForces, last: str) -> None:
-    """Plot the resultant force on each pin over the crank rotation; ``last`` names the fourth: D or the guide."""
+    """Plot the resultant force on each pin over the crank rotation; ``last`` is the name of the fourth: D or the guide."""
     for pin, force, colour in zip(("A", "B", "C", last), forces.force.T, COLOURS):
         axis.plot(np.degrees(forces.rotation), force, color=colour, label=f"{pin}: {force.max():.3g} N at most")
     _tick_quarter_turns(axis, np.degrees(forces.rotation))
@@ -544,8 +544,8 @@ def animate_solution(
 ) -> Path:
     """Write a GIF of the linkage over a crank turn, with the transmission angle below it.
 
-    For a rocker function the rocker angle with its target is below. Positions at which the links cannot be joined are left
-    out.
+    For a rocker function, the rocker angle with its target is plotted instead of the transmission angle. Positions at which the
+    links cannot be joined are left out.
 
     Raises
     ------

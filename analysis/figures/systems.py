@@ -98,7 +98,7 @@ def _path(
 
 @plot.register
 def plot_system_run(run: SystemRun, names: Sequence[str] = (), *, title: str = "") -> Figure:
-    """Plot outputs of a run over time, by default all connected ones but accelerations, and the power residuals."""
+    """Plot outputs of a run over time, by default all connected outputs except accelerations, and the power residuals."""
     names = names or [name for name in run.connected if not name.endswith("acceleration")]
     with figure_style():
         rows = len(names) + bool(run.powers)

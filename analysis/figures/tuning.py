@@ -68,7 +68,7 @@ def plot_tuned(tuned: Tuned, *, title: str = "") -> Figure:
 
 
 def _view_range(curves: Sequence[Curve]) -> tuple[float, float]:
-    """Return the range of the y axis: that of the curves with a margin, and from zero if the least value is near zero."""
+    """Return the range of the y axis: the range of the curves with a margin, or from zero if the least value is near zero."""
     y = np.concatenate([np.asarray(curve.y, dtype=float) for curve in curves])
     low, high = float(np.nanmin(y)), float(np.nanmax(y))
     rim = 0.08 * (high - low) or 0.05 * abs(high) or 1.0

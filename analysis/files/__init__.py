@@ -1,4 +1,4 @@
-"""Reading and writing files: tables of numbers, curves, drawings, and TOML or JSON with units; knows no mechanism.
+"""Read and write files: tables of numbers, curves, drawings, and TOML or JSON with units; independent of mechanisms.
 
 ``__init__.pyi`` lists the public names; each is imported from its module when it is first used.
 """

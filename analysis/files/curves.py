@@ -21,11 +21,12 @@ from .reader import unknown_name
 _CSS = {**LENGTHS, "": INCH / 96, "px": INCH / 96, "pt": INCH / 72, "pc": INCH / 6}
 #: Greatest deviation of the chords from a curve of an SVG file, as a share of the curve's extent.
 _CHORD_ERROR = 1e-4
-#: Greatest extent of a curve of an SVG file (m), against typing errors.
+#: Greatest extent of a curve of an SVG file (m); a larger extent is taken for a typing error.
 _WIDEST = 1e9
-#: Greatest depth of nested groups and uses in an SVG file; greatest number of elements after all uses are replaced.
+#: Greatest depth of nested groups and ``<use>`` elements in an SVG file; greatest number of elements after each ``<use>`` is
+#: replaced by its target.
 _DEPTH, _ELEMENTS = 100, 100_000
-#: Words and units in SVG's transforms that svgelements knows; it ignores others silently.
+#: Words and units in SVG's transforms that svgelements knows; svgelements silently ignores all others.
 _TRANSFORMS = {
     "matrix", "translate", "translateX", "translateY", "scale", "scaleX", "scaleY", "rotate", "skew", "skewX", "skewY",
     "px", "pt", "pc", "mm", "cm", "in", "deg", "rad", "grad", "turn", "e", "E",
@@ -38,26 +39,27 @@ def read_points(
     """Read the points of a curve from a CSV or SVG file.
 
     CSV (also ``.txt``): two columns, x and y, separated by commas, semicolons, tabs or spaces; a header line, empty lines and
-    lines that start with # are ignored. If the last point repeats the first, it is left out and the curve is closed.
+    lines that start with # are ignored. If the last point repeats the first point, it is omitted and the curve is closed.
 
-    SVG: the first path, or without one the first ellipse, circle, polygon, polyline, rectangle or line; ``name`` selects an
-    element by its ``id``, or the first one in a group. Transforms are applied, and y, which points down in SVG, is turned
-    upwards: a point (x, y) in the user space of the drawing's ``viewBox`` comes out at (x, -y). Chords replace curves, with
-    a deviation below 1e-4 of the curve's extent. The curve is closed if its path is, or ends where it started.
+    SVG: the first path is read; if there is no path, the first ellipse, circle, polygon, polyline, rectangle or line. ``name``
+    selects an element by its ``id``, or a group, of which the first path or shape is read. Transforms are applied. y points
+    down in SVG, and is turned upwards: a point (x, y) in the user space of the drawing's ``viewBox`` becomes (x, -y). Chords
+    replace curves, with a deviation below 1e-4 of the curve's extent. The curve is closed if the SVG path is closed, or if its
+    end is its beginning.
 
     Parameters
     ----------
     path : path
     unit : str, optional
-        Unit of the file's numbers, such as ``"mm"``. By default m for CSV; an SVG file's own scale (``width`` and
-        ``height`` with ``viewBox``; if it has none, pixels of 1/96 inch).
+        Unit of the file's numbers, such as ``"mm"``. The default for CSV is m. The default for SVG is the scale of the file,
+        from ``width``, ``height`` and ``viewBox``; if the file has no scale, pixels of 1/96 inch.
     name : str, optional
         ``id`` of the element or group of an SVG file.
 
     Returns
     -------
     points : ndarray, shape (n, 2)
-        m.
+        Points of the curve (m).
     closed : bool
         Whether the last point is joined to the first.
 
@@ -147,7 +149,7 @@ def _svg_points(path: Path, text: str, scale: float | None, name: str | None) ->
     shapes.sort(key=lambda shape: not isinstance(shape, svgelements.Path))
     if not shapes:
         raise InputError(f"{path} has no path")
-    # from the pixels of the page back to the user space, as svgelements rounds a millimetre to 3.7795296 px
+    # transform the pixels of the page back to the user space, because svgelements rounds a millimetre to 3.7795296 px
     curve = abs(svgelements.Path(shapes[0]) * ~svgelements.Matrix(drawing.viewbox_transform or ""))
     curves = [part for part in curve.as_subpaths() if any(not isinstance(s, svgelements.Move) for s in part)]
     if len(curves) != 1:
@@ -155,7 +157,7 @@ def _svg_points(path: Path, text: str, scale: float | None, name: str | None) ->
     segments = [s for s in curves[0] if not isinstance(s, svgelements.Move)]
     extent = float(np.ptp(np.vstack([_chords(s, np.inf) for s in segments]), axis=0).max())
     points = np.vstack([_chords(s, _CHORD_ERROR * extent) for s in segments])
-    # a segment repeats the end of the one before, and may have no length, such as a Z at the first point
+    # a segment begins with the last point of the previous segment, and may have no length, such as a Z at the first point
     points = points[np.append(True, np.hypot(*np.diff(points, axis=0).T) > 1e-9 * extent)]
     gap = float(np.hypot(*(points[-1] - points[0])))
     closed = gap <= 1e-9 * extent
@@ -163,12 +165,15 @@ def _svg_points(path: Path, text: str, scale: float | None, name: str | None) ->
 
 
 def _check_tree(path: Path, root: Any) -> None:
-    """Check that the transforms of an SVG drawing are known, and its size after each ``<use>`` is replaced by its target."""
+    """Check the transforms of an SVG drawing, and the number of its elements after each ``<use>`` is replaced by its target.
+
+    Raises InputError if svgelements does not know a transform, or if the drawing has too many elements.
+    """
     named = {element.get("id"): element for element in root.iter() if element.get("id") is not None}
     sizes: dict[int, int] = {}
 
     def size(element: Any, depth: int) -> int:
-        """Return the number of elements in an element, itself included, after uses are replaced."""
+        """Return the number of elements in an element, including itself, after each ``<use>`` is replaced by its target."""
         if depth > _DEPTH:
             raise InputError(f"{path} has groups and uses inside each other, deeper than {_DEPTH}, or a use of itself")
         if id(element) not in sizes:
@@ -191,7 +196,7 @@ def _check_tree(path: Path, root: Any) -> None:
 
 
 def _chords(segment: Any, allowed: float) -> NDArray[np.float64]:
-    """Return points on a segment of an SVG path whose chords deviate by at most ``allowed``."""
+    """Return points on a segment of an SVG path, so close that the chords deviate from the segment by at most ``allowed``."""
     import svgelements
 
     if isinstance(segment, svgelements.Line | svgelements.Close):
@@ -206,7 +211,7 @@ def _chords(segment: Any, allowed: float) -> NDArray[np.float64]:
 
 
 def _svg_scale(path: Path, root: Any) -> float:
-    """Return the metres per user unit of an SVG document."""
+    """Return the length of a user unit of an SVG document in metres."""
     lengths: list[float | None] = []
     for key in ("width", "height"):
         found = re.fullmatch(r"\s*((?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*(px|mm|cm|in|pt|pc|)\s*", root.get(key, ""))

@@ -1,7 +1,7 @@
-"""Drawings to scale of plain lines, circles, polylines, dimensions and texts on named layers, written as DXF or SVG.
+"""Drawings to scale of lines, circles, polylines, dimensions and texts on named layers, written as DXF or SVG.
 
-A `Drawing` is in m with y upwards and knows no mechanics. `to_dxf` and `to_svg` write it in a unit of length; the same drawing
-gives the same text, byte for byte.
+The coordinates of a `Drawing` are in m, with y upwards. `to_dxf` and `to_svg` write a drawing in a given unit of length; the
+same drawing always gives the same text, byte for byte.
 """
 
 from __future__ import annotations
@@ -41,9 +41,9 @@ MARGIN = 0.05
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Layer:
-    """Look of a layer: colour as 0xRRGGBB, and width of its lines (m).
+    """Appearance of a layer: colour as 0xRRGGBB, and width of its lines (m).
 
-    A layer in the ``foreground`` contrasts with any background: in DXF it is black on white and white on black.
+    The lines of a layer with ``foreground`` contrast with any background: in DXF they are black on white and white on black.
     """
 
     colour: int
@@ -89,10 +89,10 @@ class Circle(_Shape):
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Polyline(_Shape):
-    """Points joined by straight lines or arcs, shape (n, 2) in m; if closed, the last is joined to the first.
+    """A line through points, shape (n, 2) in m, with straight or circular segments; if closed, back to the first point.
 
-    ``bulges``, one for each point, make arcs of the segments, as in DXF: each is the tangent of a quarter of the angle of the
-    arc to the next point, positive counter-clockwise, from -1 to 1; 1 is a half circle.
+    ``bulges``, one for each point, bend the segments to arcs, as in DXF. A bulge is the tangent of a quarter of the arc's angle
+    from this point to the next, positive counter-clockwise, from -1 to 1; 0 is a straight line, 1 is a half circle.
     """
 
     points: NDArray[np.float64]
@@ -112,10 +112,10 @@ class Polyline(_Shape):
 
     @property
     def hull(self) -> NDArray[np.float64]:
-        """Points whose convex hull contains the polyline, shape (m, 2): its points, and corners of boxes about its arcs."""
+        """Points whose convex hull contains the polyline, shape (m, 2): its points, and corners of boxes around its arcs."""
         chords = np.roll(self.points, -1, axis=0) - self.points
         bulges = np.array(self.bulges or np.zeros(len(chords)))[:, None]
-        # from the chord to the top of its arc
+        # vector from a chord to the top of its arc
         heights = 0.5 * bulges * np.column_stack([chords[:, 1], -chords[:, 0]])
         return np.vstack([self.points, self.points + heights, self.points + chords + heights])
 
@@ -153,7 +153,7 @@ class Dimension(_Shape):
 
     @property
     def line(self) -> tuple[Point, Point]:
-        """Ends of the line that carries the number (m)."""
+        """End points (m) of the dimension line, above which the number is written."""
         (x1, y1), (x2, y2) = self.start, self.end
         share = self.offset / hypot(x2 - x1, y2 - y1)
         dx, dy = share * (y1 - y2), share * (x2 - x1)
@@ -161,7 +161,10 @@ class Dimension(_Shape):
 
     @property
     def readable(self) -> Dimension:
-        """The same dimension with its points from left to right or upwards, so that it is read from below or from the right."""
+        """The same dimension with its points in the order left to right, or upwards.
+
+        The number is then read from below or from the right.
+        """
         (x1, y1), (x2, y2) = self.start, self.end
         slight = 1e-9 * abs(y2 - y1)
         forward = x2 - x1 > slight or (abs(x2 - x1) <= slight and y2 > y1)
@@ -175,7 +178,7 @@ class Drawing:
     Attributes
     ----------
     title : str
-        One line.
+        Title of the drawing, in one line.
     layers : mapping of str to Layer
         Layers by name, in the order in which they are drawn.
     lines, circles, polylines, dimensions, texts : tuple
@@ -211,7 +214,7 @@ class Drawing:
 
     @property
     def extents(self) -> tuple[Point, Point]:
-        """Lower left and upper right corner (m) of the box about all shapes; of texts only the start counts."""
+        """Lower left and upper right corner (m) of the box around all shapes; a text counts only with its start."""
         points = np.vstack(
             [np.array([p for line in self.lines for p in (line.start, line.end)]).reshape(-1, 2)]
             + [np.array(c.centre) + side * c.radius for c in self.circles for side in (-1.0, 1.0)]
@@ -232,7 +235,7 @@ def _unit_length(unit: str, known: Iterable[str]) -> float:
 
 
 def _label(dimension: Dimension, metre: float) -> str:
-    """Return the text of a dimension in a unit of length ``metre`` (m), rounded to hundredths of the unit."""
+    """Return the number of a dimension as text, rounded to hundredths of the unit; ``metre`` is the length of the unit (m)."""
     return f"{round(dimension.length / metre, 2):g}"
 
 
@@ -370,7 +373,7 @@ def to_svg(drawing: Drawing, unit: str = "mm") -> str:
 
 
 class _Svg:
-    """Elements of an SVG, in one group for each layer; ``metre`` is the length of its unit (m)."""
+    """Elements of an SVG drawing, in one group for each layer; ``metre`` is the length of the drawing's unit (m)."""
 
     def __init__(self, drawing: Drawing, metre: float) -> None:
         self.metre = metre
@@ -405,7 +408,7 @@ class _Svg:
         self.add(layer, "line", x1=start[0], y1=-start[1], x2=end[0], y2=-end[1])
 
     def path(self, polyline: Polyline) -> str:
-        """Return the data of a path along a polyline."""
+        """Return the path data of a polyline, the SVG attribute ``d``."""
         points = polyline.points.tolist()
         bulges = polyline.bulges or [0.0] * len(points)
         parts = [f"M {self.point(*points[0])}"]
@@ -419,14 +422,14 @@ class _Svg:
         return " ".join(parts) + (" Z" if polyline.closed else "")
 
     def add_text(self, layer: str, text: str, place: Point, height: float, **attributes: Any) -> ElementTree.Element:
-        """Add a text with letters in the colour of the layer, and return its element."""
+        """Add a text in the colour of its layer, and return the SVG element."""
         element = self.add(layer, "text", x=place[0], y=-place[1], **{"font-size": height}, **attributes)
         element.attrib |= {"font-family": "sans-serif", "fill": f"#{self.layers[layer].colour:06x}", "stroke": "none"}
         element.text = text
         return element
 
     def add_dimension(self, dimension: Dimension) -> None:
-        """Add the lines, the arrows and the number of a dimension; the number is read from below or from the right."""
+        """Add the lines, the arrows and the number of a dimension to its layer."""
         layer, height, ends = dimension.layer, dimension.height, dimension.line
         for start, end in (ends, *zip((dimension.start, dimension.end), ends)):
             self.add_line(layer, start, end)

@@ -1,8 +1,8 @@
-"""Output files: a command overwrites only its own files, unless --force is given.
+"""Write output files so that a command overwrites only its own files, unless --force is given.
 
-A folder of results has a file ``.linkwork`` with hash, command and name of each result. A file that the command did not write,
-or that was changed later, stays, and the new file gets another name beside it, so that no result is lost. In Python, outside
-of commands, a new file replaces an existing one.
+A folder of results has a file ``.linkwork`` with hash, command and name of each result. If a file was not written by the
+command, or was changed later, it is kept and the new file gets another name in the same folder, so that no result is lost. In
+Python, outside of commands, a new file replaces an existing file.
 """
 
 from __future__ import annotations
@@ -23,16 +23,16 @@ RECORD = ".linkwork"
 
 @dataclass(slots=True)
 class Writing:
-    """Record of a command that writes files.
+    """The command that now writes files, and what it may overwrite.
 
     Attributes
     ----------
     command : str
-        Name of the command, which may overwrite its own files.
+        Name of the command; it may always overwrite its own files.
     force : bool
-        Whether the command may overwrite other files.
+        Whether the command may also overwrite other files.
     notes : list of str
-        A sentence for each file that got another name.
+        A sentence for each file that was written under another name because a file had to be kept.
     """
 
     command: str
@@ -45,7 +45,7 @@ _CURRENT: ContextVar[Writing | None] = ContextVar("writing", default=None)
 
 @contextmanager
 def attribute_files(command: str, force: bool = False) -> Iterator[Writing]:
-    """Attribute the files written inside this context to a command."""
+    """Attribute to a command all files that are written inside this context."""
     token = _CURRENT.set(writing := Writing(command, force))
     try:
         yield writing
@@ -65,7 +65,7 @@ def output(path: str | Path) -> Iterator[tuple[Path, Path]]:
 def write_text(path: str | Path, text: str) -> Path:
     """Write a text in UTF-8 without changing its line ends, and return its path.
 
-    Bytes of file names that are not UTF-8 become escapes, such as \\udcff.
+    Characters that UTF-8 cannot encode, such as those of undecodable file names, become escapes such as \\udcff.
     """
     with output(path) as (part, path):
         part.write_bytes(text.encode(errors="backslashreplace"))
@@ -73,7 +73,7 @@ def write_text(path: str | Path, text: str) -> Path:
 
 
 def free_path(path: str | Path) -> Path:
-    """Return the path, or a numbered one beside it if the current command may not overwrite the file there."""
+    """Return the path, or a numbered path in the same folder if the current command may not overwrite the file ``path``."""
     path, writing = Path(path), _CURRENT.get()
     if writing is None or writing.force or _is_own(path, writing.command):
         return path
@@ -86,7 +86,7 @@ def free_path(path: str | Path) -> Path:
 
 
 def record_output(path: Path) -> None:
-    """Record that the current command wrote a file, in ``.linkwork`` of its folder."""
+    """Record in the file ``.linkwork`` of the same folder that the current command wrote the file ``path``."""
     writing = _CURRENT.get()
     if writing is None:
         return
@@ -98,21 +98,21 @@ def record_output(path: Path) -> None:
 
 
 def _is_own(path: Path, command: str) -> bool:
-    """Return whether there is no file at the path, or one that the command wrote and nobody has changed."""
+    """Return whether a command may overwrite a path: there is no file, or the command wrote it and it was not changed since."""
     if not os.path.lexists(path):
         return True
     return path.is_file() and _last_record_line(path) == _record_line(path, command)
 
 
 def _record_line(path: Path, command: str) -> str:
-    """Return the line of the record for a file with its present content: hash, command, name."""
+    """Return a line of ``.linkwork`` for a file with its present content: hash, command and name."""
     with path.open("rb") as file:
         digest = hashlib.file_digest(file, "sha256").hexdigest()
     return f"{digest} {command}: {path.name}"
 
 
 def _last_record_line(path: Path) -> str:
-    """Return the last line of the record about a file; empty if there is none."""
+    """Return the last line of ``.linkwork`` about a file; empty if there is none."""
     try:
         lines = os.fsdecode(path.with_name(RECORD).read_bytes()).splitlines()
     except (OSError, UnicodeDecodeError):

@@ -1,4 +1,4 @@
-"""Read and write files of any kind, with limits of size, plain files only, and no incomplete files."""
+"""Read and write files of any kind safely: limits of size, regular files only, and no incomplete files."""
 
 from __future__ import annotations
 
@@ -44,14 +44,14 @@ def limit(name: str, default: int) -> int:
 
 
 def prepare(path: str | Path) -> Path:
-    """Make the folder of a path, and return the path."""
+    """Make the folder that will contain the file ``path``, and return the path."""
     path = Path(path)
     path.parent.mkdir(parents=True, exist_ok=True)
     return path
 
 
 def check_ending(path: Path, known: Sequence[str]) -> str:
-    """Return the ending of a path in lower case; raise InputError unless it is among those ``known``."""
+    """Return the ending of a path in lower case; raise InputError if it is not one of the endings ``known``."""
     ending = path.suffix.lower()
     if ending not in known:
         endings = f"{', '.join(known[:-1])} or {known[-1]}"
@@ -61,7 +61,7 @@ def check_ending(path: Path, known: Sequence[str]) -> str:
 
 @contextmanager
 def write_completely(path: Path) -> Iterator[Path]:
-    """Yield a temporary path to write to, which is renamed to ``path`` at the end, so that no incomplete file appears."""
+    """Yield a temporary path to write to; at the end the file is renamed to ``path``, so that no incomplete file appears."""
     part = prepare(path).with_name(f"{path.name}.{os.getpid()}.part")
     try:
         yield part
@@ -76,7 +76,7 @@ def write_completely(path: Path) -> Iterator[Path]:
 def read_text(path: Path) -> str:
     """Read a text in UTF-8, or in UTF-16 with a byte order mark; a file that ends in ``.gz`` is unpacked.
 
-    Raises InputError if it cannot be read, is no plain file, or is larger than the limit for its kind (LINKWORK_MAX_FILE_MB).
+    Raises InputError if the file cannot be read, is not a regular file, or is larger than the limit (LINKWORK_MAX_FILE_MB).
     """
     packed = path.suffix.lower() == ".gz"
     most = limit("FILE_MB", _TEXT.get(Path(path.stem if packed else path).suffix.lower(), _TEXT[""]))
@@ -103,7 +103,7 @@ def read_text(path: Path) -> str:
 
 
 def check_plain(path: Path) -> None:
-    """Raise InputError if a path is no plain file, as devices and pipes may never end; OSError if nothing is there."""
+    """Raise InputError if a path is not a regular file, OSError if nothing is there; devices and pipes may never end."""
     mode = os.stat(path).st_mode
     if not stat.S_ISREG(mode):
         kinds = ((stat.S_ISDIR, "a folder"), (stat.S_ISFIFO, "a pipe"), (stat.S_ISSOCK, "a socket"))
@@ -112,12 +112,12 @@ def check_plain(path: Path) -> None:
 
 
 def check_fmu(path: str | Path) -> None:
-    """Check that an FMU can be unpacked: an archive of bounded size whose members stay in its folder.
+    """Check that an FMU can be unpacked safely: an archive of limited size that unpacks only into its own folder.
 
     Raises
     ------
     InputError
-        If it cannot; the message says how to raise a limit.
+        If the FMU cannot be unpacked; if a limit is exceeded, the message says how to raise it.
     """
     path, most, members = Path(path), limit("FMU_MB", _FMU), limit("FMU_MEMBERS", _MEMBERS)
     try:
@@ -151,7 +151,7 @@ def check_fmu(path: str | Path) -> None:
 
 
 def _printable(path: Path) -> str:
-    """Return a path as an error names it: printable, and of bounded length."""
+    """Return a path as text for an error message: printable, and of limited length."""
     text = str(path)
     return text if text.isprintable() and len(text) <= 300 else repr(text[:300])
 

@@ -1,7 +1,7 @@
 """Read tables of a file into frozen dataclasses, whose fields declare units, bounds and choices.
 
-A reader is a function of a value and its dotted name: it returns the converted value, or raises a ParameterError with the
-name. `entry` attaches a reader to a field of a dataclass, and `read` reads a whole table:
+A reader is a function that takes a value and its dotted name. It returns the converted value, or raises a ParameterError with
+the name. `entry` attaches a reader to a field of a dataclass, and `read` reads a whole table:
 
 >>> @dataclass(frozen=True, slots=True, kw_only=True)
 ... class Bar:
@@ -33,7 +33,10 @@ Made = TypeVar("Made")
 
 
 def unknown_name(name: str, known: Iterable[str], words: str | None = None) -> UnknownNameError:
-    """Return the error for a name that is not in ``known``, with the nearest names; ``words`` replace the name in the text."""
+    """Return the error for a name that is not in ``known``, with the most similar names.
+
+    ``words`` replace the name in the message.
+    """
     return UnknownNameError(name, tuple(known), words or "")
 
 
@@ -45,9 +48,9 @@ def entry(reader: Reader, default: Any = MISSING, *, factory: Any = MISSING, key
     reader : callable
         ``reader(value, name)``.
     default, factory : optional
-        As in `dataclasses.field`; without either the table must have the entry.
+        As in `dataclasses.field`; if neither is given, the table must have the entry.
     key : str, optional
-        Name in the table, if it is not the field's.
+        Name of the entry in the table, if it differs from the name of the field.
     """
     return field(default=default, default_factory=factory, metadata={"reader": reader, "key": key})
 
@@ -59,7 +62,10 @@ class _Entry(NamedTuple):
 
 
 def _entries(kind: Callable[..., Any], readers: Mapping[str, Reader], keys: Mapping[str, str]) -> dict[str, _Entry]:
-    """Return the entries of a kind of table by their names in the table; arguments without a default are required."""
+    """Return the entries of a table by name; an entry is required if its field or argument of ``kind`` has no default.
+
+    ``readers`` and ``keys`` are those of `read`.
+    """
     needed = set()
     if kind is not dict:
         arguments = inspect.signature(kind).parameters.values()
@@ -71,12 +77,12 @@ def _entries(kind: Callable[..., Any], readers: Mapping[str, Reader], keys: Mapp
 
 
 def entry_names(kind: type) -> tuple[str, ...]:
-    """Return the names of the entries of a table that is read into a dataclass."""
+    """Return the names of the entries of a table that `read` reads into the dataclass ``kind``."""
     return tuple(_entries(kind, {}, {}))
 
 
 def check_names(table: Mapping[str, Any], name: str, known: Iterable[str]) -> None:
-    """Raise UnknownNameError for the first entry of a table that is not ``known``."""
+    """Raise UnknownNameError for the first entry of a table whose name is not in ``known``; ``name`` is the table's name."""
     prefix = f"{name}." if name else ""
     known = tuple(known)
     for key in table:
@@ -93,27 +99,27 @@ def read(
     keys: Mapping[str, str] | None = None,
     base: Any = None,
 ) -> Made:
-    """Read a table into an object.
+    """Read a table: convert its values and pass them to ``kind``, which makes an object from them.
 
     Parameters
     ----------
     kind : dataclass, function or dict
-        It is called with the values by field and makes the object.
+        Called with the converted values as keyword arguments; returns the object.
     value : mapping
         The table.
     name : str
         Dotted name of the table; empty for a whole file.
     readers : mapping, optional
-        Readers by field; they replace those that fields declare.
+        Readers by field; they replace the readers that the fields declare.
     keys : mapping, optional
-        Names in the table by field, if they differ.
+        Names of entries in the table by field, where they differ from the name of the field.
     base : dataclass instance, optional
-        Values of the fields that are not in the table.
+        Gives the values of the fields that are not in the table.
 
     Raises
     ------
     UnknownNameError, MissingParameterError, ParameterError
-        If an entry is unknown, missing or wrong.
+        If the name of an entry is unknown, an entry is missing, or a value is wrong.
     """
     table = as_table(value, name)
     entries = _entries(kind, readers or {}, keys or {})
@@ -139,7 +145,7 @@ def read(
 
 
 def any_value(value: Any, name: str) -> Any:
-    """Return any value unchanged, for a later check."""
+    """Return a value of any type unchanged; it is checked later."""
     return value
 
 
@@ -169,18 +175,19 @@ def as_table(value: Any, name: str) -> Mapping[str, Any]:
 
 @dataclass(frozen=True, slots=True)
 class Quantity:
-    """Reader of a quantity, which it returns in SI; see `analysis.units.quantity`.
+    """Reader of a quantity: returns its value in SI; see `analysis.units.quantity`.
 
     Attributes
     ----------
     unit : str
-        SI unit, for the dimension.
+        SI unit of the quantity, which tells its dimension.
     above, least, below : float, optional
         Bounds in SI: greater than, not less than, less than.
     bare : str, optional
-        Unit of numbers without a unit; by default SI.
+        Unit of numbers that are given without a unit; by default SI.
     requirement : str, optional
-        End of the sentence "it must ..." for a number outside of bounds that are not zero.
+        End of the error message "it must ..."; needed if a bound is not zero (by default the message says "be greater than
+        zero" or "be zero or greater").
     """
 
     unit: str
@@ -236,12 +243,12 @@ class Choice:
 
 @dataclass(frozen=True, slots=True)
 class Many:
-    """Reader of a list, which it returns as a tuple.
+    """Reader of a list: returns a tuple of the converted items.
 
     Attributes
     ----------
     item : callable
-        Reader of the items, whose names are numbered, such as ``bar.holes[0]``.
+        Reader of each item; items have numbered names, such as ``bar.holes[0]``.
     least, length : int, optional
         Least number of items, and exact number of items.
     single : bool
@@ -267,7 +274,7 @@ class Many:
 
 @dataclass(frozen=True, slots=True)
 class Range:
-    """Reader of [least, greatest], or of one value for both; ``ordered`` says whether least may not exceed greatest."""
+    """Reader of a range [least, greatest], or of one value for both; with ``ordered`` least must not exceed greatest."""
 
     item: Reader
     ordered: bool = True
@@ -284,7 +291,7 @@ class Range:
 
 @dataclass(frozen=True, slots=True)
 class Table:
-    """Reader of a table inside a table, with the arguments of `read`."""
+    """Reader of a table inside a table; the attributes are the arguments of `read`."""
 
     kind: Callable[..., Any]
     readers: Mapping[str, Reader] = field(default_factory=dict)
@@ -295,7 +302,7 @@ class Table:
 
 @dataclass(frozen=True, slots=True)
 class Kinds:
-    """Reader of a table whose entry ``kind`` selects the reader of the rest."""
+    """Reader of a table whose entry ``kind`` selects, by name, the reader of its other entries."""
 
     readers: Mapping[str, Reader]
 

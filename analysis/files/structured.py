@@ -28,7 +28,7 @@ def write_tables(path: str | Path, data: Mapping[str, Any], *, head: str = "") -
     Raises
     ------
     InputError
-        If the path has another ending.
+        If the path ends neither in .toml nor in .json.
     """
     path = Path(path)
     if check_ending(path, ENDINGS) == ".json":
@@ -66,7 +66,7 @@ def read_tables(path: str | Path) -> dict[str, Any]:
 
 
 def _duplicate_in_words(text: str, error: ValueError) -> str:
-    """Return in words which entry or table of a TOML file is there twice; empty for any other error."""
+    """Return in words which entry or table a TOML file defines twice; empty if ``error`` has another cause."""
     if not re.match("Cannot (overwrite|declare)", str(error)):
         return ""
     last = re.search(r"at line (\d+)", str(error))
@@ -78,7 +78,7 @@ def _duplicate_in_words(text: str, error: ValueError) -> str:
 
 
 def _check(path: Path, data: dict[str, Any]) -> None:
-    """Raise InputError if names, texts, whole numbers or the nesting exceed their limits."""
+    """Raise InputError if a name, a text, a whole number or the depth of nesting in tables exceeds its limit."""
     level: list[tuple[str, Any]] = [("", data)]
     for _ in range(_DEPTH):
         inside: list[tuple[str, Any]] = []
@@ -114,14 +114,14 @@ def override(
     ----------
     data : mapping
     overrides : mapping
-        Values by dotted name of any depth, such as ``slider.stiffness``.
+        New values by dotted name, such as ``slider.stiffness``; the names may have any number of parts.
     exclusive : collection of str, optional
-        Tables that hold one entry only: setting one removes the others.
+        Names of tables that hold only one entry: setting an entry removes the entry that was there.
 
     Raises
     ------
     ParameterError
-        If a dotted name leads through an entry that is no table.
+        If a part of a dotted name other than the last names an entry that is not a table.
     """
     result = dict(data)
     for name, value in overrides.items():
@@ -138,7 +138,7 @@ def override(
 
 
 def flatten(data: Mapping[str, Any], prefix: str = "") -> dict[str, Any]:
-    """Return the values of nested tables by dotted name."""
+    """Return the values of nested tables in one table, by dotted name."""
     flat: dict[str, Any] = {}
     for name, value in data.items():
         flat |= flatten(value, f"{prefix}{name}.") if isinstance(value, Mapping) else {prefix + name: value}

@@ -1,4 +1,4 @@
-"""Tables of numbers: CSV files of results and signals, arrays for caches."""
+"""Read and write tables of numbers: CSV files of results and signals, and arrays for caches."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from .outputs import output
 from .paths import first_line, is_number, read_text, write_completely
 from .reader import unknown_name
 
-#: Numbers that are written in one block; Ctrl-C takes effect between blocks.
+#: Count of numbers that are written in one block; Ctrl-C takes effect between blocks.
 _BLOCK = 50_000
 #: A file of this size (bytes) or more is announced, and its progress is shown on a terminal.
 LARGE = 20_000_000
@@ -55,7 +55,7 @@ def write_csv(path: str | Path, columns: Mapping[str, ArrayLike]) -> Path:
 
 
 def _write_rows(file: TextIO, path: Path, columns: Sequence[NDArray[np.float64]]) -> None:
-    """Write the rows block by block; announce a large file and show its progress."""
+    """Write the rows of a CSV table to a file in blocks; announce a large file and show the progress."""
     count, block = len(columns[0]), max(1, _BLOCK // len(columns))
     row = ",".join(["%.17g"] * len(columns)) + "\n"
     done: Callable[[int], None] | None = None
@@ -85,9 +85,9 @@ def _progress_bar(what: str, count: int) -> Iterator[Callable[[int], None]]:
 
 
 def cell(text: str) -> str:
-    """Return a text as a cell of a CSV file: in one line, quoted if necessary, and harmless to a spreadsheet.
+    """Return a text as a cell of a CSV file: in one line, quoted if necessary, and never executed as a formula.
 
-    A text that begins like a formula, also after blanks, gets an apostrophe in front, which marks a text in spreadsheets.
+    A text that begins like a formula, perhaps after blanks, gets an apostrophe in front; to a spreadsheet it is then a text.
     """
     text = " ".join(text.splitlines())
     if text.lstrip().startswith(_FORMULA) and not is_number(text):
@@ -107,7 +107,7 @@ def read_csv(path: str | Path) -> NDArray[np.float64]:
     Raises
     ------
     InputError
-        If it cannot be read, or has no numbers.
+        If the file cannot be read, or has no numbers.
     """
     path = Path(path)
     lines = [line.partition("#")[0] for line in read_text(path).splitlines()[1:]]
@@ -127,15 +127,15 @@ def read_columns(path: str | Path, names: Sequence[str | None]) -> list[NDArray[
     ----------
     path : str or Path
     names : sequence of str or None
-        Name of each column in the header line, with or without its unit in brackets; for None the column at the same position
-        is taken. In a file without a header all columns are taken by position.
+        Name of each wanted column in the header line, with or without its unit in brackets. None stands for the column of the
+        file at the same position. In a file without a header line all columns are taken by position.
 
     Raises
     ------
     InputError
         If the file cannot be read, or a cell is not a number; the message gives the line.
     UnknownNameError
-        If there is no such column.
+        If the file has no column of a given name.
     """
     path = Path(path)
     lines = [(i, line) for i, line in enumerate(read_text(path).splitlines(), 1) if line.partition("#")[0].strip()]
@@ -162,17 +162,17 @@ def read_columns(path: str | Path, names: Sequence[str | None]) -> list[NDArray[
 
 
 def read_rows(path: str | Path) -> list[dict[str, str]]:
-    """Read the rows of a CSV file, each as a dictionary of texts by the names in the header line.
+    """Read the rows of a CSV file; each row is a dictionary of texts by the names in the header line.
 
     Raises
     ------
     InputError
-        If it cannot be read.
+        If the file cannot be read.
     """
     path = Path(path)
     try:
         return [
-            # without cells beyond the header, and names without a cell
+            # ignore cells beyond the header line, and names without a cell
             {name: text for name, text in row.items() if isinstance(name, str) and isinstance(text, str)}
             for row in csv.DictReader(read_text(path).splitlines())
         ]
@@ -181,7 +181,7 @@ def read_rows(path: str | Path) -> list[dict[str, str]]:
 
 
 def save_array(path: str | Path, values: ArrayLike) -> Path:
-    """Write an array with its hash to a file of a cache, and return the path; see `load_array`."""
+    """Write an array and its hash to a file of a cache, for `load_array`, and return the path."""
     content = io.BytesIO()
     np.save(content, np.asarray(values, dtype=float))
     with write_completely(path := Path(path)) as part:

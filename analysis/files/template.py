@@ -1,4 +1,4 @@
-"""Write tables of case files with an explanation of every entry, from the readers of its fields and from docstrings."""
+"""Write tables of case files with an explanation of every entry, which comes from the entry's reader and from docstrings."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ _COLUMN = 46
 
 
 def in_words(value: float, unit: str) -> str:
-    """Return a quantity given in SI as text with an easily read unit, to ten digits."""
+    """Return a quantity, given in SI, as text with at most ten digits and a common unit such as mm."""
     name, factor = _FRIENDLY.get(unit, (with_unit(value, unit).partition(" ")[2], 1.0))
     return f"{value * factor:.10g} {name}"
 
@@ -41,7 +41,7 @@ def literal(value: Any) -> str:
 
 
 def requirement(read: Reader) -> str:
-    """Describe the values that a reader accepts, in a few words."""
+    """Return a few words on the values that a reader accepts, such as "a number, above zero"."""
     match read:
         case Quantity(unit=unit, above=above, least=least):
             bounds = "above zero" if above == 0.0 else "not below zero" if least == 0.0 else ""
@@ -65,7 +65,7 @@ def requirement(read: Reader) -> str:
 
 
 def example(read: Reader) -> Any:
-    """Return a value that a reader accepts; None if none is known."""
+    """Return an example of a value that a reader accepts; None if no example is known."""
     match read:
         case Quantity(unit=unit, below=below):
             value = _ANGLE if unit == "rad" else 1.0 if below > 1.0 else 0.5 * below
@@ -87,9 +87,9 @@ def example(read: Reader) -> Any:
 
 
 def meanings(kind: Any, *, follow: bool = True) -> dict[str, str]:
-    """Return the explanations of entries by name, from the docstring of a class or function.
+    """Return the explanations of a table's entries by name, from the docstring of the class or function ``kind``.
 
-    With ``follow`` the docstrings of names in backticks in its first line are used as well.
+    With ``follow`` the docstrings of all names in backticks in the docstring's first line are used as well.
     """
     doc = inspect.getdoc(kind) or ""
     found: dict[str, str] = {}
@@ -104,7 +104,7 @@ def meanings(kind: Any, *, follow: bool = True) -> dict[str, str]:
     for head in heads:
         words = " ".join(head[2].split()).removesuffix(".")
         sentence = words if len(words) < 90 else re.split(r"[.;:] ", words)[0]
-        # a unit alone repeats what the value says
+        # an explanation that is only a unit is left out: the value has a unit
         if not re.fullmatch(r"\S{1,6}", words):
             sentence = re.sub(r" \([^)]*$", "", sentence.replace("`", ""))
             found |= {name.strip(): sentence for name in head[1].split(",")}
@@ -112,7 +112,7 @@ def meanings(kind: Any, *, follow: bool = True) -> dict[str, str]:
 
 
 def line(name: str, value: Any, comment: str, *, active: bool) -> str:
-    """Return the line of an entry with its explanation; the entry is commented out if it is not active or has no value."""
+    """Return a line of a TOML file: an entry and its explanation; it is a comment if it is not active or has no value."""
     text = f"{name} = {literal(value)}" if value is not None else f"{name} = ..."
     if value is None or not active:
         text = f"# {text}"
@@ -120,7 +120,7 @@ def line(name: str, value: Any, comment: str, *, active: bool) -> str:
 
 
 def _default(of: Any, read: Reader) -> Any:
-    """Return a default as it is written in a file; None if a file cannot express it."""
+    """Return the default ``of`` an entry as it is written in a TOML file; None if TOML cannot express it."""
     if isinstance(read, Quantity) and isinstance(of, (int, float)):
         return (float(of) if read.unit == "1" else in_words(of, read.unit)) if isfinite(of) else None
     if isinstance(read, Range) and isinstance(of, tuple):
@@ -134,18 +134,18 @@ def _default(of: Any, read: Reader) -> Any:
 def entries(
     kind: Any, given: Mapping[str, Any], *, readers: Mapping[str, Reader] | None = None, active: bool = True
 ) -> Iterator[str]:
-    """Yield a line for each entry of a table: first the ``given`` ones, then the others as comments with their defaults.
+    """Yield a TOML line for each entry of a table: the ``given`` entries, then all others as comments with their defaults.
 
     Parameters
     ----------
     kind : dataclass, or dict with ``readers``
-        Kind of the table.
+        What the table is read into; its fields are the entries.
     given : mapping
-        Values by name in the file.
+        Values of the given entries by name.
     readers : mapping, optional
-        Readers by name, instead of the dataclass's own.
+        Readers by name, instead of the readers of the dataclass.
     active : bool
-        Whether the given entries are active; otherwise they are comments too.
+        Whether the given entries are active; otherwise they are comments as well.
     """
     about = {} if kind is dict else meanings(kind)
     known: dict[str, tuple[Reader, Any, str]] = {name: (read, None, "") for name, read in (readers or {}).items()}

@@ -1,11 +1,12 @@
-"""Design controllers of one coordinate by the force (or torque) on it, on a linear model.
+"""Design controllers of one coordinate with a linear model; they act by the force (or torque) on the coordinate.
 
 The operating point is the state x0 with the force F0. At a reference r of the coordinate u, the equilibrium of the linear model
-is the state x0 + x_s (r - u0) with the force F0 + F_s (r - u0). Every design is a law of the deviation of the state x from it:
+is the state x0 + x_s (r - u0) with the force F0 + F_s (r - u0). Every design is a control law for the deviation of the state x
+from this equilibrium:
 
     F = F0 + F_s (r - u0) - k (x - x0 - x_s (r - u0)) - k_i * integral of (u - r)
 
-LQR chooses k and k_i by weights, PID by poles, PI (no gain on the velocity) by crossover and phase margin.
+LQR determines k and k_i from weights, PID from poles, PI (no gain on the velocity) from crossover and phase margin.
 """
 
 from __future__ import annotations
@@ -38,26 +39,26 @@ class DesignError(LinkworkError):
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Design:
-    """A control law for a force, with poles and margins on the linear model; the units are those of a force and a position.
+    """A control law for a force, with poles and margins on the linear model; units are for a force and a position.
 
     Attributes
     ----------
     method : str
         LQR, PID or PI.
     model : LinearModel
-        The linear model of the design.
+        The linear model with which the controller was designed.
     channel : str
         FMI name of the force.
     freedom : int
-        Index of the freedom that is controlled, on which the force acts.
+        Index of the controlled freedom, on which the force acts.
     gains : ndarray, shape (2 n,)
         Gains k of the model's state (q, q'), in N per unit of each component.
     integral_gain : float
         k_i (N/(m.s)); zero if there is no integral action.
     target, target_slope : ndarray, shape (2 n,)
-        x0, and x_s per m of the reference.
+        x0, and its change x_s per m of the reference.
     force, force_slope : float
-        F0 (N), and F_s (N/m).
+        F0 (N), and its change F_s per m of the reference (N/m).
     poles : ndarray
         Poles of the closed loop (1/s), by magnitude.
     gain_margin : float
@@ -100,7 +101,7 @@ class Design:
 
     @property
     def plant(self) -> _Plant:
-        """Matrices of the linear model as seen from the force."""
+        """Linear model with the force as the only input."""
         return _Plant(self.model, self.channel)
 
     @property
@@ -133,12 +134,12 @@ class Design:
         return sort_by_magnitude(np.linalg.eigvals(kept))
 
     def continuous_law(self, reference: float) -> Function:
-        """Return the law without sampling, as a force for `analysis.run.Inputs`.
+        """Return the control law without sampling, as a force for `analysis.run.Inputs`.
 
         Raises
         ------
         DesignError
-            If the law has integral action: its integral is no function of the plant's state.
+            If the law has integral action, as the integral is no function of the plant's state.
         """
         if self.integral_gain:
             raise DesignError("a law with integral action is no function of the state: run it with control_loop")
@@ -155,14 +156,14 @@ class Design:
         return Function(force)
 
     def plant_values(self, values: FloatArray) -> FloatArray:
-        """Extend values for the components of the model's state to all coordinates and rates; zero for the other components."""
+        """Extend an array over the model's state to all coordinates and rates of the plant, with zeros for the others."""
         whole = np.zeros(2 * len(self.model.mechanism.freedoms))
         whole[self.model.places] = values
         return whole
 
 
 class _Plant:
-    """A linear model as seen from a force: A, the force's column of B, and the index of the driven coordinate."""
+    """A linear model with one force as its input: A, the force's column of B, and the index of the driven coordinate."""
 
     def __init__(self, model: LinearModel, channel: str | None) -> None:
         try:
@@ -182,7 +183,7 @@ class _Plant:
         return whole, np.vstack([self.b, [[0.0]]])
 
     def feedback_matrices(self, gains: FloatArray, integral_gain: float) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Return A, B and the gains as a row, shape (1, states); the integral is the last state if it has a gain."""
+        """Return A, B and the gains, shape (1, states); the integral is the last state if its gain is not zero."""
         if integral_gain:
             return *self.with_integral_state(), np.append(gains, integral_gain)[None, :]
         return self.a, self.b, gains[None, :]
@@ -221,7 +222,7 @@ def _design(method: str, model: LinearModel, channel: str | None, gains: FloatAr
         ) from None
     gain, phase, _, _, crossings, _ = control.stability_margins(loop, returnall=True)
     phase, crossings = np.atleast_1d(np.radians(phase)), np.atleast_1d(crossings)
-    # a delay can only lower the phase: to a negative margin a turn is added
+    # a delay can only lower the phase: 2 pi is added to a negative margin
     delays = np.where(phase > 0.0, phase, phase + 2.0 * pi) / crossings
     gains_up = [float(value) for value in np.atleast_1d(gain) if value > 1.0]
     return Design(
@@ -258,12 +259,12 @@ def design_lqr(
     model : LinearModel
         Model of an equilibrium, or mean model of a periodic motion.
     q : mapping or array_like
-        Weights by the names of the states, zero if left out; or the diagonal of Q; or Q. With the weight 1e6 r for a position,
-        a deviation of 1 mm costs as much as a force of 1 N.
+        Weights of the states by name, zero for states left out; or the diagonal of Q; or Q. With the weight 1e6 r for a
+        position, a deviation of 1 mm costs as much as a force of 1 N.
     r : float
         Weight of the force.
     integral : float
-        Weight of the integral of the coordinate (1/s2); if it is above zero, the law has integral action.
+        Weight of the integral of the coordinate (1/s2); if the weight is above zero, the law has integral action.
     channel : str, optional
         FMI name of the force; by default the force on the last free freedom (`LinearModel.force_channel`).
 
@@ -329,7 +330,7 @@ def design_pid(
     model : LinearModel
         A model with one free freedom, such as a five-bar in speed drive.
     poles : sequence of 3 complex, optional
-        Poles (1/s), real or in conjugate pairs, left of the imaginary axis.
+        Poles (1/s), real or in conjugate pairs, with negative real parts.
     bandwidth, damping : float
         Instead of poles: bandwidth in rad/s and damping ratio. The poles are -bandwidth and
         -bandwidth (damping +- i sqrt(1 - damping^2)).
@@ -339,7 +340,7 @@ def design_pid(
     Raises
     ------
     DesignError
-        If the model has more than one freedom, or the poles are not usable.
+        If the model has more than one free freedom, or the poles are not usable.
 
     Examples
     --------
@@ -396,8 +397,8 @@ def design_pi(
     Raises
     ------
     DesignError
-        If no PI controller meets the requirements: it gives no phase lead, which a sprung mass needs near its resonance and
-        above.
+        If no PI controller meets the requirements: a PI controller gives no phase lead, which a sprung mass needs near its
+        resonance and above.
 
     Examples
     --------
@@ -445,7 +446,7 @@ def check_period(period: float) -> None:
     Raises
     ------
     InputError
-        If it is not a finite number greater than zero.
+        If the period is not a finite number greater than zero.
     """
     if not (isfinite(period) and period > 0.0):
         raise InputError(f"sampling period is {period} s: it must be a finite number greater than zero")

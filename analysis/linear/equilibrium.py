@@ -1,7 +1,6 @@
-"""Find equilibria of a mechanism, free or with some of its freedoms held.
+"""Find equilibria of a mechanism, with all freedoms free or some of them held.
 
-Newton's method is applied to the generalised forces at rest, M a, with exact derivatives by CasADi
-(`analysis.run.expressions`).
+Newton's method makes the generalised forces at rest, M a, zero, with exact derivatives by CasADi (`analysis.run.expressions`).
 """
 
 from __future__ import annotations
@@ -43,9 +42,10 @@ class EquilibriumError(LinkworkError):
 def _statics(mechanism: Mechanism, modes: Modes) -> tuple[Any, Any]:
     """Return two CasADi functions of coordinates, channels and constants: statics alone, and statics with derivatives.
 
-    The first result of either function is the generalised forces at rest on the free freedoms. The first function also returns
-    the clearance; the second also returns the negative derivatives of the forces by the free coordinates, and the derivatives
-    by the forces of the channels. Friction, which a mechanism's switch turns on, does not act at rest.
+    Both functions first return the generalised forces at rest on the free freedoms. The first function also returns the
+    clearance from the limit of assembly. The second function also returns the negative derivatives of the generalised forces
+    with respect to the free coordinates, and the derivatives with respect to the forces of the channels. Friction, which a
+    mechanism's switch turns on, does not act at rest.
     """
     casadi, traces, its = symbolic.library(), expressions(mechanism), layout(mechanism, modes)
     x, mode_symbols, u, p = traces.symbols
@@ -80,9 +80,9 @@ class Equilibrium:
     inputs : Inputs
         Acting inputs; a held freedom has the commanded rate 0.
     holding : dict
-        Generalised force (N.m or N) that holds each held freedom, by the name of its coordinate.
+        Generalised force (N.m or N) that keeps each held freedom in place, by the name of the freedom's coordinate.
     stiffness : ndarray
-        Negative derivatives of the generalised forces on the free and held freedoms by their coordinates.
+        Negative derivatives of the generalised forces on the free and held freedoms with respect to their coordinates.
     residual : float
         Norm of the imbalance, relative to the forces that balance each other.
     iterations : int
@@ -135,7 +135,7 @@ class Equilibrium:
 
     @property
     def potential(self) -> float:
-        """Potential energy (J) of springs, gravity and the constant forces; that of a force is zero at displacement 0."""
+        """Potential energy (J) of springs, gravity and constant forces; the energy of a force is zero at displacement 0."""
         mechanism = find_mechanism(self.parameters)
         work = 0.0
         for channel in mechanism.channels:
@@ -155,9 +155,9 @@ class _Balance:
     modes : tuple of int
         Modes in which held freedoms count as free, under no force: the unbalanced forces on them are the holding forces.
     its : Layout
-        Layout in these modes: its free freedoms are the free and the held freedoms.
+        Layout in these modes; ``its.free`` has the free and the held freedoms.
     free : list of int
-        Indices of the free freedoms in ``its.free``.
+        Indices, in ``its.free``, of the freedoms that are not held.
     scale : ndarray
         Scales of the coordinates of ``its.free``.
     """
@@ -218,7 +218,7 @@ class _Balance:
     def solve(self, guess: FloatArray) -> Equilibrium:
         """Find an equilibrium by Newton's method; a step is halved while the imbalance would grow.
 
-        Raises EquilibriumError if it does not converge.
+        Raises EquilibriumError if the method does not converge.
         """
         q, moved = guess.copy(), np.array(self.its.free)[self.free]
         before = self.imbalance(q[:, None])[0]
@@ -234,7 +234,7 @@ class _Balance:
             trials = np.tile(q[:, None], 40)
             trials[moved] += step[:, None] * 0.5 ** np.arange(40)
             after = self.imbalance(trials)
-            # go on as long as a step still reduces the imbalance much
+            # continue as long as a step still reduces the imbalance considerably
             if before <= BALANCE * size and not np.any(after < 0.1 * before):
                 return self._make_equilibrium(q, forces[:, 0], stiffness, before / size if size else 0.0, iteration)
             if not np.any(after < before):
@@ -273,7 +273,7 @@ class _Balance:
         return (*q.tolist(), *[0.0] * (self.mechanism.size - len(q)))
 
     def starts(self, held: FloatArray) -> list[FloatArray]:
-        """Return starts for Newton's method: the points of a grid with no more imbalance than their neighbours."""
+        """Return starts for Newton's method: the points of a grid at which the imbalance has a local minimum."""
         lengths = [
             abs(getattr(self.parameters, field.name))
             for field in fields(self.parameters)
@@ -296,7 +296,7 @@ class _Balance:
 def _balance_with_held(
     parameters: Parameters, inputs: Inputs | None, held: Mapping[str, float] | None
 ) -> tuple[_Balance, FloatArray]:
-    """Return the equations of rest, and all coordinates, with the given values for held freedoms and zero elsewhere."""
+    """Return the equations of rest, and all coordinates: given values for held freedoms, zero for the others."""
     mechanism = find_mechanism(parameters)
     inputs, _ = check_run(mechanism, inputs, None)
     coordinates = np.zeros(len(mechanism.freedoms))
@@ -316,14 +316,14 @@ def _balance_with_held(
 def find_equilibria(
     parameters: Parameters, inputs: Inputs | None = None, *, held: Mapping[str, Amount] | None = None
 ) -> tuple[Equilibrium, ...]:
-    """Find the equilibria of a mechanism from a grid over all configurations, sorted by potential energy.
+    """Find the equilibria of a mechanism, starting from a grid over all configurations; sort them by potential energy.
 
     Parameters
     ----------
     parameters
         Parameters of the mechanism.
     inputs : Inputs, optional
-        Constant forces; by default none. A freedom whose rate is commanded, which must be 0, is held.
+        Constant forces; by default none. A freedom with a commanded rate is held; the rate must be 0.
     held : mapping, optional
         Coordinates (rad, m) of held freedoms, such as ``{"crank.angle": "30 deg"}``; 0 for a freedom held by the inputs alone.
 
@@ -335,7 +335,7 @@ def find_equilibria(
     Raises
     ------
     InputError
-        If a force is not constant, a freedom that is held moves or is driven by a force, or nothing is free.
+        If a force is not constant, a held freedom moves or is driven by a force, or no freedom is free.
     """
     balance, coordinates = _balance_with_held(parameters, inputs, held)
     found: list[Equilibrium] = []
@@ -365,15 +365,15 @@ def find_equilibrium(
     held: Mapping[str, Amount] | None = None,
     guess: ArrayLike | None = None,
 ) -> Equilibrium:
-    """Find an equilibrium of a mechanism, hanging freely or with some of its freedoms held.
+    """Find an equilibrium of a mechanism, with all freedoms free or some of them held.
 
     Parameters
     ----------
     parameters, inputs, held
         As for `find_equilibria`.
     guess : array_like, optional
-        All coordinates (rad, m) to start from; those of held freedoms are not used. Without a guess the stable equilibrium of
-        least potential energy is returned, or that of least potential energy if none is stable.
+        All coordinates (rad, m) to start from; the values for held freedoms are ignored. Without a guess the stable equilibrium
+        of least potential energy is returned or, if none is stable, the equilibrium of least potential energy.
 
     Raises
     ------
@@ -382,7 +382,8 @@ def find_equilibrium(
     AssemblyError
         If the links cannot be joined at the guess.
     EquilibriumError
-        If there is no equilibrium, or none is found from the guess; the message then has the imbalance and the configuration.
+        If there is no equilibrium, or Newton's method finds none from the guess; the message then states the imbalance left and
+        the configuration.
 
     Examples
     --------

@@ -1,4 +1,4 @@
-"""Simulate a closed loop of a sampled controller and the nonlinear plant or its linear model.
+"""Simulate a closed loop of a sampled controller with the nonlinear plant or with its linear model.
 
 In `control_loop` the controller samples the plant, or its FMU, and holds its force for each step, as a digital controller does.
 `predict_loop` runs the same controller with the linear model.
@@ -57,7 +57,7 @@ def check_limit(limit: float) -> None:
     Raises
     ------
     InputError
-        If it is not greater than zero.
+        If the limit is not greater than zero.
     """
     if not limit > 0.0:
         raise InputError(f"limit of the force is {limit} N: it must be greater than zero")
@@ -74,7 +74,7 @@ def peak(values: FloatArray) -> float:
 
 
 class SampledController:
-    """A design as a sampled controller: it measures, computes the force, and holds it for a period.
+    """A design as a sampled controller: measures the state, computes the force, and holds the force for a period.
 
     Parameters
     ----------
@@ -108,7 +108,7 @@ class SampledController:
         return self.design.method
 
     def force(self, measured: Sequence[float], reference: float) -> float:
-        """Return the force for the next period from all measured coordinates, then rates, and the reference."""
+        """Return the force for the next period; ``measured`` has all coordinates, then all rates."""
         step = reference - self._target[self._place]
         wanted = self.holding_force(reference)
         for gain, value, target, slope in zip(self._gains, measured, self._target, self._slope):
@@ -120,7 +120,7 @@ class SampledController:
         return self.design.force + self.design.force_slope * (reference - self._target[self._place])
 
     def follow(self, feedforward: float, position_error: float, velocity_error: float) -> float:
-        """Return the force for the next period along a moving reference, from the errors of coordinate and rate.
+        """Return the force for the next period along a moving reference, from the errors of the coordinate and its rate.
 
         ``feedforward`` replaces the holding force; the gains of other freedoms are not used.
         """
@@ -128,7 +128,7 @@ class SampledController:
         return self._limit_force(feedforward - k_u * position_error - k_v * velocity_error, position_error)
 
     def _limit_force(self, wanted: float, error: float) -> float:
-        """Add the integral part, clip the force to the limit, and advance the integral by the error."""
+        """Add the integral part to the force, clip the force to the limit, and advance the integral by the error."""
         d = self.design
         wanted -= d.integral_gain * self.integral
         # beyond the limit the integral must not ask for an even larger force
@@ -144,9 +144,9 @@ class LoopMetrics:
     Attributes
     ----------
     settling_time : float or None
-        Time from the start until the coordinate stays within the band about the reference (s); None if it does not.
+        Time from the start until the coordinate stays within the band about the reference (s); None if it never does.
     overshoot : float
-        Greatest excursion beyond the reference, relative to the initial distance from it.
+        Greatest excursion beyond the reference, relative to the initial distance from the reference.
     peak_force : float
         Largest magnitude of the force (N).
     rms_error, peak_error : float
@@ -176,13 +176,13 @@ class LoopResult:
     force, reference : ndarray, shape (n,)
         Force (N) and reference (m); each value holds until the next sample.
     freedom : int
-        Index of the freedom that is controlled; by default the last.
+        Index of the controlled freedom; by default the last.
     trajectory : Trajectory or None
         All outputs of the plant; None for a linear model.
     status : int
         0 if the run reached its end, otherwise the solver.status of the FMI contract.
     message : str
-        Reason why the run ended early; empty if it did not.
+        Reason why the run ended early; empty if the run reached its end.
     """
 
     time: FloatArray
@@ -219,7 +219,7 @@ class LoopResult:
         band : float
             Half width of the band in which the coordinate counts as settled (m).
         start : float
-            Time at which the reference steps, or control begins (s).
+            Time at which the reference jumps, or control begins (s).
         window : float, optional
             Length of the window at the end (s), such as a period of the motion; by default a tenth of the run.
 
@@ -287,7 +287,7 @@ class _Plant(Protocol):
 def _run_loop(
     plant: _Plant, controller: Controller, reference: Reference, times: FloatArray, freedom: int
 ) -> LoopResult:
-    """Reset the controller and run a closed loop: at each sampling time measure, compute the force, hold it, and step."""
+    """Reset the controller and run a closed loop: measure, compute the force and step with it, at each sampling time."""
     controller.reset()
     rows: list[tuple[float, ...]] = []
     status, message = 0, ""
@@ -317,7 +317,7 @@ def _run_loop(
 
 
 class _DrivenPlant:
-    """The nonlinear plant, in this process or as its FMU; all other inputs are sampled and held with the controller."""
+    """Base of the nonlinear plants; all inputs but the controller's force are sampled and held at the controller's times."""
 
     def __init__(self, mechanism: Mechanism, inputs: Inputs, channel: str, times: FloatArray) -> None:
         self.mechanism, self.channel = mechanism, channel
@@ -327,7 +327,7 @@ class _DrivenPlant:
         self.rows: list[Sequence[float]] = []
 
     def inputs(self, time: float, ahead: float, measured: Sequence[float]) -> dict[str, float]:
-        """Return all inputs by FMI name, with 0 for the controller's force."""
+        """Return all inputs from ``time`` to ``ahead`` by FMI name, with 0 for the controller's force."""
         x = np.array([*measured, 0.0, 0.0])
         return dict(zip(self.mechanism.input_names, sample(self._encoded, time, x, self._laws, ahead=ahead).tolist()))
 
@@ -372,7 +372,7 @@ class _Fmu(_DrivenPlant):
 
 
 def _channel(mechanism: Mechanism, name: str) -> Channel:
-    """Return the channel of a controller's force, by its FMI name; raises InputError if it is no force on a freedom."""
+    """Return the channel with an FMI name; raises InputError if the channel is no force on a freedom."""
     for channel in mechanism.channels:
         if channel.name == name and channel.kind == "force" and channel.freedom >= 0:
             return channel
@@ -392,7 +392,7 @@ def control_loop(
     fmu: str | Path | None = None,
     tolerance: float = 1e-9,
 ) -> LoopResult:
-    """Run a closed loop of a controller and the nonlinear plant, in this process or as its FMU.
+    """Run a closed loop of a controller and the nonlinear plant; the plant runs in this process or as its FMU.
 
     Parameters
     ----------
@@ -403,8 +403,8 @@ def control_loop(
     reference : float or function of time
         Reference of the controlled coordinate, such as the slider position (m).
     inputs : Inputs, optional
-        All other inputs, such as the speed of the crank (0 if it is held), sampled and held with the controller; none by
-        default.
+        All other inputs, such as the speed of the crank (0 for a held crank), sampled and held at the controller's times; none
+        by default.
     initial
         State at the start.
     stop_time : float
@@ -540,7 +540,8 @@ def predict_loop(
     Parameters
     ----------
     model : LinearModel or PeriodicModel
-        Model about an equilibrium; or about a periodic motion, to which the deviations are added, from its first sample on.
+        Model about an equilibrium or about a periodic motion. The deviations are added to this equilibrium or motion; the run
+        starts at the first sample of the motion.
     controller, reference, stop_time
         As for `control_loop`.
     inputs : Inputs, optional

@@ -1,13 +1,13 @@
 """Linearise a mechanism about one state.
 
-With the deviations q of the free freedoms and w of the inputs, the linear model is
+With q the deviations of the coordinates of the free freedoms, and w the deviations of the inputs, the linear model is
 
     M q'' + C q' + K q = F w
 
-Its matrices are exact derivatives of the mechanism's own equations, traced with CasADi (`analysis.run.expressions`): M is the
-Hessian of the energy with respect to the rates, and from the accelerations a(q, q', w) follow K = -M da/dq, C = -M da/dq' and
-F = M da/dw. Away from an equilibrium the accelerations are not zero, and K = -d(M a)/dq + (dM/dq) a. A freedom whose rate is
-commanded is not part of q; it acts through three inputs: acceleration, speed and coordinate.
+Its matrices are exact derivatives of the mechanism's own equations, traced with CasADi (`analysis.run.expressions`). M is the
+Hessian of the energy with respect to the rates. The accelerations a(q, q', w) give K = -M da/dq, C = -M da/dq' and F = M da/dw.
+Away from an equilibrium the accelerations are not zero, and K = -d(M a)/dq + (dM/dq) a. A freedom whose rate is commanded is
+not part of q; it acts through three inputs: acceleration, speed and coordinate.
 """
 
 from __future__ import annotations
@@ -43,7 +43,7 @@ SAME_RATE = 1e-6
 
 
 class LinearModelError(LinkworkError):
-    """The linear model does not have what was asked for, or it could not be computed."""
+    """The linear model has no such input, output or force, or the model could not be computed."""
 
 
 def signal_name(name: str) -> str:
@@ -58,8 +58,8 @@ class Layout:
     Attributes
     ----------
     free, commanded : tuple of int
-        Indices of the freedoms that forces move, and of the freedoms with commanded rates. A freedom that is tied to another,
-        as by a groove, is neither.
+        Indices of the freedoms that forces move, and of the freedoms with commanded rates. A freedom that is tied to another
+        freedom, as by a groove, is in neither.
     forces : tuple of int
         Indices of the channels whose forces act.
     input_names : tuple of str
@@ -116,7 +116,7 @@ def _channel_name(mechanism: Mechanism, freedom: int, kind: str) -> str:
 
 @cache
 def missing_outputs(mechanism: Mechanism) -> Mapping[str, str]:
-    """Return the outputs that a linear model does not have, by FMI name, each with the reason."""
+    """Return the outputs of a mechanism that its linear models do not have, by FMI name, each with the reason."""
     casadi, traces = symbolic.library(), expressions(mechanism)
     x, _, _, p = traces.symbols
     of_the_run = casadi.vertcat(x[2 * len(mechanism.freedoms) :], p[-1])
@@ -139,7 +139,8 @@ def linear_outputs(mechanism: Mechanism) -> tuple[str, ...]:
 def _derivatives(mechanism: Mechanism, modes: Modes, switched: bool) -> Any:
     """Return a CasADi function of state, channels and constants that gives the arrays of `Matrices`.
 
-    They are the outputs, the accelerations, M, C, K, F, and the derivatives of the outputs by the state and by the inputs.
+    The arrays are the outputs, the accelerations, M, C, K, F, and the derivatives of the outputs with respect to the state and
+    to the inputs.
     """
     casadi, traces, its = symbolic.library(), expressions(mechanism, switched), layout(mechanism, modes)
     x, mode_symbols, u, p = traces.symbols
@@ -179,8 +180,8 @@ class Matrices:
     """Arrays of a linear model, or of many models stacked along the first axis.
 
     n is the number of free freedoms: for a five-bar 2 in torque drive, with q = (crank angle, slider position), and 1 in speed
-    drive, with q = (slider position); m is the number of inputs, l of outputs, f of all freedoms. States and inputs are
-    deviations from the operating point, in SI.
+    drive, with q = (slider position). m is the number of inputs, l the number of outputs, f the number of all freedoms. States
+    and inputs are deviations from the operating point, in SI.
 
     Attributes
     ----------
@@ -191,7 +192,7 @@ class Matrices:
     M, C, K : ndarray, shape (..., n, n)
         Inertia, damping and stiffness.
     F : ndarray, shape (..., n, m)
-        Generalised forces of unit inputs.
+        Generalised forces due to unit inputs.
     H : ndarray, shape (..., l, 2 n)
         Derivatives of the outputs with respect to (q, q').
     D : ndarray, shape (..., l, m)
@@ -215,12 +216,12 @@ class Matrices:
 
     @property
     def mechanism(self) -> Mechanism:
-        """Mechanism of the parameters."""
+        """Mechanism to which the parameters belong."""
         return find_mechanism(self.parameters)
 
     @property
     def layout(self) -> Layout:
-        """Free and commanded freedoms and acting forces."""
+        """Free and commanded freedoms and acting forces, in the model's modes."""
         return layout(self.mechanism, self.modes)
 
     @property
@@ -240,7 +241,7 @@ class Matrices:
 
     @property
     def places(self) -> list[int]:
-        """Indices of (q, q') in the state of the plant."""
+        """Indices of the components of (q, q') in the state of the plant."""
         free, n = self.layout.free, len(self.mechanism.freedoms)
         return [*free, *(n + k for k in free)]
 
@@ -262,7 +263,7 @@ class Matrices:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class LinearModel(Matrices):
-    """A mechanism about one state, or the mean model along a periodic motion; see `Matrices`.
+    """Linear model of a mechanism about one state, or mean model along a periodic motion; see `Matrices`.
 
     Attributes
     ----------
@@ -281,7 +282,7 @@ class LinearModel(Matrices):
 
     @property
     def inputs(self) -> Inputs:
-        """Inputs at the operating point, as constants; without the rates of change of commands."""
+        """Inputs at the operating point, as constants; the time derivatives of commanded rates are left out."""
         return constant_inputs(self.mechanism, self.modes, self.channels)
 
     @property
@@ -357,7 +358,7 @@ class LinearModel(Matrices):
 
 
 def sort_by_magnitude(values: ArrayLike) -> NDArray[np.complex128]:
-    """Return complex numbers sorted by magnitude, those of equal magnitude by their imaginary parts."""
+    """Return complex numbers sorted by magnitude, and numbers of equal magnitude by imaginary part."""
     whole = np.asarray(values, dtype=complex)
     return whole[np.lexsort((whole.imag, np.abs(whole)))]
 
@@ -373,7 +374,7 @@ def constant_inputs(mechanism: Mechanism, modes: Modes, channels: ArrayLike) -> 
     values = dict(zip((channel.argument for channel in mechanism.channels), np.asarray(channels, float).tolist()))
     forces = {mechanism.channels[n].argument for n in layout(mechanism, modes).forces}
     acting = {name: values[name] for name in forces if values[name] != 0.0}
-    # an argument that chooses a mode without being a channel is a flag, such as groove
+    # an argument that chooses a mode but is no channel is a flag, such as groove
     chosen = [mode.arguments[value] for mode, value in zip(mechanism.modes, modes)]
     return Inputs(**acting | {name: values.get(name, True) for name in chosen})
 
@@ -381,8 +382,8 @@ def constant_inputs(mechanism: Mechanism, modes: Modes, channels: ArrayLike) -> 
 def evaluate(parameters: Parameters, modes: Modes, states: FloatArray, channels: FloatArray) -> dict[str, FloatArray]:
     """Return the arrays of `Matrices` by name, at states (s, size) with channels (s, channels), stacked along the first axis.
 
-    Raises InputError if a state or a channel is not finite, or nothing is free; AssemblyError if the links cannot be joined at
-    a state.
+    Raises InputError if a state or a channel is not finite or no freedom is free; AssemblyError if the links cannot be joined
+    at a state.
     """
     mechanism = find_mechanism(parameters)
     its, p, n = layout(mechanism, modes), parameters.constants(), len(states)
@@ -420,7 +421,7 @@ def evaluate(parameters: Parameters, modes: Modes, states: FloatArray, channels:
 
 
 def full_states(mechanism: Mechanism, states: ArrayLike) -> FloatArray:
-    """Extend states (n, 2 f) to full states (n, 2 f + 2) by zero work; return full states as they are."""
+    """Extend states (n, 2 f) to full states (n, 2 f + 2) by zeros for the two works; return full states unchanged."""
     array, n = np.array(states, dtype=float), 2 * len(mechanism.freedoms)
     if array.ndim != 2 or array.shape[1] not in (n, mechanism.size) or len(array) == 0:
         raise InputError(
@@ -433,7 +434,7 @@ def full_states(mechanism: Mechanism, states: ArrayLike) -> FloatArray:
 def sample_channels(
     mechanism: Mechanism, inputs: Inputs | None, times: FloatArray, states: FloatArray
 ) -> tuple[Modes, FloatArray]:
-    """Return the modes, and the channels at s times and states, shape (s, channels), under inputs.
+    """Return the modes, and the values of the channels at s times and states, shape (s, channels), for given inputs.
 
     Raises InputError if the inputs belong to another mechanism, a state is not finite, or the inputs command a rate that
     differs from the rate in a state.
@@ -462,17 +463,18 @@ def linearise(parameters: Parameters, state: ArrayLike, inputs: Inputs | None = 
     Parameters
     ----------
     parameters
-        Parameters of the mechanism; or a published set or its name.
+        Parameters of the mechanism, or a published set or its name.
     state : array_like
-        All coordinates, then all rates, such as `Equilibrium.state`: for a five-bar (th2, u, th2', u'). It need not be an
-        equilibrium: deviations are then from the motion through this state, and the model holds at this instant.
+        All coordinates, then all rates, such as `Equilibrium.state`: for a five-bar (th2, u, th2', u'). The state need not be
+        an equilibrium. Otherwise the deviations are measured from the motion through this state, and the model holds at this
+        instant.
     inputs : Inputs, optional
-        Inputs at time 0, such as `Equilibrium.inputs`; they decide which freedoms are free. None by default.
+        Inputs at time 0, such as `Equilibrium.inputs`; they decide which freedoms are free. By default no input acts.
 
     Raises
     ------
     InputError
-        If state or inputs are not finite, of the wrong shape, or do not go together; or nothing is free.
+        If state or inputs are not finite, of the wrong shape, or do not match; or if no freedom is free.
     AssemblyError
         If the links cannot be joined in this state.
 

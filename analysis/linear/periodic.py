@@ -38,7 +38,7 @@ MOST_ITERATIONS = 60
 
 
 class Turn(Protocol):
-    """One period of a motion at equal steps of the crank angle, without its end, such as `periodic.Turn`."""
+    """One period of a motion, sampled at equal steps of the crank angle, without the end point; such as `periodic.Turn`."""
 
     @property
     def time(self) -> FloatArray: ...
@@ -114,12 +114,12 @@ class PeriodicModel(Matrices):
     def mean(self) -> LinearModel:
         """Return the time-averaged model: the means of M, C, K, F, H and D over the period.
 
-        It predicts slow deviations of a motion whose M and K vary little; `monodromy` is exact.
+        The mean model predicts slow deviations of a motion whose M and K vary little; `monodromy` is exact.
         """
         return self._model(lambda values: np.asarray(values.mean(axis=0)))
 
     def interpolate(self, values: FloatArray) -> Callable[[float], FloatArray]:
-        """Interpolate values at the samples, shape (s, ...), by a trigonometric polynomial; return it as a function of time."""
+        """Return the trigonometric polynomial through values at the samples, shape (s, ...), as a function of time."""
         return trigonometric(values, self.period)
 
     def motion(self) -> Callable[[float], FloatArray]:
@@ -130,7 +130,7 @@ class PeriodicModel(Matrices):
         return lambda t: periodic(t) + t * rates
 
     def _mean_rates(self) -> FloatArray:
-        """Return the mean rates of all freedoms: of a cyclic freedom whole turns per period, of any other zero; shape (f,)."""
+        """Return the mean rates of all f freedoms: whole turns per period for cyclic freedoms, zero for the others."""
         freedoms = self.mechanism.freedoms
         way = self.states[:, len(freedoms) : 2 * len(freedoms)].mean(axis=0) * self.period
         return (
@@ -140,12 +140,12 @@ class PeriodicModel(Matrices):
     def check(self) -> None:
         """Check that the rates of the free freedoms are the derivatives of their coordinates over the period.
 
-        They are not if the period is wrong, the samples include the end of the period, or the motion has not settled.
+        The check fails if the period is wrong, the samples include the end of the period, or the motion has not settled.
 
         Raises
         ------
         InputError
-            If they are not; the message names the freedom.
+            If a rate is not the derivative of its coordinate; the message names the freedom.
         """
         mechanism, n, secular = self.mechanism, len(self), self._mean_rates()
         scale = mechanism.error_scale(self.parameters, tuple(self.states[0].tolist()))
@@ -206,21 +206,22 @@ def linearise_orbit(
     parameters
         Parameters of the mechanism.
     motion : array_like, shape (s, states), or an orbit
-        States at evenly spaced times of one period, without its end: all coordinates, then all rates; or an object such as
-        `analysis.periodic.PeriodicOrbit`.
+        States at evenly spaced times of one period, without the end point: all coordinates, then all rates; or an object such
+        as `analysis.periodic.PeriodicOrbit`.
     inputs : Inputs, optional
-        Inputs along the motion if it is an array, which begins at time 0; none by default. If a torque or force is a law of the
-        state, such as a motor's or a controller's, only its value is used: the model does not include the law's derivative.
+        Inputs along a motion given as an array, whose first state is at time 0; none by default. If a torque or force is a law
+        of the state, such as a motor's or a controller's, only its value is used: the model does not include the law's
+        derivative.
     period : float, optional
-        Period (s); by default the period of the orbit, or one turn for an array at a constant prescribed speed.
+        Period (s); by default the period of the orbit, or, for an array at a constant prescribed speed, the time of one turn.
     samples : int
-        Number of samples of an orbit; it is not used for an array.
+        Number of samples if the motion is an orbit; ignored for an array.
 
     Raises
     ------
     InputError
-        If inputs or period are given for an orbit; if the samples are fewer than `LEAST_SAMPLES`, not finite, or not samples
-        of a periodic motion evenly spaced in time.
+        If inputs or period are given for an orbit; if there are fewer than `LEAST_SAMPLES` samples; or if the samples are not
+        finite, not evenly spaced in time, or not from a periodic motion.
     AssemblyError
         If the links cannot be joined at one of the samples.
     """
@@ -304,7 +305,7 @@ def settled_motion(
 ) -> FloatArray:
     """Run a mechanism at constant speed for many turns; return the states of the last turn, after which the motion repeats.
 
-    With several cranks, turns are their common periods.
+    With several cranks, a turn means the common period of the cranks.
 
     Parameters
     ----------
@@ -313,9 +314,9 @@ def settled_motion(
     inputs : Inputs
         Constant inputs with the speed of a cyclic freedom, such as ``Inputs(speed=40.0)``.
     initial : optional
-        Initial state of the run; by default all coordinates are zero, and all rates but the commanded speed.
+        Initial state of the run; by default all coordinates and all rates are zero, except the commanded speed.
     samples : int
-        Number of states of the last turn, evenly spaced in time, without its end.
+        Number of states of the last turn, evenly spaced in time, without the end point.
     turns : int
         Number of turns of the run.
 

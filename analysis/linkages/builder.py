@@ -38,9 +38,11 @@ def has_linkage(tables: Mapping[str, Any]) -> bool:
 
 
 def with_linkage(tables: Mapping[str, Any], folder: Path) -> Mapping[str, Any]:
-    """Compile the linkage that the tables of a case describe; return tables that name it as their published set.
+    """Compile the linkage of a case; return the case's tables with the linkage replaced by the name of its published set.
 
-    If the tables name a file instead, its other tables hold too, unless those of the case override them: see `_merge_tables`.
+    Tables without a linkage are returned unchanged. If the case names a file for its linkage, the other tables of this file
+    apply as well, except its title and tuning, unless the case overrides them: see `_merge_tables`. ``folder`` is the folder
+    of the case.
 
     Raises
     ------
@@ -63,16 +65,16 @@ def with_linkage(tables: Mapping[str, Any], folder: Path) -> Mapping[str, Any]:
 
 
 def _without_linkage(tables: Mapping[str, Any], *others: str) -> dict[str, Any]:
-    """Return the tables without the linkage and ``others``; raise InputError if they name a published set as well."""
+    """Return the tables without the linkage and the entries ``others``; raise InputError if a published set is named, too."""
     if "published" in tables:
         raise InputError(f"a case has one mechanism: leave out linkage, or published = {tables['published']!r}")
     return {name: value for name, value in tables.items() if name not in (LINKAGE, *others)}
 
 
 def _named_files(path: Path) -> list[tuple[Path, Mapping[str, Any]]]:
-    """Return the file at ``path`` and the files that it names one after the other, each with its tables.
+    """Return the chain of files that begins at ``path``, each with its tables.
 
-    The last file is the one that describes the linkage.
+    Each file names the next one as the file of its linkage; the last file describes the linkage.
     """
     found: list[tuple[Path, Mapping[str, Any]]] = []
     while True:
@@ -102,7 +104,7 @@ def _with_absolute_files(table: Any, folder: Path) -> Any:
 
 
 def _merge_tables(base: Mapping[str, Any], tables: Mapping[str, Any], *, top: bool = True) -> dict[str, Any]:
-    """Return ``base`` overridden by ``tables``, entry by entry; at the top level runs and drives are replaced as a whole."""
+    """Return ``base`` overridden by ``tables``, entry by entry; the tables of runs and drives are replaced as a whole."""
     merged = {**base, **tables}
     for name, table in tables.items():
         whole = top and (name in ("run", "drive") or name.endswith("Drive"))
@@ -116,13 +118,13 @@ def _no_linkage_error(path: str | Path) -> InputError:
 
 
 def _package(tables: Mapping[str, Any]) -> Package:
-    """Return the package of the linkage in the tables of a file; its title is by default that of the file."""
+    """Return the package of the linkage in the tables of a file; by default it has the title of the file."""
     title = {"title": tables["title"]} if "title" in tables else {}
     return Package(read_description({**title, **tables[LINKAGE]}))
 
 
 def load_linkage(path: str | Path) -> Mechanism:
-    """Compile the linkage that a file describes, itself or by the name of another file; see `docs/linkages.md`.
+    """Compile the linkage that a file describes, or that another file named in it describes; see `docs/linkages.md`.
 
     Raises
     ------
@@ -132,7 +134,7 @@ def load_linkage(path: str | Path) -> Mechanism:
 
 
 def load_package(path: str | Path) -> Package:
-    """Return the package of the linkage that a file describes, itself or by the name of another file.
+    """Return the package of the linkage that a file describes, or that another file named in it describes.
 
     Raises
     ------
@@ -148,10 +150,11 @@ Place = Sequence[Amount] | NDArray[np.float64]
 
 
 class Builder:
-    """Builder of a description: each method adds one entry to the table of the same name in a linkage file.
+    """Builder of the description of a linkage, with one method for each kind of entry of a linkage file.
 
-    Amounts are numbers in SI or texts with a unit, such as ``"50 mm"``. An omitted argument has the default of the file. Every
-    method returns the builder, and raises InputError for a name that its table has already.
+    For instance, `body` adds a body, as a table ``[linkage.bodies.<name>]`` does. Amounts are numbers in SI or texts with a
+    unit, such as ``"50 mm"``. An omitted argument has the same default as in a file. Each method that adds an entry returns the
+    builder, and raises InputError if there is an entry of this kind with the same name.
 
     Examples
     --------
@@ -259,7 +262,10 @@ class Builder:
         return self._add("slides", name, body=body, on=on, through=through, direction=direction)
 
     def slot(self, name: str, *, pin: str, on: str, through: str, direction: Amount | None = None) -> Builder:
-        """Add a straight slot in the body ``on``, ``through`` a point in a ``direction`` (rad), for the ``pin`` of another."""
+        """Add a straight slot in the body ``on``, in which the ``pin`` of another body slides.
+
+        The centre line of the slot passes through the point ``through`` of ``on``, in a ``direction`` (rad) given in ``on``.
+        """
         return self._add("slots", name, pin=pin, on=on, through=through, direction=direction)
 
     def gear(self, name: str, *, bodies: Sequence[str], ratio: Amount, phase: Amount | None = None) -> Builder:
@@ -279,7 +285,8 @@ class Builder:
     def rack(self, name: str, *, gear: str, rack: str, radius: Amount, offset: Amount | None = None) -> Builder:
         """Add a toothed rack, which slides on the body to which its ``gear`` is pinned.
 
-        ``radius`` is the travel of the rack per radian of the gear (m), of either sign, ``offset`` its position at angle 0 (m).
+        ``radius`` is the travel of the rack per radian of the gear (m), positive or negative. ``offset`` is the position of the
+        rack when the angle of the gear is zero (m).
         """
         return self._add("racks", name, gear=gear, rack=rack, radius=radius, offset=offset)
 
@@ -318,12 +325,13 @@ class Builder:
         friction : optional
             Level of Coulomb friction (N, N.m).
         law : str or sequence of (x, force), optional
-            A further force that opposes the stretch x and its rate v, such as ``"a*x**3 + 4*v"``, or a table of it (SI).
+            A further force that opposes the stretch: a formula in the stretch x and its rate v, such as ``"a*x**3 + 4*v"``, or
+            a table of stretch and force (SI).
         constants : mapping, optional
             Constants of the law, by their names in it.
         driven : bool, optional
-            Whether an input adds a force that lengthens it, as in a cylinder, or a torque that twists it, as of a motor. It may
-            also be at a joint whose coordinate is not a freedom.
+            Whether an input adds a force that lengthens the spring, as a cylinder does, or a torque that twists it, as a motor
+            does. A driven spring may also be at a joint whose coordinate is not a freedom.
         """
         return self._add(
             "springs", name, between=between, at=at, bodies=bodies, stiffness=stiffness, damping=damping, free=free,
@@ -339,7 +347,7 @@ class Builder:
         speed: Amount | None = None,
         driven: bool | None = None,
     ) -> Builder:
-        """Add a freedom: the angle of a pin, or the position of a slide.
+        """Add a degree of freedom: the angle of a pin, or the position of a slide.
 
         Parameters
         ----------
@@ -392,7 +400,7 @@ class Builder:
         return self.spring(name, between=between, driven=True)
 
     def mechanism(self) -> Mechanism:
-        """Compile the linkage and register a published set under its name, which every function accepts.
+        """Compile the linkage and return its mechanism; every analysis then accepts the name of the linkage as a published set.
 
         Raises
         ------
@@ -452,12 +460,12 @@ def linkage(
 
 
 def _without_none(entries: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the entries that are not None, in the form of a file."""
+    """Return the entries that are not None, converted to the data types of a file."""
     return {key: _as_data(value) for key, value in entries.items() if value is not None}
 
 
 def _as_data(value: Any) -> Any:
-    """Return mappings, sequences and arrays as the dicts and lists of a file."""
+    """Convert mappings to dicts, and sequences and arrays to lists, as a file has them."""
     if isinstance(value, Mapping):
         return {key: _as_data(inner) for key, inner in value.items()}
     if isinstance(value, (np.ndarray, np.generic)):

@@ -17,7 +17,11 @@ class Contacts:
         self.joints = [motion.structure.joints[name] for name in motion.description.friction]
 
     def blocks(self) -> Iterator[str]:
-        """Write three functions: friction for joint forces of 1 N, forces in joints with friction, and their changes by it."""
+        """Write the functions `rubbing`, `contacts` and `responses`.
+
+        `rubbing` computes the friction for a force of 1 N in each joint, `contacts` the forces in the joints with friction, and
+        `responses` the changes of these forces that the friction of `rubbing` causes.
+        """
         yield self._unit_friction()
         rows = ["return ("]
         for joint in self.joints:

@@ -25,7 +25,7 @@ _NAME = re.compile(r"[A-Za-z][A-Za-z0-9]*")
 
 
 class LinkageError(LinkworkError):
-    """A described linkage cannot move as described: its bodies, joints and freedoms do not fit together."""
+    """Error for a linkage that cannot move as described: its bodies, joints and freedoms do not fit together."""
 
 
 def coordinate(value: Any, name: str) -> float:
@@ -67,7 +67,7 @@ class Body:
     Attributes
     ----------
     points : mapping of str to (x, y)
-        Its points (m). Give these, or ``bar``, or a bar and further points.
+        Coordinates of its points (m). Give points, or a ``bar``, or a bar and further points.
     bar : tuple of str
         Two points: the first is the body's origin, the second lies at ``length`` along its x axis.
     length : float
@@ -182,7 +182,7 @@ class Rack:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Spring:
-    """A spring with a damper and dry friction: between two points, about a pin, along a slide, or as a shaft of two bodies.
+    """A spring with damper and dry friction: between two points, about a pin, along a slide, or as a shaft between two bodies.
 
     Attributes
     ----------
@@ -191,7 +191,8 @@ class Spring:
     at : str
         a joint, or
     bodies : tuple of str
-        two bodies, which need not be joined: the angle of the second relative to the first, up to half a turn, twists it.
+        two bodies, which need not be joined. The spring is twisted by the angle of the second relative to the first, which is
+        counted up to half a turn.
     stiffness, damping : float
         In N/m and N.s/m; about a pin in N.m/rad and N.m.s/rad.
     free : float
@@ -199,12 +200,12 @@ class Spring:
     friction : float
         Level of Coulomb friction (N, N.m), smooth about rest.
     law : str or list of (x, force)
-        A further force that opposes the stretch x: a formula in x and its rate v such as "2e5*x**3 + 4*v", or a table,
-        which is interpolated linearly, of quantities or numbers in SI. Its work counts as dissipated.
+        A further force that opposes the stretch: a formula in the stretch x and its rate v, such as "2e5*x**3 + 4*v", or a
+        table of stretch and force, which is interpolated linearly. The work of this force counts as dissipated.
     constants : mapping of str to (float, str)
-        Constants of the formula, by their names in it: values and units. They become parameters of the mechanism.
+        Values and units of the constants in the formula, by name. They become parameters of the mechanism.
     driven : bool
-        Whether an input drives it, as in a cylinder or a linear motor: a force that lengthens it, or a torque that twists it.
+        Whether an input drives the spring with a force that lengthens it, as a cylinder does, or a torque that twists it.
     """
 
     between: tuple[str, ...] = entry(Many(_name, length=2), ())
@@ -242,7 +243,7 @@ def _load(value: Any, name: str) -> PointLoad:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FreedomTable:
-    """A joint whose coordinate is a freedom.
+    """A degree of freedom: a joint whose coordinate is independent.
 
     Attributes
     ----------
@@ -251,8 +252,8 @@ class FreedomTable:
     start : float
         Initial coordinate (rad, m).
     speed : float
-        Commanded rate at the start and by default (rad/s, m/s). The whole number 0 commands none, "0 rpm" commands rest. For a
-        freedom that is not driven, its initial rate.
+        Commanded rate, at the start and as long as no input changes it (rad/s, m/s). The whole number 0 means that no rate is
+        commanded; "0 rpm" commands rest. For a freedom that is not driven: its initial rate.
     driven : bool
         Whether its rate can be commanded; by default only the first freedom can be.
     """

@@ -77,13 +77,13 @@ class Picture:
         return joints, parts
 
     def tick(self, pair: str, gear: str, pin: str, arm: str) -> PicturePoint:
-        """Return a point that marks a gear on its pitch circle; the expression ``arm`` leads there from the bearing ``pin``."""
+        """Return a mark on the pitch circle of a gear; ``arm`` is the expression of the vector from its ``pin`` to the mark."""
         return PicturePoint(
             f"{pair}{gear}Tick", f"mark on {gear}", f"*(b.at_{pin}.x + {arm}.x, b.at_{pin}.y + {arm}.y, 0.0)"
         )
 
     def bearings(self, bodies: tuple[str, ...]) -> tuple[str, tuple[str, ...]]:
-        """Return the name of the body that carries two gears, and the names of their two pins on it."""
+        """Return the name of the body that carries two gears, and the names of the pins that join the gears to this body."""
         step = next(s for s in self.structure.steps if isinstance(s, GearStep) and {s.body, s.mate} == set(bodies))
         joints = [joint for joint in self.structure.joints.values() if isinstance(joint, Pin)]
         return step.parent, tuple(
@@ -97,9 +97,9 @@ class Picture:
         return function(signature, "Compute the places of the points of the picture.", rows)
 
     def drag_argument(self, own: str) -> str:
-        """Return the source of the argument `Joint.moves` of a point: the parameters that follow when it is dragged.
+        """Return the source of the argument `Joint.moves` of a point: the parameters that change when the point is dragged.
 
-        The result is empty if no parameter follows.
+        The result is empty if no parameter changes.
         """
         names = {p.name for p in self.interface.parameters}
         for body, points in self.interface.points.items():
@@ -121,7 +121,7 @@ class Picture:
         return ""
 
     def paths(self) -> list[str]:
-        """Return the points whose paths are drawn: those that are not joints, or else the last pin between moving bodies."""
+        """Return the points whose paths are drawn: all that are no joints, or else the last pin between moving bodies."""
         moving = [own for body in self.description.bodies for own in self.interface.points[body]]
         alone = [own for own in dict.fromkeys(moving) if own not in self.structure.joints]
         return alone or [own for own in dict.fromkeys(moving) if own not in self.description.ground][-1:]

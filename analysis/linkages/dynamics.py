@@ -23,13 +23,13 @@ class Reaction(NamedTuple):
 
 
 def springs_by_freedom(description: Description, interface: Interface) -> dict[str, int]:
-    """Return, by name of each spring that acts along a freedom, the index of the freedom."""
+    """Return the springs that act along a freedom, by name, each with the index of that freedom."""
     numbers = {drive.joint: n for n, drive in enumerate(interface.drives)}
     return {name: numbers[s.at] for name, s in description.springs.items() if s.at in numbers}
 
 
 class Motion:
-    """Writer of the dynamics of one linkage, function by function."""
+    """Writer of the functions that compute forces and motion of one linkage."""
 
     def __init__(self, interface: Interface) -> None:
         self.description, self.structure, self.interface = interface.description, interface.structure, interface
@@ -50,7 +50,7 @@ class Motion:
     # What acts
 
     def springs(self) -> Iterator[str]:
-        """Write the function that computes the stretches of all springs and their rates."""
+        """Write the function that computes the stretch of each spring and its rate of change."""
         rows, fields = [], []
         for name, spring in self.description.springs.items():
             free = f" - p.{name}_free" if is_given(spring.free) else ""
@@ -106,7 +106,7 @@ class Motion:
         return f"p.{name}_stiffness * s.{name}_stretch" if is_given(spring.stiffness) else ""
 
     def tension(self, name: str, spring: Spring) -> str:
-        """Return the expression of the whole force of a spring that is not driven; it opposes the stretch."""
+        """Return the expression of the total force of a spring that is not driven; the force opposes the stretch."""
         return " + ".join(filter(None, (self._pull(name, spring), self.resistance(name, spring))))
 
     def laws(self) -> Iterator[str]:
@@ -300,7 +300,7 @@ class Motion:
     # Equations of motion
 
     def inputs(self) -> Iterator[str]:
-        """Write the record of the inputs in effect, and the function that computes it from the modes and the channels."""
+        """Write the record of the acting loads and commanded rates, and the function that computes it from modes and inputs."""
         fields, values, names = [], [], []
         modes = [f"{drive.name}_mode" for drive in self.interface.drives if drive.table]
         for drive in self.interface.drives:
@@ -322,13 +322,13 @@ class Motion:
         yield function(signature, "Return what acts on the linkage from the values of the modes and the inputs.", rows)
 
     def _commanded_rates(self) -> tuple[str, str]:
-        """Return the expressions of two tuples: which rates are commanded, and the commanded accelerations."""
+        """Return the expressions of two tuples by freedom: 1 if its rate is commanded, and the commanded acceleration."""
         held = ", ".join(f"i.{d.name}_held" if d.table else "0.0" for d in self.interface.drives)
         known = ", ".join(f"i.{d.name}_given" if d.table else "0.0" for d in self.interface.drives)
         return f"({held},)", f"({known},)"
 
     def motion(self) -> Iterator[str]:
-        """Write the functions of accelerations, derivative, energies, jumps, start and clearance."""
+        """Write the functions for accelerations, state derivative, energies, speed jumps, initial state and clearance."""
         n, drives = range(self.n), self.interface.drives
         held, known = self._commanded_rates()
         s = "s, " if self.description.springs else ""

@@ -24,11 +24,11 @@ class PoseWriter:
         self.structure, self.interface = interface.structure, interface
         self.n = len(interface.drives)
         self.lines: list[str] = []
-        #: variables of points of the ground or of known bodies, by name of the point
+        #: variables of the positions of points of the ground and of bodies with known pose, by name of the point
         self.places: dict[str, str] = {}
-        #: for bodies whose angles are linear in the coordinates: their coefficients, and the constant terms
+        #: for each body whose angle is linear in the coordinates: the coefficients, and the constant terms
         self.angles: dict[str, tuple[dict[int, str], list[str]]] = {GROUND: ({}, [])}
-        #: the same for slides whose positions are linear in the coordinates
+        #: for each slide whose position is linear in the coordinates: the coefficients, and the constant terms
         self.travels: dict[str, tuple[dict[int, str], list[str]]] = {}
         self.margins: list[str] = []
 
@@ -37,8 +37,8 @@ class PoseWriter:
     def point(self, body: str, own: str, frame: str = "") -> str:
         """Return the expression of the position of a body's point.
 
-        ``frame`` is the variable of the body's pose, by default that in the ground; with "own" the position is that in the
-        body's own frame.
+        ``frame`` is the variable of the body's pose, by default of its pose in the ground frame. With ``frame="own"`` the
+        position is given in the body's own frame.
         """
         x, y = self.interface.coordinates(body, own)
         if body == GROUND or frame == "own":
@@ -47,7 +47,7 @@ class PoseWriter:
         return f"{frame}.origin" if (x, y) == ("0.0", "0.0") else f"point({frame}, {x}, {y})"
 
     def point_variable(self, body: str, own: str) -> str:
-        """Return the variable of the point ``own`` of a body whose pose is known; write its line at the first use."""
+        """Return the variable of the position of the body's point ``own``, and write its assignment at the first use."""
         if own not in self.places:
             self.lines.append(f"at_{own} = {self.point(body, own)}")
             self.places[own] = f"at_{own}"
@@ -61,16 +61,19 @@ class PoseWriter:
         return f"Frame(subtract_vectors({pin}, arm({turn}, {x}, {y})), {turn})"
 
     def incline_turn(self, turn: str, joint: Slider, sign: int = 1) -> str:
-        """Return the expression of the direction of a slide's line from ``turn``, the direction of the body that has the line.
+        """Return the expression of the direction of a slide's line; ``turn`` is the direction of the body that has the line.
 
-        With ``sign`` -1 ``turn`` is the direction of the line, and the result that of the body.
+        With ``sign`` -1 it is the reverse: ``turn`` is the direction of the line, and the result the direction of the body.
         """
         if not joint.inclined:
             return turn
         return f"incline_direction({turn}, p.{joint.name}_COS, {'-' if sign < 0 else ''}p.{joint.name}_SIN)"
 
     def place_freedom_body(self, step: FreedomStep, lead: str = "") -> None:
-        """Write the pose of a body that a freedom joins to a known one, in the ground or relative to the body ``lead``."""
+        """Write the pose of a body that a freedom joins to a body of known pose.
+
+        The pose is relative to the body ``lead``, or to the ground if no ``lead`` is given.
+        """
         suffix = f"in_{lead}" if lead else "frame"
         parent = "" if step.parent in (GROUND, lead) else f"{step.parent}_{suffix}"
         own = "own" if lead and step.parent == lead else parent
@@ -99,9 +102,9 @@ class PoseWriter:
     def slide_pose(
         self, step: FreedomStep | RackStep, joint: Slider, parent_turn: str, travel: str, own: str = ""
     ) -> str:
-        """Write the line for the direction of ``step.body``; return the expression of the body's pose.
+        """Write the assignment of the direction of ``step.body``; return the expression of the body's pose.
 
-        The body is the block or the guide of the slide ``joint`` on its parent, and ``travel`` the arm from the start of the
+        The body is the block or the guide of the slide ``joint`` on its parent. ``travel`` is the vector from the start of the
         guide line to the block.
         """
         turn = f"{step.body}_turn"
@@ -155,7 +158,7 @@ class PoseWriter:
         self.lines.append(f"{step.body}_frame = {frame}")
 
     def derivative_tuple(self, terms: dict[int, str]) -> str:
-        """Return the source of the tuple of derivatives by the coordinates; ``terms`` has those that are not zero."""
+        """Return the source of the tuple of derivatives with respect to the coordinates; ``terms`` has the nonzero ones."""
         return f"({', '.join(terms.get(n, '0.0') for n in range(self.n))},)"
 
     def linear_turn(self, terms: dict[int, str], constants: Iterable[str]) -> str:
@@ -192,9 +195,10 @@ class PoseWriter:
     # Dyads
 
     def arm_to_inner_pin(self, side: Side, body: str, joint: Pin) -> str:
-        """Return the expression of the arm from a side's outer joint to the dyad's inner pin ``joint``, a point of ``body``.
+        """Return the expression of the vector from a side's outer joint to the dyad's inner pin ``joint``, a point of ``body``.
 
-        It is given in the axes of the side's body or, if that body guides the slide at the outer joint, of the guide line.
+        The vector is given in the axes of the side's first body or, if this body guides the slide at the outer joint, in the
+        axes of the guide line.
         """
         if isinstance(side.joint, Pin):
             start, axes = side.joint.name, ""
@@ -205,10 +209,10 @@ class PoseWriter:
         return self.own_arm(side, body, joint.name, start, axes)
 
     def own_arm(self, side: Side, body: str, to: str, start: str, axes: str) -> str:
-        """Return the expression of the arm from the point ``start`` of a side's first body to the point ``to`` of ``body``.
+        """Return the expression of the vector from the point ``start`` of a side's first body to the point ``to`` of ``body``.
 
-        ``body`` is any body of the side. The arm is given in the frame of the first body or, if ``axes`` names a slide of it,
-        in the axes of that slide's line.
+        ``body`` is any body of the side. The vector is given in the frame of the first body or, if ``axes`` names a slide on
+        this body, in the axes of the slide's line.
         """
         sx, sy = self.interface.coordinates(side.body, start)
         if body == side.body:
@@ -221,7 +225,7 @@ class PoseWriter:
         return f"rotate_arm(fixed_direction(p.{axes}_COS, -p.{axes}_SIN, {self.n}), {result})" if axes else result
 
     def guide_line(self, side: Side) -> tuple[str, str]:
-        """Write the line along which a side slides; return the variables of its origin and direction."""
+        """Write the direction of the guide line along which a side slides; return the variables of its origin and direction."""
         joint = side.joint
         assert isinstance(joint, Slider)
         parent = self.interface.turn(side.parent)
@@ -233,9 +237,10 @@ class PoseWriter:
         return f"{side.parent}_frame.origin", name
 
     def place_side(self, side: Side, turn: str, along: str = "", origin: str = "", line: str = "") -> None:
-        """Write the poses of a side's bodies: from the direction ``turn`` of the first body if its joint is a pin.
+        """Write the poses of the bodies of one side of a dyad.
 
-        If it is a slide, they follow from the arm ``along`` the line that starts at ``origin`` and has the direction ``line``.
+        If the outer joint is a pin, ``turn`` is the direction of the first body. If the joint is a slide, ``along`` is the
+        vector along the guide line, which starts at ``origin`` and has the direction ``line``.
         """
         joint, body = side.joint, side.body
         if isinstance(joint, Pin):
@@ -252,7 +257,7 @@ class PoseWriter:
             self.lines.append(f"{own}_frame = composed_frame({body}_frame, {own}_in_{body})")
 
     def place_inner_bodies(self, step: Dyad) -> None:
-        """Write the poses of the bodies inside the two sides of a dyad, relative to the side's first body."""
+        """Write the poses of the further bodies of both sides of a dyad, relative to the first body of their side."""
         for side in step.sides:
             kept = dict(self.angles)
             self.angles[side.body] = {}, []
@@ -389,7 +394,7 @@ class PoseWriter:
 
 
 def _difference(a: str, b: str) -> str:
-    """Return the expression a - b, simplified where one of them is zero."""
+    """Return the expression a - b, simplified if a or b is zero."""
     if b == "0.0":
         return a
     return f"-{b}" if a == "0.0" else f"{a} - {b}"

@@ -30,7 +30,7 @@ _UNITS = (
     "1", "rad", "m", "rad/s", "m/s", "N", "N.m", "N/m", "N.m/rad", "N.s/m", "N.m.s/rad", "N/m2", "N/m3", "N.s2/m2", "m2", "m3",
     "kg", "s",
 )  # fmt: skip
-#: Angles at which a law is compared with itself a turn further (rad).
+#: Angles at which the value of a law is compared with its value one turn later (rad).
 _ANGLES = (-2.0, -0.7, 0.3, 1.9)
 
 
@@ -40,7 +40,7 @@ def law(value: Any, name: str) -> Law:
     Raises
     ------
     ParameterError
-        If a formula has anything but names, arithmetic and functions of `math`, or a table has no rows of two.
+        If a formula has anything but names, arithmetic and the known functions, or a table is not of at least two pairs.
     """
     if isinstance(value, list):
         return _ROWS(value, name)
@@ -67,12 +67,12 @@ def law(value: Any, name: str) -> Law:
 
 
 def expression(law: Law, about: bool, name: str) -> str:
-    """Return a force law as an expression in x, v and the constants; ``about`` tells whether x is an angle and not a length.
+    """Return a force law as an expression in x, v and the constants; ``about`` is true if x is an angle, not a length.
 
     Raises
     ------
     ParameterError
-        If a row of a table is of other kinds of quantities, or the rows are not in order.
+        If a quantity in a table has another dimension, or x does not increase from row to row.
     """
     if isinstance(law, str):
         return ast.unparse(_WithoutBranches().visit(ast.parse(law, mode="eval")))
@@ -84,7 +84,7 @@ def expression(law: Law, about: bool, name: str) -> str:
 class _WithoutBranches(ast.NodeTransformer):
     """Syntax transformer: max, min and abs become expressions with `math.fabs`, and powers become `math.pow`.
 
-    `math.pow` raises an error where ``**`` gives a complex number; powers with a whole constant exponent stay.
+    `math.pow` raises an error where ``**`` gives a complex number. Powers with a whole constant exponent keep ``**``.
     """
 
     def visit_BinOp(self, node: ast.BinOp) -> ast.expr:
@@ -135,7 +135,7 @@ def check_law(law: Law, known: Mapping[str, Any], name: str) -> None:
 
 
 def is_periodic(law: Law, known: Mapping[str, tuple[float, str]]) -> bool:
-    """Return whether a force law about a pin is periodic with a turn."""
+    """Return whether a force law about a pin repeats itself after every whole turn."""
     if not isinstance(law, str):
         return False
     names = vars(math) | {"abs": abs, "max": max, "min": min} | {name: value for name, (value, _) in known.items()}

@@ -18,7 +18,7 @@ def check_entries(description: Description) -> None:
     Raises
     ------
     LinkageError, ParameterError
-        For the first entry that does not fit: its place in the file, and what would be right.
+        If an entry does not fit. The message says where it is in the file, and what would be right.
     """
     d = description
     if not re.fullmatch(r"[A-Za-z][A-Za-z0-9-]*", d.name):
@@ -42,7 +42,7 @@ def check_entries(description: Description) -> None:
         raise LinkageError(f"linkage.{where} {wrong}: {right}")
 
 
-#: Where the mistake is, what is wrong, what would be right.
+#: Mistakes: where each one is, what is wrong, what would be right.
 Found = Iterator[tuple[str, str, str]]
 
 
@@ -69,7 +69,7 @@ def _names(d: Description, owners: Mapping[str, set[str]]) -> Found:
 
 
 def _bodies_without_length(d: Description, owners: Mapping[str, set[str]]) -> Found:
-    """Yield bodies whose pins are all at one place; a block that slides may have several rods on one axis."""
+    """Yield bodies whose pins all coincide, except blocks and guides: a sliding block may carry several rods on one axis."""
     sliding = {body for slide in d.slides.values() for body in (slide.body, slide.on)}
     for name, body in d.bodies.items():
         pins = {own: place for own, place in body.all_points.items() if len(owners[own]) > 1}

@@ -15,7 +15,7 @@ from .writing import function, quote
 
 
 class Output(NamedTuple):
-    """An output: name, unit, meaning, further arguments of its variable, and the expression of its value."""
+    """An output: name, unit, meaning, further arguments of its variable (``rest``), and the expression of its value."""
 
     name: str
     unit: str
@@ -25,7 +25,7 @@ class Output(NamedTuple):
 
     @property
     def variable(self) -> str:
-        """Return the source of the variable in the package."""
+        """Return the source text that declares the output's variable."""
         known = f'"{self.name}", "{self.unit}", {quote(self.text)}, {quote(symbol(self.name, self.unit))}'
         return f"output({known}{self.rest and f', {self.rest}'})"
 
@@ -116,7 +116,7 @@ class Outputs:
         yield from self._joint_forces()
 
     def _transmission(self, dyad: Dyad) -> tuple[str, str]:
-        """Return description and expression of a dyad's transmission angle; at 0 and at 180 deg its bodies lock."""
+        """Return description and expression of a dyad's transmission angle; at 0 and 180 deg the dyad locks."""
         c, (one, other) = dyad.inner.name, (side.body for side in dyad.sides)
         pins = [f"b.at_{side.joint.name}" for side in dyad.sides if isinstance(side.joint, Pin)]
         lines = [f"b.{side.joint.name}_line" for side in dyad.sides if isinstance(side.joint, Slider)]
@@ -163,7 +163,7 @@ class Outputs:
             yield Output(f"{rack.rack}.force", "N", text, "", along)
 
     def _dependent_slides(self) -> list[Slider]:
-        """Return the slides whose positions are not freedoms but follow from them."""
+        """Return the slides whose positions are not freedoms but follow from the freedoms."""
         freed = {drive.joint for drive in self.interface.drives}
         return [slide for name, slide in sliders(self.structure).items() if name not in freed]
 

@@ -154,7 +154,7 @@ MECHANISM = Mechanism(
 
 
 class Package:
-    """Source texts of the package of one linkage.
+    """Python package of one linkage, as source texts.
 
     Attributes
     ----------
@@ -241,7 +241,7 @@ class Package:
         return made
 
     def _unreachable(self, made: Mechanism) -> str:
-        """Return the words of an error on two bodies that do not reach each other at the start; empty if all do."""
+        """Return a phrase that names two bodies that cannot be joined at the start; empty if all bodies can be joined."""
         start = made.published[made.name]
         try:
             made.modules[-1].places(made.state(start.initial), start.parameters.constants())
@@ -299,7 +299,7 @@ class Package:
             return False
 
     def _check_twists(self, made: Mechanism) -> None:
-        """Raise LinkageError if a torsion spring is twisted by more than half a turn and no freedom counts its turns."""
+        """Raise LinkageError if a torsion spring whose turns no freedom counts is twisted by over half a turn at the start."""
         start = made.published[made.name]
         places = made.modules[-1].places(made.state(start.initial), start.parameters.constants())
         for name, spring in self.description.springs.items():
@@ -323,7 +323,7 @@ class Package:
         blocks += motion.springs() if self.description.springs else ()
         blocks += [*motion.applied_forces(), *motion.motion(), *motion.forces()]
         blocks += Contacts(motion).blocks() if self.description.friction else ()
-        # only now it is known which joint forces there are
+        # the joint forces that are outputs are known only after motion.forces()
         self.outputs = Outputs(motion)
         names = [*(p.name for p in self.interface.parameters), *self.outputs.names()]
         for name in names:
@@ -392,7 +392,7 @@ def _imports(body: str) -> str:
 
 
 def _error_scale(drives: tuple[Drive, ...], length: float, mass: float) -> str:
-    """Write the function that returns the magnitudes below which the integrator's errors are absolute."""
+    """Write the function that returns, for each state, the magnitude below which the integrator's tolerance is absolute."""
     squares = " + ".join(f"x[{len(drives) + k}] * x[{len(drives) + k}]" for k, d in enumerate(drives) if d.turns)
     coordinates = ", ".join("1.0" if d.turns else repr(length) for d in drives)
     rates = ", ".join("speed" if d.turns else f"{length!r} * speed" for d in drives)

@@ -35,10 +35,11 @@ class Parameter(NamedTuple):
 
 
 class Drive(NamedTuple):
-    """A freedom: its names and unit in the FMI interface, its start, and the table of its inputs if it can be driven.
+    """A degree of freedom of a linkage: its FMI names, unit, and initial coordinate and rate.
 
-    ``commanded`` says whether its rate is commanded by default; ``turns_back`` is the number of turns after which all bodies
-    are back in the same poses, or 0 if they never are.
+    ``table`` is the prefix of the names of its inputs, empty if it cannot be driven. ``turns`` says whether it is an angle,
+    and ``commanded`` whether its rate is commanded by default. ``turns_back`` is the number of turns after which all bodies are
+    back in the same poses, or 0 if they never are.
     """
 
     name: str
@@ -64,7 +65,7 @@ class Drive(NamedTuple):
 
     @property
     def load(self) -> str:
-        """Return the name of the torque or force input in the freedom's table."""
+        """Return the last part of the name of the torque or force input: ``torque`` or ``force``."""
         return "torque" if self.turns else "force"
 
     @property
@@ -102,7 +103,7 @@ class Interface:
     points : mapping
         Coordinates of each point in the frame of its body, as expressions in the parameters.
     centres : mapping
-        The same for the centres of mass; massless bodies are left out.
+        Coordinates of the centre of mass of each body, as such expressions; massless bodies are left out.
     """
 
     description: Description
@@ -118,11 +119,11 @@ class Interface:
         return self.points[body].get(point, ("0.0", "0.0"))
 
     def frame(self, body: str, of: str = "") -> str:
-        """Return the expression of the pose of a body, a field of the record ``of``."""
+        """Return the expression of the pose of a body; ``of`` is the prefix of the record that has the pose, such as "b."."""
         return f"{of}{body}_frame" if body != GROUND else f"ground({len(self.drives)})"
 
     def turn(self, body: str, of: str = "") -> str:
-        """Return the expression of the direction of a body, a field of the record ``of``."""
+        """Return the expression of the direction of a body; ``of`` is the prefix of the record, see `frame`."""
         return f"{of}{body}_frame.turn" if body != GROUND else f"fixed_direction(1.0, 0.0, {len(self.drives)})"
 
     def travel(self, slide: Slider) -> str:
@@ -163,7 +164,7 @@ def freedoms(description: Description, structure: Structure) -> tuple[Drive, ...
 
 
 def _is_wound(description: Description, pin: str) -> bool:
-    """Return whether a spring about a pin is wound up further by every turn, so that a turn changes the configuration."""
+    """Return whether a spring about a pin is wound up further by every turn, so that its force is not periodic."""
     springs = [spring for spring in description.springs.values() if spring.at == pin]
     return any(
         is_given(spring.stiffness) or (spring.law and not is_periodic(spring.law, spring.constants))
@@ -172,7 +173,7 @@ def _is_wound(description: Description, pin: str) -> bool:
 
 
 def _returning_turns(description: Description, structure: Structure, freedom: int) -> int:
-    """Count the turns of a freedom after which all gears are back at their angles; 0 if they never are, or a rack moves on."""
+    """Count the turns of a freedom after which all gears are back at their angles; 0 if never, or if a rack is displaced."""
     angles, turns = {GROUND: 0.0}, 1
     for step in structure.steps:
         carrier = angles.get(step.parent, 0.0) if not isinstance(step, Dyad) else 0.0
@@ -385,7 +386,10 @@ def _mass(name: str, body: Body) -> _Mass | None:
 
 
 def spring_angle_name(description: Description, name: str) -> str:
-    """Return the name of a torsion spring's angle: its pin's, or its own if the pin has other springs or it has no pin."""
+    """Return the name of the angle of a torsion spring, such as ``A.turn``.
+
+    It begins with the name of the pin, or with that of the spring if the spring has no pin or the pin has several springs.
+    """
     pin = description.springs[name].at
     alone = sum(spring.at == pin for spring in description.springs.values()) == 1
     return f"{pin if pin and alone else name}.turn"
@@ -433,7 +437,7 @@ def _spring(name: str, description: Description, structure: Structure, drive: Dr
 
 
 def length_and_mass(found: Interface) -> tuple[float, float]:
-    """Return the greatest length or coordinate (m) and the mass of all bodies (kg), each 1 if there is none."""
+    """Return the greatest length or coordinate (m) and the total mass of the bodies (kg), each 1 if there is none."""
     lengths = [abs(p.value) for p in found.parameters if p.unit == "m" and p.role not in ("spring", "law", "friction")]
     masses = [p.value for p in found.parameters if p.unit == "kg"]
     return max(lengths, default=1.0) or 1.0, sum(masses) or 1.0

@@ -27,7 +27,7 @@ class Reach(NamedTuple):
     low, high : float
         Ends of the range (rad, m): limits of assembly, or the ends of a turn or of the search.
     open : (bool, bool)
-        Whether no limit was met up to the low and to the high end.
+        For the low and the high end: whether the linkage can move beyond this end.
     turns : bool
         Whether the freedom can make a whole turn.
     least : float
@@ -51,10 +51,10 @@ def reach(mechanism: Mechanism, freedom: int = 0, *, most: float | None = None, 
     mechanism : Mechanism
     freedom : int
     most : float, optional
-        Greatest distance from the start that is searched: by default half the period, or four turns if there is none; for a
-        slide 1 m.
+        Greatest distance from the start that is searched: by default half the period of the coordinate. If the coordinate is
+        not periodic, the default is four turns, for a slide 1 m.
     samples : int
-        Number of positions that are tried on either side, for each half turn.
+        Number of positions that are tried on each side of the start: for an angle per half turn, for a slide in all.
     """
     coordinate, period = mechanism.freedoms[freedom].coordinate, mechanism.freedoms[freedom].period
     unit = next(v.unit for v in mechanism.variables if v.name == coordinate)
@@ -76,14 +76,14 @@ def reach(mechanism: Mechanism, freedom: int = 0, *, most: float | None = None, 
 
     ends, free, least = [], [], margin(middle)
     for sign in (-1.0, 1.0):
-        # one place more at either end, so that a dip in the first or the last interval is seen
+        # one position more at each end, so that a minimum in the first or the last interval is found
         places = (middle + sign * most * np.arange(-1, samples + 2) / samples).tolist()
         values = [margin(places[0]), least]
         for n, q in enumerate(places[2:], 2):
             values.append(margin(q))
             lowest, at = (values[n], q) if n <= samples + 1 else (inf, q)
             if values[n - 2] > values[n - 1] <= values[n]:
-                # the limit may lie between two places, where a sine goes through zero
+                # a limit may lie between two positions, where the sine of a transmission angle goes through zero
                 bounds = sorted((places[n - 2], q))
                 dip = scipy.optimize.minimize_scalar(
                     margin, bounds=bounds, method="bounded", options={"xatol": 1e-9 * most}
@@ -109,7 +109,7 @@ class DeadCentre(NamedTuple):
     Attributes
     ----------
     name : str
-        Name of the body that is pinned to the ground, or of its slide on the ground.
+        Name of the body if it is pinned to the ground, or of its slide if it slides on the ground.
     at : float
         Coordinate of the freedom (rad, m).
     """

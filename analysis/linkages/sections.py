@@ -23,14 +23,14 @@ class LinkBody:
     corners: tuple[tuple[float, float], ...] = ()
 
     def properties(self, length: float) -> MassProperties:
-        """Return mass, centre of mass along and across the link from its first pin, and moment of inertia about that centre."""
+        """Return mass, centre of mass (along, across) from the first pin, and moment of inertia about the centre of mass."""
         if isinstance(self.section, Plate):
             return self.section.properties(self.corners)
         body = length + 2.0 * self.overhang
         return MassProperties(self.section.mass(body), (0.5 * length, 0.0), self.section.inertia(body))
 
     def origin(self, weighed: bool) -> str:
-        """Return in words where the masses come from: all from the section, or the mass from weighing (``weighed``)."""
+        """Return in words where the mass properties come from: the section, or with ``weighed`` weighing and the section."""
         return f"{'weighed, shaped as a ' if weighed else 'of a '}{self.words}"
 
 

@@ -21,7 +21,7 @@ MOST_FREEDOMS = 4
 
 
 class Pin(NamedTuple):
-    """Bodies pinned together at a point that all of them have."""
+    """A pin: it joins bodies at a point that all of them have."""
 
     name: str
     bodies: tuple[str, ...]
@@ -40,7 +40,10 @@ Joint = Pin | Slider
 
 
 class FreedomStep(NamedTuple):
-    """A body whose joint with the known body ``parent`` is a freedom; ``sign`` is -1 if ``body`` is the joint's first body."""
+    """Step that adds a body whose joint with the known body ``parent`` is a freedom.
+
+    ``sign`` is -1 if ``body`` is the first body of the joint, otherwise +1.
+    """
 
     body: str
     parent: str
@@ -50,14 +53,14 @@ class FreedomStep(NamedTuple):
 
     @property
     def bodies(self) -> tuple[str, ...]:
-        """Return the body alone."""
+        """Return the one body that the step adds."""
         return (self.body,)
 
 
 class GearStep(NamedTuple):
-    """A gear whose angle follows from that of its mate, both pinned to ``parent``.
+    """Step that adds a gear whose angle follows from the angle of its mate; both are pinned to ``parent``.
 
-    ``gear`` is the name of the pair in the description; ``inverse`` says whether the mate is its second gear.
+    ``gear`` is the name of the pair in the description; ``inverse`` says whether the mate is the second gear of the pair.
     """
 
     body: str
@@ -69,7 +72,7 @@ class GearStep(NamedTuple):
 
 
 class RackStep(NamedTuple):
-    """A rack whose position follows from its gear, or a gear whose angle follows from its rack.
+    """Step that adds a rack whose position follows from its gear, or a gear whose angle follows from its rack.
 
     ``body`` follows from ``mate``, and ``joint`` joins it to the carrier ``parent``. ``rack`` is the name of the pair in the
     description; ``pin`` joins the gear and ``slide`` the rack to the carrier. ``linear`` says whether the travel of the slide
@@ -92,7 +95,7 @@ class RackStep(NamedTuple):
 
 
 class Side(NamedTuple):
-    """One side of a dyad: a body, its joint with the known body ``parent``, and the steps that place bodies relative to it."""
+    """One side of a dyad: a body, its joint with the known body ``parent``, and steps that place more bodies relative to it."""
 
     body: str
     parent: str
@@ -106,10 +109,10 @@ class Side(NamedTuple):
 
 
 class Dyad(NamedTuple):
-    """Two bodies joined to known ones and to each other; ``ends`` are the bodies of the two sides at the inner joint.
+    """A dyad: two sides, each joined to a known body, and to each other by the inner joint of the bodies ``ends``.
 
-    ``kind`` is RRR, RRP, PRP, RPR or RPP: R a pin, P a slide, the inner joint in the middle. If one side is pinned and the
-    other slides, the pinned one is the first.
+    ``kind`` is RRR, RRP, PRP, RPR or RPP: R is a pin, P a slide, and the middle letter is the inner joint. If one side is
+    pinned and the other slides, the pinned side is the first.
     """
 
     kind: str
@@ -223,7 +226,7 @@ def carrier_joints(name: str, rack: Rack, found: Mapping[str, Joint]) -> tuple[P
     Raises
     ------
     LinkageError
-        If there is no such body.
+        If the gear is not pinned to the body on which its rack slides.
     """
     for slide in found.values():
         if isinstance(slide, Slider) and rack.rack in slide.bodies:
@@ -282,7 +285,7 @@ def _removal_hint(description: Description) -> str:
 
 
 def _check_pairs(found: Mapping[str, Joint]) -> None:
-    """Raise LinkageError if two joints hold the same two bodies together."""
+    """Raise LinkageError if two joints join the same two bodies."""
     joined: dict[tuple[str, ...], str] = {}
     for name, joint in found.items():
         for pair in combinations(sorted(joint.bodies), 2):
@@ -302,7 +305,7 @@ def analyse(description: Description) -> Structure:
     ------
     LinkageError
         If the number of freedoms is wrong, or the bodies are not a chain of dyads with these freedoms; the error names the
-        bodies that are left, and other choices of freedoms that are possible.
+        bodies whose poses do not follow, and other possible choices of freedoms.
     """
     if not description.bodies:
         raise LinkageError("linkage.bodies has none: one at least must move")
@@ -355,21 +358,24 @@ def analyse(description: Description) -> Structure:
 
 
 def _choices(description: Description, found: Mapping[str, Joint], count: int) -> Iterator[tuple[str, ...]]:
-    """Yield the sets of joints that determine all bodies if taken as freedoms; sets with most joints on the ground first."""
+    """Yield the sets of ``count`` joints that, taken as freedoms, determine the poses of all bodies.
+
+    Joints on the ground are tried first.
+    """
     simple = [name for name, joint in found.items() if len(joint.bodies) == 2 and name not in description.slots]
     simple.sort(key=lambda name: GROUND not in found[name].bodies)
     return (some for some in combinations(simple, count) if not _solve(description, found, list(some))[1])
 
 
 def _propose_freedoms(description: Description, found: Mapping[str, Joint], count: int) -> dict[str, FreedomTable]:
-    """Return the first set of freedoms that determines all bodies, each named after its body."""
+    """Return the first set of freedoms that determines the poses of all bodies, each named after its joint's second body."""
     for some in _choices(description, found, count):
         return {found[name].bodies[1]: FreedomTable(joint=name) for name in some}
     raise LinkageError(f"{description.name} is no chain of dyads, whatever joints are taken as freedoms")
 
 
 def _tree(root: str, found: Mapping[str, Joint], freed: list[str]) -> list[FreedomStep]:
-    """Return the steps that place the bodies which freedoms connect to the body ``root``, each after its parent."""
+    """Return the steps that place the bodies that freedoms connect to the body ``root``, each step after that of its parent."""
     steps: list[FreedomStep] = []
     there = {root}
     growing = True
@@ -386,9 +392,9 @@ def _tree(root: str, found: Mapping[str, Joint], freed: list[str]) -> list[Freed
 
 
 def _solve(description: Description, found: Mapping[str, Joint], freed: list[str]) -> tuple[list[Step], list[str]]:
-    """Return the steps that start at the ground, and the bodies that remain undetermined."""
+    """Return the steps of the solution, and the undetermined bodies; ``freed`` has the names of the joints of freedoms."""
     steps: list[Step] = list(_tree(GROUND, found, freed))
-    #: bodies whose places are known, in order, and those whose angles are linear in the coordinates
+    #: bodies whose poses are known, in order; bodies whose angles, and slides whose positions, are linear in the coordinates
     known = dict.fromkeys((GROUND, *(step.body for step in _freedom_steps(steps))))
     linear, travels = set(known), set(freed)
     moving = [*description.bodies, *description.slots]
@@ -419,9 +425,9 @@ def _solve(description: Description, found: Mapping[str, Joint], freed: list[str
 
 
 def _next_dyad(fixed: list[Joint], trees: Mapping[str, list[FreedomStep]], known: Mapping[str, None]) -> Dyad | None:
-    """Return the next dyad on the known bodies; None if there is none.
+    """Return the next dyad that is joined to known bodies; None if there is none.
 
-    Each side is a body with the bodies that freedoms join to it; if there is no such dyad, sides may also contain dyads.
+    Each side is a body with the bodies that freedoms join to it. If there is no such dyad, sides may also contain dyads.
     """
     if dyad := next(_dyads(fixed, trees, known), None):
         return dyad
@@ -452,7 +458,7 @@ def _freedom_steps(steps: list[Step]) -> Iterator[FreedomStep]:
 def _gear_steps(
     description: Description, fixed: list[Joint], known: Mapping[str, None], linear: set[str], unknown: list[str]
 ) -> Iterator[GearStep]:
-    """Yield the unknown gears whose mates' angles are known."""
+    """Yield a step for each unknown gear whose mate and carrier have angles that are linear in the coordinates."""
     pins = [joint for joint in fixed if isinstance(joint, Pin)]
     for name, gear in description.gears.items():
         for (mate, body), inverse in ((gear.bodies, False), (gear.bodies[::-1], True)):
@@ -472,7 +478,7 @@ def _rack_steps(
     linear: set[str],
     travels: set[str],
 ) -> Iterator[RackStep]:
-    """Yield the racks whose gears are known and the gears whose racks are known.
+    """Yield a step for each rack whose gear is known, and for each gear whose rack is known.
 
     ``travels`` are the slides whose positions are linear in the coordinates.
     """
@@ -496,7 +502,10 @@ def _connecting_joints(fixed: list[Joint], first: set[str], second: set[str]) ->
 def _dyads(
     fixed: list[Joint], trees: Mapping[str, Sequence[FreedomStep | Dyad]], known: Mapping[str, None]
 ) -> Iterator[Dyad]:
-    """Yield the dyads on known bodies; ``trees`` are the steps that place further bodies relative to each unknown body."""
+    """Yield the dyads that are joined to known bodies.
+
+    ``trees`` has, for each unknown body, the steps that place further bodies relative to this body.
+    """
     base = set(known)
     sides = [
         Side(body, parent, joint, tuple(inside))
@@ -517,7 +526,7 @@ def _dyads(
 
 
 def _dyad_kind(sides: tuple[Side, Side], inner: Joint) -> str:
-    """Return the kind of a dyad from its three joints; empty if they do not determine its pose."""
+    """Return the kind of a dyad from its three joints; empty if the joints do not determine the dyad's pose."""
     pinned = sum(isinstance(side.joint, Pin) for side in sides)
     if isinstance(inner, Pin):
         return ("PRP", "RRP", "RRR")[pinned]

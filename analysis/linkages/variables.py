@@ -22,7 +22,7 @@ class Start(NamedTuple):
 
 
 def display_argument(unit: str) -> str:
-    """Return the argument that names a variable's display unit, deg or rpm; empty if it is the unit itself."""
+    """Return the argument that names a variable's display unit, deg or rpm; empty if there is no other display unit."""
     shown = {"rad": "deg", "rad/s": "rpm"}.get(unit)
     return f', display="{shown}"' if shown else ""
 
@@ -40,9 +40,9 @@ class Variables:
     # Parameters
 
     def constants(self) -> dict[str, str]:
-        """Return the constants of the equations: by name the expression of each in the parameters ``self``.
+        """Return the constants of the equations by name, each as an expression in the parameters ``self``.
 
-        Constants of laws have no capitals in their names, so that ``COS`` and ``SIN`` are free.
+        Names of constants of force laws have no capitals, so that no such name can end in ``COS`` or ``SIN``.
         """
         found = {p.field: f"self.{p.field}" for p in self.interface.parameters}
         for name, joint in sliders(self.structure).items():
@@ -175,7 +175,7 @@ class Variables:
 
 
 def _input(name: str, unit: str, text: str, of: str = "", rest: str = "") -> str:
-    """Return the source of an input's variable; its symbol is that of the variable ``of`` if one is given.
+    """Return the source of an input's variable; if ``of`` is given, the symbol is that of the variable ``of``.
 
     ``rest`` is the source of further arguments.
     """

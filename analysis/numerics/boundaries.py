@@ -43,7 +43,7 @@ class Line:
     intervals : tuple of (float, float)
         Intervals on which the test function is negative; they may end at an end of the line or at a gap.
     gaps : tuple of (float, str)
-        Samples at which the test function has no value, each with the reason.
+        Places at which the test function has no value, each with the reason.
     """
 
     roots: NDArray[np.float64]
@@ -56,9 +56,9 @@ def scan(
 ) -> Line:
     """Find the roots of a function on an interval, also two roots between neighbouring samples.
 
-    Where the samples have an extremum towards zero, the extremum itself is computed: if the function has the other sign there,
-    the roots on both sides of it are found. A pair of roots can be missed only if the function has several extrema between
-    samples.
+    Where the samples have an extremum in the direction of zero, the extremum itself is computed: if the function has the other
+    sign there, the roots on both sides of the extremum are found. A pair of roots can be missed only if the function has
+    several extrema between samples.
 
     Parameters
     ----------
@@ -113,7 +113,7 @@ def scan(
 def _sample_function(
     function: Callable[[float], float], samples: NDArray[np.float64]
 ) -> tuple[list[float], list[float], list[tuple[float, str]]]:
-    """Sample a function, also at extrema of the opposite sign between samples; return places, values (NaN at gaps), gaps."""
+    """Sample a function, also at extrema of the opposite sign between samples; return arguments, values (NaN at gaps), gaps."""
     values, gaps = np.full(len(samples), np.nan), []
     for i, place in enumerate(samples.tolist()):
         try:
@@ -146,7 +146,7 @@ def find_minimum(
 ) -> tuple[float, float]:
     """Find the minimum of a smooth function on an interval; return its place and its value.
 
-    The error of the place is the tolerance, relative to the length of the interval; that of the value is of second order.
+    The error of the place is ``tolerance`` times the length of the interval; the error of the value is of second order.
 
     Raises
     ------
@@ -200,7 +200,7 @@ class Box:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Boundary:
-    """A boundary in a chart; the region of instability is on the left of its direction.
+    """A boundary in a chart; seen along its points, the region of instability is on the left.
 
     Attributes
     ----------
@@ -226,7 +226,7 @@ class Boundary:
         return self.ends[0].reason is Reason.CLOSED
 
     def crossings(self, axis: int, value: float, box: Box) -> NDArray[np.float64]:
-        """Return where the boundary crosses x = value (axis 0) or y = value (axis 1): the other coordinates, interpolated."""
+        """Interpolate the values of y where the boundary crosses x = value (axis 0), or of x where y = value (axis 1)."""
         scaled = (self.points - box.corner) / box.size
         level = (value - box.corner[axis]) / box.size[axis]
         found = []
@@ -273,7 +273,7 @@ class _Zero:
         return np.array([value * self.box.size[0]])
 
     def evaluate(self, x: NDArray[np.float64], y: float) -> Evaluation:
-        """Return the residual, its slopes by second-order differences inside the box, and as data the distance from zero."""
+        """Return the residual, its derivatives by second-order differences, and the distance from the boundary as data."""
         place, low, high = np.array([x[0], y]), self.box.corner, self.box.corner + self.box.size
         here, slope = float(self.residual(x, y)[0]), np.empty(2)
         for axis, size in enumerate(self.box.size):
@@ -298,8 +298,8 @@ class _Zero:
 def trace(test: Test, seed: tuple[float, float], box: Box, *, step: float = 0.02, most: int = 5000) -> Boundary:
     """Follow the boundary through a point in both directions; see `analysis.numerics.continuation`.
 
-    A step is halved if the tangent turns by more than 20 degrees, or if it meets the other side of a narrow region, which
-    has the opposite direction.
+    A step is halved if the tangent turns by more than 20 degrees, or if the step jumps to the opposite boundary of a narrow
+    region.
 
     Parameters
     ----------
@@ -384,7 +384,7 @@ class Chart:
     gaps: tuple[Gap, ...]
 
     def scan_line(self, y: float, *, samples: int = 200) -> Line:
-        """Scan the line at this y: return where it crosses boundaries, and its intervals of instability."""
+        """Scan the line of constant ``y`` for its crossings with boundaries and its intervals of instability."""
         return scan(lambda x: self.test(x, y), *self.box.x, samples=samples)
 
 
@@ -404,8 +404,8 @@ def chart(
         Test function, negative in a region of instability.
     box : Box
     lines : (int, int)
-        Numbers of lines x = const and y = const that are searched, evenly spaced from side to side of the box. Every boundary
-        that crosses one of these lines is found. A line costs ``samples`` values of the test function.
+        Numbers of lines x = const and y = const that are searched, evenly spaced over the box, its sides included. Every
+        boundary that crosses one of these lines is found. A line costs ``samples`` values of the test function.
     samples : int
         See `scan`.
     step : float
@@ -414,7 +414,7 @@ def chart(
     Raises
     ------
     InputError
-        If there are no lines, or just one of a kind, whose place would not be determined.
+        If no lines are searched, or only one line x = const or y = const, since its position would be arbitrary.
     """
     if 1 in lines or min(lines) < 0 or lines == (0, 0):
         raise InputError(f"lines is {lines}: none or two and more of each kind, and at least one kind")

@@ -57,7 +57,7 @@ def store_file(path: Path, content: bytes) -> None:
 
 
 def keep(path: Path, content: bytes) -> None:
-    """Write a file of the cache as `store_file` does; do nothing if the disk is full or read-only: the cache can do without."""
+    """Write a file of the cache as `store_file` does; do nothing if the disk is full or read-only."""
     with suppress(OSError):
         store_file(path, content)
 
@@ -69,7 +69,7 @@ def hashes_below(folder: Path) -> dict[str, str]:
 
 
 def keep_hashes(path: Path, hashes: Mapping[str, str]) -> None:
-    """Write the hashes of files to a file, one a line as `sha256sum` does, unless it has just these lines."""
+    """Write the hashes of files to ``path``, one per line as `sha256sum` does; do nothing if the content is the same."""
     content = "".join(f"{digest}  {name}\n" for name, digest in hashes.items()).encode()
     if not path.is_file() or path.read_bytes() != content:
         keep(path, content)

@@ -1,14 +1,14 @@
 """Machine code of functions traced with CasADi, and Numba kernels that call them by address.
 
-A ``casadi.Function`` of symbols is a list of elementary instructions. They are translated to LLVM's and compiled in some
-hundredths of a second. The machine code is kept on disk under a hash of the instructions, the processor and this module, so
-that it cannot be out of date. Every function has the form
+A ``casadi.Function`` of symbols is a list of elementary instructions. The instructions are translated to LLVM's and compiled in
+some hundredths of a second. The machine code is kept on disk under a hash of the instructions, the processor and this module,
+so that it cannot be out of date. Every function has the form
 
     f(t, a, b, c, d, out)        t a float, the others arrays of floats
 
-so that a kernel, compiled once, works with the functions of any mechanism. In lanes each number of an array is a vector of
-doubles, one of each lane, and the functions of `lanes` take the place of the C library's. Kernels are kept on disk in a folder
-whose name is a hash of all their sources.
+so that a kernel, compiled once, works with the functions of any mechanism. With several lanes each entry of an array is a
+vector of doubles, one for each lane, and the functions of `lanes` replace those of the C library. Kernels are kept on disk in a
+folder whose name is a hash of all their sources.
 """
 
 from __future__ import annotations
@@ -59,7 +59,7 @@ _ALIVE: list[Any] = []
 
 
 class MachineCode:
-    """Machine code of functions, which stays in the process, as a caller may hold an address.
+    """Machine code of CasADi functions, kept in memory until the process ends, as a caller may hold an address.
 
     Parameters
     ----------
@@ -67,11 +67,11 @@ class MachineCode:
         Of SX, with the inputs (t, a, b, c, d) and dense outputs. The outputs follow one another in ``out``, matrices column
         by column.
     lanes : int
-        Number of lanes, arguments that a call takes at once: with several, each entry of an array is a vector of lanes, and t
-        is the same for all.
+        Number of sets of arguments that a call evaluates at once. With several lanes each entry of an array is a vector, and t
+        is the same for all lanes.
     rows : sequence of str
-        Names of the functions whose outputs are written one lane after the other, which readers of single lanes need: to
-        gather them takes some processors longer than to compute them.
+        Names of the functions whose outputs are read lane by lane: all outputs of the first lane are written first, then those
+        of the next lane. On some processors gathering them afterwards takes longer than computing them.
     shared : bool
         Whether b, c and d are the same for all lanes; they are then plain arrays.
 
@@ -85,7 +85,7 @@ class MachineCode:
     Raises
     ------
     LinkworkError
-        If an operation has no counterpart here, or an output is not dense.
+        If an operation of CasADi is not supported, or an output is not dense.
     """
 
     def __init__(
@@ -113,7 +113,7 @@ class MachineCode:
 def _compile(
     functions: Sequence[Any], lanes: int, rows: Sequence[str], shared: bool, triple: str, machine: Any
 ) -> bytes:
-    """Return an object file with functions."""
+    """Compile functions; return the object file."""
     module = ir.Module("linkwork")
     module.triple = triple
     for function in functions:
@@ -186,7 +186,7 @@ def _prepare() -> None:
 
 
 class _Writer:
-    """Translates one function of CasADi into a module of LLVM."""
+    """Translator of one CasADi function into LLVM code, added to a module."""
 
     def __init__(self, module: ir.Module, function: Any, lanes: int, in_rows: bool, shared: bool) -> None:
         self.module = module
@@ -243,7 +243,7 @@ class _Writer:
         return self.build.bitcast(pointer, self.kind.as_pointer())
 
     def _store(self, value: Any, place: int, count: int) -> None:
-        """Write the output ``place`` of ``count`` outputs."""
+        """Write ``value`` as output number ``place`` of ``count`` outputs."""
         if not self.in_rows:
             self.build.store(value, self._place(5, place), align=8)
             return
@@ -284,12 +284,12 @@ class _Writer:
     def _quotient(self, a: Any, b: Any) -> Any:
         if self.lanes == 1:
             return self.build.fdiv(a, b)
-        # a division takes as long as sixteen products, and equations often divide by the same again
+        # a division takes as long as sixteen products, and equations often divide by the same value again
         return self.build.fmul(a, self._reciprocal(b))
 
     def _reciprocal(self, a: Any) -> Any:
         if id(a) not in self.reciprocals:
-            # with a, so that no other value gets its id
+            # keep a, so that no other value gets its id
             self.reciprocals[id(a)] = a, self.build.fdiv(self._constant(1.0), a)
         return self.reciprocals[id(a)][1]
 
@@ -341,7 +341,7 @@ def call_user(typing_context, address, t, x):
 
 
 def user_function(function: Any, size: int) -> Any:
-    """Compile a user's function f(t, x1, ..., x_size) to a C function of t and x, which returns NaN where the user's raises."""
+    """Compile a user's function f(t, x1, ..., x_size) to a C function of t and x; an exception becomes the value NaN."""
     own = njit(error_model="numpy")(getattr(function, "py_func", function))
 
     @njit(error_model="numpy")
@@ -373,7 +373,7 @@ inline = njit(**_PART, _nrt=False, inline="always")
 
 @inner
 def copy(source, target):
-    """Copy a vector; ``target[:] = source`` takes a second longer to compile, for its message about shapes."""
+    """Copy a vector; ``target[:] = source`` takes a second longer to compile, because of its error message about shapes."""
     for i in range(target.shape[0]):
         target[i] = source[i]
 
@@ -386,7 +386,7 @@ def kernel(*signature: Any, purpose: str) -> Callable[[Callable[..., Any]], Call
     *signature
         Types of the arguments, or Numba's signature.
     purpose : str
-        Ends the message "compiling ...", which is printed once on standard error when the function is really compiled.
+        End of the message "compiling ...", printed once on standard error when the function is not found on disk.
     """
 
     def decorate(function: Callable[..., Any]) -> Callable[..., Any]:
@@ -402,7 +402,7 @@ CARRIED = Path(__file__).parent / "kernels"
 class Kernel:
     """A function that is compiled, or read from the cache, when it is first called."""
 
-    #: All of them.
+    #: All kernels.
     known: ClassVar[list[Kernel]] = []
 
     def __init__(self, function: Any, signature: tuple[Any, ...], purpose: str) -> None:
@@ -473,7 +473,7 @@ class Kernel:
 
     @property
     def carried_path(self) -> Path:
-        """Path of the code for any processor; such code is of one build of Python, one LLVM and one operating system."""
+        """Path of the code for any processor, which is valid for one build of Python, one LLVM and one operating system."""
         build = sysconfig.get_config_var("SOABI") or sysconfig.get_config_var("EXT_SUFFIX")
         kind = f"{build}-llvm{binding.llvm_version_info[0]}-{binding.get_process_triple()}"
         return CARRIED / f"{self.__name__}-{self._fingerprint()}-{kind}"
@@ -483,7 +483,7 @@ class Kernel:
 
 
 class _Announcer(event.Listener):
-    """Announces the compilation; of several functions with the same purpose only the first."""
+    """Listener that announces a compilation: once for all functions with the same purpose."""
 
     said: ClassVar[set[str]] = set()
 
@@ -508,8 +508,8 @@ def _announce(purpose: str) -> Iterator[None]:
 def fingerprint(function: Any, signature: Any = None) -> str:
     """Return a hash of all that a compiled function depends on.
 
-    It covers the function's code, all functions and constants that it reads, Numba's options, and the sources of our modules
-    in which they stand, for facts that a function does not show, such as the fields of a NamedTuple.
+    The hash covers the function's code, all functions and constants that the function uses, and Numba's options. It also covers
+    the sources of Linkwork's modules that define them, since the code does not show the fields of a NamedTuple, for instance.
     """
     digest = hashlib.sha256(f"{numba.__version__} {llvmlite.__version__} {np.__version__} {signature}".encode())
     seen: set[int] = set()
@@ -549,7 +549,7 @@ def fingerprint(function: Any, signature: Any = None) -> str:
             digest.update(repr(value).encode())
 
     def note(module: str | None) -> None:
-        """Add the source of a module, if it is ours."""
+        """Add the source of a module, if the module is part of Linkwork."""
         if module is not None and module.partition(".")[0] in ("analysis", "linkwork") and module in sys.modules:
             files.add(Path(str(sys.modules[module].__file__)))
 

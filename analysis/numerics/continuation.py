@@ -21,11 +21,11 @@ from linkwork.errors import InputError, LinkworkError
 
 #: Correction, relative to the scales, at which a point counts as on the curve.
 TOLERANCE = 1e-10
-#: Largest number of corrections in a step; number of corrections from which on a step counts as hard: the next is not longer.
+#: Largest number of corrections in a step; smallest number that makes a step hard: the next step is then not longer.
 MOST_CORRECTIONS, HARD = 10, 5
-#: Distance of a point from the end of the tangent, relative to the step, beyond which it may lie on another curve.
+#: Distance of a point from the end of the tangent, relative to the step, beyond which the point may lie on another curve.
 REACH = 0.5
-#: 1 / cos of the angle between old and new tangent from which on the new tangent is not computed with the help of the old one.
+#: 1 / cos of the angle between old and new tangent above which the new tangent is computed without the old tangent.
 _OBLIQUE = 1e3
 #: Factors by which a step grows and shrinks.
 GROWTH, SHRINKAGE = 1.4, 0.5
@@ -34,7 +34,7 @@ Vector = NDArray[np.float64]
 
 
 class Evaluation(NamedTuple):
-    """G and its derivatives by y and by lambda, shapes (n,), (n, n), (n,), and any ``data`` that the `Point` is to keep."""
+    """G, its derivatives with respect to y and lambda, shapes (n,), (n, n), (n,), and ``data`` that the `Point` keeps."""
 
     residual: Vector
     jacobian: Vector
@@ -47,7 +47,7 @@ Evaluate = Callable[[Vector, float], Evaluation]
 
 
 class ContinuationError(LinkworkError):
-    """No point of a curve was found near the given one."""
+    """No point of a curve was found near the given point."""
 
 
 class Reason(Enum):
@@ -118,7 +118,7 @@ class Curve:
     end : Reason
         Why the curve ended.
     reason : str
-        The end in words, with what stopped the curve.
+        Description of the end and its cause.
     message : str
         Error message of G if the curve ended because G has no value; else empty.
     """
@@ -130,7 +130,7 @@ class Curve:
     message: str = ""
 
     def plane_end(self, message: str) -> End:
-        """Return the last point in the plane of last unknown and parameter as an `End` with this message."""
+        """Return the end of the curve as an `End` with this message; its point is (last component of y, parameter)."""
         last = self.points[-1]
         return End(reason=self.end, point=(float(last.y[-1]), last.parameter), message=message)
 
@@ -156,19 +156,20 @@ class Settings:
     bounds : mapping
         Ranges (low, high) of unknowns, by index.
     first, least, greatest : float
-        First, shortest and longest step in scaled arc length; the range of the parameter has length 1.
+        First, shortest and longest step in arc length, scaled so that the range of the parameter has length 1.
     widest : float
-        Largest scaled change in a step of the parameter, and of each unknown that has a range.
+        Largest scaled change, in one step, of the parameter and of each unknown that has a range.
     most_points : int
+        Largest number of points of the curve.
     greatest_turn, growing_turn : float
         Largest angle between the tangents at neighbouring points (rad), and the angle up to which the step grows (rad).
     oriented : bool
-        Whether the curve ends where it crosses another one. Then no step jumps to the other side of a narrow region.
+        Whether the curve ends where it crosses another curve. If so, no step jumps to the opposite boundary of a narrow region.
 
     Raises
     ------
     InputError
-        If the range is empty or the steps are not in order.
+        If the range is empty, or the three steps are not positive and increasing in the order least, first, greatest.
     """
 
     low: float
@@ -193,7 +194,7 @@ class Settings:
 
 
 class _Failure(NamedTuple):
-    """Reason why a step could not be taken (TIP or NO_VALUE), and the same in words."""
+    """Reason why a step could not be taken (TIP or NO_VALUE), and its description."""
 
     reason: Reason
     text: str
@@ -216,7 +217,7 @@ def _null_vector(derivatives: Vector, ahead: Vector) -> Vector:
         length = np.inf
     if length * float(np.linalg.norm(ahead)) < _OBLIQUE:
         return np.asarray(vector / length)
-    # the tangent is nearly normal to it: take the singular value decomposition, which costs more
+    # the tangent is nearly normal to ``ahead``: take the singular value decomposition, which costs more
     tangent: Vector = np.linalg.svd(derivatives)[2][-1]
     return -tangent if tangent @ ahead < 0.0 else tangent
 
@@ -290,7 +291,7 @@ class Follower:
         return self._point(found, np.asarray(ahead, dtype=float))
 
     def step(self, point: Point, length: float) -> Point | None:
-        """Take a step of a given arc length along the tangent; return its end, or None if the corrections fail."""
+        """Take a step of a given arc length along the tangent; return the new point, or None if the corrections fail."""
         found = self._step(point, length)
         return None if isinstance(found, _Failure) else self._point(found, point.tangent)
 
@@ -352,7 +353,7 @@ class Follower:
     def follow_both(
         self, first: Point, *, leave: Callable[[Point], str] | None = None
     ) -> tuple[list[Point], Curve, Curve]:
-        """Follow the curve from a point both ways; return all points in forward order, the backward and the forward curve."""
+        """Follow the curve from a point in both directions; return all points in order, the backward and the forward curve."""
         forth = self.follow(first, leave=leave)
         if forth.closed:
             return [*forth.points], forth, forth
@@ -360,9 +361,10 @@ class Follower:
         return [*(point.with_opposite_tangent() for point in back.points[:0:-1]), *forth.points], back, forth
 
     def locate(self, point: Point, length: float, beyond: Point, test: Callable[[Point], float]) -> tuple[Point, float]:
-        """Find where a test function is zero within a step; return that point and its distance from the step's beginning.
+        """Find the zero of a test function within a step; return its point and the distance from the beginning of the step.
 
-        The step from ``point`` has this length and ends at ``beyond``; the test function has opposite signs at its ends.
+        The step leads from ``point`` to ``beyond`` and has the given arc length; the test function has opposite signs at these
+        points.
         """
         # the parabola through the end of the step
         bend = 2.0 * (self._scale_point(beyond) - self._scale_point(point) - length * point.tangent) / length**2
@@ -381,7 +383,7 @@ class Follower:
         return at(s), s
 
     def _attempt(self, last: Point, length: float, bend: Vector | None) -> tuple[Point, int] | _Failure:
-        """Take a step; return its end and the number of corrections, or a failure if it may have left the curve."""
+        """Take a step; return the new point and the number of corrections, or a failure if the step may have left the curve."""
         found = self._step(last, length, bend)
         if isinstance(found, _Failure):
             return found
@@ -404,7 +406,7 @@ class Follower:
     def _correct(
         self, plane: Vector, normal: Vector, last: Point | None, aside: Vector | float = 0.0
     ) -> _Landing | _Failure:
-        """Solve G = 0 from ``plane + aside`` in the plane through the point ``plane`` normal to ``normal``; all scaled."""
+        """Solve G = 0 in the plane through ``plane`` normal to ``normal``, starting at ``plane + aside``; all scaled."""
         n, z, before = len(plane) - 1, plane + aside, np.inf
         matrix = np.vstack([np.zeros((n, n + 1)), normal])
         secant = self.residual is not None and last is not None
@@ -505,7 +507,7 @@ class Follower:
         guess, fixed = here + parts[axis] * way, np.eye(len(here))[axis]
         found = self._correct(guess, fixed, last)
         point = self._point(found, last.tangent) if isinstance(found, _Landing) else last
-        # next to a fold the corrections may lead to its other side, where the curve comes back inside
+        # next to a fold the corrections may lead to the other side of the fold, where the curve comes back inside the bounds
         if isinstance(found, _Landing) and (
             np.linalg.norm(found.z - guess) < REACH * length and point.tangent[axis] * way[axis] > 0.0
         ):

@@ -1,6 +1,6 @@
 """Compute damping and natural frequency of a freedom on a spring from the logarithmic decrement of its free decay.
 
-A freedom of mass m on a spring k with a damper c and dry friction F turns back at
+A freedom of mass m on a spring k with a damper c and dry friction F has its turning points at
 
     x_n = b + (-1)^n [(A + f) q^n - f],  f = r (1 + q) / (1 - q),  r = F / k,
 
@@ -93,14 +93,14 @@ class Decay:
         return sqrt(4.0 * pi**2 + self.decrement**2)
 
     def damping(self, mass: float) -> tuple[float, float]:
-        """Return the damping coefficient (N.s/m) that follows for a mass (kg), and its standard error."""
+        """Return the damping coefficient (N.s/m) for a given mass (kg), and its standard error."""
         factor = mass / pi
         value = factor * self.decrement * self.frequency
         relative = self.decrement_error / self.decrement, self.frequency_error / self.frequency
         return value, abs(value) * sqrt(relative[0] ** 2 + relative[1] ** 2)
 
     def stiffness(self, mass: float) -> tuple[float, float]:
-        """Return the stiffness of the spring (N/m) that follows for a mass (kg), and its standard error."""
+        """Return the stiffness of the spring (N/m) for a given mass (kg), and its standard error."""
         value = mass * self.natural_frequency**2
         return value, 2.0 * value * self.natural_frequency_error / self.natural_frequency
 
@@ -120,12 +120,13 @@ def fit_decay(
     friction : bool
         Whether to fit dry friction besides the damper.
     least_swing : float
-        Smallest distance between successive turning points, as a fraction of the record's range. Smaller ones count as noise.
+        Smallest distance between successive turning points, as a fraction of the record's range. Smaller distances count as
+        noise.
 
     Raises
     ------
     InputError
-        If the arrays are not a record, or the record has too few swings or does not decay.
+        If the arrays do not form a record, or the record has too few swings or does not decay.
 
     Examples
     --------

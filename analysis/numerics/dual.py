@@ -10,8 +10,8 @@ True
 In mechanics they are screws (Rahman, chapter II): a dual angle is an angle + eps a distance along the same axis, a dual
 velocity an angular velocity + eps the velocity of the point at the origin, a dual force a force + eps its moment about the
 origin, a dual momentum likewise. Dual vectors have shape (..., 3), dual matrices (..., 3, 3). The matrix of a frame with
-orientation R and origin p is R + eps [p]R, with [p] the matrix of the cross product by p. It is orthogonal, so that its
-inverse is its transpose (eq 4), and takes screws from that frame to the frame in which p and R are given.
+orientation R and origin p is R + eps [p]R, with [p] the matrix of the cross product by p. It is orthogonal, so that its inverse
+is its transpose (eq 4), and transforms screws from the described frame to the frame in which p and R are given.
 """
 
 from __future__ import annotations
@@ -207,7 +207,7 @@ def _inexact(part: Any) -> Array:
 
 
 def dual(x: Any) -> Dual:
-    """Return ``x`` itself if it is a dual number, else as a dual number with dual part zero."""
+    """Return ``x`` as a dual number: unchanged if it is one already, else with dual part zero."""
     return x if isinstance(x, Dual) else Dual(x)
 
 

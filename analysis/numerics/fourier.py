@@ -14,7 +14,7 @@ from linkwork.errors import InputError
 
 @dataclass(frozen=True, slots=True, eq=False)
 class FourierSeries:
-    """f(x) = sum over k of cos[k] cos(k x) + sin[k] sin(k x), k = 0, 1, ..., with period 2 pi.
+    """Fourier series f(x) = sum over k of cos[k] cos(k x) + sin[k] sin(k x), k = 0, 1, ..., with period 2 pi.
 
     Attributes
     ----------
@@ -54,7 +54,7 @@ class FourierSeries:
         Raises
         ------
         InputError
-            If ``order`` is higher than that.
+            If ``order`` is higher than (n - 1) // 2.
         """
         values = np.asarray(samples, dtype=float)
         c = np.fft.rfft(values) / len(values)

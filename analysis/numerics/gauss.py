@@ -19,9 +19,9 @@ class Gauss(NamedTuple):
     ----------
     nodes, weights : ndarray, shape (s,)
     integrals : ndarray, shape (s, s)
-        Matrix from values at the nodes to the integrals, from 0 to each node, of the polynomial through these values.
+        Matrix that maps values at the nodes to the integrals, from 0 to each node, of the polynomial through these values.
     coefficients : ndarray, shape (s, s)
-        Matrix from values at the nodes to the coefficients of Legendre's polynomials on -1 to 1.
+        Matrix that maps values at the nodes to the coefficients of Legendre's polynomials on -1 to 1.
     """
 
     nodes: FloatArray

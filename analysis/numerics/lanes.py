@@ -216,7 +216,7 @@ def _with_fallback(great: Any, result: Vector, name: str, x: Vector) -> Vector:
 
 
 def _split_quarter_turns(x: Vector, quarters: int) -> tuple[Any, Vector, Vector]:
-    """Split x into quarter turns and a rest; return their number plus ``quarters``, then sine and cosine of the rest."""
+    """Split x into n quarter turns and a remainder; return n + ``quarters``, and sine and cosine of the remainder."""
     shifted = x.multiply_add(2.0 / pi, _ROUNDER)
     k = shifted - _ROUNDER
     # exact, as the difference has no more bits than x
@@ -236,7 +236,7 @@ def _split_quarter_turns(x: Vector, quarters: int) -> tuple[Any, Vector, Vector]
 
 
 def _circular(x: Vector, quarters: int, name: str) -> Vector:
-    """Return the sine of x plus a number of quarter turns; for large x from the C function ``name``."""
+    """Return sin(x + quarters pi/2); for large x the C function ``name`` is called instead."""
     build = x.build
     number, sine, cosine = _split_quarter_turns(x, quarters)
     odd = build.icmp_unsigned("!=", build.and_(number, x.longs(1)), x.longs(0))

@@ -1,13 +1,13 @@
-"""Compiler classes with which Numba makes machine code once, of a kernel together with all functions that it calls.
+"""Numba compilers that make machine code only once, for a kernel together with all functions that it calls.
 
-By default Numba optimises each function with all that it calls, makes machine code of it, and does the same again for its
-caller. Where Python calls only the kernel, nobody uses the code of the inner functions, and it takes a third of the time. Numba
-has no public option for this: the classes below override private ones, hence the upper bound of its version. Nor does it
-notice that a bit of machine code on disk has changed: here every file ends with a hash of its bytes.
+By default Numba optimises each function together with the functions that it calls, makes machine code, and does the same again
+for its caller. If Python calls only the kernel, the separate machine code of the inner functions is never used, but takes a
+third of the time. Numba has no public option for this: the classes below override private classes of Numba, hence the upper
+bound of its version. Numba also does not notice damaged machine code on disk: here every file ends with a hash of its bytes.
 
-An installation may carry kernels *for any processor* with lanes of the same width: what Numba, whose type inference takes
-most of the time, makes of them before LLVM optimises it. The machine code that follows from it on a processor is the same as
-if it were compiled there.
+An installation may carry kernels *for any processor* whose lanes have the same width: Numba's output before LLVM optimises it.
+This saves Numba's type inference, which takes most of the time. The final machine code is the same as if the kernel were
+compiled from its source on that processor.
 """
 
 from __future__ import annotations
@@ -33,13 +33,13 @@ from numba.core.serialize import dumps
 
 _HASH = hash(Flags())
 _DIGEST = sha256().digest_size
-#: Place of the type annotation in what Numba keeps of a kernel, after its code.
+#: Index of the type annotation in Numba's cache entry of a kernel, not counting the code.
 _ANNOTATION = 5
 _ALIVE: list[Any] = []
 
 
 class _Options(Flags):
-    """Numba's options with a fast comparison: Numba compares them at each call that it types."""
+    """Numba's options with a fast comparison: Numba compares options at every call whose types it infers."""
 
     def __eq__(self, other: object) -> bool:
         return self._values == other._values if isinstance(other, _Options) else bool(super().__eq__(other))
@@ -74,14 +74,14 @@ class KernelCompiler(Compiler):
 
 
 class PartCompiler(KernelCompiler):
-    """Compiler of the functions that kernels call, and Python cannot call."""
+    """Compiler of functions that only kernels call; Python cannot call them."""
 
     def __init__(self, typing_context: Any, context: Any, library: Any, *rest: Any) -> None:
         super().__init__(typing_context, context, library or _Part(context.codegen(), "part"), *rest)
 
 
 class _Noted(JITCodeLibrary):
-    """Code of a kernel that stores its portable form before it is optimised."""
+    """Code of a kernel that also keeps its form before optimisation, which is valid for any processor."""
 
     def _optimize_final_module(self) -> None:
         self.noted = self._final_module.as_bitcode()
@@ -89,7 +89,7 @@ class _Noted(JITCodeLibrary):
 
 
 class NotingCompiler(KernelCompiler):
-    """Compiler of kernels whose code for any processor is wanted."""
+    """Compiler of kernels that also keeps their code for any processor."""
 
     def __init__(self, typing_context: Any, context: Any, library: Any, *rest: Any) -> None:
         library = _Noted(context.codegen(), "kernel")
@@ -106,7 +106,7 @@ def portable_code(dispatcher: Any) -> bytes:
 
 
 def _read_portable_code(content: bytes) -> tuple[Any, ...]:
-    """Return what Numba keeps of a kernel, read from the kernel's code for any processor."""
+    """Return the entry of a kernel in Numba's cache, made from the kernel's code for any processor."""
     name, noted, *rest = pickle.loads(zlib.decompress(content))
     library = cpu_target.target_context.codegen().create_library(name)
     library.enable_object_caching()
@@ -156,7 +156,7 @@ def _with_hash(content: bytes) -> bytes:
 
 
 def _read_verified(path: Path) -> bytes:
-    """Return the bytes of a file before the hash at its end, which Numba ignores; raise ValueError if it is not their hash."""
+    """Return the content of a file without the hash at its end; raise ValueError if the hash does not match the content."""
     whole = path.read_bytes()
     content = whole[:-_DIGEST]
     if sha256(content).digest() != whole[-_DIGEST:]:
@@ -165,7 +165,7 @@ def _read_verified(path: Path) -> bytes:
 
 
 def keep(dispatcher: Any, source: Path) -> None:
-    """Keep the machine code of a dispatcher in files of Numba's cache folder, with hashes; ``source`` is of `_Files`."""
+    """Make Numba keep the machine code of a dispatcher in files with hashes; for ``source`` see `_Files`."""
     dispatcher.enable_caching()
     file = dispatcher._cache._cache_file
     file.__class__ = _Files

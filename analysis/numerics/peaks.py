@@ -11,7 +11,7 @@ def peaks(values: NDArray[np.float64]) -> list[tuple[int, float]]:
 
     On each side of a peak, take the minimum between the peak and the next higher value or the end of the series: the prominence
     is the peak's height above the higher of these two minima. The results are those of `scipy.signal.find_peaks`, whose import
-    takes longer than a response curve.
+    takes longer than the computation of a response curve.
 
     >>> peaks(np.array([0.0, 3.0, 1.0, 2.0, 2.0, 0.5]))
     [(1, 2.5), (3, 1.0)]

@@ -1,7 +1,7 @@
-"""References to NamedTuples, which compiled functions take as arguments instead of the tuples.
+"""Pass NamedTuples to compiled functions by reference instead of by value.
 
-Numba passes a tuple by value, number by number: two hundred numbers for a tuple of thirty arrays, in each call. To compile
-these calls took longer than to compile the functions.
+Numba passes a tuple by value, number by number: two hundred numbers for a tuple of thirty arrays, in each call. Compiling such
+calls took longer than compiling the functions.
 """
 
 from __future__ import annotations

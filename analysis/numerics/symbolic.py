@@ -1,4 +1,4 @@
-"""Trace functions with CasADi, for exact derivatives of the equations without writing these a second time.
+"""Trace functions with CasADi, for exact derivatives of the equations without writing the equations a second time.
 
 The code of the equations runs unchanged on symbols (`tracing`). The result can be differentiated to any order, evaluated
 as a ``casadi.Function``, or compiled to machine code (`codegen`).
@@ -43,12 +43,12 @@ def evaluate_arrays(function: Any, *arguments: Any) -> tuple[NDArray[np.float64]
     ----------
     function : casadi.Function
     *arguments : array_like
-        For a scalar input a number or an array, all arrays of one shape; for a column input one column for all points.
+        For a scalar input, a number or an array, all arrays of one shape; for a column input, one column used at all points.
 
     Returns
     -------
     tuple of ndarray
-        One array of that shape for each output.
+        One array for each output, of the shape of the argument arrays.
     """
     scalar = [function.numel_in(i) == 1 for i in range(function.n_in())]
     shape = np.broadcast_shapes(*(np.shape(a) for a, one in zip(arguments, scalar) if one))
@@ -61,13 +61,13 @@ def evaluate_arrays(function: Any, *arguments: Any) -> tuple[NDArray[np.float64]
 
 
 def wrap_function(name: str, inputs: int, outputs: int, evaluate: Callable[..., tuple[Any, Any]]) -> Any:
-    """Wrap a Python function that cannot be traced as a CasADi function, which calls it.
+    """Return a CasADi function that calls a Python function which cannot be traced.
 
     Parameters
     ----------
     name : str
     inputs, outputs : int
-        Lengths of the columns that it takes and returns.
+        Lengths of the columns that the function takes and returns.
     evaluate : callable
         ``evaluate(x, slopes)`` returns values (outputs,) and, if ``slopes`` is true, derivatives (outputs, inputs); both are
         NaN where the function has no value.
@@ -75,7 +75,7 @@ def wrap_function(name: str, inputs: int, outputs: int, evaluate: Callable[..., 
     Returns
     -------
     casadi.Callback
-        The caller must keep a reference to it as long as an expression contains it.
+        The caller must keep a reference to this object as long as an expression contains it.
     """
     casadi = library()
 
@@ -124,7 +124,7 @@ def wrap_function(name: str, inputs: int, outputs: int, evaluate: Callable[..., 
 
 
 def ipopt(name: str, program: dict[str, Any], **options: Any) -> Any:
-    """Return an IPOPT solver for a CasADi program, without output; its ``stats()`` say whether it found a solution."""
+    """Return an IPOPT solver for a CasADi program that prints nothing; its ``stats()`` say whether it found a solution."""
     settings = {
         "print_time": False,
         "error_on_fail": False,

@@ -1,7 +1,7 @@
-"""Run the plant's own functions on other numbers than floats: the same code objects with other globals.
+"""Run the plant's functions on symbols, arrays or dual numbers: copies with the same code and other elementary functions.
 
-The equations are arithmetic without branches and functions of `math`. With another library's functions in place of those of
-`math`, the same code runs on CasADi's symbols, on NumPy's arrays and on dual numbers. The modules are not changed.
+The equations consist of arithmetic and functions of `math`, without branches. With another library's functions in place of
+`math`, the same code runs on CasADi's symbols, NumPy's arrays and dual numbers. The plant's modules are not changed.
 """
 
 from __future__ import annotations
@@ -16,14 +16,18 @@ from linkwork.errors import LinkworkError
 
 
 class ReboundFunctions(SimpleNamespace):
-    """Rebound functions as attributes by name, the later module's if two share a name; methods are found by `find` only."""
+    """Copies of functions that calculate with another kind of number, as attributes by name.
+
+    If two modules have a function of the same name, the attribute is that of the later module. Methods are found by `find`
+    only.
+    """
 
     def __init__(self, functions: Mapping[Callable[..., Any], FunctionType]) -> None:
         super().__init__(**{f.__name__: f for f in functions.values() if "." not in f.__qualname__})
         self._functions = functions
 
     def find(self, function: Callable[..., Any]) -> Callable[..., Any]:
-        """Return the new function for an original function or method.
+        """Return the copy of an original function or method.
 
         Raises
         ------

@@ -66,7 +66,7 @@ _operator(operator.truediv, "fdiv")
 
 
 def _pointer(context: Any, builder: Any, kind: Any, array: Any, index: Any) -> Any:
-    """Return a pointer to the vector with an index in an array in lanes."""
+    """Return a pointer to the vector number ``index`` of an array in lanes."""
     data = context.make_array(kind)(context, builder, array).data
     return builder.bitcast(builder.gep(data, [builder.mul(index, ir.Constant(index.type, LANES))]), _KIND.as_pointer())
 
@@ -97,7 +97,8 @@ def store(typing_context, array, index, value):
 def spread(typing_context, rows, index, value):
     """Write the value of lane l into row l of an array, shape (LANES, n), at the column ``index``.
 
-    Single lanes read their rows: to gather a lane's numbers from an array in lanes is slower on some processors.
+    Use it for results that are read lane by lane: each lane then has one contiguous row. Reading every LANES-th number of an
+    array in lanes is slower on some processors.
     """
 
     def generate(context, builder, signature, arguments):

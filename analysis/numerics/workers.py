@@ -97,7 +97,7 @@ def share_memory(n_jobs: int | None, *, threads: bool = False) -> bool:
 
 
 def _workers(n_jobs: int | None, threads: bool) -> tuple[int, bool, Any]:
-    """Return the number of workers, whether they are other processes, and the backend of joblib."""
+    """Return the number of workers, whether the workers are other processes, and the backend of joblib."""
     import joblib
 
     check_jobs(n_jobs)
@@ -121,9 +121,9 @@ def run_in_parallel(
 ) -> Iterator[tuple[int, Made]]:
     """Apply a function to items in parallel; yield index and result of each item as soon as it is done.
 
-    The workers are ``n_jobs`` processes of this machine, threads if ``threads`` is true, or those of the backend that
+    The workers are ``n_jobs`` processes of this machine, threads if ``threads`` is true, or the workers of the backend that
     `joblib.parallel_config` has set, such as "dask", "loky" or "threading". With one worker the work is done in this process.
-    An item whose worker was killed goes to another worker. Processes that are started here end with this one.
+    An item whose worker was killed goes to another worker. Worker processes of this machine end when this process ends.
 
     Parameters
     ----------
@@ -136,13 +136,13 @@ def run_in_parallel(
     Raises
     ------
     WorkersLost
-        If workers were killed more than `RETRIES` times, or fail otherwise, or the scheduler of a cluster does not answer. If
-        an item kills every worker of a cluster, the message names it; the results of all other items are yielded first.
+        If workers were killed more than `RETRIES` times or fail in another way, or the scheduler of a cluster does not answer.
+        If an item kills every worker of a cluster, the message names it; the results of all other items are yielded first.
 
     Notes
     -----
     Processes of this machine pass large results in files: if a process is killed in the middle of a message, joblib waits for
-    ever for the rest of it.
+    ever for the rest of the message.
     """
     count, elsewhere, backend = _workers(n_jobs, threads)
     listening = Interrupts() if interrupts is None else interrupts
@@ -213,8 +213,8 @@ def _run_in_processes(tasks: Sequence[_Task], n_jobs: int | None) -> Generator[A
 def _run_in_cluster(tasks: Sequence[_Task], backend: Any) -> Generator[Any, None, None]:
     """Yield the results of the workers of a Dask cluster in the order in which they arrive.
 
-    Raises WorkersLost for tasks that kill their workers, when all others are done, and if the scheduler does not answer or has
-    no worker. Through joblib a task that kills its worker would be waited for without end.
+    Raises WorkersLost if the scheduler does not answer or has no worker. If tasks kill their workers, the error is raised after
+    all other tasks are done; joblib itself would wait for such a task for ever.
     """
     suspects = yield from _run_round(tasks, backend)
     # a cluster also gives up tasks that waited on the killed worker: run one by one, the task that killed it shows
@@ -272,7 +272,7 @@ def _wait_for_cluster(client: Any, wait: Callable[[], Any]) -> Any:
 
 
 def _run_in_this_process(tasks: Sequence[_Task], count: int) -> Generator[Any, None, None]:
-    """Do tasks in this process or its threads and yield the results; joblib would check for them every 10 ms only."""
+    """Do tasks in this process or its threads and yield the results; joblib would look for results every 10 ms only."""
     if count == 1:
         yield from map(_do_task, tasks)
         return
@@ -329,7 +329,7 @@ def _read_result(sent: _Found | Path) -> _Found:
 def end_when_orphaned(caller: int) -> None:
     """Start a thread that ends this worker process when its parent, the process ``caller``, is gone.
 
-    Without the thread a worker would go on for minutes. If the parent is another process, as in a cluster or in the caller
+    Without the thread a worker would go on for minutes. If this process has another parent, as in a cluster or in the caller
     itself, nothing is done. Under Windows the thread has no effect: the process id of the parent stays when the parent is gone.
     """
     if os.getppid() == caller and caller not in _WATCHED:

@@ -24,10 +24,10 @@ from .values import (
 class Check(NamedTuple):
     """A check of the probe."""
 
-    title: str  # what the check looks for
+    title: str  # property of the FMU that is checked
     make: Callable[[Context], Case]  # returns the function that runs one case
-    cases: Callable[[Model], int] | None = None  # number of cases; without it the number of calls limits them
-    share: float = 0.0  # share of the calls that the check gets if it has no number of cases
+    cases: Callable[[Model], int] | None = None  # number of cases; if None, the number of calls limits the cases
+    share: float = 0.0  # share of the requested number of calls that a check without a number of cases gets
 
 
 def _one_check(case: Case) -> Callable[[Context], Case]:
@@ -42,7 +42,7 @@ def _can_save(model: Model) -> bool:
     return model.can_save and model.can_serialize
 
 
-#: The checks, in the order in which they are made.
+#: The checks by name, in the order in which they are made.
 CHECKS = {
     "starts": Check(
         "parameters and inputs have their declared starts after the initialization",

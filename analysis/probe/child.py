@@ -1,6 +1,6 @@
-"""Run an FMU in a process of its own: ``python -m analysis.probe.child JOB``.
+"""Run the cases of one check in a separate process: ``python -m analysis.probe.child JOB``.
 
-The process may crash; its parent reads the journal and the findings that it has written.
+The process may crash; the parent process then reads the journal and the findings that this process has written.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from .session import Library, ProbeError
 
 
 def main(path: str) -> int:
-    """Run the cases of a job, given by its JSON file; return the exit code of the process."""
+    """Run the cases of the job that the JSON file ``path`` describes; return the exit code of the process."""
     job = json.loads(Path(path).read_text(encoding="utf-8"))
     _no_core_dump()
     context = _context(job)
@@ -46,7 +46,7 @@ def main(path: str) -> int:
 
 
 def _context(job: dict[str, Any]) -> Context | None:
-    """Return the context of the check; None if the library cannot be loaded."""
+    """Return the context of the check that a job describes; None if the FMU's library cannot be loaded."""
     from .model import read_model
 
     folder, work = Path(job["folder"]), Path(job["work"])

@@ -1,4 +1,4 @@
-"""Define the context of a check: all that it uses in the process that runs it."""
+"""Define the context of a check: everything that the check uses in the process that runs it."""
 
 from __future__ import annotations
 
@@ -13,13 +13,13 @@ from .journal import Journal
 from .model import Model
 from .session import Library, Session
 
-#: Exit codes of the process of a check: an instance returned Fatal, so that the process cannot go on; the probe itself failed.
+#: Exit codes of the process of a check: an instance returned Fatal and the process must end; the probe itself failed.
 AFTER_FATAL, FAILED = 3, 70
 
 
 @dataclass(slots=True, kw_only=True)
 class Context:
-    """The FMU, the journal of calls and the file of findings of one check.
+    """What a check uses: the FMU, the journal of calls, and the file of findings.
 
     Parameters
     ----------
@@ -37,7 +37,7 @@ class Context:
     check : str
         Name of the check.
     avoided : frozenset of str
-        Faults that have crashed the process and are not tried again.
+        Keys of the forbidden calls that crashed an earlier process; they are not tried again.
     """
 
     model: Model
@@ -52,19 +52,19 @@ class Context:
     _shown: dict[tuple[str, str], int] = field(default_factory=dict)
 
     def session(self) -> Session:
-        """Open a session without an instance."""
+        """Return a session with the FMU, in which no instance is made yet."""
         return Session(self.library, self.model, self.journal, self.folder)
 
     def random(self, case: int, check: str = "") -> random.Random:
-        """Return the generator of random numbers for a case of a check, by default this check; it is the same each time."""
+        """Return the random number generator for a case of a check, by default this check; every run gives the same numbers."""
         return random.Random(f"{self.seed}/{self.model.interface}/{check or self.check}/{case}")
 
     def replay(self) -> str:
-        """Return the name of the current case, for --replay."""
+        """Return the name of the current case for the option --replay, such as "7/cs/forbidden/12"."""
         return f"{self.seed}/{self.model.interface}/{self.check}/{self.journal.case}"
 
     def note(self, severity: str, key: str, text: str) -> None:
-        """Write a finding; its list of calls is left out if an equal finding with as few calls was written before."""
+        """Write a finding; leave out its calls if the same finding was already written with as few calls or fewer."""
         lines = self.journal.lines()
         best = self._shown.get((severity, key), 1 << 30)
         self._shown[severity, key] = min(best, len(lines))
@@ -72,15 +72,15 @@ class Context:
         self._write(finding | {"replay": self.replay()})
 
     def tell(self, subject: str) -> None:
-        """Write what the current case is about, so that a crash can be attributed to it."""
+        """Write the subject of the current case, such as a forbidden call, so that a crash can be attributed to the subject."""
         self._write({"subject": subject, "case": self.journal.case})
 
     def say(self, sentence: str) -> None:
-        """Add a sentence to the result of the check: a measured value, or the reason why there is none."""
+        """Add a sentence to the result of the check: a measured value, or the reason why the check was not made."""
         self._write({"said": sentence})
 
     def finish(self) -> None:
-        """Write that the process has come to its regular end."""
+        """Write that the process ends regularly, after all its cases."""
         self._write({"finished": True})
 
     def _write(self, record: dict[str, Any]) -> None:

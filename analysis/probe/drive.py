@@ -14,7 +14,7 @@ from .model import CONDITIONS, Variable
 from .session import ProbeError, Session
 from .walk import access, value
 
-#: Values of all variables at one time, as bytes by group of functions.
+#: Values of all variables at one time: the bytes of the variables of each group, such as Real or Float64.
 Values = dict[str, bytes]
 #: Values of inputs for one step.
 Inputs = Mapping[Variable, Any]
@@ -23,7 +23,10 @@ _EVENT_ITERATIONS = 100
 
 
 class Run:
-    """A run of one instance, which the constructor initializes; a step is a communication step, or a step of Euler's method.
+    """A run of one instance, from its initialization on.
+
+    The constructor initializes the instance. A step is a communication step (co-simulation) or a step of Euler's method (model
+    exchange).
 
     Parameters
     ----------
@@ -31,9 +34,9 @@ class Run:
     instantiate : bool
         False for a session that already has an instance, for example one that was reset.
     start : mapping, optional
-        Values to set before the initialization.
+        Values of variables to set before the initialization.
     stop : float, optional
-        Stop time, if it is given to the FMU.
+        Stop time that is given to the FMU; by default none is given.
     finish : bool
         False to stay in initialization mode.
     """
@@ -88,14 +91,14 @@ class Run:
         return bool(needed)
 
     def set(self, values: Inputs) -> None:
-        """Set scalar variables to values."""
+        """Set the scalar variables among ``values`` to the given values."""
         for group in dict.fromkeys(variable.group for variable in values):
             chosen = [variable for variable in values if variable.group == group and variable.size == 1]
             if chosen:
                 self.session.need("Set" + group, *access(self.model, chosen, [values[v] for v in chosen]))
 
     def get(self, variables: Sequence[Variable]) -> Any:
-        """Return the values of variables of one group as a C array."""
+        """Return the values of variables, which must be of one group such as Real, as a C array."""
         arguments = access(self.model, variables)
         self.session.need("Get" + variables[0].group, *arguments)
         return arguments[2]
@@ -111,14 +114,14 @@ class Run:
         return found
 
     def states(self, name: str) -> Any:
-        """Return the continuous states or their derivatives as a C array; ``name`` is the FMI function."""
+        """Return the continuous states or their derivatives as a C array; ``name`` is the FMI function that returns them."""
         array = (ctypes.c_double * self.model.states)()
         if self.model.states:
             self.session.need(name, array, self.model.states)
         return array
 
     def step(self, size: float, inputs: Inputs | None = None) -> None:
-        """Set inputs and make one step."""
+        """Set the inputs and make one step of the given size (s)."""
         if self.model.interface == "cs":
             self.set(inputs or {})
             self._do_step(size)
@@ -134,7 +137,7 @@ class Run:
         self.time += size
 
     def _euler(self, size: float, inputs: Inputs) -> None:
-        """Take one step of Euler's explicit method, with an event if a time event or a new discrete input needs one."""
+        """Make one step of the explicit Euler method, with event mode if a time event is due or a discrete input changes."""
         continuous = {v: x for v, x in inputs.items() if CONDITIONS["5"](v)}
         others = {v: x for v, x in inputs.items() if v not in continuous}
         self.set(continuous)
@@ -164,7 +167,7 @@ class Run:
         return state
 
     def restore(self, state: Any, time: float, next_event: float = math.inf) -> None:
-        """Restore a saved state, and the time and the next event that belong to it."""
+        """Restore a saved state of the FMU, with the time of that state and the time of the next event."""
         self.session.need("SetFMUState", state)
         self.time, self.next_event = time, next_event
 
@@ -174,7 +177,7 @@ class Run:
 
 
 def random_inputs(rng: random.Random, run_model: Any, count: int) -> list[dict[Variable, Any]]:
-    """Return values of the inputs for each of ``count`` steps; continuous inputs change at each step, others seldom."""
+    """Return random values of inputs for each of ``count`` steps: Real inputs at every step, others at every seventh step."""
     inputs = [v for v in run_model.variables if v.causality == "input" and v.size == 1]
     steps = []
     for number in range(count):
@@ -184,12 +187,12 @@ def random_inputs(rng: random.Random, run_model: Any, count: int) -> list[dict[V
 
 
 def step_size(model: Any) -> float:
-    """Return the step size of a run (s): the model's step, or a tenth of it for Euler's method in model exchange."""
+    """Return the step size of a run (s): the model's step; for Euler's method in model exchange a tenth of the step."""
     return float(model.step if model.interface == "cs" else model.step / 10)
 
 
 def first_difference(one: Values, other: Values, model: Any) -> str:
-    """Return the name of the first variable that differs between two sets of values, with its values; empty if none does."""
+    """Return the first variable that differs between two sets of values: its name and both values; empty if all are equal."""
     for group, data in one.items():
         if data == other[group]:
             continue

@@ -1,8 +1,8 @@
-"""List calls that the standards forbid: calls with changed arguments, or of a function in a state where it is not allowed.
+"""List calls that the FMI standards forbid: with wrong arguments, or of a function in a state where it is not allowed.
 
 Each fault has the severity of the finding if the FMU accepts the call: `WRONG` if the standard demands an error, `QUESTIONABLE`
-if it asks for care, `None` if only a crash or a hang is a finding. `ACCEPT` marks unusual calls that are allowed: an error is
-then questionable.
+if the standard recommends care, `None` if only a crash or a hang is a finding. `ACCEPT` marks unusual calls that are allowed:
+if the FMU returns an error, the finding is questionable.
 """
 
 from __future__ import annotations
@@ -24,15 +24,15 @@ from .walk import Walk, access, byte_array, references
 ACCEPT = "accept"
 NAN, INF = math.nan, math.inf
 
-#: A function that changes a list of legal arguments; it returns None if the fault does not apply.
+#: A function that turns a list of legal arguments into wrong arguments; it returns None if the fault does not apply.
 Change = Callable[[Walk, str, list[Any]], list[Any] | None]
 
 
 @dataclass(frozen=True, slots=True)
 class Fault:
-    """A forbidden call."""
+    """A kind of forbidden call of one function."""
 
-    function: str  # name without prefix
+    function: str  # name of the function without the prefix fmi2 or fmi3
     what: str  # what is wrong with the call
     accepted: str | None  # severity of the finding if the call is accepted, or `ACCEPT`
     change: Change  # makes the wrong arguments from legal ones
@@ -44,7 +44,10 @@ class Fault:
 
 
 def swap_argument(position: int, value: Any) -> Change:
-    """Return a change that puts another value at a position of the arguments, counted from the end if negative."""
+    """Return a change that replaces the argument at a position by ``value``; a negative position counts from the end.
+
+    If ``value`` is a function, the argument is replaced by its result.
+    """
 
     def change(walk: Walk, name: str, arguments: list[Any]) -> list[Any] | None:
         if len(arguments) <= position:
@@ -86,7 +89,7 @@ def _set_forbidden_variable(walk: Walk, name: str, arguments: list[Any]) -> list
 
 
 def _arguments_to_set(walk: Walk, variables: list[Variable]) -> list[Any] | None:
-    """Return arguments that set one of these variables, chosen at random; None if there are none."""
+    """Return the arguments of a call that sets one of ``variables``, chosen at random; None if there are no variables."""
     chosen = [walk.rng.choice(variables)] if variables else []
     return access(walk.model, chosen, walk.values(chosen)) if chosen else None
 
@@ -97,7 +100,7 @@ def _set_constant(walk: Walk, name: str, arguments: list[Any]) -> list[Any] | No
 
 
 def _lengthen_array(walk: Walk, name: str, arguments: list[Any]) -> list[Any]:
-    """Return arguments with a count that is one too large, and an array that has room for it."""
+    """Return arguments with a count that is too large by one; the array has room for the further element."""
     array = arguments[-2]
     longer = (array._type_ * (len(array) + 1))()
     longer[: len(array)] = list(array)
@@ -122,7 +125,7 @@ def _use_unknown_category(walk: Walk, name: str, arguments: list[Any]) -> list[A
 
 
 def _change_start(position: int, value: float) -> Change:
-    """Return a change of the time or tolerance at the start, in SetupExperiment (FMI 2) or EnterInitializationMode (FMI 3)."""
+    """Return a change of a time or the tolerance in the call of SetupExperiment (FMI 2) or EnterInitializationMode (FMI 3)."""
 
     def change(walk: Walk, name: str, arguments: list[Any]) -> list[Any] | None:
         if len(arguments) != 5:
@@ -208,7 +211,7 @@ _DEMANDED_IN_3 = ("step of zero",)
 
 
 def catalogue(walk: Walk) -> list[Fault]:
-    """Return every fault that can be tried on this FMU, always in the same order."""
+    """Return all faults that can be tried on the FMU of ``walk``, always in the same order."""
     model, machine = walk.model, walk.machine
     groups = "(" + "|".join(model.groups) + ")"
     faults = [
@@ -233,10 +236,10 @@ def catalogue(walk: Walk) -> list[Fault]:
 class BadStart:
     """A forbidden or unusual instantiation: with another argument, or by another function."""
 
-    what: str  # what is wrong with it
-    accepted: str | None  # severity of the finding if it is accepted, or `ACCEPT`
-    position: int  # position of the argument
-    value: Any  # its wrong value
+    what: str  # what is wrong or unusual
+    accepted: str | None  # severity of the finding if the FMU makes an instance, or `ACCEPT`
+    position: int  # position of the changed argument
+    value: Any  # value of the changed argument
     function: str | None = None  # another function, if not the usual one
 
     @property
@@ -245,7 +248,7 @@ class BadStart:
 
 
 def bad_starts(model: Model) -> list[BadStart]:
-    """Return every bad instantiation that can be tried on this FMU."""
+    """Return all forbidden or unusual instantiations that can be tried on an FMU."""
     two = model.version == 2
     token = {2: 2, 3: 1}[model.version]
     starts = [
@@ -271,5 +274,5 @@ def bad_starts(model: Model) -> list[BadStart]:
 
 
 def is_refused(status: int) -> bool:
-    """Return whether a status means that the call was refused."""
+    """Return whether a status, returned by an FMI function, means that the call was refused: worse than Warning."""
     return status > WARNING

@@ -11,29 +11,29 @@ SEVERITIES = (CRASH, WRONG, QUESTIONABLE)
 
 
 class Note(Protocol):
-    """A function that takes a finding: its severity, a key (what it is about, and its kind), and a sentence."""
+    """A function that takes a finding: its severity, a key (subject and kind of the finding), and a sentence."""
 
     def __call__(self, severity: str, key: str, text: str) -> None: ...
 
 
 @dataclass(slots=True, kw_only=True)
 class Finding:
-    """One fault of an FMU, with the calls that show it.
+    """One fault of an FMU, with the calls that show the fault.
 
     Parameters
     ----------
     severity : str
         One of `SEVERITIES`.
     key : str
-        Interface, what the finding is about, and its kind; findings with the same key and severity are counted as one.
+        Interface, subject and kind of the finding; findings with the same key and severity are counted as one.
     text : str
         The finding as a sentence.
     calls : list of str
-        The calls of the shortest case that shows it.
+        The calls of the shortest case that shows the fault.
     replay : str
-        Name of this case, as `--replay` takes it.
+        Name of this case, for the option `--replay`.
     count : int
-        Number of cases that show it.
+        Number of cases that show the fault.
     """
 
     severity: str
@@ -45,12 +45,12 @@ class Finding:
 
     @property
     def subject(self) -> str:
-        """Return the function, variable or folder concerned: the first part of the key after the interface."""
+        """Return the function, variable or folder that the finding is about: the part of the key after the interface."""
         return self.key.split(": ")[1] if self.key.count(": ") > 1 else ""
 
     @property
     def kind(self) -> str:
-        """Return the kind of the finding, the rest of the key."""
+        """Return the kind of the finding: the part of the key after the subject."""
         return ": ".join(self.key.split(": ")[2:]) or self.text
 
 
@@ -63,7 +63,7 @@ class Outcome:
     cases: int  # number of cases that were run
     calls: int  # number of calls that were made
     seconds: float
-    said: str = ""  # what was measured, or why the check was not made
+    said: str = ""  # measured values, or the reason why the check was not made
 
 
 @dataclass(slots=True, kw_only=True)
@@ -85,7 +85,7 @@ class Report:
         return [finding for finding in self.findings if finding.severity in severities]
 
     def add(self, finding: Finding) -> None:
-        """Add a finding; if one with the same severity and key is known, count it there and keep the shorter list of calls."""
+        """Add a finding; if a finding with the same severity and key is known, count both as one and keep the shorter calls."""
         for known in self.findings:
             if (known.severity, known.key) == (finding.severity, finding.key):
                 known.count += finding.count
@@ -123,5 +123,5 @@ class Report:
 
 
 def last_calls(calls: Sequence[str], most: int) -> list[str]:
-    """Return at most the last ``most`` calls of a list, after a line that counts the calls left out."""
+    """Return the last ``most`` calls of a list; if there are more, a first line says how many are left out."""
     return list(calls) if len(calls) <= most else [f"... {len(calls) - most} calls", *calls[-most:]]

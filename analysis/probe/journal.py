@@ -1,4 +1,4 @@
-"""Keep a file of the calls of the current case; each is written before it is made, so that it survives a crash."""
+"""Keep a file of the calls of the current case; each call is written before it is made, so that a crash does not lose it."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ import struct
 from pathlib import Path
 from typing import NamedTuple
 
-#: Greatest number of bytes of text; of a longer case only the latest calls are kept.
+#: Greatest number of bytes of text; if a case has more, only its latest calls are kept.
 _ROOM = 1 << 17
 _HEADER = struct.Struct("<qqq")
 
@@ -16,12 +16,12 @@ class Entry(NamedTuple):
     """The content of a journal."""
 
     case: int  # number of the current case
-    calls: int  # number of calls that were begun in all cases
+    calls: int  # number of calls that were begun, over all cases
     lines: list[str]  # the latest calls of the current case
 
 
 class Journal:
-    """A journal that the current process writes."""
+    """The journal of the current process, to which calls are written."""
 
     def __init__(self, path: Path) -> None:
         path.write_bytes(bytes(_HEADER.size + _ROOM))
@@ -39,7 +39,7 @@ class Journal:
         self._mark()
 
     def call(self, text: str) -> None:
-        """Write a line for the next call, before it is made."""
+        """Write a new line with the next call, before the call is made."""
         self.calls += 1
         self.write("\n" + text)
 
@@ -67,7 +67,7 @@ class Journal:
 
 
 def read(path: Path) -> Entry:
-    """Read the journal that another process has left; the case is -1 if none was begun."""
+    """Read the journal of another process, which may have crashed; the case is -1 if no case was begun."""
     data = path.read_bytes() if path.exists() else b""
     if len(data) < _HEADER.size:
         return Entry(-1, 0, [])

@@ -1,4 +1,4 @@
-"""Check for memory leaks over many lives of instances, and over many steps and saved states of one instance."""
+"""Check for memory leaks: over many instances that are made and freed, and over many steps and saved states of one instance."""
 
 from __future__ import annotations
 
@@ -20,11 +20,11 @@ _SECONDS, _MOST = 6.0, 4000
 class Memory(NamedTuple):
     """Memory of this process in bytes."""
 
-    heap: int  # memory that the C library's allocator has given out; 0 if it is not known
+    heap: int  # memory that the C library has allocated; 0 if this number is not known
     resident: int  # resident memory
 
 
-#: Growth above which there is a leak: per repetition, and in total, because the probe and Python's allocator grow a little.
+#: There is a leak if the growth exceeds both limits: per repetition, and in total. The probe and Python also grow a little.
 _EACH = Memory(heap=8, resident=64)
 _LEAST = Memory(heap=16 * 1024, resident=192 * 1024)
 
@@ -65,7 +65,7 @@ def memory() -> Memory | None:
 
 
 def check_leaks(context: Context, case: int) -> None:
-    """Measure the growth of memory over lives of instances (case 0), steps (case 1), or saved states (case 2)."""
+    """Check the growth of memory over instances that are made and freed (case 0), steps (case 1), or saved states (case 2)."""
     if memory() is None:
         context.say("not made: this system does not say how much memory is used")
         return
@@ -82,7 +82,7 @@ def check_leaks(context: Context, case: int) -> None:
 
 
 def _measure(repeat: Callable[[], None]) -> tuple[int, Memory]:
-    """Call ``repeat`` many times; return the number of calls in the second half, and the growth of the memory over them."""
+    """Call ``repeat`` many times; return the number of calls in the second half, and the growth of memory during this half."""
     until = time.monotonic() + _SECONDS / 2
     warm = 0
     while warm < 20 or (warm < _MOST // 2 and time.monotonic() < until):

@@ -1,13 +1,13 @@
 """Define the state machines of the FMI standards: which function may be called in which state, and the state after it.
 
-The tables are those of FMI 2.0.4 (3.2.3 for model exchange, 4.2.4 for co-simulation) and, for FMI 3.0, the functions that 2.3,
-3.2 and 4.2 list as allowed in each state. Two states of the standard are divided, as it describes in words: `ready` is
-instantiated after `SetupExperiment`, and `settled` is the event mode after an update that needs no further one. In FMI 3.0
-`error` is the state Terminated, into which an error leads.
+The tables for FMI 2 are those of FMI 2.0.4 (section 3.2.3 for model exchange, 4.2.4 for co-simulation). The tables for FMI 3
+have the functions that sections 2.3, 3.2 and 4.2 of FMI 3.0 list as allowed in each state. Two states of the standard are
+divided, as the text of the standard describes: `ready` is the state Instantiated after `SetupExperiment`, and `settled` is the
+event mode after an update that needs no further update. In FMI 3.0 `error` is the state Terminated, to which an error leads.
 
-A cell is `x`: allowed; `.`: not allowed; `?`: not judged, because the standard leaves it open; `e`: allowed if the importer
-uses the event mode; another letter or a digit: allowed for some variables, see `model.CONDITIONS`, where the digits are the
-standard's footnotes.
+The cell of a function and a state is `x`: allowed; `.`: not allowed; `?`: not judged, because the standard does not decide;
+`e`: allowed if the importer uses the event mode; another letter or a digit: allowed for some variables, see
+`model.CONDITIONS`, where the digits are the standard's footnotes.
 """
 
 from __future__ import annotations
@@ -130,7 +130,7 @@ GetNumberOfEventIndicators   x ? x x ? ?
 FLOATS = ("Float32", "Float64")
 DISCRETE = ("Int8", "UInt8", "Int16", "UInt16", "Int32", "UInt32", "Int64", "UInt64", "Boolean", "String")
 
-#: State after a function that has returned OK; other functions do not change the state.
+#: State to which a call of each function leads if it returns OK; other functions do not change the state.
 LEADS_TO = {
     "SetupExperiment": "ready",
     "EnterInitializationMode": "initialization",
@@ -146,7 +146,7 @@ LEADS_TO = {
 
 @dataclass(frozen=True, slots=True)
 class Machine:
-    """The state machine of one interface."""
+    """The state machine of one interface of one FMI version."""
 
     version: int  # of FMI: 2 or 3
     interface: str  # cs or me
@@ -154,19 +154,19 @@ class Machine:
     allowed: dict[str, dict[str, str]]  # the cell of each function and state
 
     def cell(self, function: str, state: str, event_mode: bool = False) -> str:
-        """Return the cell of a function in a state; `e` is replaced by `x` or `.`, depending on ``event_mode``."""
+        """Return the cell of the table for a function and a state; `e` becomes `x` if ``event_mode``, else `.`."""
         cell = self.allowed[function][state]
         return ("x" if event_mode else ".") if cell == "e" else cell
 
     def follow(self, function: str, state: str, event_mode: bool = False) -> str:
-        """Return the state after a call of a function that has returned OK."""
+        """Return the state to which a call of a function in ``state`` leads if the call returns OK."""
         if function == "ExitInitializationMode":
             return "event" if self.interface == "me" or event_mode else "step"
         following = LEADS_TO.get(function, state)
         return "error" if following == "terminated" and self.version == 3 else following
 
     def path(self, target: str, event_mode: bool = False) -> list[str] | None:
-        """Return the shortest sequence of calls from `instantiated` to a state; None if no successful calls lead there."""
+        """Return the shortest sequence of functions that leads from `instantiated` to a state; None if there is none."""
         reached: dict[str, list[str]] = {"instantiated": []}
         queue = deque(["instantiated"])
         while queue:
@@ -186,7 +186,8 @@ def _machine(version: int, interface: str, common: str, table: str) -> Machine:
     allowed = {row.split()[0]: dict(zip(states, row.split()[1:], strict=True)) for row in rows}
     allowed |= {row.split()[0]: dict.fromkeys(states, row.split()[1]) for row in common.strip().splitlines()}
     if version == 3:
-        # there are functions for each type; every variable can be read in every state, in Instantiated only those with a start
+        # each type has its own functions; all variables can be read in every state, except that in Instantiated only variables
+        # with a start value can be read
         last = {"cs": "6", "me": "i"}[interface]
         for kind in (*FLOATS, *DISCRETE):
             allowed["Get" + kind] = dict.fromkeys(states, "x") | {"instantiated": "s"}
@@ -195,7 +196,7 @@ def _machine(version: int, interface: str, common: str, table: str) -> Machine:
     return Machine(version, interface, states, allowed)
 
 
-#: The four machines, by version and interface.
+#: The four state machines, by FMI version and interface.
 MACHINES = {
     (2, "cs"): _machine(2, "cs", _FMI2, _FMI2_CS),
     (2, "me"): _machine(2, "me", _FMI2, _FMI2_ME),

@@ -1,4 +1,4 @@
-"""Read what the probe has to know about an FMU: variables by type and by the calls allowed for them, states, capabilities."""
+"""Read from an FMU what the probe needs: variables, the calls that are allowed for each variable, states and capabilities."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from xml.etree import ElementTree
 
 from linkwork.errors import InputError
 
-#: Group of functions and C type of each type of variable, for FMI 2 and FMI 3.
+#: Group of functions and C type for each type of variable, in FMI 2 and FMI 3; the group Real has GetReal and SetReal.
 TYPES: dict[int, dict[str, tuple[str, Any]]] = {
     2: {
         "Real": ("Real", ctypes.c_double),
@@ -38,11 +38,11 @@ TYPES: dict[int, dict[str, tuple[str, Any]]] = {
 
 @dataclass(frozen=True, slots=True)
 class Variable:
-    """A variable of the model description, with its numbers converted."""
+    """A variable of the model description, with its numbers converted from text."""
 
     name: str
     reference: int
-    group: str  # end of the names of its functions: Real for SetReal, Float64 for SetFloat64, ...
+    group: str  # functions that access the variable: Real for GetReal and SetReal, Float64 for GetFloat64, ...
     causality: str
     variability: str
     initial: str | None
@@ -62,7 +62,7 @@ def _settable(variable: Variable) -> bool:
     return variable.variability != "constant" and variable.causality not in ("independent", "structuralParameter")
 
 
-#: The variables for which a cell of the table of functions allows the call, as in the standard's footnotes.
+#: For each cell of the tables in `machines`: whether a variable may be read or set, as in the standard's footnotes.
 CONDITIONS: dict[str, Callable[[Variable], bool]] = {
     "1": lambda v: _settable(v) and (v.initial in ("exact", "approx") or v.causality == "input"),
     "2": lambda v: v.causality == "output",
@@ -88,7 +88,7 @@ class Model:
     token: str
     variables: tuple[Variable, ...]
     states: int
-    state_names: tuple[str, ...]  # in the order of the state vector; empty where a state is no scalar
+    state_names: tuple[str, ...]  # in the order of the state vector; "" for a state that is not scalar
     indicators: int
     start_time: float
     step: float
@@ -102,13 +102,13 @@ class Model:
     event_mode: bool
     evaluates_discrete: bool
     other_interface: bool
-    once: bool  # can be instantiated only once in a process
+    once: bool  # whether the FMU can be instantiated only once in a process
     initial_unknowns: frozenset[str]
     #: Each Real derivative and output with the Real inputs and states on which it may depend.
     dependencies: tuple[tuple[Variable, tuple[Variable, ...]], ...] = field(repr=False)
 
     def select_variables(self, group: str, condition: str = "x") -> list[Variable]:
-        """Return the variables of a ``group``, such as Real, that meet a ``condition``, a key of `CONDITIONS`."""
+        """Return the variables of a ``group``, such as Real, that satisfy a ``condition``, a key of `CONDITIONS`."""
         meets = CONDITIONS[condition]
         if condition == "2":
             return [v for v in self.variables if v.group == group and (meets(v) or v.name in self.initial_unknowns)]
@@ -124,7 +124,7 @@ class Model:
 
 
 def interfaces(description: Any) -> list[str]:
-    """Return the interfaces of an FMU that the probe knows: cs, me."""
+    """Return the interfaces of an FMU that can be probed: "cs" (co-simulation) and "me" (model exchange)."""
     return [name for name, value in (("cs", description.coSimulation), ("me", description.modelExchange)) if value]
 
 
@@ -183,7 +183,7 @@ def read_model(folder: Path, interface: str) -> Model:
 
 
 def _dependencies(description: Any, by_name: dict[str, Variable]) -> list[tuple[Variable, tuple[Variable, ...]]]:
-    """Return each scalar Real derivative and output with the inputs and states that may influence it."""
+    """Return each scalar Real derivative and output together with the inputs and states on which it may depend."""
     knowns = [v for v in by_name.values() if v.is_real and v.size == 1 and CONDITIONS["5"](v)]
     pairs = []
     for unknown in [*description.derivatives, *description.outputs]:
@@ -239,7 +239,10 @@ def _variable(variable: Any, version: int, is_state: bool) -> Variable:
 
 
 def _capabilities(folder: Path, interface: str) -> set[str]:
-    """Return the names of the flags of an interface that are true, from the XML file, since FMPy does not read all of them."""
+    """Return the names of the capability flags of an interface that are true.
+
+    They are read from the XML file, because FMPy does not read all of them.
+    """
     root = ElementTree.parse(folder / "modelDescription.xml").getroot()
     element = root.find({"cs": "CoSimulation", "me": "ModelExchange"}[interface])
     return set() if element is None else {name for name, value in element.items() if value in ("true", "1")}

@@ -1,4 +1,4 @@
-"""Check that an FMU works wherever it is extracted to: in folders with unusual names, with unusual resource locations."""
+"""Check that an FMU works in folders with unusual names, and with unusual forms of the resource location."""
 
 from __future__ import annotations
 
@@ -29,8 +29,8 @@ FOLDERS = (
     "~tilde",
 )
 
-#: Other forms of the location of the resources: name, severity of a refusal, and the text made from the path and its quoted
-#: form.
+#: Unusual forms of the resource location: name, severity of the finding if the FMU refuses, and a function that makes the text
+#: from the path and the percent-encoded path.
 _URIS = (
     ("file:/path", WRONG, lambda path, quoted: f"file:{quoted}".encode()),
     ("file://localhost/path", WRONG, lambda path, quoted: f"file://localhost{quoted}".encode()),
@@ -61,12 +61,12 @@ def _all(part: str) -> str:
 
 
 def count(model: Model) -> int:
-    """Return the number of folders and resource locations that are tried."""
+    """Return the number of cases of `check_places`: folders and resource locations."""
     return len(FOLDERS) + len(_URIS if model.version == 2 else _PATHS)
 
 
 def check_places(context: Context, case: int) -> None:
-    """Run the FMU for a short time in a folder with an unusual name, or with another form of the location of its resources."""
+    """Check that the FMU makes a step in a folder with an unusual name, or with an unusual form of the resource location."""
     if case < len(FOLDERS):
         _folder(context, FOLDERS[case])
         return

@@ -1,4 +1,4 @@
-"""Compare runs: repeated, after a reset, beside another instance, restored, serialized, and with other steps."""
+"""Compare runs that must be equal: repeated, after a reset, beside another instance, restored, serialized; and half steps."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from .findings import QUESTIONABLE, WRONG
 from .walk import byte_array, serialize
 
 _STEPS = 20
-#: Relative difference between a step and two half steps above which it is questionable.
+#: Relative difference between one step and two half steps above which there is a (questionable) finding.
 SPLIT_TOLERANCE = 1e-2
 
 
@@ -67,7 +67,7 @@ def check_repetition(context: Context, case: int) -> None:
 
 
 def check_restoring(context: Context, case: int) -> None:
-    """Check that a run continued from a restored state is bit-identical, whatever the instance did before."""
+    """Check that a run that continues from a restored state gives the same bits, whatever the instance did in between."""
     rng = context.random(case)
     steps = random_inputs(rng, context.model, 2 * _STEPS)
     run = Run(context.session())
@@ -93,7 +93,10 @@ def check_restoring(context: Context, case: int) -> None:
 
 
 def check_serializing(context: Context, case: int) -> None:
-    """Check that a state gives the same bytes each time; write them and the run that follows, for another process."""
+    """Check that a state is serialized to the same bytes twice; write the bytes and the run from this state to a file.
+
+    `check_deserializing` reads the file in another process.
+    """
     steps = random_inputs(context.random(case), context.model, 2 * _STEPS)
     run = Run(context.session())
     _run_steps(run, steps[:_STEPS])
@@ -114,7 +117,7 @@ def check_serializing(context: Context, case: int) -> None:
 
 
 def check_deserializing(context: Context, case: int) -> None:
-    """Check that a run continued from the bytes of another process gives the same values as in that process."""
+    """Check that a run from a state that another process serialized gives the same values as in the other process."""
     path = context.work / f"serialized-{context.model.interface}-{case}.json"
     if not path.exists():
         context.say("not made: no bytes were written")
@@ -135,7 +138,7 @@ def check_deserializing(context: Context, case: int) -> None:
 
 
 def compare_half_steps(context: Context, case: int) -> None:
-    """Compare one step h with two steps h/2 at constant inputs; measure the largest difference of an output."""
+    """Compare one step h with two steps h/2 at constant inputs, and report the largest relative difference of an output."""
     model = context.model
     if model.fixed_step:
         context.say("not made: the FMU takes steps of one size only")
@@ -159,7 +162,7 @@ def compare_half_steps(context: Context, case: int) -> None:
     elements = [v for v in outputs for _ in range(v.size)]
     for column, output in enumerate(elements):
         one, two = ([row[column] for row in course] for course in courses)
-        scale = max(*map(abs, one), 1e-6 * abs(output.nominal))  # smaller values are taken to be rounding errors
+        scale = max(*map(abs, one), 1e-6 * abs(output.nominal))  # smaller values are considered rounding errors
         difference = max(abs(a - b) for a, b in zip(one, two)) / scale
         if difference > worst:
             worst, name = difference, output.name

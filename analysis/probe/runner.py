@@ -1,4 +1,4 @@
-"""Run a probe: start a process for each check, watch it, and collect the findings that it has written."""
+"""Run a probe: start a process for each check, watch the process, and collect the findings that it has written."""
 
 from __future__ import annotations
 
@@ -67,7 +67,7 @@ def probe(
     checks: Sequence[str] = (),
     progress: Callable[[str], None] | None = None,
 ) -> Report:
-    """Probe an FMU.
+    """Probe an FMU: make all checks on each of its interfaces, and return a report of the findings.
 
     Parameters
     ----------
@@ -78,15 +78,15 @@ def probe(
     seed : int
         Seed of the random numbers: the same seed makes the same calls.
     seconds : float
-        Time (s) after which no more cases of random sequences are begun.
+        Time (s) after which no further cases with random sequences of calls are begun.
     interface : str, optional
         cs or me; by default all interfaces of the FMU.
     hang : float
-        Time (s) after which a call that has not returned is taken to hang.
+        Time (s) after which a call that has not returned is considered to hang.
     checks : sequence of str
-        Names of `CHECKS` that are made; by default all.
+        Names of the checks, keys of `CHECKS`, to be made; by default all.
     progress : callable, optional
-        Takes the name of each check before it is run.
+        Called with the name of each check before the check is made.
 
     Returns
     -------
@@ -125,7 +125,7 @@ def probe(
 
 
 def replay(fmu: str | Path, case: str, *, hang: float = 10.0) -> tuple[list[str], list[Finding]]:
-    """Run one case again, named as in a report; return its calls and its findings."""
+    """Run one case again, given by its name in a report; return the calls and the findings of this case."""
     from .checks import CHECKS
 
     seed, interface, check, number = (case.split("/") + [""] * 4)[:4]
@@ -171,7 +171,7 @@ def _select_interfaces(interface: str | None, offered: Sequence[str]) -> Sequenc
 
 
 def _run(job: _Job, report: Report) -> bool:
-    """Run a check to its end, with a new process after each crash; return whether the FMU can be loaded at all."""
+    """Run all cases of a check, in a new process after each crash; return whether the FMU can be loaded."""
     begun = time.monotonic()
     cases = loadable = 0
     while job.first < job.last and not job.stopped:
@@ -188,7 +188,7 @@ def _run(job: _Job, report: Report) -> bool:
 
 
 def _one_process(job: _Job, report: Report, begun: float) -> bool:
-    """Run cases from `job.first` on in a process until it ends; return False if the FMU cannot be loaded."""
+    """Run the cases from number `job.first` in a process until the process ends; return whether the FMU can be loaded."""
     for path in (job.journal, job.records):
         path.unlink(missing_ok=True)
     order = {
@@ -220,12 +220,12 @@ def _one_process(job: _Job, report: Report, begun: float) -> bool:
 
 
 def _watch(job: _Job) -> tuple[int, bool, str]:
-    """Start the process and wait for its end, or end it if a call does not return.
+    """Start the process of a job and wait until it ends; end the process if a call does not return.
 
-    Return its exit code, whether a call did not return, and the end of its standard error.
+    Return the exit code of the process, whether a call did not return, and the last part of the standard error.
     """
     paths = os.pathsep.join(dict.fromkeys([*(path or os.getcwd() for path in sys.path)]))
-    # freed and uninitialised memory is filled with a pattern, so that the effect of reading it shows
+    # freed and uninitialised memory is filled with a pattern, so that reading it has a visible effect
     environment = {**os.environ, "PYTHONPATH": paths, "MALLOC_PERTURB_": "165"}
     stderr = job.work / "stderr"
     with stderr.open("wb") as errors:
@@ -258,11 +258,11 @@ def _records(path: Path) -> list[dict[str, Any]]:
 
 
 def _collect(records: Sequence[dict[str, Any]], job: _Job, report: Report) -> str:
-    """Add the findings of a process to the report; return the subject of its last case."""
+    """Add the findings that a process has written to the report; return the subject of the process's last case."""
     subject = ""
     for record in records:
         if "severity" in record:
-            calls = record["calls"] or ["?"] * (1 << 20)  # never shorter than those that are known
+            calls = record["calls"] or ["?"] * (1 << 20)  # never shorter than the calls that are known
             report.add(Finding(**{**record, "calls": calls, "key": f"{job.interface}: {record['key']}"}))
         elif "said" in record:
             job.said.append(record["said"])

@@ -1,4 +1,7 @@
-"""Make random sequences of calls, all legal or with one forbidden call; a case is one life of an instance."""
+"""Make random sequences of calls: legal calls only, or legal calls with one forbidden call.
+
+A case is one instance, from its instantiation until it is freed.
+"""
 
 from __future__ import annotations
 
@@ -12,12 +15,12 @@ from .findings import QUESTIONABLE, WRONG
 from .session import ERROR, FATAL, OK, Session
 from .walk import Walk, access
 
-#: Number of calls in a life with legal calls only.
+#: Approximate mean number of calls in a case with legal calls only.
 _LENGTH = 60
 
 
 def run_legal_calls(context: Context, case: int) -> None:
-    """Run one instance through random legal calls, and check that they are accepted."""
+    """Make random legal calls on one instance, and check that the FMU accepts them."""
     rng = context.random(case)
     session = context.session()
     if not session.instantiate(event_mode=rng.random() < 0.7, early_return=rng.random() < 0.5):
@@ -36,7 +39,7 @@ def run_legal_calls(context: Context, case: int) -> None:
 
 
 class ForbiddenCalls:
-    """Check of forbidden calls: each case is the life of one instance with one fault of the catalogue, all faults in turn."""
+    """Check of forbidden calls: in each case one instance gets one fault; the cases try all faults in turn."""
 
     def __init__(self, context: Context) -> None:
         self.context = context
@@ -48,7 +51,7 @@ class ForbiddenCalls:
 
     @property
     def least(self) -> int:
-        """Return the least number of cases: each fault is tried once, even if fewer calls were requested."""
+        """Return the least number of cases: each fault is tried once, even if this needs more calls than requested."""
         return len(self.faults)
 
     def __call__(self, context: Context, case: int) -> None:
@@ -83,11 +86,11 @@ class ForbiddenCalls:
     def _call(self, walk: Walk, fault: Fault, again: int) -> None:
         session, machine = walk.session, walk.machine
         reachable = [state for state in machine.states if machine.path(state, session.event_mode) is not None]
-        allowed = fault.function in machine.allowed  # FreeInstance is not: it ends a life
+        allowed = fault.function in machine.allowed  # FreeInstance is not: it ends the case
         where = [s for s in reachable if not allowed or machine.cell(fault.function, s, session.event_mode) not in ".?"]
         where.sort(
             key=lambda state: state not in ("step", "continuous")
-        )  # each time in another state, first in that of a run
+        )  # each time in another state, first in the state in which a simulation runs
         target = fault.state or (where[again % len(where)] if where else None)
         if target is None or not walk.go(target) or (fault.state and walk.cell(fault.function) != "."):
             return
@@ -124,7 +127,7 @@ class ForbiddenCalls:
             walk.state = "error"
 
     def _check_nan_step(self, walk: Walk, fault: Fault) -> None:
-        """Check whether a step with NaN in an input returns OK and outputs that are NaN."""
+        """Note a finding if a step with an input that is NaN or infinite returns OK although outputs are not finite."""
         outputs = [v for v in walk.model.variables if v.causality == "output" and v.group == fault.function[3:]]
         if not outputs or walk.state != "step" or not walk.call("DoStep"):
             return
@@ -135,7 +138,7 @@ class ForbiddenCalls:
 
 
 def _make_later_calls(walk: Walk) -> None:
-    """Make calls that may follow a forbidden call: read, continue, reset, end. Only a crash is a finding."""
+    """Make random calls after a forbidden call: read, continue, reset, free. Only a crash or a hang is a finding."""
     for _ in range(walk.rng.randint(0, 12)):
         walk.step()
     if walk.state == "error" and walk.rng.random() < 0.5 and walk.session.call("Reset") == OK:

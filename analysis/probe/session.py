@@ -1,4 +1,7 @@
-"""Call the functions of an FMU's library for one instance, as FMPy declares them; each call is noted before it is made."""
+"""Call the functions of an FMU's library for one instance; each call is written to the journal before it is made.
+
+FMPy declares the types of the functions' arguments.
+"""
 
 from __future__ import annotations
 
@@ -20,7 +23,7 @@ STATUS = ("OK", "Warning", "Discard", "Error", "Fatal", "Pending")
 
 
 class ProbeError(LinkworkError):
-    """A check could not be made, because a call that it needs was refused."""
+    """A check could not be made, because the FMU refused a call that the check needs."""
 
 
 _LOGGER = ctypes.CFUNCTYPE(
@@ -44,10 +47,10 @@ class Library:
         self._dll = made.dll  # its functions carry the argument types that FMPy declares
         self._prefix = f"fmi{model.version}"
         self.messages: list[str] = []
-        #: Callbacks, the same for all instances, so that the probe itself keeps no data of an instance.
+        #: Callbacks, the same for all instances, so that the probe keeps no data of any instance.
         self.callbacks: Any
         if model.version == 2:
-            # the logger is variadic: one more argument is declared, for the message "%s"; FMPy's type has none
+            # the logger is variadic: a further argument is declared for the message "%s", which FMPy's type lacks
             self._logger = _LOGGER(lambda _e, _n, status, _c, message, more: self._log(message, more))
             self.callbacks = fmi2.fmi2CallbackFunctions(
                 logger=ctypes.cast(self._logger, fmi2.fmi2CallbackLoggerTYPE),
@@ -64,7 +67,7 @@ class Library:
             self.messages.append((message or b"").decode("utf-8", "replace"))
 
     def function(self, name: str) -> Any:
-        """Return a function by its name without the prefix."""
+        """Return a function of the library; ``name`` is without the prefix fmi2 or fmi3."""
         return getattr(self._dll, self._prefix + name)
 
 
@@ -89,7 +92,7 @@ class Session:
         self.event_mode = False
 
     def instantiation(self, *, event_mode: bool = False, early_return: bool = False) -> tuple[str, list[Any]]:
-        """Return the name of the function that makes an instance, and its legal arguments, which a fault may change."""
+        """Return the name of the function that makes an instance, and a list of legal arguments for this function."""
         model = self.model
         token = model.token.encode()
         self.event_mode = event_mode and model.event_mode
@@ -111,7 +114,7 @@ class Session:
         return "InstantiateCoSimulation", [b"probe", token, path, False, True, *more]
 
     def instantiate(self, arguments: Iterable[Any] | None = None, **options: bool) -> bool:
-        """Make the instance; return whether the FMU has made one."""
+        """Make the instance, by default with legal arguments; return whether the FMU returned an instance."""
         name, legal = self.instantiation(**options)
         self.instance = self._make(name, legal if arguments is None else list(arguments))
         self.journal.write(" -> an instance" if self.instance else " -> NULL")
@@ -122,7 +125,7 @@ class Session:
         return self.call_instance(self.instance, name, *arguments)
 
     def call_instance(self, instance: Any, name: str, *arguments: Any) -> int:
-        """Call a function with any instance as first argument, for example NULL; return its status."""
+        """Call a function with ``instance`` as first argument, None for NULL; return its status."""
         status = self._make(name, [instance, *arguments], shown=1 if instance else 0)
         if status is None:
             return OK
@@ -131,7 +134,7 @@ class Session:
         return int(status)
 
     def need(self, name: str, *arguments: Any) -> None:
-        """Call a function that must succeed for a check to go on; raise ProbeError if it does not."""
+        """Call a function that a check needs; raise ProbeError if the FMU refuses the call."""
         status = self.call(name, *arguments)
         if status > WARNING:
             said = f": {self.messages[-1]}" if self.messages else ""
@@ -160,7 +163,7 @@ def uri(folder: Path) -> bytes:
 
 
 def show(argument: Any) -> str:
-    """Return an argument as text for the list of calls."""
+    """Return an argument of a call as text, for the list of calls."""
     if argument is None:
         return "NULL"
     if isinstance(argument, bytes):

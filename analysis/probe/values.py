@@ -12,14 +12,15 @@ from .model import Model, Variable
 from .session import ProbeError
 from .walk import derivative_arguments
 
-#: Steps of the finite differences, relative to the size of the known; the best difference is compared.
+#: Steps of the finite differences, relative to the size of the known; the closest difference counts.
 _DIFFERENCES = (1e-3, 1e-4, 1e-5, 1e-6, 1e-7)
-#: Error of a derivative, compared with the best difference and relative to the largest of the row, above which it is wrong.
+#: A derivative is wrong if it differs from the closest finite difference by more than this share of the largest derivative of
+#: the same unknown.
 DERIVATIVE_TOLERANCE = 1e-4
 
 
 def check_derivatives(context: Context, case: int) -> None:
-    """Compare directional derivatives with finite differences, and adjoint with directional derivatives, at random states."""
+    """Check, at a random state, directional derivatives by finite differences, and adjoint by directional derivatives."""
     model, rng = context.model, context.random(case)
     run = _run_at_random_state(context, case)
     worst, name = 0.0, ""
@@ -43,12 +44,12 @@ def check_derivatives(context: Context, case: int) -> None:
 
 
 def _floor(unknown: Variable) -> float:
-    """Return the size below which a derivative may be only a rounding error."""
+    """Return the magnitude below which a derivative of an unknown may be only a rounding error."""
     return 1e-8 * abs(unknown.nominal)
 
 
 def _run_at_random_state(context: Context, case: int) -> Run:
-    """Return a run in a mode that allows derivatives: continuous-time mode, or initialization mode for co-simulation."""
+    """Return a run in a mode in which derivatives may be read: continuous-time mode; initialization mode for co-simulation."""
     exchange = context.model.interface == "me"
     run = Run(context.session(), finish=exchange)
     for inputs in random_inputs(context.random(case), context.model, 5 * case) if exchange else ():
@@ -65,7 +66,7 @@ def _directional(
 
 
 def _difference(run: Run, unknown: Variable, known: Variable, step: float, declared: float) -> tuple[float, float]:
-    """Return the distance of a central difference from the declared derivative, and the difference itself."""
+    """Return the error of a declared derivative against a central difference, and the central difference."""
     here = _state(run, known)
     step *= max(abs(here), 0.01 * min(abs(known.nominal), 1.0))
     sides = []
@@ -80,7 +81,10 @@ def _difference(run: Run, unknown: Variable, known: Variable, step: float, decla
 
 
 def _state(run: Run, known: Variable) -> float:
-    """Return an input or continuous state; a state may differ from the variable of the same name between events."""
+    """Return the value of an input or a continuous state.
+
+    In model exchange it is read from the state vector, because the variable of the same name may differ between events.
+    """
     names = run.model.state_names
     if known.is_state and run.model.interface == "me" and known.name in names:
         return float(run.states("GetContinuousStates")[names.index(known.name)])
@@ -88,7 +92,7 @@ def _state(run: Run, known: Variable) -> float:
 
 
 def _put(run: Run, known: Variable, value: float) -> None:
-    """Set an input, or one of the continuous states."""
+    """Set an input or a continuous state to a value."""
     names = run.model.state_names
     if not (known.is_state and run.model.interface == "me" and known.name in names):
         run.set({known: value})
@@ -106,7 +110,11 @@ def _check_sums(
     seed: Sequence[float],
     row: Sequence[float],
 ) -> None:
-    """Check that a derivative along several knowns is the sum over them, and that the adjoint of a row is the row."""
+    """Check the derivative along several knowns, and the adjoint derivative, by the derivatives with respect to each known.
+
+    ``row`` has the derivatives with respect to each known. The derivative along ``seed`` must be the sum of ``row`` times
+    ``seed``, and the adjoint derivative must be ``row``.
+    """
     terms = [a * b for a, b in zip(row, seed)]
     floor = _floor(unknown)
     room = 1e-9 * sum(map(abs, terms)) + floor
@@ -127,7 +135,7 @@ def _check_sums(
 
 
 def check_bounds(context: Context, case: int) -> None:
-    """Check that over a run with random inputs each variable stays within its declared bounds and no output is NaN."""
+    """Check over a run with random inputs that all variables stay within their declared bounds and no output is NaN."""
     model = context.model
     numbers = [v for v in model.variables if v.group not in ("String", "Boolean") and v.size == 1]
     watched = [v for v in numbers if v.causality == "output" or math.isfinite(v.minimum) or math.isfinite(v.maximum)]
@@ -149,7 +157,7 @@ def check_bounds(context: Context, case: int) -> None:
 
 
 def check_starts(context: Context, case: int) -> None:
-    """Check that parameters and inputs have the start values of the model description after the initialization."""
+    """Check that after the initialization parameters and inputs have the start values of the model description."""
     run = Run(context.session())
     for group in context.model.groups:
         chosen = [
@@ -184,7 +192,7 @@ def check_step_past_end(context: Context, case: int) -> None:
 
 
 def bounded_parameters(model: Model) -> list[tuple[Variable, float]]:
-    """Return pairs of a parameter and a value beyond one of its declared bounds, one pair for each bound."""
+    """Return pairs (parameter, value): for each declared bound of a parameter a value beyond this bound."""
     parameters = [
         v
         for v in model.variables
@@ -200,7 +208,7 @@ def bounded_parameters(model: Model) -> list[tuple[Variable, float]]:
 
 
 def check_parameter_bounds(context: Context, case: int) -> None:
-    """Check that a parameter beyond its bounds is refused when it is set, or at the end of the initialization."""
+    """Check that a parameter value beyond a bound is refused when it is set, or by the end of the initialization."""
     variable, beyond = bounded_parameters(context.model)[case]
     session = context.session()
     if not session.instantiate():

@@ -1,4 +1,4 @@
-"""Make random legal calls on one instance, and follow the state of the standard's state machine."""
+"""Make random legal calls on one instance, and keep track of its state in the standard's state machine."""
 
 from __future__ import annotations
 
@@ -29,9 +29,9 @@ _MAY_REFUSE = (
     *("DoStep", "CompletedIntegratorStep"),
     *("NewDiscreteStates", "UpdateDiscreteStates", "EvaluateDiscreteStates"),
     *("GetDerivatives", "GetContinuousStateDerivatives", "GetEventIndicators"),
-    *("GetStatus", "GetRealStatus", "GetBooleanStatus", "GetStringStatus"),  # of use after Discard and Pending only
+    *("GetStatus", "GetRealStatus", "GetBooleanStatus", "GetStringStatus"),  # useful only after Discard and Pending
 )
-#: States before a run, in which all variables are computed from start values that the probe has chosen.
+#: States before the simulation, in which all variables are computed from start values that the probe has chosen.
 _BEFORE = ("instantiated", "ready", "initialization")
 _STATES = 3
 
@@ -42,7 +42,7 @@ def references(variables: Sequence[Variable]) -> Any:
 
 
 def value(rng: random.Random, variable: Variable) -> Any:
-    """Return a value that a variable should accept: its start value, or one near it within its bounds."""
+    """Return a random value that a variable should accept: its start value, or a value within its bounds."""
     if variable.group == "String":
         return (
             variable.start
@@ -62,7 +62,7 @@ def value(rng: random.Random, variable: Variable) -> Any:
 
 
 class Walk:
-    """A walk through the states of one instance.
+    """A walk through the states of one instance by random legal calls.
 
     Parameters
     ----------
@@ -85,7 +85,7 @@ class Walk:
         self.functions = [name for name in self.machine.allowed if self._is_offered(name)]
 
     def _is_offered(self, name: str) -> bool:
-        """Return whether the FMU declares a function, or has variables for it."""
+        """Return whether the FMU offers a function: it declares the function, or has variables for it."""
         key, model = name.lower(), self.model
         if "serializ" in key:
             return model.can_serialize and model.can_save
@@ -107,13 +107,13 @@ class Walk:
         }.get(key, "continuousstate" not in key or "number" in key or model.states > 0)
 
     def cell(self, name: str) -> str:
-        """Return the cell of the standard's table for a function in the present state; after Fatal nothing is allowed."""
+        """Return the cell of the standard's table for a function in the current state; after Fatal nothing is allowed."""
         if self.session.journal.fatal:
             return "."
         return self.machine.cell(name, self.state, self.session.event_mode)
 
     def step(self) -> None:
-        """Make one random legal call, or the call that the FMU has asked for."""
+        """Make one random legal call, or the call that must follow now, such as EnterEventMode."""
         if self.forced is not None:
             name, self.forced = self.forced, None
             if self.cell(name) not in ".?" and self.call(name):
@@ -124,7 +124,7 @@ class Walk:
                 return
 
     def go(self, target: str, most: int = 2) -> bool:
-        """Walk to a state, with up to ``most`` random calls in each state on the way; return whether it was reached."""
+        """Walk to the state ``target``, with up to ``most`` random calls in each state on the way; return success."""
         if target == "ready" and self.model.version == 3:
             return False
         for function in self.machine.path(target, self.session.event_mode) or []:
@@ -147,7 +147,7 @@ class Walk:
         return self.machine.follow(name, "", True) == "" and name.lower() != "setfmustate"
 
     def call(self, name: str) -> bool:
-        """Make a call with legal arguments, if there are any; return whether it was made and accepted."""
+        """Call a function with legal arguments, if there are any now; return whether the FMU accepted the call."""
         arguments = self.arguments(name)
         if arguments is None:
             return False
@@ -175,7 +175,7 @@ class Walk:
             )
 
     def follow_call(self, name: str, arguments: Sequence[Any], status: int) -> None:
-        """Update the state of the machine after a call, and keep what the call returned."""
+        """Update the state of the walk after a call, and keep results of the call such as saved states."""
         if status == ERROR:
             self.state = "error"
             return
@@ -192,7 +192,10 @@ class Walk:
             self.forced = "EnterEventMode"
 
     def arguments(self, name: str, whatever: bool = False) -> list[Any] | None:
-        """Return legal arguments of a function; None if there are none now, unless ``whatever`` allows any variable."""
+        """Return legal arguments of a function; None if there are none now.
+
+        With ``whatever`` a call that gets or sets variables takes any variable if no variable is allowed now.
+        """
         group = name[3:]
         if name[:3] in ("Get", "Set") and group in self.model.c_types:
             return self._access(name[:3], group, whatever)
@@ -212,21 +215,21 @@ class Walk:
         return access(self.model, chosen, self.values(chosen) if verb == "Set" else ())
 
     def values(self, variables: Sequence[Variable]) -> list[Any]:
-        """Return random legal values of variables, one for each element of each variable."""
+        """Return a random legal value for each element of each variable."""
         return [value(self.rng, v) for v in variables for _ in range(v.size)]
 
     def pick(self, pairs: Sequence[tuple[Variable, tuple[Variable, ...]]]) -> tuple[Variable, Variable] | None:
-        """Return a random unknown and a known on which it depends; None if there is none."""
+        """Return a random unknown and a known on which this unknown depends; None if there is no such known."""
         if not pairs:
             return None
         unknown, knowns = self.rng.choice(pairs)
-        if self.model.interface == "cs":  # in co-simulation states are no knowns
+        if self.model.interface == "cs":  # in co-simulation only inputs are knowns
             knowns = tuple(known for known in knowns if known.causality == "input")
         return (unknown, self.rng.choice(knowns)) if knowns else None
 
 
 def access(model: Model, variables: Sequence[Variable], values: Sequence[Any] = ()) -> list[Any]:
-    """Return the arguments of a call that gets variables of one group, or sets them to values."""
+    """Return the arguments of a call that gets variables of one group, or sets them if there are ``values``."""
     size = sum(v.size for v in variables)
     array = (model.c_types[variables[0].group] * size)(*values)
     return [references(variables), len(variables), array, *([size] if model.version == 3 else [])]
@@ -253,7 +256,7 @@ def _get_state(walk: Walk) -> list[Any] | None:
 
 
 def serialize(session: Session, state: Any) -> bytes:
-    """Return the bytes of a saved state."""
+    """Return the bytes to which the FMU serializes a saved state."""
     size = ctypes.c_size_t()
     session.need("SerializedFMUStateSize", state, size)
     buffer = byte_array(session, bytes(size.value))
@@ -262,7 +265,7 @@ def serialize(session: Session, state: Any) -> bytes:
 
 
 def byte_array(session: Session, data: bytes) -> Any:
-    """Return bytes as an array of the C type that the functions of this FMI version take."""
+    """Return bytes as a C array of the element type that the functions of the session's FMI version take."""
     kind = ctypes.c_char if session.model.version == 2 else ctypes.c_ubyte
     return (kind * len(data)).from_buffer_copy(data)
 
@@ -321,9 +324,9 @@ def derivative_arguments(
     seed: Sequence[float],
     transposed: bool = False,
 ) -> list[Any]:
-    """Return the arguments of a call for the derivative along a seed, adjoint if ``transposed``.
+    """Return the arguments of a call for the directional derivative along a seed, or the adjoint one if ``transposed``.
 
-    The call writes the result into the last argument (FMI 2) or the one before it.
+    The call writes the result into the last argument (FMI 2) or the last but one (FMI 3).
     """
     given = (ctypes.c_double * len(seed))(*seed)
     result = (ctypes.c_double * len(knowns if transposed else unknowns))()

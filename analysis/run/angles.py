@@ -1,7 +1,7 @@
-"""Angles of long runs: whole turns are subtracted from the state, counted, and added back to the outputs.
+"""Keep angles small in long runs: subtract whole turns from the state, and add them back to the outputs.
 
-An angle of 1e9 turns is rounded to 1e-6 rad. An integrator would take the rounding for motion; and its tolerance, which is
-relative to the state, would allow errors of whole turns.
+An angle of 1e9 turns is rounded to 1e-6 rad. An integrator would take this rounding for motion. Its tolerance is relative to
+the state, and would allow errors of whole turns.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ TURNS = 1024
 
 
 class WholeTurns:
-    """Whole turns that are subtracted from the angles of a run; none if an input or an event is a user's function."""
+    """Whole turns subtracted from the angles of a run; never any if an input or an event is a user's function."""
 
     def __init__(
         self, mechanism: Mechanism, p: Any, modes: Sequence[float], encoded: Encoded, events: Sequence[Event]
@@ -34,16 +34,16 @@ class WholeTurns:
         self.taken = np.zeros(mechanism.size)
         functions = chain(chain.from_iterable(encoded.functions), (event.function for event in events))
         self._never = any(functions)
-        #: number of the first sample, and the turns subtracted from it on
+        #: index of a sample, and the angles subtracted from that sample on
         self._since: list[tuple[int, NDArray[np.float64]]] = []
 
     def take(
         self, x: NDArray[np.float64], u: NDArray[np.float64], laws: NDArray[np.float64], first: int, watch: Any = None
     ) -> None:
-        """Subtract whole turns from the state x, in place, if its angles are large and the mechanism is the same without them.
+        """Subtract whole turns from large angles of the state x, in place, if the mechanism behaves the same without them.
 
-        ``u`` are the channels, ``laws`` the torque laws of the inputs, ``first`` the index of the next sample, and ``watch``
-        has the table of events, whose levels are reduced too.
+        ``u`` are the channels, ``laws`` the torque laws of the inputs; nothing is subtracted while a torsion bar acts.
+        ``first`` is the index of the next sample. ``watch`` has the table of events, where levels of angles are reduced too.
         """
         if not self.has_many_turns(x) or laws[:, 2].any():
             return
@@ -77,12 +77,12 @@ class WholeTurns:
 
     @property
     def _columns(self) -> list[int]:
-        """Return the indices of the outputs that are coordinates."""
+        """Return for each freedom the index of the output that is its coordinate."""
         return coordinate_outputs(self._mechanism)
 
 
 def coordinate_outputs(mechanism: Mechanism) -> list[int]:
-    """Return the indices of the outputs that are coordinates."""
+    """Return for each freedom of a mechanism the index of the output that is its coordinate."""
     return [mechanism.output_names.index(freedom.coordinate) for freedom in mechanism.freedoms]
 
 
@@ -94,7 +94,10 @@ def repeats(
     u: NDArray[np.float64],
     way: NDArray[np.float64],
 ) -> bool:
-    """Return whether outputs and derivatives, but for the coordinates, are the same at the states x and x + way."""
+    """Return whether the derivatives, and all outputs except the coordinates, are equal at the states x and x + way.
+
+    ``way`` is for instance a whole turn of each angle; ``u`` are the channels, the same at both states.
+    """
     equations = mechanism.equations
     acting = equations.apply_inputs(modes, tuple(u.tolist()), p)
     coordinates = coordinate_outputs(mechanism)

@@ -43,7 +43,8 @@ def takes_published(**fills: Fill) -> Callable[[_Function], _Function]:
     Parameters
     ----------
     **fills : function
-        For other arguments, such as ``initial=complete_initial_state``: a function that returns the value for a published set.
+        For another argument, as in ``initial=complete_initial_state``: function that returns the value of this argument from
+        the published set and the given value (None if it was not given).
     """
 
     def decorate(function: _Function) -> _Function:
@@ -119,7 +120,7 @@ def _without_drives(known: PublishedSet, names: Iterable[str]) -> PublishedSet:
 
 
 def complete_initial_state(known: PublishedSet, initial: Any) -> Any:
-    """Complete the initial state: None becomes that of the published set, a mapping is completed from it."""
+    """Return the initial state of a run: by default that of the published set, which also completes a mapping."""
     if isinstance(initial, Mapping):
         return read_start(find_mechanism(known.parameters), initial, known.initial)
     return known.initial if initial is None else initial
@@ -131,7 +132,10 @@ def complete_speed(known: PublishedSet, speed: Any) -> Any:
 
 
 def turn_durations(inputs: Inputs, mechanism: Mechanism) -> tuple[float, float] | None:
-    """Return the duration of a turn (s) of the slowest and of the fastest crank with a constant speed; None without any."""
+    """Return the times (s) of one revolution of the slowest and of the fastest crank that is driven at constant speed.
+
+    Return None if no crank is driven at constant speed.
+    """
     found = []
     angles = {v.name for v in mechanism.variables if v.unit == "rad"}
     for number, freedom in enumerate(mechanism.freedoms):
@@ -149,8 +153,8 @@ def usual_times(
 ) -> tuple[float, float]:
     """Return the stop time and the sampling step of a run (s).
 
-    With neither given, at constant speeds, a run has three turns of the slowest crank in steps of one degree of the fastest.
-    If only the stop time is given, the step is 1 ms.
+    The default stop time needs a crank that is driven at constant speed: it is the time of three revolutions of the slowest
+    such crank. The step is then by default one degree of the fastest. With a given stop time the default step is 1 ms.
 
     Raises
     ------
@@ -173,7 +177,7 @@ def variant(of: Any, /, **changes: Amount) -> Any:
     Parameters
     ----------
     of : str, PublishedSet, parameters of a mechanism, or their class
-        What is changed. For a class, such as FiveBarParameters, new parameters are made.
+        Published set or parameters to change. From a class, such as FiveBarParameters, new parameters are made.
     **changes
         New values by the names of the fields, such as ``slider_stiffness="1e6 dyn/cm"``. Numbers are in SI.
 

@@ -46,9 +46,9 @@ class Task:
     Attributes
     ----------
     first : int
-        Index in the ensemble of the first of these runs.
+        Index in the ensemble of the first run of the batch.
     outputs : tuple of int or None
-        Columns of the chosen outputs; None for states and channels.
+        Indices of the outputs to record; None to record states and channels.
     folder : path or None
         Folder in which the result is saved.
     code : str
@@ -77,15 +77,18 @@ class Task:
         return [(m, 5 + size + len(self.mechanism.channels)), *((m, n, numbers) for numbers in samples)]
 
     def parts(self, flat: NDArray[np.float64]) -> list[NDArray[np.float64]]:
-        """Split a flat array into views of the shapes `shapes`."""
+        """Split a flat array into views with the shapes `shapes`."""
         ends = np.cumsum([prod(shape) for shape in self.shapes])
         return [part.reshape(shape) for part, shape in zip(np.split(flat, ends[:-1]), self.shapes)]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Result:
-    """Solved runs of a batch, with fields as in `ensemble.Ensemble`; ``samples`` are states and channels, or the chosen
-    outputs, and empty if they were written into the arrays of the ensemble."""
+    """The results of the runs of a batch, with fields as in `ensemble.Ensemble`.
+
+    ``first`` is the index of the first run in the ensemble. ``samples`` are states and channels, or the chosen outputs; the
+    list is empty if the samples were written directly into the arrays of the ensemble.
+    """
 
     first: int
     samples: list[NDArray[np.float64]]
@@ -96,7 +99,10 @@ class Result:
 
 
 class PreparedBatch(NamedTuple):
-    """A batch ready for the compiled solver; ``x`` are the states at the start, ``failures`` the errors of runs without one."""
+    """A batch ready for the compiled solver.
+
+    ``x`` are the states at the start. ``failures`` are the errors of the runs that cannot start, by their index in the batch.
+    """
 
     encoded: Encoded
     batch: Any
@@ -116,10 +122,11 @@ class PreparedBatch(NamedTuple):
 
 
 def solve(task: Task, interrupts: Sequence[bool], into: Sequence[NDArray[np.float64]] | None = None) -> Result | None:
-    """Solve a batch, or read its result from its file; return None if the ensemble was interrupted before.
+    """Solve a batch, or read its result from its file; return None if the ensemble was already interrupted.
 
     ``interrupts`` is checked between compiled calls: if it is not empty, the runs are interrupted. ``into`` are the sample
-    arrays of the whole ensemble, if this process has them and the task has no folder: samples are written there directly.
+    arrays of the whole ensemble. The samples are written into them directly if this process has these arrays and the task
+    has no folder.
     """
     if interrupts:
         return None
@@ -198,11 +205,11 @@ def _integrate(
     ends: NDArray[np.float64],
     samples: Sequence[NDArray[np.float64]],
 ) -> bool:
-    """Solve the runs; return False if they were interrupted.
+    """Solve the runs of a batch; return False if they were interrupted.
 
-    A row of ``ends`` receives for each run the status of the compiled code, the number of samples, the time of the end (s), the
-    index of a channel that was not finite, the number of steps, and state and channels at the end. ``samples`` receive states
-    and channels, or the chosen outputs, at the samples, NaN after the end of a run.
+    Row i of ``ends`` receives for run i: the status of the compiled code, the number of samples reached, the time of the end
+    (s), the index of a channel that was not finite, the number of steps, and the state and the channels at the end.
+    ``samples`` receive states and channels, or the chosen outputs, at the sample times; NaN after the end of a run.
     """
     from ..numerics.vectors import LANES
     from . import compiled, lanes
@@ -259,7 +266,8 @@ def _integrate(
 def _fits(batch: Any, settings: Settings) -> NDArray[np.bool_]:
     """Return which runs can be solved in vector lanes: those whose inputs are constant, or held, in each interval.
 
-    Runs with harmonics, ramps, motors, torsion bars or functions of the state are solved one by one.
+    Unless the inputs are held, runs with harmonics, motors, torsion bars, users' functions, or ramps of other inputs than
+    commanded speeds are solved one by one.
     """
     from ..numerics.vectors import LANES
 
@@ -271,7 +279,7 @@ def _fits(batch: Any, settings: Settings) -> NDArray[np.bool_]:
 
 
 def prepare(task: Task) -> PreparedBatch:
-    """Prepare the runs of a batch with array operations; the numbers are those of `Run` and `Run.start` to the last bit.
+    """Prepare the runs of a batch with array operations; the results equal those of `Run` and `Run.start` to the last bit.
 
     Runs near the limit of assembly or with a number that is not finite are prepared by `Run.start`, whose error says why a run
     cannot start.
@@ -316,7 +324,7 @@ def prepare(task: Task) -> PreparedBatch:
         sound = np.isfinite(np.column_stack([u, x, scales, p[:, -1]])).all(axis=1) & (clearance > 2 * LIMIT_SINE)
         doubtful |= set(np.flatnonzero(~sound).tolist())
     except (ArithmeticError, ValueError):
-        # raised by a function of `math`: prepare each run by itself to find those concerned
+        # raised by a function of `math`: prepare each run by itself to find the runs that cause the error
         doubtful = set(range(len(x)))
     failures: dict[int, LinkworkError] = {}
     for i in sorted(doubtful):
@@ -333,12 +341,12 @@ def prepare(task: Task) -> PreparedBatch:
 
 
 def _is_switched_on(mechanism: Mechanism, p: NDArray[np.float64]) -> bool:
-    """Return whether the mechanism's switch is on in any row of constants."""
+    """Return whether the mechanism's switch (a constant, `Mechanism.switch`) is on in any row of the constants p."""
     return mechanism.switch_index >= 0 and bool(p[:, mechanism.switch_index].any())
 
 
 def _map_distinct(make: Callable[[Any], Any], items: Sequence[Any]) -> list[Any]:
-    """Return the values of a function for the items; it is called only once for the same object."""
+    """Return ``make(item)`` for each item; if an object occurs several times, ``make`` is called for it only once."""
     made = {key: make(item) for key, item in {id(item): item for item in items}.items()}
     return [made[id(item)] for item in items]
 
@@ -362,7 +370,7 @@ def _encode_inputs(task: Task) -> tuple[Encoded, Any]:
     constant = -1
 
     def encode_kind(inputs: Inputs) -> tuple[int, list[float] | None]:
-        """Encode inputs if they are of a new kind; return the index of their kind, and their values if all are constant."""
+        """Return the index of the inputs in ``kinds``, where all constant inputs share an entry, and the constant values."""
         nonlocal constant
         values = inputs.constants(signals)
         if values is None or constant < 0:

@@ -12,7 +12,7 @@ from .masses import Mass, mass_origins
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Case:
-    """All that a run needs, in process or through the FMU, in SI units.
+    """A case: all data that a run needs, in process or through the FMU, in SI units.
 
     Attributes
     ----------
@@ -24,8 +24,9 @@ class Case:
     step : float
         Time between samples, and communication step of the FMU (s).
     tolerance : float
+        Tolerance of the integrator, as for `simulate`.
     masses : tuple of Mass
-        The masses and where they come from; empty if that is not known.
+        The masses, each with the origin of its value; empty if the origins are not known.
     """
 
     title: str
@@ -46,8 +47,8 @@ class Case:
 def published_case(name: str, *, revolutions: float = 3.0, steps_per_revolution: int = 360) -> Case:
     """Return the case of a published set, with its published drive and initial state.
 
-    The run lasts a number of revolutions of the slowest crank; without a commanded speed it is as long as the default
-    experiment of the FMU.
+    The run lasts ``revolutions`` of the slowest crank; the step is one revolution of the fastest crank divided by
+    ``steps_per_revolution``. Without a commanded speed, duration and step are those of the default experiment of the FMU.
 
     Raises
     ------

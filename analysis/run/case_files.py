@@ -34,7 +34,7 @@ from .signals import SHAPES, Harmonics, InductionMotor, Piecewise, TorsionBar, r
 def read_parameters(
     data: Mapping[str, Any], base: Parameters | None = None, mechanism: Mechanism | None = None
 ) -> Parameters:
-    """Read parameters from nested tables or dotted names; missing ones are taken from ``base``.
+    """Read parameters from nested tables or dotted names; missing parameters are taken from ``base``.
 
     The ``section`` of a link gives its mass, its centre of mass and its moment of inertia; see `docs/case-files.md`.
 
@@ -43,7 +43,8 @@ def read_parameters(
     data : mapping
     base : parameters of a mechanism, optional
     mechanism : Mechanism, optional
-        Mechanism of the parameters: by default that of ``base``, else the one that ``data`` names or has parameters of.
+        Mechanism of the parameters. By default the mechanism of ``base``; without ``base`` the mechanism that ``data`` names,
+        or else the mechanism with most of the parameters in ``data``.
 
     Raises
     ------
@@ -83,7 +84,7 @@ def parameter_tables(parameters: Parameters) -> dict[str, Any]:
 
 
 def save_parameters(path: str | Path, parameters: Parameters, *, head: str = "") -> Path:
-    """Write parameters to a TOML or JSON file, by the path's ending; ``head`` is a comment at the top of a TOML file."""
+    """Write parameters to a file, TOML or JSON as the path ends; ``head`` is a comment at the top of a TOML file."""
     return files.write_tables(path, parameter_tables(parameters), head=head)
 
 
@@ -101,7 +102,7 @@ def load_parameters(path: str | Path) -> Parameters:
 
 
 def _find_mechanism(data: Mapping[str, Any]) -> Mechanism:
-    """Return the mechanism of a file: by its entry ``mechanism``, else the one with most of the file's parameter names."""
+    """Return the mechanism that a file names as ``mechanism``, else the mechanism with most of the file's parameters."""
     if "mechanism" in data:
         try:
             return MECHANISMS[Choice(MECHANISMS)(data["mechanism"], "mechanism")]
@@ -120,7 +121,7 @@ def _find_mechanism(data: Mapping[str, Any]) -> Mechanism:
 
 
 def case_mechanism(data: Mapping[str, Any]) -> Mechanism:
-    """Return the mechanism of a case: that of its published set, else the one that the file names or has parameters of."""
+    """Return the mechanism of a case: that of its published set, or without a set that of its parameters."""
     if "published" in data:
         return find_mechanism(PUBLISHED[Choice(PUBLISHED)(data["published"], "published")].parameters)
     return _find_mechanism(data)
@@ -140,8 +141,8 @@ class ActingInput(NamedTuple):
 def case_inputs(mechanism: Mechanism) -> dict[str, ActingInput]:
     """Return the inputs of a mechanism by their names in case files.
 
-    The name of a channel follows from `name_in_files`: ``slider.force`` is ``force``. A flag that drives a freedom is an entry
-    in the table of the freedom's mode: ``axial.groove``.
+    The function `name_in_files` gives the name of a channel: ``force`` for ``slider.force``. A flag that drives a freedom is
+    an entry in the table of the freedom's mode: ``axial.groove``.
     """
     units = {variable.name: variable.unit for variable in mechanism.variables}
     found = {}
@@ -168,7 +169,8 @@ class RunTable:
     def times(self, inputs: Inputs, mechanism: Mechanism) -> tuple[float, float]:
         """Return the stop time and the sampling step (s).
 
-        At constant speeds the defaults are three turns of the slowest crank, in steps of one degree of the fastest.
+        If cranks are driven at constant speeds, the run by default lasts three revolutions of the slowest crank, in steps of
+        one degree of the fastest crank.
         """
         turn = turn_durations(inputs, mechanism)
         step = self.step if self.step is not None else 1e-3 if turn is None else turn[1] / 360.0
@@ -190,12 +192,13 @@ def load_case(path: str | Path, overrides: Mapping[str, Any] | None = None) -> C
     ----------
     path : path
     overrides : mapping, optional
-        Values by dotted name that replace the file's, such as ``slider.stiffness``, ``drive.speed`` or ``run.stop_time``.
+        Values by dotted name that replace values of the file, such as ``slider.stiffness``, ``drive.speed`` or
+        ``run.stop_time``.
 
     Raises
     ------
     InputError
-        If the file cannot be read or leaves out what a run needs.
+        If the file cannot be read or lacks an entry that a run needs.
     ParameterError
         If a name is unknown or a value is wrong.
     """
@@ -205,7 +208,7 @@ def load_case(path: str | Path, overrides: Mapping[str, Any] | None = None) -> C
 def read_case(
     data: Mapping[str, Any], *, folder: Path, title: str = "", overrides: Mapping[str, Any] | None = None
 ) -> Case:
-    """Build a case from the tables of a case file; ``folder`` is where the files that it names, CSV or a linkage, are read."""
+    """Build a case from the tables of a case file; files named in the case (CSV, a linkage) are read from ``folder``."""
     data = with_linkage(data, folder)
     named = {**data, **(overrides or {})}
     mechanism = case_mechanism(named)
@@ -260,7 +263,7 @@ def with_case_file_names(data: Mapping[str, Any], mechanism: Mechanism) -> dict[
 
 
 def _case_file_name(name: str, mechanism: Mechanism) -> str:
-    """Return the dotted name of an entry with the FMI name of an input replaced by its name in case files."""
+    """Return the dotted name of an entry, with the FMI name of an input replaced by its name in case files."""
     for channel in mechanism.channels:
         if f"{name}.".startswith(f"{channel.name}."):
             return name_in_files(mechanism, channel) + name.removeprefix(channel.name)
@@ -290,9 +293,9 @@ def _without_rivals(
 def _split_tables(
     data: Mapping[str, Any], mechanism: Mechanism, acting: Mapping[str, ActingInput], folder: Path
 ) -> tuple[dict[str, Any], dict[str, Any]]:
-    """Split the tables of a case into those of the parameters and the inputs, read and by their names in `Inputs`.
+    """Split the tables of a case into the parameters, still unread, and the inputs, which are read and named as in `Inputs`.
 
-    Inputs are entries at the top, in tables of their own, or among the parameters in the table of a body.
+    In a file, inputs are entries at the top, in tables of their own, or in the table of a body, beside its parameters.
     """
     readers = {name: _reader(unit, folder) for name, (_, unit) in acting.items()}
     found = {name: readers[name](data[name], name) for name in acting if name in data}
@@ -319,7 +322,7 @@ def _split_tables(
 def _check_drives(
     mechanism: Mechanism, inputs: Inputs, parameters: Any, initial: Any, acting: Mapping[str, ActingInput]
 ) -> None:
-    """Raise ParameterError if a groove without amplitude drives, or an initial rate of a held freedom is given."""
+    """Raise ParameterError if a groove of zero amplitude is a drive, or if a freedom that is held has an initial rate."""
     if inputs.parts("groove") and getattr(parameters, "groove_amplitude", None) == 0.0:
         raise ParameterError(
             "groove.amplitude", 0.0, "be given with axial.groove: a groove without it holds the shift at zero"
@@ -342,7 +345,9 @@ def _check_drives(
 
 
 def _reader(unit: str, folder: Path) -> Reader:
-    """Return the reader of an input: a flag if it has no unit, else a signal or, for a torque, a law or a list of summands."""
+    """Return the reader of an input with this unit: a flag if the unit is empty, else a number or a signal.
+
+    A torque may also be a torque law, or a list of summands."""
     if not unit:
         return files.flag
     kinds, value = signal_kinds(unit, folder), Quantity(unit)
@@ -367,7 +372,7 @@ def _reader(unit: str, folder: Path) -> Reader:
 
 
 def signal_kinds(unit: str, folder: Path) -> dict[str, Table]:
-    """Return the readers of time-varying signals in a unit, by kind: a ramp, a table and so on."""
+    """Return the readers of signals in a unit, by kind: ramp, table, harmonics, and for torques torsion bar and motor."""
     value, values = Quantity(unit), Many(Quantity(unit))
     kinds: dict[str, Table] = {
         "ramp": Table(ramp, {"start": value, "end": value, "from_time": Quantity("s"), "to_time": Quantity("s")}),

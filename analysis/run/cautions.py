@@ -11,16 +11,16 @@ from numpy.typing import NDArray
 
 from linkwork.mechanism import Mechanism
 
-#: Number of steps from which on a run is checked for stiffness: a usual run takes about 50 steps for a turn.
+#: Least number of steps at which a run is checked for stiffness: a usual run takes about 50 steps per revolution.
 MANY_STEPS = 50_000
 #: Number of steps after which a stiff run ends if it would need more than this fraction of the largest number of steps.
 _PATIENCE, _SHARE = 1_000_000, 0.1
-#: Decay rate times step size from which on stability limits the step: explicit methods of this order are stable up to about 5.
+#: Least decay rate times step size at which stability limits the step: explicit methods of this order are stable up to about 5.
 _STABLE = 2.0
-#: Phase angle (rad) of the fastest vibration in a step from which on it limits the step: at the usual tolerance about 1.
+#: Least phase angle (rad) of the fastest vibration in a step at which the vibration limits the step: usually about 1.
 _FOLLOWED = 0.3
 #: Largest residual of the energy balance without a caution: the first number times tolerance times greatest energy, but at most
-#: the second times greatest energy. In place of the first number a usual run has 2, a run of 2000 turns 12.
+#: the second times greatest energy. In place of the first number a usual run has 2, a run of 2000 revolutions 12.
 _RESIDUAL, _MOST = 1e4, 0.05
 
 
@@ -41,7 +41,7 @@ def stiffness(rates: NDArray[np.complex128], steps: float, duration: float, usua
     """Return a caution if small disturbances that decay or vibrate fast make the steps of a run short; else an empty text.
 
     ``rates`` are the eigenvalues of `disturbance_rates`; ``steps`` is the number of steps in the ``duration`` (s). A vibration
-    up to the angular frequency ``usual`` (rad/s) is not reported: samples or drive explain it.
+    up to the angular frequency ``usual`` (rad/s) is not reported: the samples show it or the drive excites it.
     """
     step = duration / steps
     decay, vibration = float(-rates.real.min()), float(np.abs(rates.imag).max())
@@ -61,8 +61,8 @@ def stiffness(rates: NDArray[np.complex128], steps: float, duration: float, usua
 def is_too_slow(steps: Any, passed: Any, span: float, most: int) -> Any:
     """Return whether a stiff run should end now, as it would need too many steps for its duration ``span`` (s).
 
-    ``steps`` is the number of steps so far, ``passed`` the time that they covered (s), both of one run or arrays of several;
-    ``most`` is the largest number of steps.
+    ``steps`` is the number of steps so far, ``passed`` the time that they covered (s): numbers for one run, or arrays for
+    several runs. ``most`` is the largest number of steps.
     """
     return (steps >= _PATIENCE) & (steps * span >= _SHARE * most * passed)
 

@@ -62,8 +62,8 @@ def check(
     """Run a case in process and through an FMU, with the same inputs, and compare every output.
 
     In co-simulation both runs hold the inputs, and the compiled solver takes the same steps as the FMU's solver: the results
-    may agree to the last bit, which tests packaging and interfaces. With a method of SciPy or Hamming's the integration is
-    independent too. In model exchange CVode integrates the FMU; both runs then have a hundredth of the case's tolerance, so
+    may agree to the last bit, which tests packaging and interfaces. With a method of SciPy or Hamming's method the integrators
+    are independent too. In model exchange CVode integrates the FMU; both runs then have a hundredth of the case's tolerance, so
     that errors of integration do not matter.
 
     Returns

@@ -53,7 +53,7 @@ GREATEST_SHARE = 1e-3
 
 @inner
 def begin_interval(motion):
-    """Sample the inputs, apply jumps of commanded rates, record samples and events; return the status."""
+    """Begin an interval: sample the inputs, apply jumps of commanded rates, record samples and events; return the status."""
     problem, source, carry = motion.problem, motion.source, motion.carry
     x, u, t = motion.x, motion.u, motion.carry.begin
     piece = find(t, source.breaks)
@@ -89,7 +89,7 @@ def begin_interval(motion):
 
 @inner
 def _end_of_interval(piece, motion):
-    """Return the time up to which the inputs are smooth, or held."""
+    """Return the time up to which the inputs are smooth (polynomials with the index ``piece``), or held."""
     end, breaks = motion.problem.end, motion.source.breaks
     if motion.problem.hold > 0.0:
         later = motion.carry.interval + 1
@@ -100,7 +100,7 @@ def _end_of_interval(piece, motion):
 
 @inner
 def _not_finite(u):
-    """Return the index of the first component that is not finite; -1 if there is none."""
+    """Return the index of the first component of u that is not finite; -1 if there is none."""
     for i in range(u.shape[0]):
         if not isfinite(u[i]):
             return i
@@ -151,7 +151,7 @@ def _attempt(h, motion):
 
 @inner
 def _accept(h, last, t_new, motion):
-    """Return whether to accept a step, whether an event may lie inside it, and the clearance at its end."""
+    """Return whether to accept a step, whether an event or a sample may lie inside it, and the clearance at its end."""
     watch, carry, samples, y, u = motion.watch, motion.carry, motion.samples, motion.room.y, motion.u
     renew(carry.elapsed + h, y, u, motion)
     if watch.balance.shape[0] > 0:
@@ -237,7 +237,7 @@ def sample_step(t_new, h, motion):
 def _cross_interval(motion, most):
     """Integrate to the end of the interval, or pause after ``most`` steps or when the event table is full; return the status.
 
-    If it pauses, ``carry.midway`` is 1.
+    If the run pauses, ``carry.midway`` is 1.
     """
     carry, room, watch, x = motion.carry, motion.room, motion.watch, motion.x
     least = LEAST_STEP * (motion.problem.end - motion.samples.times[0])
@@ -313,9 +313,9 @@ def _advance(motion, most):
 class Batch(NamedTuple):
     """Data that differ between runs, one row for each run.
 
-    ``p`` are the constants and the energy at the start, ``scales`` the magnitudes for the error, ``steady`` whether the inputs
-    are constant between breaks, ``sizes`` the numbers of polynomial pieces and of harmonics. The other fields are those of
-    `signals.Source`.
+    ``p`` are the constants and the energy at the start, ``scales`` the magnitudes to which errors are relative, ``steady``
+    whether the inputs are constant between breaks, ``sizes`` the numbers of polynomial pieces and of harmonics. The other
+    fields are those of `signals.Source`.
     """
 
     p: NDArray[np.float64]
@@ -334,7 +334,7 @@ BATCH = types.NamedTuple(
 
 
 def single_batch(source: Source, p: NDArray[np.float64], scale: NDArray[np.float64], steady: bool) -> Batch:
-    """Return a single run as a batch of one; it shares the torque laws with the source."""
+    """Return a single run as a batch of one; the batch shares the arrays of ``source``."""
     sizes = [[len(source.coefficients), len(source.harmonics)]]
     inputs = (source.breaks, source.coefficients, source.harmonics, source.laws)
     return Batch(p[None], scale[None], np.array([steady]), np.array(sizes), *(values[None] for values in inputs))
@@ -366,7 +366,7 @@ def lane_motion(i, problem, source, batch, watch, samples, room, state):
 
 @kernel(types.void(float64, SOURCE, BATCH, MATRIX, MATRIX), purpose="the inputs of ensembles")
 def channels_of_many(t, source, batch, x, u):
-    """Write the channels of each run of a batch, at time t and its state in x, into its row of u."""
+    """Compute the channels of each run of a batch at time t: row i of u receives those of run i at the state in row i of x."""
     for i in range(x.shape[0]):
         own = _run_source(i, source, batch)
         write_channels(t, 0.0, find(t, own.breaks), x[i], own, u[i])
@@ -377,11 +377,11 @@ def channels_of_many(t, source, batch, x, u):
     purpose="the solver",
 )
 def run(problem, source, batch, watch, state, samples, status, most, budget):
-    """Integrate the runs of a batch whose status is RUNNING, one after the other, each until its end, a stopping event,
-    ``most`` steps in all, or a full table of events.
+    """Integrate the runs of a batch whose status is RUNNING, one after the other.
 
-    The function returns after ``budget`` steps of all runs together. Called again with the same arrays it continues, with the
-    same result as in one call.
+    Each run is integrated until its end, a stopping event, ``most`` steps in all, or a full table of events. The function
+    returns after ``budget`` steps of all runs together. Called again with the same arrays it continues, with the same result
+    as in one call.
 
     Parameters
     ----------
@@ -418,23 +418,24 @@ def run(problem, source, batch, watch, state, samples, status, most, budget):
 
 @inner
 def write_lane(lane, lanes, values, many):
-    """Write values into one lane of the array ``many``, which is in lanes."""
+    """Write values into one lane of an array in lanes: value i is ``many[lanes * i + lane]``."""
     for i in range(values.shape[0]):
         many[lanes * i + lane] = values[i]
 
 
 @inner
 def read_lane(lane, lanes, many, values):
-    """Read the values of one lane of the array ``many``, which is in lanes."""
+    """Read the values of one lane of an array in lanes: value i is ``many[lanes * i + lane]``."""
     for i in range(values.shape[0]):
         values[i] = many[lanes * i + lane]
 
 
 @kernel(types.void(int64, int64, VECTOR, VECTOR, MATRIX, MATRIX, MATRIX), purpose="the outputs")
 def rows(equation, lanes, modes, p, states, forces, out):
-    """Evaluate an equation, by its address, for rows of states (n, states) and inputs (n, inputs) into the rows of ``out``.
+    """Evaluate the equation at an address for each row of states and inputs, and write the results into the rows of ``out``.
 
-    The machine code of the equation evaluates ``lanes`` rows at once, and writes their results one row after the other.
+    Shapes are (n, states) for ``states``, (n, inputs) for ``forces``, and (n, results) for ``out``. The machine code of the
+    equation evaluates ``lanes`` rows at once, and writes their results one row after the other.
     """
     modes_of, p_of = np.empty(lanes * modes.shape[0]), np.empty(lanes * p.shape[0])
     x, u = np.empty(lanes * states.shape[1]), np.empty(lanes * forces.shape[1])

@@ -61,10 +61,10 @@ def cosimulate(
     interface : str
         ``co-simulation``: the inputs are sampled at each communication point and held over the step, commanded speeds change
         linearly; ``simulate(..., hold=step)`` does the same in process. ``linear-co-simulation``: the inputs change linearly
-        over a step to their values at its end, which are predicted if they depend on the motion; commanded speeds change
-        along a parabola. ``model-exchange``: FMPy's CVode integrates the FMU's derivatives, and the inputs act continuously,
-        as in process without ``hold``. The Python FMU has only co-simulation, native FMUs of FMI 2.0 have all interfaces, of
-        FMI 3.0 all but the linear one.
+        over a step to their values at its end, which are predicted if they depend on the motion; commanded speeds change along
+        a parabola. ``model-exchange``: FMPy's CVode integrates the FMU's derivatives, and the inputs act continuously, as in
+        process without ``hold``. The Python FMU has only co-simulation; native FMUs have all three interfaces in FMI 2.0, and
+        all but the linear one in FMI 3.0.
 
     Returns
     -------
@@ -172,7 +172,7 @@ class _Stepwise:
         return self.inputs(0, self.start)
 
     def inputs(self, number: int, x: NDArray[np.float64]) -> dict[str, float]:
-        """Return the inputs over the step from the communication point ``number`` (an index), at the state x."""
+        """Return the inputs for the step that begins at the communication point ``number`` (an index) with the state x."""
         times, t = self.times, float(self.times[number])
         if self.linear:
             release(self.encoded, x, self.laws)
@@ -237,7 +237,7 @@ class _Continuous:
         return name_channels(prepared.encoded, sample(prepared.encoded, float(prepared.settings.times[0]), x, laws))
 
     def rows(self, model: Any) -> Iterator[tuple[float, list[float]]]:
-        """Run the FMU; yield time and outputs at each sample, until the end or, included, the limit of assembly."""
+        """Run the FMU; yield time and outputs at each sample, and at the limit of assembly if the run ends there."""
         from .exchange import Exchange, ExchangeError
 
         times = self.prepared.settings.times
@@ -291,7 +291,7 @@ class Comparison:
 
     @property
     def agrees(self) -> bool:
-        """Return whether every output is within the tolerance."""
+        """Return whether the relative difference of every output is within the tolerance."""
         return self.worst.relative <= self.tolerance
 
     def __repr__(self) -> str:
@@ -311,12 +311,12 @@ class Comparison:
 def compare(a: Trajectory, b: Trajectory, *, tolerance: float = 1e-6) -> Comparison:
     """Compare two runs output by output.
 
-    Differences are relative to the scale of an output: its largest magnitude in ``a``, but at least a thousandth of that of
-    outputs of the same kind, so that small ones (a force at one pin, the displacement of a stiff slider) need not have as many
-    digits. The scale of a residual is the size of its terms.
+    Differences are relative to the scale of an output: its largest magnitude in ``a``, but at least a thousandth of the
+    largest magnitude of outputs of the same kind. Small outputs (a force at one pin, the displacement of a stiff slider) may
+    therefore have fewer equal digits. The scale of a residual is the size of its terms.
 
     If both runs ended early with the same status after the same sample, only the samples that both have are compared: a run in
-    process also has its last configuration, that of an FMU ends at the last communication point.
+    process also has its last configuration, whereas a run of an FMU ends at the last communication point.
 
     Raises
     ------

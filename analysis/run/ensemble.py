@@ -132,7 +132,7 @@ class Ensemble:
 
 
 class EnsembleInterrupted(Interrupted):
-    """An ensemble was interrupted; ``ensemble`` has the results so far, and status -1 for the other runs."""
+    """Error of an interrupted ensemble; ``ensemble`` has the results so far, and status -1 for the other runs."""
 
     def __init__(self, ensemble: Ensemble, folder: Path | None) -> None:
         self.ensemble = ensemble
@@ -140,7 +140,7 @@ class EnsembleInterrupted(Interrupted):
 
 
 class EnsembleBroken(LinkworkError):
-    """The workers of an ensemble failed, for example because they were killed; ``ensemble`` has the results so far."""
+    """Error of an ensemble whose workers failed, for example as they were killed; ``ensemble`` has the results so far."""
 
     def __init__(self, ensemble: Ensemble, folder: Path | None, error: WorkersLost) -> None:
         self.ensemble = ensemble
@@ -154,7 +154,7 @@ def _describe_progress(ensemble: Ensemble, folder: Path | None) -> str:
 
 
 class EnsembleOptions(RunOptions, total=False):
-    """Less common options of ensembles."""
+    """Less common options of `simulate_many`."""
 
     batch: int | None
 
@@ -177,14 +177,15 @@ def simulate_many(
     n_jobs: int | None = None,
     **options: Unpack[EnsembleOptions],
 ) -> Ensemble:
-    """Run many mechanisms, or one under many inputs, in batches of compiled calls.
+    """Run many mechanisms, or one mechanism under many inputs, in batches of compiled calls.
 
-    ``inputs`` and ``initial`` are one for all runs, or a list with one for each; all inputs must drive the same freedoms in the
-    same way and have the same Python functions, if any. The batches are solved by ``n_jobs`` threads of this process, or by the
-    workers of the backend that `joblib.parallel_config` has set: "dask" for a Dask cluster, "loky" for processes.
+    ``inputs`` and ``initial`` are one object for all runs, or a list with one for each run. All inputs must drive the same
+    freedoms in the same way and have the same Python functions, if any. The batches are solved by ``n_jobs`` threads of this
+    process, or by the workers of the backend that `joblib.parallel_config` has set: "dask" for a Dask cluster, "loky" for
+    processes.
 
-    Runs whose inputs are constant between jumps, or held, are integrated side by side in the vector lanes of the processor; the
-    others one after the other.
+    Runs whose inputs are constant between jumps, or held, are integrated side by side in the vector lanes of the processor; all
+    other runs one after the other.
 
     Parameters
     ----------
@@ -194,17 +195,17 @@ def simulate_many(
     outputs : sequence of str, optional
         Outputs of the FMI contract to keep; by default states and channels, from which `Ensemble` computes all outputs.
     folder : path, optional
-        Folder in which each finished batch is saved. The file names are made from everything that the results depend on, so
-        that the same call reads the batches that are there and computes the others, damaged files included. The arrays of
-        the ensemble are also on this disk as long as it is in use, and take little memory.
+        Folder in which each finished batch is saved. The file names are made from everything that the results depend on. The
+        same call again therefore reads the finished batches, and computes only those that are missing or whose file is
+        damaged. While the ensemble is in use, its arrays are also on this disk and take little memory.
 
     Other Parameters
     ----------------
     batch : int, optional
-        Number of runs that are prepared and solved together: by default a quarter of all runs up to 128, or a sixteenth up to
-        256, fewer if they have many samples, but at least 16.
+        Number of runs that are prepared and solved together: by default a quarter of all runs, at most 128, or a sixteenth, at
+        most 256, whichever is more. It is smaller if the runs have many samples, but at least 16.
     start_time, max_steps, progress
-        As for `simulate`, like the arguments that are not described here.
+        As for `simulate`, like all arguments that are not described here.
 
     Returns
     -------
@@ -217,9 +218,9 @@ def simulate_many(
     InputError, ParameterError
         If an argument that concerns all runs is not usable.
     EnsembleInterrupted
-        On Ctrl-C; it has the results so far.
+        On Ctrl-C; the error has the results so far.
     EnsembleBroken
-        If workers are killed again and again, or a cluster is gone; it has the results so far.
+        If workers are killed again and again, or a cluster is gone; the error has the results so far.
 
     Examples
     --------

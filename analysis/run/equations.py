@@ -34,14 +34,15 @@ _ALLOWED = (
 
 @cache
 def symbolic_equations(mechanism: Mechanism) -> ReboundFunctions:
-    """Return copies of the functions of the mechanism's modules that take CasADi symbols instead of floats."""
+    """Return the functions of the mechanism's modules, as copies that take CasADi symbols instead of floats."""
     return symbolic.symbolic_functions(mechanism.modules)
 
 
 def constants(mechanism: Mechanism, switched: bool = False) -> tuple[Any, Any]:
     """Return symbols for the constants of the equations: as a column, and as the NamedTuple that the equations take.
 
-    In the NamedTuple the mechanism's switch is a number, so that the equations can branch on it.
+    In the NamedTuple the mechanism's switch (`Mechanism.switch`) is a number, 1 if ``switched``, so that the equations can
+    branch on it.
     """
     p = symbolic.library().SX.sym("p", len(mechanism.constants._fields))
     k = mechanism.constants(*symbolic.library().vertsplit(p))
@@ -50,10 +51,10 @@ def constants(mechanism: Mechanism, switched: bool = False) -> tuple[Any, Any]:
 
 @cache
 def inertia_and_stiffness(mechanism: Mechanism, cranks: tuple[int, ...], freedom: int) -> Any:
-    """Return a CasADi function of inertia and stiffness of a freedom, with the mechanism at rest and its coordinate 0.
+    """Return a CasADi function that computes inertia and stiffness of a freedom, at rest and at the coordinate 0.
 
-    They are the second derivatives of the energy with respect to the rate and to the coordinate of the freedom. The arguments
-    are the angle of each of ``cranks``, and the constants as a column.
+    Inertia and stiffness are the second derivatives of the energy with respect to the rate and to the coordinate of the
+    freedom. The arguments of the function are the angle of each of ``cranks``, and the constants as a column.
     """
     casadi = symbolic.library()
     s, v, *angles = (casadi.SX.sym(name) for name in ("s", "v", *(f"angle{n}" for n in cranks)))
@@ -69,7 +70,7 @@ def inertia_and_stiffness(mechanism: Mechanism, cranks: tuple[int, ...], freedom
 
 
 class ParameterSymbols(NamedTuple):
-    """Symbols for the parameters of a mechanism: as a column, as an object with the fields, and the functions that take it."""
+    """Symbols for the parameters of a mechanism, as a column and as an object; ``functions`` take this object."""
 
     own: Any
     parameters: Any
@@ -89,7 +90,7 @@ def parameter_symbols(mechanism: Mechanism) -> ParameterSymbols:
 
 
 def parameters_class(mechanism: Mechanism, functions: ReboundFunctions) -> type[SimpleNamespace]:
-    """Return a class with the methods of a mechanism's parameters, from ``functions``, for fields of symbols or arrays."""
+    """Return a class with the methods of a mechanism's parameters, copied in ``functions``; fields are symbols or arrays."""
     own = vars(mechanism.parameters).items()
     methods = {name: functions.find(f) for name, f in own if isinstance(f, FunctionType) and name[:2] != "__"}
     return type("LikeParameters", (SimpleNamespace,), methods)
@@ -129,7 +130,7 @@ def expressions(mechanism: Mechanism, switched: bool = False) -> TracedEquations
     Raises
     ------
     LinkworkError
-        If they contain more than arithmetic without branches and the functions `symbolic.ELEMENTARY`.
+        If the equations branch on a symbol, or call functions other than `symbolic.ELEMENTARY`.
     """
     casadi = symbolic.library()
     functions = symbolic_equations(mechanism)
@@ -175,7 +176,7 @@ def expressions(mechanism: Mechanism, switched: bool = False) -> TracedEquations
 
 
 def _compile(traces: TracedEquations, functions: Mapping[str, Any], lanes: int = 1) -> MachineCode:
-    """Compile expressions in the symbols of ``traces``, given by name; with several lanes, outputs are written row by row."""
+    """Compile the named expressions ``functions`` of the symbols of ``traces``; several lanes write outputs row by row."""
     from ..numerics.codegen import MachineCode
 
     casadi = symbolic.library()
@@ -220,7 +221,7 @@ def machine(mechanism: Mechanism, switched: bool = False, lanes: int = 1) -> Mac
 
 @cache
 def compile_outputs(mechanism: Mechanism, switched: bool, columns: tuple[int, ...], lanes: int) -> MachineCode:
-    """Compile a function ``chosen`` of the outputs with these indices only, which takes less time than all outputs."""
+    """Compile a function ``chosen`` that computes only the outputs with the indices ``columns``: it is faster."""
     from ..numerics.codegen import MAKING
 
     traces = expressions(mechanism, switched)

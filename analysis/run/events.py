@@ -30,8 +30,8 @@ class Event:
     level : float
         Level of the output, in its SI unit.
     function : callable, optional
-        Function that crosses zero, instead of an output: of time, all coordinates and all their rates (floats). The compiled
-        solver compiles it with Numba.
+        Function that crosses zero, instead of an output. Its arguments are time, all coordinates and all their rates (floats).
+        The compiled solver compiles the function with Numba.
     direction : int
         +1 for rising values, -1 for falling, 0 for rising and falling.
     stop : bool
@@ -79,7 +79,7 @@ class Event:
 
 
 class RunInterrupted(Interrupted):
-    """A run was interrupted by Ctrl-C; ``trajectory``, of a mechanism or of a system, has the results so far."""
+    """Error of a run that Ctrl-C interrupted; ``trajectory``, of a mechanism or of a system, has the results so far."""
 
     def __init__(self, trajectory: Any) -> None:
         self.trajectory = trajectory

@@ -31,7 +31,7 @@ _GOOD, _SHORTER_STEP, _NO_WAY = 0, 1, -1
 
 
 class ExchangeError(Exception):
-    """CVode could not go on."""
+    """Error if CVode cannot continue the integration."""
 
 
 class Exchange(CVodeSolver):  # type: ignore[misc]
@@ -131,13 +131,13 @@ class Exchange(CVodeSolver):  # type: ignore[misc]
         return self.begin(roots[self.model.indicators :]) if roots.any() or self.time >= self.ends[0] else False
 
     def _reason(self, error: Exception) -> Exception:
-        """Return the error to raise for a failure of CVode: that of the inputs if they caused it."""
+        """Return the error to raise after a failure of CVode: the error of the inputs if the inputs caused the failure."""
         if self.failure is None or isinstance(self.failure, FMICallException):
             return ExchangeError(str(error))
         return self.failure
 
     def put(self, t: float, x: Any) -> None:
-        """Set time, states and inputs of the FMU to those at a time t (s) and CVode's state x."""
+        """Set in the FMU the time t (s), the states x (a vector of CVode), and the inputs at this time and state."""
         self.model.put(t, x)
         if not self.still:
             self.model.set_inputs(self.inputs(t, self._array(x), left=t >= self.ends[0]))
@@ -156,7 +156,7 @@ class Exchange(CVodeSolver):  # type: ignore[misc]
         return _GOOD
 
     def f(self, t: float, y: Any, ydot: Any, user_data: Any) -> int:
-        """Compute the time derivatives of the states; t is CVode's time."""
+        """Compute the time derivatives of the states; t is CVode's time (s), which counts from the start of the run."""
 
         def work() -> None:
             self.put(self.origin + t, NV_DATA_S(y))

@@ -7,14 +7,14 @@ With y' = f(t, y), f_n = f(t_n, y_n) and a constant step h,
     corrector    c_(n+1) = 1/8 (9 y_n - y_(n-2)) + 3h/8 (f(t_(n+1), m_(n+1)) + 2 f_n - f_(n-1))     (2.30)
     final value  y_(n+1) = c_(n+1) + 9/121 (p_(n+1) - c_(n+1))                                   (2.31)
 
-Predictor and corrector are of order 4, with errors 14/45 h^5 y''''' and -1/40 h^5 y'''''. Their difference therefore
-measures both: 9/121 |p - c| is the local error of the corrector, which sets the step, and modifier and final value take
-it out again, so that the motion converges one order faster than the error estimate says.
+Predictor and corrector are of order 4, with errors 14/45 h^5 y''''' and -1/40 h^5 y'''''. The difference p - c therefore
+measures both errors: 9/121 |p - c| estimates the local error of the corrector, and sets the step. The modifier and the final
+value correct p and c by their estimated errors, so that the motion converges with one order more than the error estimate.
 
-To double the step, every other one of seven stored back values is used; to halve it, Hermite interpolation between the last
-four gives new ones. If two halvings do not suffice, or the right-hand side is not finite, the method starts again from the
-last good point with the Runge-Kutta method of order 4 and error estimation by step doubling. These steps also begin the run,
-and end it if the last step is shorter than the others.
+To double the step, every second of seven stored back values is used. To halve the step, new back values are interpolated
+(Hermite) between the last four. If two halvings do not suffice, or the right-hand side is not finite, the method starts again
+from the last good point with the Runge-Kutta method of order 4 and error estimation by step doubling. These steps also begin
+the run, and end it if the last step is shorter than the others.
 """
 
 from __future__ import annotations
@@ -241,7 +241,7 @@ class Hamming(OdeSolver):  # type: ignore[misc]
         return Point(y, self.fun(t, y))
 
     def _double(self) -> None:
-        """Double the step and keep every other back value, if there are enough and the longer step is allowed."""
+        """Double the step and keep every second back value, if seven are stored and the longer step is allowed."""
         h = 2.0 * self.h
         room = abs(self.t_bound - self.t)
         if len(self._back) < BACK_VALUES or h > self.max_step * (1.0 + 1e-12) or h > room:
@@ -252,7 +252,7 @@ class Hamming(OdeSolver):  # type: ignore[misc]
         self.doublings += 1
 
     def _halve(self) -> bool:
-        """Halve the step and interpolate the back values; return False if their derivatives are not finite."""
+        """Halve the step and interpolate the back values; return False if the derivatives there are not finite."""
         h = self.direction * self.h
         (y0, f0), (y1, f1), (y2, f2), (y3, _) = self._back[:4]
         # Hermite interpolation of degree 6 through y_n .. y_(n-3) and f_n .. f_(n-2)

@@ -49,7 +49,7 @@ class Inputs:
     ------
     InputError
         If no mechanism has such a channel, one freedom is driven in two ways, a value is not finite or of the wrong kind, or
-        a text has not the channel's dimension.
+        the unit of a text does not fit the channel.
 
     Examples
     --------
@@ -126,7 +126,7 @@ class Inputs:
         return _parts(self._given.get(channel))
 
     def modes(self, mechanism: Mechanism) -> dict[str, int]:
-        """Return the values of the mechanism's modes, by name, that follow from which inputs are given."""
+        """Return the value of each mode of the mechanism, by name; the given inputs choose the modes."""
         return {
             mode.name: next((n for n, name in enumerate(mode.arguments) if name in self._given), mode.default)
             for mode in mechanism.modes
@@ -169,7 +169,7 @@ def _arguments() -> tuple[tuple[str, ...], tuple[str, ...]]:
 
 
 def _rivals(mechanism: Mechanism, given: Iterable[str]) -> list[str]:
-    """Return the given inputs that drive the same freedom of a mechanism, if there are two; else an empty list."""
+    """Return the names of given inputs that drive the same freedom of a mechanism; empty if there are no such inputs."""
     found = ([name for name in given if name in mode.arguments] for mode in mechanism.modes)
     return next((names for names in found if len(names) > 1), [])
 
@@ -179,12 +179,12 @@ def _refuse(rivals: Sequence[str]) -> NoReturn:
 
 
 def _all_units(name: str) -> tuple[str, ...]:
-    """Return the SI units that an input has in the mechanisms that know it."""
+    """Return the SI units that an input has in the mechanisms that have this input."""
     return tuple(dict.fromkeys(u[name] for m in MECHANISMS.values() if name in (u := input_units(m))))
 
 
 def _to_si(name: str, value: Any) -> tuple[Any, str]:
-    """Return an input in SI and its unit: the first unit of this input in any mechanism that the value fits."""
+    """Return the value of an input in SI, and its SI unit: the first of `_all_units` that fits the value."""
     wrong: ParameterError | None = None
     for unit in _all_units(name):
         try:
@@ -258,7 +258,15 @@ def _argument_names(mechanism: Mechanism) -> tuple[str, ...]:
 
 
 def speed_ratio(name: str, value: float, reference: str, speed: float) -> Fraction:
-    """Return value / speed (both rad/s) as a fraction of whole numbers up to `MOST_TURNS`; InputError if it is none."""
+    """Return value / speed (both rad/s) as a fraction of whole numbers up to `MOST_TURNS`.
+
+    ``name`` and ``reference`` are the names of value and speed in the error message.
+
+    Raises
+    ------
+    InputError
+        If the ratio is no such fraction.
+    """
     ratio = Fraction(value / speed).limit_denominator(MOST_TURNS)
     if abs(ratio * speed - value) > 1e-9 * abs(value) or (value != 0.0 and ratio == 0):
         raise InputError(
@@ -330,7 +338,7 @@ class Encoded:
     def steady(self) -> bool:
         """Return whether all channels except the torsion bar are constant between the breaks.
 
-        Of a commanded speed the derivative must be constant, as the speed itself is used at the beginning of an interval only.
+        A commanded speed may change linearly: the speed is used at the beginning of an interval only, then its derivative.
         """
         slopes, bends = self.source.coefficients[:, :, 1], self.source.coefficients[:, :, 2:]
         return not (
@@ -348,7 +356,7 @@ class Encoded:
 
 @lru_cache(maxsize=64)
 def _signals(mechanism: Mechanism) -> tuple[tuple[str, int, int], ...]:
-    """Return for each signal its name, the index of its channel, and that of its derivative's channel, -1 if there is none."""
+    """Return for each signal its name, and the indices of its channel and of its derivative's channel (-1 without one)."""
     rates = {channel.freedom: n for n, channel in enumerate(mechanism.channels) if channel.kind == "rate"}
     return tuple(
         (channel.argument, n, rates.get(channel.freedom, -1) if channel.kind == "command" else -1)
@@ -427,7 +435,7 @@ def _refine_breaks(part: Piecewise, breaks: NDArray[np.float64]) -> NDArray[np.f
 
 
 def align(encoded: Encoded, times: NDArray[np.float64]) -> Encoded:
-    """Return the inputs with each break that differs from a sample by rounding errors moved onto the sample.
+    """Move each break of the inputs that differs from a sample time only by rounding errors onto the sample time.
 
     In floats 0.3 is not 3 * 0.1: where inputs are sampled and held, a jump at 0.3 s would act a whole step late, and the
     sample at 0.3 s would have the values before the jump.
@@ -474,7 +482,7 @@ def _reason(error: Exception) -> str:
 
 
 def compile_source(encoded: Encoded) -> tuple[Source, list[Any]]:
-    """Return the inputs for the compiled code, with a copy of the torque laws, and the objects to keep while these are used."""
+    """Return the inputs for the compiled code, with a copy of the torque laws, and the objects to keep while it is in use."""
     freedoms = len(encoded.mechanism.freedoms)
     kept = [[f and compile_function(f, freedoms) for f in row] for row in encoded.functions]
     addresses = np.array([[f.address if f else 0 for f in row] for row in kept], dtype=np.int64).reshape(-1, 2)

@@ -1,4 +1,4 @@
-"""Runs of an ensemble in lanes: one run in each lane of the processor's vectors, with its own time, step size and end.
+"""Solve runs of an ensemble in lanes: one run in each lane of the processor's vectors, with its own time, step size and end.
 
 The steps are those of `compiled`: the stages of all lanes are computed together, and each lane then accepts its step or tries
 a shorter one. When a run ends, its lane takes the next run. Beginning an interval of inputs and locating the limit of assembly
@@ -50,7 +50,7 @@ class Lanes(NamedTuple):
     ``code`` are the addresses of the equations in lanes. For each lane: ``run`` is the index of its run or -1, ``phase`` and
     ``outcome`` are constants of this module, ``last`` is 1 if the step is the last of its interval. In lanes: state ``x``,
     state at the end of the step ``y`` and at a stage ``z``, modes, channels, constants, scales, step size, error, fraction of
-    the step, stages, interpolant, clearance. A row of ``between`` is the state of a lane at its fraction.
+    the step, stages, interpolant, clearance. Row l of ``between`` is the state of lane l at its fraction of the step.
     """
 
     code: NDArray[np.int64]
@@ -157,7 +157,7 @@ def _finite(lane, states, many):
 
 @inner
 def _judge(lane, error, carry, samples, v):
-    """Return the outcome of a lane's step, whose error is relative to the tolerance."""
+    """Return the outcome of a lane's step; ``error`` is relative to the tolerance."""
     clearance, states = v.clearance[lane], v.x.shape[0] // LANES
     if not error <= 1.0 or isnan(clearance) or not _finite(lane, states, v.y):
         return _REJECTED
@@ -191,7 +191,7 @@ def _motion(i, w):
 
 @inner
 def _take_run(lane, first, most, v, w):
-    """Give a lane the next run, from the index ``first`` on, that fits and has steps to take; return the index after it."""
+    """Give a lane the next run, from index ``first`` on, that fits and has steps to take; return the index after this run."""
     i, end = first, w.status.shape[0]
     while i < end and not (w.fits[i] and w.status[i] == RUNNING and w.state.carries[i].steps < most):
         i += 1
@@ -206,7 +206,7 @@ def _take_run(lane, first, most, v, w):
 
 @inner
 def _enter(lane, v, w):
-    """Begin a lane's next interval or continue inside one; the lane becomes empty if the run ends there."""
+    """Begin the next interval of a lane's run, or continue inside an interval; the lane becomes empty if the run ends."""
     i = v.run[lane]
     carry = w.state.carries[i]
     if carry.midway == 0:
@@ -321,7 +321,7 @@ def _accept_step(lane, v, w):
 
 @inner
 def _run(lanes, work, most, budget):
-    """Do the work of `run_in_lanes`, which keeps the arrays alive to which ``lanes`` and ``work`` refer."""
+    """Integrate as `run_in_lanes` describes; the caller keeps the arrays alive to which ``lanes`` and ``work`` refer."""
     v, w = refer(lanes), refer(work)
     least = LEAST_STEP * (w.problem.end - w.samples.times[0])
     first = 0

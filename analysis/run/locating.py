@@ -31,8 +31,8 @@ EVENTS_PER_STEP = 4
 #: Fraction of a step within which an event counts as simultaneous with the end of the run or the release.
 SAME = 1e-9
 
-# Numbers of events that are not the user's (those count from 0): NOTHING, ASSEMBLY, and RELEASE - n for torsion bar n. As
-# integers of NumPy: for each constant integer of Python Numba would compile the functions that take it once more.
+# Indices of events besides the user's, whose indices begin at 0: NOTHING, ASSEMBLY, and RELEASE - n for torsion bar n. They
+# are NumPy integers, as Numba would compile a function again for each constant Python integer that is passed.
 RELEASE, NOTHING, ASSEMBLY = np.arange(-3, 0)
 
 
@@ -52,7 +52,7 @@ def _gap(e, t, x, u, motion):
 
 @inner
 def _crosses(before, after, direction):
-    """Return whether an event's function crosses zero between two values; False if it starts at zero."""
+    """Return whether the function of an event crosses zero between two values; False if ``before`` is zero."""
     return (before < 0.0 <= after and direction >= 0.0) or (before > 0.0 >= after and direction <= 0.0)
 
 
@@ -108,7 +108,7 @@ def _locate(e, low, high, h, motion):
 def _events_of_step(what, cut, h, motion):
     """Record the user's events inside a step; return the first event that ends the step, and its fraction of the step.
 
-    ``what`` and ``cut`` are the event and the fraction of the step at which the step already ends without them.
+    Without the user's events the step ends at the event ``what`` and the fraction ``cut`` of the step.
     """
     watch, room = motion.watch, motion.room
     for e in range(watch.table.shape[0]):
@@ -145,7 +145,7 @@ def _make_interpolant(h, motion):
 
 @inner
 def locate_events(clearance, h, motion):
-    """Record the events inside an accepted step; return the event that ends it, or NOTHING, and its fraction of the step."""
+    """Record the events in an accepted step; return the event that ends the step, or NOTHING, and its fraction of the step."""
     carry, watch = motion.carry, motion.watch
     _make_interpolant(h, motion)
     what, cut = NOTHING, 2.0

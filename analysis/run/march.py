@@ -94,7 +94,7 @@ class March:
         self.losses = 0
         #: times in the present interval count as equal if their distance is smaller (s)
         self.same = 0.0
-        #: stands for a derivative without a value: it makes the error large, or as NaN ends the iterations of Radau and BDF
+        #: replaces a derivative without a value: 1e200 makes the error large, NaN ends the iterations of Radau and BDF
         self.nothing = 1e200
         #: latest time at which the derivative had a value, and the state there
         self.good = self.t, self.x
@@ -221,7 +221,7 @@ class March:
         return Ending
 
     def outputs(self, x: NDArray[np.float64], held: Any) -> tuple[float, ...]:
-        """Return the outputs at a state; all are NaN if they cannot be computed, as where a spring's law has no value."""
+        """Return the outputs at a state; all are NaN if the equations have no value there, as where a spring's law has none."""
         try:
             found: tuple[float, ...] = self.equations.outputs(tuple(x), held, self.energy, self.of.p)
         except (ArithmeticError, ValueError):
@@ -330,7 +330,7 @@ class March:
             function.terminal = True
 
         t0, x0 = self.t, self.x
-        # SciPy reports an event whose function starts at zero: its start gets the sign of the values that follow
+        # SciPy reports an event whose function starts at zero: the first value gets the sign of the values that follow
         x1 = x0 + 1e-6 * (stop - t0) * self._derivative(t0, x0, stop)
 
         def of(event: Event, start: float) -> Callable[[float, NDArray[np.float64]], float]:

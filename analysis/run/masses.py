@@ -31,7 +31,7 @@ class Mass(NamedTuple):
     origin : str
         Where the value comes from, such as ``"of table-3.1"``.
     stale : str
-        Text on what is kept from the published set although the link has another length; else empty.
+        Text that names the values kept from the published set although the link has another length than in the set; else empty.
     """
 
     name: str
@@ -43,7 +43,7 @@ class Mass(NamedTuple):
 def _values(
     link: Link, units: Mapping[str, str], made: LinkBody, length: float, mass: float | None
 ) -> dict[str, float]:
-    """Return mass, moment of inertia and centre of mass of a link (SI), by parameter names; ``mass`` is the weighed one."""
+    """Return mass, moment of inertia and centre of mass of a link (SI), by parameter names; ``mass`` is the weighed mass."""
     own, (x, y), inertia = made.properties(length)
     if mass is not None:  # weighed: the shape, and so the radius of gyration, is that of the section
         own, inertia = mass, inertia * mass / own
@@ -90,7 +90,7 @@ def with_sections(parameters: Parameters, **sections: Section) -> Parameters:
 
 
 def _section_entries(link: Link, flat: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the entries of a link's section from the values of a file by dotted name; empty if it has none."""
+    """Return the entries of a link's section from ``flat``, a file's values by dotted name; empty without a section."""
     head = f"{link.name}.section"
     if head in flat:
         raise ParameterError(head, flat[head], f"be a table with a kind, of {', '.join(SECTIONS)}")
@@ -100,7 +100,7 @@ def _section_entries(link: Link, flat: Mapping[str, Any]) -> dict[str, Any]:
 def resolve_sections(mechanism: Mechanism, flat: Mapping[str, Any], base: Parameters | None) -> dict[str, Any]:
     """Return the values of a file, by dotted name, with sections of links replaced by masses, centres and inertias.
 
-    If a mass is given besides a section, it is the weighed one: centre and radius of gyration are still those of the section.
+    A mass given besides a section is taken as weighed: centre and radius of gyration are still those of the section.
 
     Raises
     ------
@@ -133,7 +133,7 @@ def resolve_sections(mechanism: Mechanism, flat: Mapping[str, Any], base: Parame
 def mass_origins(
     parameters: Parameters, flat: Mapping[str, Any], known: PublishedSet | None = None, source: str = ""
 ) -> tuple[Mass, ...]:
-    """Tell where the masses of a case come from.
+    """Return the masses of a case, each with the origin of its value.
 
     Parameters
     ----------
@@ -141,9 +141,9 @@ def mass_origins(
     flat : mapping
         Values that the case gives, by dotted name, before `resolve_sections`.
     known : PublishedSet, optional
-        Set from which the other values are taken.
+        Published set from which the case takes its other values.
     source : str
-        Name of the set.
+        Name of this set.
     """
     mechanism = find_mechanism(parameters)
     links = {link.mass: link for link in mechanism.links}
@@ -175,7 +175,10 @@ def mass_origins(
 
 
 def trace_masses(parameters: Parameters) -> tuple[Mass, ...]:
-    """Tell where the masses of parameters come from: those equal to the most similar published set's are from this set.
+    """Return the masses of a mechanism, each with the origin of its value.
+
+    Values equal to those in the most similar published set are attributed to this set; all others count as given. If only
+    zeros are equal, all masses count as given.
 
     Raises
     ------

@@ -37,7 +37,10 @@ _HARMONICS = 30.0
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Settings:
-    """Solver settings of a run: times of the samples (s), step of held inputs (s, 0 for none), tolerance, most steps."""
+    """Solver settings of a run.
+
+    Times of the samples (s), step over which inputs are held (s, 0 if they are not held), tolerance, largest number of steps.
+    """
 
     times: NDArray[np.float64]
     hold: float
@@ -138,7 +141,7 @@ class Run:
         return stiffness(disturbance_rates(mechanism, x, self.apply_inputs(u), self.p), steps, passed, usual)
 
     def not_finite_error(self, channel: int, t: float, x: NDArray[np.float64]) -> NotFiniteError:
-        """Return the error for an input, by the index of its channel, that is not finite at the time t and the state x."""
+        """Return the error for an input that is not finite at time t and state x; ``channel`` is the index of its channel."""
         return NotFiniteError(self.encoded, channel, t, x)
 
     def _records(self, times: NDArray[np.float64], x: NDArray[np.float64]) -> tuple[Any, Any]:
@@ -312,8 +315,8 @@ def verdict(
 ) -> tuple[int, str]:
     """Return the solver.status and solver.message for a status of the compiled code at the time t and the state x.
 
-    ``limit`` returns the message for a limit of the motion; by default it is the limit of assembly. ``needed`` is the number of
-    steps that a run would have needed if it was given up, else 0.
+    ``limit`` returns the message for a limit of the motion; by default it is the limit of assembly. ``needed`` is zero, or the
+    number of steps that the run would have needed if it was given up as stiff.
     """
     from . import records as k
 

@@ -43,9 +43,10 @@ class Problem(NamedTuple):
 class Watch(NamedTuple):
     """Events to look for, and those found.
 
-    An event has a row of ``table`` (columns OUTPUT, LEVEL, DIRECTION, STOPS), the address of its function, or 0 if it uses an
-    output, and its last value in ``gaps``. A row of ``found`` has the index of an event, its time and the state. ``balance``
-    are the indices of the outputs energy residual and kinetic energy if the energy balance is to be restored, else empty.
+    Each event has a row in ``table`` (columns OUTPUT, LEVEL, DIRECTION, STOPS), the address of its function in ``addresses``,
+    0 if the event uses an output, and its last value in ``gaps``. A row of ``found`` has the index of an event, its time and
+    the state. ``balance`` are the indices of the outputs energy residual and kinetic energy if the energy balance is to be
+    restored, else empty.
     """
 
     table: NDArray[np.float64]
@@ -66,7 +67,7 @@ def watch_nothing(size: int) -> Watch:
 
 
 class Samples(NamedTuple):
-    """Times of the samples (s), increasing from the start; states and inputs there, of one run or of each in a batch."""
+    """Times of the samples (s), increasing; states and inputs at these times, of one run or of each run in a batch."""
 
     times: NDArray[np.float64]
     states: NDArray[np.float64]
@@ -108,8 +109,11 @@ class State(NamedTuple):
 
 
 class Room(NamedTuple):
-    """Work arrays: stages ``k``, states at a step's end ``y`` and inside it ``z``, coefficients of the interpolant ``f``,
-    inputs inside a step or at an interval's end, outputs."""
+    """Work arrays of a run.
+
+    ``k`` are the rates at the stages of a step, ``y`` is the state at the end of the step, ``z`` a state inside the step,
+    ``f`` the coefficients of the interpolant, ``inside`` the inputs inside the step or at the end of an interval.
+    """
 
     k: NDArray[np.float64]
     y: NDArray[np.float64]
@@ -122,8 +126,9 @@ class Room(NamedTuple):
 class Motion(NamedTuple):
     """A run in progress.
 
-    ``p`` are the constants and the mechanical energy at the start, ``scale`` magnitudes for the error; ``steady`` is true if
-    the inputs, except the torsion bar, are constant between the breaks; ``x`` and ``u`` are the state and the inputs in force.
+    ``p`` are the constants and the mechanical energy at the start, ``scale`` the magnitudes to which errors are relative;
+    ``steady`` is true if the inputs, except the torsion bar, are constant between the breaks; ``x`` and ``u`` are the state and
+    the inputs in force.
     """
 
     problem: Problem
@@ -168,7 +173,7 @@ def step_time(s, h, motion):
 
 @inner
 def renew(elapsed, x, u, motion):
-    """Update the channels u for the time since the interval's begin and the state x, unless they are constant."""
+    """Update the channels u to the state x and the time ``elapsed`` in the interval, unless the channels are constant."""
     if motion.carry.piece >= 0:
         write_channels(motion.carry.begin, elapsed, motion.carry.piece, x, motion.source, u)
 

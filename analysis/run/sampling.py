@@ -13,7 +13,7 @@ from .inputs import NUMBER, Encoded
 
 
 class NotFiniteError(InputError):
-    """An input, given by the index of its channel, is not a finite number at a time t and a state x."""
+    """Error for an input that is not a finite number at time t and state x; ``number`` is the index of its channel."""
 
     def __init__(self, encoded: Encoded, number: int, t: float, x: NDArray[np.float64]) -> None:
         self.number = number

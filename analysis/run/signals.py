@@ -76,9 +76,10 @@ class Piecewise:
 @in_si(frequencies="rad/s", phases="rad")
 @dataclass(frozen=True, slots=True)
 class Harmonics:
-    """mean + sum of amplitude cos(frequency t + phase); frequencies in rad/s, phases in rad, shapes (n,).
+    """A sum of harmonics: mean + sum of amplitude cos(frequency t + phase).
 
-    The values may be texts with units; ``unit`` is the SI unit of mean and amplitudes if these are texts, see `Piecewise`.
+    Frequencies are in rad/s, phases in rad; shapes are (n,). The values may be texts with units; ``unit`` is the SI unit of
+    mean and amplitudes if these are texts, see `Piecewise`.
     """
 
     mean: Amount = 0.0
@@ -107,8 +108,8 @@ class Harmonics:
 class TorsionBar:
     """Torque of a wound-up bar: torque (1 - angle / release_angle) until the crank reaches release_angle, then zero.
 
-    It starts the mechanism of the thesis (section 3.2.2): torque T0 in N.m, released at 1 rad. The time of the release is
-    located exactly.
+    A torsion bar starts the mechanism of the thesis (section 3.2.2): torque T0 in N.m, released at 1 rad. The time of the
+    release is located exactly.
     """
 
     torque: Amount
@@ -164,9 +165,9 @@ class Function:
     """A channel given by a Python function of time, all coordinates of the mechanism and all their rates, all floats.
 
     The arguments for a five-bar are t, crank angle, slider position u, and the two rates; for a slider-crank the second
-    coordinate is the axial shift S1. The compiled solver needs a function that Numba can compile; SciPy's methods take any. A
-    commanded speed must be a function of ``t`` alone and needs ``rate``, the function of its acceleration. ``breaks`` are
-    times (s) at which the function is not smooth.
+    coordinate is the axial shift S1. The compiled solver needs a function that Numba can compile; SciPy's methods take any
+    function. A commanded speed must be a function of ``t`` alone and needs ``rate``, the function of its acceleration.
+    ``breaks`` are times (s) at which the function is not smooth.
     """
 
     function: StateFunction
@@ -213,7 +214,7 @@ SHAPES = ("linear", "cubic", "hold")
 def table(times: ArrayLike, values: ArrayLike, kind: str = "linear") -> Piecewise:
     """Return a signal through the points (times, values), shapes (n,), times in s.
 
-    ``kind`` is ``linear`` (interpolation), ``cubic`` (spline) or ``hold`` (the value of the last point before). Before and
+    ``kind`` is ``linear`` (interpolation), ``cubic`` (spline) or ``hold`` (the value of the previous point). Before and
     after the table the signal has the first and the last value.
     """
     if kind == "hold":
@@ -281,6 +282,6 @@ class Source(NamedTuple):
 
     @property
     def is_constant(self) -> bool:
-        """Whether all signals are constant, apart from the users' functions, and no torque law acts."""
+        """Return whether all signals are constant, apart from the users' functions, and no torque law acts."""
         varies = self.coefficients[:, :, 1:].any() or len(self.harmonics) or self.laws[:, 2:4].any()
         return len(self.coefficients) == 1 and not varies

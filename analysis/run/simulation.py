@@ -114,16 +114,16 @@ def simulate(
         also `variant`.
     inputs : Inputs
         What acts on the mechanism; by default nothing: a crank is free, the slider-crank's shift is held, and a freedom of a
-        described linkage that has a speed in its file is held at rest. With a published set it has that speed;
-        ``torque=0.0`` frees it.
+        described linkage that has a speed in its file is held at rest. With a published set a freedom has the speed of the
+        set; ``torque=0.0`` frees the crank.
     initial
         Initial state of the mechanism, or a mapping such as {"crank_speed": "420 rpm"}; by default at rest with all
         coordinates zero. Commanded speeds replace the rates in it.
     stop_time : float or str, optional
-        End of the run, in s or as text with its unit, such as "0.5 s", like all times. By default three turns, if the crank has
-        a constant speed.
+        End of the run, in s or as text with its unit, such as "0.5 s", like all times. By default three revolutions, if
+        the crank has a constant speed.
     step : float or str, optional
-        Time between recorded samples: by default 1 ms, or without ``stop_time`` 1/360 of a turn.
+        Time between recorded samples: by default 1 ms, or without ``stop_time`` 1/360 of a revolution.
     samples : array_like, shape (n,), optional
         Times to record (s) in place of ``step``, increasing; the run starts at the first and ends at the last.
     hold : float or str, optional
@@ -161,7 +161,7 @@ def simulate(
         If parameters or inputs are not usable, or the links cannot be joined at the start. If an input is not a finite number
         later in the run, the message names the input and the time.
     RunInterrupted
-        On Ctrl-C; it has the results so far.
+        On Ctrl-C; the error has the results so far.
 
     Examples
     --------
@@ -194,6 +194,7 @@ def check_settings(times: NDArray[np.float64], hold: float | None, tolerance: fl
     Raises
     ------
     ParameterError, InputError
+        If a setting is not usable.
     """
     check_tolerance(tolerance)
     if hold is not None:

@@ -1,4 +1,4 @@
-"""Evaluate the inputs of a run in compiled code: all channels at a time and a state, or held over a step."""
+"""Evaluate the inputs of a run in compiled code: for a given time and state, or as a master holds them over a step."""
 
 from __future__ import annotations
 
@@ -41,8 +41,8 @@ def _find_piece(t, breaks):
 def write_channels(begin, elapsed, piece, x, source, u):
     """Write the channels at state x and time ``begin + elapsed`` into u, with the given piece of the polynomials.
 
-    The sum is not computed: far from zero it would be rounded so much that the inputs change in steps, which an integrator
-    would try to follow.
+    Polynomials and harmonics are not evaluated at the sum: at late times it is rounded so much that the inputs would change in
+    steps, which an integrator would try to follow.
     """
     s = (begin - source.breaks[piece]) + elapsed
     for n in range(source.places.shape[0]):
@@ -78,7 +78,7 @@ def write_channels(begin, elapsed, piece, x, source, u):
 @inner
 def is_bar_wound(laws):
     """Return whether any torsion bar acts."""
-    for n in range(laws.shape[0]):  # noqa: SIM110 - Numba compiles no generators  # noqa: SIM110 - Numba compiles no generators
+    for n in range(laws.shape[0]):  # noqa: SIM110 - Numba compiles no generators
         if laws[n, 2] != 0.0:
             return True
     return False
@@ -94,8 +94,8 @@ def is_bar_unwound(n, x, source):
 def _held_bar_correction(law, angle, speed, step):
     """Return the correction to a torsion bar's torque at the beginning of a step over which the torque is held.
 
-    The held torque is that at the angle predicted for the middle of the step: its impulse is correct to second order, while the
-    torque at the beginning would lag by half a step. A negative torque is replaced by zero.
+    The held torque is the torque at the angle predicted for the middle of the step. Its impulse is correct to second order,
+    whereas the torque at the beginning would lag by half a step. A negative torque is replaced by zero.
     """
     middle = angle + 0.5 * step * speed
     return law[0] * (max(0.0, 1.0 - middle / law[1]) - (1.0 - angle / law[1]))

@@ -1,8 +1,8 @@
 """Take a step of the integrator in all lanes of the processor at once, for ensembles and periodic motions.
 
 The method is DOP853 as in `stepping`. Arrays are in lanes (`numerics.vectors`): states, scales, the rates k[s] at the stages,
-the coefficients f[r] of the interpolant. Step sizes, errors and fractions are one number for each lane. Products are added with
-one rounding instead of two, so that results differ from those of `stepping` in the last digits.
+the coefficients f[r] of the interpolant. Step sizes, errors and fractions are one number for each lane. A product is
+added with one rounding instead of two (fused multiply-add), so that results differ from `stepping` in the last digits.
 """
 
 from __future__ import annotations

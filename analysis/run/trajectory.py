@@ -54,7 +54,7 @@ class Trajectory(NotebookResult):
     events : tuple of Occurrence
         Events in order of time.
     source : str
-        What computed it, such as ``compiled DOP853`` or the name of an FMU.
+        What computed the trajectory, such as ``compiled DOP853`` or the name of an FMU.
     statistics : mapping
         Statistics of the integrator, as far as known: numbers of steps, rejected steps and evaluations; ``seconds`` of the
         whole run, and ``seconds_integrating`` in the compiled loop.

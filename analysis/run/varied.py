@@ -36,7 +36,7 @@ class VariedSequence(Sequence[Any]):
     columns : dict of str to ndarray
         Values of all objects, by field.
     make : callable
-        Makes an object from the base and its own values, as keywords.
+        Function that makes an object from ``base`` and the object's own values, as keywords.
     """
 
     def __init__(self, base: Any, columns: dict[str, NDArray[np.float64]], make: Callable[..., Any]) -> None:
@@ -59,7 +59,7 @@ def distinct_objects(items: Sequence[Any]) -> list[Any]:
 
 
 def vary(parameters: Parameters, inputs: Any, values: Mapping[str, Any]) -> tuple[Sequence[Any], Any]:
-    """Return the parameters of all sets and their inputs, which differ in the given values.
+    """Return the parameters and the inputs of all sets, which differ in the given values.
 
     Parameters
     ----------
@@ -177,7 +177,7 @@ def varied_constants(mechanism: Mechanism, sets: Sequence[Parameters]) -> tuple[
 def array_functions(mechanism: Mechanism) -> tuple[ReboundFunctions, type[SimpleNamespace]]:
     """Return the equations as functions of arrays, and the class of parameters with arrays as fields.
 
-    They apply the functions of `math` to each element, as NumPy's functions differ in the last bits.
+    The functions apply those of `math` to each element, as NumPy's functions differ in the last bits.
     """
     elementwise = {name: _vectorise(getattr(math, name)) for name in ELEMENTARY}
     ours = {"sqrt": np.sqrt, "fabs": np.abs, "max": np.maximum, "min": np.minimum, "float": lambda value: value}

@@ -1,4 +1,4 @@
-"""Parts of an answer to the page: charts, and files for the browser to save."""
+"""Make the parts of a job's answer to the page: charts, and files for the browser to save."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ FloatArray = NDArray[np.float64]
 
 
 def chart(title: str, unit: str, angle: FloatArray, values: FloatArray) -> Answer:
-    """Return a chart of values (n,) in a unit over the crank angle (rad), shape (n,)."""
+    """Return a chart of values over the crank angle (rad), both of shape (n,); ``unit`` is the unit of the values."""
     return {
         "title": title,
         "unit": unit,

@@ -1,4 +1,4 @@
-"""The web server of the studio: it listens on the loopback address only, and serves one page, which must have its token."""
+"""The web server of the studio: it listens on the loopback address only, and serves one page to requests with its token."""
 
 from __future__ import annotations
 
@@ -64,7 +64,7 @@ _Start = Callable[[str, list[tuple[str, str]]], Any]
 
 
 class _Refused(Exception):
-    """A request that is refused, with the HTTP status and a sentence that give the reason."""
+    """Error for a request that is refused; an HTTP status and a sentence give the reason."""
 
     def __init__(self, status: HTTPStatus, sentence: str) -> None:
         self.status, self.sentence = status, sentence
@@ -74,9 +74,9 @@ class _Refused(Exception):
 class Application:
     """WSGI application that serves a page and accepts its jobs.
 
-    A request must name this machine as its host (a page that reaches it by another name does not), must not come from another
-    page, and must have the token, in the address of the page or in a header. There are two paths, the page and its job; a
-    path is looked up in a table, never on a disk.
+    A request must name this machine as its host (a foreign page that reaches the server by another name does not), must not
+    come from another page, and must have the token, in the address of the page or in a header. There are two paths, the page
+    and its job; a path is looked up in a table, never on a disk.
 
     Parameters
     ----------
@@ -181,7 +181,7 @@ def _hashes(page: str) -> str:
 
 
 def allowed_hosts(port: int) -> tuple[str, ...]:
-    """Return the hosts that a browser may send for this server at a port; port 80 is not named."""
+    """Return the Host headers that a browser may send to this server at a port; browsers omit port 80."""
     return tuple(name if port == 80 else f"{name}:{port}" for name in (ADDRESS, "localhost"))
 
 

@@ -1,8 +1,9 @@
 """Jobs of the studio: each takes the case of the page and options, and returns an answer for the page to show.
 
-A request has numbers and names; no text of it is used as a path. An answer is in display units and may have: ``words``, a
-``table`` of texts with ``files`` for each row; for each row ``pictures``, ``states`` of the page and ``curves`` in the plane of
-the mechanism; ``charts``, ``outputs`` of a run of the first state, and ``files`` for the browser to save.
+A request has numbers and names; no text of a request is used as a file path. An answer may have: ``words``; a ``table`` of
+texts in display units, with ``files`` for each row; for each row of the table also ``pictures``, ``states`` of the page, and
+``curves`` in the plane of the mechanism; ``charts``; ``outputs`` of a run of the first state; ``files`` for the browser to
+save.
 """
 
 from __future__ import annotations
@@ -29,7 +30,7 @@ _ROWS = 5000
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Tuning:
-    """Options of tuning: range of speeds (rad/s), parameters that may change and by which share, and what to exclude."""
+    """Options of tuning: range of speeds (rad/s), parameters that may change, by which share at most, and what to exclude."""
 
     speeds: tuple[float, float] = entry(Many(Quantity("rad/s", above=0.0), length=2))
     change: tuple[str, ...] = entry(Many(text, least=1))
@@ -41,7 +42,7 @@ class _Tuning:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Run:
-    """Options of a run of the FMU: the number of equal steps, after each of which there is a row."""
+    """Options of a run of the FMU: number of equal steps, each of which gives a row of outputs."""
 
     rows: int = entry(Whole(1))
 
@@ -70,7 +71,7 @@ def do(kind: str, request: Mapping[str, Any]) -> Answer:
 
 
 def _tuned(case: Case, wanted: _Tuning) -> Answer:
-    """Find the least change of parameters, and return it as a table and a state of the page."""
+    """Find the least change of parameters that meets the options; return a table and the changed state of the page."""
     low, high = wanted.speeds
     wish = Wish(
         parameters=case.parameters,

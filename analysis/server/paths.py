@@ -1,4 +1,4 @@
-"""Jobs about a drawn path: find linkages whose coupler point follows it, and the slider's motion for it."""
+"""Jobs for a drawn path: find linkages, or the motion of a five-bar's slider, with which the coupler point follows it."""
 
 from __future__ import annotations
 
@@ -51,7 +51,7 @@ _NOTES: dict[Kind, str] = {
     "geared-five-bar": "A geared five-bar is none of the page's mechanisms: its drawing is at real size, and linkwork "
     "synthesize with its own file searches its gears alone.",
 }
-#: Name of the file of a task; small pictures have every so many-th point of a curve.
+#: Name of the case file of a search; step between the points of a curve that a small picture shows.
 _TASK, _EVERY = "linkages.toml", 4
 
 
@@ -103,9 +103,9 @@ class Moved(_Drawn):
 
 
 def linkages(case: Case, wanted: Linkages) -> Answer:
-    """Find linkages for the drawn path; return them ranked, with pictures, states of the page and the path in their frames.
+    """Find linkages for the drawn path; return them ranked, with pictures, page states, and the path in the frame of each.
 
-    As a geared five-bar cannot be run, it has a drawing for CAD and a case file instead of a state.
+    As a geared five-bar cannot be run, the answer has a drawing for CAD and a case file instead of a state.
     """
     found = synthesize(
         wanted.task(), constraints=wanted.constraints(), kinds=wanted.kinds, search=Search(starts=wanted.starts)
@@ -198,7 +198,7 @@ def _in_ground_frame(points: FloatArray, linkage: Linkage) -> FloatArray:
 
 
 def moved(case: Case, wanted: Moved) -> Answer:
-    """Find the slider's motion for the drawn path with more and more harmonics, and the control force of the last one."""
+    """Find slider motions with 1, 2, ... harmonics for the drawn path, and the control force of the last motion."""
     p = case.parameters
     require_five_bar(p, "a motion of the slider")
     if p.coupler_point_distance == 0.0:

@@ -1,4 +1,4 @@
-"""A process that does one job after another; it is killed, with all processes that it started, if a job is cancelled."""
+"""Do one job after another in a process; the process is killed, with all processes that it started, if a job is cancelled."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ class Busy(InputError):
 
 
 class Worker:
-    """Runs one job at a time in a separate process. Its methods may be called from several threads.
+    """Worker that runs one job at a time in a separate process. Its methods may be called from several threads.
 
     The process is started with the first job, or by `start`; its temporary files are in a folder that is deleted with it.
     """
@@ -53,7 +53,7 @@ class Worker:
         Raises
         ------
         LinkworkError
-            If the system cannot start one.
+            If the system cannot start a process.
         """
         with self._lock:
             if self._process is not None and self._process.is_alive():
@@ -73,7 +73,7 @@ class Worker:
             self._process = process
 
     def give(self, kind: str, request: Mapping[str, Any]) -> dict[str, Any]:
-        """Begin a job and return its state, see `look`.
+        """Begin a job and return it as `look` does.
 
         Raises
         ------
@@ -172,7 +172,7 @@ class _Teller:
 
 
 class _Terminal(io.TextIOBase):
-    """Standard error of a job: its notes, such as that something is compiled, are also sent as progress."""
+    """Standard error of a job; notes in it, for example that equations are compiled, are also sent as progress."""
 
     def __init__(self, teller: _Teller) -> None:
         self.teller = teller

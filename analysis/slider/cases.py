@@ -75,7 +75,7 @@ class SliderTable:
     Attributes
     ----------
     harmonics : tuple of int
-        Numbers of harmonics, increasing; each search starts from the solutions of the previous one.
+        Numbers of harmonics, increasing: one search for each number, which starts from the solutions of the search before.
     links : str
         "kept", or "free": optimised together with the motion.
     guide_angle, position, stroke, speed, acceleration
@@ -94,7 +94,7 @@ class SliderTable:
     starts: int = entry(Whole(1), 24)
 
     def __post_init__(self) -> None:
-        self.unknown(0)  # checks them
+        self.unknown(0)  # checks the bounds
 
     def unknown(self, harmonics: int) -> SliderUnknown:
         """Return the unknowns of a motion with this number of harmonics, within the bounds of the table."""
@@ -104,7 +104,7 @@ class SliderTable:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class StrategyTable:
-    """The table ``[strategy]``: arguments of `simplest_mechanism`."""
+    """The table ``[strategy]``: the arguments of `simplest_mechanism`."""
 
     tolerance: float = entry(any_value)
     criterion: Criterion = entry(Choice(get_args(Criterion)), "worst")
@@ -116,7 +116,7 @@ class StrategyTable:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class DriveTable:
-    """The table ``[drive]``: crank speed (rad/s), samples in a crank turn, and whether the best spring is added."""
+    """The table ``[drive]``: crank speed (rad/s), samples per crank turn, and whether the best spring is added."""
 
     speed: float = entry(Quantity("rad/s", above=0.0))
     samples: int = entry(Whole(72), 720)
@@ -138,11 +138,11 @@ class TrackingTable:
     revolutions : float
         Number of crank turns.
     limit : float
-        Largest magnitude of the force (N).
+        Largest magnitude of the slider force (N).
     coulomb_friction : float, optional
         Coulomb friction of the plant (N); by default the model's.
     mass_error : float
-        Relative excess of the plant's masses and moments of inertia of slider and links over the model's.
+        Relative error: the plant's masses and moments of inertia are larger than the model's by this fraction.
     load_known : bool
         Whether the feed-forward knows the load.
     """
@@ -159,7 +159,7 @@ class TrackingTable:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Load:
-    """The table ``[load]``: force at the coupler point P (N), along the ground link and to its left."""
+    """The table ``[load]``: components of the force at the coupler point P (N) along the ground link and to the left of it."""
 
     fx: float = entry(Quantity("N"), 0.0)
     fy: float = entry(Quantity("N"), 0.0)
@@ -174,11 +174,11 @@ class SliderCase:
     synthesis : SynthesisCase
         Task, bounds, constraints, search, and masses of the linkage.
     linkage : Linkage or None
-        Linkage whose pivot is moved; None if it is to be found by a search.
+        Linkage whose rocker pivot is moved; None if a search has to find the linkage.
     slider : SliderTable
         Unknowns and bounds of the motion.
     strategy, drive, tracking
-        Further computations; None if not requested.
+        Tables of further computations; None if not requested.
     load : Load, optional
         Force at the coupler point.
     """
@@ -219,7 +219,7 @@ class SliderCase:
         return _fixed_bounds(self.linkage)
 
     def find_four_bar(self, *, progress: bool = False) -> Solution:
-        """Evaluate the given linkage with a fixed pivot; without a given linkage search for the best one."""
+        """Evaluate the given linkage with a fixed pivot; if no linkage is given, search for the best."""
         task = self.synthesis.task
         if self.linkage is None:
             return self.synthesis.solve(progress=progress).best
@@ -236,7 +236,7 @@ class SliderCase:
     ) -> Synthesis:
         """Find the best motion of the pivot with this number of harmonics; see `slider_motion`.
 
-        ``four_bar`` is the linkage with a fixed pivot, ``guesses`` are further starts.
+        ``four_bar`` is the linkage with a fixed pivot; ``guesses`` are further solutions to start from.
         """
         search = self.synthesis.search
         bounds = (
@@ -316,7 +316,7 @@ class SliderCase:
         )
 
     def system(self, drive: SliderDrive, case: str) -> dict[str, Any]:
-        """Return the tables of a system in which a controller moves the slider; ``case`` is the case file of the linkage."""
+        """Return the tables of a system of linkage, reference and controller; ``case`` is the case file of the linkage."""
         from ..export.controllers import HARMONICS
 
         wanted = self.tracking or TrackingTable()
@@ -363,12 +363,12 @@ class SliderCase:
 
 
 def _fixed_bounds(linkage: Linkage) -> dict[str, tuple[float, float]]:
-    """Return bounds that fix the dimensions of a linkage."""
+    """Return bounds, by dimension, that fix all dimensions of a linkage."""
     return {name: (value, value) for name, value in linkage.values().items() if name != "branch"}
 
 
 def _free_bounds(linkage: Linkage, task: Task) -> dict[str, tuple[float, float]]:
-    """Return wide bounds of free links, such as a quarter to four times a length; unbounded dimensions stay fixed."""
+    """Return wide bounds for free links, for instance a quarter to four times a length; dimensions not named stay fixed."""
     near = {name: (0.25 * getattr(linkage, name), 4.0 * getattr(linkage, name)) for name in LINKS}
     near["crank_phase"] = (linkage.crank_phase - pi, linkage.crank_phase + pi)
     if isinstance(task, RockerFunction):
@@ -384,7 +384,7 @@ def _free_bounds(linkage: Linkage, task: Task) -> dict[str, tuple[float, float]]
 
 
 def run_case(drive: SliderDrive, title: str, force_file: str) -> dict[str, Any]:
-    """Return the tables of a case file that runs one turn with the control force in a file; see `docs/case-files.md`."""
+    """Return the tables of a case file for one turn under the control force in ``force_file``; see `docs/case-files.md`."""
     assert not callable(drive.load)
     position, velocity = drive.states[0, [1, 3]].tolist()
     return {
@@ -408,7 +408,7 @@ TABLES: Mapping[str, type] = {
 
 
 def _read_strategy(value: Any, name: str, *, angular: bool) -> StrategyTable:
-    """Read the table ``[strategy]``; the tolerance is in m or rad, and squared if the criterion is the quality function."""
+    """Read the table ``[strategy]``; the tolerance is in m or rad, or for the quality function in m2 or rad2."""
     unit = ("rad" if angular else "m") + "**2" * (as_table(value, name).get("criterion") == "error")
     return read(StrategyTable, value, name, readers={"tolerance": Quantity(unit, above=0.0)})
 
@@ -438,7 +438,7 @@ def load_slider_case(path: str | Path, overrides: Mapping[str, Any] | None = Non
 def read_slider_case(
     data: Mapping[str, Any], *, folder: Path, title: str = "", overrides: Mapping[str, Any] | None = None
 ) -> SliderCase:
-    """Build a case from the tables of a case file; file names in it are relative to ``folder``."""
+    """Build a case from the tables of a case file; file names in the tables are relative to ``folder``."""
     data = {"title": title} | override(data, overrides or {})
     own = [name for name in entry_names(SliderCase) if name != "synthesis"]
     check_names(data, "", [name for name in (*entry_names(SynthesisCase), *own) if name != "trade_off"])
@@ -458,12 +458,12 @@ def read_slider_case(
 
 
 def linkage_from_csv(path: str | Path, rank: int = 1) -> Linkage:
-    """Read a linkage from a file of `Synthesis.to_csv`: ``rank`` 1 is the best.
+    """Read a linkage from a file of `Synthesis.to_csv`; ``rank`` 1 is the best linkage.
 
     Raises
     ------
     InputError
-        If the file cannot be read, is not of that kind, or has no linkage of that rank.
+        If the file cannot be read, was not written by `Synthesis.to_csv`, or has no linkage of that rank.
     """
     rows = read_rows(path)
     if not 1 <= rank <= len(rows):

@@ -5,8 +5,8 @@ The second equation of motion then gives the force,
 
     F2 = m22 u'' + b2 - Q2
 
-and with it the plant's own outputs give the torque on the crank (the first equation) and the forces in the pins and the
-guide. Spring, damper, guide friction, gravity and the load at P are all in Q2.
+With F2 known, the plant's output equations give the torque on the crank (the first equation of motion) and the forces in the
+pins and the guide. Spring, damper, guide friction, gravity and the load at P are all in Q2.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ FloatArray = NDArray[np.float64]
 #: Force at P (N, N): constant, or a function of the crank angle (rad).
 Load = tuple[float, float] | Callable[[float], tuple[float, float]]
 
-#: Outputs that a prescribed motion has: all but the energies that count from the start of a run.
+#: Names of the outputs of a prescribed motion: all except the energies, which are counted from the start of a run.
 NAMES = tuple(name for name in OUTPUT_NAMES if name not in ("energy.dissipated", "energy.supplied", "energy.residual"))
 _KEPT = [OUTPUT_NAMES.index(name) for name in NAMES]
 LEAST_SAMPLES = 16
@@ -43,7 +43,7 @@ LEAST_SAMPLES = 16
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class TurnBalance:
-    """Energy over one turn of a periodic motion (J): the work supplied equals the work dissipated.
+    """Energy balance over one turn of a periodic motion (J): the work supplied equals the work dissipated.
 
     Attributes
     ----------
@@ -66,7 +66,7 @@ class TurnBalance:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class SliderDrive:
-    """One turn of the crank with a prescribed slider motion, sampled at equal steps of the crank angle, without the end.
+    """One turn of the crank with a prescribed slider motion, sampled at n equal steps of the crank angle, without its end.
 
     Attributes
     ----------
@@ -86,8 +86,8 @@ class SliderDrive:
 
     Notes
     -----
-    ``drive["pin.C.fx"]`` is an output over the turn, shape (n,). Peaks are taken over the samples. `linear.linearise_orbit`
-    takes a drive as the motion to linearise about.
+    ``drive["pin.C.fx"]`` is an output over the turn, shape (n,). Peak values are the greatest among the samples.
+    `linear.linearise_orbit` accepts a `SliderDrive` as the motion to linearise about.
     """
 
     parameters: FiveBarParameters
@@ -111,12 +111,12 @@ class SliderDrive:
         return magnitude
 
     def turn(self, samples: int) -> SliderDrive:
-        """Return the drive for the same motion with another number of samples."""
+        """Return the drive of the same motion with another number of samples."""
         return inverse_dynamics(self.parameters, self.slider, self.crank_speed, load=self.load, samples=samples)
 
     @property
     def modes(self) -> tuple[int, ...]:
-        """Return the values of the mechanism's modes: 1, as the crank speed is commanded."""
+        """Return the mechanism's mode parameters: a single 1, because the crank speed is prescribed."""
         return (1,)
 
     @property
@@ -205,8 +205,8 @@ def slider_force(
 ) -> float:
     """Return the slider force F2 (N) for a slider acceleration u'' (m/s2) at constant crank speed.
 
-    Raises ValueError or ZeroDivisionError if the links cannot be joined at this position, and InputError if the parameters have
-    friction that depends on contact forces.
+    Raises ValueError or ZeroDivisionError if the links cannot be joined at this position; InputError if the friction of
+    the parameters depends on contact forces.
     """
     require_no_contact_friction(p, "a prescribed motion of the slider")
     g = kinematics.position(th2, u, p)
@@ -235,7 +235,7 @@ def inverse_dynamics(
     slider : FourierSeries
         Slider position u (m) over the crank angle th2; `FourierSeries.from_samples` makes it from samples.
     crank_speed : float
-        rad/s, not zero; below zero the crank turns clockwise.
+        rad/s, not zero; if negative, the crank turns clockwise.
     load : (float, float) or function of the crank angle (rad)
         Force at the coupler point P (N).
     samples : int
@@ -287,7 +287,7 @@ def check_speed(crank_speed: float) -> None:
 
 
 def whole_number(value: float, what: str) -> int:
-    """Return a whole number as an int; raise InputError, with the name ``what`` of the quantity, if it is not whole."""
+    """Return a whole number as an int; raise InputError, which names the quantity as ``what``, if the value is not whole."""
     if not float(value).is_integer():
         raise InputError(f"{value} {what}: it must be a whole number")
     return int(value)
@@ -323,11 +323,11 @@ class BestSpring:
     Attributes
     ----------
     parameters : FiveBarParameters
-        Parameters with that spring.
+        Parameters of the mechanism with this spring.
     stiffness, free_position : float
-        N/m, m; a stiffness of zero means no spring.
+        Of the spring (N/m, m); a stiffness of zero means that no spring is best.
     rms_force : float
-        Rms control force with that spring (N).
+        Rms control force with this spring (N).
     rms_force_without : float
         Rms control force without any spring (N).
     """
@@ -352,14 +352,14 @@ def best_spring(
 ) -> BestSpring:
     """Find stiffness and free position of the spring that minimise the rms control force of a motion.
 
-    The force is affine in k and k u0. The minimum is therefore a linear least-squares solution in the wedge k >= 0,
-    low k <= k u0 <= high k: inside of it or on one of its two edges.
+    The force is affine in k and k u0, with the stiffness k and the free position u0. The minimum is therefore a linear
+    least-squares solution in the wedge k >= 0, low k <= k u0 <= high k: inside the wedge or on one of its two edges.
 
     Parameters
     ----------
     free_position : (float, float), optional
-        Least and greatest free position (m); by default the ground link's length either way. Without bounds a constant
-        force would be matched by an arbitrarily soft spring.
+        Least and greatest free position (m); by default minus and plus the ground link's length. Bounds are needed because
+        an arbitrarily soft spring with a far free position replaces any constant force.
     parameters, slider, crank_speed, load, samples
         As for `inverse_dynamics`; a spring in the parameters is ignored.
 

@@ -1,8 +1,9 @@
 """Find the slider's motion as a Fourier series of the crank rotation by direct search (thesis, chapter VII).
 
-A slider moves the rocker pivot of a given linkage, so that the linkage does its task better. Mean, harmonics and guide angle,
-and the links if they are free, are optimised with exact Jacobians from several starts, within bounds of stroke, speed and
-acceleration. `analysis.slider.variational` finds the optimum at each crank angle separately, which may jump.
+A slider moves the rocker pivot of a given linkage, so that the linkage does its task better. The search optimises mean and
+harmonics of the motion, guide angle and, if they are free, the links, with exact Jacobians, from several starts and within
+bounds of stroke, speed and acceleration. `analysis.slider.variational` finds the optimum at each crank angle separately; that
+motion may have jumps.
 """
 
 from __future__ import annotations
@@ -47,30 +48,30 @@ def slider_motion(
     guesses: Sequence[Linkage | Solution] = (),
     search: Search = USUAL_SEARCH,
 ) -> Synthesis:
-    """Find the motion of the rocker pivot with which a linkage does a task best.
+    """Find the motion of the rocker pivot that minimises the error of a linkage in a task.
 
     Parameters
     ----------
     task : Task
         Task of `analysis.synthesis`, with its weights.
     linkage : Linkage or Solution
-        Linkage whose dimensions are kept, except those with ``bounds``. For an open path it must be a solution, which knows
-        the crank rotations of the stations.
+        Linkage whose dimensions are kept, except the dimensions in ``bounds``. For an open path it must be a `Solution`, which
+        contains the crank rotations of the stations.
     unknown : SliderUnknown or CrankUnknown
         Harmonics, and bounds of guide angle, stroke, speed and acceleration.
     bounds : mapping, optional
-        Dimensions that are optimised together with the motion, (least, greatest) by name (m, rad).
+        Dimensions that are optimised together with the motion: (least, greatest) value by name (m, rad).
     constraints : sequence
         Constraints of the search; by default the links must stay joined over the turn.
     guesses : sequence of Linkage or Solution
-        Further starts of the search, with the motion of their pivots and their free dimensions.
+        Further starts of the search: the motion of their rocker pivots and the dimensions named in ``bounds`` are used.
     search : Search
         Settings of the search, which starts from random harmonics and guide angles, without a scan.
 
     Returns
     -------
     Synthesis
-        Solutions whose linkages have a moved pivot.
+        Solutions: linkages with a moving rocker pivot.
 
     Raises
     ------
@@ -110,9 +111,9 @@ def slider_motion(
 
 
 def greatest_derivative(linkage: Linkage, order: int) -> float:
-    """Return the greatest magnitude, over a turn, of a derivative of the slider position by the crank rotation (m/rad^order).
+    """Return the greatest magnitude over a turn of d^order u/dphi^order, slider position by crank rotation (m/rad^order).
 
-    Order 0 is the position itself. For a pivot that is no slider the result is 0.
+    Order 0 is the position itself. If no slider moves the pivot, the result is 0.
     """
     if not isinstance(linkage.pivot, SliderMotion):
         return 0.0

@@ -1,8 +1,8 @@
 """Search for the simplest mechanism that meets a tolerance (thesis, section 7.4).
 
-The search tries a four-bar first, then four-bars whose rocker pivot is moved by a slider, with more and more harmonics, links
-and motion optimised together, and last five-bars, whose rocker pivot is on a second crank, geared to the first one or turned
-independently. Each step starts from earlier solutions, and records why it was accepted or rejected.
+The search first tries a four-bar. Then a slider moves the rocker pivot of the four-bar, with more and more harmonics; links and
+motion are optimised together. Last come five-bars: their rocker pivot is on a second crank, which is geared to the first crank
+or turned independently. Each step starts from earlier solutions, and records why its mechanism was accepted or rejected.
 """
 
 from __future__ import annotations
@@ -33,13 +33,13 @@ from ..synthesis import (
 
 Criterion = Literal["error", "worst"]
 
-#: Gear ratios that are tried: turns of the second crank for one turn of the first.
+#: Default gear ratios to be tried: turns of the second crank per turn of the first.
 RATIOS = (1, -1, 2, -2)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Step:
-    """One mechanism of the search.
+    """One mechanism that the search has tried, with the result.
 
     Attributes
     ----------
@@ -61,7 +61,7 @@ class Step:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Strategy:
-    """Mechanisms tried in order of simplicity, and the chosen one.
+    """Result of `simplest_mechanism`: the mechanisms tried, in order of simplicity, and the chosen one.
 
     Attributes
     ----------
@@ -81,9 +81,9 @@ class Strategy:
 
     @property
     def chosen(self) -> Step:
-        """Return the step that meets the tolerance or, if none does, the best one.
+        """Return the step that meets the tolerance or, if none does, the best step.
 
-        The best one has the least `Step.value` among the steps without defects, or of all if every step has some.
+        The best step has the least `Step.value` among the steps without defects, or among all steps if all have defects.
         """
         if self.met:
             return self.steps[-1]
@@ -94,7 +94,7 @@ class Strategy:
 
 
 class StrategyInterrupted(Interrupted):
-    """Error for a search that was stopped with Ctrl-C; ``strategy`` holds the steps so far, or is None."""
+    """Error of a search that was stopped with Ctrl-C; ``strategy`` holds the steps so far, or is None if there is none."""
 
     def __init__(self, strategy: Strategy | None) -> None:
         self.strategy = strategy
@@ -120,9 +120,10 @@ def simplest_mechanism(
     ----------
     task : Task
     tolerance : float
-        Bound of the quality function (m2, rad2), or of the worst error (m, rad; angular errors of a motion times its length).
+        Bound of the quality function (m2, rad2), or of the worst error (m, rad; for a `Motion`, angles times its ``length``).
     criterion : "error" or "worst"
-        Whether the quality function or the worst error is compared; the worst error then also replaces the task's objective.
+        Whether the quality function or the worst error is compared with the tolerance. With "worst", the search also minimises
+        the worst error.
     bounds, constraints
         Bounds and constraints of the links of every mechanism, as for `synthesize`.
     stroke : float, optional
@@ -130,7 +131,7 @@ def simplest_mechanism(
     harmonics : int
         Greatest number of harmonics of the slider, and of an independent second crank.
     ratios : sequence of int
-        Gear ratios to be tried.
+        Gear ratios to be tried: turns of the second crank per turn of the first.
     second_crank : float, optional
         Greatest length of the second crank (m); half the stroke by default.
     search : Search
@@ -204,7 +205,7 @@ def simplest_mechanism(
 
 @dataclass(eq=False)
 class _Trials:
-    """Mechanisms tried so far; the fields are arguments of `simplest_mechanism`."""
+    """Mechanisms tried so far; the other fields are the arguments of `simplest_mechanism`."""
 
     task: Task
     tolerance: float
@@ -220,7 +221,7 @@ class _Trials:
         return self._met
 
     def find_four_bar(self) -> Solution:
-        """Find the best four-bar, record it and return it."""
+        """Find the best four-bar with a fixed pivot, record it and return it."""
         search = replace(self.search, starts=2 * int(self.search.starts))
         solution = self._record("four-bar", self._run_search("four-bar", search))
         assert solution is not None
@@ -251,7 +252,7 @@ class _Trials:
             raise StrategyInterrupted(self.result() if self.steps else None) from None
 
     def _record(self, mechanism: str, found: Synthesis | None) -> Solution | None:
-        """Record a mechanism with the reason why it is accepted or rejected; return its best solution, if it has one."""
+        """Record a mechanism and why it is accepted or rejected; return its best solution, None if there is no solution."""
         if found is None:
             self.steps.append(
                 Step(mechanism=mechanism, solution=None, value=inf, reason="none keeps the constraints: moved on")

@@ -4,11 +4,11 @@ The force over a sampling period h is
 
     F2 = F_ff + feedback on (u - u_ref, u' - u_ref')
 
-F_ff is the force by inverse dynamics of the model half a period ahead, at th2 + w2 h/2. This force, held over the period, is
-exact in its middle, so that the error is of order h^2; the force at the sample would give an error of order h. F_ff and u_ref'
-are computed at the measured crank angle. Gains, integral and limit of the feedback are those of `analysis.linear`.
+F_ff is the force by inverse dynamics of the model half a period ahead, at th2 + w2 h/2. The force is held over the period and
+exact in the middle of the period, so that the error is of order h^2; the force at the sample would give an error of order h.
+F_ff and u_ref' are computed at the measured crank angle. `analysis.linear` defines gains, integral and limit of the feedback.
 
-The plant in the loop may differ from the model in friction, masses, and the load at P.
+The plant (the simulated five-bar slider) may differ from the model in friction, masses, and the load at P.
 """
 
 from __future__ import annotations
@@ -52,13 +52,13 @@ class TrackingController:
     period : float
         Sampling period (s).
     design : Design, optional
-        Design of the feedback, on a model in speed drive; none by default.
+        Design of the feedback, on a model with prescribed crank speed; no feedback by default.
     feedforward : bool
         Whether there is a feed-forward; otherwise the holding force of the design's linear model takes its place.
     load : (float, float) or function of the crank angle
         Load at P (N) that the feed-forward takes into account.
     limit : float
-        Largest force either way (N).
+        Largest magnitude of the force (N).
 
     Raises
     ------
@@ -95,7 +95,7 @@ class TrackingController:
 
     @property
     def method(self) -> str:
-        """Return the name of the control: feed-forward, the feedback's method, or both."""
+        """Return the name of the control method: feed-forward, the method of the feedback, or both."""
         parts = ["feed-forward"] if self.feedforward else []
         return " + ".join(parts + ([self.feedback.method] if self.feedback else []))
 
@@ -105,7 +105,7 @@ class TrackingController:
             self.feedback.reset()
 
     def force(self, measured: Sequence[float], reference: float) -> float:
-        """Return the force (N) for the next period from the measured (th2, u, th2', u') in SI and the reference of u (m)."""
+        """Return the force (N) for the next period from the measured (th2, u, th2', u') in SI and the reference u_ref (m)."""
         th2, u, w2, v = measured
         if self.feedforward:
             forward = self._forward(th2 + 0.5 * w2 * self.period, w2)
@@ -123,7 +123,7 @@ class TrackingController:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class TrackingMetrics:
-    """Tracking errors, force and power over the last turn.
+    """Tracking errors, force and power over the last crank turn of a run.
 
     Attributes
     ----------
@@ -154,7 +154,7 @@ class TrackingResult:
     Attributes
     ----------
     method : str
-        Name of the control.
+        Name of the control method.
     crank_speed : float
         rad/s.
     loop : LoopResult
@@ -175,12 +175,12 @@ class TrackingResult:
     power: FloatArray
 
     def metrics(self) -> TrackingMetrics:
-        """Compute errors, force and power over the last turn.
+        """Compute tracking errors, force and power over the last turn.
 
         Raises
         ------
         InputError
-            If the run ended early.
+            If the run ended before its last turn was complete.
         """
         last = self.loop.end(2.0 * pi / abs(self.crank_speed))
         error, point_error, force, power = (
@@ -214,8 +214,8 @@ def track(
     Parameters
     ----------
     controller : TrackingController
-        Controller with the reference; its feedback is designed by `analysis.linear` on a model in speed drive, such as the mean
-        model along the reference: ``linearise_orbit(parameters, inverse_dynamics(...)).mean()``.
+        Controller with the reference. Its feedback is designed by `analysis.linear` on a model with prescribed crank speed, for
+        example the mean model along the reference: ``linearise_orbit(parameters, inverse_dynamics(...)).mean()``.
     crank_speed : float
         Constant prescribed speed (rad/s).
     revolutions : float
@@ -223,7 +223,7 @@ def track(
     plant : FiveBarParameters, optional
         Parameters of the plant; by default those of the controller's model.
     load : (float, float) or function of the crank angle
-        Load on the plant at P (N), held over each period at its value in the middle; the feed-forward uses the controller's.
+        Load on the plant at P (N), held over each period at its value in the middle; the feed-forward uses `controller.load`.
     initial : InitialState, optional
         Initial state; by default the slider is on the reference at crank angle 0.
     fmu : path, optional
@@ -234,7 +234,7 @@ def track(
     Returns
     -------
     TrackingResult
-        A run in which the plant reaches the limit of assembly ends there with a status, a message and all data up to it.
+        If the plant reaches the limit of assembly, the run ends there, with a status, a message and all data up to that time.
 
     Raises
     ------

@@ -5,21 +5,22 @@ b = (B - E) exp(-i alpha), s = th3 - alpha, t = th4 - alpha. Loop closure is the
 
     l4 sin t = l3 sin s + Im b,        u = Re b + l3 cos s - l4 cos t,
 
-and one freedom is left, the slider position u. It moves the links by
+and one degree of freedom is left, the slider position u. A change of u turns the links by
 
     ds/du = cos t / (l3 sin(t - s)),   dt/du = cos s / (l4 sin(t - s)).
 
 For a path, P turns with the coupler about B, and |P - p*|^2 grows with the angle between BP and the direction from B to p*; for
-a function the rocker has to be at th4*. The error as a function of u therefore has its minima
+a function the rocker has to be at th4*. The target link is therefore the coupler for a path, the rocker for a function; for a
+path its target angle is that at which BP points at p*. The error as a function of u has its minima where
 
-    with the link at the target angle, the other link on either side of the perpendicular to the guide;
-    with the other link perpendicular to the guide, either way, and the link on either side: cos t = 0 for a path, cos s = 0
-    for a function;
-    at an end of the range of u: a limit of assembly (sin(t - s) = 0, BD = l3 + l4 or |l3 - l4|) or an end of the stroke.
+    the target link is at its target angle, with the other link on either side of the perpendicular to the guide;
+    the other link is perpendicular to the guide, in either direction, with the target link on either side of the
+    perpendicular: cos t = 0 for a path, cos s = 0 for a function;
+    u is at an end of its range: a limit of assembly (sin(t - s) = 0, BD = l3 + l4 or |l3 - l4|) or an end of the stroke.
 
-The first two kinds are the thesis's (7.6)-(7.15). The third kind is not in the thesis: without it the optimum may lie in the
-other assembly, past a dead centre. A linkage that keeps its assembly must stop at the dead centre, or before it if it keeps a
-least transmission angle.
+The first two kinds of minima are the thesis's (7.6)-(7.15). The third kind is not in the thesis: without it the optimum may lie
+in the other assembly, past a dead centre. A linkage that stays in its assembly must stop at the dead centre, or earlier if a
+least transmission angle is required.
 """
 
 from __future__ import annotations
@@ -66,15 +67,15 @@ class VariationalMotion:
     branch : ndarray of int, shape (n,)
         Assembly, the sign of sin(th4 - th3).
     kind : ndarray of str, shape (n,)
-        Why the error is least: "target" (the link is at the target angle), "perpendicular" (the other link is perpendicular
-        to the guide), "limit" (limit of assembly or least transmission angle), "stroke" (end of the stroke).
+        Why the error is least: "target" (the target link is at its target angle), "perpendicular" (the other link is
+        perpendicular to the guide), "limit" (limit of assembly or least transmission angle), "stroke" (end of the stroke).
     error : ndarray, shape (n,)
         Distance from the target point (m), or from the target angle (rad).
     weights : ndarray, shape (n,)
         Weights of the squared errors.
     jumps : ndarray of int
-        Every k for which the slider has to jump between rotation k and the next, as no continuous path of minima of one
-        assembly connects them.
+        Each k for which the slider has to jump between rotations k and k + 1, because no continuous path of minima of one
+        assembly connects the two positions.
     guide_angle : float
         Angle alpha from the ground link (rad).
     """
@@ -101,7 +102,7 @@ class VariationalMotion:
         return float(np.ptp(self.u))
 
     def to_series(self, order: int) -> FourierSeries:
-        """Fit a Fourier series of the crank rotation to u by weighted least squares, as a start for a direct search.
+        """Fit a Fourier series in the crank rotation to u by weighted least squares, as a start for a direct search.
 
         Raises
         ------
@@ -122,8 +123,8 @@ class VariationalMotion:
 class _Minima(NamedTuple):
     """Candidates for minima of the error: slider position (m), angles of coupler and rocker (rad), error, and validity.
 
-    Each field has the shape (m, n), with a row for each kind and assembly and a column for each crank rotation. The last one
-    says whether the candidate is a minimum.
+    Each field has the shape (m, n): a row for each kind of minimum and assembly, a column for each crank rotation. The field
+    ``valid`` says whether the candidate is a minimum.
     """
 
     u: FloatArray
@@ -135,7 +136,7 @@ class _Minima(NamedTuple):
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class _Problem:
-    """Linkage, guide and bounds of the problem; target points are complex numbers, target angles real ones."""
+    """Linkage, guide and bounds of the problem; a target is a complex number for a point, a real number for an angle."""
 
     linkage: Linkage
     guide_angle: float
@@ -163,7 +164,7 @@ class _Problem:
         return np.array(kinds * len(self.assemblies)), np.repeat(self.assemblies, len(kinds))
 
     def _limits(self) -> list[tuple[float, float, float]]:
-        """Return the limits of the distance BD: angle at C (rad), BD (m), and 1 for an upper limit, -1 for a lower one."""
+        """Return the limits of the distance BD: angle at C (rad), BD (m), and 1 for an upper or -1 for a lower limit."""
         l3, l4 = self.linkage.coupler_length, self.linkage.rocker_length
         low = self.least_transmission
         least = sqrt((l3 - l4) ** 2 + 4.0 * l3 * l4 * sin(0.5 * low) ** 2)
@@ -172,7 +173,7 @@ class _Problem:
         return [(pi - low, most, 1.0)] + ([(low, least, -1.0)] if least > 0.0 else [])
 
     def pin(self, rotation: FloatArray) -> NDArray[np.complex128]:
-        """Return b, the position of the crank pin B from the guide's zero, in the frame of the guide."""
+        """Return b, the position of the crank pin B relative to the guide's zero, in the frame of the guide."""
         k = self.linkage
         b: NDArray[np.complex128] = (
             k.crank_length * np.exp(1j * (rotation + k.crank_phase)) - k.ground_length
@@ -233,9 +234,9 @@ class _Problem:
         return _Minima(u, coupler + self.guide_angle, rocker + self.guide_angle, error, valid)
 
     def _ends(self, b: NDArray[np.complex128]) -> tuple[FloatArray, FloatArray, FloatArray, NDArray[np.bool_]]:
-        """Return four arrays for the ends of the range of u, for crank pins b.
+        """Return the ends of the range of u for crank pins b, in four arrays (ends, n).
 
-        They are the position (m), the angle at C (rad), the direction into the range (1 or -1), and whether the end exists.
+        The arrays are position (m), angle at C (rad), direction into the range (1 or -1), and whether the end exists.
         """
         l3, l4 = self.linkage.coupler_length, self.linkage.rocker_length
         low, high = self.stroke
@@ -279,7 +280,7 @@ def variational_motion(
         Crank rotation phi (rad), increasing.
     target : array_like, shape (n, 2) or (n,)
         Wanted position of the coupler point (m), or wanted angle of the rocker from the ground link (rad), with the linkage's
-        ``output_angle`` as mounting angle; whole turns do not count.
+        ``output_angle`` as mounting angle; whole turns of a target angle do not matter.
     guide_angle : float
         Direction alpha of the guide from the ground link (rad).
     stroke : (float, float)
@@ -290,12 +291,12 @@ def variational_motion(
     assemblies : tuple of int, optional
         Assemblies to choose from, +1 and -1; the linkage's own by default.
     weights : array_like, shape (n,), optional
-        Weights of the squared errors; one by default. They affect the positions only of a continuous motion.
+        Weights of the squared errors; 1 by default. They affect the slider positions only if ``continuous`` is True.
     continuous : bool
-        False: the least error at each rotation, and of equal errors the least travel. True: the motion with the fewest jumps
-        (none, if possible), and of such motions the one with the least sum of squared errors.
+        False: choose the least error at each rotation and, among equal errors, the least travel. True: choose the motion with
+        the fewest jumps (none, if possible) and, among these motions, the least sum of squared errors.
     closed : bool
-        Whether the first rotation follows the last one, a turn later.
+        Whether the motion is periodic: one turn later, the first rotation follows the last.
 
     Raises
     ------
@@ -366,7 +367,7 @@ def _wrap_angles(angle: FloatArray) -> FloatArray:
 
 
 def _describe_unreachable(problem: _Problem, phi: FloatArray, n: int) -> str:
-    """Describe, in a sentence, the worst of the rotations ``phi`` at which no slider position lets the links be joined."""
+    """Return a sentence on ``phi``, those of ``n`` rotations at which the links cannot be joined, and the worst of them."""
     b = problem.pin(phi)
     limits = problem._limits()
     most = limits[0][1]
@@ -400,12 +401,12 @@ def _find_connections(
 ) -> NDArray[np.bool_]:
     """Find the minima that continuous paths connect.
 
-    The result, shape (n, m, m), says at [k, i, j] whether a path leads from minimum i at rotation k to minimum j at the next
-    rotation. The last rotation is followed by the first, a turn later.
+    The result, shape (n, m, m), says at [k, i, j] whether a path leads from minimum i at rotation k to minimum j at rotation
+    k + 1. The last rotation is followed by the first, a turn later.
 
-    Between two rotations the target moves along a straight line. The step is bisected: in its middle the minimum with the
-    smallest gap is taken, then the half with the wider gap is bisected, and so on. The gap of a path vanishes, that of a jump
-    remains.
+    Between two rotations the target moves along a straight line. The step is bisected: in the middle, the minimum that leaves
+    the smallest gap of u is taken. Then the half with the wider gap is bisected, and so on. For a path the gap vanishes; for a
+    jump it remains.
     """
     m, n = minima.u.shape
     following = (np.arange(n) + 1) % n
@@ -444,7 +445,7 @@ def _find_connections(
 def _choose_minima(
     squares: FloatArray, travel: FloatArray, chosen_from: NDArray[np.bool_], bridged: NDArray[np.bool_], closed: bool
 ) -> NDArray[np.int64]:
-    """Choose a minimum (row) at each rotation (column) by dynamic programming.
+    """Return the index of the chosen minimum (row) at each rotation (column), by dynamic programming.
 
     The choice has the fewest jumps, then the least sum of squares, then the least travel.
     """

@@ -10,10 +10,10 @@ Around the loop the displacements from joint to joint multiply to the identity, 
 where X and Z are screw displacements about and along i and k. B2 and B3 are the rotations in the ball joints. The thesis
 gives each rotation two angles, with which the loop cannot close for given theta1 and S1 (see `settle` below, erratum 1).
 Here both are general rotations, corrected in every step by small rotations about three axes. With S4 these are seven
-unknowns for six equations, because the rod can spin about its own line without effect. The convention that it does not spin,
-omega . u = 0, is the seventh equation, in each step of Newton's method (the correction does not turn the rod about its line)
-and for the rates (`dual_dynamics`). It determines only changes of the spin angle, so that the angle found depends on where
-the iteration starts; positions and forces do not depend on it.
+unknowns for six equations, because the rod can spin about its own line without effect. The seventh equation is a convention:
+the rod does not spin, omega . u = 0. It holds in each step of Newton's method (the correction does not turn the rod about its
+line) and for the rates (`dual_dynamics`). This convention determines only changes of the spin angle. The spin angle itself
+therefore depends on the start of the iteration; positions and forces do not depend on the spin angle.
 """
 
 from __future__ import annotations
@@ -40,11 +40,11 @@ MAX_ITERATIONS = 60
 
 
 class ClosureError(LinkworkError):
-    """The iteration did not find the closed loop in the chosen assembly, although the links can be joined."""
+    """Error of an iteration that does not find the closed loop in the chosen assembly, although the links can be joined."""
 
 
 def scale(p: SliderCrankParameters, shift: Array) -> float:
-    """Return the length (m) by which lengths are divided to compare them with angles: sum of link lengths and largest shift."""
+    """Return the length (m) by which lengths are divided to compare them with angles: link lengths plus largest ``|shift|``."""
     return p.crank_length + p.rod_length + abs(p.guide_offset) + float(np.max(np.abs(shift)))
 
 
@@ -65,42 +65,42 @@ class Loops:
 
     @property
     def crank_frame(self) -> Dual:
-        """Frame 2, its origin on the crank axis, in frame 1: (n, 3, 3)."""
+        """Return frame 2, with its origin on the crank axis, in frame 1: (n, 3, 3)."""
         return about_k(Dual(self.crank_angle, self.shift))
 
     @property
     def rod_frame(self) -> Dual:
-        """A frame fixed to the rod, in frame 1, its origin in the crank pin and i along the rod: (n, 3, 3).
+        """Return a frame fixed to the rod, with its origin in the crank pin and i along the rod, in frame 1: (n, 3, 3).
 
-        It differs from frame 3, in which components of forces are given (`JointLoads.components`): its axes j and k are turned
-        about the rod by the spin angle, which depends on the start of the iteration.
+        This frame is not frame 3, in which components of forces are given (`JointLoads.components`): its axes j and k are
+        turned about the rod by the spin angle, which depends on the start of the iteration.
         """
         return cast(Dual, _pin_frame(self.parameters, self.crank_angle, self.shift) @ self.crank_ball)
 
     @property
     def guide_frame(self) -> Dual:
-        """Frame 4, its origin in the slider pin, in frame 1: (n, 3, 3)."""
+        """Return frame 4, with its origin in the slider pin, in frame 1: (n, 3, 3)."""
         return cast(Dual, self.rod_frame @ about_i(Dual(0.0, self.parameters.rod_length)) @ self.slider_ball)
 
     @property
     def crank_pin(self) -> FloatArray:
-        """Position of the crank pin in frame 1 (m): (n, 3)."""
+        """Return the position of the crank pin in frame 1 (m): (n, 3)."""
         return origin(self.rod_frame)
 
     @property
     def slider_pin(self) -> FloatArray:
-        """Position of the slider pin in frame 1 (m): (n, 3)."""
+        """Return the position of the slider pin in frame 1 (m): (n, 3)."""
         return origin(self.guide_frame)
 
     @property
     def product(self) -> Dual:
-        """The product M1 L2 L3 M4 (n, 3, 3) of eq 5, the identity where the loop is closed."""
+        """Return the product M1 L2 L3 M4 of eq 5, (n, 3, 3): the identity where the loop is closed."""
         p, s4 = self.parameters, self.slider_position
         slide = about_k(Dual(np.zeros_like(s4), s4))
         return cast(Dual, self.guide_frame @ slide @ about_i(Dual(p.guide_twist, p.guide_offset)))
 
     def take_newton_step(self) -> Loops:
-        """Return the loops after one step of Newton's method; raises LinAlgError if its equations are singular."""
+        """Return the loops after one step of Newton's method; raise LinAlgError if the equations of the step are singular."""
         length = scale(self.parameters, self.shift)
         step = _correction(self.product, self.rod_frame, self.guide_frame, length)
         return replace(
@@ -116,7 +116,7 @@ class Closure(Loops):
     """Closed loops, one for each of n given crank angles and shifts; see `Loops`.
 
     ``rotation_residual`` (rad) and ``length_residual`` (m) are the closure errors, shape (n,); ``iterations`` is the largest
-    number of steps.
+    number of Newton steps.
     """
 
     rotation_residual: FloatArray
@@ -136,7 +136,7 @@ def planar_loops(p: SliderCrankParameters, th: Array, s1: Array) -> Loops:
     """Return the start of the iteration: the planar slider-crank of section 2.6.2.
 
     The planar mechanism lies in the plane through the crank pin that is parallel to the common normal i and the guide. With
-    alpha4 = 270 deg and S1 = 0 this is the thesis's planar slider-crank, and exact.
+    alpha4 = 270 deg and S1 = 0 the start is the thesis's planar slider-crank, and already the exact closed loop.
     """
     guide = about_i(-Dual(p.guide_twist, p.guide_offset))
     pin = (origin(_pin_frame(p, th, s1)) - origin(guide)) @ guide.real
@@ -156,7 +156,7 @@ def planar_loops(p: SliderCrankParameters, th: Array, s1: Array) -> Loops:
 
 
 def _start_nearby(start: Closure, th: Array, s1: Array) -> Loops:
-    """Return loops to start from, made of closed loops nearby, one or one for each point: the rod keeps its orientation."""
+    """Return start loops with the rod orientation of nearby closed loops: one loop for all points, or one for each point."""
     if start.crank_angle.size not in (1, th.size):
         raise InputError(
             f"start has {start.crank_angle.size} loops for {th.size} points: it must have one, or one for each point"
@@ -186,8 +186,8 @@ def close(
     crank_angle, shift : array_like
         theta1 (rad) and S1 (m); numbers, or arrays of shape (n,).
     start : Closure, optional
-        Loops near the wanted ones to start from, one or one for each point; the rod at first keeps its orientation in space.
-        By default the planar slider-crank.
+        Closed loops near the wanted loops, one for all points or one for each point: the iteration starts with their rod
+        orientation in space. By default it starts from the planar slider-crank.
 
     Raises
     ------
@@ -228,7 +228,7 @@ def close(
 @takes_published()
 @in_si(crank_angle="rad", shift="m")
 def follow(parameters: SliderCrankParameters, crank_angle: Amount, shift: Amount) -> Closure:
-    """Close the loop by continuation: start the first point from the planar slider-crank, the others from their predecessor.
+    """Close the loop by continuation: start the first point from the planar slider-crank, every other from the point before.
 
     The rod then turns from point to point without spin. The points must be close to each other, by 20 degrees or less.
 
@@ -255,8 +255,8 @@ def follow(parameters: SliderCrankParameters, crank_angle: Amount, shift: Amount
 def residuals(product: Dual) -> tuple[FloatArray, FloatArray]:
     """Return the closure errors of loops (..., 3, 3): angle (rad) and length (unit of the loop), shape (...).
 
-    The whole matrix is used, because its antisymmetric part, which the iteration makes zero, is also zero if the loop is
-    open by half a turn.
+    The whole matrix is used. Its antisymmetric part, which the iteration makes zero, is not enough: this part is also zero if
+    the loop is open by half a turn.
     """
     # |R - I| is 2 sqrt2 |sin of half the angle|
     chord = np.linalg.norm(product.real - np.eye(3), axis=(-2, -1)) / np.sqrt(8.0)
@@ -285,7 +285,7 @@ def _pin_frame(p: SliderCrankParameters, th: Array, s1: Array) -> Dual:
 
 
 def _correction(product: Dual, rod: Dual, guide: Dual, length: float) -> FloatArray:
-    """Return Newton's step (n, 6): rotations about rod axes j, k and guide axes i, j, k; slide as a share of ``length``.
+    """Return Newton's step (n, 6): rotations about rod axes j, k and guide axes i, j, k; slide divided by ``length``.
 
     A joint's motion q along its screw s changes the loop E by [s]E q. The vector of the antisymmetric part of this change is
     (tr(E) I - E) s q / 2, which is the exact derivative for closed and for open loops.
@@ -310,7 +310,7 @@ def _rotation(vector: Array) -> Array:
 
 
 def _check(found: Closure) -> None:
-    """Check that the loops are closed and in the chosen assembly; raises ClosureError if they are not."""
+    """Check that the loops are closed and in the chosen assembly; raise ClosureError if one is not."""
     p, rotation, distance = found.parameters, found.rotation_residual, found.length_residual
     error = np.maximum(rotation, distance / scale(p, found.shift))
 
@@ -334,7 +334,7 @@ def _check(found: Closure) -> None:
 
 
 def shortage(p: SliderCrankParameters, crank_angle: Any, shift: Any) -> FloatArray:
-    """Return the distance of the crank pin from the guide minus the rod length (m): above 0 the loop cannot be closed."""
+    """Return the distance of the crank pin from the guide minus the rod length (m): the loop cannot be closed if positive."""
     guide = about_i(-Dual(p.guide_twist, p.guide_offset))
     pin = origin(_pin_frame(p, np.asarray(crank_angle), np.asarray(shift)))
     across = (pin - origin(guide)) @ guide.real[:, :2]
@@ -368,10 +368,10 @@ _UPPER = np.array([[0, 0, 1], [1, 2, 2]])
 class Settled:
     """Result of the thesis's iteration for each of n crank angles.
 
-    ``unknowns`` (n, 5) are theta2, eta2, theta3, eta3 (rad) and S4 (m). ``steps`` is the number of corrections, and
-    ``settled`` whether the last one was below the tolerance, which the thesis regards as convergence. ``rotation_residual``
-    (rad) and ``length_residual`` (m) are the closure errors of the result; ``position_error`` (m) is the difference of S4
-    from that of the loop with true ball joints.
+    ``unknowns`` (n, 5) are theta2, eta2, theta3, eta3 (rad) and S4 (m). ``steps`` is the number of corrections; ``settled``
+    says whether the last correction was below the tolerance, which the thesis regards as convergence. ``rotation_residual``
+    (rad) and ``length_residual`` (m) are the closure errors of the result; ``position_error`` (m) is the
+    magnitude of S4 minus the slider position of the loop with true ball joints.
     """
 
     crank_angle: FloatArray
@@ -385,7 +385,7 @@ class Settled:
 
 
 def chain(p: SliderCrankParameters, th: Array, s1: Array, q: Array) -> tuple[Dual, Dual]:
-    """Return the product M1 L2 L3 M4 (n, 3, 3) for unknowns q (n, 5), and their screws in frame 1 (n, 3, 5)."""
+    """Return the product M1 L2 L3 M4 (n, 3, 3) for unknowns q (n, 5), and the joint screw of each in frame 1 (n, 3, 5)."""
     zero = np.zeros_like(th)
     pin = about_k(Dual(th, s1)) @ about_i(Dual(zero, p.crank_length))
     turned = pin @ about_k(q[:, 0])
@@ -420,7 +420,7 @@ def settle(
     step_tolerance: float = 1e-6,
     max_steps: int = 100,
 ) -> Settled:
-    """Run the thesis's iteration: take least-squares Newton steps from an estimate until a step is small.
+    """Run the thesis's iteration to close the loop: least-squares Newton steps from an estimate until a step is small.
 
     Parameters
     ----------
@@ -429,14 +429,14 @@ def settle(
     crank_angle, shift : array_like
         theta1 (rad) and S1 (m), numbers or arrays of shape (n,).
     rows : str
-        Equations that are solved: ``all`` eighteen, or those of the upper triangle, either the six of eqs 20 and 21 (``upper``)
-        or the same with eq 22 instead of eq 20 (``printed``).
+        Equations that are solved in a step. ``all``: the eighteen of all matrix entries. ``upper``: the six of the upper
+        triangle, eqs 20 and 21. ``printed``: as in the thesis, these six with eq 22 instead of eq 20.
     start : array_like, optional
-        Estimates of the unknowns (n, 5), such as the solution at the previous angle; by default those of the planar mechanism.
+        Estimates of the unknowns (n, 5), such as the solution at the previous angle; by default `planar`.
     unit : float
-        Unit of length (m) in which lengths are compared with angles; the thesis's is the inch.
+        Unit of length (m) in which lengths are compared with angles; the thesis uses the inch.
     step_tolerance : float
-        Largest change of an angle (rad) or of the slider position (``unit``) in a small step.
+        A step counts as small if no angle (rad) and not the slider position (``unit``) changes by more than this.
     max_steps : int
         Largest number of steps.
 
@@ -471,9 +471,9 @@ def settle(
 
 
 def freedoms(parameters: SliderCrankParameters, crank_angle: float, shift: float, unknowns: Array) -> int:
-    """Return the number of freedoms of the chain at a configuration: seven joint rates minus the rank of their screws.
+    """Return the degrees of freedom of the chain at a configuration: seven joint rates minus the rank of their screws.
 
-    The screws are those of theta1, S1 and the five unknowns; lengths are divided by the rod length.
+    The seven joint rates are those of theta1, S1 and the five unknowns. Lengths are divided by the rod length.
     """
     _, screws = chain(parameters, np.array([crank_angle]), np.array([shift]), np.asarray(unknowns)[None])
     crank = np.zeros((6, 2))
@@ -484,7 +484,7 @@ def freedoms(parameters: SliderCrankParameters, crank_angle: float, shift: float
 
 
 def equations(product: Dual, screws: Dual, unit: float, rows: Rows) -> tuple[FloatArray, FloatArray]:
-    """Return matrix (n, m, 5) and right side (n, m) of the m equations of a step, with slide and lengths in ``unit``.
+    """Return matrix (n, m, 5) and right side (n, m) of the m equations of a Newton step, with slide and lengths in ``unit``.
 
     A joint's motion q along its screw s changes the loop B by [s]B q, which is set equal to I - B. The thesis writes this as
     [s] q = B' - I (eq 11), with its matrix A and its right side V (eqs 23 to 25).

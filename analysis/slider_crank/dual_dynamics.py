@@ -5,12 +5,12 @@ the frame; forces are F + eps M and momenta p + eps H in the same way. The dual 
 from frame to frame. Each body's momentum is its inertia binor applied to its velocity (eqs 46 to 48). The rate of the
 momentum is the rate in the body's frame plus the cross product with the velocity (eqs 49 to 58); it equals the sum of the
 dual forces on the body (eqs 59 to 64). These are 18 scalar equations. The moment equation of the rod about its own line is
-always satisfied: forces at the pins have no moment about it, and a rod of rotational symmetry without spin needs none. The
+always satisfied: forces at the pins have no moment about this line, and a symmetric rod without spin needs none. The
 other 17 equations have 17 unknowns (eqs 69): force (2) and moment (2) of the bearing, the axial force on the crank (erratum
 7: it is an unknown, because S1 is prescribed), three components of the force in each ball joint, force (2) and moment (3)
 of the guide, and the crank's torque or the force on the slider.
 
-The plant's equations (`linkwork.slider_crank.kinematics`, `dynamics`) are not used here, only its parameters.
+The plant's equations (`linkwork.slider_crank.kinematics`, `dynamics`) are not used here, only the plant's parameters.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ LIMIT_COSINE = 1e-9
 
 
 class DeadCentreError(LinkworkError):
-    """The crank torque does not determine the slider force, because the configuration is a dead centre, dS4/dtheta1 = 0.
+    """Error at a dead centre, dS4/dtheta1 = 0, where the crank torque does not determine the slider force.
 
     ``points`` are the indices of the dead centres among the points.
     """
@@ -66,13 +66,13 @@ class Binor:
         )
 
     def rate(self, velocity: Dual, acceleration: Dual) -> Dual:
-        """Return the rate of the dual momentum (eqs 49 to 58) from the velocity and the rate of its components."""
+        """Return the rate of the dual momentum (eqs 49 to 58); ``acceleration`` is the rate of the velocity's components."""
         return cast(Dual, self.momentum(acceleration) + cross(velocity, self.momentum(velocity)))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Rates:
-    """Dual velocities of the links in frame 1 with their rates, and velocity and acceleration of the slider.
+    """Dual velocities of the links in frame 1, their time derivatives, and velocity and acceleration of the slider.
 
     Dual vectors have shape (n, 3): omega + eps v, where v is the velocity of the body's point at O. ``slider_velocity`` and
     ``slider_acceleration`` are S4' (m/s) and S4'' (m/s2), ``ratio`` is dS4/dtheta1 (m/rad), each of shape (n,).
@@ -93,13 +93,14 @@ class Rates:
 class JointLoads:
     """Forces and moments in all joints, as components in frame 1; arrays of shape (n, 3) and (n,), N and N.m.
 
-    ``bearing`` is the force of the bearing on the crank, without axial component; ``axial`` is the force along the axis of all
-    that drives or holds the shift; ``bearing_moment`` is about O and includes the drive's ``torque``.
-    ``crank_pin`` is the force of the crank on the rod, ``slider_pin`` that of the slider on the rod; ``guide`` that of the
-    guide on the slider and ``guide_moment`` its moment about the slider pin. ``slider_force`` is all that acts on the
-    slider along the guide (load, spring, damper, friction), positive in the direction in which the slider position increases.
+    ``bearing`` is the force of the bearing on the crank, without axial component; ``axial`` is the total force on the
+    crank along its axis, which drives or holds the shift; ``bearing_moment`` is about O and includes the drive's ``torque``.
+    ``crank_pin`` is the force of the crank on the rod, ``slider_pin`` the force of the slider on the rod; ``guide`` is the
+    force of the guide on the slider and ``guide_moment`` its moment about the slider pin. ``slider_force`` is the sum of all
+    forces on the slider along the guide (load, spring, damper, friction), positive in the direction in which the slider
+    position increases.
 
-    ``residual`` is the residual of the equation that is not among the 17, the moment about the rod's line (N.m).
+    ``residual`` is the residual of the one equation that is not solved, the moment of the rod about its line (N.m).
     """
 
     closure: Closure
@@ -115,7 +116,7 @@ class JointLoads:
     residual: FloatArray
 
     def components(self, name: str, frame: int) -> FloatArray:
-        """Return components (n, 3) of a force or moment in frame 1 (ground), 2 (crank), 3 (rod) or 4 (guide).
+        """Return the components of a force or moment in frame 1 (ground), 2 (crank), 3 (rod) or 4 (guide), shape (n, 3).
 
         The points about which moments are taken do not change with the frame.
 
@@ -143,11 +144,13 @@ def rates(
     acceleration: Any = 0.0,
     shift_acceleration: Any = 0.0,
 ) -> Rates:
-    """Compute dual velocities (eqs 29 to 45) and their rates from theta1', S1', theta1'', S1'' (rad/s, m/s, rad/s2, m/s2).
+    """Compute dual velocities (eqs 29 to 45) and their time derivatives from the motion of crank and shift.
 
-    The screws of the joints times their rates add up to zero around the loop: six equations, all of which are used (the
-    thesis drops the last, erratum 3), together with omega . u = 0 for the rod's spin. Their derivative, in which each screw
-    moves with the body that carries it, gives the accelerations.
+    The arguments are theta1' (rad/s), S1' (m/s), theta1'' (rad/s2) and S1'' (m/s2).
+
+    The screws of the joints times the joint rates add up to zero around the loop. These are six equations, all of which are
+    used (the thesis drops the last, erratum 3). The seventh is omega . u = 0 for the rod's spin. The time derivative of the
+    equations, in which each screw moves with the body that carries it, gives the accelerations.
 
     Raises
     ------
@@ -182,7 +185,7 @@ def rates(
     matrix[:, 6, 0] = 1.0
 
     def solve(known: Dual, turning: Dual) -> FloatArray:
-        """Return the joint rates, shape (n, 7), for the known part of the loop and the known rotation of the rod."""
+        """Return the joint rates, shape (n, 7), from the known velocity of the loop and the known rotation of the rod."""
         spin = np.sum(turning.real * rod.real[..., 0], -1)
         right = np.concatenate([known.real, known.dual / length, spin[:, None]], -1)
         return cast(FloatArray, -np.linalg.solve(matrix, right[..., None])[..., 0])
@@ -191,9 +194,9 @@ def rates(
     q = solve(crank, crank)
     rod_relative, slider_relative = apply(rod, q[:, :3]), apply(guide, q[:, 3:6])
     rod_velocity = crank + rod_relative
-    # from the other side of the loop, starting at the ground
+    # the slider's velocity from the ground's side of the loop
     slider = -(slide * q[:, 6:])
-    # rates of the screws: those of the first ball joint move with the rod, of the second with the slider; the slide's is 0
+    # rates of the screws: the first ball joint's screws move with the rod, the second's with the slider; the slide's rate is 0
     crank_rate = Dual(e[:, None] * k, a[:, None] * k)
     rod_moving = crank_rate + cross(rod_velocity, rod_relative)
     qq = solve(rod_moving + cross(slider, slider_relative), rod_moving)
@@ -212,10 +215,10 @@ def rates(
 
 
 def binors(p: SliderCrankParameters) -> tuple[Binor, Binor, Binor]:
-    """Return the inertia binors of crank (frame 2), rod (its frame, at the crank pin) and slider (frame 4, at its pin).
+    """Return the inertia binors of crank (in frame 2), rod (in its frame at the crank pin) and slider (in frame 4 at its pin).
 
-    Only the crank's inertia about its axis, and the rod's about transverse axes, have an effect; the slider does not turn, so
-    that its inertia has none.
+    Only the crank's inertia about its axis and the rod's inertia about transverse axes have an effect. The slider's inertia
+    has none, because the slider does not rotate.
     """
     crank = np.zeros((3, 3))
     crank[2] = crank[:, 2] = -p.crank_product_xz, -p.crank_product_yz, p.crank_inertia
@@ -322,10 +325,10 @@ def _ball_frames(closure: Closure) -> tuple[Dual, Dual]:
 
 
 def _equations(closure: Closure, motion: Rates, length: float) -> tuple[FloatArray, FloatArray]:
-    """Return matrix (n, 18, 18) and right side (n, 18) of eqs 62 to 64, moments and arms divided by ``length``.
+    """Return matrix (n, 18, 18) and right side (n, 18) of eqs 62 to 64; moments and lever arms are divided by ``length``.
 
-    The unknowns, by the screws of their lines of action or axes: bearing 1Fi, 1Fj, 1Ti, 1Tj, axial 1Fk, torque 1Tk; crank
-    pin 2F; slider pin 3F; guide 4Fi, 4Fj, 4T; force on the slider.
+    The columns of the matrix are the screws of the unknown forces (F) and moments (T), in this order: bearing 1Fi, 1Fj, 1Ti,
+    1Tj; axial force 1Fk; torque 1Tk; crank pin 2F; slider pin 3F; guide 4Fi, 4Fj, 4T; force on the slider.
     """
     p, n = closure.parameters, closure.crank_angle.size
     axes = np.broadcast_to(np.eye(3), (n, 3, 3))
@@ -428,7 +431,7 @@ class Comparison:
     iterations : int
         Largest number of iterations that closing the loop took.
     rod_moment : float
-        Greatest moment about the rod's line (N.m); it should be zero, although no equation was solved for that.
+        Greatest moment on the rod about its line (N.m): it should be zero, although this equation is not solved.
     """
 
     differences: tuple[Difference, ...]
@@ -450,7 +453,7 @@ def compare(turn: ForceTurn) -> Comparison:
     ------
     InputError
         If the slider's force is sought and a groove in the shaft makes the shift, which the dual method does not cover, or if
-        the force is determined at none of the angles.
+        the slider's force is determined at none of the angles.
     """
     sought = turn.sought == SLIDER_FORCE
     if sought and has_shaft_groove(turn.law):

@@ -4,11 +4,11 @@ Crank and shift move as prescribed, so that the axial force on the crank is an u
 Either the slider's load L is given and the crank's torque T is sought, or the torque is given and the load is sought (the
 thesis's problem). Load and torque are related by the crank's equation of motion
 
-    T = T0 - kth L,    kth = dS4/dtheta1 at the shift held,
+    T = T0 - kth L,    kth = dS4/dtheta1 with the shift held constant,
 
 where T0 is the torque without load. The first problem is therefore regular wherever the mechanism can be assembled, and the
-second has a pole where kth = 0: at the dead centres, where the slider's force has no lever on the crank. The values there are
-masked; `ForceTurn.mask_reasons` gives the reason.
+second has a pole where kth = 0: at the dead centres, where the slider's force has no lever arm about the crank axis. The
+values there are masked; `ForceTurn.mask_reasons` gives the reason.
 
 The equations are the plant's own (`linkwork.slider_crank.dynamics`), evaluated on arrays.
 """
@@ -66,7 +66,7 @@ TORQUE, SLIDER_FORCE = "torque", "slider force"
 
 
 class Solution(NamedTuple):
-    """Result of `solve`: `Position`, `Coefficients`, `Motion`, `Reactions`, load (N), ratio (m); arrays or dual numbers."""
+    """Result of `solve`: position, velocity coefficients, motion, reactions, load (N), ratio (m); arrays or dual numbers."""
 
     position: Any
     coefficients: Any
@@ -142,13 +142,13 @@ class ForceTurn:
         Load on the slider (N), positive in the direction in which the slider position increases, -k of frame 4; the forces of
         spring, damper and friction are not part of it. If it is sought, it is masked at dead centres.
     axial_force : masked array, shape (n,)
-        Whole force on the crank along its axis (N): of the drive of the shift, spring and damper.
+        Total force on the crank along its axis (N): drive of the shift, spring and damper together.
     applied_axial_force : masked array, shape (n,)
-        Part of the axial force that drives or holds the shift (N): without the spring and the damper.
+        Axial force of the drive that moves or holds the shift (N): without the spring and the damper.
     ratio : ndarray, shape (n,)
-        Lever of the slider's force on the crank, minus dT/dL (m): kth, or dS4/dtheta1 with a groove in the shaft.
+        Lever arm of the slider's force about the crank axis, -dT/dL (m): kth, or dS4/dtheta1 with a groove in the shaft.
     unreachable : ndarray, shape (m,)
-        Given angles (rad) that were left out because the rod does not reach the guide there.
+        Requested crank angles (rad) that were left out because the rod does not reach the guide there.
     """
 
     parameters: SliderCrankParameters
@@ -185,29 +185,30 @@ class ForceTurn:
 
     @cached_property
     def dead_centres(self) -> tuple[DeadCentre, ...]:
-        """Dead centres of the slider between the first and the last angle, located to rounding errors."""
+        """Return the dead centres of the slider between the first and the last angle, exact to rounding errors."""
         return self._course.dead_centres(*self._span)
 
     @cached_property
     def singularities(self) -> tuple[DeadCentre, ...]:
-        """Configurations between the first and last angle at which the torque does not determine the slider force.
+        """Return the configurations between first and last angle in which the torque does not determine the slider force.
 
-        They are the zeros of ``ratio``, and differ from the dead centres only if the shift moves without a groove in the shaft.
+        There ``ratio`` is zero. These configurations are the dead centres, unless the shift moves without a groove in the
+        shaft.
         """
         return self.dead_centres if has_shaft_groove(self.law) else self._course.singularities(*self._span)
 
     @cached_property
     def limits(self) -> tuple[float, ...]:
-        """Crank angles (rad) between the first and the last given angle at which a range of assembly ends.
+        """Return the crank angles (rad) between the first and the last given angle at which a range of assembly ends.
 
-        At these angles rod and guide are perpendicular; velocity, acceleration and all forces grow without bound near them.
+        At these angles rod and guide are perpendicular. Velocity, acceleration and all forces grow without bound near them.
         """
         asked = np.concatenate([self.angle, self.unreachable])
         return self._course.limits(float(asked.min()), float(asked.max()))
 
     @cached_property
     def breaks(self) -> tuple[int, ...]:
-        """Indices of angles such that the mechanism cannot be assembled somewhere between this angle and the next."""
+        """Return each index i such that the mechanism cannot be assembled somewhere between angles i and i + 1."""
         outside = np.sort(np.concatenate([self.unreachable, self.limits]))
         low, high = np.minimum(self.angle[:-1], self.angle[1:]), np.maximum(self.angle[:-1], self.angle[1:])
         between = np.searchsorted(outside, high) - np.searchsorted(outside, low, side="right")
@@ -215,19 +216,19 @@ class ForceTurn:
 
     @property
     def without_lever(self) -> bool:
-        """Whether the slider force is unknown and has no lever on the crank at any angle."""
+        """Return whether the slider force is unknown and has no lever arm about the crank axis at any angle."""
         return bool(np.ma.getmaskarray(self.slider_force).all()) and not self.singularities
 
     @property
     def _parallel(self) -> NDArray[np.bool_]:
-        """Mask of the angles at which the rod is parallel to the crank axis, shape (n,)."""
+        """Return a mask (n,) of the angles at which the rod is parallel to the crank axis."""
         p = self.parameters.constants()
         r = plant_functions().rod(self._position, p)
         return np.asarray(np.hypot(r.x, r.y) <= _PARALLEL * p.a2)
 
     @cached_property
     def mask_reasons(self) -> tuple[str, ...]:
-        """Sentences about masked values with the reasons, one for each set of consecutive angles."""
+        """Return sentences that say where values are masked and why, one for each group of consecutive angles."""
         sentences = [NO_LEVER] if self.without_lever else []
         dead = np.ma.getmaskarray(self.slider_force) & (not sentences)
         for flags, what, why in (
@@ -243,10 +244,10 @@ class ForceTurn:
         return tuple(sentences)
 
     def clear(self, degrees: float = CLEAR_DEG, *, poles: bool = True) -> NDArray[np.bool_]:
-        """Return a mask (n,) of the angles that are further than ``degrees`` from the poles of the forces.
+        """Return a mask (n,) of the angles that are further than ``degrees`` from every angle at which forces become infinite.
 
-        Poles are at the limits of assembly and, if the slider force is unknown, at the singularities; if ``poles`` is
-        False, only the limits are taken. Poles before the first and after the last angle are taken into account.
+        Forces become infinite (poles) at the limits of assembly and, if the slider force is unknown, at the singularities.
+        If ``poles`` is False, only the limits of assembly count. Poles before the first and after the last angle also count.
         """
         away = radians(degrees)
         low, high = self._span
@@ -270,7 +271,7 @@ class ForceTurn:
             slider pin.
         frame : int
             1 ground; 2 crank, i towards the crank pin; 3 rod, i along the rod from crank pin to slider pin, j perpendicular to
-            rod and crank axis; 4 guide, the slider position increasing along -k. The points of moments do not change.
+            rod and crank axis; 4 guide, the slider position increases along -k. Moments stay about the same points.
 
         Returns
         -------
@@ -362,7 +363,7 @@ def force_turn(
     Parameters
     ----------
     parameters : SliderCrankParameters
-        Parameters, or a published set or its name; a set brings its crank speed and shift.
+        Parameters, or a published set or its name. A set also provides defaults of crank speed and shift.
     crank_speed, crank_acceleration : array_like, scalar or shape (n,)
         theta1' (rad/s), theta1'' (rad/s2). Here and below, a number may be given as text with its unit, such as "50 rpm".
     shift : ShiftLaw
@@ -370,17 +371,17 @@ def force_turn(
     angles : array_like, shape (n,), optional
         Crank angles (rad); 361 over the turn by default.
     load : array_like, scalar or shape (n,), optional
-        Force on the slider (N), positive in the direction in which its position increases, 0 by default; the torque is then
-        sought.
+        Force on the slider (N), positive in the direction in which its position increases, 0 by default; the torque is
+        computed.
     torque : array_like, scalar or shape (n,), optional
-        Torque of the drive on the crank (N.m); the load on the slider is then sought. Not together with ``load``.
+        Torque of the drive on the crank (N.m); the load on the slider is computed. Not together with ``load``.
     partial : bool
         Whether to leave out the angles at which the rod does not reach the guide; ``unreachable`` lists them.
 
     Raises
     ------
     InputError
-        If both ``load`` and ``torque`` are given, a value is no finite number or of the wrong shape, or ``shift`` is no law.
+        If both ``load`` and ``torque`` are given, a value is not finite or has the wrong shape, or ``shift`` is no `ShiftLaw`.
     AssemblyError
         If the rod does not reach the guide at some angle; the message gives the ranges in which it does. With ``partial`` only
         if it reaches the guide at no angle.
@@ -482,7 +483,7 @@ def _degrees_text(angle: float) -> str:
 def _assembly_error(
     parameters: SliderCrankParameters, law: ShiftLaw, th: FloatArray, s1: FloatArray, reached: NDArray[np.bool_]
 ) -> AssemblyError:
-    """Return the error for angles at which the rod does not reach the guide."""
+    """Return the error of crank angles at which the rod does not reach the guide, with the ranges in which it does."""
     p = parameters.constants()
     square = plant_functions().assembly_square(th, s1, p)
     worst = int(np.argmin(square))

@@ -1,16 +1,16 @@
 """Find the mobility of the slider-crank: margin of assembly, ranges of the crank, dead centres, stroke.
 
-With f and g the crank pin's coordinates across the guide, as in `kinematics`, and S1 a function of theta1 (prime: by it)
+The shift S1 is a function of theta1; a prime is a derivative with respect to theta1. With the crank pin's coordinates f and g
+perpendicular to the guide, as in `kinematics`,
 
     D = a2^2 - f^2 - g^2       its square root is h: the rod reaches the guide where D >= 0
-    A = D'/2                   zero where the margin of assembly is least or greatest
+    A = D'/2                   A = 0 where the margin of assembly is least or greatest
     S4' = A/h - B,  B = a1 cos(theta1) sin(alpha4) + S1' cos(alpha4)
 
-and the slider's dead centres are the zeros of h S4' = A - B h, which stays finite at the limit of assembly. The zeros are
-found by halving the turn repeatedly: the lengths and the bounds of the law's derivatives bound the change of each function
-over a piece, and a piece is dropped only if this bound excludes a zero. In the remaining pieces zeros are bisected to the
-last digit. No zero is missed except pairs closer together than `FINEST`, between which the slider moves by some 1e-10 of
-the crank's length.
+and the slider's dead centres are the zeros of h S4' = A - B h, which stays finite at the limit of assembly. To find the zeros,
+the turn is halved repeatedly. The lengths and the bounds of the law's derivatives bound the change of each function over a
+piece, and a piece is dropped only if this bound excludes a zero. In the remaining pieces zeros are bisected to the last digit.
+No zero is missed except pairs closer together than `FINEST`; the slider moves by some 1e-10 of the crank's length between them.
 """
 
 from __future__ import annotations
@@ -84,7 +84,7 @@ class PeriodicShift:
 
     @property
     def span(self) -> float:
-        """Crank angle after which the law repeats (rad)."""
+        """Return the crank rotation after which the law repeats (rad)."""
         return 2.0 * pi * self.turns
 
 
@@ -123,7 +123,7 @@ def groove_shift(parameters: SliderCrankParameters) -> PeriodicShift:
 
 
 class Margin(NamedTuple):
-    """A least or greatest value over the turn of the margin of assembly."""
+    """The least or the greatest margin of assembly over the turn, and the crank angle at which it occurs."""
 
     length: float  # rod length minus distance of the crank pin from the guide (m)
     crank_angle: float  # rad
@@ -140,8 +140,8 @@ class Place(NamedTuple):
 class DeadCentre(NamedTuple):
     """A configuration in which the slider reverses: crank angle (rad), shift and slider position (m).
 
-    ``outer`` is true at a maximum of S4 on branch +1 and at a minimum on branch -1: the slider is then furthest out on the side
-    of its assembly.
+    ``outer`` is true at a maximum of S4 on branch +1 and at a minimum of S4 on branch -1: the slider is then at the outer end
+    of its travel.
     """
 
     crank_angle: float
@@ -153,9 +153,9 @@ class DeadCentre(NamedTuple):
 class Range(NamedTuple):
     """A range of crank angles in which the rod reaches the guide, and the slider positions in it.
 
-    ``low`` (rad) is in [0, span), and ``high`` exceeds it by at most the span; the other angles are in [0, span). The span
-    is one turn, or the number of turns after which the law of the shift repeats. ``greatest`` and ``least`` are the extreme
-    slider positions; if the crank cannot turn fully, they may be at an end of the range.
+    ``low`` (rad) is in [0, span), and ``high`` exceeds ``low`` by at most the span; all other crank angles are in [0, span).
+    The span is the crank rotation after which the law of the shift repeats: one turn or more. ``greatest`` and ``least`` are
+    the extreme slider positions; if the crank cannot turn fully, they may be at an end of the range.
     """
 
     low: float
@@ -165,12 +165,12 @@ class Range(NamedTuple):
     least: Place
 
     def full(self, span: float) -> bool:
-        """Return whether the range has no ends: whether it covers the whole ``span`` of the law."""
+        """Return whether the range covers the whole ``span`` of the law and so has no ends."""
         return self.high - self.low >= span * (1.0 - 1e-12)
 
     @property
     def stroke(self) -> float:
-        """Greatest minus least slider position (m)."""
+        """Return the greatest minus the least slider position (m)."""
         return self.greatest.slider_position - self.least.slider_position
 
 
@@ -180,7 +180,7 @@ class _Zero(NamedTuple):
 
 
 class _Change(NamedTuple):
-    """D, A and B (``square``, ``pull``, ``along``) at the middle of a piece, and bounds of their changes within it."""
+    """D, A, B of the module (``square``, ``pull``, ``along``) at the middle of a piece, and bounds of their changes in it."""
 
     square: float
     pull: float
@@ -191,7 +191,7 @@ class _Change(NamedTuple):
 
 
 def _change(middle: float, half: float, law: PeriodicShift, p: Constants, pitch: float) -> _Change:
-    """Return D, A, B and bounds of their changes over ``middle`` +- ``half``; with ``pitch`` 0, not 1, S1' is left out."""
+    """Return D, A, B and bounds of their changes over ``middle`` +- ``half``; A and B take ``pitch`` (1 or 0) times S1'."""
     s1, ds1 = law.at(middle)[:2]
     if not (isfinite(s1) and abs(ds1) <= law.rate * (1.0 + 1e-9)):
         raise InputError(
@@ -228,7 +228,7 @@ _Bounded = Callable[[float, float], tuple[float, float]]
 
 
 def _margin_slope(law: PeriodicShift, p: Constants) -> _Bounded:
-    """Return the function A, whose zeros are the extremes of the distance between crank pin and guide."""
+    """Return the function A: it is zero where the distance between crank pin and guide is extreme."""
 
     def slope(middle: float, half: float) -> tuple[float, float]:
         change = _change(middle, half, law, p, 1.0)
@@ -238,7 +238,7 @@ def _margin_slope(law: PeriodicShift, p: Constants) -> _Bounded:
 
 
 def _slider_slope(changes: Callable[[float, float], _Change], branch: float) -> _Bounded:
-    """Return the function A - B h (A + B h on branch -1), which has the sign of S4' on branch +1 and the opposite on -1."""
+    """Return the function A - B h (A + B h on branch -1): its sign is that of S4' on branch +1, the opposite on branch -1."""
 
     def slope(middle: float, half: float) -> tuple[float, float]:
         change = changes(middle, half)
@@ -257,7 +257,7 @@ def _slider_slope(changes: Callable[[float, float], _Change], branch: float) -> 
 
 
 def _bisect(positive: Callable[[float], bool], low: float, high: float) -> float:
-    """Find by bisection, to the last digit, where ``positive`` changes between ``low`` and ``high``."""
+    """Find the place between ``low`` and ``high`` where ``positive`` changes, by bisection to the last digit."""
     at_low = positive(low)
     while True:
         middle = 0.5 * (low + high)
@@ -272,8 +272,8 @@ def _bisect(positive: Callable[[float], bool], low: float, high: float) -> float
 def _zeros(function: _Bounded, low: float, high: float, scale: float) -> list[_Zero]:
     """Find all sign changes of ``function`` between ``low`` and ``high``, in order.
 
-    If the function is zero over a stretch, up to rounding errors of ``scale``, the stretch is one zero if the signs before and
-    after it differ, and none otherwise.
+    A stretch over which the function is zero, up to rounding errors of ``scale``, counts as one zero if the signs before and
+    after the stretch differ; otherwise it does not count.
     """
 
     def positive(x: float) -> bool:
@@ -327,8 +327,8 @@ def _extremes(law: PeriodicShift, p: Constants) -> list[float]:
 def assembly_margin(parameters: SliderCrankParameters, law: PeriodicShift) -> Margin:
     """Find the least margin of assembly over the turn; it is negative if the crank cannot turn fully.
 
-    The crank turns fully where the margin is zero or greater. The plant's steps also keep clear of the limit of assembly
-    by `linkwork.limits.LIMIT_SINE`, 5e-7 of the rod's length.
+    The crank can turn fully if this margin is zero or greater. A simulation also stays off the limit of assembly, by
+    `linkwork.limits.LIMIT_SINE`, 5e-7 of the rod's length.
     """
     return _margin(min, law, parameters.constants())
 
@@ -349,8 +349,8 @@ def _margin(choose: Callable[..., float], law: PeriodicShift, p: Constants) -> M
 def greatest_shift(parameters: SliderCrankParameters) -> float | None:
     """Find the greatest constant shift ``|S1|`` (m) at which the crank turns fully; None if there is none.
 
-    The crank turns fully at shifts of either sign up to this value. With the guide parallel to the crank axis it does so at any
-    shift, and the value is infinite.
+    The crank turns fully at shifts of either sign up to this value. If the guide is parallel to the crank axis and the crank
+    turns fully at one shift, it does so at every shift, and the result is infinite.
     """
     p = parameters.constants()
     if p.a2 < p.a1 + abs(p.a4):
@@ -381,7 +381,7 @@ def greatest_shift(parameters: SliderCrankParameters) -> float | None:
 
 
 def _place(angle: float, law: PeriodicShift, p: Constants, *, limit: bool = False) -> Place:
-    """Return the configuration at an angle; at the ``limit`` of assembly the rod is perpendicular to the guide."""
+    """Return the configuration at a crank angle; with ``limit`` the rod is exactly perpendicular to the guide."""
     shift = law.at(angle)[0]
     # at the limit h is set to zero: the square root would magnify the rounding error of the angle
     h = 0.0 if limit else p.branch * sqrt(max(0.0, kinematics.assembly_square(angle, shift, p)))
@@ -430,7 +430,7 @@ def ranges(parameters: SliderCrankParameters, law: PeriodicShift) -> tuple[Range
     """Find the ranges of crank angles in which the rod reaches the guide, with dead centres and stroke.
 
     There is one range, from 0 to the span, if the crank turns fully; none if the mechanism cannot be assembled at all; at most
-    two at a constant shift. At the ends of a range rod and guide are exactly perpendicular; the plant's steps stop earlier,
+    two at a constant shift. At the ends of a range rod and guide are exactly perpendicular; a simulation stops earlier,
     within `linkwork.limits.LIMIT_SINE` of such an end.
     """
     p = parameters.constants()
@@ -460,13 +460,13 @@ def assembled_ranges(parameters: SliderCrankParameters, law: PeriodicShift) -> t
 
 @takes_published()
 def dead_centres(parameters: SliderCrankParameters, law: PeriodicShift) -> tuple[DeadCentre, ...]:
-    """Find all configurations in which the slider reverses, in the order of their angles: dS4/dtheta1 = 0 along the law.
+    """Find all configurations in which the slider reverses, dS4/dtheta1 = 0 along the law, in the order of their angles.
 
-    There are none if the slider stands still at every angle. At a constant shift there are two if the crank turns fully, and at
-    most four on the two branches together.
+    If the slider stands still at every angle, there is no dead centre. At a constant shift there are two dead centres if the
+    crank turns fully, and at most four on the two branches together.
 
     If the crank torque is given and the slider force sought, these configurations are singular at a constant shift, or if a
-    groove in the shaft makes the shift. If the shift has a drive of its own, the singular ones are those of `singularities`.
+    groove in the shaft makes the shift. If the shift has a drive of its own, `singularities` finds the singular configurations.
     """
     return tuple(sorted(centre for part in ranges(parameters, law) for centre in part.dead_centres))
 
@@ -477,8 +477,8 @@ def singularities(parameters: SliderCrankParameters, law: PeriodicShift) -> tupl
 
     kth is the derivative of the slider position by the crank angle at constant shift. If the shift has a drive of its own, kth
     multiplies the slider force in the crank's equation of motion (the thesis's force problem), whatever the rate of the shift.
-    The slider itself stops in these configurations only if the shift is constant; ``outer`` is true if its position would have
-    a maximum (on branch +1) at constant shift.
+    The slider itself stops in these configurations only if the shift is constant. ``outer`` is true if, at constant shift, the
+    slider position would have a maximum (on branch +1) or a minimum (on branch -1).
     """
     p = parameters.constants()
     found = (_dead_centres(low, high, law, p, 0.0) for low, high in _find_ranges(law, p))

@@ -44,7 +44,7 @@ JOINTS: Mapping[str, Joint] = MappingProxyType(
 #: Frames by number: of the ground, the crank, the rod and the guide.
 FRAMES: Mapping[int, str] = MappingProxyType({1: "ground", 2: "crank", 3: "rod", 4: "guide"})
 
-#: Units by system: for each SI unit the name of the unit used, and its value in SI.
+#: Units by system: for each SI unit, the name of the unit used instead and the factor from that unit to SI.
 UNITS: Mapping[str, Mapping[str, tuple[str, float]]] = MappingProxyType(
     {
         "SI": {unit: (unit, 1.0) for unit in ("rad", "m", "m/s", "m/s2", "N", "N.m")},
@@ -61,7 +61,7 @@ UNITS: Mapping[str, Mapping[str, tuple[str, float]]] = MappingProxyType(
 
 
 def unit_table(units: str) -> Mapping[str, tuple[str, float]]:
-    """Return an entry of `UNITS`.
+    """Return the units of a system by SI unit: an entry of `UNITS`.
 
     Raises
     ------
@@ -74,7 +74,7 @@ def unit_table(units: str) -> Mapping[str, tuple[str, float]]:
 
 
 def shown_units(units: str) -> Mapping[str, tuple[str, float]]:
-    """Return an entry of `UNITS` for tables and figures: with "SI", lengths are in millimetres instead of metres.
+    """Return the units of a system as `unit_table`, for tables and figures: with "SI", lengths are in mm instead of m.
 
     Raises
     ------
@@ -86,7 +86,7 @@ def shown_units(units: str) -> Mapping[str, tuple[str, float]]:
 
 
 def check_joint(name: str, frame: int) -> None:
-    """Check that a force or moment of this name and a frame of this number exist; raises InputError if not."""
+    """Check that a force or moment of this name and a frame of this number exist; raise InputError if not."""
     if name not in JOINTS:
         raise unknown_name(name, JOINTS, f"joint force or moment {name!r}")
     if frame not in FRAMES:
@@ -95,14 +95,14 @@ def check_joint(name: str, frame: int) -> None:
 
 
 def masked_array(values: ArrayLike, where: NDArray[np.bool_]) -> MaskedArray:
-    """Return values as a masked array with the mask ``where``, which is broadcast; masked values are NaN."""
+    """Return values as a masked array; the mask ``where`` is broadcast to their shape. Masked values are NaN."""
     whole = np.asarray(values, dtype=float)
     mask = np.broadcast_to(where, whole.shape).copy()
     return np.ma.MaskedArray(np.where(mask, np.nan, whole), mask=mask, fill_value=np.nan)
 
 
 def float_array(value: ArrayLike, message: str) -> FloatArray:
-    """Return a new array of floats; raises InputError with ``message`` if the value is not numeric."""
+    """Return the value as a new array of floats; raise InputError with ``message`` if it is not numeric."""
     try:
         return np.array(value, dtype=float)
     except (TypeError, ValueError, OverflowError):

@@ -1,4 +1,4 @@
-"""Run a Monte Carlo analysis of a slider-crank with tolerances, and compare it with the estimates without samples."""
+"""Run a Monte Carlo analysis of a slider-crank with tolerances, and compare it with the estimates of `tolerances`."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ PERCENTILES = (0.13498980316300957, 2.275013194817921, 50.0, 97.72498680518208, 
 OFF = 0.05
 #: Number of samples that are evaluated at once, small enough for the processor's cache.
 _CHUNK = 16384
-#: Number of parts of the turn for each worker.
+#: Number of parts of the turn for each worker process.
 _PARTS = 4
 #: Bins of the histograms.
 _BINS = 80
@@ -54,7 +54,7 @@ class Spread:
     ----------
     mean, deviation : masked array, shape (n,)
         Mean and standard deviation; masked if samples fall on both sides of a dead centre at which the quantity has a pole.
-        Mean and deviation of the distribution then do not exist, although those of the samples can be computed.
+        The distribution then has neither mean nor deviation, although the mean of the samples can be computed.
     percentiles : masked array, shape (p, n)
         Values at `PERCENTILES`; masked only if there is no sample.
     least, greatest : masked array, shape (n,)
@@ -76,7 +76,7 @@ class Spread:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class MonteCarlo:
-    """Random samples of a mechanism with tolerances, and the estimates without samples.
+    """Statistics of random samples of a mechanism with tolerances, and the estimates of `tolerances` for comparison.
 
     Attributes
     ----------
@@ -89,9 +89,9 @@ class MonteCarlo:
     estimates : mapping
         `Estimate` of each quantity, by name.
     not_assembled : ndarray of int, shape (n,)
-        Number of samples whose rod does not reach the guide; they are left out of the statistics.
+        Number of samples whose rod does not reach the guide; these samples are left out of the statistics.
     undetermined : ndarray of int, shape (n,)
-        Number of samples exactly at a dead centre, if the slider's force is sought; they are left out, too.
+        Number of samples exactly at a dead centre, if the slider's force is sought; these are left out, too.
     """
 
     turn: ForceTurn
@@ -152,10 +152,10 @@ class MonteCarlo:
         return np.asarray(np.ma.getmaskarray(linear.deviation) & ~np.ma.getmaskarray(linear.nominal))
 
     def linear_misses(self, quantity: str) -> NDArray[np.bool_]:
-        """Return a mask (n,) of the angles at which the linear estimate is off.
+        """Return a mask (n,) of the angles at which the linear estimate fails.
 
-        It is off if its mean or standard deviation is wrong by more than 5 % of the standard deviation plus five standard
-        errors of the samples, or if a dead centre is so near that there is no estimate.
+        The estimate fails if its mean or standard deviation is wrong by more than 5 % of the standard deviation plus five
+        standard errors of the samples, or if a dead centre is so near that there is no estimate.
         """
         check_names((quantity,), self.spreads, "quantity")
         spread, linear = self.spreads[quantity], self.estimates[quantity]
@@ -170,7 +170,7 @@ class MonteCarlo:
         return cast(NDArray[np.bool_], np.ma.filled(off, False)) | self._without_estimate(quantity)
 
     def place(self, quantity: str, angle: float) -> int:
-        """Return the index of the crank angle nearest to ``angle`` (rad); the quantity must be determined there.
+        """Return the index of the crank angle nearest to ``angle`` (rad), at which the quantity must be determined.
 
         Raises
         ------
@@ -194,9 +194,9 @@ class MonteCarlo:
         return () if free else tuple(centre.crank_angle for centre in self.turn.singularities)
 
     def _failure_sentence(self, name: str, unit: str, one: float) -> list[str]:
-        """Return a list with the sentence on the worst failure of the linear estimate, or an empty one.
+        """Return the sentence on the worst failure of the linear estimate, in a list; an empty list if there is no failure.
 
-        ``one`` is the value in SI of the unit ``unit``.
+        ``one`` is the factor from ``unit`` to SI.
         """
         off = np.flatnonzero(self.linear_misses(name) & ~self._without_estimate(name))
         if not off.size:
@@ -290,7 +290,7 @@ def monte_carlo(
 
 
 def _mask_poles(linear: Estimate, poles: NDArray[np.bool_]) -> Estimate:
-    """Return an estimate masked at the angles at which samples fall on both sides of a pole."""
+    """Return the estimate masked at ``poles``, the angles at which samples fall on both sides of a pole."""
     values = {name: getattr(linear, name) for name in Estimate.__dataclass_fields__ if name != "nominal"}
     return replace(
         linear, **{name: np.ma.masked_where(np.broadcast_to(poles, x.shape), x) for name, x in values.items()}
@@ -298,7 +298,7 @@ def _mask_poles(linear: Estimate, poles: NDArray[np.bool_]) -> Estimate:
 
 
 class _Draws(NamedTuple):
-    """The evaluated samples at one angle."""
+    """Statistics of the samples at one crank angle."""
 
     statistics: Mapping[str, tuple[Any, ...]]  # fields of `Spread`, by quantity
     across: bool  # whether samples fall on both sides of a dead centre
@@ -314,7 +314,9 @@ def _sample_angles(
     seed: int,
     places: Sequence[int],
 ) -> list[_Draws]:
-    """Draw the samples and evaluate them at some of the angles; drawing them in each worker is faster than sending them."""
+    """Draw all samples, the same in each worker process, and evaluate them at the angles with the indices ``places``.
+
+    To draw the samples in each process is faster than to send them."""
     generator = np.random.default_rng(seed)
     errors = {t.name: t.draw(generator, samples) for t in tolerances}
     _check_samples(turn.parameters, errors)
@@ -322,7 +324,7 @@ def _sample_angles(
 
 
 def _sample_angle(turn: ForceTurn, i: int, errors: Mapping[str, FloatArray], quantities: Sequence[str]) -> _Draws:
-    """Evaluate the samples at angle i in chunks."""
+    """Evaluate the samples at angle i in chunks, and return their statistics."""
     samples = len(next(iter(errors.values())))
     found = {name: np.empty(samples) for name in quantities}
     levers = np.empty(samples)
@@ -347,7 +349,7 @@ def _sample_angle(turn: ForceTurn, i: int, errors: Mapping[str, FloatArray], qua
 
 
 def _statistics(values: FloatArray) -> tuple[Any, ...]:
-    """Return the fields of `Spread` for the samples at one angle, NaN if there are none; sorts the samples."""
+    """Return the fields of `Spread` for the samples at one angle, NaN without samples; sort ``values`` in place."""
     if values.size < 2:
         none = np.nan
         return none, none, np.full(len(PERCENTILES), none), none, none, np.zeros(_BINS + 1), np.zeros(_BINS)
@@ -365,7 +367,7 @@ def _statistics(values: FloatArray) -> tuple[Any, ...]:
 
 
 def _spread(rows: Sequence[tuple[Any, ...]], poles: NDArray[np.bool_]) -> Spread:
-    """Collect the statistics of all angles; mean and deviation are masked at the poles."""
+    """Return the `Spread` from the statistics at each angle; mean and deviation are masked at the poles."""
     mean, deviation, percentiles, least, greatest, edges, counts = (np.array(part) for part in zip(*rows))
     return Spread(
         mean=masked_array(mean, poles | np.isnan(mean)),
@@ -381,7 +383,7 @@ def _spread(rows: Sequence[tuple[Any, ...]], poles: NDArray[np.bool_]) -> Spread
 def _check_samples(parameters: SliderCrankParameters, drawn: Mapping[str, FloatArray]) -> None:
     """Check that every sample is a valid mechanism, by the rules of `SliderCrankParameters`.
 
-    Raises InputError if some are invalid, with the tolerances that make them so and their number.
+    Raises InputError if samples are invalid; the message gives their number and the tolerances that cause it.
     """
     values: dict[str, Any] = {field.name: getattr(parameters, field.name) for field in fields(parameters)}
     for name, x in drawn.items():

@@ -1,6 +1,6 @@
-"""Define laws of the axial shift over the crank's turn, on arrays, and find the special configurations along them.
+"""Define laws of the crank's axial shift, on arrays, and find dead centres and limits of assembly along a law.
 
-The plant's functions on arrays are also here, because the law of a groove is one of them.
+`plant_functions` is also here, because the law of a groove is one of the plant's functions.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ from .quantities import FloatArray
 
 @cache
 def plant_functions() -> ReboundFunctions:
-    """Return the plant's functions by name, for NumPy arrays and for dual numbers (`analysis.numerics.dual`)."""
+    """Return the slider-crank's equations of `linkwork`, for NumPy arrays and for dual numbers (`analysis.numerics.dual`)."""
     elementary = {"sin": np.sin, "cos": np.cos, "sqrt": np.sqrt, "atan2": np.arctan2, "tanh": np.tanh}
     return rebind_functions((friction, vectors, kinematics, dynamics), elementary)
 
@@ -45,10 +45,10 @@ class ShiftMotion(NamedTuple):
 
 @runtime_checkable
 class ShiftLaw(Protocol):
-    """A law of the crank's axial shift over its turn."""
+    """Interface of a law: the crank's axial shift as a function of its angle, or of time at constant speed."""
 
     def at(self, angle: Any, speed: Any, acceleration: Any) -> ShiftMotion:
-        """Return shift and rates at crank angles (rad), speeds (rad/s) and accelerations (rad/s2) of equal shape."""
+        """Return shift and rates at crank angles (rad) with speeds (rad/s) and accelerations (rad/s2) of the same shape."""
 
     def periodic_shift(self, parameters: SliderCrankParameters) -> mobility.PeriodicShift | None:
         """Return the law as `mobility.PeriodicShift`; None if it is not known to repeat after whole turns."""
@@ -57,7 +57,7 @@ class ShiftLaw(Protocol):
 @in_si(value="m")
 @dataclass(frozen=True, slots=True)
 class ConstantShift:
-    """A law for a crank that is held at a constant shift S1 (m).
+    """The law of a crank that is held at a constant shift S1 (m).
 
     Raises
     ------
@@ -72,12 +72,12 @@ class ConstantShift:
             raise InputError(f"the shift is {self.value!r} m: it must be a finite number")
 
     def at(self, angle: Any, speed: Any, acceleration: Any) -> ShiftMotion:
-        """See `ShiftLaw`."""
+        """Return shift and rates; see `ShiftLaw.at`."""
         zero = 0.0 * angle
         return ShiftMotion(self.value + zero, zero, zero)
 
     def periodic_shift(self, parameters: SliderCrankParameters) -> mobility.PeriodicShift:
-        """See `ShiftLaw`."""
+        """Return the law as `mobility.PeriodicShift`."""
         return mobility.constant_shift(self.value)
 
 
@@ -91,10 +91,10 @@ class GrooveShift:
     amplitude : float
         SS1 (m).
     ratio : float
-        alpha, periods of the shift in a turn of the crank.
+        alpha, periods of the shift per turn of the crank.
     in_shaft : bool
-        Whether the groove is cut in the crank's shaft, so that the torque of the drive works against its flank, as in the plant
-        and the FMU. By default, as in the thesis, a drive of its own shifts the crank.
+        Whether the groove is cut in the crank's shaft, so that the crank's torque also moves the shift, as in the FMU. By
+        default, as in the thesis, the shift has a drive of its own.
 
     Raises
     ------
@@ -112,13 +112,13 @@ class GrooveShift:
                 raise InputError(f"the groove's {name} is {getattr(self, name)!r}: it must be a finite number")
 
     def at(self, angle: Any, speed: Any, acceleration: Any) -> ShiftMotion:
-        """See `ShiftLaw`."""
+        """Return shift and rates; see `ShiftLaw.at`."""
         # the plant's function uses only amplitude and ratio of the constants
         shift, pitch, bend = plant_functions().groove(angle, self)
         return ShiftMotion(shift, pitch * speed, pitch * acceleration + bend * speed * speed)
 
     def periodic_shift(self, parameters: SliderCrankParameters) -> mobility.PeriodicShift | None:
-        """See `ShiftLaw`."""
+        """Return the law as `mobility.PeriodicShift`; None if alpha is not a ratio of small whole numbers."""
         try:
             return mobility.groove_shift(
                 replace(parameters, groove_amplitude=float(self.amplitude), groove_ratio=float(self.ratio))
@@ -143,7 +143,7 @@ class AngleShift:
     curvature: ArrayFunction
 
     def at(self, angle: Any, speed: Any, acceleration: Any) -> ShiftMotion:
-        """See `ShiftLaw`."""
+        """Return shift and rates; see `ShiftLaw.at`."""
         slope = np.asarray(self.slope(angle))
         return ShiftMotion(
             np.asarray(self.value(angle)),
@@ -152,7 +152,7 @@ class AngleShift:
         )
 
     def periodic_shift(self, parameters: SliderCrankParameters) -> None:
-        """See `ShiftLaw`."""
+        """Return None: the law need not repeat after whole turns."""
         return None
 
 
@@ -166,7 +166,7 @@ class TimeShift:
     Raises
     ------
     InputError
-        When it is evaluated at a speed that is zero or varies: give the law as an `AngleShift`.
+        If the law is evaluated at a crank speed that is zero or varies; use an `AngleShift` instead.
     """
 
     value: ArrayFunction
@@ -174,7 +174,7 @@ class TimeShift:
     acceleration: ArrayFunction
 
     def at(self, angle: Any, speed: Any, acceleration: Any) -> ShiftMotion:
-        """See `ShiftLaw`."""
+        """Return shift and rates; see `ShiftLaw.at`."""
         w = np.unique(speed)
         if w.size != 1 or w[0] == 0.0 or np.any(acceleration):
             raise InputError(
@@ -185,7 +185,7 @@ class TimeShift:
         return ShiftMotion(*(np.asarray(f(time)) for f in (self.value, self.velocity, self.acceleration)))
 
     def periodic_shift(self, parameters: SliderCrankParameters) -> None:
-        """See `ShiftLaw`."""
+        """Return None: the law need not repeat after whole turns."""
         return None
 
 
@@ -195,13 +195,13 @@ def has_shaft_groove(law: ShiftLaw) -> bool:
 
 
 def with_groove(p: Constants, law: ShiftLaw) -> Constants:
-    """Return the constants with amplitude and ratio of a `GrooveShift`; for any other law return them unchanged."""
+    """Return the constants ``p`` with amplitude and ratio of a `GrooveShift`; for any other law return ``p`` unchanged."""
     return p._replace(amplitude=law.amplitude, ratio=law.ratio) if isinstance(law, GrooveShift) else p
 
 
 # Special configurations along a law
 
-#: Pieces of a turn at whose ends signs are compared if the law need not repeat; two zeros in one piece are not found.
+#: Pieces of a turn in the search for sign changes, if the law need not repeat; two zeros in one piece are not found.
 _PIECES = 1440
 
 
@@ -209,7 +209,7 @@ _PIECES = 1440
 class Course:
     """A mechanism whose shift follows a law over the crank angle.
 
-    ``speed`` is the crank speed (rad/s); the derivative of the shift by the angle depends on it only for a law of time.
+    ``speed`` is the crank speed (rad/s). It matters only if the shift is a function of time.
     """
 
     parameters: SliderCrankParameters
@@ -225,7 +225,7 @@ class Course:
         return self._zeros(low, high, held=True)
 
     def limits(self, low: float, high: float) -> tuple[float, ...]:
-        """Find the ends of the ranges of assembly from ``low`` to ``high`` (rad)."""
+        """Find the crank angles from ``low`` to ``high`` (rad) at which a range of assembly ends."""
         repeating = self.law.periodic_shift(self.parameters)
         if repeating is None:
             at = _search_angles(low, high)
@@ -255,7 +255,7 @@ class Course:
         return tuple(centre for centre in moved if low <= centre.crank_angle <= high)
 
     def _sign_changes(self, low: float, high: float, pitch: float) -> tuple[DeadCentre, ...]:
-        """Find the zeros of kth + ``pitch`` S1' ks from its signs at `_PIECES` angles of a turn."""
+        """Find the zeros of kth + ``pitch`` S1' ks, with ks = dS4/dS1, from the signs at `_PIECES` angles per turn."""
         f, p = plant_functions(), self.parameters.constants()
 
         def slope(angle: FloatArray) -> FloatArray:
@@ -281,17 +281,17 @@ class Course:
         return self.law.at(angle, np.full(angle.shape, self.speed or 1.0), np.zeros(angle.shape))
 
     def _assembly_square(self, angle: FloatArray) -> FloatArray:
-        """Return rod length squared minus squared distance of crank pin and guide (m2); it can be assembled if positive."""
+        """Return squared rod length minus squared distance of crank pin from guide (m2); positive if it can be assembled."""
         return np.asarray(
             plant_functions().assembly_square(angle, self._shift(angle).shift, self.parameters.constants())
         )
 
 
 def _whole_spans(low: float, high: float, span: float) -> list[float]:
-    """Return the shifts by whole spans that bring angles in [0, 2 span] between ``low`` and ``high``."""
+    """Return the multiples of ``span`` that, added to angles in [0, 2 span], can bring them between ``low`` and ``high``."""
     return [span * n for n in range(ceil(low / span) - 2, ceil(high / span) + 1)]
 
 
 def _search_angles(low: float, high: float) -> FloatArray:
-    """Return evenly spaced angles from ``low`` to ``high`` at which signs are compared."""
+    """Return evenly spaced angles from ``low`` to ``high`` (rad), `_PIECES` per turn or slightly more."""
     return np.linspace(low, high, ceil((high - low) / tau * _PIECES) + 1)

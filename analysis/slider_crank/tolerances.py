@@ -1,13 +1,13 @@
-"""Compute the effect of manufacturing tolerances on the slider-crank without samples: exact sensitivities, estimated spread.
+"""Compute the effect of manufacturing tolerances on the slider-crank: exact sensitivities, estimates of the spread.
 
-The nominal mechanism and its motion are a `ForceTurn`. An error is added to one of its dimensions, masses or settings while all
-others, and the motion of the crank, stay the same. The derivatives are exact: the plant's own equations are evaluated on dual
+The nominal mechanism and its motion are a `ForceTurn`. An error is added to one dimension, mass or setting; all other values
+and the motion of the crank stay the same. The derivatives are exact: the plant's own equations are evaluated on dual
 numbers (`analysis.numerics.dual`).
 
 The linear estimate adds the variances of independent errors, each times the square of its derivative. It fails where the
 derivatives vanish: at the ideal mechanism (S1 = a4 = 0, alpha4 = 270 deg) the slider's position is of the second order in S1
-and alpha4 at every angle, and in a4 at 90 and 270 deg. Therefore there is also an estimate to second order, and a Monte Carlo
-analysis (`sampling`), which evaluates the same equations on random samples, shows where the linear estimate is off.
+and alpha4 at every angle, and in a4 at 90 and 270 deg. Therefore there is also an estimate to second order. A Monte Carlo
+analysis (`sampling`) evaluates the same equations on random samples and shows where the linear estimate fails.
 """
 
 from __future__ import annotations
@@ -49,13 +49,13 @@ _ERRORS = {
         and not v.name.startswith("groove.")
     )
 }
-#: Names of all that may be in error, with the units; the symbols of the thesis, where there are any.
+#: Names of all parameters and settings that may be in error, with their units; and their symbols in the thesis, if any.
 ERRORS: Mapping[str, str] = MappingProxyType({name: v.unit for name, v in _ERRORS.items()})
 SYMBOLS: Mapping[str, str] = MappingProxyType({name: v.symbol for name, v in _ERRORS.items() if v.symbol})
 
 #: Quantities that do not depend on forces.
 KINEMATIC = ("slider.position", "slider.velocity", "slider.acceleration")
-#: Field of `Reactions` and its component by the name of the FMI interface.
+#: Vector of `Reactions` and its component, by the name of the output in the FMI interface.
 _COMPONENTS = {
     f"{vector.removesuffix('_moment')}.{'m' if vector.endswith('_moment') else 'f'}{axis}": (vector, axis)
     for vector in JOINTS
@@ -82,7 +82,7 @@ _CONSTANTS: Callable[[Any], Constants] = rebind_functions((parameters,), {"cos":
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Sensitivities:
-    """Exact first derivatives over the turn.
+    """Exact first derivatives of quantities by errors, at the n angles of a turn.
 
     Attributes
     ----------
@@ -108,7 +108,7 @@ class Sensitivities:
         Raises
         ------
         ParameterError
-            If there is no such quantity or error here.
+            If there is no such quantity or error in this result.
         """
         check_names((quantity,), self.derivatives, "quantity")
         check_names((error,), self.names, "error")
@@ -118,7 +118,7 @@ class Sensitivities:
 def sensitivities(
     turn: ForceTurn, errors: Sequence[str] = DIMENSIONS, quantities: Sequence[str] = tuple(QUANTITIES)
 ) -> Sensitivities:
-    """Compute derivatives of motion, torque and joint forces by dimensions, masses and settings over the turn.
+    """Compute the derivatives of motion, torque and joint forces with respect to dimensions, masses and settings.
 
     Parameters
     ----------
@@ -165,13 +165,13 @@ class PerturbedTurn:
 
     @property
     def assembly_square(self) -> Any:
-        """Rod length squared minus squared distance of crank pin and guide (m2); it can be assembled if this is positive."""
+        """Return squared rod length minus squared distance of crank pin from guide (m2); positive if it can be assembled."""
         return plant_functions().assembly_square(self.angle, self.moving.shift, self.p)
 
     def evaluate(self, quantities: Collection[str]) -> tuple[dict[str, Any], Any]:
-        """Compute quantities by name, and the lever of the slider's force (m).
+        """Return the values of quantities by name, and the lever arm of the slider's force about the crank axis (m).
 
-        Only what is needed is computed; the lever is 0 if no quantity depends on forces.
+        Forces are computed only if a quantity depends on them; otherwise the lever arm is 0.
         """
         turn, p, moving = self.turn, self.p, self.moving
         w, e = turn.speed[self.at], turn.acceleration[self.at]
@@ -220,15 +220,17 @@ def perturb(turn: ForceTurn, at: Any, errors: Mapping[str, Any]) -> PerturbedTur
 
 
 def error_variables(names: Sequence[str], n: int, moved: int = 0, step: float = 0.0) -> dict[str, Dual]:
-    """Return errors at n points as independent dual variables by name, all zero except that
-    with index ``moved``, which is ``step``."""
+    """Return errors at n points by name, as independent dual variables.
+
+    The error with the index ``moved`` has the value ``step``, all others are zero.
+    """
     values = np.zeros((len(names), n))
     values[moved] = step
     return dict(zip(names, independent(*values)))
 
 
 def undetermined_mask(turn: ForceTurn, quantity: str) -> NDArray[np.bool_]:
-    """Return a mask (n,) of the angles at which a quantity of the nominal mechanism is undetermined: dead centres."""
+    """Return a mask (n,) of the dead centres at which a quantity of the nominal mechanism is undetermined."""
     dead = np.ma.getmaskarray(turn.slider_force)
     return np.zeros(len(turn), dtype=bool) if quantity in FREE_OF_LOAD else dead
 
@@ -260,8 +262,8 @@ class Tolerance:
     name : str
         One of `ERRORS`: a parameter of the mechanism by its FMI name, "shift.position" or "crank.angle".
     half_width : float or str, optional
-        Half the width of the tolerance, in the SI unit of the quantity that is in error, or with a unit, such as "0.1 mm".
-        For a normal distribution it is three standard deviations; the distribution is not cut off there.
+        Half the width of the tolerance zone, in the SI unit of the quantity in error, or text with a unit, such as "0.1 mm".
+        For a normal distribution it is three standard deviations; the distribution also has values beyond.
     standard_deviation : float, optional
         Standard deviation, instead of the half width.
     distribution : str
@@ -298,14 +300,14 @@ class Tolerance:
 
     @property
     def deviation(self) -> float:
-        """Standard deviation."""
+        """Return the standard deviation."""
         if self.standard_deviation is not None:
             return float(self.standard_deviation)
         return float(self.half_width) / _DISTRIBUTIONS[self.distribution][0]
 
     @property
     def extent(self) -> float:
-        """Half width; for a normal distribution three standard deviations."""
+        """Return half the width of the tolerance zone; for a normal distribution three standard deviations."""
         if self.half_width is not None:
             return float(self.half_width)
         return self.deviation * _DISTRIBUTIONS[self.distribution][0]
@@ -321,7 +323,7 @@ class Tolerance:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Estimate:
-    """Effect of the tolerances on one quantity over the turn, without samples; masked arrays.
+    """Estimated effect of m tolerances on one quantity, at the n angles of a turn; masked arrays.
 
     Attributes
     ----------
@@ -330,18 +332,18 @@ class Estimate:
     deviation : masked array, shape (n,)
         Standard deviation to first order: the root of the sum of squares of derivative times standard deviation.
     worst : masked array, shape (n,)
-        Greatest deviation from the nominal value to first order: every error is at its extent, with the sign that makes it
-        worse.
+        Greatest deviation from the nominal value to first order: every error has its extent as magnitude, and the worse
+        sign.
     shares : masked array, shape (m, n)
         Share of each tolerance in the variance to first order; masked if the variance is only a rounding error.
     second_mean, second_deviation : masked array, shape (n,)
-        Mean and standard deviation to second order, from exact first derivatives and their differences over one standard
-        deviation; masked if the mechanism cannot be assembled with these errors.
+        Mean and standard deviation to second order, from exact first derivatives and finite differences of these derivatives
+        over one standard deviation; masked if the mechanism cannot be assembled with errors of this size.
     second_shares : masked array, shape (m, n)
-        As ``shares``, to second order; half of the joint effect of two errors is counted for each.
+        As ``shares``, to second order; the joint effect of two errors is divided equally between them.
 
-    If the slider's force is sought and the errors, all at their extents, reach a dead centre, everything but ``nominal``
-    is masked: the quantity has a pole there, and has neither mean nor variance.
+    If the slider's force is sought and the errors, all at their extents, reach a dead centre, all arrays but ``nominal``
+    are masked: the quantity has a pole at the dead centre, and so neither mean nor variance.
     """
 
     nominal: MaskedArray
@@ -356,7 +358,7 @@ class Estimate:
 def tolerance_effects(
     turn: ForceTurn, tolerances: Sequence[Tolerance], quantities: Sequence[str] = ("slider.position",)
 ) -> dict[str, Estimate]:
-    """Compute the effect of tolerances to first and second order over the turn, by quantity.
+    """Compute the effect of tolerances on each quantity over the turn, to first and second order.
 
     Raises
     ------
@@ -411,7 +413,7 @@ def tolerance_effects(
 
 
 def check_tolerances(tolerances: Sequence[Tolerance]) -> tuple[str, ...]:
-    """Return the names of the tolerances; raises InputError if there is none, or two of the same name."""
+    """Return the names of the tolerances; raise InputError if there is none, or two have the same name."""
     names = tuple(t.name for t in tolerances)
     if not names:
         raise InputError("there is no tolerance: give at least one")
@@ -424,10 +426,10 @@ def check_tolerances(tolerances: Sequence[Tolerance]) -> tuple[str, ...]:
 def _curvatures(
     turn: ForceTurn, tolerances: Sequence[Tolerance], quantities: Sequence[str]
 ) -> tuple[dict[str, FloatArray], NDArray[np.bool_]]:
-    """Return second derivatives times the two standard deviations, and a mask (n,): whether all mechanisms can be assembled.
+    """Return second derivatives times standard deviations, and a mask (n,): whether all varied mechanisms can be assembled.
 
-    The second derivatives of each quantity, by name and of shape (m, m, n), are half the differences between the first
-    derivatives one standard deviation above and below.
+    The second derivatives are given for each quantity, by name, shape (m, m, n): each times the standard deviations of its
+    two errors. They are half the difference between the first derivatives one standard deviation above and below.
     """
     n, m = len(turn), len(tolerances)
     names, deviations = [t.name for t in tolerances], np.array([t.deviation for t in tolerances])
@@ -446,7 +448,7 @@ def _curvatures(
 
 
 def _near_pole(turn: ForceTurn, names: tuple[str, ...], extents: FloatArray) -> NDArray[np.bool_]:
-    """Return a mask (n,): whether errors at their extents reach a zero of the slider force's lever, if the force is unknown."""
+    """Return a mask (n,): whether the slider force is unknown and errors at their extents make its lever arm zero."""
     n = len(turn)
     if turn.sought != SLIDER_FORCE:
         return np.zeros(n, dtype=bool)
@@ -456,7 +458,7 @@ def _near_pole(turn: ForceTurn, names: tuple[str, ...], extents: FloatArray) -> 
 
 
 def _share(parts: MaskedArray, whole: MaskedArray, none: NDArray[np.bool_]) -> MaskedArray:
-    """Return parts (m, n) divided by a whole (n,), masked where ``none`` is true."""
+    """Return ``parts`` (m, n) divided by their sum ``whole`` (n,), masked where ``none`` is true."""
     shares = np.ma.masked_where(np.broadcast_to(none, parts.shape), parts) / np.ma.masked_where(none, whole)
     shares.fill_value = np.nan
     return cast(MaskedArray, shares)

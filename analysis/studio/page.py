@@ -1,4 +1,7 @@
-"""Build the page, one file beside this module, from `studio/` and the registry of mechanisms, and open it with a state."""
+"""Build the studio's web page, one HTML file beside this module, from `studio/` and the registry of mechanisms.
+
+The page opens with a given state of a mechanism.
+"""
 
 from __future__ import annotations
 
@@ -57,12 +60,12 @@ def is_current() -> bool:
 
 
 def build_page(template: str | None = None, mechanisms: Iterable[Mechanism] | None = None) -> str:
-    """Return the page with mechanisms, which Zig compiles.
+    """Return the HTML of the page with mechanisms, which Zig compiles to WebAssembly.
 
     Parameters
     ----------
     template : str, optional
-        A page whose mechanisms are replaced; by default the page that `npm run build` wrote.
+        HTML of a page whose mechanisms are replaced; by default the page that `npm run build` wrote.
     mechanisms : iterable of Mechanism, optional
         By default all registered mechanisms.
 
@@ -83,7 +86,9 @@ def build_page(template: str | None = None, mechanisms: Iterable[Mechanism] | No
 
 
 def make_page(state: Mapping[str, Any]) -> str:
-    """Return the built page with an opening state; if the page lacks the state's mechanism, it has only that one.
+    """Return the HTML of the built page with an opening state.
+
+    If the built page lacks the mechanism of this state, the returned page has this mechanism only.
 
     Raises
     ------
@@ -97,7 +102,7 @@ def make_page(state: Mapping[str, Any]) -> str:
 
 
 def page_address(state: Mapping[str, Any], page: str) -> str:
-    """Return the address of the page with a state, in the form that the page itself writes; start values are left out.
+    """Return the address that opens the page with a state, as the page itself writes it; start values are left out.
 
     Parameters
     ----------
@@ -118,7 +123,7 @@ def main() -> None:
 
 
 def _replace_script(page: str, script: str, data: Any) -> str:
-    """Return a page in which the JSON script with the id ``script`` has other data."""
+    """Return the page with ``data`` in the JSON script whose id is ``script``."""
     text = json.dumps(data, separators=(",", ":")).replace("<", "\\u003c")
     pattern = rf'(<script type="application/json" id="{script}">).*?(</script>)'
     return re.sub(pattern, lambda found: found[1] + text + found[2], page, count=1, flags=re.DOTALL)

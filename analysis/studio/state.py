@@ -1,4 +1,7 @@
-"""Convert between cases and states of the page; the opening state."""
+"""Convert cases to states of the page and back; make the opening state.
+
+A state is a mapping with the mechanism, the title, the values in SI by FMI name, and the duration of a run (s).
+"""
 
 from __future__ import annotations
 

@@ -135,7 +135,7 @@ def _entry_rows(mechanism: Mechanism, variable: Variable, reference: int) -> dic
 
 
 def _motor(mechanism: Mechanism, crank: int) -> list[dict[str, Any]]:
-    """Return the rows of a motor on the crank, whose references in the page's module are negative."""
+    """Return the rows of the values of a motor on the crank; their references in the page's module are negative."""
     torque = find_crank(mechanism, mechanism.freedoms[crank].coordinate).torque if crank >= 0 else None
     if torque is None:
         return []
@@ -162,7 +162,8 @@ def _motor(mechanism: Mechanism, crank: int) -> list[dict[str, Any]]:
 def _stiffness_reference(mechanism: Mechanism, reference: dict[str, int], crank: int) -> int | None:
     """Return the value reference of the stiffness from which the page computes the natural frequency.
 
-    It is -1 if no single parameter is this stiffness, so that it follows from the energy; None if there is no such frequency.
+    The result is -1 if no single parameter is this stiffness: the page then computes the stiffness from the energy. The
+    result is None if the mechanism has no such frequency.
     """
     if crank < 0 or len(mechanism.cyclic_freedoms) == len(mechanism.freedoms):
         return None
@@ -207,9 +208,10 @@ def _outputs_with_rates(mechanism: Mechanism) -> list[str]:
 
 
 def _charts(mechanism: Mechanism) -> list[dict[str, Any]]:
-    """Return the charts of the page; ``of`` lists the index of the output of a curve, or of those whose magnitude it shows.
+    """Return the charts of the page.
 
-    The indices of powers follow the outputs and the coordinates of the joints: see studio.c.
+    The entry ``of`` of a curve lists the index of an output, or of several: the curve then shows the magnitude of their
+    vector. Powers have the indices after all outputs and all coordinates of joints: see studio.c.
     """
     names, variables = list(mechanism.output_names), {v.name: v for v in mechanism.variables}
     power = len(names) + 3 * len(mechanism.drawing.joints if mechanism.drawing else ())

@@ -8,7 +8,7 @@
 >>> round(1e4 * result.best.error, 2)
 0.44
 
-The names are those of ``__init__.pyi``; each is imported from its module when it is first used.
+The public names are listed in ``__init__.pyi``; each is imported from its module when it is first used.
 """
 
 from __future__ import annotations

@@ -19,14 +19,14 @@ from .master import SystemRun, run_system
 
 
 class Way(NamedTuple):
-    """A way of coupling: the master's coupling, whether rates of commanded speeds are connected, and the FMI version."""
+    """A way of coupling: the master's coupling, whether inputs for rates of speeds are connected, and the FMI version."""
 
     coupling: str
     rates: bool = True
     fmi: int = 2
 
 
-#: The ways that are compared.
+#: The ways of coupling that are compared, by name.
 WAYS = {
     "hold": Way("hold", rates=False),
     "acceleration": Way("hold"),
@@ -50,8 +50,9 @@ class Convergence:
     steps : (N,) float array
         Communication steps (s), in descending order.
     errors : mapping of str to (N,) float array
-        For each coupling, the greatest error of all connected outputs without accelerations, at the points of the greatest
-        step, relative to the greatest magnitude of each output; NaN if a part refused a step.
+        For each coupling, the greatest error of any connected output that is not an acceleration, relative to the greatest
+        magnitude of this output. The error is taken at the communication points of the longest step. NaN if a part refused a
+        step.
     powers : mapping of str to (N,) float array
         For each coupling, the work that the coupling added, as a fraction of the work transmitted by the power bonds; 0
         without bonds, NaN if a part refused a step.
@@ -68,7 +69,7 @@ class Convergence:
     def order(self, way: str) -> float:
         """Return the order of a coupling: the slope of log error over log step by regression; NaN with fewer than two errors.
 
-        Errors above 0.1, where the step is too long for the system, and errors of the parts' own integrators are left out.
+        Errors above 0.1 are left out (the step is too long), and errors below 1e-8 (they are due to the parts' integrators).
         """
         good = np.isfinite(self.errors[way]) & (self.errors[way] > _FLOOR) & (self.errors[way] < 0.1)
         if np.count_nonzero(good) < 2:
@@ -85,14 +86,14 @@ def convergence(
     ways: Sequence[str] = tuple(WAYS),
     progress: bool = False,
 ) -> Convergence:
-    """Run a system with several couplings and communication steps, and compare each run with the joined equations.
+    """Run a system with several couplings and communication steps, and compare each run with that of a `JoinedSystem`.
 
     Parameters
     ----------
     system : System
     steps : sequence of float, optional
-        Communication steps (s), each a whole fraction of the first; by default three per decade, from the shorter of the
-        system's step and the controllers' sample times downwards.
+        Communication steps (s); each must divide the first. By default the first is the shortest of the system's step and the
+        controllers' sample times, and there are three steps per decade.
     decades : int
         Number of decades of the default steps.
     stop_time : float, optional

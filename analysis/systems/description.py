@@ -34,7 +34,7 @@ PARTNERS = ("induction-motor", "flywheel-gear", "line-shaft", "press-load")
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PartTable:
-    """A part: a case, a partner, a controller or an FMU, and its start values.
+    """Table of a part of a system: a case, a partner, a controller or an FMU, and start values.
 
     Attributes
     ----------
@@ -47,7 +47,7 @@ class PartTable:
     fmu : str
         An FMU of FMI 2.0 or 3.0, from any tool.
     values : mapping
-        Parameters and inputs at the start by their FMI names; texts with units, or numbers in SI. A list ``table`` gives
+        Start values of parameters and inputs, by FMI name: texts with units, or numbers in SI. A list ``table`` gives
         ``table_0``, ``table_1`` and so on.
     """
 
@@ -85,7 +85,7 @@ def _connections(value: Any, name: str) -> dict[End, End]:
 
 @dataclass(frozen=True, kw_only=True)
 class System:
-    """A system as a file describes it.
+    """A system of connected parts, as a file describes it.
 
     Attributes
     ----------
@@ -106,7 +106,7 @@ class System:
 
     @cached_property
     def members(self) -> dict[str, Member]:
-        """The parts by name, with their mechanisms and start values."""
+        """Return the parts by name, with their mechanisms and start values."""
         return {name: self._member(name, table) for name, table in self.parts.items()}
 
     def _member(self, name: str, table: PartTable) -> Member:
@@ -133,7 +133,7 @@ class System:
         )
 
     def _case(self, table: PartTable) -> tuple[Any, Any, dict[str, float]]:
-        """Return parameters, state at the start, and the constant inputs that the case is driven by."""
+        """Return the parameters, the initial state and the constant driving inputs of the case of a part."""
         if table.partner:
             made = load_linkage(Path(str(HERE / "partners" / f"{table.partner}.toml")))
             case = published_case(made.name)
@@ -148,7 +148,7 @@ class System:
         return case.parameters, case.initial, {k: float(v) for k, v in given.items() if isinstance(v, int | float)}
 
     def _modes(self, name: str, mechanism: Mechanism, inputs: Mapping[str, float]) -> dict[str, float]:
-        """Return the mode of each freedom: that of its connected input, or that of the case if none is connected."""
+        """Return the drive mode of each freedom: it follows from the connected input or, if there is none, from the case."""
         found = {}
         for number, freedom in enumerate(mechanism.freedoms):
             if freedom.mode is None:
@@ -167,7 +167,7 @@ class System:
         ----------
         folder : path, optional
         fmi : int
-            Version of FMI of the mechanisms and partners, 2 or 3; controllers are of FMI 2.0.
+            Version of FMI of the mechanisms and partners, 2 or 3; controllers always have FMI 2.0.
 
         Raises
         ------
@@ -233,7 +233,7 @@ def _number(value: Any, name: str) -> float:
 
 
 def _read_values(values: Mapping[str, Any], units: Mapping[str, str], where: str) -> dict[str, float]:
-    """Read values by FMI name, in the unit of each; a list gives the values of ``name_0``, ``name_1`` and so on."""
+    """Return values by FMI name, in the units of the variables; a list gives ``name_0``, ``name_1`` and so on."""
     values = dict(values)
     for key in [key for key, value in values.items() if isinstance(value, list)]:
         names = [name for name in units if re.fullmatch(re.escape(key) + r"_\d+", name)]
@@ -263,7 +263,7 @@ def load_system(path: str | Path) -> System:
     Raises
     ------
     InputError, ParameterError
-        If it cannot be read, or an entry is not right.
+        If the file cannot be read, or an entry is wrong.
     """
     return replace(files.read(System, files.read_tables(path), ""), folder=Path(path).parent)
 

@@ -21,10 +21,10 @@ OPTIONS = (
 
 
 def write_host(wiring: Wiring, folder: str | Path) -> list[str]:
-    """Write a system as C files into a folder, and return the names of those to compile.
+    """Write a system as C files into a folder, and return the names of the files to compile.
 
-    These are ``host.c``, which is the master with its clock, and one file for each native FMU. ``system.h`` has the start
-    values and the connections.
+    Compile ``host.c``, which is the master with its clock, and one file for each native FMU. The header ``system.h`` has the
+    start values and the connections.
 
     Raises
     ------
@@ -171,5 +171,5 @@ def _function(head: str, lines: Iterable[str]) -> list[str]:
 
 
 def _field(port: str) -> str:
-    """Return the field of a controller's C structure for a port: harmonics are elements of an array."""
+    """Return the field of a controller's C structure for a port, such as ``name[0]`` for the port ``name_0``."""
     return re.sub(r"_(\d+)$", r"[\1]", port)

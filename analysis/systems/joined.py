@@ -1,7 +1,7 @@
 """Integrate a system as one model, with the equations of all mechanisms joined: the reference for coupling errors.
 
-A commanded speed equals the speed that it is connected to at every instant, and its rate is the derivative of that speed.
-Controllers sample at their sample times, and their outputs act at once.
+At every instant a commanded speed equals the speed to which it is connected, and its rate equals the derivative of this
+speed. Controllers sample at their sample times, and their outputs act at once.
 """
 
 from __future__ import annotations
@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import fields as dataclass_fields
 from itertools import pairwise
+from math import ceil
 from typing import Any
 
 import numpy as np
@@ -28,7 +29,7 @@ from .wiring import End, WiringError
 
 
 class _Model:
-    """A mechanism of the system: its traced equations, its constants, its initial state."""
+    """Traced equations, constants and initial state of one mechanism of a system."""
 
     def __init__(self, member: Member, mechanism: Mechanism) -> None:
         self.mechanism, values = mechanism, member.values
@@ -132,7 +133,11 @@ class JoinedSystem:
         self.start = np.concatenate([model.start for model in self.models.values()])
 
     def _solve_connections(self, casadi: Any, symbols: list[Any], values: list[Any]) -> Any:
-        """Solve the connections: return the connected values as expressions of the states alone."""
+        """Solve the connections: return the connected outputs as expressions of the states and the controllers' outputs.
+
+        ``symbols`` stand for the connected outputs of mechanisms; ``values`` are the expressions of these outputs, which may
+        contain ``symbols``.
+        """
         if not symbols:
             return casadi.SX(0, 1)
         w, found = casadi.vertcat(*symbols), casadi.vertcat(*values)
@@ -147,7 +152,7 @@ class JoinedSystem:
         return -casadi.solve(matrix, casadi.substitute(found - w, w, casadi.SX.zeros(len(symbols))))
 
     def run(self, stop_time: float, step: float, *, tolerance: float = 1e-12) -> SystemRun:
-        """Integrate with SciPy's DOP853; return all outputs at multiples of a step.
+        """Integrate the system with SciPy's DOP853, and return all outputs at multiples of ``step`` (s).
 
         Raises
         ------
@@ -155,8 +160,7 @@ class JoinedSystem:
             If the integration does not reach the end.
         """
         times = step * np.arange(round(stop_time / step) + 1)
-        period = min((c.sample_time for c in self.controllers.values()), default=stop_time)
-        marks = np.unique(np.concatenate([period * np.arange(round(stop_time / period) + 1), [stop_time]]))
+        marks = self._sample_times(stop_time)
         x, rows, kept = self.start, [], []
         for begin, end in pairwise(marks):
             held = self._sample(float(begin), x)
@@ -180,8 +184,17 @@ class JoinedSystem:
             coupling="joined",
         )
 
+    def _sample_times(self, stop_time: float) -> NDArray[np.float64]:
+        """Return the instants (s) at which controllers sample, from 0, and the stop time; equal but for rounding is equal."""
+        periods = [controller.sample_time for controller in self.controllers.values()]
+        times = [period * np.arange(ceil(stop_time / period)) for period in periods]
+        marks = np.unique(np.concatenate([[0.0], *times]))
+        shortest = min(periods, default=stop_time)
+        apart = np.diff(marks, append=stop_time) > 1e-6 * shortest
+        return np.append(marks[apart], stop_time)
+
     def _sample(self, t: float, x: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Sample the controllers that are due at t, each with the others' outputs before t; return the outputs of all."""
+        """Sample the controllers that are due at t, using the controller outputs before t; return the outputs of all."""
         due = {name: c for name, c in self.controllers.items() if c.count * c.sample_time <= t + 1e-6 * c.sample_time}
         # at the start the values that controllers exchange settle after as many rounds as there are controllers
         for _ in due if t == 0.0 else ():

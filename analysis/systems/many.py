@@ -27,7 +27,7 @@ _BATCH = 16
 
 
 class SystemRunsEnded(LinkworkError):
-    """The runs were interrupted, or workers were lost; ``runs`` has the finished runs, and ``folder``, if given, keeps them."""
+    """Error for interrupted runs or lost workers; ``runs`` has the finished runs, and ``folder``, if given, keeps them."""
 
     def __init__(self, reason: str, runs: SystemRuns, folder: Path | None) -> None:
         self.runs = runs
@@ -71,7 +71,11 @@ class SystemRuns:
 
 
 class _Task(NamedTuple):
-    """A batch of runs: FMUs and values of the parts, connections, varied values, and settings of the run."""
+    """A batch of runs: FMUs and values of the parts, connections, varied values, outputs, and settings of the run.
+
+    ``varied`` has the names of the varied variables, and ``sets`` their values by run and variable. ``run`` is coupling,
+    communication step (s), stop time (s) and number of steps per sample.
+    """
 
     parts: tuple[tuple[str, Path, tuple[tuple[str, float], ...]], ...]
     connections: tuple[tuple[End, End], ...]
@@ -107,9 +111,9 @@ def run_many(
     coupling, step, stop_time
         See `run_system`.
     every : int
-        Number of communication points per sample.
+        Number of communication steps from one sample to the next.
     folder : path, optional
-        Folder in which the runs are kept; runs that it already has are not repeated.
+        Folder in which the runs are kept; runs that are finished in this folder are not repeated.
     n_jobs : int, optional
         Number of processes; the default, also within `joblib.parallel_config`, is that of `run_in_parallel`.
     progress : bool
@@ -117,7 +121,7 @@ def run_many(
     Raises
     ------
     InputError
-        If the numbers of values differ, or the folder has runs of another study.
+        If two variables have different numbers of values, or the folder has runs of another study.
     SystemRunsEnded
         On Ctrl-C, and if workers are lost.
     UnknownNameError
@@ -165,7 +169,7 @@ def _value_rows(wiring: Wiring, vary: Mapping[str, ArrayLike]) -> NDArray[np.flo
 
 
 class _Storage:
-    """Storage of samples, lengths and messages in memory, or in a folder, of which finished runs are read first."""
+    """Storage of samples, lengths and messages in memory or in a folder; finished runs in the folder are taken over."""
 
     def __init__(self, task: _Task, count: int, folder: Path | None) -> None:
         self.folder, self.messages = folder, dict[int, str]()

@@ -2,8 +2,8 @@
 
 Over a communication step the inputs are constant or linear in time: see `COUPLINGS`. If two parts exchange power, the work
 that the coupling adds over a step is known at its end (S. Sadjina, L. T. Kyllingstad, S. Skjong and E. Pedersen, Energy
-conservation and power bonds in co-simulations, Engineering with Computers 33, 2017). It estimates the error of a run and the
-step that a wanted error needs, and it can control the step.
+conservation and power bonds in co-simulations, Engineering with Computers 33, 2017). This work measures the error of a run. It
+gives the step that is needed for a wanted error, and it can control the step.
 """
 
 from __future__ import annotations
@@ -34,14 +34,14 @@ COUPLINGS = {
 #: Controller of the communication step: proportional and integral gain; least and greatest growth of a step; least and greatest
 #: step relative to the first one (Sadjina et al., section 5).
 _GAINS, _GROWTH, _STEPS = (0.2, 0.15), (0.2, 1.5), (1e-3, 1e2)
-#: Decay per step of the power to which residuals are compared: it remembers some fifty steps, so that zeros of the power
-#: do not matter.
+#: Decay per step of the power to which residuals are compared: this power remembers some fifty steps, so that instants
+#: without power do not matter.
 _MEMORY = 0.98
 
 
 @dataclass(frozen=True, kw_only=True)
 class SystemRun:
-    """A run of a system.
+    """Result of a run of a system.
 
     Attributes
     ----------
@@ -90,7 +90,7 @@ class SystemRun:
     def added_work(self) -> float:
         """Return the work that the coupling added, as a fraction of the work that all bonds transmitted; 0 without bonds.
 
-        Over a step a residual grows from 0, so that its mean is half of its value at the end.
+        Over a step a power residual grows from 0, so that the mean residual is half of the residual at the end.
         """
         steps = np.diff(self.time)
         through = sum(float(steps @ np.abs(flow[1:])) for flow in self.flows.values())
@@ -100,8 +100,9 @@ class SystemRun:
     def suggested_step(self, share: float) -> float | None:
         """Return the communication step with which the coupling would add a given share of the work (s).
 
-        It is valid for equal steps so small that a residual is proportional to the step, or to its square if inputs are linear.
-        None without power bonds, and for couplings whose error the residuals do not measure.
+        It is valid if the steps of the run are equal, and so small that a residual is proportional to the step, or to the
+        square of the step if the inputs are linear in time. The result is None if the coupling added no work, as without power
+        bonds, and for couplings whose error the residuals do not measure.
         """
         brought = self.added_work()
         orders = {"hold": 1.0, "derivatives": 2.0}
@@ -157,7 +158,7 @@ class _Instances:
         }
         #: For each connected input the output that is the rate of its source, or the source itself if none is known.
         self.rates = np.array([rates.get(s, index[s]) for s in wiring.connections.values()], dtype=int)
-        #: Whether each connected input has a slope: not if its rate is connected, too, or its source is held.
+        #: Whether each connected input has a slope: not if its rate is connected, too, or its source has discrete values.
         self.moving = np.array(
             [
                 not (wiring.port(source).held or wiring.rate_input(target) in wiring.connections)
@@ -181,7 +182,7 @@ class _Instances:
     def _exchange(
         self, outputs: Floats, slopes: Floats | None = None, *, middle: float = 0.0, updated: bool = False
     ) -> None:
-        """Set all connected inputs; a part that accepts no slopes receives the values at ``middle`` (s) after the start."""
+        """Set all connected inputs; a part that accepts no slopes receives the values ``middle`` (s) after the step begins."""
         values = outputs[self.sources]
         for name, (ports, numbers) in self.own.items():
             own = None if slopes is None else slopes[numbers]
@@ -190,7 +191,7 @@ class _Instances:
             self.instances[name].set_inputs(ports, values[numbers], own, middle=later, updated=updated)
 
     def _slopes(self) -> Floats:
-        """Return the slopes of all connected inputs; if a rate is not known, the slope of the step before is used."""
+        """Return the slopes of all connected inputs over time; if a rate is not known, the slope of the last step is used."""
         found = self.outputs[self.rates]
         unknown = self.rates == self.sources
         found[unknown] = (self.outputs - self.before)[self.sources[unknown]] / self.last
@@ -248,7 +249,7 @@ class _Instances:
 
 
 class _Stepper:
-    """Controller of the communication step, which is constant, or such that the coupling adds about a share of the work."""
+    """Controller of the communication step: constant, or adapted so that the coupling adds a wanted share of the work."""
 
     def __init__(self, step: float, stop_time: float, share: float | None) -> None:
         self.step, self.stop_time, self.share = step, stop_time, share
@@ -267,7 +268,7 @@ class _Stepper:
 
     @property
     def count(self) -> int:
-        """Number of equal steps."""
+        """Return the number of steps of a run with equal steps."""
         return round(self.stop_time / self.first)
 
     def adapt(self, powers: Floats, flows: Floats) -> None:
@@ -304,8 +305,8 @@ def run_system(
     step, stop_time : float, optional
         Communication step and end (s); by default the wiring's.
     share : float, optional
-        Wanted power residual, such as 1e-3, as a fraction of the power that the bonds transmitted recently. It controls the
-        length of the steps, and ``step`` is the first of them.
+        Share of the work that the coupling may add, such as 1e-3, relative to the power that the bonds transmitted recently.
+        The share controls the length of the steps; ``step`` is the length of the first step.
     progress : bool
 
     Returns
@@ -385,6 +386,6 @@ def run_system(
 
 
 def _refusal(together: _Instances, time: float, error: FMICallException) -> str:
-    """Return the message that a part refused a step, with the last text of any FMU: FMPy passes all texts to one of them."""
+    """Return the message on a refused step, with the last text of any FMU, as FMPy passes all texts to one of the FMUs."""
     said = [text for instance in together.instances.values() for text in instance.messages]
     return f"{together.stepping} refused the step from t = {time:.9g} s: {said[-1] if said else error}"

@@ -116,7 +116,7 @@ def _component(part: Part, source: str, ports: Mapping[str, Iterable[str]]) -> A
 
 
 def _complete_structure(path: Path, wiring: Wiring) -> None:
-    """Add communication step and geometry, and move the units before the experiment, as the schema requires."""
+    """Add communication step and geometry to the file, and move the units before the experiment, as the schema requires."""
     tree = etree.parse(path)
     root, placed = tree.getroot(), boxes(wiring)
     found = {node.tag: node for node in root}
@@ -141,7 +141,7 @@ def _complete_structure(path: Path, wiring: Wiring) -> None:
 
 
 def _values(path: Path, part: Part) -> Path:
-    """Write the start values of a part, those of an enumeration by the names of its items, and return the path."""
+    """Write the start values of a part to ``path``, values of enumerations by their names, and return the path."""
     ports = [part.ports[name] for name in part.values]
     with lazy("pyssp_standard.ssv").SSV(path, mode="w") as values:
         for port in ports:
@@ -179,7 +179,7 @@ def read_ssp(path: str | Path) -> Wiring:
     MissingLibraryError
         If pyssp-standard is not installed.
     WiringError, UnknownNameError
-        If it has an element that is not supported, or a connection is wrong.
+        If the system has an element that is not supported, or a connection is wrong.
     """
     if not zipfile.is_zipfile(path):
         raise InputError(f"{path} is no .ssp: it must be an archive with a SystemStructure.ssd")
@@ -229,7 +229,11 @@ def read_ssp(path: str | Path) -> Wiring:
 
 
 def _start_values(folder: Path, bindings: Iterable[Any], name: str, own: int) -> dict[str, str]:
-    """Return a part's start values as text: first from its ``own`` first bindings, then from the system's for its name."""
+    """Return the start values of the part ``name`` as texts, by variable.
+
+    The first ``own`` bindings belong to the part. The other bindings belong to the system; there the names of the part's
+    variables begin with the name of the part. If a variable has several values, the first one is taken.
+    """
     found: dict[str, str] = {}
     for number, binding in enumerate(bindings):
         inline, prefix = binding.ssv is not None, binding.prefix or ""
@@ -247,7 +251,7 @@ def _start_values(folder: Path, bindings: Iterable[Any], name: str, own: int) ->
 
 
 def _mapping(folder: Path, binding: Any) -> dict[str, tuple[str, ...]]:
-    """Return the targets of each parameter in the binding's ``.ssm``; empty without one."""
+    """Return the targets of each parameter in the ``.ssm`` of a binding; empty if the binding has no ``.ssm``."""
     mapping = binding.parameter_mapping
     if mapping is None:
         return {}

@@ -14,7 +14,7 @@ from ..run import read_description
 
 
 class WiringError(LinkworkError):
-    """A system is wired wrongly; the message names the connection and says what would be right."""
+    """Error for a system with a wrong part or connection; the message says what would be right."""
 
 
 #: The types of real variables, in FMI 2.0 and 3.0.
@@ -24,8 +24,8 @@ REAL = ("Real", "Float64")
 class Port(NamedTuple):
     """A variable of an FMU: its type, its unit, and the variable whose time derivative it is, if any.
 
-    ``held`` says that it changes only at discrete instants. For an enumeration, ``enumeration`` is the name of its type and
-    ``items`` has the names of its values.
+    ``held`` says whether the variable changes only at discrete instants. For an enumeration, ``enumeration`` is the name of
+    its type and ``items`` has the names of its values.
     """
 
     name: str
@@ -40,7 +40,7 @@ class Port(NamedTuple):
 
 
 class End(NamedTuple):
-    """A port of a part, given by the names of both."""
+    """End of a connection: the name of a part and the name of its port."""
 
     part: str
     port: str
@@ -61,7 +61,7 @@ class Part:
     ports : mapping of str to Port
         All its variables.
     values : mapping of str to float
-        Start values by variable; all other variables have the FMU's own.
+        Start values by variable; all other variables have the start values of the FMU.
     feeds : mapping of str to tuple of str
         Inputs on which an output depends directly, by the name of the output.
     description : object
@@ -84,7 +84,7 @@ class Part:
         InputError
             If the file is no FMU.
         WiringError
-            If it is not for co-simulation of FMI 2.0 or 3.0, or has no parameter or input of a name in ``values``.
+            If the FMU is not for co-simulation with FMI 2.0 or 3.0, or a name in ``values`` is no parameter or input of it.
         """
         check_fmu(fmu)
         description = read_description(fmu)
@@ -193,11 +193,11 @@ class Wiring:
                 )
 
     def port(self, end: End) -> Port:
-        """Return a port."""
+        """Return the port at an end of a connection."""
         return self.parts[end.part].ports[end.port]
 
     def rate_input(self, end: End) -> End | None:
-        """Return the input that is the time derivative of an input: in the same table, with the unit divided by seconds."""
+        """Return the input for the time derivative of a given input: in the same table, with the unit divided by seconds."""
         unit = {"rad/s": "rad/s2", "m/s": "m/s2"}.get(self.port(end).unit)
         inputs = (
             End(end.part, name)

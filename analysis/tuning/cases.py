@@ -105,7 +105,7 @@ def load_tuning_case(path: str | Path, overrides: Mapping[str, Any] | None = Non
 def read_tuning_case(
     data: Mapping[str, Any], *, folder: Path, title: str = "", overrides: Mapping[str, Any] | None = None
 ) -> TuningCase:
-    """Build a case from the tables of a case file; names of files in it are relative to ``folder``."""
+    """Build a case from the tables of a case file; file names in the tables are relative to ``folder``."""
     tables = override({"title": title} | dict(data), overrides or {})
     if "tune" not in tables:
         raise MissingParameterError("tune")

@@ -1,8 +1,8 @@
-"""Define the conditions on the changes of parameters: functions that must not be negative, each of one motion of the response.
+"""Define the conditions on the changes of parameters: functions of a motion of the response that must not be negative.
 
 The level is the value of the speed, or of the other quantity whose range is tuned. A motion is given by y at crank angle 0 and
-its level. It is picked from its branch by one further equation: a plane across the branch, or the loss of stability. When the
-parameters change, it is found again from its last place, so that it stays on its branch.
+its level. One further equation picks the motion from its branch: a plane across the branch, or the loss of stability. When the
+parameters change, the motion is found again from its last position, so that it stays on its branch.
 """
 
 from __future__ import annotations
@@ -32,18 +32,18 @@ from ..periodic import (
 )
 from .wishes import AMPLITUDE, Limit, Wish
 
-#: Step of the search for the level at which an output is greatest, relative to the range's size, and steps at most.
+#: Search for the level at which an output is greatest: step relative to the range's size, and greatest number of steps.
 _STEP, _CLIMB = 1e-3, 12
-#: Greatest number of samples by which the crank angle of a greatest value may move in a search.
+#: Greatest number of samples by which the crank angle of a maximum may move in a search.
 _UPHILL = 256
 FloatArray = NDArray[np.float64]
 
-#: Newton's method: iterations at most, and the correction relative to the scale at which a place is found.
+#: Newton's method: greatest number of iterations, and correction, relative to the scale, at which a motion counts as found.
 ITERATIONS, FOUND = 12, 1e-9
 #: Greatest change of a parameter in one step, relative to the larger of its value and its tolerance; greatest correction in a
 #: step, relative to the scale.
 STRIDE, REACH = 0.05, 0.3
-#: Halvings of a step, over all steps, after which a place counts as lost.
+#: Halvings of a step, over all steps, after which a motion counts as lost.
 _HALVINGS = 3
 #: Samples of a turn.
 _SAMPLES = 256
@@ -54,7 +54,7 @@ class LostError(LinkworkError):
 
 
 class Expansion(NamedTuple):
-    """Derivatives of y(T) - y(0) and of the monodromy matrix by y at crank angle 0, the level and the k changes.
+    """Derivatives of y(T) - y(0) and of the monodromy matrix with respect to y at crank angle 0, the level and the k changes.
 
     Attributes
     ----------
@@ -83,7 +83,7 @@ class Expansion(NamedTuple):
 def family(wish: Wish, x: FloatArray, spot: Spot | None = None) -> Family:
     """Return the family of periodic motions over the level for changes x in units of the tolerances.
 
-    With a spot, links go round in them as often as in the motion at the spot.
+    With a spot, links go round as often per period as in the motion at the spot.
     """
     parameters, drive = wish.operation(x, wish.span[0])
     found = Family(parameters=parameters, drive=drive, vary=wish.over)
@@ -91,7 +91,7 @@ def family(wish: Wish, x: FloatArray, spot: Spot | None = None) -> Family:
 
 
 class Spot(NamedTuple):
-    """A motion on the response, given by y at crank angle 0 and its level."""
+    """A motion on the response, given by the changes of parameters, y at crank angle 0 and the level."""
 
     x: FloatArray  # the changes in units of the tolerances, shape (k,)
     y: FloatArray  # y at crank angle 0, shape (n,)
@@ -106,7 +106,7 @@ def known_spot(wish: Wish, x: FloatArray, orbit: PeriodicOrbit) -> Spot:
 
 
 def motion(wish: Wish, spot: Spot) -> PeriodicOrbit:
-    """Return the orbit that begins at a spot; its residual says how well it closes."""
+    """Return the orbit that begins at a spot; the orbit's residual says how well the orbit closes."""
     orbit: PeriodicOrbit = OrbitEquations(family(wish, spot.x, spot), spot.turns, *wish.span)(spot.y, spot.level).data
     return orbit
 
@@ -133,7 +133,7 @@ def expansion(wish: Wish, spot: Spot) -> Expansion:
 
 
 def margin_matrix(monodromy: FloatArray, kind: Crossing, radius: float = 1.0) -> FloatArray:
-    """Return a matrix A such that det(I - A) is zero when multipliers cross the circle of ``radius`` in the way ``kind``.
+    """Return a matrix A such that det(I - A) is zero when multipliers cross the circle of ``radius`` (crossing ``kind``).
 
     The determinant is positive if all multipliers are inside the circle.
     """
@@ -154,7 +154,7 @@ def crossing_margin(monodromy: FloatArray, kind: Crossing, radius: float = 1.0) 
 
 
 def margin_slopes(found: Expansion, kind: Crossing, radius: float = 1.0) -> FloatArray:
-    """Return the derivatives of `crossing_margin` by y, the level and the parameters, by exact complex steps."""
+    """Return the derivatives of `crossing_margin` with respect to y, the level and the changes, by exact complex steps."""
     step = 1e-30
     matrices = [margin_matrix(found.monodromy + 1j * step * m, kind, radius) for m in found.monodromies]
     return np.array([np.linalg.det(np.eye(len(m)) - m).imag / step for m in matrices])
@@ -167,15 +167,15 @@ class Row(Protocol):
         """Return the residual of the equation."""
 
     def slopes(self, found: Expansion) -> FloatArray:
-        """Return the derivatives of the residual by y, the level and the changes, shape (n + 1 + k,)."""
+        """Return the derivatives of the residual with respect to y, the level and the changes, shape (n + 1 + k,)."""
 
     def motion_slopes(self, found: Callable[[], Expansion]) -> FloatArray:
-        """Return the derivatives of the residual by y and the level alone, shape (n + 1,)."""
+        """Return the derivatives of the residual with respect to y and the level alone, shape (n + 1,)."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class CrossPlane:
-    """A plane across the branch, normal . (y, level) = offset; it fixes the level if the normal has no other component."""
+    """A plane across the branch, normal . (y, level) = offset; if only the normal's last entry is not 0, the level is fixed."""
 
     normal: FloatArray
     offset: float
@@ -213,7 +213,7 @@ class StabilityLoss:
 
 
 class PickedMotion:
-    """The motion that an equation picks from its branch after some changes, with its derivatives by the changes."""
+    """The motion that an equation picks from its branch for given changes, and its derivatives with respect to them."""
 
     def __init__(self, wish: Wish, row: Row, spot: Spot) -> None:
         self.spot = spot
@@ -231,19 +231,22 @@ class PickedMotion:
 
     @cached_property
     def slopes(self) -> FloatArray:
-        """Derivatives of y and the level by the changes, shape (n + 1, k)."""
+        """Derivatives of y and the level with respect to the changes, shape (n + 1, k)."""
         gaps, n = self.expansion.gaps, len(self.spot.y) + 1
         rows = np.vstack([gaps, self._row.slopes(self.expansion)])
         return -np.linalg.solve(rows[:, :n], rows[:, n:])
 
     def total_derivatives(self, slopes: FloatArray) -> FloatArray:
-        """Return total derivatives by the changes, (..., k), from those by y, the level and the changes, (..., n + 1 + k)."""
+        """Convert partial derivatives, (..., n + 1 + k), to total derivatives with respect to the changes, (..., k).
+
+        The partial derivatives are with respect to y, the level and the changes.
+        """
         n = len(self.spot.y) + 1
         found: FloatArray = slopes[..., n:] + slopes[..., :n] @ self.slopes
         return found
 
     def output_slopes(self, number: int, angle: float) -> FloatArray:
-        """Return the derivatives of an output, given by its index, at a crank angle, by the changes; shape (k,)."""
+        """Return the derivatives, (k,), of the output with index ``number`` at a crank angle with respect to the changes."""
         found = self.expansion
         v = found.variations
         angle = float(angle % (self.spot.turns * v.flow.period))
@@ -276,7 +279,7 @@ class TrackedMotion:
         self._scale = np.append(motion_scales(*wish.operation(spot.x, spot.level), spot.y), wish.size)
 
     def find(self, x: FloatArray) -> PickedMotion:
-        """Find the motion for changes x in units of the tolerances; raises LostError if it is not found again."""
+        """Find the motion for changes x in units of the tolerances; raises LostError if the motion is not found again."""
         last = self._last
         moved = np.abs(x - last.x) * self.wish.tolerance
         size = np.maximum(np.abs(self.wish.present), self.wish.tolerance)
@@ -346,7 +349,7 @@ def curve(turn: Turn, limit: Limit) -> Callable[[Any], Any]:
 
 
 def value_at_angles(turn: Turn, limit: Limit, angles: Sequence[float]) -> float:
-    """Return the value that the limit bounds: the magnitude at one crank angle, or half the difference between two."""
+    """Return the value that the limit bounds: the magnitude at one crank angle, or half the difference between two values."""
     values = curve(turn, limit)(np.array(angles))
     return float(abs(values[0])) if len(angles) == 1 else 0.5 * float(values[0] - values[1])
 
@@ -354,7 +357,8 @@ def value_at_angles(turn: Turn, limit: Limit, angles: Sequence[float]) -> float:
 def limited_value(turn: Turn, limit: Limit) -> tuple[float, tuple[float, ...]]:
     """Return the value that the limit bounds, over a period, and the crank angles at which it occurs.
 
-    It is the greatest magnitude, with one angle; or the amplitude, half the range, with the angles of maximum and minimum.
+    The value is the greatest magnitude, with one angle; or the amplitude, half the range, with the angles of maximum and
+    minimum.
     """
     samples = reduce(np.hypot, (turn.oscillation(part) for part in limit.parts))
     places = [np.abs(samples).argmax()]
@@ -372,7 +376,7 @@ def peak_angles(turn: Turn, limit: Limit, angles: Sequence[float]) -> tuple[floa
 
 
 def _climb(value: Callable[[Any], Any], angle: float, step: float, sign: float) -> float:
-    """Find the maximum (sign +1) or minimum of a function of the crank angle near an angle."""
+    """Find the crank angle of a maximum (sign +1) or minimum (sign -1) of a function near a given angle."""
     for _ in range(_UPHILL):
         a, b, c = sign * value(angle + step * np.array([-1.0, 0.0, 1.0]))
         if b >= max(a, c):
@@ -393,7 +397,7 @@ def _climb(value: Callable[[Any], Any], angle: float, step: float, sign: float) 
 
 
 class Condition(Protocol):
-    """A function of the changes that must not be negative."""
+    """A function of the changes of parameters that must not be negative."""
 
     #: Greatest violation that is accepted.
     slack: float
@@ -406,11 +410,11 @@ class Condition(Protocol):
         """Return the value of the function; raises LostError if the motion is not found."""
 
     def slopes(self, x: FloatArray) -> FloatArray:
-        """Return the derivatives of the function by the changes, shape (k,)."""
+        """Return the derivatives of the function with respect to the changes, shape (k,)."""
 
 
 class MultipliersInside:
-    """Condition that no multiplier has left the circle of radius ``radius`` in the way ``kind``: `crossing_margin` >= 0."""
+    """Condition that no multiplier has left the circle of ``radius`` by a crossing of ``kind``: `crossing_margin` >= 0."""
 
     slack = 1e-9
 
@@ -463,7 +467,7 @@ class PeakBeyond:
 
 
 def find_resonance(wish: Wish, x: FloatArray, near: Spot) -> tuple[Gradient, Spot]:
-    """Find a resonance near a motion: return its level with derivatives by the parameters that may be changed, and its spot.
+    """Find a resonance near a motion; return its level with the gradient over the changes, and its spot.
 
     Raises LinkworkError if there is no resonance near the motion.
     """

@@ -1,4 +1,4 @@
-"""Find the least change of given parameters that clears a range of speeds, by IPOPT and an exchange of conditions."""
+"""Find the least change of parameters that keeps a range of speeds free of resonance and instability, with IPOPT."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ from .result import JUMP, RESONANCE, STABLE, Tuned, Verification, readings, requ
 from .survey import MARGINAL, SOUGHT, Region, Survey, chart_range, other_motions, survey
 from .wishes import Wish
 
-#: IPOPT's tolerance, iterations at most, and the greatest violation of the conditions that is accepted.
+#: IPOPT's tolerance, greatest number of iterations, and greatest violation of the conditions that is accepted.
 _TOLERANCE, _ITERATIONS, VIOLATION = 1e-9, 60, 1e-8
 #: Number of points at which a motion was lost, after which a nonlinear program is given up.
 _PATIENCE = 4
@@ -45,7 +45,7 @@ _REST = 1e-6
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Answer:
-    """Solution.from_linkage a nonlinear program.
+    """Solution of a nonlinear program.
 
     Attributes
     ----------
@@ -72,7 +72,7 @@ class Answer:
 
 
 def objective(wish: Wish, x: Any) -> Any:
-    """Return the objective for changes x, numbers or symbols: the sum of their squares, or the change of one parameter."""
+    """Return the objective for changes x, numbers or symbols: the sum of the squares, or the change of one parameter."""
     squares = symbolic.library().sumsqr(x)
     if not wish.least:
         return squares
@@ -138,9 +138,9 @@ def _solve(wish: Wish, conditions: Sequence[Condition], x: FloatArray, *, elasti
 
 
 class _Values:
-    """Values and derivatives of the conditions as functions of the changes; NaN from the first condition whose motion is lost.
+    """Values and derivatives of the conditions for given changes.
 
-    The results of the last call are cached.
+    If the motion of a condition is lost, the results of this and all later conditions are NaN. The last results are cached.
     """
 
     def __init__(self, conditions: Sequence[Condition]) -> None:
@@ -149,7 +149,7 @@ class _Values:
         self._lost = 0
 
     def __call__(self, x: FloatArray, slopes: bool = False) -> tuple[FloatArray, FloatArray]:
-        """Return values, shape (m,), and derivatives, (m, k), which are NaN unless ``slopes``."""
+        """Return values, shape (m,), and derivatives, (m, k); the derivatives are NaN unless ``slopes`` is true."""
         key = x.tobytes()
         if self._last is not None and self._last[0] == key and self._last[1] >= slopes:
             return self._last[2:]
@@ -173,21 +173,21 @@ class _Values:
         return function
 
 
-#: Rounds of the exchange at most, and number of combinations of ways that are tried.
+#: Greatest number of rounds of the exchange, and of combinations of ways that are tried.
 _ROUNDS, _WAYS = 12, 8
-#: Value of a condition from which on it is far from being active.
+#: Value of a condition above which the condition counts as far from active.
 _FAR = 0.05
 #: Number of changes spread over their bounds that are tried if no way meets the wish, a power of two; halvings of the distance
 #: from the present values to changes that meet the wish; ratio of positive bounds above which the values are spread evenly in
 #: the logarithm.
 _SPREAD, _BISECTIONS, _WIDE = 16, 6, 10.0
-#: Ways to clear the range of a region of lost stability or a resonance: it goes below the range, above it, or vanishes.
+#: Where a region of lost stability or a resonance is moved to clear the range: below the range, above it, or removed.
 _BELOW, _ABOVE, _REMOVED = -1, 1, 0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Way:
-    """The way in which a region of lost stability, or a resonance, shall leave the range."""
+    """Choice of how a region of lost stability, or a resonance, leaves the range."""
 
     kind: Crossing | None  # kind of the region; None for a resonance
     level: float  # middle of the region, or the resonance
@@ -206,7 +206,7 @@ class _Search:
     best: tuple[tuple[bool, float, float], Survey, tuple[float, ...]] | None = None
 
     def survey_changes(self, x: FloatArray) -> Survey:
-        """Survey the range with the changes x."""
+        """Follow the response with the changes x and survey the range."""
         own = []
         for spot in self.more:
             place = TrackedMotion(self.wish, CrossPlane.level_plane(self.wish, spot, spot.level), spot)
@@ -235,17 +235,17 @@ class _Search:
 
     @property
     def least(self) -> float:
-        """Least objective so far with which all requirements are met; infinite if there is none."""
+        """Least objective found so far for which all requirements are met; infinite if there is none."""
         return np.inf if self.best is None or self.best[0][0] else self.best[0][2]
 
 
 def tune(wish: Wish, *, progress: bool = False) -> Tuned:
-    """Find the least change of parameters that clears a range of speeds.
+    """Find the least change of parameters that keeps a range of speeds free of resonance, jumps and instability.
 
     Conditions at motions of the response, with exact derivatives, keep unwanted regions and resonances out of the range; IPOPT
-    finds the least change that satisfies them. The response is then followed anew, and whatever still lies in the range becomes
-    a further condition, until nothing does. Regions of lost stability and resonances are moved below the range, above it, or
-    removed, and the least change of all combinations is taken.
+    finds the least change that satisfies them. The response is then followed again, and each region or resonance still in the
+    range adds a condition, until none is left. Each region of lost stability may be moved below the range, moved above it, or
+    removed; each resonance may be moved below or above. The least change of all combinations is returned.
 
     Parameters
     ----------
@@ -256,7 +256,7 @@ def tune(wish: Wish, *, progress: bool = False) -> Tuned:
     Returns
     -------
     Tuned
-        The verified changes; if the wish cannot be met, those with the least sum of excesses.
+        The verified changes; if the wish cannot be met, the changes with the least sum of excesses.
 
     Raises
     ------
@@ -292,7 +292,7 @@ def tune(wish: Wish, *, progress: bool = False) -> Tuned:
 
 
 def _try_ways(search: _Search, first: Survey, progress: bool) -> None:
-    """Try the combinations of ways, starting from the changes of a survey, and keep the best result."""
+    """Try the combinations of ways to clear the range, starting from the changes of a survey; keep the best result."""
     ways = _ways(first)
     with show_progress(progress, len(ways), "trying changes") as show:
         for number, way in enumerate(ways):
@@ -305,8 +305,8 @@ def _try_ways(search: _Search, first: Survey, progress: bool) -> None:
 def _survey_near_solution(search: _Search, first: Survey) -> Survey | None:
     """Find changes within the bounds that meet the requirements, and return a survey at nearby changes that do not.
 
-    If all ways from the first changes lose their motions, ways that start at the nearby changes may succeed. The result is None
-    if no changes of a sample spread over the bounds meet the requirements.
+    If the motions are lost on all ways from the first changes, a search that starts at the nearby changes may succeed. The
+    result is None if none of the sampled changes, spread over the bounds, meets the requirements.
     """
     wish = search.wish
     low, high = wish.scale_changes(wish.low), wish.scale_changes(wish.high)
@@ -328,7 +328,7 @@ def _survey_near_solution(search: _Search, first: Survey) -> Survey | None:
 
 
 def _spread_values(low: FloatArray, high: FloatArray) -> FloatArray:
-    """Return values spread over their bounds, shape (m, k)."""
+    """Return m sets of k values spread over their bounds, shape (m, k)."""
     share = qmc.Sobol(len(low), rng=0).random(_SPREAD)
     wide = (low > 0.0) & (high > _WIDE * low)
     base, ratio = np.where(wide, low, 1.0), np.where(wide, high / np.where(wide, low, 1.0), 1.0)
@@ -433,7 +433,7 @@ def _side(ways: Sequence[_Way], kind: Crossing | None, level: float) -> int | No
 
 
 def _exchange(search: _Search, first: Survey, ways: list[_Way]) -> tuple[Survey, tuple[float, ...]] | None:
-    """Find the least change by the given ways: return its survey, and the levels with two stable motions.
+    """Find the least change that clears the range in the given ways; return its survey and the levels with two stable motions.
 
     The requirements may not all be met after the last round. The result is None if a motion is lost, or if another combination
     of ways has found a change as small.
@@ -475,7 +475,7 @@ def _value(condition: Condition, answer: Answer) -> float:
 
 
 def _conditions(found: Survey, ways: list[_Way]) -> Iterator[Condition]:
-    """Yield the conditions for all that the survey has found; choices for new regions are added to ``ways``."""
+    """Yield the conditions for regions, minima, resonances and outputs of a survey; add ways for new regions to ``ways``."""
     wish, x = found.wish, found.x
     low, high = wish.span
     gone: list[Region] = []

@@ -29,9 +29,9 @@ class Reading:
     text : str
         Description with units of what was found.
     excess : float
-        Amount by which the requirement is missed, zero if it is met. For a resonance or a jump it is the distance from the
-        nearer end of the range, and for missing stable motions the width without one, both divided by the middle of the range;
-        for the largest multiplier the excess, for a limit the relative excess.
+        Amount by which the requirement is missed; zero if the requirement is met. Resonance or jump: distance from the nearer
+        end of the range; second stable motion: width of the range; missing stable motion: width of the parts without one; each
+        is divided by the middle of the range. Largest multiplier: excess over its bound. Limit: excess relative to the limit.
     missed : str
         Description of the excess; empty if the requirement is met.
     """
@@ -70,7 +70,7 @@ def describe_wish(wish: Wish) -> dict[str, str]:
 
 
 def readings(found: Survey, several: Sequence[float] = ()) -> dict[str, Reading]:
-    """Return the state of each requirement by its name; ``several`` are levels with two stable motions."""
+    """Return the state of each requirement of a survey, by name; ``several`` are levels with two stable motions."""
     wish, result = found.wish, {}
     if wish.no_resonance:
         peaks = [(spot.level, spot.level) for spot in found.peaks]
@@ -142,7 +142,8 @@ class Verification:
     orbits : int
         Number of motions of the response over the range.
     charted, largest, place : int, float, str
-        Number of points of a chart's row over the range, the largest multiplier on it, and the level of this multiplier.
+        Number of points of a chart's row over the range, the largest multiplier at these points, and the level of this
+        multiplier.
     sought : int
         Number of levels at which all motions were sought.
     several : str
@@ -172,7 +173,7 @@ class Verification:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Tuned(NotebookResult):
-    """The least change that meets a wish; if there is none, the change that misses it least.
+    """The least change that meets a wish; if no change does, the change with the least sum of excesses.
 
     Attributes
     ----------

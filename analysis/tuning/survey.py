@@ -1,4 +1,7 @@
-"""Survey a range of speeds: find resonances, lost stability and greatest outputs on the response followed over it."""
+"""Survey a range of speeds: follow the response over the range; find resonances, lost stability and greatest outputs.
+
+The level is the value of the speed, or of the other quantity whose range is tuned.
+"""
 
 from __future__ import annotations
 
@@ -66,21 +69,21 @@ NEXT = 0.05
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Region:
-    """A part of a branch on which stability is lost in one way.
+    """A part of a branch on which stability is lost by one kind of crossing.
 
     Attributes
     ----------
     kind : Crossing
     low, high : float
-        Least and greatest level of the region, as far as it was followed.
+        Least and greatest level of the region, as far as the branch was followed.
     first, last : SpecialPoint or None
         Special points at the ends of the region, if they were met.
     worst : Spot
         Motion with the least value of the test function.
     across : CrossPlane
-        Equation that picks this motion from the branch.
+        Equation that picks the motion ``worst`` from the branch.
     value : float
-        Value of the test function at this motion.
+        Value of the test function at the motion ``worst``.
     """
 
     kind: Crossing
@@ -104,7 +107,7 @@ class TestMinimum:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class OutputMaximum:
-    """A maximum over the range of an output that has a limit."""
+    """A maximum, over the range, of an output that has a limit."""
 
     limit: Limit
     value: float  # the maximum (SI)
@@ -128,7 +131,7 @@ class Survey:
     peaks : tuple of Spot
         Resonances in the range or the margin beside it.
     least : tuple of TestMinimum
-        Minima of the test functions, as far as the wish is concerned with them.
+        Minima of the test functions that matter for the wish.
     greatest : tuple of OutputMaximum
         Maxima of each limited output.
     largest : (float, float)
@@ -162,12 +165,12 @@ def survey(wish: Wish, x: FloatArray, more: Sequence[PeriodicOrbit] = ()) -> Sur
     x : ndarray, shape (k,)
         Changes in units of their tolerances.
     more : sequence of PeriodicOrbit
-        Motions on other branches, which are followed, too.
+        Motions on other branches, which are also followed.
 
     Raises
     ------
     OrbitError
-        If there is no motion to begin with.
+        If there is no periodic motion from which to start.
     """
     parameters, drive = wish.operation(x, wish.span[0])
     low, high = _ends(wish, BESIDE)
@@ -261,7 +264,7 @@ def _overlap(wish: Wish, low: float, high: float, span: tuple[float, float]) -> 
 
 
 def _add_branch(wish: Wish, response: Response, orbit: PeriodicOrbit) -> Response:
-    """Return the response with the branch of a motion added, followed in both directions, unless a branch has the motion."""
+    """Follow the branch of a motion in both directions and add it to the response, unless the response has the motion."""
     if _meets(wish, response, orbit):
         return response
     level, (low, high) = wish.level(orbit), _ends(wish, FAR)
@@ -291,7 +294,7 @@ def _tests(branch: Branch, kind: Crossing, radius: float = 1.0) -> FloatArray:
 
 
 def _kinds(branch: Branch) -> Iterator[Crossing]:
-    """Yield the ways in which multipliers can cross the circle: a complex pair needs two multipliers."""
+    """Yield the kinds of crossing of the unit circle possible on a branch: a complex pair needs two multipliers."""
     for kind in Crossing:
         if kind is not Crossing.TORUS or len(branch.orbits[0].start) > 1:
             yield kind
@@ -302,7 +305,7 @@ def _parts(
 ) -> Iterator[tuple[SpecialPoint | None, Any, SpecialPoint | None]]:
     """Yield the parts of a branch between sign changes of a test function.
 
-    Each is (special point at its beginning or None, indices of its points, special point at its end or None).
+    Each part is (special point at the beginning or None, indices of the points, special point at the end or None).
     """
     special = [s for s in branch.special if s.kind is kind]
     ends = [-1, *(s.after for s in special), len(branch) - 1]
@@ -320,7 +323,7 @@ def _parts(
 
 
 def _find_doubling(wish: Wish, orbit: PeriodicOrbit, response: Response) -> SpecialPoint | None:
-    """Return the period doubling near a motion, from which its branch begins; None if there is none."""
+    """Return the period doubling near a motion from which the motion's branch begins; None if there is none."""
     for branch in response.branches:
         for point in branch.special if 2 * branch.turns == orbit.turns else ():
             there = point.orbit
@@ -430,7 +433,7 @@ def _peaks(wish: Wish, x: FloatArray, response: Response) -> Iterator[Spot]:
 def _output_maxima(
     wish: Wish, x: FloatArray, limit: Limit, motions: Sequence[Sequence[tuple[float, PeriodicOrbit]]]
 ) -> Iterator[OutputMaximum]:
-    """Yield the local maxima of an output in the range, refined over the level."""
+    """Yield the local maxima of an output in the range, refined with respect to the level."""
     found = []
     for branch in motions:
         values = [limited_value(sample_turn(orbit), limit)[0] for _, orbit in branch]
@@ -443,7 +446,7 @@ def _output_maxima(
 
 
 def _refine_maximum(wish: Wish, limit: Limit, near: Spot) -> OutputMaximum:
-    """Find the maximum of an output over the level near a motion."""
+    """Find the maximum of an output near a motion as the level varies."""
     step = 2.0 * STEP * (wish.span[1] - wish.span[0])
     low, high = max(wish.span[0], near.level - step), min(wish.span[1], near.level + step)
     found: list[OutputMaximum] = []
@@ -467,7 +470,7 @@ def _refine_maximum(wish: Wish, limit: Limit, near: Spot) -> OutputMaximum:
 
 
 def other_motions(found: Survey) -> tuple[tuple[PeriodicOrbit, ...], tuple[float, ...]]:
-    """Search for all motions at `SOUGHT` levels: return the motions on no branch, and the levels with two stable motions."""
+    """Search for all motions at `SOUGHT` levels; return the motions on no branch, and the levels with two stable motions."""
     wish = found.wish
     new: list[PeriodicOrbit] = []
     several: list[float] = []
@@ -492,7 +495,7 @@ def _nearest_motion(wish: Wish, response: Response, level: float) -> PeriodicOrb
 
 
 def chart_range(found: Survey) -> tuple[float, float, int]:
-    """Compute a row of a chart over the range; return its largest multiplier, the level of that, and the number of points.
+    """Compute the row of a stability chart over the range; return the largest multiplier, its level and the number of points.
 
     The multiplier is infinite if no motion was found at some point.
     """

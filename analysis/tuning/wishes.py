@@ -67,7 +67,7 @@ class Change:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Limit:
-    """Upper bound of the magnitude of an output over a turn.
+    """Upper bound of the magnitude of an output over the period of a motion.
 
     Attributes
     ----------
@@ -112,9 +112,9 @@ class Wish:
         Range of the crank's prescribed speed: rad/s, or texts such as "900 rpm".
     over : str
         FMI name of another drive quantity whose range is tuned, such as ``drive.torque`` or ``slider.force``, or of a motor's
-        number, such as ``drive.torque.synchronous_speed``.
+        parameter, such as ``drive.torque.synchronous_speed``.
     between : (float, float), optional
-        Range of the quantity ``over``: in SI, or texts.
+        Range of the quantity ``over``: numbers in SI, or texts with units.
     drive : Drive, optional
         All that drives the mechanism; needed without a range of speeds.
     start : array_like, optional
@@ -126,10 +126,10 @@ class Wish:
     resonance_margin : float
         Distance of a resonance from either end of the range, as a share of the value at that end; 0.02 by default.
     no_jump : bool
-        No fold lies in the range, and nowhere in the range is there a second stable motion.
+        No fold lies in the range, and there is no second stable motion anywhere in the range.
     no_unstable : bool
-        No unstable motion lies in the range. If it is False, unstable motions may lie beside stable ones, but everywhere in the
-        range there must be a stable motion.
+        No unstable motion lies in the range. If ``no_unstable`` is False, unstable motions may lie beside stable ones, but
+        everywhere in the range there must be a stable motion.
     least_margin : float
         The largest Floquet multiplier is at most 1 - ``least_margin``.
     limits : sequence of Limit
@@ -216,7 +216,7 @@ class Wish:
             self.operation(x, self.span[0])
 
     def _check_range(self) -> str:
-        """Check the arguments about the range; return the FMI name of the quantity whose range it is."""
+        """Check the arguments about the range; return the FMI name of the quantity whose range is tuned."""
         speed = speed_name(self.mechanism, self.drive)
         if (self.speeds is None) == (self.between is None) or (self.between is None) == bool(self.over):
             raise InputError(

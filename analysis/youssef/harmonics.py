@@ -36,7 +36,7 @@ MOST_ITERATIONS, MOST_HALVINGS = 40, 12
 
 
 class HarmonicBalanceError(LinkworkError):
-    """The harmonic balance failed; the message tells speed, order, residual and iterations."""
+    """The harmonic balance failed; the message states speed, order, residual and iterations."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -69,7 +69,7 @@ class HarmonicMotion:
         return float(self.series.amplitudes[n]) if n <= self.order else 0.0
 
     def position(self, angle: ArrayLike) -> NDArray[np.float64]:
-        """Return the position at crank angles (rad), an array of their shape."""
+        """Return the positions at crank angles (rad), as an array of the angles' shape."""
         return self.series(angle)
 
 
@@ -84,7 +84,7 @@ class SliderMotion(HarmonicMotion):
     residual : float
         Greatest harmonic of the unbalanced force up to the order of the series, relative to l4 ((m4 + m5) omega^2 + k).
     iterations : int
-        Newton steps of all orders together.
+        Total number of Newton steps over all orders tried.
     speed : float
         Crank speed (rad/s).
     torque : FourierSeries
@@ -144,7 +144,7 @@ def harmonic_amplitudes(
     variant: Variant = Variant.EXACT,
     load: Load = NO_LOAD,
 ) -> NDArray[np.float64]:
-    """Return the amplitudes (m) of `harmonic_balance` at many crank speeds (rad/s), an array of their shape.
+    """Return the amplitudes (m) of `harmonic_balance` at many crank speeds (rad/s), as an array of the speeds' shape.
 
     Apart from the damping, each coefficient of a linear slider equation is a constant plus a multiple of 1/speed^2. The
     equations at two speeds therefore determine the equation at every speed.
@@ -176,7 +176,7 @@ def harmonic_amplitudes(
 
 
 def _coefficients(z: NDArray[Any]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Convert coefficients of exp(i k theta), shape (..., 2 n + 1), to those of cosines and of sines, each (..., n + 1)."""
+    """Convert coefficients of exp(i k theta), shape (..., 2 n + 1), to cosine and sine coefficients, each (..., n + 1)."""
     half = z[..., z.shape[-1] // 2 :]
     cos = 2.0 * np.real(half)
     cos[..., 0] *= 0.5
@@ -184,7 +184,7 @@ def _coefficients(z: NDArray[Any]) -> tuple[NDArray[np.float64], NDArray[np.floa
 
 
 def _half_ranges(cos: NDArray[np.float64], sin: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return half the range of each of m Fourier series, shape (m,), from cosines and sines of shape (m, n + 1)."""
+    """Return half the range of each of m Fourier series, shape (m,), from cosine and sine coefficients, each (m, n + 1)."""
     n = np.arange(cos.shape[-1])
     angle = np.linspace(0.0, 2.0 * pi, 32 * len(n), endpoint=False)
     phase = np.multiply.outer(n, angle)
@@ -228,7 +228,7 @@ def resonance(
     Parameters
     ----------
     parameters : FiveBarParameters
-        Their damping is ignored.
+        Parameters, of which the damping is ignored.
     variant : Variant
     harmonic : int
         Resonating harmonic: 1 at the natural frequency, 2 near half of it; at most ``order``.
@@ -286,7 +286,7 @@ class Approximations:
     amplitudes: Mapping[str, NDArray[np.float64]]
 
     def at(self, speed: ArrayLike) -> dict[str, NDArray[np.float64]]:
-        """Return the amplitudes (m) at given speeds (rad/s) by approximation, arrays of the speeds' shape."""
+        """Return the amplitudes (m) at crank speeds (rad/s) by name of approximation, as arrays of the speeds' shape."""
         return _approximate(self.parameters, speed, self.load)
 
     def columns(self) -> dict[str, NDArray[np.float64]]:
@@ -297,12 +297,12 @@ class Approximations:
 def approximations(response: Response, points: int = 160) -> Approximations:
     """Approximate the amplitudes of a response by the corrected equation (4.21), with two and with ten harmonics.
 
-    They are computed at ``points`` evenly spaced speeds over the response's range.
+    The amplitudes are computed at ``points`` evenly spaced speeds over the response's range.
 
     Raises
     ------
     InputError
-        If another parameter than the speed varies.
+        If the response is not over the crank speed.
     """
     if response.family.vary != "drive.speed":
         raise InputError(f"{response.family.name} varies: the approximations are over the speed")
@@ -332,7 +332,7 @@ def _approximate(parameters: FiveBarParameters, speed: ArrayLike, load: Load) ->
 
 
 class _Basis(NamedTuple):
-    """Functions 1, cos k x, sin k x at the samples ``angle`` x (rad): values and two derivatives, (samples, 2 order + 1).
+    """Functions 1, cos k x, sin k x at samples x (``angle``, rad): values and first two derivatives, (samples, 2 order + 1).
 
     ``projection``, shape (2 order + 1, samples), converts samples of a function to its coefficients.
     """
@@ -386,7 +386,7 @@ def nonlinear_harmonic_balance(
     start : FourierSeries, optional
         Initial slider position (m); by default the solution of the linear equation, reduced until the links can follow it.
     tolerance : float
-        The iteration ends when a Newton step is at most this times the rocker's length.
+        Length of the last Newton step, relative to the rocker's length, at which the iteration ends.
     load : Load
 
     Raises
@@ -420,7 +420,7 @@ def nonlinear_harmonic_balance(
 
 
 def _linear_start(parameters: FiveBarParameters, speed: float, order: int, load: Load) -> FourierSeries:
-    """Solve the linear equation for the slider position (m); halve it until the links can be joined over the whole turn."""
+    """Solve the linear equation for the slider position (m); halve the result until the links can be joined at all angles."""
     equation = slider_equation(replace(parameters, slider_coulomb_friction=0.0), speed, load=load)
     start = parameters.rocker_length * harmonic_balance(equation, order).series
     angle = np.linspace(0.0, 2.0 * pi, 256, endpoint=False)
@@ -441,7 +441,7 @@ def _newton(
     scale = p.l4 * (p.m45 * speed**2 + p.k)
 
     def at(x: NDArray[np.float64]) -> tuple[Balance, NDArray[np.float64]]:
-        """Return the plant's balance at the samples and the harmonics of its force, for coefficients ``x`` of the position."""
+        """Return the plant's balance at the samples and the harmonics of the force; ``x`` has the position's coefficients."""
         u, v, a = basis.value @ x, speed * (basis.rate @ x), speed**2 * (basis.curvature @ x)
         plant = balance(basis.angle, u, v, a, speed, p, load)
         return plant, basis.projection @ plant.force

@@ -4,8 +4,9 @@ Three methods determine their stability and share only the coefficients: integra
 Hill's infinite determinant truncated at an order (`hill_multipliers`, `hill_determinant`, `boundary_stiffnesses`), and
 perturbation for small harmonics (`perturbed_boundary`, `perturbed_region`).
 
-A region of parametric instability has a number N. If the harmonics of the coefficients vanish, it shrinks to the stiffness at
-which the natural frequency is N/2 times the frequency of the coefficients. On its boundaries one Floquet multiplier is (-1)^N.
+A region of parametric instability has a number N. If the harmonics of the coefficients vanish, the region shrinks to the
+stiffness at which the natural frequency is N/2 times the frequency of the coefficients. On its boundaries one Floquet
+multiplier is (-1)^N.
 """
 
 from __future__ import annotations
@@ -27,9 +28,9 @@ from ..periodic import liouville, require_sign
 
 #: Gauss points of a step: the method is of order 12.
 STAGES = 6
-#: Greatest product of step (rad) and rate of the equation (1/rad) for which the error over a turn is only rounding.
+#: Greatest product of step (rad) and rate of the equation (1/rad) for which the error over a period is only rounding.
 STEP_BY_RATE = 0.5
-#: Least number of samples a turn from which the rate of the equation is estimated.
+#: Least number of samples per period from which the rate of the equation is estimated.
 JUDGED = 64
 #: The default order of Hill's determinant is twice the order of the coefficients plus this number.
 MORE_HARMONICS = 16
@@ -121,7 +122,7 @@ def _even_steps(count: int) -> tuple[float, ...]:
 
 
 def _steps(tables: Sequence[NDArray[np.float64]]) -> int:
-    """Return the number of steps a turn that reduces the integration error to rounding."""
+    """Return the number of steps per period (2 pi) that reduces the integration error to rounding."""
     k = np.arange(tables[0].shape[2])
     points = _even_steps(max(JUDGED, 4 * len(k)))
     a, slope, b, c = (_sample_series(table, points) for table in tables)
@@ -148,7 +149,7 @@ def monodromies(equations: Sequence[PeriodicEquation], *, steps: int | None = No
     ----------
     equations : sequence of PeriodicEquation
     steps : int, optional
-        Steps a turn; by default enough to reduce the error to rounding.
+        Steps per period; by default enough to reduce the error to rounding.
 
     Returns
     -------
@@ -212,7 +213,7 @@ def determinant(equation: PeriodicEquation) -> float:
 
 
 def _toeplitz(series: FourierSeries, size: int) -> NDArray[np.complex128]:
-    """Return the matrix that multiplies a function by a series, both by their coefficients of exp(i k x).
+    """Return the matrix that multiplies a function, given by its coefficients of exp(i k x), by a series.
 
     Entry (n, k) is coefficient n - k of the series; the shape is (size, size).
     """
@@ -221,14 +222,14 @@ def _toeplitz(series: FourierSeries, size: int) -> NDArray[np.complex128]:
 
 
 def _harmonics(multiplier: int, order: int) -> NDArray[np.float64]:
-    """Return the harmonic numbers k, symmetric about 0: whole for the multiplier +1 (period 2 pi), halves for -1 (4 pi)."""
+    """Return the harmonic numbers k, symmetric about 0: integers for the multiplier +1 (period 2 pi), half-integers for -1."""
     count, first = (2 * order + 1, -order) if multiplier == 1 else (2 * order, -order + 0.5)
     k: NDArray[np.float64] = first + np.arange(count, dtype=float)
     return k
 
 
 def _order(equation: PeriodicEquation, order: int | None, more: int = 0) -> int:
-    """Return ``order`` if it is given, otherwise the default highest harmonic for the equation plus ``more``."""
+    """Return the highest harmonic: ``order`` if it is given, otherwise the default for the equation plus ``more``."""
     if order is None:
         return 2 * equation.order + MORE_HARMONICS + more
     if order < 1:
@@ -323,7 +324,7 @@ def boundary_stiffnesses(
     multiplier : int
         +1 or -1.
     count : int
-        Number of stiffnesses returned, those of least real part.
+        Number of stiffnesses to return: those with the least real parts.
     order : int, optional
         Highest harmonic.
 
@@ -375,7 +376,7 @@ class Region:
 
 
 def hill_regions(equation: PeriodicEquation, count: int, *, order: int | None = None) -> Mapping[int, Region]:
-    """Return the regions of instability from 1 to ``count`` that damping has not removed, by their number N.
+    """Return the regions of instability N = 1 to ``count`` that damping has not removed, by their number N.
 
     Parameters
     ----------
@@ -405,8 +406,8 @@ def _perturb_boundaries(equation: PeriodicEquation, number: int, order: int) -> 
     """Return the boundaries of the region N: one for N = 0, else two, a complex pair if damping has removed the region.
 
     On the harmonics exp(i k x) the equation is (V - lambda S) y = 0. To first order only the harmonics k = +-N/2 count. To
-    second order the other harmonics q subtract the sum of (V_jq - lambda S_jq) (V_qk - lambda S_qk) / (V_qq - lambda S_qq),
-    in which lambda is that of the equation with the mean values as constant coefficients.
+    second order the other harmonics q subtract the sum of (V_jq - lambda S_jq) (V_qk - lambda S_qk) / (V_qq - lambda S_qq), in
+    which lambda is the solution for constant coefficients equal to the means.
     """
     if order not in (1, 2):
         raise InputError(f"region {number} to order {order}: the order is 1 or 2")
@@ -422,7 +423,7 @@ def _perturb_boundaries(equation: PeriodicEquation, number: int, order: int) -> 
     inside = np.abs(k) == n
     left = v - start * s
     if order == 1:
-        # a harmonic of S is multiplied by the lambda of constant coefficients
+        # a harmonic of S is multiplied by lambda for constant coefficients
         near, weight = left[np.ix_(inside, inside)] / s0 + start * np.eye(inside.sum()), None
     else:
         others = ~inside
@@ -457,7 +458,7 @@ def perturbed_region(equation: PeriodicEquation, number: int, *, order: int = 2)
     Parameters
     ----------
     equation : PeriodicEquation
-        Damping is taken to be of the order of the half width.
+        The damping is assumed to be of the same order as half the width of the region.
     number : int
         N, from 1; for N = 0 see `perturbed_boundary`.
     order : int
@@ -471,7 +472,7 @@ def perturbed_region(equation: PeriodicEquation, number: int, *, order: int = 2)
     Raises
     ------
     InputError
-        As `perturbed_boundary`, or if the number is not positive.
+        As for `perturbed_boundary`, or if the number is not positive.
     """
     if number < 1:
         raise InputError(f"region {number}: regions count from 1")

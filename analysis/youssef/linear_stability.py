@@ -77,8 +77,8 @@ def linear_motion(
 ) -> Mapping[str, Callable[[Plane], Monodromy]]:
     """Return the linear equation as a second motion for a `stability_chart`, whose axes are the parameters ``names``.
 
-    The mapping has `linear_monodromy` by the motion's name. It is empty if there is no linear equation: if the drive is by
-    torque, or if friction that is not viscous acts or is one of the axes.
+    The mapping has `linear_monodromy` by the motion's name. The mapping is empty if there is no linear equation: if the drive
+    is by torque, or if friction that is not viscous acts or is one of the axes.
     """
     rough = set(FIVE_BAR.names("friction"))
     friction = parameters != without_friction(parameters) or not rough.isdisjoint(names)

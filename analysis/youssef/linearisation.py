@@ -39,7 +39,7 @@ from .printed_coefficients import Form
 
 #: Largest amplitude of a neglected harmonic of the exact coefficients, relative to the largest harmonic.
 NEGLIGIBLE = 1e-13
-#: Least and greatest number of samples a turn for the exact coefficients: doubled until the highest harmonics are negligible.
+#: Least and greatest number of samples per turn for the exact coefficients, doubled until the last harmonics are negligible.
 FEWEST_SAMPLES, MOST_SAMPLES = 64, 8192
 
 
@@ -94,14 +94,14 @@ NO_LOAD = Load()
 
 
 class Balance(NamedTuple):
-    """Unbalanced slider force and crank torque at given motions of the slider; arrays of the motions' shape.
+    """Unbalanced slider force and crank torque for given slider motions; arrays of the same shape as the motions.
 
     Attributes
     ----------
     force : ndarray
         m22 u'' + b2 - Q2 - F2 (N): zero where the motion satisfies the slider's equation.
     by_acceleration, by_velocity, by_position : ndarray
-        Its derivatives with respect to u'' (the effective mass m22, kg), u' (N.s/m) and u (N/m).
+        Derivatives of the force with respect to u'' (the effective mass m22, kg), u' (N.s/m) and u (N/m).
     torque : ndarray
         Crank torque that holds the speed (N.m).
     """
@@ -208,7 +208,7 @@ class SliderEquation:
     Attributes
     ----------
     mass, stiffness, force : FourierSeries
-        M; K, without lambda_k^2; F.
+        M, K (without lambda_k^2) and F.
     spring, damping : float
         lambda_k^2 and lambda_c.
     spring_factor, damping_factor : FourierSeries
@@ -239,7 +239,7 @@ class SliderEquation:
             raise InputError(f"lambda_k^2 = {self.spring} and lambda_c = {self.damping} must be finite")
 
     def homogeneous(self) -> PeriodicEquation:
-        """Return the equation without F and lambda_k^2; lambda_k^2 is the stiffness on whose axis `hill_regions` lie."""
+        """Return the equation without F and without lambda_k^2, which is the stiffness lambda of `hill_regions`."""
         rate = self.mass.derivative() if self.mass_rate else FourierSeries.constant(0.0)
         b = rate + self.damping * self.damping_factor
         return PeriodicEquation(a=self.mass, b=b, c=self.stiffness, factor=self.spring_factor)
@@ -366,7 +366,7 @@ def _last_harmonic(series: FourierSeries) -> int:
 def _taylor_coefficients(
     p: Constants, speed: float, load: Load, order: int
 ) -> tuple[FourierSeries, FourierSeries, FourierSeries]:
-    """Return Taylor polynomials in the crank's length of what `_exact_coefficients` returns, with harmonics up to ``order``."""
+    """Return the series of `_exact_coefficients` as Taylor polynomials in the crank's length, harmonics up to ``order``."""
     bare, loaded = _without_spring(p, load)
     # the expansion is about a crank of zero length
     bare = bare._replace(l2=0.0)

@@ -2,10 +2,10 @@
 
     I zeta'' + lambda_c S zeta' + (lambda_k^2 S + K) zeta = F
 
-I, S, K and F have a mean and a first harmonic, since the thesis linearises about one position of the mechanism, the datum. Its
-results all hold for a coupler without mass and a rocker whose centre of mass is on the slider. The printed equation
-lacks M' zeta'. The programs lack it too, halve the crank's terms in the inertia and in the factors of spring and damper, and
-have a different K.
+I, S, K and F have a mean and a first harmonic, since the thesis linearises about one position of the mechanism, the datum. All
+its results hold for a coupler without mass and a rocker whose centre of mass is on the slider. The printed equation lacks M'
+zeta'. The programs lack this term too, halve the crank's terms in the inertia and in the factors of spring and damper, and have
+a different K.
 """
 
 from __future__ import annotations
@@ -99,7 +99,7 @@ def ratios(parameters: FiveBarParameters) -> Ratios:
 def printed(ratios: Ratios, datum: Datum = DATUM) -> Coefficients:
     """Return the coefficients that the thesis lists after (4.21).
 
-    The sign of P1, which is illegible, is taken from H1, and the force from the program listings.
+    The sign of P1 is illegible and is taken from H1; the force is taken from the program listings.
     """
     s2, s3, p45, i4 = ratios
     alpha, a3, a4 = datum
@@ -155,9 +155,9 @@ def _series(mean: float, cosine: float, sine: float) -> FourierSeries:
 def _force(ratios: Ratios, datum: Datum) -> FourierSeries:
     """Return the force with the harmonics -U and -V of the listings (L8449-8450), used in place of R1 and S1.
 
-    In the scan the lines of R1 and S1 (L2786-2794) are incomplete: the legible terms are in r4 and mr3, which vanish here, and
-    none is in I4. At sigma3 = 1, U and V are the I4 term in the line of Q1 (L2781) times cos and sin of alpha3. The force has
-    no mean in the listings, nor to first order in the correct equation.
+    In the scan the lines of R1 and S1 (L2786-2794) are incomplete: the legible terms contain r4 and mr3, which are zero here,
+    and none contains I4. At sigma3 = 1, U and V are the I4 term in the line of Q1 (L2781) times cos and sin of alpha3. The
+    force has no mean in the listings, nor to first order in the correct equation.
     """
     size = ratios.p45 * ratios.inertia_ratio * ratios.sigma2 * cos(datum.coupler)
     return _series(0.0, -size * cos(datum.coupler), -size * sin(datum.coupler))

@@ -38,7 +38,7 @@ from .premises import require_five_bar
 
 #: Cells across the area in the coarsest and in the finest grid.
 COARSEST, FINEST = 128, 4096
-#: Halvings of a cell's edge that locate the boundary on it.
+#: Halvings of a cell's edge to locate the boundary on the edge.
 BISECTIONS = 40
 #: A grid is fine enough if at most this share of the sampled configurations lies outside the boundaries.
 MISSED = 0.01
@@ -60,7 +60,7 @@ class CouplerCurve:
     Attributes
     ----------
     slider_position : float
-        m.
+        Slider position (m).
     arcs : tuple of Arc
         One closed arc if the crank turns fully, its last point equal to its first; else one per range between limits of
         assembly; none if the links cannot be joined at any crank angle.
@@ -121,9 +121,10 @@ def coupler_curve(parameters: FiveBarParameters, slider_position: Amount, n: int
     parameters : FiveBarParameters
         ``assembly_branch`` chooses the assembly.
     slider_position : float
-        m.
+        Slider position (m).
     n : int
-        Intervals of each arc. In an open arc they shorten towards the ends, where P varies as the square root of the angle.
+        Intervals of each arc. In an open arc the intervals become shorter towards the ends, where P varies as the square root
+        of the angle.
 
     Raises
     ------
@@ -190,7 +191,8 @@ def assembly_ranges(u: float, p: Constants) -> list[tuple[float, float]]:
 def _coupler_point(th2: float, u: float, middle: float, p: Constants) -> tuple[float, float]:
     """Return P (m) at the crank angle ``th2``, for slider position u.
 
-    If rounding puts the angle beyond a limit of assembly, it is moved slightly towards ``middle``, the middle of its range.
+    If rounding puts the angle beyond a limit of assembly, the angle is moved slightly towards ``middle``, the middle of its
+    range.
     """
     share = 1e-16
     angle = th2
@@ -214,7 +216,7 @@ def accessible(parameters: FiveBarParameters, slider_range: Amount, x: Amount, y
     slider_range : (float, float)
         Least and greatest slider position (m).
     x, y : array_like
-        m, shapes that broadcast.
+        Coordinates of the points (m), of shapes that broadcast.
 
     Returns
     -------
@@ -333,7 +335,7 @@ class _Grid(NamedTuple):
 def _trace(
     parameters: FiveBarParameters, slider_range: tuple[float, float], sample: NDArray[np.float64], cells: int
 ) -> tuple[list[NDArray[np.float64]], float]:
-    """Return the boundaries (m) from a grid with ``cells`` cells across, and the share of the sample that lies outside them."""
+    """Return the boundaries (m) from a grid with ``cells`` cells across, and the share of the sample outside the boundaries."""
     least, most = sample.min(axis=0), sample.max(axis=0)
     size = float((most - least).max()) / cells
     margin = 0.02
@@ -379,7 +381,7 @@ def _rings(grid: _Grid) -> list[NDArray[np.float64]]:
 def _crossings(grid: _Grid, between: NDArray[np.float64]) -> NDArray[np.float64]:
     """Locate the boundary between neighbouring points of the grid by bisection; return its points (m), shape (k, 2).
 
-    ``between`` (k, 2) has grid indices, one of each pair fractional: a place on the edge between the two neighbours.
+    Each row of ``between``, shape (k, 2), has two grid indices, one of them fractional: a place on an edge of the grid.
     """
     xs, ys, inside, reaches = grid
     (i, j), (far_i, far_j) = np.floor(between).astype(int).T, np.ceil(between).astype(int).T

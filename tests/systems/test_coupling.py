@@ -57,6 +57,25 @@ def test_the_joined_model_is_the_motor_and_shaft_of_a_hand_written_run() -> None
         np.testing.assert_allclose(joined[f"linkage.{name}"], run[name], rtol=1e-4, atol=1e-7)
 
 
+def test_each_controller_of_the_joined_model_samples_at_its_own_times(monkeypatch: pytest.MonkeyPatch) -> None:
+    model = JoinedSystem(system_of("motor-tracking"))
+    found: dict[str, list[float]] = {}
+    for (name, controller), period in zip(model.controllers.items(), (1e-3, 7e-4, 1e-3), strict=False):
+        controller.sample_time, sample = period, controller.sample
+
+        def record(t: float, sample: Any = sample, name: str = name) -> None:
+            found.setdefault(name, []).append(t)
+            sample(t)
+
+        monkeypatch.setattr(controller, "sample", record)
+    run = model.run(5e-3, 1e-3)
+    assert len(found) >= 2
+    assert len(run.time) == 6
+    for name, times in found.items():
+        period = model.controllers[name].sample_time
+        assert sorted({round(t, 9) for t in times}) == pytest.approx(np.arange(0.0, 5e-3 + 1e-9, period))
+
+
 #: Two masses between walls, three springs and dampers: F. Gonzalez, cosim-benchmarks, linear oscillator, table 1.
 #: Stiffnesses (N/m) of the first, the coupling and the second spring, both masses (kg), speeds at the start (m/s), time (s).
 OSCILLATORS = ((10.0, 100.0, 1000.0), 1.0, 100.0, 10.0)

@@ -15,8 +15,9 @@ from .tolerances import tolerances
 def slider_crank() -> None:
     """Analyse the generalised slider-crank of Rahman's thesis: offset, shifted along its crank axis, twisted.
 
-    Each command takes a file of parameters (TOML or JSON, with mechanism = "slider-crank") or a published case, and changes to
-    it. Lengths, angles, speeds and so on are texts with a unit, such as '10 in' or '310 deg'; bare numbers are in SI.
+    Each command takes a file of parameters (TOML or JSON, with mechanism = "slider-crank") or a published case, and options
+    that change parameters. Lengths, angles, speeds and so on are texts with a unit, such as '10 in' or '310 deg'; numbers
+    without a unit are in SI.
 
     \b
     Examples:

@@ -26,9 +26,9 @@ from .options import MechanismChoice, Problem, add_mechanism_options, out_option
 def dual(chosen: MechanismChoice, problem: Problem, tolerance: float, two_rotations: bool, out: str) -> None:
     """Compare the thesis's dual-number method with vector mechanics, quantity by quantity.
 
-    Dual matrices with true ball joints close the loop, and dual momenta give the forces. Differences are relative to the
-    largest quantity of the same unit. --two-rotations shows the thesis's own form, which gives each ball joint two rotations
-    and converges to loops that are not closed.
+    Dual matrices with true ball joints (three rotations) close the loop, and dual momenta give the forces. Differences are
+    relative to the largest quantity of the same unit. --two-rotations shows the form in the thesis instead: it gives each ball
+    joint only two rotations, and converges to loops that are not closed.
 
     \b
     Examples:
@@ -75,7 +75,7 @@ def dual(chosen: MechanismChoice, problem: Problem, tolerance: float, two_rotati
 
 
 def _show_two_rotations(chosen: MechanismChoice, points: int, folder: Path) -> None:
-    """Print and write the closure errors with which the thesis's iteration ends over the turn."""
+    """Print and write, for crank angles over a turn, the closure error with which the iteration of the thesis ends."""
     from ...files import write_csv
 
     angle = np.linspace(0.0, tau, points)

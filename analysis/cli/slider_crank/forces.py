@@ -43,9 +43,9 @@ if TYPE_CHECKING:
 def forces(chosen: MechanismChoice, problem: Problem, frames: Sequence[int], out: str, plot: bool) -> None:
     """Find all joint forces over a turn, and the slider force if the torque is given, or the torque if the load is given.
 
-    If the torque is given, there is no finite slider force at the dead centres. If the crank cannot turn fully, all forces grow
-    without bound towards the limits of assembly. These angles are listed with the reason; extremes are taken more than 10 deg
-    away from them.
+    If the torque is given, the slider force is not finite at the dead centres. If the crank cannot make a full turn, all forces
+    grow without bound towards the limits of assembly. The command lists these crank angles with the reason; the extremes that
+    it prints lie more than 10 deg away from them.
 
     \b
     Examples:
@@ -76,7 +76,10 @@ def forces(chosen: MechanismChoice, problem: Problem, frames: Sequence[int], out
 
 
 def _extremes(turn: ForceTurn, frames: Sequence[int], units: Units) -> Sequence[Sequence[str]]:
-    """Return the rows of least and greatest values with their angles, without those near singular angles."""
+    """Return rows of a table: least and greatest value of each quantity with their crank angles, in ``frames``.
+
+    Forces and torques near singular angles are left out.
+    """
     quantities: list[tuple[str, str, Any]] = [
         ("slider position", "m", turn.slider_position),
         ("crank torque", "N.m", turn.torque),
@@ -103,7 +106,7 @@ def _extremes(turn: ForceTurn, frames: Sequence[int], units: Units) -> Sequence[
     for name, si, values, ends in found:
         cells = [name, units.name(si)]
         for i in ends:
-            # a value that is rounding compared with the greatest of its unit is zero
+            # a value that is only a rounding error compared with the greatest value in the same unit is printed as zero
             value = 0.0 if abs(values[i]) <= 1e-12 * size[si] else values[i] * units.factor(si)
             cells += [f"{value:.6g}", f"{degrees(turn.angle[i]):.1f}"]
         rows.append(cells)
@@ -111,7 +114,7 @@ def _extremes(turn: ForceTurn, frames: Sequence[int], units: Units) -> Sequence[
 
 
 def _special_places(turn: ForceTurn, units: Units) -> list[str]:
-    """Return sentences on dead centres and limits of assembly, and on the forces that are not determined there."""
+    """Return sentences on the dead centres and limits of assembly, and on the forces that are not determined at them."""
     without = f"grows without bound towards it; within {sc.CLEAR_DEG:g} deg it is not among the extremes"
     sentences = [
         f"dead centre at {angle_text(d.crank_angle)}, slider at {units.length(d.slider_position)}"

@@ -1,4 +1,4 @@
-"""Options that the commands about the slider-crank share: mechanism, units, and force or torque."""
+"""Options that all commands about the slider-crank share: mechanism, units, and force or torque."""
 
 from __future__ import annotations
 
@@ -43,25 +43,25 @@ Command = Callable[..., Any]
 
 
 class Units:
-    """Units of the output, "SI" (lengths in mm) or "inch"; angles are in degrees in both systems."""
+    """The system of units of the output: "SI" (lengths in mm) or "inch"; angles are in degrees in both systems."""
 
     def __init__(self, system: str) -> None:
         self.system = system
         self._table = {**sc.shown_units(system), "rad": sc.UNITS["inch"]["rad"]}
 
     def name(self, si: str) -> str:
-        """Return the name of the output's unit for a unit of SI."""
+        """Return the name of the unit in which the output shows quantities with the SI unit ``si``."""
         return self._table.get(si, (si, 1.0))[0]
 
     def factor(self, si: str) -> float:
-        """Return the factor from a unit of SI to the output's unit."""
+        """Return the factor from the SI unit ``si`` to the unit of the output."""
         return 1.0 / self._table.get(si, (si, 1.0))[1]
 
     def length(self, value: float) -> str:
         return f"{value * self.factor('m'):.6g} {self.name('m')}"
 
     def convert_error(self, text: str) -> str:
-        """Return the message of an error with its quantities in these units; texts in quotes are not changed."""
+        """Return an error message with its quantities converted from SI to the units of the output, except texts in quotes."""
         variables = SLIDER_CRANK.mechanism_variables
 
         def parameter(found: re.Match[str]) -> str:
@@ -74,9 +74,10 @@ class Units:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class MechanismChoice:
-    """The mechanism of a command.
+    """The mechanism that the options of a command choose.
 
-    ``name`` is for files; ``shift`` (m) is constant unless there is a ``groove``, "shaft" or "apart"; ``speed`` is in rad/s.
+    ``name`` is the first part of the names of files that are written. ``shift`` (m) is the constant shift S1 of the crank,
+    unless a ``groove``, "shaft" or "apart", moves the crank. ``speed`` is the crank speed (rad/s).
     """
 
     name: str
@@ -89,14 +90,14 @@ class MechanismChoice:
 
     @property
     def law(self) -> PeriodicShift:
-        """The shift over the crank angle, for ranges of assembly and pictures."""
+        """The shift as a function of the crank angle, for ranges of assembly and pictures."""
         if self.groove is None:
             return sc.constant_shift(self.shift)
         return sc.groove_shift(self.parameters)
 
     @property
     def force_law(self) -> ShiftLaw:
-        """The shift over the crank angle, for force problems."""
+        """The shift as a function of the crank angle, for force problems."""
         p = self.parameters
         if self.groove is None:
             return sc.ConstantShift(self.shift)
@@ -109,7 +110,7 @@ class MechanismChoice:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _MechanismOptions:
-    """Options on the mechanism as they were given on the command line."""
+    """Options about the mechanism, as texts from the command line."""
 
     file: str | None
     published: str | None
@@ -122,7 +123,7 @@ class _MechanismOptions:
     speed: str | None = None
 
     def choose(self, *, paced: bool) -> MechanismChoice:
-        """Return the chosen mechanism; ``paced`` says whether the speed has an effect.
+        """Return the mechanism that the options choose; ``paced`` says whether the crank speed has an effect.
 
         Raises LinkworkError if a file, a name or a value is wrong.
         """
@@ -173,7 +174,7 @@ class _MechanismOptions:
         )
 
     def _check_groove(self, p: SliderCrankParameters, values: Mapping[str, Any]) -> None:
-        """Raise a usage error if options about a groove have no effect."""
+        """Raise a usage error if an option about a groove has no effect."""
         if self.groove is None:
             for name in values:
                 if name.startswith("groove."):
@@ -185,7 +186,7 @@ class _MechanismOptions:
             )
 
     def _note_defaults(self, p: SliderCrankParameters, start: str, speed: float | None) -> None:
-        """Print the default values that are used because neither the file nor the command line gives them."""
+        """Print the default values of shift, groove and speed that are used because no option gives these quantities."""
         used = []
         if self.shift is None and self.groove is None:
             used.append(f"S1 = {start} (--shift)")
@@ -198,7 +199,7 @@ class _MechanismOptions:
 
 
 def _title(units: Units, p: SliderCrankParameters, shift: float, groove: str | None) -> str:
-    """Return a title with offset, shift or groove, and twist of a mechanism."""
+    """Return a title for tables and pictures with offset, shift or groove, and twist of a mechanism."""
     moved = f"S1 = {units.length(shift)}"
     if groove is not None:
         moved = f"SS1 = {units.length(p.groove_amplitude)}, alpha = {p.groove_ratio:g}"
@@ -213,7 +214,10 @@ class Problem:
     points: int
 
     def turn(self, chosen: MechanismChoice, *, at: float | None = None) -> ForceTurn:
-        """Solve the problem over a turn, and ``at`` one more crank angle (rad), wherever the mechanism can be assembled."""
+        """Solve the force problem at crank angles over a turn, and ``at`` one further crank angle (rad).
+
+        Angles at which the mechanism cannot be assembled are left out, with a note.
+        """
         angles = np.linspace(0.0, tau, self.points)
         if at is not None and np.abs(angles - at).min() > 1e-9:
             angles = np.sort(np.append(angles, at))
@@ -265,7 +269,7 @@ plot_option = click.option("--plot/--no-plot", default=True, help="Whether to wr
 
 
 def add_mechanism_options(command: Command) -> Command:
-    """Add the options that choose a mechanism to a command, which receives them as one argument ``chosen``."""
+    """Add to a command the options that choose a mechanism; the command receives a `MechanismChoice` as ``chosen``."""
 
     @wraps(command)
     @report_errors
@@ -283,7 +287,10 @@ def add_mechanism_options(command: Command) -> Command:
 
 
 def problem_options(points: int) -> Callable[[Command], Command]:
-    """Return a decorator that adds the options --speed and, passed to the command as ``problem``, those of a force problem."""
+    """Return a decorator that adds the options of a force problem: --torque, --load, --points and --speed.
+
+    The command receives the first three as one `Problem`, its argument ``problem``. ``points`` is the default of --points.
+    """
 
     def decorate(command: Command) -> Command:
         @wraps(command)

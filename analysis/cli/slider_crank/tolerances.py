@@ -28,7 +28,7 @@ from .options import (
 if TYPE_CHECKING:
     from ...slider_crank import ForceTurn, MonteCarlo, Sensitivities, Tolerance
 
-#: Quantities with an error by default, and their half widths by unit.
+#: Quantities that have a tolerance by default, and the default half widths by unit.
 _TOLERANCES = ("crank.length", "rod.length", "guide.offset", "shift.position", "guide.twist")
 _WIDTHS = {"m": "0.25 mm", "rad": "0.1 deg"}
 
@@ -135,9 +135,9 @@ def _degrees(turn: ForceTurn, i: int) -> float:
 
 
 def _reduce_to_turn(angle: float, chosen: MechanismChoice) -> float:
-    """Return the same crank angle (rad) between 0 and 2 pi.
+    """Return a crank angle reduced to the range from 0 to 2 pi (rad).
 
-    Raises InputError if it is outside of this turn and the shift there differs from that in this turn.
+    Raises InputError if the angle is outside of this range and the shift of the crank differs from turn to turn.
     """
     if 0.0 <= angle <= tau:
         return angle
@@ -150,7 +150,7 @@ def _reduce_to_turn(angle: float, chosen: MechanismChoice) -> float:
 
 
 def _tolerance(text: str, distribution: str) -> Tolerance:
-    """Read a tolerance given as NAME=HALF_WIDTH."""
+    """Return the tolerance given by a text NAME=HALF_WIDTH."""
     from ...files import unknown_name
 
     name, equals, value = (part.strip() for part in text.partition("="))
@@ -165,7 +165,10 @@ def _tolerance(text: str, distribution: str) -> Tolerance:
 def _sensitivity_table(
     exact: Sensitivities, allowed: Sequence[Tolerance], place: int, units: Units
 ) -> tuple[Sequence[Sequence[str]], dict[str, Any]]:
-    """Return the rows of the table of sensitivities, and the columns of its file by name with unit."""
+    """Return the rows of the printed table of sensitivities, and the columns of the CSV file by name with unit.
+
+    ``place`` is the index of the crank angle for which the printed table has values.
+    """
     turn, rows = exact.turn, []
     columns: dict[str, Any] = {"crank angle [deg]": np.degrees(turn.angle)}
     for name in exact.derivatives:
@@ -179,10 +182,10 @@ def _sensitivity_table(
             columns[f"d {name} / d {t.name} [{unit}]"] = values.filled(np.nan)
             greatest = np.where(clear, np.ma.abs(values).filled(-1.0), -1.0)
             top = int(np.argmax(greatest))
-            # a value that is rounding compared with the greatest effect of any tolerance is zero
+            # a value that is only a rounding error compared with the greatest effect of any tolerance is printed as zero
             tiny = 1e-12 * effect / t.extent * scale
             here, most = (_number(values[i] if np.ma.abs(values[i]) > tiny else values[i] * 0.0) for i in (place, top))
-            # perhaps no angle is clear of poles and limits
+            # there may be no angle that is far enough from poles and limits
             ends = (most, f"{_degrees(turn, top):.1f}") if greatest[top] >= 0.0 else ("none", "")
             rows.append((name, t.name, unit, here, *ends))
     return rows, columns
@@ -198,7 +201,7 @@ def _unit_quotient(above: str, below: str) -> str:
 
 
 def _spread_columns(found: MonteCarlo, units: Units) -> dict[str, Any]:
-    """Return the results of a Monte Carlo simulation over the turn as columns by name with unit."""
+    """Return the results of a Monte Carlo simulation, over crank angles of a turn, as columns by name with unit."""
     columns: dict[str, Any] = {"crank angle [deg]": np.degrees(found.turn.angle)}
     for name, spread in found.spreads.items():
         si, linear = sc.QUANTITIES[name], found.estimates[name]

@@ -1,13 +1,13 @@
 """Trace boundaries of instability over two parameters, and find the damping that removes a region of instability.
 
 A fold, a period doubling or a torus point of a branch becomes a curve when a second parameter varies: for example the speed at
-which a machine jumps as a function of the damping. `follow_crossing` follows it by arclength in the space of the orbit and the
-two parameters, so that it continues through the cusp where two folds meet and vanish. `line_branches` finds the branches on a
-line of a chart, including isolas, from which such curves begin.
+which a machine jumps as a function of the damping. `follow_crossing` follows this curve by arclength in the space of the orbit
+and the two parameters, so that the curve continues through the cusp where two folds meet and vanish. Such curves begin at
+special points of branches; `line_branches` finds the branches on a line of a chart, including isolas.
 
-A test function of a point of a plane is negative in a region of instability and zero on its boundary, where a Floquet
-multiplier of the mechanism's own periodic orbit is +1 or -1 (`orbit_test`). `numerics.boundaries` traces its zeros, and
-`removing_damping` finds the damping at which a region ends.
+A test function of the two parameters is negative in a region of instability and zero on its boundary, where a Floquet
+multiplier of the mechanism's own periodic orbit is +1 or -1 (`orbit_test`). `numerics.boundaries` traces the zeros of a test
+function, and `removing_damping` finds the damping at which a region of instability ends.
 """
 
 from __future__ import annotations
@@ -39,16 +39,17 @@ _DIFFERENCE = 1e-7
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class CrossingCurve:
-    """A curve of folds, period doublings or torus points.
+    """A curve of folds, period doublings or torus points over two parameters.
 
     Attributes
     ----------
     kind : Crossing
     points : ndarray, shape (m, 2)
-        Values of the two parameters.
+        Values of the two parameters along the curve.
     orbits : tuple of PeriodicOrbit
+        The orbit at each point.
     ends : (End, End)
-        At the first and at the last point.
+        Why the curve ends at its first and at its last point.
     """
 
     kind: Crossing
@@ -112,7 +113,10 @@ def follow_crossing(
 
 
 def _evaluate(at: Plane, turns: int, kind: Crossing, scale: NDArray[np.float64], settings: Settings) -> Evaluate:
-    """Return the function G = (y(T) - y(0), test) of the unknowns (y(0), x) and the parameter y, with its derivatives."""
+    """Return a function that evaluates G = (y(T) - y(0), test) and its derivatives at unknowns (y(0), x) and a parameter y.
+
+    x and y are the two parameters of the plane; y(0) and y(T) are the state y of the orbit at the beginning and the end.
+    """
     n = len(scale) - 1
     (low, high), (bottom, top) = settings.bounds[n], (settings.low, settings.high)
     corners = [operating_point(*at(a, b)) for a in (low, high) for b in (bottom, top)]
@@ -143,7 +147,8 @@ def _evaluate(at: Plane, turns: int, kind: Crossing, scale: NDArray[np.float64],
     return evaluation
 
 
-#: Points of a line at which all motions are sought; points of a branch at most in each direction, and its greatest step.
+#: Points of a line at which all motions are sought; greatest number of points of a branch in each direction; greatest step of
+#: a branch, relative to the range of its parameter.
 POINTS, BRANCH_POINTS, STEP = 17, 600, 5e-2
 
 
@@ -157,24 +162,27 @@ def line_branches(
     start: ArrayLike | None = None,
     watch: Callable[[float], None] = lambda share: None,
 ) -> tuple[list[Branch], Coexistence, list[str]]:
-    """Find all motions on the line y = const and follow them in both directions, until branches pass through all of them.
+    """Follow all branches of motions along the line y = const of a plane, in both directions.
 
-    A motion is followed as long as deviations grow less than a thousandfold per turn. Beyond that, next to the limit of
-    assembly, folds and period doublings come in pairs; the ranges of stability between them are too narrow for any machine.
+    All motions are sought at evenly spaced points of the line; a branch is followed from each motion through which no branch
+    passes yet. A motion is followed as long as deviations grow less than a thousandfold per turn. Where they grow faster, next
+    to the limit of assembly, folds and period doublings come in pairs; the ranges of stability between them are too narrow for
+    any machine.
 
     Parameters
     ----------
     operation : callable
         See `plane`.
     x : (float, float)
-        Range of the line.
+        Range of the parameter x along the line.
     y : float
+        Value of the parameter y on the line.
     name, unit : str
         Name and unit of x.
     start : array_like, shape (n,), optional
         See `coexistence`.
     watch : callable, optional
-        Called with the share of the line that is done.
+        Called with the share of the work that is done, from 0 to 1.
 
     Returns
     -------
@@ -220,10 +228,10 @@ Monodromy = Callable[[float, float], NDArray[np.float64]]
 
 
 def orbit_monodromy(operation: Plane, *, start: ArrayLike | None = None, near: Grid | None = None) -> Monodromy:
-    """Return a function that gives the monodromy matrix of the periodic orbit of one turn at a point of a plane.
+    """Return a function of a point of a plane: the monodromy matrix of the periodic orbit of one turn at this point.
 
     Each orbit is sought from the orbit found last, so that neighbouring points stay on one branch, then from the orbits at the
-    nearest points of a grid, then from all starts of `newton_orbit`. Results are cached.
+    nearest points of the grid ``near``, then from all starts of `newton_orbit`. Results are cached.
 
     Parameters
     ----------
@@ -256,12 +264,15 @@ def orbit_monodromy(operation: Plane, *, start: ArrayLike | None = None, near: G
 
 
 def plane_test(matrix: Monodromy, crossing: Crossing | int) -> Test:
-    """Return a function of a point (x, y) of the plane: `crossing_test` of the monodromy matrix there."""
+    """Return a test function of a point (x, y) of a plane: the `crossing_test` of the monodromy matrix at this point."""
     return lambda x, y: float(crossing_test(matrix(x, y), crossing))
 
 
 def orbit_test(operation: Plane, multiplier: int, *, start: ArrayLike | None = None) -> Test:
-    """Return the test function of the mechanism's own periodic orbit: see `plane_test` and `orbit_monodromy`."""
+    """Return the test function of the mechanism's own periodic orbit over a plane: see `plane_test` and `orbit_monodromy`.
+
+    ``multiplier`` is +1 or -1: the test function is zero where a Floquet multiplier of the orbit has this value.
+    """
     return plane_test(orbit_monodromy(operation, start=start), multiplier)
 
 
@@ -274,7 +285,7 @@ class RemovalError(LinkworkError):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RemovingDamping:
-    """The damping at which a region vanishes, the other parameter x at its tip, and the value of the test function there."""
+    """Damping at which a region vanishes; at the tip of the region the other parameter x, and the test function's value."""
 
     damping: float
     x: float
@@ -289,25 +300,25 @@ def removing_damping(
     samples: int = 40,
     tolerance: float = 1e-8,
 ) -> RemovingDamping:
-    """Find the damping at which a region of instability vanishes: the least value of its test function is zero there.
+    """Find the damping at which a region of instability vanishes, so that the least value of its test function is zero.
 
     Parameters
     ----------
     test : callable
-        Test function of (x, damping).
+        Test function of (x, damping), negative inside the region.
     x : (float, float)
-        Range of the other parameter, with this region and no other in it.
+        Range of the other parameter x; it contains this region and no other region.
     damping : (float, float)
-        Range in which the region vanishes: it exists at the lower end and not at the upper one.
+        Range of damping in which the region vanishes: the region exists at the lower end and not at the upper end.
     samples : int
-        Samples of x, from which the least value is sought.
+        Number of samples of x from which the search for the least value begins.
     tolerance : float
         Tolerance of the damping, relative to its upper end.
 
     Raises
     ------
     RemovalError
-        If the region does not exist at the lower end, or still exists at the upper one.
+        If the region does not exist at the lower end, or still exists at the upper end.
     LinkworkError
         If the test function raises it.
     """

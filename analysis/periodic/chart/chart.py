@@ -1,7 +1,7 @@
 """Compute stability charts: the stability of a mechanism over two parameters.
 
-`stability_chart` combines the grid of Floquet multipliers, traced boundaries, removing damping and long runs, for one
-mechanism and two parameters by their FMI names, the crank speed among them.
+`stability_chart` computes, for one mechanism and two parameters given by their FMI names (the crank speed can be one of them),
+a grid of Floquet multipliers, the stability boundaries, the damping that removes each region of instability, and long runs.
 """
 
 from __future__ import annotations
@@ -56,7 +56,7 @@ from .grid import Grid, grid, points_to_confirm
 
 #: Default range of a crank speed relative to the natural frequency, and of another parameter relative to its present value.
 _SPEEDS, _OTHERS = (0.3, 2.5), (0.1, 2.0)
-#: Lines x = const and y = const of a chart on which boundaries are sought, and samples on each.
+#: Numbers of lines x = const and y = const of a chart on which boundaries are sought; number of samples on each line.
 LINES, SAMPLES = (2, 5), 120
 #: Extent, relative to the chart's ranges, below which a boundary that could not be followed to its end is not drawn.
 STUB = 1e-3
@@ -66,7 +66,7 @@ SAME_MOTION = 0.4
 SAME = 5e-3
 #: Names for boundaries of the grid's motion and of other motions.
 TRUE_ORBIT, OTHER_ORBIT = "true orbit", "another motion"
-#: Codes of a boundary in files: its motion, 0 for the linear equation, and its multiplier.
+#: Codes in files for a boundary's motion (0: the linear equation) and for its multiplier.
 _MOTION = {TRUE_ORBIT: 1.0, OTHER_ORBIT: 2.0}
 _MULTIPLIER = {Crossing.FOLD: 1.0, Crossing.PERIOD_DOUBLING: -1.0, Crossing.TORUS: 0.0}
 
@@ -98,7 +98,7 @@ class Axis:
         return f"{self.name} [{self.unit}]"
 
     def format_value(self, value: float) -> str:
-        """Format a value in SI with the parameter's name and unit."""
+        """Return a value, given in SI, as text with the parameter's name and unit."""
         return format_value(self.name, value, self.si)
 
 
@@ -109,14 +109,15 @@ class TracedBoundary:
     Attributes
     ----------
     points : ndarray, shape (n, 2)
-        In SI.
+        Values of the two parameters along the boundary, in SI.
     motion : str
-        `TRUE_ORBIT`, the motion of the grid; `OTHER_ORBIT`; or the name of a motion given in ``beside``.
+        The motion that loses stability: `TRUE_ORBIT`, the motion of the grid; `OTHER_ORBIT`, another motion; or the name of a
+        motion given in ``beside``.
     kind : Crossing
         Period doubling (multiplier -1); fold (+1), beyond which the orbit does not exist; or, under a torque, torus (a complex
         pair on the unit circle).
     ends : (End, End)
-        At the first and at the last point.
+        Why the curve ends at its first and at its last point.
     starts : ndarray, shape (n, m), or None
         y at crank angle 0 of the motions on the boundary, if they were followed.
     """
@@ -145,19 +146,19 @@ class StabilityChart(NotebookResult):
     ----------
     axes : (Axis, Axis)
     box : Box
-        In SI.
+        Ranges of the two parameters, in SI.
     grid : Grid
         Largest Floquet multiplier of the true orbit.
     boundaries : tuple of TracedBoundary
         Boundaries of the true orbit, of other motions, and of the motions given in ``beside``.
     removals : tuple of str
-        For each region the damping that removes it, in words; empty unless damping is an axis.
+        One sentence for each region of instability: the damping that removes it. Empty unless one of the axes is the damping.
     runs : tuple of Run
-        Long runs at three points.
+        Long runs at up to three points.
     most : int
-        Greatest number of stable motions found at one point of the lines that were searched, or of ``beside``.
+        Greatest number of stable motions found at one point, on the searched lines or in ``beside``.
     beside : Coexistence or None
-        All motions at every point, if they were asked for.
+        All motions at every point of the grid; None if they were not asked for.
     problems : tuple of str
         One sentence for each part that could not be computed; empty if there is none.
     """
@@ -188,7 +189,7 @@ class StabilityChart(NotebookResult):
         )
 
     def to_csv(self, path: str | Path) -> Path:
-        """Write the grid as a table, one row per point."""
+        """Write the grid as a CSV table with one row per point, and return its path."""
         x, y = self.axes
         columns = {
             x.label: x.factor * np.tile(self.grid.x, len(self.grid.y)),
@@ -199,7 +200,7 @@ class StabilityChart(NotebookResult):
         return write_csv(path, columns)
 
     def boundaries_to_csv(self, path: str | Path) -> Path:
-        """Write the boundaries as a table, one row per point, numbered in the first column."""
+        """Write the boundaries as a CSV table with one row per point; the first column is the boundary's number."""
         rows = [np.empty((0, 5))]
         for number, traced in enumerate(self.boundaries, start=1):
             points = traced.points * [axis.factor for axis in self.axes]
@@ -236,8 +237,8 @@ def stability_chart(
     parameters : parameters of a mechanism
         Or a published set or its name.
     drive : Drive, optional
-        Speed, or torque, and constant forces, unless they are axes. For a published set it may be left out: the set is then
-        driven at its own speed.
+        Crank speed or torque, and constant forces, except those that are axes of the chart. For a published set the drive may
+        be omitted: the set is then driven at its own speed.
     names : (str, str), optional
         FMI names of the parameters along x and y; by default the crank speed and the damping of the first freedom other than
         the crank, for a five-bar ``drive.speed`` and ``slider.damping``.
@@ -246,16 +247,16 @@ def stability_chart(
     points : int
         Points of the grid along each axis.
     start : array_like, shape (n,), optional
-        Guess of the orbits; under a torque it is needed: see `find_orbit`.
+        Guess of the orbits; required if the crank is driven by a torque: see `find_orbit`.
     beside : mapping, optional
-        Further motions whose boundaries are traced, such as `analysis.youssef.linear_motion`: by name, a function that takes a
-        plane and returns the motion's monodromy matrix as a function over it.
+        Further motions whose boundaries are traced, by name, such as `analysis.youssef.linear_motion`. Each is a function that
+        takes a plane and returns a function of a point of this plane: the monodromy matrix of the motion.
     coexisting : bool
-        Whether all motions of every point are sought, which takes some twenty times as long: see `coexistence`.
+        Whether to find all motions at every point of the grid; this takes about twenty times as long: see `coexistence`.
     n_jobs, progress
         See `grid`.
     first : callable, optional
-        Called with the chart as soon as its grid is computed, for example to show it: boundaries and long runs take longer.
+        Called with the chart as soon as its grid is computed, for example to show the chart before boundaries and long runs.
 
     Returns
     -------
@@ -267,7 +268,7 @@ def stability_chart(
     InputError, ParameterError
         If the drive, a name, a range or the number of points is not usable.
     GridInterrupted
-        On Ctrl-C; the same call continues from the rows that are kept.
+        On Ctrl-C; the same call, made again, continues from the rows that were finished.
 
     Examples
     --------
@@ -306,7 +307,7 @@ def stability_chart(
 
 
 def _steps(coexisting: bool) -> Iterator[str]:
-    """Yield the texts for the progress bars of the steps of a chart, numbered."""
+    """Yield the text of the progress bar for each step of a chart, such as "step 1 of 4, grid"."""
     names = ["grid", *(["all motions"] if coexisting else []), "boundaries", "branches of other motions", "long runs"]
     yield from (f"step {number} of {len(names)}, {name}" for number, name in enumerate(names, start=1))
 
@@ -331,7 +332,10 @@ class _Survey:
     def chart(
         self, beside: Mapping[str, Monodromy], around: Coexistence | None, progress: bool, steps: Iterator[str]
     ) -> StabilityChart:
-        """Find the boundaries of the true orbit, of the motions ``beside``, and of other motions; make the long runs."""
+        """Return the complete chart: find the boundaries of all motions, make the long runs, and compute removing dampings.
+
+        ``around`` is the coexisting motions, if they were sought; ``steps`` gives the texts of the progress bars.
+        """
         true = orbit_monodromy(self.operation, start=self.start, near=self.grid)
         # at a fold the true orbit ends, and its test function with it: folds are found on branches
         tests = [(TRUE_ORBIT, true, Crossing.PERIOD_DOUBLING)]
@@ -352,7 +356,7 @@ class _Survey:
         return self.result(around, removals)
 
     def result(self, around: Coexistence | None, removals: tuple[str, ...] = ()) -> StabilityChart:
-        """Return the chart as far as it is computed."""
+        """Return the chart as far as it has been computed; ``around`` is the coexisting motions, if they were sought."""
         return StabilityChart(
             axes=self.axes,
             box=self.box,
@@ -370,7 +374,7 @@ class _Survey:
         return ", ".join(axis.format_value(value) for axis, value in zip(self.axes, (x, y)))
 
     def note_missing_orbits(self) -> None:
-        """Add to the problems how many points of the grid have no orbit."""
+        """Add a sentence to the problems if no orbit was found at some points of the grid."""
         places: NDArray[np.int64] = np.argwhere(np.ma.getmaskarray(self.grid.largest))
         if len(places):
             row, column = places[0].tolist()
@@ -380,7 +384,7 @@ class _Survey:
             )
 
     def trace(self, motion: str, matrix: Monodromy, kind: Crossing) -> None:
-        """Find and trace the boundaries of one kind by their test function."""
+        """Find and trace the boundaries of one kind for a motion, given by name and monodromy matrix, by a test function."""
         result = chart(plane_test(matrix, kind), self.box, lines=LINES, samples=SAMPLES)
         self.traced += [
             TracedBoundary(points=b.points, motion=motion, kind=kind, ends=b.ends) for b in result.boundaries
@@ -393,7 +397,10 @@ class _Survey:
             )
 
     def follow_lines(self, ys: Sequence[float], progress: bool, what: str) -> None:
-        """Follow the branches of all motions on the lines y = const, and the boundaries from their special points."""
+        """Follow the branches of all motions on the lines y = const; follow a boundary from each special point of a branch.
+
+        ``what`` is the text of the progress bar.
+        """
         lost: list[str] = []
         with show_progress(progress and bool(ys), float(len(ys)), what) as show:
             for number, y in enumerate(ys):
@@ -419,7 +426,7 @@ class _Survey:
             self.problems.append(f"{len(lost)} motions on the lines searched are not followed, the first at {lost[0]}")
 
     def _follow_special(self, special: SpecialPoint, place: tuple[float, float]) -> None:
-        """Follow a fold, period doubling or torus through the chart, unless it is known."""
+        """Follow the boundary through a fold, period doubling or torus point, unless this boundary is already known."""
         if self._is_known(special, place):
             return
         what = f"the {special.kind.value} at {self.place(*place)}"
@@ -456,7 +463,7 @@ class _Survey:
         self.problems += [f"{what} is followed to {self.place(*end.point)} only: {end.message}" for end in lost]
 
     def _is_known(self, special: SpecialPoint, place: tuple[float, float]) -> bool:
-        """Return whether a boundary of the same kind and motion nearly passes through a special point."""
+        """Return whether a traced boundary of the same kind and motion passes through, or close to, a special point."""
         orbit = special.orbit
         scale = orbit.scale
         for boundary in self.traced:
@@ -474,7 +481,7 @@ class _Survey:
         return False
 
     def run_three_points(self) -> None:
-        """Run the mechanism at the points of `points_to_confirm`."""
+        """Run the mechanism at up to three points, chosen by `points_to_confirm`, to confirm the chart."""
         for row, column in points_to_confirm(self.grid):
             x, y = float(self.grid.x[column]), float(self.grid.y[row])
             try:
@@ -485,7 +492,7 @@ class _Survey:
                 self.runs.append(Run(x=x, y=y, confirmation=check))
 
     def removals(self, matrix: Monodromy) -> tuple[str, ...]:
-        """Return a sentence on the damping that removes each region of the mechanism's motions; none if no axis is damping."""
+        """Return a sentence for each region of instability on the damping that removes it; empty if no axis is the damping."""
         names = [axis.name for axis in self.axes]
         if self.damping not in names:
             return ()
@@ -510,7 +517,7 @@ class _Survey:
         by_points = f"{region}: goes up to {self.damping} = {top:.4g} {up.si}, by its points"
         if boundary.motion != TRUE_ORBIT:
             return by_points
-        # this region and no other
+        # a range of the other parameter that contains this region and no other
         margin = 0.25 * (high - low)
         x = (max(spans[1 - which][0], low - margin), min(spans[1 - which][1], high + margin))
         test = plane_test(matrix, boundary.kind)
@@ -521,21 +528,22 @@ class _Survey:
                 (float(dampings.min()), greatest),
             )
         except LinkworkError:
-            # the test function ends at folds: take what the traced boundary says
+            # the test function ends at folds: use the greatest damping of the traced boundary
             return by_points
         return f"{region}: gone from {self.damping} = {found.damping:.8g} {up.si} on, last at {other.format_value(found.x)}"
 
 
 def unmet_lines(beside: Coexistence, lines: Sequence[float], boundaries: Sequence[NDArray[np.float64]]) -> list[float]:
-    """Return lines y = const through the regions that no line or boundary has met.
+    """Return lines y = const, one through each region that no searched line crosses and no known boundary touches.
 
-    A region is a connected set of grid points with the same number of stable motions.
+    A region is a connected set of grid points with the same number of stable motions. The result is the values of y.
 
     Parameters
     ----------
     beside : Coexistence
+        All motions at every point of the grid.
     lines : sequence of float
-        Lines y = const that were searched.
+        Values of y of the lines that were searched.
     boundaries : sequence of ndarray, shape (n, 2)
         Known boundaries: a region within one cell of a boundary needs no line.
     """
@@ -554,7 +562,10 @@ def unmet_lines(beside: Coexistence, lines: Sequence[float], boundaries: Sequenc
 
 
 def _belongs(found: Grid, orbit: PeriodicOrbit, place: Sequence[float]) -> bool:
-    """Return whether an orbit belongs to the motion of a grid: whether its start is near one at a point around ``place``."""
+    """Return whether an orbit belongs to the motion of a grid.
+
+    The start of the orbit must be near the start of an orbit of the grid, at one of the grid points around ``place``.
+    """
     scale = orbit.scale
     distance = np.linalg.norm((found.nearby_starts(*place) - orbit.start) / scale, axis=1)
     return bool(np.any(distance < SAME_MOTION))
@@ -562,7 +573,9 @@ def _belongs(found: Grid, orbit: PeriodicOrbit, place: Sequence[float]) -> bool:
 
 @takes_published()
 def default_range(parameters: Parameters, drive: Drive, name: str) -> tuple[float, float]:
-    """Return the default range of an axis: a speed around the natural frequency, others around the present value.
+    """Return the default range of an axis of a chart, in SI.
+
+    The range of a crank speed lies around the natural frequency, the range of another parameter around its present value.
 
     Raises
     ------
@@ -584,7 +597,7 @@ def default_range(parameters: Parameters, drive: Drive, name: str) -> tuple[floa
 
 
 def damping_name(mechanism: Mechanism) -> str:
-    """Return the FMI name of the damping of the first freedom other than the crank, or else of any damping.
+    """Return the FMI name of the damping of the first freedom other than the crank; if it has none, of another damping.
 
     Raises
     ------

@@ -31,7 +31,7 @@ from .kernels import LOST, MOST_ORBITS, UNSETTLED, Motions
 from .rows import PointRow, point_row
 
 FloatArray = NDArray[np.float64]
-#: Number of starts from which the motions of a point are sought, after the motions of its neighbour: a power of two.
+#: Number of guesses from which the motions of a point are sought, after the motions of its neighbour: a power of two.
 STARTS = 16
 #: Samples of a turn from which an amplitude is computed.
 SAMPLES = 64
@@ -50,16 +50,18 @@ class Coexistence:
     Attributes
     ----------
     x, y : ndarray, shapes (nx,) and (ny,)
+        Values of the two parameters.
     largest : masked array, shape (ny, nx, k)
-        Largest modulus of the Floquet multipliers of each motion, sorted by amplitude; masked after the last motion.
+        Largest modulus of the Floquet multipliers of each motion. The up to k motions of a point are sorted by amplitude;
+        entries after the last motion are masked.
     amplitude : masked array, shape (ny, nx, k)
         Half the range of the first free coordinate, such as a slider position (m).
     starts : ndarray, shape (ny, nx, k, n)
         y at crank angle 0; NaN after the last motion.
     swing : (str, str)
-        Coordinate whose amplitude is given, and its unit.
+        Name and unit of the coordinate whose amplitude is given.
     computed : int
-        Rows that were not in the cache.
+        Number of rows that were not in the cache.
     """
 
     x: FloatArray
@@ -72,12 +74,12 @@ class Coexistence:
 
     @property
     def count(self) -> NDArray[np.int64]:
-        """Number of motions that were found at each point, shape (ny, nx)."""
+        """Number of motions found at each point, shape (ny, nx)."""
         return np.asarray(self.largest.count(axis=2))
 
     @property
     def stable(self) -> NDArray[np.int64]:
-        """Number of stable motions that were found at each point, shape (ny, nx)."""
+        """Number of stable motions found at each point, shape (ny, nx)."""
         return np.asarray(self._is_stable.sum(axis=2))
 
     @property
@@ -87,12 +89,12 @@ class Coexistence:
 
     @property
     def least(self) -> np.ma.MaskedArray[Any, np.dtype[np.float64]]:
-        """Amplitude of the smallest stable motion, shape (ny, nx)."""
+        """Amplitude of the smallest stable motion at each point, shape (ny, nx)."""
         return self._extreme(np.ma.min)
 
     @property
     def greatest(self) -> np.ma.MaskedArray[Any, np.dtype[np.float64]]:
-        """Amplitude of the largest stable motion, shape (ny, nx)."""
+        """Amplitude of the largest stable motion at each point, shape (ny, nx)."""
         return self._extreme(np.ma.max)
 
     def _extreme(self, of: Callable[..., Any]) -> np.ma.MaskedArray[Any, np.dtype[np.float64]]:
@@ -100,7 +102,7 @@ class Coexistence:
         return np.ma.masked_invalid(of(stable, axis=2).filled(np.nan))
 
     def to_csv(self, path: str | Path) -> Path:
-        """Write the grid as a table, one row per point, in SI."""
+        """Write the grid as a CSV table with one row per point, in SI units."""
         columns = {
             "x": np.tile(self.x, len(self.y)),
             "y": np.repeat(self.y, len(self.x)),
@@ -125,9 +127,9 @@ def coexistence(
 ) -> Coexistence:
     """Find all periodic motions of one turn at every point of a grid.
 
-    The motions of each point are sought from those of its neighbour in the row, then from `STARTS` starts with the known
-    motions divided out. A motion that exists only in a short part of a row may be missed; `find_orbits` searches one point
-    closely. A link that nothing drives swings in these motions, or goes round as often as the drive says; `find_orbits` finds
+    Newton's method starts from the motions of the neighbouring point in the row, then from `STARTS` guesses, with the known
+    motions divided out. A motion that exists only in a short part of a row may be missed; `find_orbits` searches a single
+    point closely. In these motions an undriven link swings, or goes round as often as the drive says; `find_orbits` finds
     motions of both kinds. The rows are distributed over workers and kept as in `grid`.
 
     Parameters
@@ -137,7 +139,8 @@ def coexistence(
     x, y : array_like, shapes (nx,) and (ny,)
         See `grid`.
     start : array_like, shape (n,), optional
-        A further start; under a torque it is needed for the crank speed, unless that follows from a motor.
+        A further guess. If the crank is driven by a torque, it is required because it gives the crank speed, unless the speed
+        follows from a motor.
     folder, n_jobs, progress, what
         See `grid`.
 
@@ -170,7 +173,7 @@ def coexistence(
 
 
 def _compute_motions(guesses: FloatArray, row: PointRow) -> FloatArray:
-    """Return largest multiplier, amplitude and start of each motion at the m points of a row, shape (m, MOST_ORBITS, n + 2).
+    """Compute the motions at the m points of a row, shape (m, MOST_ORBITS, n + 2): largest multiplier, amplitude and start.
 
     The motions of a point are sorted by amplitude; entries after the last motion are NaN.
     """
@@ -185,7 +188,7 @@ def _compute_motions(guesses: FloatArray, row: PointRow) -> FloatArray:
     largest = np.full((m, MOST_ORBITS), np.nan)
     found = np.arange(MOST_ORBITS) < counts[:, None]
     largest[found] = np.abs(multipliers(monodromies[found].reshape(-1, n, n)))[:, 0]
-    # the Fourier series of the samples on a finer grid, as in `Turn.amplitude`
+    # evaluate the Fourier series of the samples on a finer grid, as in `Turn.amplitude`
     fine = np.fft.irfft(np.fft.rfft(swings, axis=2), 8 * SAMPLES, axis=2) * 8.0
     amplitude = 0.5 * np.ptp(fine, axis=2)
     order = np.argsort(np.where(found, amplitude, np.inf), axis=1, kind="stable")
@@ -196,20 +199,20 @@ def _compute_motions(guesses: FloatArray, row: PointRow) -> FloatArray:
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Basins(NotebookResult):
-    """Basins of attraction: the motion on which each start at crank angle 0 settles.
+    """Basins of attraction: for each initial state at crank angle 0, the motion on which the mechanism settles.
 
     Attributes
     ----------
     position, rate : ndarray, shapes (nx,) and (ny,)
-        Initial values of the first free coordinate, for a slider in m, and of its rate (m/s); the other components of y are
-        those of the first motion.
+        Initial values of the first free coordinate (m for a slider) and of its rate (m/s); the other components of the initial
+        state y are those of the first motion.
     ends : ndarray of int, shape (ny, nx)
-        Index of the stable motion in ``motions``; -1 if the links reach the limit of assembly, -2 if the run reaches no
-        motion within the turns that are followed.
+        Index of the stable motion in ``motions``; -1 if the links reach the limit of assembly, -2 if the mechanism settles on
+        no motion within the computed number of turns.
     found : Orbits
-        All motions that were found; the unstable ones lie on the boundaries of the basins.
+        All motions found, also the unstable motions, which lie on the boundaries of the basins.
     computed : int
-        Rows that were not in the cache.
+        Number of rows that were not in the cache.
     """
 
     position: FloatArray
@@ -231,11 +234,11 @@ class Basins(NotebookResult):
         return self.found.stable
 
     def share(self, end: int) -> float:
-        """Return the share of the starts with this value in ``ends``: an index into ``motions``, or -1 or -2."""
+        """Return the share of the initial states for which ``ends`` is ``end``: an index into ``motions``, -1 or -2."""
         return float(np.mean(self.ends == end))
 
     def to_csv(self, path: str | Path) -> Path:
-        """Write the basins as a table, one row per start."""
+        """Write the basins as a CSV table with one row per initial state."""
         (name, unit), (rate, rate_unit) = self._components()
         columns = {
             f"{name} [{unit}]": np.tile(self.position, len(self.rate)),
@@ -270,7 +273,7 @@ def basins(
     n_jobs: int | None = None,
     progress: bool = False,
 ) -> Basins:
-    """Compute basins of attraction: the stable periodic motion on which each start of a plane settles.
+    """Compute basins of attraction: the stable periodic motion on which each initial state of a grid settles.
 
     Parameters
     ----------
@@ -279,14 +282,14 @@ def basins(
     turns : int
         Greatest number of turns in the period of the motions that are sought.
     points : int
-        Number of starts along each axis.
+        Number of initial states along each axis.
     position, rate : (float, float), optional
         Ranges of the first free coordinate and of its rate at crank angle 0, in SI or as text such as "5 mm"; by default as
-        far as the mechanism can be assembled.
+        wide as the assembly of the mechanism permits.
     start : array_like, shape (n,), optional
-        Under a torque, a guess of y that includes the crank speed; see `find_orbits`.
+        A guess of y that includes the crank speed, for a crank driven by a torque; see `find_orbits`.
     found : Orbits, optional
-        Motions that `find_orbits` has found here; they are not sought again.
+        Result of `find_orbits` for these parameters and this drive; the motions are then not sought again.
     folder, n_jobs, progress
         See `grid`.
 
@@ -297,7 +300,7 @@ def basins(
     ParameterError
         If a range is not two quantities, or ``points`` is no whole number.
     GridInterrupted
-        On Ctrl-C; the same call continues from the rows that are kept.
+        On Ctrl-C; the same call, made again, continues from the rows that were finished.
 
     Examples
     --------
@@ -347,12 +350,15 @@ def basins(
 
 
 def describe_turns(flow: Flow, turns: int) -> str:
-    """Return in words the crank's turns in up to ``turns`` common periods: "one turn", "up to 4 turns"."""
+    """Return the number of crank turns in up to ``turns`` common periods, in words: "one turn", "up to 4 turns"."""
     return ("" if turns == 1 else "up to ") + format_turns(turns * flow.turns)
 
 
 def _ends(point: OperatingPoint, known: FloatArray, across: FloatArray, rate: float) -> FloatArray:
-    """Return where each start of a row, all at one rate, ends: an index into ``known``, LOST or UNSETTLED; shape (points,)."""
+    """Return for each start of a row an index into ``known``, the motion on which it settles, or LOST or UNSETTLED.
+
+    A start has an initial coordinate from ``across``, shape (points,), and the initial rate ``rate``.
+    """
     starts = np.tile(known[0], (len(across), 1))
     starts[:, 0], starts[:, point.flow.size // 2] = across, rate
     ends = np.zeros(len(across), dtype=np.int64)

@@ -49,17 +49,19 @@ def largest_multipliers(
     turns: int = 1,
     tolerance: float = INTEGRATOR_TOLERANCE,
 ) -> tuple[FloatArray, FloatArray, NDArray[np.int64]]:
-    """Compute the largest Floquet multiplier of each mechanism of a row, on its periodic orbit.
+    """Compute the largest Floquet multiplier of the periodic orbit of each mechanism in a row.
 
-    Each orbit is sought from the start of its neighbour, then from the guesses: the mechanisms should be ordered along a line.
+    Newton's method starts from the orbit of the neighbouring mechanism, then from the guesses; neighbours in the sequence
+    should therefore have similar parameters.
 
     Parameters
     ----------
     rows, drives : sequences of length m
         Parameters and drive of each mechanism.
     guesses : array_like, shape (n,) or (k, n), optional
-        Guess of y for the first mechanism, and further guesses if no orbit is found from there; see `find_orbit`.
+        Guess of y for the first mechanism, and further guesses that are used if the first leads to no orbit; see `find_orbit`.
     turns : int
+        Number of common periods in the period of the orbits.
     tolerance : float
         Bound of the integrator's local error.
 
@@ -81,7 +83,7 @@ def largest_multipliers(
 def _solve_row(
     row: PointRow, guesses: FloatArray, tolerance: float, turns: int = 1
 ) -> tuple[FloatArray, FloatArray, NDArray[np.int64]]:
-    """Return multipliers, starts and status of a row: see `largest_multipliers`."""
+    """Return the largest multipliers, the starts and the status of the orbits of a row: see `largest_multipliers`."""
     m, n = row.scales.shape
     section = row.first.section(guesses[0], *_USED, tolerance=tolerance, switched=row.switched)
     found = Row(np.full((m, n), np.nan), np.full((m, n * n), np.nan), np.zeros(m, dtype=np.int64))
@@ -94,12 +96,12 @@ def _solve_row(
 
 
 class GridInterrupted(Interrupted):
-    """A grid was interrupted; the finished rows are kept, and the same call continues from them.
+    """The computation of a grid was interrupted; the finished rows are kept, and the same call continues from them.
 
     Attributes
     ----------
     done, rows : int
-        Number of rows that are finished, and of all rows.
+        Number of finished rows, and number of all rows.
     """
 
     def __init__(self, done: int, rows: int, folder: Path) -> None:
@@ -112,19 +114,20 @@ class GridInterrupted(Interrupted):
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Grid:
-    """The largest Floquet multiplier at each point of a grid, of the periodic orbit at that point.
+    """The largest Floquet multiplier of the periodic orbit at each point of a grid.
 
     Attributes
     ----------
     x, y : ndarray, shapes (nx,) and (ny,)
+        Values of the two parameters.
     largest : masked array, shape (ny, nx)
         Largest modulus of the Floquet multipliers; masked if no orbit was found.
     starts : ndarray, shape (ny, nx, n)
-        Starts of the orbits, see `PeriodicOrbit`; NaN if ``largest`` is masked.
+        Starts of the orbits, see `PeriodicOrbit`; NaN where no orbit was found.
     status : ndarray of int, shape (ny, nx)
-        `kernels.Status`: 0, or the reason why there is no orbit.
+        `kernels.Status`: 0 if an orbit was found, otherwise the reason why not.
     computed : int
-        Rows that were not in the cache.
+        Number of rows that were not in the cache.
     """
 
     x: FloatArray
@@ -135,18 +138,18 @@ class Grid:
     computed: int
 
     def reason(self, row: int, column: int) -> str:
-        """Return the reason why a point has no orbit; empty if it has one."""
+        """Return the reason why no orbit was found at a point; empty if an orbit was found."""
         return REASONS.get(Status(self.status[row, column]), "")
 
     def nearby_starts(self, x: float, y: float) -> FloatArray:
-        """Return the starts of the orbits at the nine or fewer grid points around (x, y), roughly nearest first; (k, n)."""
+        """Return the starts of the orbits at up to nine grid points around (x, y), roughly the nearest first; shape (k, n)."""
         across, up = (np.argsort(np.abs(axis - value))[:3] for axis, value in ((self.x, x), (self.y, y)))
         starts = self.starts[np.ix_(up, across)].reshape(-1, self.starts.shape[-1])
         kept: FloatArray = starts[~np.isnan(starts).any(axis=1)]
         return kept
 
     def stability(self, tolerance: float = TOLERANCE) -> NDArray[Any]:
-        """Return the `Stability` of each point, None if it has no orbit; an array of objects of shape (ny, nx)."""
+        """Return the `Stability` of the orbit at each point, None where there is no orbit; object array, shape (ny, nx)."""
         margin = 1.0 - self.largest.filled(np.nan)
         result = np.full(margin.shape, Stability.MARGINAL, dtype=object)
         result[margin > tolerance] = Stability.STABLE
@@ -172,19 +175,20 @@ def grid(
     progress: bool = False,
     what: str = "filling in the stability chart",
 ) -> Grid:
-    """Compute the largest Floquet multiplier at every point of a grid.
+    """Compute the largest Floquet multiplier of the periodic orbit at every point of a grid.
 
-    The rows are distributed over workers. Each row becomes a file in the cache; its name is a hash of all that the row depends
-    on: mechanisms, drives, guess, tolerance and machine code. An interrupted grid continues from the rows in the cache.
+    The rows are distributed over workers. Each row is stored in a file of the cache; the name of the file is a hash of all that
+    the row depends on: mechanisms, drives, guess, tolerance and machine code. After an interruption the same call continues
+    from the rows in the cache.
 
     Parameters
     ----------
     operation : callable
         See `plane`.
     x, y : array_like, shapes (nx,) and (ny,)
-        Values of the axes: in SI, or as texts with units if the plane is one of named parameters.
+        Values of the two parameters: in SI, or as texts with units if the plane is a `NamedPlane`.
     start : array_like, shape (n,), optional
-        Guess of the first orbit of each row; see `find_orbit`. If it leads to no orbit, other guesses are tried.
+        Guess of the first orbit of each row; see `find_orbit`. If this guess leads to no orbit, others are tried.
     tolerance : float
         Bound of the integrator's local error.
     folder : path, optional
@@ -225,7 +229,7 @@ def grid(
 
 
 def _compute_row(guesses: FloatArray, tolerance: float, row: PointRow) -> FloatArray:
-    """Compute a row of a grid, shape (m, n + 2): largest multiplier, start and status of each point."""
+    """Compute a row of a grid, shape (m, n + 2): largest multiplier, start and status of the orbit at each of the m points."""
     values, starts, status = _solve_row(row, guesses, tolerance)
     return np.column_stack([values, starts, status])
 
@@ -236,7 +240,7 @@ def _compute_row(guesses: FloatArray, tolerance: float, row: PointRow) -> FloatA
 def grid_points(
     operation: Plane, x: ArrayLike, y: ArrayLike, start: ArrayLike | None, count: int
 ) -> tuple[FloatArray, FloatArray, list[PointRow], FloatArray]:
-    """Return the values of the axes x and y of a grid, its operating points by rows, and the guesses for each row, (k, n).
+    """Return the values of x and y of a grid, its rows of operating points, and the guesses for each row, shape (k, n).
 
     Raises InputError if an axis is empty or not finite, ParameterError if a text on an axis is no quantity.
     """
@@ -251,7 +255,7 @@ def grid_points(
 
 
 def _axis(name: str, values: ArrayLike) -> FloatArray:
-    """Return the values of an axis as an array; raise InputError if there are none, or one is not a finite number."""
+    """Return the values of an axis as an array; raise InputError if the axis is empty or a value is not a finite number."""
     with suppress(TypeError, ValueError):
         axis = np.array(values, dtype=float, ndmin=1)
         if axis.ndim == 1 and len(axis) > 0 and np.isfinite(axis).all():
@@ -260,7 +264,7 @@ def _axis(name: str, values: ArrayLike) -> FloatArray:
 
 
 def row_code(*functions: Any) -> tuple[str, ...]:
-    """Return texts that identify the code: fingerprints of compiled functions, and all Python sources of this package."""
+    """Return texts that identify the code: the fingerprints of ``functions``, and all Python sources of this package."""
     sources = (path.read_text(encoding="utf-8") for path in sorted(Path(__file__).parents[1].rglob("*.py")))
     return *map(fingerprint, functions), *sources
 
@@ -272,13 +276,13 @@ def row_name(
     code: Sequence[str],
     *numbers: float,
 ) -> str:
-    """Return the name under which a row is kept: a hash of all that the row depends on.
+    """Return the name of a row in the cache: a hash of all that the row depends on.
 
     Parameters
     ----------
     row : PointRow
     guesses : ndarray, shape (k, n)
-        Guesses of y; the first gives the magnitudes of y.
+        Guesses of y; the first guess also gives the magnitudes of y.
     functions : sequence of int
         Indices of the flow's functions that are called.
     code : sequence of str
@@ -295,18 +299,19 @@ def row_name(
 
 @dataclass(frozen=True, slots=True)
 class RowComputation:
-    """Settings for the computation of rows on several workers, and for their storage on disk.
+    """Settings for computing rows of a grid on several workers and for storing the rows on disk.
 
     Attributes
     ----------
     folder : path or None
         Folder of the cache; `grid_folder` if None.
     n_jobs : int or None
+        Number of processes: see `grid`.
     progress : bool
     what : str
         Text before the progress bar.
     kernel : Kernel
-        Kernel that computes the rows: it is compiled once, before several workers need it.
+        Kernel that computes the rows; it is compiled once, before the workers start.
     """
 
     folder: str | Path | None
@@ -322,7 +327,7 @@ class RowComputation:
         names: Sequence[str],
         shape: tuple[int, ...],
     ) -> tuple[FloatArray, int]:
-        """Return the result of ``work`` for each item: from the cache, or computed by a worker and then cached.
+        """Return the result of ``work`` for each item (row): from the cache, or computed by a worker and then cached.
 
         Parameters
         ----------
@@ -335,7 +340,7 @@ class RowComputation:
         -------
         rows : ndarray, shape (items, *shape)
         computed : int
-            Rows that were not in the cache.
+            Number of rows that were not in the cache.
 
         Raises
         ------
@@ -387,8 +392,8 @@ MEASURABLE = 1e-2
 def points_to_confirm(found: Grid) -> list[tuple[int, int]]:
     """Choose three points of a grid for long runs: the most stable, the least stable, and the one nearest to a boundary.
 
-    They lie at least a tenth of the ranges inside the edges, so that the figure shows their marks whole, unless unstable points
-    lie only next to the edges. The third point has the least absolute margin that a long run can still measure.
+    Each point lies at least a tenth of the range away from the edges, so that a figure shows its mark whole, unless unstable
+    points lie only next to the edges. The third point has the smallest margin of stability that a long run can still measure.
 
     Returns
     -------

@@ -1,8 +1,8 @@
-"""Compute rows of a chart: one or all periodic motions of each mechanism, and basins of attraction; compiled kernels.
+"""Compiled kernels for rows of a chart: one or all periodic motions of each mechanism, and basins of attraction.
 
-Along a row the orbits change smoothly: a polynomial through the last orbits predicts the next one at every node, and
-collocation corrects it. If that fails (friction, a torque, the limit of assembly, a fold in between), shooting finds the orbit
-from its neighbour on the left, from its neighbour on the right, or from other starts.
+Along a row the orbits change smoothly: a polynomial through the previous orbits predicts the next orbit at every node, and
+collocation corrects the prediction. If this fails (friction, a torque, the limit of assembly, a fold in between), shooting
+finds the orbit from its neighbour on the left, from its neighbour on the right, or from other guesses.
 """
 
 from __future__ import annotations
@@ -41,20 +41,20 @@ from ..motion.tracks import IDLE, RUNNING, advance_tracks, begin, make_tracks, s
 
 #: Numbers of elements of a turn that are tried, from few to many.
 COUNTS = np.array([8, 16, 24, 32, 48])
-#: Size of the highest Legendre coefficients, see `collocation.close`, below which fewer elements are taken for the next orbit,
-#: relative to the square root of the tolerance.
+#: The next orbit gets fewer elements if the highest Legendre coefficients (see `collocation.close`), relative to the square
+#: root of the tolerance, are smaller than this value.
 FEWER = 0.7
-#: Number of orbits of a row that are solved by shooting alone after no number of elements has sufficed for one.
+#: If no number of elements suffices for an orbit, this number of following orbits in the row is solved by shooting alone.
 _PAUSE = 8
 #: Extrapolation by a polynomial through one to four equally spaced values: weights, the last value first.
 _NEXT = np.array([[1.0, 0.0, 0.0, 0.0], [2.0, -1.0, 0.0, 0.0], [3.0, -3.0, 1.0, 0.0], [4.0, -6.0, 4.0, -1.0]])
 PASSED = len(_NEXT)
-#: Greatest number of periodic motions of a point that are kept.
+#: Greatest number of periodic motions that are kept for one point of a chart.
 MOST_ORBITS = 8
 
 
 class Points(NamedTuple):
-    """Arrays with the data of the m mechanisms of a row, in the form of `Section`."""
+    """Arrays with the data of the m mechanisms in a row of a chart, in the form that `Section` uses."""
 
     constants: NDArray[np.float64]  # constants of the equations and their derivatives, shape (m, 2 constants)
     drives: NDArray[np.float64]  # drive vectors and their derivatives, (m, 2 drive)
@@ -62,30 +62,33 @@ class Points(NamedTuple):
 
 
 class Search(NamedTuple):
-    """Settings of the search for the orbits of a row."""
+    """Settings of the search for the periodic orbits of a row of a chart."""
 
     end: float  # crank angle at the end of the period (rad)
-    turns: int  # turns in a period
-    most: int  # Newton iterations at most
-    loose: float  # tolerance of the integrator in the search from further starts
+    turns: int  # number of common periods in a period of the orbit
+    most: int  # greatest number of Newton iterations
+    loose: float  # tolerance of the integrator in a search from a guess
     smooth: bool  # whether collocation can be used
 
 
 class Row(NamedTuple):
-    """The orbits of a row; entries are written if the status is DONE."""
+    """Periodic orbits of the m mechanisms in one row of a chart.
+
+    The start and monodromy matrix of an orbit are valid only if its status is DONE.
+    """
 
     starts: NDArray[np.float64]  # y at crank angle 0, shape (m, n)
-    monodromies: NDArray[np.float64]  # monodromy matrices by columns, (m, n n)
+    monodromies: NDArray[np.float64]  # monodromy matrices by columns, (m, n * n)
     status: NDArray[np.int64]  # `Status` of the search for each orbit, (m,)
 
 
 class Motions(NamedTuple):
-    """All orbits of a row, at most MOST_ORBITS = k of each point."""
+    """All periodic orbits of the m mechanisms in one row of a chart, at most k = MOST_ORBITS of each mechanism."""
 
     starts: NDArray[np.float64]  # y at crank angle 0, shape (m, k, n)
-    monodromies: NDArray[np.float64]  # monodromy matrices by columns, (m, k, n n)
+    monodromies: NDArray[np.float64]  # monodromy matrices by columns, (m, k, n * n)
     swings: NDArray[np.float64]  # samples of the first component of y, (m, k, samples)
-    counts: NDArray[np.int64]  # number of orbits of each point, (m,)
+    counts: NDArray[np.int64]  # number of orbits of each mechanism, (m,)
 
 
 POINTS = types.NamedUniTuple(MATRIX, 3, Points)
@@ -96,16 +99,17 @@ MOTIONS = types.NamedTuple((CUBE, CUBE, CUBE, int64[::1]), Motions)
 
 @part
 def point_section(section, points, row, tolerance):
-    """Return the section of one mechanism of a row."""
+    """Return the `Section` of the mechanism with the index ``row``: ``section`` with the data of this mechanism."""
     return replace_numbers(section, points.drives[row], points.constants[row], points.scales[row], tolerance)
 
 
 @part
 def divide(section, search, level, start, path, desk, room):
-    """Find an orbit by collocation with the fewest elements that suffice; ``level`` is the first index into `COUNTS` to try.
+    """Find an orbit by collocation with the least number of elements in `COUNTS` that suffices.
 
-    Return the level that suffices, -1 if there is none, and the relative size of the highest Legendre coefficients.
-    ``start`` is y at crank angle 0. ``path`` = (y, w) receives y at the beginnings of the elements and the slopes w.
+    ``level`` is the first index into `COUNTS` to try. Return the level that suffices, or -1, and the relative size of the
+    highest Legendre coefficients. ``start`` is a guess of y at crank angle 0. ``path`` = (y, w) receives y at the beginning of
+    each element, and the slopes w.
     """
     y, w = path
     while level < len(COUNTS):
@@ -128,7 +132,10 @@ def divide(section, search, level, start, path, desk, room):
 
 @inner
 def predict(known, size, path):
-    """Extrapolate ``known`` previous orbits, rows 1, 2, ... of ``path``, latest first; write ``size`` entries into row 0."""
+    """Predict the next orbit, row 0 of ``path``, by extrapolation from the previous orbits.
+
+    The ``known`` previous orbits are rows 1, 2, ... of ``path``, the latest first; each has ``size`` entries.
+    """
     for i in range(size):
         path[0, i] = 0.0
         for old in range(known):
@@ -137,16 +144,17 @@ def predict(known, size, path):
 
 @inner
 def shift(size, path):
-    """Move each orbit in ``path`` one row down, to make room for the next one: the first ``size`` entries of each row."""
+    """Move each orbit, ``size`` entries of a row of ``path``, one row down, so that row 0 can take the next orbit."""
     for old in range(PASSED, 0, -1):
         copy(path[old - 1, :size], path[old, :size])
 
 
 @part
 def solve_from_left(section, points, search, guess, found, tables):
-    """Find the orbits of a row from left to right: by collocation if it converges, otherwise by shooting.
+    """Find the orbits of a row of a chart from left to right: by collocation if it converges, otherwise by shooting.
 
-    ``tables`` is a desk of `make_desk`; the caller keeps its arrays alive while they are used here.
+    ``guess`` is a guess of y for the first orbit. ``tables`` is the work space made by `make_desk`; the caller must keep its
+    arrays alive during the call.
     """
     starts, monodromies, status = found
     n = guess.shape[0]
@@ -155,8 +163,8 @@ def solve_from_left(section, points, search, guess, found, tables):
     report = np.zeros(3)
     start = np.empty(n)
     most_rows = row_count(COUNTS[-1] * search.turns)
-    # this orbit, then the orbits before it, the last first; ys and ws have all numbers of an orbit in a row, y and w have them
-    # by rows of elements in lanes
+    # row 0 is this orbit, rows 1, 2, ... are the previous orbits, the latest first; ys and ws have all numbers of an orbit in
+    # one row; y and w are views of the same numbers by rows of elements, with the elements in lanes
     sizes = n * LANES, NODES * (n // 2) * LANES
     ys, ws = np.zeros((1 + PASSED, most_rows * sizes[0])), np.zeros((1 + PASSED, most_rows * sizes[1]))
     y, w = ys.reshape((1 + PASSED, most_rows, sizes[0])), ws.reshape((1 + PASSED, most_rows, sizes[1]))
@@ -184,7 +192,7 @@ def solve_from_left(section, points, search, guess, found, tables):
         if not by_collocation:
             known = 0
             if passed > 1:
-                # predict the start by the secant through the last two
+                # predict the start by the secant through the last two starts
                 for i in range(n):
                     start[i] = 2.0 * starts[row - 1, i] - starts[row - 2, i]
             elif passed == 1:
@@ -223,14 +231,14 @@ def solve_from_left(section, points, search, guess, found, tables):
             shift(rows * sizes[1], ws)
             known = min(known + 1, PASSED)
             if level > 0 and tail < FEWER * np.sqrt(section.tolerance):
-                # take fewer elements for the next orbit, which shooting begins
+                # take fewer elements for the next orbit; shooting finds it first
                 level -= 1
                 known = 0
 
 
 @part
 def solve_from_right(section, points, search, found):
-    """Find missing orbits from their neighbours on the right, by Newton's method."""
+    """Find missing orbits of a row by Newton's method, each from the start of its neighbour on the right."""
     starts, monodromies, status = found
     n = starts.shape[1]
     z, carry, report = np.empty(n * (1 + n)), np.array([0.1, 0.0]), np.zeros(3)
@@ -246,7 +254,7 @@ def solve_from_right(section, points, search, found):
 
 @part
 def solve_from_guesses(section, points, search, guesses, found):
-    """Find orbits that are still missing: once more from the neighbour on the left, then from all guesses but the first."""
+    """Find orbits of a row that are still missing, from the neighbour on the left, then from all guesses except the first."""
     starts, monodromies, status = found
     n = starts.shape[1]
     z, carry, report = np.empty(n * (1 + n)), np.array([0.1, 0.0]), np.zeros(3)
@@ -280,10 +288,10 @@ def solve_row(section, points, search, guesses, found):
     points : Points
     search : Search
     guesses : ndarray, shape (k, n)
-        Guesses of y. The first guess is used for the first mechanism and after each failure of Newton's method. An orbit that
-        is not found from a neighbour on either side is sought from the other guesses.
+        Guesses of y. The first guess is used for the first mechanism and after each failure of Newton's method. If neither
+        neighbour of a mechanism leads to its orbit, the other guesses are tried.
     found : Row
-        Written.
+        The result; its arrays are written.
     """
     tables = make_desk(guesses.shape[1], COUNTS[-1] * search.turns, False)
     solve_from_left(section, points, search, guesses[0].copy(), found, tables)
@@ -298,7 +306,7 @@ def solve_row(section, points, search, guesses, found):
 
 @inner
 def _is_known(start, known, section, away):
-    """Return whether a start is one of the known ones, whole turns of angles apart; ``away`` is work space."""
+    """Return whether a start equals a known start, apart from whole turns of angles; ``away`` is work space."""
     found = False
     for k in range(known.shape[0]):
         subtract_modulo_turns(start, known[k], section.ways, away)
@@ -307,11 +315,11 @@ def _is_known(start, known, section, away):
 
 
 class Seekers(NamedTuple):
-    """Searches, one in each lane."""
+    """Searches for periodic motions that run at the same time, one in each lane of the processor."""
 
-    place: NDArray[np.int64]  # number of the start in the queue, -1 if there is no search
+    place: NDArray[np.int64]  # index of the guess from which the search began, -1 if the lane is free
     begun: NDArray[np.int64]  # number of motions that were known when the search began
-    polishing: NDArray[np.bool_]  # whether Newton's method refines a motion that was found
+    polishing: NDArray[np.bool_]  # whether Newton's method now refines a motion at the full tolerance
     hunts: Hunt  # states of Newton's method: each array has a row for each lane
 
 
@@ -326,7 +334,7 @@ def _make_seekers(n):
 
 @inline
 def _hunt(lane, hunts):
-    """Return the state of the search in one lane, a view of the arrays of all lanes."""
+    """Return the state of Newton's method in one lane, a view of the arrays of all lanes."""
     return Hunt(
         hunts.start[lane], hunts.trial[lane], hunts.correction[lane], hunts.following[lane],
         hunts.system[lane], hunts.last[lane], hunts.numbers[lane],
@@ -334,13 +342,13 @@ def _hunt(lane, hunts):
 
 
 class Point(NamedTuple):
-    """A point whose motions are sought, and the motions found so far."""
+    """A point of a chart whose motions are sought, and the motions found so far."""
 
     own: Any  # section with the full tolerance
     wide: Any  # section with the looser tolerance of a search
     search: Search
-    before: NDArray[np.float64]  # starts of the motions of the point before, (b, n)
-    guesses: NDArray[np.float64]  # further starts of searches, (k, n)
+    before: NDArray[np.float64]  # starts of the motions of the previous point of the row, (b, n)
+    guesses: NDArray[np.float64]  # further guesses of a start, (k, n)
     angles: NDArray[np.float64]  # crank angles of the samples (rad)
     starts: NDArray[np.float64]  # starts of the motions found, (MOST_ORBITS, n)
     monodromies: NDArray[np.float64]  # as in `Motions`
@@ -350,7 +358,7 @@ class Point(NamedTuple):
 
 @inner
 def _begin_search(lane, point, seekers, v):
-    """Begin the search of a lane: by Newton's method from a motion of the point before, or by deflation from a guess."""
+    """Begin the search of a lane: Newton's method from a motion of the previous point, or deflated Newton from a guess."""
     place, before = seekers.place[lane], point.before.shape[0]
     seekers.polishing[lane] = place < before
     seekers.begun[lane] = point.count[0]
@@ -379,7 +387,7 @@ def _record(lane, point, seekers, v, room, carry):
 
 @inner
 def _continue_search(lane, point, seekers, v, room, carry):
-    """Continue the search of a lane after its integration; if it is over, mark the lane free: ``seekers.place[lane]`` = -1."""
+    """Continue the search of a lane after its integration; if the search is over, set ``seekers.place[lane]`` = -1 (free)."""
     hunt, most, status = _hunt(lane, seekers.hunts), point.search.most, v.status[lane]
     read_lane(lane, LANES, v.x, v.z)
     if seekers.polishing[lane]:
@@ -405,7 +413,7 @@ def _continue_search(lane, point, seekers, v, room, carry):
 
 @part
 def _search_point(point, seekers, tables, room, carry):
-    """Find the motions of a point, in lanes: from the motions of the point before, then from all guesses."""
+    """Find the motions of a point by searches in lanes: from the motions of the previous point, then from all guesses."""
     v, before = refer(tables), point.before.shape[0]
     place = 0
     for bound in (before, before + point.guesses.shape[0]):
@@ -432,15 +440,15 @@ def _search_point(point, seekers, tables, room, carry):
 def solve_all(section, points, search, angles, guesses, found):
     """Find all orbits of each mechanism in a row of a chart.
 
-    The orbits of each point are sought from the orbits of the point before, then from every guess with the known orbits divided
-    out.
+    Newton's method starts from each orbit of the previous mechanism in the row, then from every guess, with the known orbits
+    divided out.
 
     Parameters
     ----------
     angles : ndarray, shape (samples,)
         Crank angles at which the first component of y is sampled.
     found : Motions
-        Written.
+        The result; its arrays are written.
 
     The other parameters are those of `solve_row`.
     """
@@ -459,15 +467,15 @@ def solve_all(section, points, search, angles, guesses, found):
         _search_point(point, seekers, tables, make_room(own, 0), carry)
 
 
-#: Results for a start that settles on no known motion: it comes to the limit of assembly, or does not settle in the turns.
+#: Results for a start that settles on no known motion: the links reach the limit of assembly, or the turns are used up.
 LOST, UNSETTLED = -1, -2
 
 
 @inner
 def _find_known(z, known, near, section, away):
-    """Return the index of the known motion to which the state z is close, whole turns of angles apart; UNSETTLED if none is.
+    """Return the index of the known motion to which the state z is close, or UNSETTLED if there is none.
 
-    ``near`` is the greatest distance relative to the scale; ``away`` is work space.
+    Whole turns of angles are ignored. ``near`` is the greatest distance relative to the scale; ``away`` is work space.
     """
     end = UNSETTLED
     for k in range(known.shape[0]):
@@ -479,9 +487,9 @@ def _find_known(z, known, near, section, away):
 
 @part
 def _settle(section, turn, near, most, starts, known, ends, tables):
-    """Do the work of `settle_starts`, which keeps the arrays of ``tables`` alive while they are used here."""
+    """Do the work of `settle_starts`; ``tables`` is work space whose arrays the caller must keep alive during the call."""
     v, away = refer(tables), np.empty(starts.shape[1])
-    # for each lane: the index of its start, or -1, and the turns that it has made
+    # for each lane: the index of its start, or -1, and the number of turns that have been computed
     rows, turns = np.full(LANES, -1), np.zeros(LANES, np.int64)
     following, running = 0, True
     while running:
@@ -509,7 +517,7 @@ def _settle(section, turn, near, most, starts, known, ends, tables):
 
 @kernel(types.void(SECTION, float64, float64, int64, MATRIX, MATRIX, int64[::1]), purpose="basins of attraction")
 def settle_starts(section, turn, near, most, starts, known, ends):
-    """Follow each start turn by turn until it settles on one of the known motions.
+    """Simulate the motion from each start, turn by turn, until it settles on one of the known motions.
 
     Parameters
     ----------
@@ -518,11 +526,11 @@ def settle_starts(section, turn, near, most, starts, known, ends):
     near : float
         Distance from a known start, relative to the scale, at which the motion counts as settled.
     most : int
-        Turns at most.
+        Greatest number of turns.
     starts, known : ndarray, shapes (m, n) and (k, n)
         y at crank angle 0 of each start, and of the known motions.
     ends : ndarray of int64, shape (m,)
-        Written: index of the known motion, or `LOST` or `UNSETTLED`.
+        The result, written: for each start the index of the known motion, or `LOST` or `UNSETTLED`.
     """
     tables = make_tracks(starts.shape[1], 0)
     set_scale(section.scale, tables)

@@ -24,7 +24,7 @@ FloatArray = NDArray[np.float64]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PointRow:
-    """Operating points of a row that share a flow.
+    """The m operating points of a row of a chart, which share a flow.
 
     Attributes
     ----------
@@ -49,7 +49,7 @@ class PointRow:
 
     @property
     def switched(self) -> bool:
-        """Whether the mechanism's switch is on at any point: see `Mechanism.is_switched_on`."""
+        """Whether the mechanism's switch (friction by joint forces) is on at any point: see `Mechanism.is_switched_on`."""
         place = self.first.mechanism.switch_index
         return place >= 0 and bool(self.constants[:, place].any())
 
@@ -66,9 +66,9 @@ class PointRow:
 
 
 def point_row(points: Sequence[OperatingPoint], start: FloatArray) -> PointRow:
-    """Collect operating points in a row; the magnitudes of y are those at ``start``.
+    """Collect operating points in a row; the magnitudes of y are computed at ``start``.
 
-    Raises InputError if the points are not driven in the same way.
+    Raises InputError if the points do not all have the same kind of drive.
     """
     if any(point.flow is not points[0].flow for point in points):
         raise InputError(
@@ -84,19 +84,19 @@ def point_row(points: Sequence[OperatingPoint], start: FloatArray) -> PointRow:
 
 
 def grid_rows(operation: Plane, xs: FloatArray, ys: FloatArray, start: FloatArray) -> list[PointRow]:
-    """Return the operating points of a grid by rows; in a plane of named parameters a whole row is computed at once."""
+    """Return the rows of operating points of a grid; in a `NamedPlane` the data of a whole row are computed at once."""
     if isinstance(operation, NamedPlane):
         return [_named_row(operation, xs, y, start) for y in ys.tolist()]
     return [point_row([operating_point(*operation(x, y)) for x in xs.tolist()], start) for y in ys.tolist()]
 
 
 def _named_row(operation: NamedPlane, xs: FloatArray, y: float, start: FloatArray) -> PointRow:
-    """Return the row of a plane of named parameters at one value ``y`` of the second parameter."""
+    """Return the row of a `NamedPlane` at one value ``y`` of the second parameter."""
     first = operating_point(*operation(float(xs[0]), y))
     flow, mechanism = first.flow, first.mechanism
     vectors = np.tile(first.vector, (len(xs), 1))
     sets: Sequence[Parameters] = [first.parameters]
-    # the two ends suffice: if the drive refuses a value, or a friction is not zero, this is so at one of them
+    # checking the two ends is enough: if the drive rejects a value, or a friction is not zero, this happens at an end
     ends = [operating_point(*operation(x, y)) for x in (float(xs.min()), float(xs.max()))]
     factors = parameter_places(flow, first.drive, operation.x)
     if factors is None:

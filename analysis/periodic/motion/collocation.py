@@ -1,15 +1,16 @@
-"""Solve a period by Gauss collocation from a neighbouring motion: compiled kernels.
+"""Compute a periodic motion by Gauss collocation, starting from a neighbouring motion: compiled kernels.
 
-At prescribed speed the coordinates follow from the rates, and the rates from their slopes over the crank angle. The unknowns
-are therefore the slopes w at the Gauss nodes of each element of a period, and y at its beginning. Newton's method corrects all
-of them together. The slopes of an element are eliminated first; small matrices, whose product is the monodromy matrix, then
-join the elements. With NODES nodes the ends of the elements are of order 2 NODES (E. Hairer, S. P. Norsett, G. Wanner, Solving
-Ordinary Differential Equations I, section II.7). From a good guess, which a neighbouring motion gives at every node, two or
-three corrections suffice. Each evaluates the right-hand side a sixth as often as an integrator of order 8 does. The decay of
-the Legendre coefficients over each element is a measure of the error.
+The period is divided into elements. At prescribed speed the coordinates are integrals of the rates, and the rates are integrals
+of their slopes over the crank angle. The unknowns are therefore, for each element, the slopes w of the rates at the Gauss
+nodes, and the state y (coordinates, then rates) at the beginning. Newton's method corrects all unknowns together. The slopes of
+each element are eliminated first; small matrices, whose product is the monodromy matrix, then join the elements. With NODES
+nodes the values at the ends of the elements are of order 2 NODES (E. Hairer, S. P. Norsett, G. Wanner, Solving Ordinary
+Differential Equations I, section II.7). A neighbouring motion gives a good guess at every node; two or three corrections then
+suffice. Each correction evaluates the right-hand side a sixth as often as an integrator of order 8 does. The decay of the
+Legendre coefficients over each element is a measure of the error.
 
-LANES elements are linearised at once by vector instructions: element e is lane ``e % LANES`` of row ``e // LANES`` of an array
-"in lanes". Lanes beyond the last element repeat it.
+Vector instructions linearise LANES elements at once. In an array "in lanes", element e has lane ``e % LANES`` of row
+``e // LANES``. Unused lanes of the last row repeat the last element.
 """
 
 from __future__ import annotations
@@ -48,8 +49,9 @@ _CORRECTIONS, _FAR = 8, 1.0
 
 
 class Desk(NamedTuple):
-    """Work space of a period: arrays in lanes of all elements, then of one row of elements, then matrices that join elements.
+    """Work space for the collocation of one period.
 
+    It contains arrays in lanes for all elements, arrays in lanes for one row of elements, and matrices that join the elements.
     f = n / 2 is the number of coordinates.
     """
 
@@ -80,7 +82,7 @@ def row_count(elements):
 
 @part
 def make_desk(n, most, directional):
-    """Make the work space for y of n components and at most ``most`` elements; with lambda if ``directional``."""
+    """Return the work space for y of n components and ``most`` elements; ``directional``: with derivatives by lambda."""
     f, columns = n // 2, n + 1 if directional else n
     unknowns, rows = NODES * f, row_count(most)
     return Desk(
@@ -105,7 +107,7 @@ def make_desk(n, most, directional):
 
 @inner
 def lay_elements(angles, desk):
-    """Write the beginnings and lengths of the elements onto the desk; ``angles`` are the beginnings and the end of the last."""
+    """Write the beginnings and lengths of the elements into ``desk``; ``angles`` are the beginnings and the end of the last."""
     m = angles.shape[0] - 1
     for place in range(row_count(m) * LANES):
         e = min(place, m - 1)
@@ -115,7 +117,7 @@ def lay_elements(angles, desk):
 
 @inner
 def _identity(matrix):
-    """Write the identity into a matrix, and zeros into further columns."""
+    """Set a matrix to the identity; columns beyond the square are set to zero."""
     for i in range(matrix.shape[0]):
         for j in range(matrix.shape[1]):
             matrix[i, j] = 1.0 if i == j else 0.0
@@ -123,7 +125,7 @@ def _identity(matrix):
 
 @inner
 def _equation(section, desk):
-    """Return the address of the equations with their derivatives, those by lambda included if the desk has room for them."""
+    """Return the address of the function for rates and derivatives; by lambda, too, if ``desk`` has room for them."""
     n = desk.shift.shape[0]
     directional = desk.out.shape[1] > n * (1 + n) * LANES
     return section.equations[IN_LANES + (DIRECTIONAL if directional else VARIATIONAL)]
@@ -131,7 +133,7 @@ def _equation(section, desk):
 
 @inner
 def _pace(section, y, desk):
-    """Return the time per radian: the derivative of a coordinate's slope by its rate."""
+    """Return the time per radian of crank rotation: the derivative of a coordinate's slope with respect to its rate."""
     n = desk.shift.shape[0]
     for i in range(n):
         store(desk.z, i, load(y[0], i))
@@ -143,7 +145,10 @@ def _pace(section, y, desk):
 
 @inner
 def _evaluate_node(s, row, unit, y, w, desk):
-    """Compute y and the angle at node s of a row of elements from the slopes; the results are written into ``desk.z``."""
+    """Compute y and the crank angle at node s of a row of elements from the slopes, and write them into ``desk.z``.
+
+    ``unit`` is the time per radian of crank rotation.
+    """
     n = desk.shift.shape[0]
     f = n // 2
     h = load(desk.lengths[row], 0)
@@ -160,7 +165,10 @@ def _evaluate_node(s, row, unit, y, w, desk):
 
 @inner
 def _linearise_row(section, row, unit, y, w, desk):
-    """Linearise a row of elements about y and w, and eliminate the slopes; the results are written onto the desk."""
+    """Linearise the collocation equations of a row of elements about y and w, and eliminate the slopes.
+
+    The results are written into the work space ``desk``; ``unit`` is the time per radian of crank rotation.
+    """
     n = desk.shift.shape[0]
     f = n // 2
     system, unknowns = desk.equations, NODES * f
@@ -203,10 +211,10 @@ def _linearise_row(section, row, unit, y, w, desk):
 
 @inner
 def _eliminate(system, unknowns, width):
-    """Solve linear equations in lanes, as ``kernels.eliminate`` does but without pivots.
+    """Solve linear equations in lanes by elimination without pivoting; the last columns of ``system`` become the solutions.
 
-    The matrix is the identity minus a multiple of the element's length: no pivots are needed while elements are short. If it is
-    far from the identity, the corrections do not converge.
+    ``width`` is the number of columns. The matrix is the identity minus a multiple of the element's length: pivoting is not
+    needed while elements are short. If the matrix is far from the identity, the corrections do not converge.
     """
     for c in range(unknowns):
         inverse = 1.0 / load(system, c * width + c)
@@ -226,7 +234,7 @@ def _eliminate(system, unknowns, width):
 
 @inner
 def _close_row(row, unit, y, w, desk):
-    """Compute y at the ends of a row of elements, with its derivatives, from the corrections of the slopes."""
+    """Compute y and its derivatives at the end of each element of a row from the corrections of the slopes."""
     n = desk.shift.shape[0]
     f = n // 2
     moves = desk.moves[row]
@@ -261,7 +269,7 @@ def _close_row(row, unit, y, w, desk):
 
 @inner
 def linearise(section, y, w, desk):
-    """Linearise all elements about y and w, and write the results onto the desk; see `Desk`."""
+    """Linearise the collocation equations of all elements about y and w; the results are written into ``desk``."""
     unit = _pace(section, y, desk)
     for row in range(y.shape[0]):
         _linearise_row(section, row, unit, y, w, desk)
@@ -269,10 +277,10 @@ def linearise(section, y, w, desk):
 
 @inner
 def _carry(e, y, following, desk):
-    """Replace ``desk.shift``, the change of y at the beginning of element e, by that at the beginning of the next element.
+    """Replace ``desk.shift``, the change of y at the beginning of element e, by the change at the next element's beginning.
 
-    ``following`` is the index of the next element; if it is -1, the result is y at the end of element e. The change at the
-    beginning is written into ``desk.shifts``, in the lane of the element and the lanes after it.
+    ``following`` is the index of the next element; if it is -1, ``desk.shift`` becomes y at the end of element e. The change at
+    the beginning of element e is written into ``desk.shifts``, in the lane of the element and the later lanes of its row.
     """
     shift, column = desk.shift, desk.column
     row, lane, n = e // LANES, e % LANES, shift.shape[0]
@@ -289,7 +297,7 @@ def _carry(e, y, following, desk):
 
 @inner
 def _chain(e, product, desk):
-    """Multiply ``product`` from the left by the matrix of element e, in place."""
+    """Multiply ``product``, in place, from the left by the transition matrix of element e: see `Desk.matrices`."""
     row, lane, n, column = e // LANES, e % LANES, product.shape[0], desk.column
     for j in range(product.shape[1]):
         for i in range(n):
@@ -302,7 +310,7 @@ def _chain(e, product, desk):
 
 @inner
 def _greatest(values, so_far):
-    """Return the greatest of the values and ``so_far``, none of them negative; NaN if one is NaN."""
+    """Return the greatest of ``values`` and ``so_far``, which are not negative; NaN if one of them is NaN."""
     for value in values:
         if not (value <= so_far or isnan(so_far)):
             so_far = value
@@ -332,7 +340,7 @@ def _move(section, y, w, desk):
             change = load(shifts, i)
             store(y[row], i, load(y[row], i) + change)
             worst = greater(worst, absolute(change) * (1.0 / section.scale[i]))
-        # a NaN is lost in comparisons, but not here
+        # comparisons lose a NaN, this sum keeps it
         store(desk.single, 0, worst + valid)
         result = _greatest(desk.single, result)
     return result
@@ -340,9 +348,10 @@ def _move(section, y, w, desk):
 
 @inner
 def _correct_period(section, m, y, w, desk):
-    """Correct y and w of a closed period of m elements once; return the greatest correction, relative to the scale.
+    """Correct y and w of a closed period of m elements by one Newton step; return the greatest correction.
 
-    It is NaN if the linear system has no solution. The monodromy matrix before the correction is written onto the desk.
+    The greatest correction is relative to the scale of y, and NaN if the linear system has no solution. The monodromy matrix
+    before the correction is written into ``desk``.
     """
     n = desk.shift.shape[0]
     linearise(section, y, w, desk)
@@ -367,9 +376,10 @@ def _correct_period(section, m, y, w, desk):
 
 @inner
 def _tails(section, row, w, desk):
-    """Compute the size of the highest Legendre coefficients of the slopes and of their derivatives, relative to the greatest.
+    """Compute the size of the two highest Legendre coefficients of the slopes and their derivatives: a measure of the error.
 
-    The size for each element of the row is written into ``desk.single``.
+    The size is relative to the greatest value plus the scale. The size for each element of the row is written into
+    ``desk.single``.
     """
     scale = section.scale
     n = scale.shape[0]
@@ -393,7 +403,7 @@ def _tails(section, row, w, desk):
 
 @inner
 def _least_gap(section, y, w, desk):
-    """Return the least clearance to the limit of assembly at the nodes; NaN beyond it."""
+    """Return the least clearance to the limit of assembly at the nodes; NaN if a node is beyond the limit."""
     least = np.inf
     unit = _pace(section, y, desk)
     for row in range(y.shape[0]):
@@ -410,10 +420,10 @@ def _least_gap(section, y, w, desk):
 
 @part
 def close(section, m, y, w, desk):
-    """Solve y and w of a closed period of m elements, in lanes, by Newton's method.
+    """Find y and w of a periodic motion on m elements, in lanes, by Newton's method.
 
-    Return a `Status` and the relative size of the highest Legendre coefficients. NO_STEP means that this size is too large: the
-    elements are too few.
+    Return a `Status` and the relative size of the highest Legendre coefficients. NO_STEP means that this size is too large:
+    more elements are needed.
     """
     before = tail = 0.0
     for count in range(_CORRECTIONS):
@@ -433,10 +443,10 @@ def close(section, m, y, w, desk):
 
 @part
 def integrate_elements(section, angles, first, start, y, w, room):
-    """Compute y and w of elements by the integrator, from the element with the index ``first`` on; return a `Status`.
+    """Integrate over elements, beginning with element ``first``, and write their y and w; return a `Status`.
 
-    ``start``, y at the beginning of the first element, becomes y at the end of the last. ``angles`` are the beginnings of these
-    elements and the end of the last.
+    ``start`` is y at the beginning of the first element, and becomes y at the end of the last element. ``angles`` are the crank
+    angles at which these elements begin, and the end of the last element.
     """
     n = start.shape[0]
     out = np.empty(n)
@@ -461,7 +471,7 @@ def integrate_elements(section, angles, first, start, y, w, room):
 
 @inner
 def repeat_last(m, many):
-    """Copy the last of m elements into the lanes beyond it."""
+    """Copy the values of the last of m elements into the unused lanes of its row; ``many`` is an array in lanes."""
     row, lane = (m - 1) // LANES, (m - 1) % LANES
     for i in range(many.shape[1] // LANES):
         for other in range(lane + 1, LANES):
@@ -469,7 +479,7 @@ def repeat_last(m, many):
 
 
 class Neighbour(NamedTuple):
-    """A neighbouring motion, in lanes."""
+    """A neighbouring motion, from which the collocation starts; arrays in lanes."""
 
     y: NDArray[np.float64]  # y at the beginnings of the elements, shape (rows, n LANES)
     w: NDArray[np.float64]  # slopes at the nodes, (rows, NODES f LANES)
@@ -486,13 +496,13 @@ class PieceSolution(NamedTuple):
     """The result of `solve_pieces`."""
 
     rows: NDArray[np.float64]  # ends of the pieces, as `kernels.segments` writes them
-    tails: NDArray[np.float64]  # decay of the Legendre coefficients, shape (m,)
+    tails: NDArray[np.float64]  # size of the highest Legendre coefficients of each element, shape (m,)
     clearance: NDArray[np.float64]  # least clearance to the limit of assembly, (1,)
 
 
 @inner
 def _predict(firsts, starts, change, unit, neighbour, desk):
-    """Move a neighbouring motion to other beginnings of the pieces and another lambda, to first order."""
+    """Extrapolate a neighbouring motion, in place, to other starts of the pieces and another lambda, to first order."""
     y, w, moves = neighbour
     n = desk.shift.shape[0]
     f = n // 2
@@ -519,9 +529,9 @@ def _predict(firsts, starts, change, unit, neighbour, desk):
 
 @inner
 def _correct_pieces(section, firsts, starts, y, w, desk, rows):
-    """Correct y and w of pieces with given beginnings once; return the greatest correction, relative to the scale.
+    """Correct y and w of pieces with given starts by one Newton step; return the greatest correction.
 
-    The ends of the pieces are written into ``rows``.
+    The greatest correction is relative to the scale of y. y at the ends of the pieces is written into ``rows``.
     """
     linearise(section, y, w, desk)
     n = desk.shift.shape[0]
@@ -538,7 +548,7 @@ def _correct_pieces(section, firsts, starts, y, w, desk, rows):
 
 @inner
 def _write_derivatives(firsts, rows, desk):
-    """Write the derivatives of the ends of pieces by their beginnings and by lambda into ``rows``."""
+    """Write the derivatives of y at the end of each piece, by y at its beginning and by lambda, into ``rows``."""
     n = desk.shift.shape[0]
     whole = desk.system
     for piece in range(rows.shape[0]):
@@ -554,7 +564,10 @@ def _write_derivatives(firsts, rows, desk):
 
 @part
 def _solve_pieces(section, angles, firsts, starts, change, known, neighbour, found, tables):
-    """Do the work of `solve_pieces`, which keeps the arrays of the desk ``tables`` alive while they are used here."""
+    """Do the work of `solve_pieces`; ``tables`` is the work space `Desk`.
+
+    `solve_pieces` makes the work space and keeps its arrays alive while this function refers to them.
+    """
     y, w, moves = neighbour
     m, desk, room = angles.shape[0] - 1, refer(tables), make_room(section, 0)
     lay_elements(angles, desk)
@@ -606,14 +619,14 @@ def _solve_pieces(section, angles, firsts, starts, change, known, neighbour, fou
     purpose="the collocation of periodic motions",
 )
 def solve_pieces(section, angles, firsts, starts, change, known, neighbour, found):
-    """Solve y with its derivatives over each piece of a period, starting from a neighbouring motion.
+    """Compute y and its derivatives over each piece of a period by collocation, starting from a neighbouring motion.
 
     Parameters
     ----------
     angles : ndarray, shape (m + 1,)
-        Crank angles at which the elements begin, and the end of the last.
+        Crank angles (rad) at which the m elements begin, and the end of the last element.
     firsts : ndarray of int64, shape (k + 1,)
-        Index of the first element of each piece, and m.
+        Index of the first element of each of the k pieces, and m.
     starts : ndarray, shape (k, n)
         y at the beginning of each piece.
     change : float
@@ -621,14 +634,14 @@ def solve_pieces(section, angles, firsts, starts, change, known, neighbour, foun
     known : bool
         Whether there is a neighbour; if not, the integrator gives the first guess.
     neighbour : Neighbour
-        Overwritten with this motion.
+        The neighbouring motion; overwritten with the new motion.
     found : PieceSolution
-        Written.
+        Overwritten with the result.
 
     Returns
     -------
     int
-        A `Status`; NO_STEP if elements are too long, DIVERGED if the slopes were not found.
+        A `Status`; NO_STEP if elements are too long, DIVERGED if Newton's method did not find the slopes.
     """
     m, n = angles.shape[0] - 1, starts.shape[1]
     return _solve_pieces(section, angles, firsts, starts, change, known, neighbour, found, make_desk(n, m, True))

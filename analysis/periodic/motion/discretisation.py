@@ -1,18 +1,19 @@
 """Discretise a period: one interface for shooting and collocation, and the rule that chooses between them.
 
-A period is divided into pieces. The unknowns of a periodic motion are y at the beginnings of the pieces; the residual is y at
-the end of each piece minus y at the beginning of the next. Its exact Jacobian contains the derivatives of each end with respect
-to its beginning; their product is the monodromy matrix, whose eigenvalues are the Floquet multipliers. Either method gives the
-`Ends` of the pieces; from these `orbit.OrbitEquations` builds the equations for Newton's method and for continuation.
+A period is divided into pieces. The unknowns of a periodic motion are the states y at the beginnings of the pieces; the
+residual is y at the end of each piece minus y at the beginning of the next piece. The exact Jacobian contains, for each piece,
+the derivatives of y at the end with respect to y at the beginning. The product of these matrices is the monodromy matrix; its
+eigenvalues are the Floquet multipliers. Both methods compute the `Ends` of the pieces. `orbit.OrbitEquations` builds the
+equations for Newton's method and for continuation from them.
 
 - **Shooting** integrates each piece with steps of order 8. With one piece it is single shooting, with several multiple
   shooting. It works for every drive.
-- **Collocation** corrects the polynomials of a neighbouring motion, element by element, with a sixth of the right-hand sides.
-  It works if the crank's speed is prescribed and the rates are smooth (`collocation_serves`), as long as the links stay clear
-  of the limit of assembly and not too many elements are needed; otherwise shooting replaces it for a while.
+- **Collocation** corrects the polynomials of a neighbouring motion, element by element. It evaluates the right-hand sides a
+  sixth as often. It works if the crank's speed is prescribed and the rates are smooth (`collocation_serves`), as long as the
+  links stay clear of the limit of assembly and not too many elements are needed; otherwise shooting is used for a while.
 
-One piece is followed as long as a deviation grows less than `GROWTH` times over the period; then the period is divided so that
-deviations grow about `AIM` times over each piece (`choose_pieces`).
+The period is one piece as long as a deviation grows less than `GROWTH` times over the period. If a deviation grows more, the
+period is divided so that deviations grow about `AIM` times over each piece (`choose_pieces`).
 """
 
 from __future__ import annotations
@@ -61,7 +62,7 @@ class OrbitError(LinkworkError):
     start : tuple of float
         y at crank angle 0 of the last iterate: see `PeriodicOrbit`.
     residual : float
-        ``|y(T) - y(0)|`` relative to the scale there; infinite if not one period could be followed.
+        ``|y(T) - y(0)|`` relative to the scale of y; infinite if the motion ended within the first period.
     iterations : int
     """
 
@@ -83,13 +84,13 @@ class OrbitAssemblyError(OrbitError, AssemblyError):
 def orbit_error(
     status: int, flow: Flow, start: FloatArray, residual: float = np.inf, iterations: int = 0
 ) -> OrbitError:
-    """Return the error for a status of `kernels`."""
+    """Return the exception for a `Status` of the kernels that is a failure."""
     kind = OrbitAssemblyError if status == Status.LIMIT else OrbitError
     return kind(kernels.REASONS[Status(status)], flow, start, float(residual), iterations)
 
 
 class Ends(NamedTuple):
-    """The ends of the k pieces of a period."""
+    """y at the ends of the k pieces of a period, with derivatives."""
 
     y: FloatArray  # y at the end of each piece, shape (k, n)
     matrices: FloatArray  # its derivatives by y at the beginning, (k, n, n)
@@ -98,7 +99,7 @@ class Ends(NamedTuple):
 
 
 class Period(NamedTuple):
-    """One period from a start: y(T) - y(0), shape (n,), its derivatives dy(T)/dy(0), (n, n), and dy(T)/dlambda, (n,)."""
+    """One period followed from a start: y(T) - y(0), shape (n,), dy(T)/dy(0), (n, n), and dy(T)/dlambda, (n,)."""
 
     shift: FloatArray
     monodromy: FloatArray
@@ -131,7 +132,7 @@ class OperatingPoint:
         return _unpickle, (self.mechanism, self.parameters, self.drive)
 
     def scale(self, start: FloatArray) -> FloatArray:
-        """Return the magnitudes of y: see `motion_scales`."""
+        """Return the scale of each component of y, its typical magnitude: see `motion_scales`."""
         return flow_scales(self.flow, self.parameters, self.vector, start)
 
     def section(
@@ -152,14 +153,14 @@ class OperatingPoint:
         *functions : int
             Indices of the flow's functions that are needed, in addition to GAP.
         direction : Direction, optional
-            Derivatives by a parameter lambda; zero without it.
+            Derivatives of the drive vector and the constants by a parameter lambda; zero if not given.
         along : float
-            Magnitude of lambda.
+            Typical magnitude of lambda, for the errors of derivatives by lambda.
         switched : bool
             Whether to use the equations with their optional terms, such as friction, even if this mechanism has none.
         """
         d_drive, d_p = direction or (np.zeros_like(self.vector), np.zeros_like(self.constants))
-        # a change of lambda may set the switch
+        # a change of lambda may switch the optional terms on
         switched = switched or any(map(self.mechanism.is_switched_on, (self.constants.tolist(), d_p.tolist())))
         return Section(
             self.flow.addresses(GAP, *functions, switched=switched),
@@ -188,7 +189,7 @@ class OperatingPoint:
         Raises
         ------
         OrbitError
-            If a piece cannot be followed.
+            If the integration over a piece fails.
         """
         k, n = starts.shape
         rows = np.zeros((k, n * (2 + n)))
@@ -199,7 +200,7 @@ class OperatingPoint:
         return _ends(rows, n)
 
     def period(self, start: FloatArray, turns: int, direction: Direction | None = None, along: float = 1.0) -> Period:
-        """Follow a period from a start that need not be on a periodic orbit; see `shoot`."""
+        """Integrate over ``turns`` common periods from a start that need not be on a periodic orbit; see `shoot`."""
         ends = self.shoot(np.array([0.0, self.flow.period * turns]), start[None, :], direction, along)
         return Period(ends.y[0] - start, ends.matrices[0].copy(), ends.slopes[0])
 
@@ -207,8 +208,8 @@ class OperatingPoint:
 def operating_point(parameters: Parameters, drive: Drive) -> OperatingPoint:
     """Return a mechanism and its drive as an `OperatingPoint`.
 
-    Raises InputError if the drive does not suit the mechanism, or if a gear ratio or a force law was changed so that the period
-    is another.
+    Raises InputError if the drive does not suit the mechanism, or if a gear ratio or a force law differs from the mechanism's
+    first published set and the period changes with it.
     """
     require_drive(drive)
     mechanism = find_mechanism(parameters)
@@ -226,7 +227,7 @@ def operating_point(parameters: Parameters, drive: Drive) -> OperatingPoint:
 
 
 def _repeats(point: OperatingPoint) -> bool:
-    """Return whether the equations are the same after a common period, and after a whole turn of each free angle.
+    """Return whether the equations of motion repeat after a common period, and after a whole turn of each free angle.
 
     The result is also True if the links can be joined at none of the angles tried.
     """
@@ -267,24 +268,24 @@ def follow_period(
     ----------
     start : ndarray, shape (n,)
         y at crank angle 0.
-    direction : Direction, optional
-        Derivatives by a parameter lambda; zero without it.
-    along : float
-        Magnitude of lambda.
+    turns : int
+        Number of common periods, `Flow.period`, in the period.
+    direction, along
+        As in `OperatingPoint.section`.
 
     Raises
     ------
     OrbitError
-        If the period cannot be followed.
+        If the integration over the period fails.
     """
     return operating_point(parameters, drive).period(start, turns, direction, along)
 
 
 def collocation_serves(drives: Iterable[Drive], mechanisms: Iterable[Parameters]) -> bool:
-    """Return whether collocation can be used under these drives: it needs prescribed speeds and smooth rates.
+    """Return whether collocation can be used: it needs drives with prescribed speeds, and mechanisms with smooth rates.
 
-    It assumes that the slope of a coordinate over the crank angle is its rate divided by the crank speed, which does not hold
-    for a second crank that turns freely, or a link that goes round.
+    Collocation assumes that the slope of a coordinate over the crank angle is its rate divided by the crank speed. This does
+    not hold for a second crank that turns freely, or for a link that goes round.
     """
     mechanisms = list(dict.fromkeys(mechanisms))
 
@@ -305,9 +306,9 @@ class Stations(NamedTuple):
     angles : ndarray, shape (k + 1,)
         Crank angles (rad) at which the pieces begin, the first 0, and the end of the period.
     starts : ndarray, shape (k, n)
-        y at the beginnings.
+        y at the beginnings of the pieces.
     growth : float
-        Greatest norm of the derivatives of y over a piece by y at its beginning, scaled.
+        Greatest growth factor of a deviation over a piece: see `growths`.
     """
 
     angles: FloatArray
@@ -316,13 +317,16 @@ class Stations(NamedTuple):
 
 
 def growths(matrices: FloatArray, scale: FloatArray) -> FloatArray:
-    """Return the greatest growth of a deviation, scaled, over each piece of a period; shape (k,)."""
+    """Return the greatest growth factor of a deviation over each piece of a period; shape (k,).
+
+    ``matrices`` are those of `Ends`; deviations are measured in units of ``scale``, the scale of y.
+    """
     growths: FloatArray = np.linalg.norm(matrices * scale / scale[:, None], ord=2, axis=(1, 2))
     return growths
 
 
 def choose_pieces(point: OperatingPoint, places: FloatArray, turns: int) -> tuple[FloatArray, FloatArray]:
-    """Divide a period into pieces over which deviations grow by equal factors.
+    """Divide a period into pieces that are shorter where deviations grow faster.
 
     Parameters
     ----------
@@ -345,9 +349,9 @@ def choose_pieces(point: OperatingPoint, places: FloatArray, turns: int) -> tupl
 
 
 class Discretisation:
-    """Compute the pieces of a period for one motion after another of a family.
+    """Method that computes the ends of the pieces of a period, for one motion of a family after another.
 
-    Collocation takes the previous motion as its first approximation; shooting replaces it where it fails or is not used.
+    Collocation takes the previous motion as first approximation; shooting is used where collocation fails or is not tried.
 
     Parameters
     ----------
@@ -371,9 +375,10 @@ class Discretisation:
         direction: Direction | None = None,
         along: float = 1.0,
     ) -> Ends:
-        """Compute the ends of the pieces from their beginnings at a value of lambda: see `OperatingPoint.shoot`.
+        """Compute y and its derivatives at the ends of the pieces from y at their beginnings, ``starts``.
 
-        Raises OrbitError if a piece cannot be followed.
+        ``value`` is the value of lambda; ``direction`` and ``along`` are those of `OperatingPoint.section`. Raises OrbitError
+        if the integration over a piece fails.
         """
         self._pause -= 1
         if self.collocated and self._pause < 0:
@@ -385,7 +390,7 @@ class Discretisation:
         return point.shoot(self.angles, starts, direction, along)
 
     def _collocate(self, section: Section, flow: Flow, starts: FloatArray, value: float) -> Ends | None:
-        """Compute the ends by collocation on as many elements as are needed; return None if shooting has to replace it."""
+        """Compute the ends by collocation on as many elements as are needed; return None if shooting must be used instead."""
         k, n = starts.shape
         self._calls += 1
         if self._calls % _RENEWED == 1:
@@ -413,7 +418,7 @@ class Discretisation:
             if status == Status.NO_STEP:
                 long = ~(found.tails <= collocation.DECAY * np.sqrt(section.tolerance))
             elif known:
-                # not found from the neighbour: try without it
+                # not found from the neighbouring motion: try again without this motion
                 continue
             else:
                 long = np.ones(len(found.tails), dtype=bool)
@@ -431,6 +436,6 @@ class Discretisation:
 
 
 def _ends(rows: FloatArray, n: int) -> Ends:
-    """Return the ends of pieces from the rows of a kernel."""
+    """Return the `Ends` of the pieces from the array ``rows`` that a kernel has written; n is the size of y."""
     matrices = rows[:, n : n + n * n].reshape(-1, n, n).transpose(0, 2, 1)
     return Ends(rows[:, :n], matrices, rows[:, n + n * n :])

@@ -40,7 +40,7 @@ Torque = float | InductionMotor | Sequence[float | InductionMotor]
 
 
 class VaryingInputError(InputError):
-    """An input varies in time, so that no periodic motion exists under it; ``channel`` is its name."""
+    """An input varies in time, so that no periodic motion can be sought; ``channel`` is the name of the input."""
 
     def __init__(self, channel: str, value: object) -> None:
         self.channel = channel
@@ -50,7 +50,7 @@ class VaryingInputError(InputError):
 
 
 class NothingFreeError(InputError):
-    """Every freedom is commanded, so that nothing is free to oscillate; ``force`` is the input that would free one, if any."""
+    """All freedoms are commanded, so that none can oscillate; ``force`` is an input that would free one of them, or empty."""
 
     def __init__(self, mechanism: str, force: str) -> None:
         self.force = force
@@ -61,11 +61,11 @@ class NothingFreeError(InputError):
 @in_si(speed="rad/s", torque="N.m", forces=variable_units, held=variable_units, speeds=variable_units)
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Drive:
-    """The drive of a mechanism in periodic motion: speeds of its cranks or torques on them; all else is constant.
+    """The drive of a mechanism in periodic motion: speeds of its cranks or torques on them; other inputs are constant.
 
-    With one crank, ``speed``, ``torque`` and ``motor`` refer to it. With several, ``speeds`` gives the speeds of all commanded
-    cranks, which keep their ratios as the speed varies. If no crank is commanded, ``crank`` names the crank that ``torque``
-    and ``motor`` drive; torques on other cranks are among ``forces`` and ``motors``.
+    With one crank, ``speed``, ``torque`` and ``motor`` refer to this crank. With several cranks, ``speeds`` gives the speeds of
+    all commanded cranks, which keep their ratios as the speed varies. If no crank is commanded, ``crank`` names the crank that
+    ``torque`` and ``motor`` drive; torques on other cranks are among ``forces`` and ``motors``.
 
     Attributes
     ----------
@@ -74,7 +74,7 @@ class Drive:
     torque : float
         Constant torque on the crank (N.m): the mean torque.
     motor : InductionMotor or None
-        A motor whose torque is added.
+        Motor on the crank; its torque is added to ``torque``.
     forces : mapping of str to float
         Constant forces by the FMI names of their inputs, such as ``slider.force`` or ``load.fx`` (N), and torques on other
         cranks (N.m).
@@ -82,15 +82,15 @@ class Drive:
         Coordinates of held freedoms by their FMI names, such as ``shift.position``, and angles of other commanded cranks at
         the crank angle 0; 0 if they are left out.
     modes : mapping of str to int
-        Modes of other freedoms than the crank, by name, such as ``axial.mode``. A freedom whose mode is left out is free if its
+        Modes of freedoms other than the crank, by name, such as ``axial.mode``. A freedom whose mode is left out is free if its
         force is among ``forces`` (0 included), commanded if it is a crank with a ratio, and otherwise in its default mode.
     crank : str
-        FMI name of the crank of ``speed``, ``torque`` and ``motor``: its coordinate, commanded speed or torque; follows from
-        ``speeds``, and may be left out where there is one crank.
+        FMI name of the crank to which ``speed``, ``torque`` and ``motor`` refer: name of its coordinate, commanded speed or
+        torque. It follows from ``speeds``, and may be left out if there is one crank.
     ratios : mapping of str to Fraction
-        Turns of other cranks for each turn of the crank, by their FMI names; follow from ``speeds``. A crank that is
-        neither free nor among them is held. A link that nothing drives may go round, too: its coordinate with the ratio, such
-        as ``{"swing.angle": 1}``; without a ratio only motions in which it swings are meant.
+        Turns of each other crank per turn of the crank, by FMI name; they follow from ``speeds``. A crank that is not free and
+        has no ratio is held. An undriven link that goes round has a ratio, too, by the name of its coordinate, such as
+        ``{"swing.angle": 1}``; a link without a ratio only swings.
     motors : mapping of str to InductionMotor
         Motors on other cranks by the FMI names of the torques.
     speeds : mapping of str to float, optional
@@ -148,25 +148,25 @@ class Drive:
 
     @property
     def speed_drive(self) -> bool:
-        """Return whether the speed is prescribed."""
+        """Return whether the crank speed is prescribed."""
         return self.speed is not None
 
     def reference(self, mechanism: Mechanism) -> Crank:
-        """Return the crank whose angle is the independent variable: the one that ``speed``, ``torque`` and ``motor`` drive.
+        """Return the crank to which ``speed``, ``torque`` and ``motor`` refer; its angle is the independent variable.
 
         Raises
         ------
         InputError
-            If the mechanism has no crank, or several and ``crank`` names none.
+            If the mechanism has no crank, or has several cranks and ``crank`` names none of them.
         """
         return find_crank(mechanism, self.crank)
 
     def ratios_by_freedom(self, mechanism: Mechanism) -> dict[int, Fraction]:
-        """Return turns per turn of the crank, of the other cranks and of links that go round, by the index of the freedom."""
+        """Return the turns of each other crank and link that goes round per turn of the crank, by index of the freedom."""
         return {find_turning_freedom(mechanism, name): ratio for name, ratio in self.ratios.items()}
 
     def arguments(self, mechanism: Mechanism) -> Mapping[str, str]:
-        """Return how each freedom with a mode is driven, as one of `Mode.arguments` by the name of the mode.
+        """Return how each freedom with a mode is driven: by the name of the mode, one of `Mode.arguments`.
 
         Raises
         ------
@@ -183,12 +183,12 @@ class Drive:
         )
 
     def flow(self, mechanism: Mechanism) -> Flow:
-        """Return the mechanism's flow, driven in this way.
+        """Return the flow of the mechanism with this drive.
 
         Raises
         ------
         InputError
-            If the mechanism cannot be driven in this way, or no freedom is free.
+            If the mechanism cannot have this drive, or no freedom is free.
         """
         crank, ratios = self.reference(mechanism), self.ratios_by_freedom(mechanism)
         if (crank.command if self.speed_drive else crank.torque) is None:
@@ -198,7 +198,7 @@ class Drive:
         modes = tuple(mode.arguments.index(chosen[mode.name]) for mode in mechanism.modes)
         freedoms = mechanism.freedoms
         common = lcm(*(ratio.denominator for n, ratio in ratios.items() if not freedoms[n].swings))
-        # of a link that goes round, in its own whole turns
+        # ratio of each link that goes round, in whole turns of the crank and of the link
         rounds = (
             ratio * _whole_turns(freedoms[crank.freedom]) / _whole_turns(freedoms[n])
             for n, ratio in ratios.items()
@@ -221,20 +221,21 @@ class Drive:
         return made
 
     def with_rounds(self, mechanism: Mechanism, rounds: Mapping[str, int], turns: int) -> tuple[Drive, int]:
-        """Return the drive of motions in which links make the whole turns ``rounds`` in ``turns`` common periods.
+        """Return the drive for motions in which undriven links make ``rounds`` whole turns in ``turns`` common periods.
 
         Parameters
         ----------
         mechanism : Mechanism
         rounds : mapping of str to int
-            Numbers of whole turns, by the coordinates of links that swing.
+            Number of whole turns of each link, by the FMI name of its coordinate.
         turns : int
+            Number of common periods of this drive.
 
         Returns
         -------
         drive : Drive
         turns : int
-            Common periods of the new drive in the same time: fewer than before if the new ones are longer.
+            Number of common periods of the new drive in the same time: fewer if the common period has become longer.
         """
         made, freedoms = self.flow(mechanism), {f.coordinate: f for f in mechanism.freedoms}
         ratios = {n: Fraction(times * _whole_turns(freedoms[n]), turns * made.turns) for n, times in rounds.items()}
@@ -247,7 +248,7 @@ class Drive:
         Raises
         ------
         UnknownNameError
-            If there is no force, or no motor torque, of a given name.
+            If a name in ``forces`` is not that of a force input, or a name in ``motors`` not that of a torque.
         InputError
             If a force does not act, or if ``held`` names a coordinate that is not held.
         """
@@ -287,7 +288,7 @@ class Drive:
         return np.array([*u, *motors, *held, *(float(ratios.get(n, 0)) for n in made.others)])
 
     def inputs(self, mechanism: Mechanism) -> Inputs:
-        """Return the inputs of a run that drive the mechanism in this way."""
+        """Return the `Inputs` with which a run of the mechanism has this drive."""
         made, crank, ratios = self.flow(mechanism), self.reference(mechanism), self.ratios_by_freedom(mechanism)
         names = [c.argument for c in mechanism.channels]
         acting: dict[str, Any] = {c.argument: self.forces[c.name] for c in mechanism.channels if c.name in self.forces}
@@ -310,14 +311,14 @@ def _whole_turns(freedom: Freedom) -> int:
 
 
 def require_drive(drive: object) -> Drive:
-    """Return a drive; raise InputError if it is no `Drive`."""
+    """Return ``drive``; raise InputError if it is not a `Drive`."""
     if not isinstance(drive, Drive):
         raise InputError(f"drive is {drive!r}: give a drive, such as Drive(speed=44.0) or Drive(speed='420 rpm')")
     return drive
 
 
 class Direction(NamedTuple):
-    """Derivatives of `Drive.vector` and of the constants with respect to a parameter lambda."""
+    """Derivatives of `Drive.vector` and of the constants of the equations with respect to a parameter lambda."""
 
     drive: NDArray[np.float64]
     constants: NDArray[np.float64]
@@ -356,7 +357,7 @@ def _arguments(
 
 @cache
 def force_inputs(mechanism: Mechanism) -> dict[str, Channel]:
-    """Return the force inputs of a mechanism, without the torque on its crank if it has only one crank, by FMI name."""
+    """Return the force inputs of a mechanism by FMI name; the torque on the crank is left out if there is one crank only."""
     crank = mechanism.cyclic_freedoms[0] if len(mechanism.cyclic_freedoms) == 1 else -1
     return {c.name: c for c in mechanism.channels if c.kind == "force" and (c.freedom != crank or crank < 0)}
 
@@ -374,7 +375,7 @@ def _value(mode: Mode, argument: str) -> str:
 
 
 def published_drive(known: PublishedSet, drive: Drive | None) -> Drive:
-    """Return ``drive``; if it is None, the drive of a published set, with held freedoms at their initial values."""
+    """Return ``drive``; if it is None, return the drive of a published set, with held freedoms at their initial values."""
     return drive or steady_drive(known.parameters, complete_inputs(known, None), known.initial)
 
 
@@ -388,23 +389,24 @@ def steady_drive(
     speed: Amount = None,
     torque: Amount = None,
 ) -> Drive:
-    """Return the drive of an orbit from the inputs of a run, which must not vary in time.
+    """Return the drive of a periodic motion from the inputs of a run; the inputs must not vary in time.
 
     Parameters
     ----------
     parameters : parameters of a mechanism
     inputs : Inputs, optional
     initial : state at the start, optional
-        Positions at which freedoms are held: those that are neither free nor the crank.
+        Positions of held freedoms, which are all freedoms that are neither free nor the crank.
     speed, torque : optional
-        Replace the drive of the crank in the inputs; other commanded cranks keep their ratios to it.
+        Crank speed (rad/s) and torque on the crank (N.m), instead of the drive of the crank in ``inputs``; other commanded
+        cranks keep their ratios to the crank.
 
     Raises
     ------
     VaryingInputError
         If an input varies.
     InputError
-        If nothing drives the crank, or another freedom is commanded to move without end.
+        If nothing drives the crank, or if a freedom that is no crank is commanded at a speed other than zero.
     """
     mechanism = find_mechanism(parameters)
     inputs, initial = check_run(mechanism, inputs, initial)
@@ -459,8 +461,8 @@ def _choose_crank(
 ) -> tuple[Crank, dict[int, Fraction]]:
     """Return the crank whose angle is the independent variable under the inputs of a run, and the ratios of the other cranks.
 
-    It is the first crank that is commanded to turn forward, or else the first crank. The ratios, by the indices of freedoms,
-    are those of commanded speeds; a free crank has the ratio of the speeds at the start, to the nearest whole number.
+    This crank is the first crank that is commanded at a positive speed, or else the first crank. The ratios, by index of the
+    freedom, are those of the commanded speeds; a free crank has the ratio of the initial speeds, rounded to a whole number.
     """
     if len(mechanism.cyclic_freedoms) < 2:
         return find_crank(mechanism), {}
@@ -498,7 +500,10 @@ _SPEEDS = (0.25, 1.5)
 
 @takes_published()
 def motion_scales(parameters: Parameters, drive: Drive, start: ArrayLike) -> NDArray[np.float64]:
-    """Return the scales of y: for a five-bar the crank length, the speed of the crank pin, and the crank speed."""
+    """Return the scale of each component of y, its typical magnitude; shape (n,).
+
+    For a five-bar: the crank length, the speed of the crank pin and, under a torque, the crank speed.
+    """
     mechanism = find_mechanism(parameters)
     return flow_scales(drive.flow(mechanism), parameters, drive.vector(mechanism), np.asarray(start, dtype=float))
 
@@ -506,15 +511,15 @@ def motion_scales(parameters: Parameters, drive: Drive, start: ArrayLike) -> NDA
 def flow_scales(
     flow: Flow, parameters: Parameters, vector: NDArray[np.float64], start: NDArray[np.float64]
 ) -> NDArray[np.float64]:
-    """Return the scales of y; ``vector`` is the drive vector."""
+    """Return the scale of each component of y: see `motion_scales`; ``vector`` is the drive vector."""
     scale = flow.mechanism.error_scale(parameters, flow.state(start, vector))
     return np.array([scale[place] for place in flow.places])
 
 
 def is_smooth(parameters: Parameters) -> bool:
-    """Return whether the rates are smooth over a turn.
+    """Return whether the rates are smooth functions of the crank angle: whether there is no friction.
 
-    Friction changes fast when a motion reverses, which only an integrator with step size control resolves reliably.
+    Friction changes fast when a motion reverses; only an integrator with step size control resolves this reliably.
     """
     mechanism = find_mechanism(parameters)
     rough = mechanism.names("friction")
@@ -526,10 +531,10 @@ def is_smooth(parameters: Parameters) -> bool:
 def assembly_ranges(
     parameters: Parameters, drive: Drive, guess: NDArray[np.float64]
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return the low and the high bounds of the free coordinates at crank angle 0 within which the links can be joined.
+    """Return the lower and the upper bounds of the free coordinates at crank angle 0 within which the links can be joined.
 
-    Each coordinate is moved away from its default in steps that grow, while the others stay as in ``guess``; a bound may lie
-    one step too far. Both arrays have the shape (free,).
+    Each coordinate is moved away from its default value in growing steps, while all other components of y stay as in
+    ``guess``; a bound may lie one step too far. Both arrays have the shape (free,).
     """
     mechanism = find_mechanism(parameters)
     flow, vector, scale = drive.flow(mechanism), drive.vector(mechanism), motion_scales(parameters, drive, guess)
@@ -552,7 +557,7 @@ def assembly_ranges(
 
 
 def mean_rates(drive: Drive, flow: Flow, guess: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the mean rate of each free coordinate: 0, or the rate of a uniform rotation if it goes round; shape (free,)."""
+    """Return the mean rate of each free coordinate, shape (free,): 0 unless the coordinate goes round."""
     turning, pace = drive.ratios_by_freedom(flow.mechanism), drive.speed or guess[-1]
     return np.array([pace * turning.get(n, 0) for n in flow.free], dtype=float)
 
@@ -560,20 +565,20 @@ def mean_rates(drive: Drive, flow: Flow, guess: NDArray[np.float64]) -> NDArray[
 def spread_starts(
     parameters: Parameters, drive: Drive, guess: NDArray[np.float64], count: int, number: int = 0
 ) -> NDArray[np.float64]:
-    """Return initial states of many amplitudes and phases within the coordinate ranges, from a scrambled Sobol sequence.
+    """Return starts of many amplitudes and phases for the search, by a scrambled Sobol sequence; shape (count or 2 count, n).
 
-    In the plane of a coordinate and its rate they fill the greatest ellipse about its default initial value. If a coordinate
-    can move much further to one side, as many further states fill the ellipse about the middle of its range; shape (count or
-    2 count, n).
+    In the plane of a coordinate and its rate the starts fill the largest ellipse about the default initial value for which the
+    links can be joined. If a coordinate can move much further to one side, ``count`` further starts fill the ellipse about the
+    middle of the range of this coordinate.
 
     Parameters
     ----------
     guess : ndarray, shape (n,)
-        Under a torque the crank speeds of the starts lie around its crank speed.
+        First guess of y; under a torque the crank speeds of the starts lie around the crank speed in ``guess``.
     count : int
-        A power of two.
+        Number of starts in an ellipse, a power of two.
     number : int
-        Index of the set, the seed of the sequence: each index gives other starts.
+        Index of the set of starts, which is the seed of the sequence: each index gives other starts.
     """
     from scipy.stats import qmc  # takes half a second
 

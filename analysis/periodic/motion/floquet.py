@@ -36,7 +36,7 @@ class Stability(Enum):
 
 
 class Crossing(Enum):
-    """The way in which the largest multiplier leaves the unit circle."""
+    """Kind of bifurcation, given by the place at which a multiplier crosses the unit circle."""
 
     FOLD = "fold"  # at +1: two motions of the same period meet, or a branch point
     PERIOD_DOUBLING = "period doubling"  # at -1
@@ -64,7 +64,7 @@ class StabilityVerdict:
     Raises
     ------
     VerdictError
-        If it is used as a truth value.
+        If the verdict is used as a truth value.
     """
 
     stability: Stability
@@ -82,7 +82,7 @@ class StabilityVerdict:
 
     @property
     def crossing(self) -> Crossing:
-        """The way in which the largest multiplier leaves the unit circle, or would leave it if it grew."""
+        """Kind of bifurcation at which the largest multiplier leaves the unit circle, or would leave it if its modulus grew."""
         return crossing(self.largest_multiplier)
 
 
@@ -179,9 +179,10 @@ def crossing_test(monodromy: NDArray[np.float64], crossing: Crossing | int) -> N
     ----------
     monodromy : ndarray, shape (..., n, n)
     crossing : Crossing or int
-        +1 for a fold, -1 for a period doubling: det(I - multiplier Phi), positive if all multipliers are inside the unit
-        circle, negative if one real multiplier has passed it. For a torus: the product over all pairs of multipliers
-        mu_i, mu_j of (mu_i mu_j - 1).
+        The crossing; the number +1 stands for a fold, -1 for a period doubling. For these two the function is det(I - Phi) or
+        det(I + Phi), with the monodromy matrix Phi: positive if all multipliers are inside the unit circle, negative if one
+        real multiplier has crossed it at +1 or -1. For a torus the function is the product of (mu_i mu_j - 1) over all pairs
+        of multipliers mu_i, mu_j.
 
     Returns
     -------

@@ -1,4 +1,4 @@
-"""Write a mechanism as a flow, dy/dangle over the crank angle, from its traced equations."""
+"""Write a mechanism as a flow: the derivatives dy/dangle of the state y over the crank angle, from the traced equations."""
 
 from __future__ import annotations
 
@@ -25,16 +25,16 @@ IN_LANES = len(_NAMES)
 
 
 class Crank(NamedTuple):
-    """A freedom that turns without end."""
+    """A crank of a mechanism: a freedom that turns without end."""
 
-    freedom: int  # number of the freedom
-    command: int | None  # channel of its commanded rate, if there is one
-    torque: int | None  # channel of the torque on it, if there is one
+    freedom: int  # index of the freedom
+    command: int | None  # index of the channel of the commanded speed, if there is one
+    torque: int | None  # index of the channel of the torque on the crank, if there is one
 
 
 @cache
 def find_cranks(mechanism: Mechanism) -> tuple[Crank, ...]:
-    """Return all freedoms of a mechanism that turn."""
+    """Return all cranks of a mechanism."""
     return tuple(
         Crank(n, mechanism.channel_index(n, "command"), mechanism.channel_index(n, "force"))
         for n in mechanism.cyclic_freedoms
@@ -43,7 +43,7 @@ def find_cranks(mechanism: Mechanism) -> tuple[Crank, ...]:
 
 @cache
 def find_turning_freedom(mechanism: Mechanism, name: str) -> int:
-    """Return the index of a freedom that turns, by one of its FMI names: a crank, or a link that swings and may go round."""
+    """Return the index of a crank, or of a link that swings and may go round, by one of its FMI names."""
     swinging = {freedom.coordinate: n for n, freedom in enumerate(mechanism.freedoms) if freedom.swings}
     return swinging[name] if name in swinging else find_crank(mechanism, name).freedom
 
@@ -62,7 +62,7 @@ def find_crank(mechanism: Mechanism, name: str = "") -> Crank:
     Raises
     ------
     InputError
-        If the mechanism has no crank, if it has several and no name is given, or if none has that name.
+        If the mechanism has no crank, if it has several and no name is given, or if no crank has that name.
     """
     cranks = find_cranks(mechanism)
     if not cranks:
@@ -88,50 +88,52 @@ def _names(mechanism: Mechanism, crank: Crank) -> list[str]:
 
 
 class Flow:
-    """A mechanism as a flow over its crank's angle, driven in one way.
+    """A mechanism with one kind of drive as a flow: differential equations for the state y over the crank angle.
 
-    Other cranks turn at a ratio to this crank: a commanded crank exactly, a crank under a torque or a link that nothing drives
-    on average. If such a freedom is free, y contains its angle minus the ratio times the crank angle, which is periodic. The
-    ratio of a link that only swings is 0.
+    Other cranks and undriven links have a ratio to this crank. Commanded cranks turn exactly at their ratio; cranks under a
+    torque and undriven links turn at their ratio on average. For these y contains the angle minus the ratio times the crank
+    angle: this difference is periodic. The ratio of a link that only swings is 0.
 
     Parameters
     ----------
     mechanism : Mechanism
     modes : tuple of int
-        Values of its modes.
+        Values of the mechanism's modes.
     crank : int
         Index of the cyclic freedom whose angle is the independent variable.
     base : int
-        Turns of the crank after which all cranks have made whole turns, and all links that go round.
+        Number of periods of the crank after which all cranks, and all links that go round, have made whole turns.
     commons : int
-        Number of common periods of the cranks alone in ``base`` turns.
+        Number of common periods of the cranks alone in ``base`` periods of the crank.
 
     Attributes
     ----------
     others : tuple of int
         Indices of the other freedoms that turn, or swing and may go round.
     free : tuple of int
-        Indices of the other freedoms that are part of y; a freedom commanded without a ratio is held in place.
+        Indices of the freedoms other than the crank whose coordinates and rates are in y. A freedom that is commanded without
+        a ratio is held in place.
     torque : bool
-        Whether the crank's rate is part of y.
+        Whether a torque drives the crank: the crank's rate is then in y.
     motors : int
-        Index of the motor parameters in the drive vector, after the channels: three for each of `Mechanism.torques`.
+        Index of the first motor parameter in the drive vector, after the channels; each of `Mechanism.torques` has three.
     held : int
-        Index of the coordinates at crank angle 0 of freedoms that are held or have a ratio; the ratios of ``others`` follow.
+        Index in the drive vector of the coordinates at crank angle 0, one for each freedom; they are used for freedoms that
+        are held or have a ratio. The ratios of ``others`` follow.
     components : tuple of (str, str)
-        FMI names and units of y.
+        FMI name and unit of each component of y.
     labels : tuple of str
         Names of the components of y in messages: short symbols where there are any.
     places : tuple of int
-        Components of the state of a run that make up y.
+        Index of each component of y in the state of a run.
     size : int
         Number of components of y.
     rest : ndarray, shape (n,)
         y with the coordinates at which the mechanism starts by default, and rates of zero.
     ways : ndarray, shape (n,)
-        Increase of each component after which the motion is the same: a whole turn of an angle; 0 where there is none.
+        Period of each component: for an angle the whole turn after which the mechanism is the same, otherwise 0.
     swinging : dict of str to int
-        Indices in y of the coordinates of links that nothing drives and that may go round, by FMI name.
+        Indices in y of the coordinates of undriven links that may go round, by FMI name.
     """
 
     def __init__(self, mechanism: Mechanism, modes: tuple[int, ...], crank: int, base: int, commons: int) -> None:
@@ -186,11 +188,15 @@ class Flow:
 
     @property
     def turns(self) -> int:
-        """Return the turns of the crank in the common period: several if other cranks or gears repeat only after several."""
+        """Return the number of turns of the crank in the common period: more than one if other cranks or gears need several."""
         return max(1, round(self.period / (2.0 * pi)))
 
     def addresses(self, *which: int, switched: bool = False) -> NDArray[np.int64]:
-        """Return the addresses of all functions; those with the indices ``which`` are compiled, with the switch on or off."""
+        """Return the addresses of all functions of the flow, by index; 0 for a function that is not compiled.
+
+        The functions with the indices ``which`` are compiled if needed. ``switched`` tells whether the equations have their
+        optional terms, such as friction.
+        """
         with MAKING:
             for n in which:
                 if (switched, n) not in self._code:
@@ -204,14 +210,14 @@ class Flow:
         return addresses
 
     def fingerprint(self, *which: int, switched: bool = False) -> str:
-        """Return a hash of the machine code of the functions ``which``."""
+        """Return the hashes of the machine code of the functions with the indices ``which``."""
         self.addresses(*which, switched=switched)
         return " ".join(self._code[switched, n].fingerprint for n in which)
 
     def state(self, y: NDArray[np.float64], drive: NDArray[np.float64]) -> tuple[Any, ...]:
-        """Return the state of a run at the crank angle 0, from y and the drive vector.
+        """Return the state of a run at crank angle 0, from y and the drive vector.
 
-        With an array for each entry of the drive vector, shape (drive, m), the state has arrays too.
+        If ``drive`` holds m drive vectors, shape (drive, m), the entries of the state are arrays, too.
         """
         rates = len(self.mechanism.freedoms)
         numbers = drive.tolist() if drive.ndim == 1 else list(drive)
@@ -238,7 +244,7 @@ class Flow:
         return whole
 
     def paces(self, drive: NDArray[np.float64]) -> dict[str, float]:
-        """Return the ratio to the crank of each coordinate of y that goes round, by FMI name, from the drive vector."""
+        """Return the ratio to the crank of each coordinate in y that goes round, by FMI name, from the drive vector."""
         freedoms = self.mechanism.freedoms
         return {freedoms[n].coordinate: float(r) for n, r in self._ratios(drive).items() if n in self.free and r}
 
@@ -251,16 +257,17 @@ class Flow:
         return y
 
     def _ratios(self, drive: Any) -> dict[int, Any]:
-        """Return the ratios of the freedoms `others`, by their indices."""
+        """Return the ratio to the crank of each freedom in `others`, by index of the freedom."""
         return {n: drive[self.held + len(self.mechanism.freedoms) + i] for i, n in enumerate(self.others)}
 
     @cache  # noqa: B019 - flows themselves are never discarded
     def function(self, which: int, switched: bool = False) -> Any:
-        """Return one of the functions of the flow as a ``casadi.Function``.
+        """Return the function of the flow with the index ``which`` as a ``casadi.Function``.
 
-        Its arguments are the angle, z, the modes, the drive and its derivative by lambda, the constants and their derivative by
-        lambda. ``plain`` gives dy/dangle, ``variational`` also the rates of the columns dy/dy0, ``directional`` also those of
-        dy/dlambda; ``gap`` the clearance to the limit of assembly, ``state`` the state of a run and the channels.
+        The arguments are the crank angle; z, which is y and the columns of its derivatives; the modes; the drive vector and its
+        derivative by lambda; the constants and their derivative by lambda. ``plain`` gives dy/dangle, ``variational`` also the
+        rates of the columns dy/dy0, ``directional`` also the rates of dy/dlambda. ``gap`` gives the clearance to the limit of
+        assembly, ``state`` the state of a run and the channels.
         """
         casadi = symbolic.library()
         n, m = self.size, self.mechanism
@@ -303,10 +310,10 @@ class Flow:
         return casadi.Function(_NAMES[which], arguments, [casadi.densify(r) for r in results], {"cse": True})
 
     def function_in_lanes(self, which: int, switched: bool = False) -> Any:
-        """Return one of the functions in the form for several angles at once, with the arguments (unused, (y, angle), ...).
+        """Return a function of the flow in the form for several crank angles at once; its arguments: unused, (y, angle), ...
 
         The columns dy/dy0 are set to the identity and dy/dlambda to zero, so that the columns of the result are the derivatives
-        of the rates.
+        of the rates by y and by lambda.
         """
         casadi = symbolic.library()
         function = self.function(which, switched)
@@ -318,7 +325,7 @@ class Flow:
         return casadi.Function(_NAMES[which], arguments, [casadi.densify(r) for r in results], {"cse": True})
 
     def jacobian_trace(self, switched: bool = False) -> Any:
-        """Return the trace of the rates' Jacobian as a ``casadi.Function`` of angle, y, modes, drive and constants."""
+        """Return the trace of the Jacobian of dy/dangle as a ``casadi.Function`` of angle, y, modes, drive and constants."""
         casadi = symbolic.library()
         plain = self.function(PLAIN, switched)
         shapes = [plain.size1_in(i) for i in range(plain.n_in())]
@@ -338,7 +345,7 @@ class Flow:
         return casadi.Function("trace", [angle, y, modes, drive, p], [casadi.trace(casadi.jacobian(f, y))])
 
     def _state(self, angle: Any, y: Any, drive: Any) -> tuple[tuple[Any, ...], Any]:
-        """Return the state of a run and the channels, as expressions."""
+        """Return the state of a run and the channels as symbolic expressions of crank angle, y and drive vector."""
         casadi = symbolic.library()
         m, freedoms = self.mechanism, len(self.mechanism.freedoms)
         held = drive[self.held : self.held + freedoms]
@@ -368,5 +375,5 @@ def label(variable: Variable) -> str:
 
 @cache
 def flow(mechanism: Mechanism, modes: tuple[int, ...], crank: int, base: int = 1, commons: int = 1) -> Flow:
-    """Return the flow of a mechanism driven in one way; it is built at the first call and then kept."""
+    """Return the `Flow` with these parameters; it is built at the first call and then kept."""
     return Flow(mechanism, modes, crank, base, commons)

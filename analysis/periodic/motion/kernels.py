@@ -1,10 +1,10 @@
-"""Integrate a period with its variational equations, and solve for its start by Newton's method: compiled kernels of shooting.
+"""Integrate a period with its variational equations, and find periodic motions by Newton's method: kernels of shooting.
 
-The independent variable is the angle of the mechanism's cyclic freedom, the crank, so that the period is known beforehand
-whatever drives it. The state y has the coordinates of the other free freedoms, their rates, and under a torque the crank's
-rate. The map over a period is the Poincare map of the section at crank angle 0. The columns of dy/dy0, and dy/dlambda for a
-parameter lambda if it is wanted, are integrated with y. The right-hand sides and their exact derivatives are traced from the
-equations (`flow`); the integrator is the one that `simulate` uses.
+The independent variable is the crank angle, so that the period is known beforehand, whatever drives the crank. The state y has
+the coordinates of the other free freedoms, their rates, and under a torque the crank's rate. The map over a period is the
+Poincare map of the section at crank angle 0. The columns of dy/dy0, and if wanted dy/dlambda for a parameter lambda, are
+integrated with y. The right-hand sides and their exact derivatives are traced from the equations (`flow`). The integrator is
+that of `simulate`.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ from .flow import DIRECTIONAL, GAP, PLAIN, STATE, VARIATIONAL
 
 
 class Status(IntEnum):
-    """How an integration or a search ended."""
+    """Result of an integration or a search: success, or the kind of failure."""
 
     DONE = 0
     LIMIT = 3
@@ -62,7 +62,7 @@ _LEAST_FRACTION, _LEAST_SEARCHED = 1.0 / 4096.0, 1.0 / 64.0
 
 
 class Section(NamedTuple):
-    """The data of a flow that the kernels take, with derivatives with respect to a parameter lambda."""
+    """Input of the kernels: functions and numbers of a flow, with derivatives with respect to a parameter lambda."""
 
     equations: NDArray[np.int64]  # addresses of the flow's functions
     modes: NDArray[np.float64]
@@ -70,7 +70,7 @@ class Section(NamedTuple):
     p: NDArray[np.float64]  # constants of the equations, then their derivatives by lambda
     scale: NDArray[np.float64]  # magnitudes of y, shape (n,)
     ways: NDArray[np.float64]  # whole turn of each component of y that is an angle, otherwise 0, shape (n,)
-    along: float  # magnitude of lambda
+    along: float  # typical magnitude of lambda
     tolerance: float  # bound of the local error of a step
     torque: bool  # whether the crank's rate is the last component of y
 
@@ -95,7 +95,7 @@ class Room(NamedTuple):
 
 @part
 def make_room(section, columns):
-    """Make the work space for y and ``columns`` columns of derivatives."""
+    """Return the work space of the integrator for y and ``columns`` columns of derivatives."""
     n = section.scale.shape[0]
     sizes = np.empty(n * (1 + columns))
     for i in range(n):
@@ -113,15 +113,16 @@ def _clearance(section, angle, z, room):
 
 @inner
 def _take(section, equation, angle, end, slowest, z, room, carry):
-    """Try steps from z until the error of one is accepted; return the status and the new angle.
+    """Take one step from z, shortened until its error is accepted; return the status and the new crank angle.
 
     The step ends at ``end`` at the latest. The rates of z are in ``room.k[0]``; z after the step is written into ``room.y``.
+    ``slowest`` is the crank speed below which the crank stalls; ``carry`` is that of `advance`.
     """
     n = section.scale.shape[0]
     flow = Flow(equation, section.modes, section.p, room.sizes)
     proposed = carry[0]
     while True:
-        # no tiny last step before the end
+        # avoid a tiny last step before the end
         last = angle + 1.001 * proposed >= end
         h = end - angle if last else proposed
         error = attempt(flow, 0.0, angle, h, z, room, section.drive, -1, None) / section.tolerance
@@ -143,7 +144,10 @@ def _take(section, equation, angle, end, slowest, z, room, carry):
 
 @inner
 def _enter(section, equation, angle, z, room):
-    """Write the rates of z at an angle into room.k[0]; return the status and the speed below which the crank stalls."""
+    """Prepare an integration from z: write the rates of z at the crank angle into ``room.k[0]``.
+
+    Return the status and the speed below which the crank stalls.
+    """
     n = section.scale.shape[0]
     slowest = STALL * z[n - 1] if section.torque else 0.0
     if section.torque and not slowest > 0.0:
@@ -159,7 +163,7 @@ def _enter(section, equation, angle, z, room):
 def advance(section, begin, end, z, room, carry):
     """Integrate z in place from one crank angle to another; return a `Status`.
 
-    ``carry[0]`` is the first step size (rad) and becomes the proposed next one; ``carry[1]`` counts steps.
+    ``carry[0]`` is the first step size (rad) and becomes the proposed next step size; ``carry[1]`` counts steps.
     """
     n = section.scale.shape[0]
     size = z.shape[0]
@@ -211,7 +215,7 @@ def move(start, fraction, correction, trial):
 
 @inner
 def magnitude(correction, scale):
-    """Return the largest component relative to the scale; NaN if a component is NaN."""
+    """Return the largest component of a correction relative to the scale; NaN if a component is NaN."""
     size = 0.0
     for i in range(scale.shape[0]):
         relative = abs(correction[i]) / scale[i]
@@ -223,9 +227,9 @@ def magnitude(correction, scale):
 
 @inner
 def eliminate(system, size):
-    """Solve a linear system in place by elimination with pivots; return whether it has a solution.
+    """Solve a linear system in place by elimination with pivoting; return whether the system has a solution.
 
-    The right-hand sides are the columns after the first ``size``, which become the solutions.
+    The columns of ``system`` after the first ``size`` are the right-hand sides; they become the solutions.
     """
     width = system.shape[1]
     for c in range(size):
@@ -293,7 +297,7 @@ class Hunt(NamedTuple):
 
 @part
 def make_hunt(n):
-    """Make the state of a search for y of n components."""
+    """Return an empty state of a search for y of n components."""
     return Hunt(
         np.zeros(n), np.zeros(n), np.zeros(n), np.zeros(n), np.zeros((n, n + 1)), np.zeros(n * (1 + n)), np.zeros(4)
     )
@@ -312,8 +316,9 @@ def begin_hunt(start, hunt):
 def continue_newton(section, most, status, z, hunt):
     """Continue Newton's method after an integration from ``hunt.trial`` to z; return GOING or a `Status`.
 
-    A correction is taken in part if the next one, found with the same matrix, would not be smaller (Deuflhard's natural
-    monotonicity test), or if it leads out of the domain.
+    Only a part of a correction is taken if the next correction, computed with the same matrix, would not be smaller
+    (Deuflhard's natural monotonicity test), or if the integration from the corrected start fails. ``most`` is the greatest
+    number of iterations.
     """
     scale, close = section.scale, 100.0 * section.tolerance
     start, trial, correction, following, system, last, numbers = hunt
@@ -353,7 +358,7 @@ def continue_newton(section, most, status, z, hunt):
 
 @inner
 def continue_deflated_newton(section, most, reach, status, known, z, hunt):
-    """Continue as `continue_newton` does, with the known orbits divided out; return GOING or a `Status`; see `search`."""
+    """Continue Newton's method with the known orbits divided out, as `search` describes; return GOING or a `Status`."""
     scale, n = section.scale, section.scale.shape[0]
     start, trial, correction, _, system, _, numbers = hunt
     if status != DONE:
@@ -399,7 +404,7 @@ def continue_deflated_newton(section, most, reach, status, known, z, hunt):
 
 @part
 def newton(section, end, most, start, z, room, carry, report):
-    """Solve y(end) = y(0) by Newton's method; parameters and result are those of `solve`."""
+    """Solve y(end) = y(0) by Newton's method; parameters and result: see `solve`, ``room`` and ``carry``: see `advance`."""
     n = section.scale.shape[0]
     hunt = make_hunt(n)
     begin_hunt(start, hunt)
@@ -424,7 +429,7 @@ def solve(section, end, most, start, z, report):
     most : int
         Iterations at most.
     start : ndarray, shape (n,)
-        Guess of y at crank angle 0; the solution when it returns DONE.
+        Guess of y at crank angle 0; overwritten, with the solution if the status is DONE.
     z : ndarray, shape (n (1 + n),)
         Written: y at the end of the period and the monodromy matrix by columns, of the last iterate.
     report : ndarray, shape (3,)
@@ -444,7 +449,10 @@ def solve(section, end, most, start, z, report):
 
 @part
 def deflated_newton(section, end, most, reach, start, known, z, room, carry):
-    """Run Newton's method with the known orbits divided out; parameters and result are those of `search`."""
+    """Run Newton's method with the known orbits divided out.
+
+    Parameters and result are those of `search`; ``room`` and ``carry`` are those of `advance`.
+    """
     n = section.scale.shape[0]
     hunt = make_hunt(n)
     begin_hunt(start, hunt)
@@ -471,11 +479,11 @@ def search(section, end, most, reach, start, known, z):
     Parameters
     ----------
     reach : float
-        Greatest correction relative to the scale.
+        Greatest size of a correction relative to the scale; larger corrections are shortened to this size.
     start : ndarray, shape (n,)
-        Guess of y at crank angle 0; the solution, to the tolerance of the search, when it returns DONE.
+        Guess of y at crank angle 0; overwritten, with the solution to the tolerance of the search if the status is DONE.
     known : ndarray, shape (m, n)
-        Starts of the known orbits; with none this is Newton's method.
+        Starts of the known orbits; if m is 0, the search is plain Newton's method.
     z : ndarray, shape (n (1 + n),)
         Work space.
 
@@ -489,7 +497,8 @@ def search(section, end, most, reach, start, known, z):
 def settle(section, turn, change, most, start):
     """Follow a motion until y changes by less than ``change`` over a turn, or for ``most`` turns; return a `Status`.
 
-    Whole turns of links do not count as a change. ``start`` is overwritten with y after the last turn.
+    ``turn`` is the crank angle (rad) of a turn or a common period. Whole turns of links do not count as a change. ``start`` is
+    overwritten with y after the last turn.
     """
     room = make_room(section, 0)
     z = start.copy()
@@ -508,7 +517,7 @@ def settle(section, turn, change, most, start):
 
 @kernel(int64(SECTION, VECTOR, MATRIX, VECTOR, MATRIX), purpose="the sampling of periodic motions")
 def sample(section, stations, starts, angles, rows):
-    """Sample a period at increasing crank angles by the integrator's interpolant.
+    """Sample a period at increasing crank angles by the integrator's interpolant; return a `Status`.
 
     Parameters
     ----------
@@ -567,8 +576,7 @@ def segments(section, angles, starts, rows):
     starts : ndarray, shape (k, n)
         y at the beginning of each piece.
     rows : ndarray, shape (k, n (1 + columns))
-        Written: y at the end of each piece, then dy/dy0 by columns (columns = n), then dy/dlambda (n + 1), as far as there is
-        room for them.
+        Written: y at the end of each piece; if columns is n or more, dy/dy0 by columns; if columns is n + 1, dy/dlambda.
 
     Returns
     -------

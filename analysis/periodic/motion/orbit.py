@@ -1,9 +1,9 @@
 """Find periodic motions of the full nonlinear mechanism with their Floquet multipliers.
 
 At prescribed speed a periodic motion repeats itself after one turn of the crank, or after several; under a torque the mean
-speed is part of the solution. `newton_orbit` solves y(T) = y(0) by Newton's method with the exact monodromy matrix from the
-variational equations. Its eigenvalues, the Floquet multipliers, come with every solution, and an unstable motion is found as
-easily as a stable one.
+speed is part of the solution. `newton_orbit` solves y(T) = y(0) for the state y by Newton's method, with the exact monodromy
+matrix from the variational equations. The eigenvalues of this matrix, the Floquet multipliers, come with every solution.
+Unstable motions are found as easily as stable motions.
 """
 
 from __future__ import annotations
@@ -93,7 +93,7 @@ class Turn:
         Output whose amplitude is returned by default: the first free coordinate, such as ``slider.position``, or the
         crank's speed if nothing else is free.
     rounding : float
-        Amplitude of ``swing`` up to which it counts as a rounding error.
+        Amplitudes of ``swing`` up to this size count as rounding errors.
     angles : frozenset of str
         Outputs that are angles.
 
@@ -127,8 +127,8 @@ class Turn:
         For a coordinate that goes round, the deviation from a uniform rotation is taken. The amplitude is zero if it is no more
         than a rounding error, as for a pendulum that hangs still.
 
-        The Fourier series of the turn is evaluated on a grid eight times as fine, and parabolas are laid through its greatest
-        and its least values: good to a millionth of the amplitude if the samples are enough for the series.
+        The Fourier series of ``swing`` is evaluated on a grid eight times as fine, and parabolas are laid through the greatest
+        and the least values. The result is accurate to a millionth of itself if there are enough samples for the series.
         """
         u = self.oscillation(self.swing)
         n = 8 * len(u)
@@ -141,7 +141,7 @@ class Turn:
         return size if size > self.rounding else 0.0
 
     def oscillation(self, name: str) -> FloatArray:
-        """Return an output; from an angle that goes round, its mean increase is subtracted; shape (n,)."""
+        """Return an output, shape (n,); for an angle that goes round, return the deviation from a uniform rotation."""
         values = self[name]
         if name not in self.angles:
             return values
@@ -150,14 +150,14 @@ class Turn:
         return followed[:-1] - increase * np.arange(len(values)) / len(values) if increase else values
 
     def harmonic(self, name: str, order: float) -> float:
-        """Return the amplitude of a harmonic of an output; ``order`` is its cycles per turn of the crank.
+        """Return the amplitude of a harmonic of an output; ``order`` is the number of cycles per turn of the crank.
 
         For a coordinate that goes round, the deviation from a uniform rotation is taken.
 
         Raises
         ------
         InputError
-            If the period does not hold the harmonic a whole number of times, or the samples are too few for it.
+            If the period is not a whole number of cycles of the harmonic, or there are too few samples for the harmonic.
         """
         number = order * self.turns
         if number != int(number) or not 0 < number < len(self.angle) / 2:
@@ -197,20 +197,20 @@ class PeriodicOrbit(NotebookResult):
     turns : int
         Number of common periods, `Flow.period`, in one period of the motion; `crank_turns` is the number of turns of the crank.
     start : ndarray, shape (n,)
-        y at crank angle 0: first the coordinates, then the rates of the freedoms other than the crank that are not
-        prescribed; last, if a torque drives the crank, its speed (rad/s). For a five-bar: u (m), u' (m/s).
+        State y at crank angle 0: first the coordinates, then the rates, of the free freedoms other than the crank; last, if a
+        torque drives the crank, the crank speed (rad/s). For a five-bar: u (m), u' (m/s).
     monodromy : ndarray, shape (n, n)
-        Derivative of the map over one period on the section at crank angle 0.
+        Derivatives of y after one period with respect to y at crank angle 0.
     residual : float
         ``|y(T) - y(0)|`` relative to `motion_scales`, before the last correction.
     iterations : int
         Newton iterations taken.
     stations : Stations or None
-        The pieces in which the period was followed, if it is too unstable to be followed as a whole.
+        The pieces of the period, if the motion is too unstable to be followed in one piece.
     others : int or None
-        Number of other periodic motions of the same period, as far as they were sought; None if they were not.
+        Number of other periodic motions found with the same period; None if no other motions were sought.
     least_clearance : float or None
-        Least clearance to the limit of assembly, see `clearance`, if it was computed on the way.
+        Least clearance to the limit of assembly, see `clearance`; None if it was not computed together with the motion.
     """
 
     parameters: Parameters
@@ -258,7 +258,7 @@ class PeriodicOrbit(NotebookResult):
 
     @property
     def scale(self) -> FloatArray:
-        """Magnitudes of y, shape (n,): see `motion_scales`."""
+        """Scale of each component of y, its typical magnitude, shape (n,): see `motion_scales`."""
         if "scale" not in self._kept:
             self._kept["scale"] = self.point.scale(self.start)
         scale: FloatArray = self._kept["scale"]
@@ -276,7 +276,7 @@ class PeriodicOrbit(NotebookResult):
 
     @property
     def rounds(self) -> dict[str, int]:
-        """Whole turns in a period of the motion of links that nothing drives and that go round, by their coordinates."""
+        """Number of whole turns per period of each undriven link that goes round, by the FMI name of its coordinate."""
         flow, paces = self.flow, self.flow.paces(self.point.vector)
         way = flow.period * self.turns
         return {name: round(paces[name] * way / flow.ways[i]) for name, i in flow.swinging.items() if name in paces}
@@ -288,7 +288,7 @@ class PeriodicOrbit(NotebookResult):
 
     @property
     def multipliers(self) -> NDArray[np.complex128]:
-        """Floquet multipliers, the largest first, shape (n,)."""
+        """Floquet multipliers, the largest modulus first, shape (n,)."""
         if "multipliers" not in self._kept:
             self._kept["multipliers"] = multipliers(self.monodromy)
         found: NDArray[np.complex128] = self._kept["multipliers"]
@@ -300,13 +300,13 @@ class PeriodicOrbit(NotebookResult):
         return float(abs(self.multipliers[0]))
 
     def verdict(self, tolerance: float = TOLERANCE) -> StabilityVerdict:
-        """Return the verdict on stability, whether small deviations die out, with the margin."""
+        """Return the verdict on stability: whether small deviations die out, and with what margin; see `floquet.verdict`."""
         return verdict(self.multipliers, tolerance)
 
     def sample(self, angles: FloatArray) -> FloatArray:
         """Return the state of a run and the channels at increasing crank angles (rad), shape (m, states + inputs).
 
-        Raises OrbitError if the motion cannot be followed.
+        Raises OrbitError if the integration fails.
         """
         rows = np.empty((len(angles), self.point.mechanism.size + self.flow.inputs))
         stations, starts = (np.zeros(1), self.start[None, :].copy())
@@ -360,10 +360,10 @@ class PeriodicOrbit(NotebookResult):
         )
 
     def determinant_by_liouville(self, samples: int = 512) -> float:
-        """Return the determinant of the monodromy matrix from the trace of the rates' Jacobian along the orbit.
+        """Return the determinant of the monodromy matrix from the trace of the Jacobian of dy/dangle along the orbit.
 
-        It does not use the variational equations, and therefore is a check of them. With Coulomb friction the trace has sharp
-        peaks where the slider reverses: some ten thousand samples are then needed.
+        The result does not depend on the variational equations, and therefore is a check of them. With Coulomb friction the
+        trace has sharp peaks where the slider reverses: some ten thousand samples are then needed.
         """
         flow, turn, p = self.flow, self.turn(samples), self.point.constants
         y = flow.unknowns(turn.states, self.point.vector).T
@@ -374,11 +374,11 @@ class PeriodicOrbit(NotebookResult):
     def passages(self) -> FloatArray:
         """Return y at the beginning of each common period of the cranks and gears; shape (periods, n).
 
-        The same motion could start from each of them.
+        The motion could start from each of these states.
         """
         passed, flow, paces = [self.start], self.flow, self.flow.paces(self.point.vector)
         angles = np.array([0.0, flow.period / flow.commons])
-        # angles in y are relative to a uniform rotation, which has gone on by this angle
+        # angles in y are relative to a uniform rotation, which has advanced by this angle
         ahead = angles[1] * np.array([paces.get(name, 0.0) for name, _ in flow.components])
         for _ in range(self.periods - 1):
             passed.append(self.point.shoot(angles, passed[-1][None, :]).y[0] + ahead)
@@ -386,7 +386,7 @@ class PeriodicOrbit(NotebookResult):
 
 
 def make_orbit(point: OperatingPoint, **rest: Any) -> PeriodicOrbit:
-    """Build an orbit at an operating point, which it keeps; ``rest`` are the other fields of `PeriodicOrbit`."""
+    """Build an orbit that keeps its operating point; ``rest`` are the other fields of `PeriodicOrbit`."""
     orbit = PeriodicOrbit(parameters=point.parameters, drive=point.drive, **rest)
     orbit._kept["point"] = point
     return orbit
@@ -401,7 +401,7 @@ def newton_orbit(
     start: ArrayLike | None = None,
     settle: bool = True,
 ) -> PeriodicOrbit:
-    """Find the periodic motion to which Newton's method leads.
+    """Find the periodic motion to which Newton's method leads from a guess.
 
     Parameters
     ----------
@@ -409,8 +409,8 @@ def newton_orbit(
     turns : int
         Turns of the crank in one period; if gears or other cranks have a longer common period, the number of common periods.
     start : array_like, shape (n,), optional
-        Guess of y at crank angle 0; without it the coordinates with which the mechanism starts, at rest. If a link that nothing
-        drives goes round from there, a motion is sought first in which it does so in each period.
+        Guess of y at crank angle 0; by default the coordinates with which the mechanism starts, at rest. If an undriven link
+        goes round in the period after this guess, a motion in which the link goes round in each period is sought first.
     settle : bool
         Whether other starts are tried if Newton's method fails from the guess: the state to which the motion settles, and the
         states of `spread_starts`.
@@ -418,7 +418,7 @@ def newton_orbit(
     Raises
     ------
     OrbitError
-        If none is found; `OrbitAssemblyError` if the links come to the limit of assembly on the way.
+        If no periodic motion is found; `OrbitAssemblyError` if the links come to the limit of assembly in the search.
     InputError
         If an argument is not usable.
     """
@@ -455,7 +455,8 @@ def settle_motion(
 ) -> tuple[Status, FloatArray]:
     """Integrate from ``start`` until a turn changes y by less than ``change``, or for ``turns`` turns at most.
 
-    Whole turns of links do not count as a change. Return the status and the last y, with whole turns removed.
+    A turn is here a common period, `Flow.period`. Whole turns of links do not count as a change. Return the status and the last
+    y, with whole turns removed.
     """
     settled, flow = start.copy(), point.flow
     section = point.section(start, PLAIN, tolerance=tolerance)
@@ -464,9 +465,9 @@ def settle_motion(
 
 
 def _solve_with_rounds(point: OperatingPoint, turns: int, start: FloatArray) -> PeriodicOrbit:
-    """Find a motion by Newton's method in which links go round as often as they do in the period after the start.
+    """Find by Newton's method a motion in which undriven links go round as often as in the period after ``start``.
 
-    If there is none, find one in which they go round as the drive says.
+    If there is no such motion, find a motion in which the links go round at the ratios of the drive.
     """
     rounds = _count_rounds(point, start, turns)
     if rounds:
@@ -477,12 +478,12 @@ def _solve_with_rounds(point: OperatingPoint, turns: int, start: FloatArray) -> 
 
 
 def _count_rounds(point: OperatingPoint, start: FloatArray, turns: int) -> dict[str, int]:
-    """Return how often links that nothing drives, and for which the drive has no ratio, go round in the period after a start.
+    """Return how often undriven links without a ratio in the drive go round in the period after a start.
 
     Returns
     -------
     dict of str to int
-        Whole turns by coordinate, without the links that only swing.
+        Number of whole turns by FMI name of the coordinate; links that only swing are left out.
     """
     flow = point.flow
     swinging = {name: i for name, i in flow.swinging.items() if name not in point.drive.ratios}
@@ -495,9 +496,9 @@ def _count_rounds(point: OperatingPoint, start: FloatArray, turns: int) -> dict[
 def approach_orbit(
     point: OperatingPoint, turns: int, place: FloatArray, known: FloatArray | None = None
 ) -> FloatArray | None:
-    """Search for a periodic motion from a guess that may be far from it; return its start, None if the search fails.
+    """Search for a periodic motion from a guess that may be far away; return the start of the motion, None if none is found.
 
-    The start has the accuracy of a search, `SEARCH_TOLERANCE`.
+    The start is accurate only to `SEARCH_TOLERANCE`.
 
     Parameters
     ----------
@@ -520,12 +521,17 @@ def approach_orbit(
 
 
 def approach_uniform_rotation(point: OperatingPoint, turns: int, place: FloatArray) -> FloatArray | None:
-    """Search for a motion near a uniform rotation, however unstable, by multiple shooting; return its start, or None.
+    """Search for a motion near a uniform rotation, however unstable, by multiple shooting.
 
     Parameters
     ----------
     place : ndarray, shape (n,)
         y of the uniform rotation, the same at all crank angles.
+
+    Returns
+    -------
+    ndarray, shape (n,), or None
+        Start of the motion; None if none is found.
     """
     k, n = EVEN_PIECES * turns * point.flow.commons, point.flow.size
     angles, starts, scale = (
@@ -549,8 +555,9 @@ def approach_uniform_rotation(point: OperatingPoint, turns: int, place: FloatArr
 def first_guess(flow: Flow, drive: Drive, start: ArrayLike | None, speed: float | None = None) -> FloatArray:
     """Return the first guess of y for Newton's method: ``start``, or else the mechanism's default coordinates with zero rates.
 
-    In the default guess only cranks turn. The first has the prescribed speed; under a torque it has ``speed`` (rad/s), or else
-    a speed within the motor's range. Another crank whose angle is part of y has its ratio times that speed.
+    In the default guess only cranks and links with a ratio turn. The drive's crank has the prescribed speed; under a torque the
+    crank has ``speed`` (rad/s), or else a speed within the motor's range. Other cranks and links have their ratio times this
+    speed.
 
     Raises InputError if ``start`` does not have the components of the state, if under a torque neither ``start``, ``speed``
     nor a motor is given, or if the crank's speed is then not above zero.
@@ -583,10 +590,10 @@ def rest_guess(
 ) -> list[float]:
     """Return a guess of y for a periodic motion: rest at the coordinates of ``initial``.
 
-    Under a torque the crank has ``speed`` (rad/s), or else the speed in ``initial`` if it is above zero, or else one within the
-    motor's range.
+    Under a torque the crank has ``speed`` (rad/s), or else the speed in ``initial`` if this is above zero, or else a speed
+    within the motor's range.
 
-    Raises InputError if there is none of these speeds; ``other`` is appended to the message: where else one can be given.
+    Raises InputError if there is none of these speeds; ``other`` ends the message: it tells where else a speed can be given.
     """
     mechanism = find_mechanism(parameters)
     flow, ratios, state = drive.flow(mechanism), drive.ratios_by_freedom(mechanism), mechanism.state(initial)
@@ -642,7 +649,7 @@ def _check_assembly(point: OperatingPoint, start: FloatArray) -> None:
 
 
 def solve_orbit(point: OperatingPoint, turns: int, guess: FloatArray) -> PeriodicOrbit:
-    """Find a periodic motion by Newton's method from a guess; raises OrbitError if there is none."""
+    """Find a periodic motion by Newton's method from a guess; raises OrbitError if the method fails."""
     n, start = point.flow.size, guess.copy()
     z, report = np.empty(n * (1 + n)), np.zeros(3)
     section = point.section(guess, VARIATIONAL)
@@ -663,10 +670,10 @@ def solve_orbit(point: OperatingPoint, turns: int, guess: FloatArray) -> Periodi
 def trial_orbit(
     point: OperatingPoint, start: FloatArray, turns: int, path: Discretisation | None = None
 ) -> tuple[PeriodicOrbit, FloatArray]:
-    """Follow one period from a start; return it as an orbit, even if it does not close, and y(T) - y(0).
+    """Follow one period from a start; return an orbit, even if the motion is not periodic, and y(T) - y(0).
 
-    ``path`` is a discretisation of the period as one piece, which may start from the last motion. Raises OrbitError if the
-    period cannot be followed.
+    ``path`` is a `Discretisation` with the period as one piece; by default a new one without collocation. Raises OrbitError if
+    the integration fails.
     """
     path = path or Discretisation(np.array([0.0, point.flow.period * turns]), False)
     ends = path.ends(point, start[None, :])
@@ -684,7 +691,7 @@ def trial_orbit(
 
 
 def _close(ends: Ends, starts: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return the gaps of a period of k pieces, each end minus the next beginning, (k, n), and their Jacobian, (k n, k n)."""
+    """Return the gaps of a period, y at each end minus y at the next beginning, (k, n), and their Jacobian, (k n, k n)."""
     (k, n), pieces = starts.shape, np.arange(len(starts))
     following = (pieces + 1) % k
     jacobian: FloatArray = np.zeros((k, n, k, n))
@@ -696,18 +703,18 @@ def _close(ends: Ends, starts: FloatArray) -> tuple[FloatArray, FloatArray]:
 class OrbitEquations:
     """Equations of a family's periodic motions over a range, in the form for `numerics.continuation`.
 
-    The unknowns are y at the beginnings of the pieces of a period; the residual is y at the end of each piece minus y at the
-    beginning of the next; each evaluation also returns the `PeriodicOrbit`.
+    The unknowns are the states y at the beginnings of the pieces of a period. The residual is y at the end of each piece minus
+    y at the beginning of the next piece. Each evaluation also returns the `PeriodicOrbit`.
 
     Parameters
     ----------
     family : Family
     turns : int
-        Turns of the crank in a period.
+        Number of common periods, `Flow.period`, in a period of the motion.
     low, high : float
-        Range of the parameter.
+        Range of the family's parameter.
     angles : ndarray, shape (k + 1,), optional
-        As in `Stations`; without it the period is one piece.
+        As in `Stations`; by default the period is one piece.
     """
 
     def __init__(self, family: Family, turns: int, low: float, high: float, angles: FloatArray | None = None) -> None:
@@ -722,14 +729,14 @@ class OrbitEquations:
         self._direction = family.direction(high, low, high) if mechanism is other else None
 
     def scale(self, start: FloatArray) -> FloatArray:
-        """Return the magnitudes of the unknowns: the larger of those at the two ends of the range."""
+        """Return the scale of each unknown, its typical magnitude: the larger of those at the two ends of the range."""
         scale = np.max([operating_point(*bound).scale(start) for bound in self._bounds], axis=0)
         # arc length is measured by the mean square over the pieces
         pieces = len(self.angles) - 1
         return np.asarray(np.tile(scale * np.sqrt(pieces), pieces))
 
     def __call__(self, unknowns: FloatArray, value: float) -> Evaluation:
-        """Evaluate the residual with its exact derivatives; raises OrbitError if a piece cannot be followed."""
+        """Evaluate the residual with its exact derivatives; raises OrbitError if the integration over a piece fails."""
         point = operating_point(*self.family.operation(value))
         starts = unknowns.reshape(self._shape).copy()
         direction = self._direction or self.family.direction(value, self.low, self.high)

@@ -1,4 +1,4 @@
-"""Search for periodic motions: all at one operating point, the one that a machine meets, or a sweep over speeds.
+"""Search for periodic motions: all motions at an operating point, the motion that a machine reaches, or a sweep over speeds.
 
 Newton's method finds one motion, which depends on the guess. `find_orbits` uses two methods that share only the map over a
 period: many starts that fill the region in which the mechanism can be assembled; and, from fewer starts, deflation, which
@@ -61,9 +61,9 @@ class Jump:
     speed : float
         First speed on the new motion (rad/s).
     amplitude_before, amplitude_after : float
-        Amplitudes of the two motions (m).
+        Amplitudes of the two motions (m, or rad for an angle).
     turns_before, turns_after : int
-        Turns in a period of the two motions: a period doubling hardly changes the amplitude.
+        Turns of the crank in a period of the two motions; a period doubling changes them, but hardly the amplitude.
     """
 
     speed: float
@@ -82,7 +82,7 @@ class Sweep:
     speed : ndarray, shape (m,)
         Speeds in the order of the sweep (rad/s).
     orbits : tuple of (PeriodicOrbit or None)
-        None if no steady motion with a period of 1 to 4 turns, or common periods, was met.
+        The steady motion at each speed; None if there was none with a period of 1 to 4 turns, or common periods.
     flags : tuple of str
         For each speed the reason why there is no orbit; empty if there is one.
     jumps : tuple of Jump
@@ -95,13 +95,16 @@ class Sweep:
 
     @property
     def amplitude(self) -> np.ma.MaskedArray[tuple[int], np.dtype[np.float64]]:
-        """Half the range of the first free coordinate, of a slider (m), masked without a steady motion; shape (m,)."""
+        """Half the range of the first free coordinate at each speed, shape (m,); masked where there is no steady motion.
+
+        Its unit is m for a slider, rad for an angle.
+        """
         values = [np.nan if orbit is None else orbit.amplitude for orbit in self.orbits]
         return np.ma.masked_invalid(np.array(values))
 
     @property
     def turns(self) -> NDArray[np.int64]:
-        """Turns in a period, 0 without a steady motion; shape (m,)."""
+        """Turns of the crank in a period at each speed, shape (m,); 0 where there is no steady motion."""
         return np.array([0 if orbit is None else orbit.crank_turns for orbit in self.orbits])
 
 
@@ -115,23 +118,25 @@ def sweep(
     start: ArrayLike | None = None,
     watch: Callable[[float], None] | None = None,
 ) -> Sweep:
-    """Step through crank speeds as a machine does: each steady motion starts from the last one.
+    """Step through crank speeds as a machine does: each steady motion starts from the steady motion at the last speed.
 
-    Under an induction motor these are the synchronous speeds of its field, set by a frequency converter. If the last motion is
-    lost or unstable at the new speed, the mechanism is integrated for up to 5000 turns to the next steady motion: a jump.
+    Under an induction motor the speeds are the synchronous speeds of its field, set by a frequency converter. If the last
+    motion is lost or unstable at the new speed, the mechanism is integrated for up to 5000 turns to the next steady motion: a
+    jump.
     Rising and falling speeds may lead to different motions.
 
     Parameters
     ----------
     parameters : parameters of a mechanism
     speeds : array_like, shape (m,) or ()
-        rad/s, increasing or decreasing.
+        Speeds (rad/s), increasing or decreasing.
     drive : Drive, optional
-        Other inputs; its own speed is replaced, or the synchronous speed of its motor if it has no speed.
+        Drive with the other inputs. Its speed is replaced; if it has a motor instead, the motor's synchronous speed.
     start : array_like, shape (n,), optional
-        y at crank angle 0 at the first speed, of a five-bar u (m) and u' (m/s); zero without it.
+        Guess of y at crank angle 0 for the first speed: for a five-bar u (m) and u' (m/s). By default the coordinates with
+        which the mechanism starts, at rest.
     watch : callable, optional
-        Called with every speed.
+        Called with each speed (rad/s) after its search.
 
     Raises
     ------
@@ -180,7 +185,7 @@ def sweep(
 
 
 def _with_speed(drive: Drive, speed: float) -> Drive:
-    """Return the drive with this prescribed speed, or with its motor at this synchronous speed."""
+    """Return the drive with this prescribed speed; if it has a motor instead, with this synchronous speed of the motor."""
     if drive.speed is None and drive.motor is not None:
         return replace(drive, motor=replace(drive.motor, synchronous_speed=speed))
     return replace(drive, speed=speed, torque=0.0, motor=None)
@@ -196,9 +201,9 @@ def _speed_of_drive(drive: Drive) -> float | None:
 def _follow(
     parameters: Parameters, speed: float, last: PeriodicOrbit, halvings: int = HALVINGS
 ) -> PeriodicOrbit | None:
-    """Follow a stable motion to another speed; return None if it is lost on the way.
+    """Follow a stable motion to another speed; return None if the motion is lost or becomes unstable.
 
-    If the motion found differs much, Newton's method may have jumped to another motion: the step is then halved.
+    If the amplitude changes much, Newton's method may have jumped to another motion: the step is then halved.
     """
     before = _speed_of_drive(last.drive)
     assert before is not None
@@ -221,7 +226,7 @@ def _follow(
 def _settle(point: OperatingPoint, state: FloatArray) -> PeriodicOrbit:
     """Return the steady motion on which the mechanism settles from a state at crank angle 0.
 
-    If it settles on an unstable motion, such as that of a pendulum that hangs still, it is disturbed and followed once more.
+    If the steady motion is unstable, such as a pendulum at rest, the mechanism is disturbed and followed once more.
     """
     scale, disturbed = point.scale(state), state
     for _ in range(2):
@@ -262,22 +267,22 @@ _ARRIVED = 1e-2
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Orbits(NotebookResult):
-    """The periodic motions at a point.
+    """The periodic motions found at an operating point.
 
     Attributes
     ----------
     orbits : tuple of PeriodicOrbit
-        By amplitude, the smallest first.
+        The motions in the order of their amplitudes, the smallest first.
     agreed : bool
         Whether the two methods found the same motions and ``index`` is ``index_of_all``; if not, there may be more.
     index : int
-        Sum of the signs of det(I - monodromy matrix) over these motions and those whose period divides theirs, each counted
-        once per turn. Motions come and go in pairs of opposite signs: if every motion stays clear of the limit of assembly, a
-        sum other than ``index_of_all`` means that a motion was missed, or lost at that limit. For several numbers of turns it
+        Sum of the signs of det(I - monodromy matrix) over these motions and the motions whose period is a fraction of theirs;
+        each motion counts once per turn. Motions come and go in pairs of opposite signs: a sum other than ``index_of_all``
+        means that a motion was missed, or lost at the limit of assembly. If several numbers of turns were searched, ``index``
         is the first sum that differs from ``index_of_all``.
     index_of_all : int
-        The index of all motions: 1; or 0 if a link may go round, as the motions then come in pairs, like those of a pendulum
-        that hangs and one that stands.
+        Value of ``index`` if no motion is missing: 1; or 0 if a link may go round, because motions then come in pairs, like a
+        hanging and an inverted pendulum.
     """
 
     orbits: tuple[PeriodicOrbit, ...]
@@ -296,13 +301,16 @@ class Orbits(NotebookResult):
 
     @property
     def stable(self) -> tuple[PeriodicOrbit, ...]:
-        """The motions in which a machine can stay: all but the unstable ones."""
+        """The motions in which a machine can stay: all motions that are not unstable."""
         return tuple(orbit for orbit in self.orbits if orbit.verdict().stability is not Stability.UNSTABLE)
 
 
 @takes_published()
 def unsought_hint(parameters: Parameters, drive: Drive) -> str:
-    """Return a hint for an error message: which motions of links that go round were not sought; empty without such links."""
+    """Return the end of an error message, which tells what motions with links that go round were not sought.
+
+    The result is empty if no link can go round.
+    """
     names = list(drive.flow(find_mechanism(parameters)).swinging)
     if not names:
         return ""
@@ -323,12 +331,12 @@ def find_orbit(
     start: ArrayLike | None = None,
     settle: bool = True,
 ) -> PeriodicOrbit:
-    """Find a periodic motion of the full nonlinear mechanism; if there are several, the one that a machine reaches in run-up.
+    """Find a periodic motion of the full nonlinear mechanism; of several, the motion that a machine reaches in run-up.
 
     Parameters
     ----------
     parameters : parameters of a mechanism
-        Or a published set or its name, which brings its crank speed, unless another drive is given.
+        Or a published set or its name; the set also gives the crank speed, unless another drive is given.
     inputs : Inputs, optional
         Constant inputs; a motor may drive the crank.
     speed : float or str, optional
@@ -338,28 +346,28 @@ def find_orbit(
     initial : state at the start, optional
         Positions of the freedoms that are held: see `Drive`.
     turns : int
-        Turns of the crank in one period, or common periods of gears or several cranks; if there is no such motion, one of
+        Turns of the crank in one period, or common periods of gears or several cranks; if there is no such motion, a motion of
         fewer turns is returned.
     start : array_like, shape (n,), optional
         Guess of y at crank angle 0: coordinates and rates of the free freedoms other than the crank, of a five-bar u (m) and
         u' (m/s), and under a torque the crank speed (rad/s), which is needed unless it follows from a motor's synchronous
-        speed. The result is then, at prescribed speed, the motion to which Newton's method leads from there; under a torque,
-        of several stable motions the one on which the mechanism settles from there.
+        speed. If ``start`` is given, the result at prescribed speed is the motion to which Newton's method leads from this
+        guess. Under a torque, the result is the stable motion on which the mechanism settles from this guess.
     settle : bool
-        Whether other motions are sought, and other starts are tried if Newton's method fails from the guess; without it the
+        Whether other motions are sought, and other starts are tried if Newton's method fails from the guess; if False, the
         result is the motion to which Newton's method leads.
 
     Returns
     -------
     PeriodicOrbit
-        If several are stable, the one that a machine meets when it is run up slowly from rest, under a motor by a slowly
-        rising frequency of its field; ``others`` is the number of others: see `find_orbits`. It may be unstable: see
-        ``verdict``.
+        If several motions are stable, the motion that a machine reaches when it is run up slowly from rest; under a motor, with
+        slowly rising frequency of the field. ``others`` is the number of other motions: see `find_orbits`. The motion may be
+        unstable: see ``verdict``.
 
     Raises
     ------
     OrbitError
-        If none is found; `OrbitAssemblyError` if the links come to the limit of assembly on the way.
+        If no motion is found; `OrbitAssemblyError` if the links come to the limit of assembly in the search.
     InputError
         If an argument is not usable.
 
@@ -401,8 +409,9 @@ def find_orbits(
 ) -> Orbits:
     """Find all periodic motions with a given number of turns in the period.
 
-    Motions of several turns need not branch off those of one: next to a weakly damped motion, motions of three or four turns
-    may appear by a fold, in a range of speeds of some rpm (subharmonic resonance). Only those that ``turns`` names are found.
+    Motions of several turns need not branch off motions of one turn: next to a weakly damped motion, motions of three or four
+    turns may appear by a fold, in a range of speeds of some rpm (subharmonic resonance). Only motions with the numbers of turns
+    in ``turns`` are found.
 
     Parameters
     ----------
@@ -412,7 +421,7 @@ def find_orbits(
         Turns of the crank in one period, or common periods of gears or several cranks; or several numbers, such as
         (1, 2, 3, 4). A motion that repeats itself after fewer turns does not count.
     start : array_like, shape (n,), optional
-        A further start; under a torque it is needed for the crank speed, unless that follows from a motor.
+        A further start of the search; under a torque ``start`` must give the crank speed, unless this follows from a motor.
 
     Returns
     -------
@@ -447,10 +456,10 @@ def search_orbits(
     start: ArrayLike | None = None,
     known: Iterable[PeriodicOrbit] = (),
 ) -> Orbits:
-    """Find all periodic motions under a `Drive`, ``known`` ones included: see `find_orbits`.
+    """Find all periodic motions under a `Drive`, including the motions ``known`` from before: see `find_orbits`.
 
-    Motions in which a link that nothing drives goes round are sought, too, for one link at a time and with at most one round in
-    a turn, unless the drive says how often it goes round.
+    Motions in which an undriven link goes round are sought, too: one link at a time, at most once per turn of the crank. If the
+    drive has a ratio for the link, only motions with this ratio are sought.
     """
     if not isinstance(turns, int):
         return join_orbits(
@@ -478,7 +487,7 @@ def search_orbits(
 def _search_rounds(
     point: OperatingPoint, turns: int, start: ArrayLike | None, known: Iterable[PeriodicOrbit] = ()
 ) -> Orbits:
-    """Find the periodic motions in which swinging links make as many turns as the drive's ratios say."""
+    """Find the periodic motions in which undriven links go round at the ratios of the drive, or swing if they have none."""
     guess = first_guess(point.flow, point.drive, start)
     require_turns(turns, point, guess)
     many, deflated = (_FoundMotions(point, turns, guess) for _ in range(2))
@@ -527,7 +536,7 @@ def join_orbits(parts: Sequence[Orbits]) -> Orbits:
 
 
 class _FoundMotions:
-    """The motions that one method has found at a point."""
+    """The motions that one method of the search has found at an operating point."""
 
     def __init__(self, point: OperatingPoint, turns: int, guess: FloatArray) -> None:
         self.point, self.turns, self.guess, self.scale = point, turns, guess, point.scale(guess)
@@ -538,11 +547,11 @@ class _FoundMotions:
         self.index = 0
 
     def places(self, count: int, number: int) -> list[FloatArray]:
-        """Return the starts of the set with the index ``number``: see `spread_starts`."""
+        """Return the starts of a set, by its index ``number``: see `spread_starts`."""
         return list(spread_starts(self.point.parameters, self.point.drive, self.guess, count, number))
 
     def knows(self, start: FloatArray, near: float = SAME) -> bool:
-        """Return whether a start belongs to a known motion."""
+        """Return whether a start is a start of a known motion, to a distance of ``near`` relative to the scale of y."""
         away = np.abs(self.point.flow.remove_turns(self.known - start)) / self.scale
         return bool((away.max(axis=1) < near).any()) if len(away) else False
 
@@ -588,10 +597,11 @@ class _FoundMotions:
 def _reached_motion(
     found: Orbits, drive: Drive, turns: int, first: PeriodicOrbit | None, start: ArrayLike | None
 ) -> PeriodicOrbit:
-    """Return the stable motion that a machine reaches; if none is stable, ``first``, or the smallest motion if that is None.
+    """Return the motion that a machine reaches: the stable motion nearest to the motion on which the machine settles.
 
-    The stable motion nearest to the one on which the machine settles is returned. If a link may go round and none of the stable
-    motions is near to it, the result is ``first``.
+    ``first`` is the motion that Newton's method found from the first guess, or None. It is returned if no motion is stable, or
+    if a link may go round and no stable motion is near. If no motion is stable and ``first`` is None, the result is the motion
+    of the smallest amplitude.
     """
     stable = found.stable
     if not stable:

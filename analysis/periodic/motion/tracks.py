@@ -1,7 +1,8 @@
 """Integrate several motions of one mechanism at once, each in its own lane: functions of compiled kernels.
 
-Each lane has its own start, tolerance, step size and end; mechanism and drive are the same. A kernel begins all lanes, steps
-them until the motion in one ends, and gives this lane another start. The steps are those of `kernels.advance`.
+Each lane has its own start, tolerance, step size and end; mechanism and drive are the same. A kernel starts a motion in each
+lane, steps all lanes until one motion ends, and then starts another motion in this lane. The integrator is that of
+`kernels.advance`.
 """
 
 from __future__ import annotations
@@ -21,12 +22,15 @@ from ...run.stepping_in_lanes import errors_in_lanes, stage_in_lanes
 from .flow import GAP, IN_LANES, PLAIN, VARIATIONAL
 from .kernels import DONE, LEAST_STEP, LIMIT, NO_STEP, STALL, STALLED, start_piece
 
-#: Statuses of a lane whose motion has not ended, or that has none; a motion ends with a `Status`.
+#: Status of a lane whose motion has not ended, and of a lane without a motion; a motion ends with a `Status`.
 RUNNING, IDLE = -1, -2
 
 
 class Tracks(NamedTuple):
-    """Work space for z, which is y and the columns of its derivatives: arrays in lanes, then arrays with an entry per lane."""
+    """Work space of the integration in lanes; z is the state y followed by the columns of its derivatives.
+
+    First there are arrays in lanes, then arrays with one entry per lane.
+    """
 
     x: NDArray[np.float64]  # z at the beginning of a step
     y: NDArray[np.float64]  # z at a stage, then at the end of a step
@@ -48,7 +52,7 @@ class Tracks(NamedTuple):
 
 @part
 def make_tracks(n, columns):
-    """Make work space for y of n components with ``columns`` columns of derivatives; all lanes are idle."""
+    """Return work space for y of n components with ``columns`` columns of derivatives; all lanes are idle."""
     width = n * (1 + columns)
     lanes = width * LANES
     return Tracks(
@@ -60,7 +64,7 @@ def make_tracks(n, columns):
 
 @inner
 def set_scale(scale, v):
-    """Set the magnitudes of z from those of y."""
+    """Compute the magnitudes of z from the magnitudes ``scale`` of y, and write them into ``v.sizes``."""
     n = scale.shape[0]
     for i in range(n):
         store(v.sizes, i, scale[i])
@@ -99,7 +103,7 @@ def _set_argument(node, n, z, v):
 
 @inner
 def _rates(section, s, z, v):
-    """Compute the rates of z at stage s."""
+    """Compute the rates of z at stage s of a step, in all lanes."""
     n = section.scale.shape[0]
     columns = z.shape[0] // (n * LANES) - 1
     equation = section.equations[IN_LANES + (VARIATIONAL if columns else PLAIN)]
@@ -116,7 +120,7 @@ def _rates(section, s, z, v):
 
 @inner
 def _attempt(section, v):
-    """Take a step in all lanes; write z after it into ``v.y``, and its error and the clearance."""
+    """Try a step in all lanes; write z after the step into ``v.y``, error and clearance into ``v.error`` and ``v.gap``."""
     _rates(section, 0, v.x, v)
     for s in range(1, STAGES):
         stage_in_lanes(s, v.x, v.k, v.h, v.y)
@@ -129,7 +133,10 @@ def _attempt(section, v):
 
 @inner
 def _judge(lane, section, last, v):
-    """Accept the step of a lane or make it shorter; return whether the motion has ended. ``last``: the step ends the motion."""
+    """Accept the step of a lane, or propose a shorter step; return whether the motion has ended.
+
+    ``last`` tells whether the step reaches the end of the motion.
+    """
     h, n = v.h[lane], section.scale.shape[0]
     error = v.error[lane] / v.tolerance[lane]
     if not error <= 1.0:
@@ -155,7 +162,7 @@ def _judge(lane, section, last, v):
 
 @inner
 def advance_tracks(section, v):
-    """Step all lanes until the motion in one has ended; return False at once if no lane is running.
+    """Step all lanes until the motion in one lane has ended; return False at once if no lane is running.
 
     If the status of a lane is DONE, z at the end of its motion is in ``v.x``.
     """
@@ -166,7 +173,7 @@ def advance_tracks(section, v):
             v.h[lane] = 0.0
             if v.status[lane] == RUNNING:
                 running = True
-                # no tiny last step before the end
+                # avoid a tiny last step before the end
                 rest = v.end[lane] - v.angle[lane]
                 v.h[lane] = rest if 1.001 * v.step[lane] >= rest else v.step[lane]
         if not running:

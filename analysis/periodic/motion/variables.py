@@ -48,7 +48,7 @@ def motor_parameters(mechanism: Mechanism) -> dict[str, tuple[str, str]]:
 
 
 def driving_names(mechanism: Mechanism) -> tuple[str, ...]:
-    """Return the names of the parameters of a drive: speeds of cranks, torques on them, parameters of motors, and forces."""
+    """Return the FMI names of the parameters of a drive: crank speeds, crank torques, parameters of motors, and forces."""
     return tuple(dict.fromkeys((*_crank_inputs(mechanism), *motor_parameters(mechanism), *force_inputs(mechanism))))
 
 
@@ -58,12 +58,12 @@ def speed_names(mechanism: Mechanism) -> tuple[str, ...]:
 
 
 def speed_name(mechanism: Mechanism, drive: Drive | None = None) -> str | None:
-    """Return the FMI name of the prescribed speed of the crank, such as ``drive.speed``; None where it cannot be prescribed.
+    """Return the FMI name of the prescribed speed of the crank, such as ``drive.speed``; None if no speed can be prescribed.
 
     Raises
     ------
     InputError
-        If the mechanism has several cranks, and there is no drive that says which.
+        If the mechanism has several cranks, and no drive tells which crank is meant.
     """
     command = (find_crank(mechanism) if drive is None else drive.reference(mechanism)).command
     return None if command is None else mechanism.channels[command].name
@@ -75,7 +75,7 @@ def default_variable(mechanism: Mechanism, drive: Drive | None = None) -> str:
     Raises
     ------
     InputError
-        If this speed cannot be prescribed; or if the mechanism has several cranks, and there is no drive that says which.
+        If the speed cannot be prescribed; or if the mechanism has several cranks, and no drive tells which crank is meant.
     """
     name = speed_name(mechanism, drive)
     if name is None:
@@ -92,8 +92,8 @@ def require_variable(parameters: Parameters, drive: Drive, name: str) -> None:
     UnknownNameError
         If there is no parameter of that name.
     InputError
-        If it does not act in this drive: a speed under a torque, a torque at prescribed speed, a motor parameter without a
-        motor.
+        If the parameter has no effect in this drive: a speed under a torque, a torque at prescribed speed, a motor parameter
+        without a motor.
     """
     require_drive(drive)
     mechanism = find_mechanism(parameters)
@@ -111,7 +111,7 @@ def require_variable(parameters: Parameters, drive: Drive, name: str) -> None:
 
 
 def _crank_ratio(mechanism: Mechanism, drive: Drive, freedom: int) -> float:
-    """Return the turns of a commanded crank per turn of the drive's crank; 0 if it is held or not commanded."""
+    """Return the turns of a commanded crank per turn of the drive's crank; 0 if the crank is held or not commanded."""
     if freedom == drive.reference(mechanism).freedom:
         return 1.0
     commanded = freedom in drive.flow(mechanism).commanded
@@ -119,14 +119,14 @@ def _crank_ratio(mechanism: Mechanism, drive: Drive, freedom: int) -> float:
 
 
 def _find_motor(mechanism: Mechanism, drive: Drive, name: str) -> InductionMotor | None:
-    """Return the motor to which a motor parameter, given by FMI name, belongs; None if there is none."""
+    """Return the motor to which a motor parameter, given by FMI name, belongs; None if there is no motor."""
     torque = name.rpartition(".")[0]
     own = drive.reference(mechanism).torque
     return drive.motor if own is not None and mechanism.channels[own].name == torque else drive.motors.get(torque)
 
 
 def variable_names(mechanism: Mechanism) -> tuple[str, ...]:
-    """Return the names of all parameters of a mechanism and its drive: see `driving_names`."""
+    """Return the FMI names of all parameters of a mechanism and its drive: see `driving_names`."""
     of_mechanism = [v.name for v in mechanism.mechanism_variables.values() if v.kind == "Real"]
     return (*driving_names(mechanism), *of_mechanism)
 
@@ -171,13 +171,13 @@ def format_value(name: str, value: float, unit: str) -> str:
 
 @lru_cache(maxsize=64)
 def _replace_parameters(parameters: Parameters, *values: tuple[str, float]) -> Parameters:
-    """Return parameters with new values; cached, as all points of a chart's row over the speed share a mechanism."""
+    """Return parameters with new values; cached, because all points in a row of a chart over the speed have the same values."""
     return replace(parameters, **dict(values))
 
 
 @takes_published()
 def with_values(parameters: Parameters, drive: Drive, values: Mapping[str, float]) -> Operation:
-    """Return the mechanism and drive with new values of parameters, by FMI name."""
+    """Return the mechanism and drive with new values of parameters, given by FMI name."""
     mechanism = find_mechanism(parameters)
     of_cranks, of_motor, forces = _crank_inputs(mechanism), motor_parameters(mechanism), force_inputs(mechanism)
     own = drive.reference(mechanism).freedom
@@ -245,7 +245,7 @@ def plane(parameters: Parameters, drive: Drive, x: str, y: str) -> Plane:
     UnknownNameError
         If there is no parameter of that name.
     InputError
-        If the two axes are the same, if they are the speeds of two cranks, or if one does not act in this drive.
+        If the two parameters are the same or the speeds of two cranks, or if one of them has no effect in this drive.
     """
     if x == y:
         raise InputError(f"both axes are {x!r}: a chart needs two parameters")
@@ -265,15 +265,16 @@ Vary = str | Callable[[float], Operation]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Family:
-    """Periodic motions of a mechanism as one parameter varies.
+    """A family of periodic motions: a mechanism and its drive as one parameter varies.
 
     Attributes
     ----------
     parameters : parameters of a mechanism
     drive : Drive
     vary : str or callable
-        FMI name of an input that acts, such as ``drive.speed``, ``drive.torque`` or ``slider.force``, or of a parameter, such
-        as ``slider.damping``; or a function from a number to (parameters, Drive). By default the speed of the crank.
+        What varies: FMI name of an input that has an effect, such as ``drive.speed``, ``drive.torque`` or ``slider.force``, or
+        of a parameter, such as ``slider.damping``; or a function from a number to (parameters, Drive). By default the speed of
+        the crank.
     name, unit : str
         Name and unit of the parameter for tables and plots; by default those of the FMI variable.
 
@@ -282,7 +283,7 @@ class Family:
     UnknownNameError
         If there is no parameter of that name.
     InputError
-        If it does not act in this drive.
+        If the parameter has no effect in this drive.
     """
 
     parameters: Parameters
@@ -321,7 +322,7 @@ class Family:
         return format_value(self.name, value, self.unit)
 
     def direction(self, value: float, low: float, high: float) -> Direction:
-        """Differentiate the drive vector and the constants by the parameter, by finite differences in its range."""
+        """Differentiate drive vector and constants by the parameter at ``value``, by finite differences within its range."""
         step = _DIFFERENCE * max(abs(value), 1e-3 * (high - low))
         a, b = max(value - step, low), min(value + step, high)
         mechanism = find_mechanism(self.parameters)
@@ -332,7 +333,7 @@ class Family:
 
 
 def _with_ratios(vary: Callable[[float], Operation], ratios: Mapping[str, Any], value: float) -> Operation:
-    """Return the mechanism and drive at a value of a parameter, with other ratios."""
+    """Return the mechanism and drive that ``vary`` gives for a value, with other ratios in the drive."""
     parameters, drive = vary(value)
     return parameters, replace(drive, ratios=ratios)
 
@@ -342,10 +343,10 @@ FloatArray = NDArray[np.float64]
 
 @takes_published()
 def gradient_names(parameters: Parameters, drive: Drive) -> tuple[str, ...]:
-    """Return the FMI names of all parameters, of the drive and of the mechanism, by which motions are differentiated.
+    """Return the FMI names of the parameters of drive and mechanism with respect to which motions are differentiated.
 
-    A parameter at zero that would switch on further equations, such as friction by contact forces, is left out; it can be
-    named explicitly.
+    A parameter at zero that would switch on further equations, such as friction by contact forces, is left out of these names;
+    where names can be chosen, it can be included.
     """
     mechanism, acting = find_mechanism(parameters), []
     for name in variable_names(mechanism):
@@ -361,16 +362,16 @@ def gradient_names(parameters: Parameters, drive: Drive) -> tuple[str, ...]:
 
 
 class ConstantDerivatives(NamedTuple):
-    """Derivatives of the P constants with respect to m parameters."""
+    """Derivatives of the P constants of the equations with respect to m parameters."""
 
     p: FloatArray  # first derivatives, shape (P, m)
     p_along: FloatArray  # derivatives of ``p`` with respect to one further parameter, (P, m)
 
 
 def differentiate_constants(parameters: Parameters, names: Sequence[str], along: str = "") -> ConstantDerivatives:
-    """Compute the derivatives of the constants by parameters given by FMI name; zero for parameters of the drive.
+    """Compute the derivatives of the constants of the equations by parameters; zero for parameters of the drive.
 
-    ``along`` is the FMI name of the further parameter for the second derivatives.
+    ``names`` are FMI names; ``along`` is the FMI name of the further parameter for the second derivatives.
     """
     mechanism = find_mechanism(parameters)
     own = [float(getattr(parameters, field.name)) for field in fields(parameters)]
@@ -388,7 +389,7 @@ def differentiate_constants(parameters: Parameters, names: Sequence[str], along:
 
 
 def parameter_places(flow: Flow, drive: Drive, name: str) -> dict[int, float] | None:
-    """Return the entries of `Drive.vector` that are multiples of a parameter: their factors by index.
+    """Return, for each entry of `Drive.vector` that is a multiple of a parameter, the factor, by index of the entry.
 
     For a parameter of the mechanism the result is None.
     """
@@ -403,9 +404,9 @@ def parameter_places(flow: Flow, drive: Drive, name: str) -> dict[int, float] | 
 
 
 def stack_derivatives(drive: Drive, flow: Flow, names: Sequence[str], p: FloatArray) -> FloatArray:
-    """Return the derivatives of the drive vector by parameters, and below them those of the constants, ``p``.
+    """Return the derivatives of the drive vector by the m parameters ``names``, and below them ``p``.
 
-    The shape is (size of the drive vector + constants, m).
+    ``p`` are the derivatives of the constants. The shape is (size of the drive vector + constants, m).
     """
     found = np.zeros((flow.drive_size, p.shape[1]))
     for column, name in enumerate(names):
@@ -416,9 +417,10 @@ def stack_derivatives(drive: Drive, flow: Flow, names: Sequence[str], p: FloatAr
 
 @cache
 def _constants(mechanism: Mechanism) -> Any:
-    """Return a ``casadi.Function`` of parameters and a direction.
+    """Return a ``casadi.Function`` that differentiates the constants of the equations by the parameters.
 
-    Its values are the Jacobian of the constants by the parameters, and the derivative of this Jacobian along the direction.
+    Its arguments are the parameters and a direction in their space. Its values are the Jacobian of the constants by the
+    parameters, and the derivative of this Jacobian along the direction.
     """
     casadi = symbolic.library()
     traced = parameter_symbols(mechanism)

@@ -1,8 +1,8 @@
 """Derive advice for a machine from branches: values of the parameter to avoid, jumps at folds, and greatest amplitudes.
 
-An arc is a part of a branch along which the parameter only rises or only falls and stability stays the same. At a fold where a
-stable arc ends, the machine jumps to another arc. If several stable arcs overlap, the machine's history decides which arc it
-follows. Where there is no stable arc, no motion on the branches is stable.
+An arc is a part of a branch along which the parameter only rises or only falls and the stability does not change. At a fold
+where a stable arc ends, the machine jumps to another arc. If several stable arcs overlap, the machine's history decides which
+of them the machine follows. Where there is no stable arc, no motion on the branches is stable.
 """
 
 from __future__ import annotations
@@ -66,8 +66,9 @@ class FoldJump:
     Attributes
     ----------
     parameter : float
+        Value of the parameter at the fold.
     direction : int
-        +1 if the motion exists below the fold and ends as the parameter rises, -1 if it ends as the parameter falls.
+        +1 if the motion exists below the fold and ends as the parameter rises, -1 if the motion ends as the parameter falls.
     before : float
         Amplitude of the motion that ends.
     after : tuple of float
@@ -82,20 +83,20 @@ class FoldJump:
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Arc:
-    """A part of a branch with one direction of the parameter and one stability.
+    """A part of a branch along which the parameter only rises or only falls and the stability does not change.
 
     Attributes
     ----------
     turns : int
-        See `Branch`.
+        Number of common periods in a period of the motion: see `Branch.periods`.
     stable : bool
-        Whether no deviation grows.
+        Whether the motions on the arc are stable.
     parameter, amplitude : ndarray, shape (m,)
-        Values along the arc, by rising parameter.
+        Values along the arc, in the order of rising parameter.
     start : ndarray, shape (m, n)
         Starts of the orbits.
     cut : (bool, bool)
-        Whether the branch continues on another arc beyond the low and the high end.
+        Whether the branch continues on another arc beyond the low end, and beyond the high end.
     """
 
     turns: int
@@ -127,7 +128,7 @@ class Arc:
 
 
 def arcs(branches: Iterable[Branch]) -> tuple[Arc, ...]:
-    """Divide branches into arcs, in the order of the branches."""
+    """Return the arcs into which branches divide, in the order of the branches."""
     return tuple(arc for branch in branches for arc in _branch_arcs(branch))
 
 
@@ -171,7 +172,7 @@ def fold_jumps(branches: Sequence[Branch]) -> tuple[FoldJump, ...]:
     """Return the jumps at the folds at which a stable motion ends, sorted by parameter."""
     stable = [arc for arc in arcs(branches) if arc.stable]
     found: list[FoldJump] = []
-    # a motion of twice the period begins at a doubling, where its branch turns back on itself: no motion ends there
+    # a motion of twice the period begins at a doubling: its branch turns back there like at a fold, but no motion ends
     born = [s.parameter for branch in branches for s in branch.special if s.kind is Crossing.PERIOD_DOUBLING]
     for branch, special in ((b, s) for b in branches for s in b.special if s.kind is Crossing.FOLD):
         if branch.periods > 1 and any(abs(special.parameter / value - 1.0) < _ROUNDING for value in born):
@@ -186,7 +187,7 @@ def fold_jumps(branches: Sequence[Branch]) -> tuple[FoldJump, ...]:
                 if not any(other.is_same_curve(known) for known in (arc, *beyond)):
                     beyond.append(other)
             after = sorted(float(np.interp(value, other.parameter, other.amplitude)) for other in beyond)
-            # and so does a fold that was met from both sides
+            # a fold that was found from both sides counts once
             if not any(
                 abs(value - other.parameter) < _ROUNDING * abs(value)
                 and abs(amplitude - other.before) < _SAME * amplitude
@@ -197,7 +198,10 @@ def fold_jumps(branches: Sequence[Branch]) -> tuple[FoldJump, ...]:
 
 
 def ranges_to_avoid(branches: Sequence[Branch], low: float, high: float) -> tuple[Avoided, ...]:
-    """Return the ranges in which a machine resonates, may jump, doubles its period or has no stable motion."""
+    """Return the ranges of the parameter in which a machine resonates, may jump, doubles its period or has no stable motion.
+
+    ``low`` and ``high`` bound the range of the parameter over which the branches were followed.
+    """
     least = _SLIVER * (high - low)
     stable = [arc for arc in arcs(branches) if arc.stable]
     without = _gaps(_union((arc.span for arc in stable if arc.turns == 1), least), low, high)
@@ -221,7 +225,7 @@ def _overlap(a: Arc, b: Arc) -> Interval:
 def _resonances(arc: Arc) -> list[Interval]:
     """Return the half-power bands of the peaks of an arc.
 
-    An end counts as a peak, too, if the amplitude is greatest there and the branch continues on another arc.
+    An end of the arc also counts as a peak if the amplitude is greatest there and the branch continues on another arc.
     """
     a = arc.amplitude
     tops = [top for top, prominence in peaks(a) if prominence > _PROMINENCE * a[top]]
@@ -234,7 +238,10 @@ def _resonances(arc: Arc) -> list[Interval]:
 
 
 def _band_end(arc: Arc, top: int, way: int) -> float:
-    """Return the half-power point on one side (``way``) of the peak ``top``; infinite if the arc rises above the peak first."""
+    """Return the parameter at the half-power point on one side of a peak; infinite if the arc rises above the peak first.
+
+    ``top`` is the index of the peak; ``way`` is -1 for the side of lower parameters, +1 for the side of higher parameters.
+    """
     a, x = arc.amplitude, arc.parameter
     level, i = HALF_POWER * a[top], top
     while 0 <= i + way < len(a):
@@ -242,7 +249,7 @@ def _band_end(arc: Arc, top: int, way: int) -> float:
         if a[i] > a[top]:
             return inf
         if a[i] < level:
-            # by the cubic through the four points around it, limited to the interval between these two
+            # interpolate by a cubic through the four points around the crossing, but stay between the two nearest points
             about = slice(max(min(i, i - way) - 1, 0), max(i, i - way) + 2)
             places = a[about].tolist()
             weights = [prod((level - b) / (c - b) for b in places if b != c) for c in places]
@@ -251,7 +258,7 @@ def _band_end(arc: Arc, top: int, way: int) -> float:
 
 
 def _union(intervals: Iterable[Interval], least: float) -> list[Interval]:
-    """Join intervals that overlap or are closer than ``least``."""
+    """Return intervals, sorted; those that overlap or are closer than ``least`` are joined."""
     joined: list[Interval] = []
     for low, high in sorted((low, high) for low, high in intervals if low < high):
         if joined and low <= joined[-1][1] + least:
@@ -283,9 +290,9 @@ class Extremum:
     Attributes
     ----------
     parameter : float
-        Speed (rad/s), or the other parameter that varies.
+        Value of the parameter that varies, such as the speed (rad/s).
     amplitude : float
-        Amplitude (m).
+        Amplitude (m for a slider).
     stability : Stability
         Stability of the motion at the extremum.
     orbit : PeriodicOrbit
@@ -301,8 +308,9 @@ class Extremum:
 def extrema(branch: Branch, sign: int = 1) -> tuple[Extremum, ...]:
     """Find the local maxima (sign +1) or minima (-1) of the amplitude along a branch.
 
-    Each extremum is found by `extremum_orbit`, where the exact derivative of the amplitude by the parameter is zero. If the
-    family is a function of a number, or the amplitude has a kink, it is found by Brent's method, to 1e-4 of the parameter.
+    `extremum_orbit` locates each extremum: there the exact derivative of the amplitude with respect to the parameter is zero.
+    If the parameter of the family is not an FMI name but a function, or if the amplitude has a kink, Brent's method locates the
+    extremum with a relative error of 1e-4 of the parameter.
     """
     amplitude = sign * branch.amplitude
     found = []
@@ -323,7 +331,10 @@ def extrema(branch: Branch, sign: int = 1) -> tuple[Extremum, ...]:
 def _locate_extremum(
     family: Family, orbit: PeriodicOrbit, a: float, begin: float, c: float, sign: int
 ) -> tuple[float, PeriodicOrbit]:
-    """Return the extremum between a and c and the motion there, starting from the motion at the parameter ``begin``."""
+    """Return the parameter of the extremum between a and c, and the motion there.
+
+    ``orbit`` is the motion at the parameter ``begin``, from which the search starts; ``sign`` is +1 for a maximum.
+    """
     if isinstance(family.vary, str):
         try:
             rested = extremum_orbit(orbit, family.vary)
@@ -354,7 +365,7 @@ def _locate_extremum(
 def special_gradient(
     family: Family, point: SpecialPoint | Extremum, names: Sequence[str] | None = None
 ) -> PointGradient:
-    """Compute how a special point of a branch, or an extremum of its amplitude, moves with the other parameters.
+    """Compute how a special point of a branch, or an extremum of the amplitude, moves when other parameters change.
 
     Parameters
     ----------
@@ -362,14 +373,14 @@ def special_gradient(
         A family over a parameter with an FMI name.
     point : SpecialPoint or Extremum
     names : sequence of str, optional
-        Names of the other parameters; by default all, see `gradient_names`.
+        FMI names of the other parameters; by default all, see `gradient_names`.
 
     Raises
     ------
     InputError
-        If the family's parameter is a function.
+        If the parameter of the family is not an FMI name but a function.
     LinkworkError
-        If the parameter at the point has no derivative, as where two folds meet.
+        If the parameter at the point has no derivative, for example where two folds meet.
     """
     if not isinstance(family.vary, str):
         raise InputError(f"{family.name} is a function: gradients are along a parameter with an FMI name")

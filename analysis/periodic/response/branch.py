@@ -1,9 +1,9 @@
 """Follow branches of periodic motions over a parameter, and locate the points where they lose stability or branch off.
 
 The parameter is the speed, the torque, a force, any parameter of the FMI contract, or any number from which a function
-computes mechanism and drive. A branch is followed by arclength, past its folds. Special points are located between its points:
-a Floquet multiplier crosses the unit circle at +1 (fold), at -1 (period doubling), or as a complex pair (torus). At a period
-doubling, `switch` changes to the motion of twice the period.
+computes mechanism and drive. A branch is followed by arclength, past its folds. Special points are located between the computed
+points: there a Floquet multiplier crosses the unit circle at +1 (fold), at -1 (period doubling), or as a complex pair (torus).
+At a period doubling, `switch` changes to the branch of motions with twice the period.
 """
 
 from __future__ import annotations
@@ -42,21 +42,26 @@ LEAST_SINE, GREATEST_MULTIPLIER = 1e-3, 1e8
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Branch(NotebookResult):
-    """A branch: periodic orbits along a curve, in order.
+    """A branch of periodic motions: the orbits along a curve over a parameter, in order.
 
     Attributes
     ----------
     family : Family
     turns : int
-        Common periods in a period: see `PeriodicOrbit`.
+        Number of common periods in the period of the motions: see `PeriodicOrbit`.
     parameter : ndarray, shape (m,)
+        Value of the parameter at each point.
     orbits : tuple of PeriodicOrbit
+        The orbit at each point.
     special : tuple of SpecialPoint
-    reached, closed : bool
-        Whether the branch was followed to an end of the range, to its own beginning, or to a branch of half its period; whether
-        it came back to its own beginning.
+        Folds, period doublings and torus points on the branch.
+    reached : bool
+        Whether the branch was followed to its end: to an end of the range, to its own beginning, or to a branch of half its
+        period.
+    closed : bool
+        Whether the branch came back to its own beginning.
     reason : str
-        Reason why the branch ended. If it was lost, its last point is the last good one.
+        Reason why the branch ended. If the branch was lost, its last point is the last for which an orbit was found.
     """
 
     family: Family
@@ -80,12 +85,12 @@ class Branch(NotebookResult):
 
     @property
     def periods(self) -> int:
-        """Common periods of the cranks and gears in a period: see `PeriodicOrbit.periods`."""
+        """Number of common periods of the cranks and gears in a period of the motions: see `PeriodicOrbit.periods`."""
         return self.orbits[0].periods
 
     @property
     def crank_turns(self) -> int:
-        """Turns of the crank in a period: see `PeriodicOrbit.crank_turns`."""
+        """Number of crank turns in a period of the motions: see `PeriodicOrbit.crank_turns`."""
         return self.orbits[0].crank_turns
 
     @property
@@ -106,9 +111,9 @@ class Branch(NotebookResult):
     def columns(self) -> Mapping[str, NDArray[np.float64]]:
         """Return the quantities along the branch, by name with unit, each of shape (m,).
 
-        They are the parameter, the mean speed and the turns in a period; amplitude, mean and first three harmonics of the first
-        free coordinate, for a five-bar u; largest multiplier and stability; and, if the mechanism has these outputs, mean and
-        greatest crank torque, greatest forces in pins, guide and bearings, and the least sine of the transmission angle.
+        The quantities are the parameter, the mean speed and the turns in a period; amplitude, mean and first three harmonics of
+        the first free coordinate (u of a five-bar); largest multiplier and stability; and, if the mechanism has these outputs,
+        mean and greatest crank torque, greatest forces in pins, guide and bearings, and least sine of the transmission angle.
         """
         if not self._table:
             turns = [orbit.turn() for orbit in self.orbits]
@@ -126,16 +131,19 @@ class Branch(NotebookResult):
         return first | self._table
 
     def to_csv(self, path: str | Path) -> Path:
-        """Write the branch as a table, one row per point; see `columns`."""
+        """Write the branch as a CSV table with one row per point; the columns are those of `columns`."""
         return write_csv(path, self.columns())
 
 
-#: Beginning of the names of the columns of forces in joints.
+#: Beginning of the name of each column of joint forces.
 FORCE = "greatest force in "
 
 
 def _turn_columns(orbit: PeriodicOrbit, first: Turn) -> dict[str, Callable[[Turn], float]]:
-    """Return the functions that compute columns from the outputs over a period, by the names of the columns."""
+    """Return functions that compute a column's value from the outputs over one period, by the name of the column.
+
+    ``first`` is the outputs of ``orbit``; they tell which outputs the mechanism has.
+    """
     mechanism = find_mechanism(orbit.parameters)
     rate = next(v for v in mechanism.variables if v.name == mechanism.freedoms[orbit.flow.crank].rate)
     swing, what = first.swing, "{} [{}]".format(*orbit.swing)
@@ -192,14 +200,15 @@ def follow(
     low, high : float
         Range of the parameter.
     direction : int
-        +1 to follow it to higher values at first, -1 to lower values.
+        +1 to begin towards higher values of the parameter, -1 towards lower values.
     greatest : float
         Greatest step of the parameter, relative to its range; narrow resonances need small steps.
     most_points : int
+        Greatest number of points.
     watch : callable, optional
         Called with the parameter of every point.
     stop : callable, optional
-        Called with the orbit of every point; the branch ends if it returns true.
+        Called with the orbit of every point; the branch ends when ``stop`` returns true.
 
     Returns
     -------
@@ -228,7 +237,7 @@ def switch(
     watch: Callable[[float], None] | None = None,
     stop: Callable[[PeriodicOrbit], bool] | None = None,
 ) -> Branch:
-    """Switch to the branch of twice the period at a period doubling, and follow it.
+    """Follow the branch of motions with twice the period that begins at a period doubling.
 
     Parameters
     ----------
@@ -308,12 +317,18 @@ def _follower(
 
 
 def _growth(orbit: PeriodicOrbit) -> float:
-    """Return the growth of a deviation over the period, or over one of its pieces if it has several."""
+    """Return the greatest growth factor of a small deviation over the period.
+
+    If the period is divided for multiple shooting, it is the greatest growth factor over any one piece.
+    """
     return orbit.largest if orbit.stations is None else orbit.stations.growth
 
 
 def _divide_period(family: Family, last: Point, settings: Settings) -> tuple[Follower, Point]:
-    """Divide the period into pieces at the last point; return a follower by multiple shooting and its first point there."""
+    """Return a follower that uses multiple shooting, and its first point, which is the last point of the branch so far.
+
+    The pieces into which the period is divided are chosen from the orbit at this point.
+    """
     orbit: PeriodicOrbit = last.data
     places = orbit.flow.unknowns(orbit.turn(PLACES * orbit.periods).states, orbit.point.vector)
     angles, starts = choose_pieces(orbit.point, places, orbit.turns)
@@ -325,7 +340,7 @@ def _divide_period(family: Family, last: Point, settings: Settings) -> tuple[Fol
 
 
 def reason_to_leave(point: Point, largest: float = GREATEST_MULTIPLIER) -> str:
-    """Return the reason why a branch is not followed beyond a point; empty if it is followed."""
+    """Return the reason why a branch must not be followed beyond a point; empty if there is none."""
     orbit = point.data
     if orbit.largest > largest:
         return (
@@ -370,7 +385,7 @@ def _branch(
             first, watch=None if watch is None else lambda point: watch(point.parameter), leave=leave
         )
         if merged:
-            # beyond this point come the same motions, begun half a period later
+            # beyond this point the branch passes through the same motions again, half a period later
             curve = replace(curve, points=curve.points[:-1], steps=curve.steps[:-1])
         pieces.append((follower, curve))
         last, left = curve.points[-1], settings.most_points - len(curve.points) + 1
@@ -398,9 +413,9 @@ def _branch(
 
 
 def _meets_half(before: Point, after: Point) -> bool:
-    """Return whether a branch meets a branch of half its period between two points.
+    """Return whether a branch meets, between two of its points, a branch of motions with half the period.
 
-    It then turns back on itself with the two halves of the period exchanged.
+    From there on the followed branch passes through the same motions again, with the two halves of the period exchanged.
     """
     turns = after.data.turns
     if turns % 2 or not before.tangent[-1] * after.tangent[-1] < 0.0:
@@ -413,8 +428,8 @@ def _meets_half(before: Point, after: Point) -> bool:
 
 
 def _tests(point: Point) -> dict[Crossing, float]:
-    """Return the value of a test function for each kind of crossing; its sign changes where a multiplier crosses the circle."""
-    # det(M - 1) is also zero where two branches cross; the parameter turns back only at a fold
+    """Return the test function of each kind of crossing; its sign changes where a multiplier crosses the unit circle."""
+    # det(M - 1) is also zero where two branches cross; the parameter's direction along the branch changes only at a fold
     return {
         kind: float(point.tangent[-1]) if kind is Crossing.FOLD else float(crossing_test(point.data.monodromy, kind))
         for kind in Crossing
@@ -424,13 +439,13 @@ def _tests(point: Point) -> dict[Crossing, float]:
 def _special_points(
     curve: Curve, follower: Follower, pieces: Sequence[tuple[Follower, Curve]] = ()
 ) -> list[SpecialPoint]:
-    """Locate the special points on the part of a branch along ``curve``; ``pieces`` are the parts before it."""
+    """Locate the special points on one part of a branch, ``curve``; ``pieces`` are the parts of the branch before this part."""
     passed = sum(len(piece.points) - 1 for _, piece in pieces)
     found: list[tuple[int, float, SpecialPoint]] = []
     values = [_tests(point) for point in curve.points]
     for i, length in enumerate(curve.steps):
         for kind in Crossing:
-            # at prescribed speed the product of two multipliers depends on the damping alone and crosses no value
+            # at prescribed speed the product of the two multipliers depends only on the damping: there is no torus point
             if (
                 kind is Crossing.TORUS
                 and curve.points[i].data.drive.speed_drive
@@ -441,7 +456,7 @@ def _special_points(
                 continue
             before, after = curve.points[i : i + 2]
             point, s = follower.locate(before, length, after, lambda p, kind=kind: _tests(p)[kind])  # type: ignore[misc]
-            # a real pair with the product 1 is no torus
+            # two real multipliers with the product 1 are no torus point
             if kind is Crossing.TORUS and abs(point.data.multipliers[0].imag) < 1e-6:
                 continue
             found.append((i, s, SpecialPoint(kind=kind, parameter=point.parameter, orbit=point.data, after=passed + i)))
@@ -449,7 +464,7 @@ def _special_points(
 
 
 def describe(branches: Sequence[Branch]) -> str:
-    """Describe branches of a family in one line: range, number of orbits, stability, greatest amplitude and where it is."""
+    """Describe branches of a family in one line: range, number of orbits, stability, and place of the greatest amplitude."""
     family, (name, unit) = branches[0].family, branches[0].orbits[0].flow.components[0]
     span = format_range(np.concatenate([branch.parameter for branch in branches]), family.unit)
     words = dict.fromkeys(word.value for branch in branches for word in branch.stability())
@@ -464,12 +479,12 @@ def describe(branches: Sequence[Branch]) -> str:
 
 #: Greatest modulus of the multipliers up to which a motion is followed.
 GREATEST = 1e3
-#: Distance from the polygon of a branch, in scaled arc length, below which a motion lies on the branch.
+#: Distance from the polygonal line through the points of a branch, in scaled units, below which a motion lies on the branch.
 _ON = 2e-3
 
 
 def distance(points: NDArray[np.float64], place: NDArray[np.float64]) -> float:
-    """Return the least distance of a place, shape (n,), from the polygon through points, shape (m, n)."""
+    """Return the distance of a place, shape (n,), from the polygonal line through points, shape (m, n)."""
     s = points - place
     pieces = np.diff(s, axis=0)
     squares = np.maximum((pieces**2).sum(axis=1), 1e-300)
@@ -479,9 +494,9 @@ def distance(points: NDArray[np.float64], place: NDArray[np.float64]) -> float:
 
 
 def passes(branch: Branch, value: float, motion: NDArray[np.float64], width: float) -> bool:
-    """Return whether a branch passes through a motion, given by its start, up to whole turns of links.
+    """Return whether a branch passes through a motion, apart from whole turns of links.
 
-    ``value`` is the parameter of the motion, and ``width`` the length that is scaled to 1 on the axis of the parameter.
+    ``motion`` is the start of the motion and ``value`` its parameter; ``width`` is the scale of the parameter.
     """
     ends = [branch.orbits[i] for i in (branch.parameter.argmin(), branch.parameter.argmax())]
     scale = np.append(np.max([o.scale for o in ends], axis=0), width)

@@ -3,7 +3,7 @@
 `frequency_response` follows the periodic motions of the full nonlinear mechanism over a range of speeds, past folds, from both
 ends of the range. At period doublings it switches to the motions of twice the period, repeatedly if wanted. `with_isolas` adds
 the motions to which no branch leads: closed curves over the parameter, and branches that reach neither end of the range.
-`natural_frequency` is the classical estimate, from the mean effective mass.
+`natural_frequency` gives the classical estimate of the resonance from the mean effective mass.
 """
 
 from __future__ import annotations
@@ -51,29 +51,33 @@ from .branch import GREATEST, GREATEST_MULTIPLIER, Branch, describe, follow, fol
 
 #: Number of crank angles over which the effective mass is averaged.
 MASS_SAMPLES = 1024
-#: Generator of a lattice of MASS_SAMPLES points over the angles of several cranks: the odd number next to their golden section.
+#: Generator of a lattice of MASS_SAMPLES points over the angles of several cranks: the odd number next to 0.618 MASS_SAMPLES,
+#: where 0.618 is the golden ratio.
 LATTICE = 633
 
 
 def oscillating_freedoms(mechanism: Mechanism) -> tuple[int, ...]:
-    """Return the indices of the freedoms that are not cranks."""
+    """Return the indices of the degrees of freedom that are not cranks."""
     return tuple(number for number in range(len(mechanism.freedoms)) if number not in mechanism.cyclic_freedoms)
 
 
 def first_freedom(mechanism: Mechanism) -> int:
-    """Return the index of the first freedom that is not a crank; raises ParameterError if there is none."""
+    """Return the index of the first degree of freedom that is not a crank; raise ParameterError if there is none."""
     for number in oscillating_freedoms(mechanism):
         return number
     raise ParameterError("mechanism", mechanism.name, "have a second freedom for a natural frequency")
 
 
 def stiffness_name(mechanism: Mechanism) -> str:
-    """Return the FMI name of the stiffness of the first freedom's spring, such as ``slider.stiffness``, or ""."""
+    """Return the FMI name of the stiffness of the first freedom's spring, such as ``slider.stiffness``; "" without a spring.
+
+    The first freedom is the first degree of freedom that is not a crank.
+    """
     return next(iter(mechanism.names("stiffness", mechanism.freedoms[first_freedom(mechanism)].coordinate)), "")
 
 
 def _mean_mass_and_stiffness(parameters: Parameters) -> tuple[float, float]:
-    """Return the effective mass (kg) and stiffness (N/m) of the first freedom at its zero position, averaged over a turn."""
+    """Return effective mass (kg) and stiffness (N/m) of the first freedom at its zero position, averaged over a crank turn."""
     mechanism = find_mechanism(parameters)
     cranks, freedom = find_cranks(mechanism), first_freedom(mechanism)
     if not cranks:
@@ -96,7 +100,9 @@ def _mean_mass_and_stiffness(parameters: Parameters) -> tuple[float, float]:
 
 @takes_published()
 def mean_effective_mass(parameters: Parameters) -> float:
-    """Return the mean effective mass (kg) over a turn of the first freedom other than the crank: the mean m22 of a five-bar.
+    """Return the effective mass (kg) of the first freedom other than the crank, averaged over a crank turn.
+
+    For a five-bar it is the mean of m22.
 
     Raises
     ------
@@ -110,8 +116,8 @@ def mean_effective_mass(parameters: Parameters) -> float:
 def natural_frequency(parameters: Parameters) -> float:
     """Compute the natural frequency (rad/s) of the first freedom other than the crank, from its mean effective mass.
 
-    The stiffness is the parameter of its spring, such as ``slider.stiffness``; without such a parameter it is the mean over a
-    turn of the second derivative of the energy.
+    The stiffness is the parameter of the freedom's spring, such as ``slider.stiffness``. If there is no such parameter, it is
+    the second derivative of the potential energy, averaged over a crank turn.
 
     Raises
     ------
@@ -139,8 +145,8 @@ def natural_frequency(parameters: Parameters) -> float:
     return sqrt(stiffness / mass)
 
 
-#: A branch of at least four times the period ends when its largest multiplier passes this value: its motion has then doubled
-#: once more, or folded, and a machine has left it for another motion.
+#: A branch of at least four times the period ends when its largest multiplier passes this value. By then there was another
+#: period doubling or a fold, and a machine has changed to another motion.
 STRAYED = 4.0
 
 
@@ -179,44 +185,44 @@ class Response(NotebookResult):
 
     @property
     def caution(self) -> str:
-        """Warning that `speeds_to_avoid` may miss motions off the branches; empty if these were sought."""
+        """Warning that `speeds_to_avoid` may miss motions to which no branch leads; empty if these motions were sought."""
         return "" if self.sought else UNSOUGHT
 
     @property
     def sought_values(self) -> str:
-        """Number of values of the parameter at which all motions were sought, in words; more values may find more motions."""
+        """Text: the number of values of the parameter at which all motions were sought; more values may find more motions."""
         return f"{format_count(self.sought, 'value')} of {self.family.name}"
 
     @property
     def family(self) -> Family:
-        """The motions as the parameter varies."""
+        """The family: mechanism and drive as functions of the parameter that varies."""
         return self.branches[0].family
 
     @property
     def speeds_to_avoid(self) -> tuple[Avoided, ...]:
-        """Ranges of the speed, or of the parameter that varies, that a machine should avoid, each with its reason.
+        """Ranges of the speed, or of another parameter that varies, that a machine should avoid, each with its reason.
 
-        They follow from the branches. A stable motion that no branch leads to is taken into account only after `with_isolas`.
+        The ranges follow from the branches. Stable motions to which no branch leads are included only after `with_isolas`.
         """
         return ranges_to_avoid(self.branches, self.low, self.high)
 
     @property
     def jumps(self) -> tuple[FoldJump, ...]:
-        """The jumps at folds at which a stable motion ends."""
+        """The jumps of the machine at the folds where a stable motion ends."""
         return fold_jumps(self.branches)
 
     def maxima(self) -> tuple[Extremum, ...]:
-        """Return the local maxima of the amplitude on the branches of the simple period, by parameter."""
+        """Return the local maxima of the amplitude, sorted by parameter; multiples of the period are left out."""
         return self._extrema(1)
 
     def minima(self) -> tuple[Extremum, ...]:
-        """Return the local minima of the amplitude on the branches of the simple period, by parameter."""
+        """Return the local minima of the amplitude, sorted by parameter; multiples of the period are left out."""
         return self._extrema(-1)
 
     def _extrema(self, sign: int) -> tuple[Extremum, ...]:
         found = [e for branch in self.branches if branch.periods == 1 for e in extrema(branch, sign)]
         found.sort(key=lambda e: (e.parameter, e.amplitude))
-        # a curve that was followed from both ends and reached neither has its extrema on both branches
+        # if a curve was followed from both ends and did not reach the other end, both branches have the same extrema
         reach = 1e-5 * (self.high - self.low)
         return tuple(
             e
@@ -227,7 +233,7 @@ class Response(NotebookResult):
         )
 
     def to_csv(self, path: str | Path) -> Path:
-        """Write all branches as one table, numbered in the first column; see `Branch.columns`."""
+        """Write all branches as one CSV table: the number of the branch, then the columns of `Branch.columns`."""
         tables = [branch.columns() for branch in self.branches]
         columns = {"branch": np.concatenate([np.full(len(b), float(i + 1)) for i, b in enumerate(self.branches)])}
         columns |= {name: np.concatenate([table[name] for table in tables]) for name in tables[0]}
@@ -235,7 +241,7 @@ class Response(NotebookResult):
 
 
 class ResponseInterrupted(Interrupted):
-    """A response was interrupted by Ctrl-C; ``response`` has the branches followed so far."""
+    """The computation of a response was interrupted by Ctrl-C; ``response`` has the branches followed so far."""
 
     def __init__(self, response: Response) -> None:
         self.response = response
@@ -265,20 +271,20 @@ def frequency_response(
     parameters : parameters of a mechanism
         Or a published set or its name.
     low, high : float or str
-        Range of the parameter: speed in rad/s, torque in N.m, else in the unit of the FMI contract; or text such as "420 rpm".
+        Range of the parameter: speed in rad/s, torque in N.m, other parameters in their FMI unit; or text such as "420 rpm".
     drive : Drive, optional
-        Needed if a parameter other than the speed varies. A published set is by default driven at its own speed.
+        Required if a parameter other than the speed varies. A published set is by default driven at its own speed.
     vary : str
-        The speed of the crank by default, ``drive.torque`` (the mean speed is then part of the solution: ``start`` is
-        needed), or any parameter that `Family` can vary.
+        FMI name of the parameter that varies: by default the crank speed; ``drive.torque`` (the mean speed is then an unknown,
+        and ``start`` is required); or any parameter that `Family` can vary.
     start : array_like, optional
         Guess of the orbit's start at the low end; see `find_orbit`.
     doublings : int
         How often the period is doubled: 1 for the motions of twice the period from each period doubling, 2 for the motions of
-        four times the period as well, and so on. From the second doubling on a branch ends when its largest multiplier passes
-        `STRAYED`.
+        four times the period as well, and so on. Branches of four times the period and more end when their largest multiplier
+        passes `STRAYED`.
     most_points : int
-        Points of a branch at most.
+        Greatest number of points of a branch.
     greatest_step : float
         Greatest step of the parameter, relative to the range. Narrow resonances need small steps.
     progress : bool
@@ -286,13 +292,13 @@ def frequency_response(
     Returns
     -------
     Response
-        ``problems`` names every branch that could not be followed. Motions to which no branch leads are not sought; the search
-        would take one to ten times as long: see `with_isolas`.
+        ``problems`` names every branch that could not be followed. Motions to which no branch leads are not sought here but by
+        `with_isolas`, which takes one to ten times as long.
 
     Raises
     ------
     OrbitError
-        If there is no periodic motion to begin with at either end.
+        If no periodic motion is found at either end of the range.
     InputError
         If the range is not finite and increasing.
     ResponseInterrupted
@@ -333,7 +339,7 @@ def frequency_response(
 
 @dataclass(slots=True)
 class _Search:
-    """The branches of a response as they are followed, with the problems on the way."""
+    """State of a frequency response while its branches are followed: the branches so far, and the problems."""
 
     family: Family
     low: float
@@ -345,7 +351,10 @@ class _Search:
     failures: list[OrbitError] = field(default_factory=list)
 
     def follow_from_both_ends(self, start: ArrayLike | None, most_points: int, show: Callable[[float], None]) -> None:
-        """Follow the branch from the low end, and the branch from the high end if it is a different one."""
+        """Follow the branch from the low end of the range, and the branch from the high end if it is a different branch.
+
+        ``show`` is called with the length of the range that is done.
+        """
         done = 0.0
 
         def watch(value: float) -> None:
@@ -356,7 +365,7 @@ class _Search:
         for value, direction, guess in ((self.low, 1, start), (self.high, -1, None)):
             at, driven = self.family.operation(value)
             if direction < 0 and not driven.speed_drive and self.branches:
-                # there is no guess of the speed at the other end
+                # under a torque there is no guess of the speed at the high end
                 break
             try:
                 orbit = newton_orbit(at, driven, start=guess)
@@ -384,7 +393,10 @@ class _Search:
                 break
 
     def follow_doublings(self, times: int) -> None:
-        """Follow the branches of twice the period, of four times and so on, ``times`` times; each from only one of its ends."""
+        """Follow the branches of twice the period, four times the period and so on: the period is doubled ``times`` times.
+
+        A branch with a period doubling at both ends is followed from one end only.
+        """
         ends: list[tuple[int, float, NDArray[np.float64]]] = []
 
         def is_end(special: SpecialPoint) -> bool:
@@ -425,7 +437,7 @@ class _Search:
                     return
 
     def seek(self, value: float, turns: int) -> None:
-        """Find the motions of ``turns`` turns at a value of the parameter, and follow each that lies on no branch."""
+        """Find the motions of ``turns`` turns at a value of the parameter; follow those that lie on no known branch."""
         parameters, drive = self.family.operation(value)
         start = None
         if not drive.speed_drive:
@@ -452,7 +464,7 @@ class _Search:
                 self.problems.append(describe_end(branch))
 
     def _knows(self, orbit: PeriodicOrbit, value: float) -> bool:
-        """Return whether a branch passes through a motion, whichever turn of the motion comes first."""
+        """Return whether a known branch passes through a motion; a motion of several turns may begin with any of its turns."""
         own = [branch for branch in self.branches if branch.turns == orbit.turns]
         starts = orbit.passages()
         return any(passes(branch, value, start, self.high - self.low) for branch in own for start in starts)
@@ -465,14 +477,14 @@ class _Search:
 
 
 def describe_end(branch: Branch) -> str:
-    """Return a sentence on a branch that was lost: how far it was followed, and why no further."""
+    """Return a sentence on a branch that was not followed to its end: how far it was followed, and why not further."""
     first, last = (branch.family.format_value(float(branch.parameter[i])) for i in (0, -1))
     period = "" if branch.periods == 1 else f"with a period of {branch.crank_turns} turns "
     return f"the branch {period}from {first} is followed to {last} only: {branch.reason}"
 
 
 def _passes(branch: Branch, value: float, orbit: PeriodicOrbit) -> bool:
-    """Return whether a branch has an orbit at one of its ends."""
+    """Return whether one of the two ends of a branch is the given orbit at the parameter ``value``."""
     return any(
         abs(branch.parameter[i] - value) <= 1e-9 * abs(value)
         and float(np.abs(orbit.flow.remove_turns(branch.orbits[i].start - orbit.start) / orbit.scale).max()) < SAME
@@ -487,14 +499,14 @@ GREATEST_OF_SEVERAL = 100.0
 def with_isolas(
     response: Response, *, places: int = 5, turns: int = 1, greatest_step: float = 5e-3, progress: bool = False
 ) -> Response:
-    """Add motions to a response that are not connected to any of its branches.
+    """Return a response with further branches: motions that are not connected to any of its branches, such as isolas.
 
-    All motions are sought at some values of the parameter; motions that exist only between these values are not found. From a
-    motion that lies on no branch, a new branch is followed in both directions until it closes or ends. Motions whose deviations
-    grow more than a thousandfold per turn are left out.
+    All motions are sought at several values of the parameter; motions that exist only between these values are not found. From
+    each motion that lies on no branch, a new branch is followed in both directions until it closes or ends. Motions whose
+    deviations grow more than a thousandfold per turn are ignored.
 
-    Motions of several turns are stable only in narrow ranges between a fold and a period doubling. Beyond the doubling they
-    continue to exist, more and more unstable, over a range some ten times as wide, where the search can find them. They are
+    Motions of several turns are stable only in narrow ranges between a fold and a period doubling. Beyond the doubling these
+    motions still exist, increasingly unstable, over a range about ten times as wide, where the search can find them. They are
     followed as long as deviations grow less than `GREATEST_OF_SEVERAL` times per period.
 
     Parameters
@@ -503,14 +515,14 @@ def with_isolas(
     places : int
         Number of values of the parameter, evenly spaced inside the range, at which all motions are sought.
     turns : int
-        Greatest number of turns, or of common periods, in the period of the motions that are sought.
+        Greatest number of turns (common periods) in the period of the motions that are sought.
     greatest_step, progress
         See `frequency_response`.
 
     Raises
     ------
     InputError
-        If there are no places, or no turns.
+        If ``places`` or ``turns`` is less than one.
     ResponseInterrupted
         On Ctrl-C, with the branches followed so far.
 

@@ -2,9 +2,9 @@
 
 On the centre manifold of a special point the map over a period is one of three normal forms (Y. A. Kuznetsov, Elements of
 Applied Bifurcation Theory, 3rd ed., Springer 2004, sections 5.4 and 8.7). The sign of one coefficient decides: beyond a
-supercritical period doubling or torus point a stable motion grows out of the old one; beyond a subcritical point the mechanism
-jumps. The second and third derivatives of the map are computed by finite differences along eigenvectors. `confirm_form`
-compares the normal form, and `confirm` the verdict, with a long run of the mechanism.
+supercritical period doubling or torus point a new stable motion grows out of the motion of the branch; beyond a subcritical
+point the mechanism jumps to another motion. The second and third derivatives of the map are computed by finite differences
+along eigenvectors. `confirm_form` compares the normal form, and `confirm` the verdict, with a long run of the mechanism.
 """
 
 from __future__ import annotations
@@ -39,9 +39,11 @@ class SpecialPoint:
     kind : Crossing
         FOLD, PERIOD_DOUBLING or TORUS.
     parameter : float
+        Value of the branch's parameter.
     orbit : PeriodicOrbit
+        The motion at the point.
     after : int
-        Index of the point of the branch after which the special point lies.
+        Index of the last point of the branch before the special point.
     """
 
     kind: Crossing
@@ -61,7 +63,7 @@ _LOCATED = 1e-2
 UNSETTLED = 0.5
 _UNSETTLED = "not settled"
 #: Run that confirms a normal form: least and greatest distance of the multiplier from the unit circle; square of the distance
-#: from the old motion that is wanted; turns.
+#: from the motion of the branch that is wanted; periods of the run.
 _BEYOND, _SMALL, _TURNS = (2e-3, 2e-2), 0.04, 6000
 FloatArray = NDArray[np.float64]
 Form = Callable[..., NDArray[np.complex128]]
@@ -81,7 +83,7 @@ class NormalForm:
         Change of the coefficient when the step of the finite differences is halved; infinite if the point is not located.
     words : str
         "supercritical", "subcritical", or "not settled" if the coefficient is uncertain or the multiplier crosses the circle
-        too fast for the point to be located; for a fold, the side on which the two motions exist.
+        too fast for the point to be located; for a fold, whether the two motions exist at lower or higher parameter values.
     """
 
     kind: Crossing
@@ -105,11 +107,11 @@ class Forms(NamedTuple):
     matrix: FloatArray
 
     def second_form(self, x: FloatArray, h: float) -> FloatArray:
-        """Return B(x, x) with the step h."""
+        """Return the second derivative B(x, x) by finite differences with the step h."""
         return (self.of(h * x) + self.of(-h * x) - 2.0 * self.of(0.0 * x)) / h**2
 
     def third_form(self, x: FloatArray, h: float) -> FloatArray:
-        """Return C(x, x, x) with the step h."""
+        """Return the third derivative C(x, x, x) by finite differences with the step h."""
         of = self.of
         return (of(2.0 * h * x) - 2.0 * of(h * x) + 2.0 * of(-h * x) - of(-2.0 * h * x)) / (2.0 * h**3)
 
@@ -131,7 +133,7 @@ class Forms(NamedTuple):
 
 
 def _forms(orbit: PeriodicOrbit) -> Forms:
-    """Return the forms of the map over a period, for deviations from the orbit in units of the scale."""
+    """Return the `Forms` of the map over a period, for deviations from the orbit in units of the scale of y."""
     scale, point = orbit.scale, orbit.point
 
     def after(x: FloatArray) -> FloatArray:
@@ -141,7 +143,7 @@ def _forms(orbit: PeriodicOrbit) -> Forms:
 
 
 def _complex_form(form: Callable[..., FloatArray], count: int) -> Form:
-    """Extend a real multilinear form to complex vectors."""
+    """Extend a real multilinear form of ``count`` vectors to complex vectors."""
 
     def of(*vectors: NDArray[np.complex128]) -> NDArray[np.complex128]:
         total = np.zeros(len(vectors[0]), dtype=complex)
@@ -171,7 +173,7 @@ def normal_form(family: Family, special: SpecialPoint) -> NormalForm:
     Raises
     ------
     OrbitError
-        If the mechanism cannot be followed over a period next to the orbit.
+        If the integration over a period, from a start next to the orbit, fails.
     """
     of = _forms(special.orbit)
     multiplier = complex(special.orbit.multipliers[0])
@@ -190,7 +192,7 @@ def normal_form(family: Family, special: SpecialPoint) -> NormalForm:
 
 
 def _extrapolate_coefficient(at: Callable[[float], float]) -> tuple[float, float]:
-    """Extrapolate a coefficient, a function of the step, to step zero; return the least uncertain value and its uncertainty."""
+    """Extrapolate a coefficient, a function of the step size, to zero; return the least uncertain value and its uncertainty."""
     found: list[tuple[float, float]] = []
     values: list[float] = []
     change = 0.0
@@ -214,7 +216,7 @@ def _extrapolate_coefficient(at: Callable[[float], float]) -> tuple[float, float
 
 
 def form_coefficient(of: Forms, kind: Crossing, multiplier: complex, h: float) -> float:
-    """Compute the coefficient of a normal form by Kuznetsov's (5.25), (5.27) or (5.28): see `NormalForm`.
+    """Compute the coefficient of a normal form by Kuznetsov's equation (5.25), (5.27) or (5.28): see `NormalForm`.
 
     Parameters
     ----------
@@ -223,7 +225,7 @@ def form_coefficient(of: Forms, kind: Crossing, multiplier: complex, h: float) -
     multiplier : complex
         For a torus: one multiplier of the pair on the unit circle.
     h : float
-        Step of the differences.
+        Step of the finite differences.
     """
     matrix, unit = of.matrix, np.eye(len(of.matrix))
     if kind is Crossing.TORUS:
@@ -250,7 +252,7 @@ def form_coefficient(of: Forms, kind: Crossing, multiplier: complex, h: float) -
 
 
 def _slope(family: Family, of: Forms, special: SpecialPoint) -> float:
-    """Return the component, along the left eigenvector of a fold, of the map's derivative with respect to the parameter."""
+    """Return the derivative of the map over a period by the parameter, at a fold: its component along the left eigenvector."""
     _, p, _ = _eigenvectors(of.matrix, 1.0)
     point, start = operating_point(*family.operation(special.parameter)), special.orbit.start
     reach = 1e-3 * max(abs(special.parameter), 1e-9)
@@ -261,15 +263,15 @@ def _slope(family: Family, of: Forms, special: SpecialPoint) -> float:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FormRun:
-    """A run near a period doubling or a torus point, on the side where the old motion is unstable.
+    """A run near a period doubling or a torus point, on the side where the motion of the branch is unstable.
 
     Attributes
     ----------
     parameter : float
         Value of the parameter in the run.
     distance : float
-        Greatest distance from the old motion over the last periods, relative to the scale of y; infinite if the run ended
-        early.
+        Greatest distance from the motion of the branch over the last periods, relative to the scale of y; infinite if the run
+        ended early.
     expected : float
         Distance that the normal form predicts for a supercritical point.
     """
@@ -281,8 +283,8 @@ class FormRun:
     def agrees(self, form: NormalForm) -> bool:
         """Return whether the run agrees with the normal form.
 
-        Its distance must be the expected one within a factor of two if the form is supercritical, and more than three times the
-        expected one if it is subcritical.
+        If the form is supercritical, the distance of the run must be the expected distance within a factor of two. If the form
+        is subcritical, the distance must be more than three times the expected distance.
         """
         if form.words == "supercritical":
             return 0.5 * self.expected < self.distance < 2.0 * self.expected
@@ -290,14 +292,14 @@ class FormRun:
 
 
 def confirm_form(family: Family, special: SpecialPoint, form: NormalForm) -> FormRun:
-    """Run the mechanism near a special point, from a small deviation, on the side where the old motion is unstable.
+    """Run the mechanism near a special point, from a small deviation, on the side where the motion of the branch is unstable.
 
     Raises
     ------
     InputError
-        If the point is a fold: beyond it there is no old motion.
+        If the point is a fold: the branch has no motion beyond a fold.
     LinkworkError
-        If the old motion is unstable on neither side.
+        If the motion of the branch is unstable on neither side.
     """
     if special.kind is Crossing.FOLD:
         raise InputError("beyond a fold there is no old motion to deviate from")
@@ -355,12 +357,12 @@ class Confirmation:
     outcome : Outcome
     growth : float
         Growth factor of the deviation per turn, along the direction of the leading multiplier, by regression over the turns
-        before the deviation is lost in rounding errors or exceeds a hundredth of the scale of y; a bound if that happens within
-        a turn.
+        before the deviation is lost in rounding errors or exceeds a hundredth of the scale of y; only a bound if this happens
+        within the first turn.
     deviations : ndarray, shape (n,)
         Distance from the orbit at crank angle 0 of each turn, relative to the first distance, up to the end of the run.
     message : str
-        Reason why the run ended early; empty if it did not.
+        Reason why the run ended early; empty if the run is complete.
     """
 
     verdict: StabilityVerdict
@@ -373,7 +375,8 @@ class Confirmation:
     def agrees(self) -> bool:
         """Whether the run confirms the verdict; the deviation of a marginal motion must neither decay nor grow.
 
-        If the margin is too small for an outcome within the turns, the measured growth must agree with the multiplier.
+        If the margin is so small that the deviation neither decays nor grows notably within the run, the measured growth must
+        agree with the multiplier.
         """
         expected = {
             Stability.STABLE: Outcome.DECAYS,
@@ -414,7 +417,8 @@ def confirm(
     parameters : parameters of a mechanism
     drive : Drive
     turns : int, optional
-        At least 20. By default 1000, and up to 20000 if the margin is too small to distinguish growth from decay.
+        Turns of the run, or common periods of gears or several cranks; at least 20. By default 1000, and up to 20000 if the
+        margin is too small to distinguish growth from decay.
     start : array_like, shape (n,), optional
         Guess of the orbit.
     disturbance : float
@@ -429,7 +433,7 @@ def confirm(
     InputError
         If the number of turns or the disturbance is not usable.
     LinkworkError
-        If the run ends within a turn.
+        If the run ends within the first turn.
     """
     if (turns is not None and turns < 20) or not NOISE < disturbance < LINEAR:
         raise InputError(
@@ -461,7 +465,7 @@ def confirm(
 
 
 def _passages(point: OperatingPoint, start: FloatArray, turns: int) -> tuple[FloatArray, str]:
-    """Run the mechanism; return y at crank angle 0 of each turn, shape (turns + 1, n), and why the run ended early, or ""."""
+    """Run the mechanism from a start; return y at the beginning of each turn, (turns + 1, n), and why the run ended early."""
     if point.drive.speed is not None:
         mechanism, flow = point.mechanism, point.flow
         x, count = flow.state(start, point.vector), len(mechanism.freedoms)
@@ -494,8 +498,8 @@ def _leading_vectors(
 ) -> tuple[NDArray[np.float64], NDArray[np.complex128]]:
     """Return the direction of greatest growth, of unit length, and a vector that measures the growth, both scaled.
 
-    The vector is the left eigenvector of the largest multiplier: the product of the deviation with it grows by the same factor
-    in each turn, whereas for a complex pair the distance itself oscillates.
+    The vector is the left eigenvector of the largest multiplier. The product of the deviation with this vector grows by the
+    same factor in each turn, whereas for a complex pair the distance itself oscillates.
     """
     scaled = orbit.monodromy * scale / scale[:, None]
     values, left, right = scipy.linalg.eig(scaled, left=True)
@@ -505,5 +509,5 @@ def _leading_vectors(
 
 
 def _growth(size: NDArray[np.float64]) -> float:
-    """Return the growth factor per turn of sizes at successive turns, by linear regression of their logarithms."""
+    """Return the growth factor per turn of the sizes of a deviation at successive turns, by regression of their logarithms."""
     return exp(float(np.polyfit(np.arange(len(size)), np.log(size), 1)[0]))

@@ -3,7 +3,7 @@
 The derivatives follow from the variational equations (`variations`) by the implicit function theorem. The conditions are: a
 motion stays periodic; at a fold, a period doubling or a torus point the multiplier stays on the unit circle; at a resonance
 the amplitude stays stationary (Y. A. Kuznetsov, Elements of Applied Bifurcation Theory, 3rd ed., Springer 2004, chapter 10).
-All derivatives are exact, up to the resolution of the collocation; none is a difference.
+All derivatives are exact, up to the resolution of the collocation; none is a finite difference.
 """
 
 from __future__ import annotations
@@ -120,7 +120,7 @@ class MotionGradient:
     values : ndarray, shape (m,)
         Values of the parameters.
     along : ndarray, shape (c, m)
-        Derivatives by the parameters of the drive vector and, below them, of the constants of the equations.
+        Derivatives of the drive vector and, below them, of the constants of the equations, with respect to the parameters.
     """
 
     def __init__(self, orbit: PeriodicOrbit, names: Sequence[str] | None = None) -> None:
@@ -143,7 +143,7 @@ class MotionGradient:
 
     @property
     def forcing(self) -> FloatArray:
-        """Derivatives of the rates by the parameters at fixed y, at the nodes of `variations`; shape (k, s, n, m)."""
+        """Derivatives of dy/dangle by the parameters at fixed y, at the nodes of `variations`; shape (k, s, n, m)."""
         return self.variations.forcing
 
     @cached_property
@@ -157,7 +157,7 @@ class MotionGradient:
 
     @property
     def start(self) -> FloatArray:
-        """Derivatives of y at crank angle 0, shape (n, m)."""
+        """Derivatives of y at crank angle 0 with respect to the parameters, shape (n, m)."""
         return self._solution[1]
 
     @cached_property
@@ -223,11 +223,15 @@ class MotionGradient:
         return self._extreme(self._numbers(name, False), 1.0)
 
     def least(self, name: str) -> Gradient:
-        """Return the gradient of the least value of an output."""
+        """Return the gradient of the least value of an output over the period, by its FMI name."""
         return self._extreme(self._numbers(name, False), -1.0)
 
     def peak(self, name: str) -> Gradient:
-        """Return the gradient of the greatest modulus of an output (``drive.applied_torque``) or joint force (``pin.A``)."""
+        """Return the gradient of the greatest modulus of an output or a joint force.
+
+        ``name`` is the FMI name of the output, such as ``drive.applied_torque``, or the name of the joint force, such as
+        ``pin.A``.
+        """
         return self._extreme(self._numbers(name, True), 0.0)
 
     def _numbers(self, name: str, joints: bool) -> list[int]:
@@ -263,7 +267,7 @@ class MotionGradient:
 
     @cached_property
     def monodromy(self) -> FloatArray:
-        """Derivatives of the monodromy matrix, shape (n, n, m)."""
+        """Derivatives of the monodromy matrix with respect to the parameters, shape (n, n, m)."""
         v, solution = self.variations, self._solution[0]
         columns = []
         for column in range(self.orbit.flow.size):
@@ -278,7 +282,7 @@ class MotionGradient:
         Raises
         ------
         LinkworkError
-            If two multipliers coincide: they have no derivatives there.
+            If two multipliers coincide: then they have no derivatives.
         """
         scale, matrix = self.variations.scale, self.orbit.monodromy
         values, right = np.linalg.eig((matrix * scale / scale[:, None]).astype(complex))
@@ -356,6 +360,7 @@ def extremum_gradient(orbit: PeriodicOrbit, along: str, names: Sequence[str] | N
     along : str
         FMI name of the parameter, such as ``drive.speed``.
     names : sequence of str, optional
+        FMI names of the other parameters; by default all, see `gradient_names`.
 
     Raises
     ------
@@ -388,6 +393,7 @@ def crossing_gradient(
     along : str
         FMI name of the parameter along which the point moves.
     names : sequence of str, optional
+        FMI names of the other parameters; by default all, see `gradient_names`.
 
     Raises
     ------
@@ -449,7 +455,8 @@ _Step = Callable[[MotionGradient], tuple[FloatArray, float]]
 def _locate_motion(orbit: PeriodicOrbit, along: str, newton_step: _Step, what: str) -> PeriodicOrbit:
     """Find the special point near a motion by Newton's method and return the motion there.
 
-    Raises LinkworkError if Newton's method does not converge to a point near the motion.
+    Raises LinkworkError if Newton's method does not converge to a point near the motion; ``what`` names the point in the
+    message.
     """
     begun = parameter_value(orbit.parameters, orbit.drive, along)
     for _ in range(_STEPS):
@@ -489,7 +496,7 @@ def _crossing_step(motion: MotionGradient, kind: Crossing) -> tuple[FloatArray, 
 
 
 def _fold_step(motion: MotionGradient) -> tuple[FloatArray, float]:
-    """Return Newton's step to the fold, where the map over a period has a fixed point and the matrix M - I is singular."""
+    """Return Newton's step to a fold, where y(T) = y(0) and the monodromy matrix minus the identity is singular."""
     v, n, orbit = motion.variations, len(motion.orbit.start), motion.orbit
     left, right = _null_vectors(v)
     by_y, by_constant = v.second_derivatives(v.fundamental @ right)
@@ -517,7 +524,10 @@ def _test(motion: MotionGradient, kind: Crossing) -> FloatArray:
 
 
 def _singular_matrix(matrix: FloatArray, by: FloatArray, kind: Crossing) -> tuple[FloatArray, FloatArray]:
-    """Return a square matrix that is singular at a crossing, and its derivatives, (..., m), from the monodromy matrix."""
+    """Return a square matrix that is singular at a crossing, and its derivatives, shape (..., m).
+
+    ``matrix`` is the monodromy matrix and ``by`` its derivatives.
+    """
     if kind is not Crossing.TORUS:
         sign = 1.0 if kind is Crossing.FOLD else -1.0
         return np.eye(len(matrix)) - sign * matrix, -sign * by
@@ -540,8 +550,8 @@ def _null_vectors(v: Variations) -> tuple[FloatArray, FloatArray]:
 def _fold_motion(motion: MotionGradient, shift: FloatArray) -> FloatArray:
     """Return the derivatives of the motion at a fold that moves by ``shift`` along the last parameter; shape (k, s, n, m).
 
-    The first-order equations determine them up to a multiple of the eigenvector. The second-order equations determine this
-    multiple, since the multiplier stays +1. The last column is zero.
+    The first-order equations determine the derivatives up to a multiple of the eigenvector. The second-order equations
+    determine this multiple, since the multiplier stays +1. The last column, that of the last parameter, is zero.
     """
     v, n, m = motion.variations, len(motion.variations.scale), len(shift)
     left, right = _null_vectors(v)

@@ -1,12 +1,12 @@
 """Solve the variational equations of a periodic motion, to second order and with parameters, by Gauss collocation.
 
 The period is divided into panels on which the motion is a polynomial to within rounding. On a panel the linear equations
-d' = A d + r are solved at Gauss points for any number of right-hand sides at once, by the implicit Runge-Kutta method of these
-points (E. Hairer, S. P. Norsett and G. Wanner, Solving Ordinary Differential Equations I, section II.7). The panels are joined
-by the condition that the solution is periodic, which works for unstable motions, too. The motion itself is sampled from the
-orbit. `motion.collocation` solves for the motion; the equations here, in contrast, allow any forcing r, friction and torques.
-The derivatives A of the rates, the derivatives by constants, and the second derivatives along a direction are traced from the
-equations.
+d' = A d + r of a deviation d are solved at Gauss points for any number of right-hand sides at once, by the implicit Runge-Kutta
+method of these points (E. Hairer, S. P. Norsett and G. Wanner, Solving Ordinary Differential Equations I, section II.7). The
+panels are joined by the condition that the solution is periodic; this works for unstable motions, too. The motion itself is
+sampled from the orbit. `motion.collocation` solves for the motion; the equations here, in contrast, allow any forcing r,
+friction and torques. The derivatives A of the rates dy/dangle, their derivatives by the constants, and the second derivatives
+along a direction are traced from the equations.
 """
 
 from __future__ import annotations
@@ -50,9 +50,9 @@ _GRID = legendre.legvander(np.linspace(-1.0, 1.0, 4 * _POINTS + 1), _POINTS - 1)
 
 
 class Place(NamedTuple):
-    """A point of the period."""
+    """A point of the period, given by its panel and its position on the panel."""
 
-    panel: int  # number of its panel
+    panel: int  # index of the panel
     position: float  # position on the panel, from -1 to 1
     weights: FloatArray  # weights of the values at the nodes that interpolate at the point, shape (s,)
 
@@ -64,10 +64,11 @@ class Variations:
     ----------
     orbit : PeriodicOrbit
     switched : bool
-        Whether the equations of the mechanism's switch are included: it is on, or a derivative with respect to it is wanted.
+        Whether the optional terms of the equations, such as friction, are included: because they are not zero, or because
+        derivatives with respect to their parameters are wanted.
     along : ndarray, shape (c, m)
-        Derivatives of the drive vector and then of the constants with respect to parameters; the panels must resolve
-        the forcing by these, too.
+        Derivatives of the drive vector and, below them, of the constants with respect to m parameters; the panels are chosen
+        such that they resolve the forcing by these parameters, too.
 
     Attributes
     ----------
@@ -76,7 +77,7 @@ class Variations:
     angles : ndarray, shape (k, s)
         Crank angles of the nodes.
     y, rates : ndarray, shape (k, s, n)
-        The motion and its derivative by the angle.
+        The motion and its derivative by the crank angle.
     by_y : ndarray, shape (k, s, n, n)
         Derivatives of the rates with respect to y.
     by_constant : ndarray, shape (k, s, n, c)
@@ -138,7 +139,10 @@ class Variations:
     def _call(
         self, name: str, size: int, direction: FloatArray | None = None, along: FloatArray | None = None
     ) -> FloatArray:
-        """Evaluate a function of `_code` at the nodes, along a direction of y and one of the constants; shape (k, s, size)."""
+        """Evaluate the function ``name`` of `_code` at the nodes; shape (k, s, size).
+
+        ``direction`` is a direction of y, ``along`` a direction of drive vector and constants; zero if not given.
+        """
         direction = np.zeros_like(self.y) if direction is None else direction
         along = np.zeros(self.constants) if along is None else along
         arguments = np.concatenate([self.y, direction, self.angles[..., None]], axis=-1)
@@ -188,7 +192,7 @@ class Variations:
     # Linear equations
 
     def _solve_panels(self) -> None:
-        """Compute the matrices that give d on each panel, for d' = A d + r, from d at its beginning and from r."""
+        """Compute, for d' = A d + r, the matrices that give d on each panel from d at the beginning of the panel and from r."""
         n, k = self.flow.size, len(self.h)
         size = _POINTS * n
         integrals = self.h[:, None, None] * _GAUSS.integrals
@@ -232,7 +236,7 @@ class Variations:
         return np.asarray(d)
 
     def solve_from_start(self, start: FloatArray, forcing: FloatArray) -> FloatArray:
-        """Return d at the nodes, shape (k, s, n, m), for d' = A d + r from d = ``start``, (n, m)."""
+        """Return d at the nodes, shape (k, s, n, m), for d' = A d + r from d = ``start``, (n, m), with the forcing r."""
         gains = self._gains(forcing)
         starts = np.empty((len(self.h), *start.shape))
         d = start
@@ -260,14 +264,14 @@ class Variations:
         return found
 
     def slope(self, panel: int, values: FloatArray, position: float) -> float:
-        """Return the derivative by the angle, at a position on a panel, of values at its nodes, shape (s,)."""
+        """Return the crank angle derivative, at a position on a panel, of a quantity with ``values``, (s,), at its nodes."""
         series = legendre.legder(_GAUSS.coefficients @ values)
         return float(legendre.legval(position, series) * 2.0 / self.h[panel])
 
     def greatest_value(self, values: FloatArray) -> tuple[float, Place]:
         """Return the greatest value over the period of a quantity with given values at the nodes, shape (k, s), and its place.
 
-        For a vector quantity, shape (k, s, c), it is the greatest modulus.
+        For a vector quantity, shape (k, s, c), the result is the greatest modulus.
         """
         vectors = values.ndim == 3
         coefficients = np.einsum("is,ks...->ki...", _GAUSS.coefficients, values)
@@ -293,7 +297,7 @@ class Variations:
         return self._call("outputs", len(self.flow.mechanism.output_names))
 
     def output_derivatives(self, panel: int, number: int) -> tuple[FloatArray, FloatArray]:
-        """Return the derivatives of an output at the nodes of a panel by y, (s, n), and by constants, (s, c)."""
+        """Return the derivatives of output ``number`` at the nodes of a panel: by y, (s, n), and by constants, (s, c)."""
         n = self.flow.size
         function = _output_derivatives(self.flow, self.switched, number)
         found = [
@@ -306,8 +310,8 @@ class Variations:
 def _solve_cyclic(steps: FloatArray, gains: FloatArray) -> FloatArray:
     """Solve for d at the beginning of each panel, shape (k, n, m), so that d is continuous over the closed period.
 
-    ``steps`` and ``gains`` give d at the end of a panel: step @ d + gain. Pairs of panels are merged repeatedly: orthogonal
-    rotations eliminate d between the two, so that neither growth nor decay accumulates.
+    ``steps`` and ``gains`` give d at the end of a panel: step @ d + gain. Neighbouring panels are merged in pairs, repeatedly:
+    orthogonal transformations eliminate d between the two panels, so that neither growth nor decay accumulates.
     """
     count, n, _ = gains.shape
     # panels of length zero make their number a power of two
@@ -373,10 +377,11 @@ def _symbols(flow: Flow, switched: bool) -> _Symbols:
 
 @cache
 def _code(flow: Flow, switched: bool, name: str) -> MachineCode:
-    """Return machine code of the rates and their derivatives, of these derivatives along a direction, or of the outputs.
+    """Return the machine code of one of three functions, by name.
 
-    ``name`` is "first", "second" or "outputs". The arguments are (y, its direction, the angle), the modes, and the drive and
-    the constants, each with its direction.
+    "first" gives the rates and their derivatives, "second" the derivatives of these derivatives along a direction, "outputs"
+    the outputs. The arguments are (y, direction of y, crank angle), the modes, and the drive vector and the constants, each
+    followed by its direction.
     """
     casadi = symbolic.library()
     with MAKING:

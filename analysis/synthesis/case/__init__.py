@@ -1,6 +1,6 @@
 """Read the case files of a synthesis: their task, constraints and search.
 
-The names are those of ``__init__.pyi``; each is imported from its module when it is first used.
+The public names are listed in ``__init__.pyi``; each is imported from its module when it is first used.
 """
 
 from __future__ import annotations

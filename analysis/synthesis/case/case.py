@@ -97,7 +97,7 @@ def _transmission(value: Any, name: str) -> float | None:
 
 
 def _error(value: Any, name: str) -> Any:
-    """Read the bound of the greatest error while pin forces are minimised: a length, or for a rocker function an angle."""
+    """Check the bound of the greatest error while pin forces are minimised: a length, or for a rocker function an angle."""
     try:
         quantity(value, "m", name)
     except ParameterError:
@@ -108,7 +108,7 @@ def _error(value: Any, name: str) -> Any:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Constraints:
-    """The table ``[constraints]``; a least transmission angle of None does not constrain it.
+    """The table ``[constraints]`` of a case file; None in ``least_transmission_angle`` leaves the transmission angle free.
 
     Attributes
     ----------
@@ -117,11 +117,11 @@ class Constraints:
     least_mechanical_advantage, greatest_mechanical_advantage : float
         Bounds of the mechanical advantage: torque on the rocker divided by torque on the crank.
     mechanical_advantage_at : list
-        Crank rotations at which these bounds hold; by default everywhere.
+        Crank rotations at which the bounds of the mechanical advantage hold; by default everywhere.
     dead_centre_stretched, dead_centre_folded : (float, float)
-        Crank rotation, or range of it, at which crank and coupler are in line.
+        Crank rotation, or range of crank rotations, at which crank and coupler are in line.
     toggle_stretched, toggle_folded : (float, float)
-        Crank rotation, or range of it, at which coupler and rocker are in line.
+        Crank rotation, or range of crank rotations, at which coupler and rocker are in line.
     no_toggle : (float, float)
         Crank rotations between which there is no toggle.
     max_pin_force : float
@@ -179,7 +179,7 @@ class Constraints:
         return (*(make(value) for value, make in made if value is not None), *self.require)
 
     def _advantage(self) -> dict[str, Any] | None:
-        """Return the arguments of `MechanicalAdvantage`; None without bounds."""
+        """Return the arguments of `MechanicalAdvantage`; None if the table gives no bounds of the mechanical advantage."""
         ends = {"least": self.least_mechanical_advantage, "greatest": self.greatest_mechanical_advantage}
         given = {name: end for name, end in ends.items() if end is not None}
         if self.mechanical_advantage_at is not None and not given:
@@ -224,7 +224,7 @@ def _trade_off(value: Any, name: str) -> TradeOffTable:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class SynthesisCase:
-    """A synthesis as a case file describes it."""
+    """A synthesis described by a case file: task, bounds, constraints, search and trade-off."""
 
     title: str = entry(text)
     task: Task = entry(any_value)
@@ -249,18 +249,21 @@ class SynthesisCase:
         return synthesize(self.task, self.bounds, self.constraints, search=search, kinds=kinds, gears=gears)
 
     def worst_violation(self, solution: Solution) -> str:
-        """Return as text which constraint a linkage violates most and by how much; empty if none, or in closed form."""
+        """Return as text the constraint or bound that a linkage violates most and by how much; empty if it violates none.
+
+        The text is also empty for tasks that are solved in closed form.
+        """
         closed = isinstance(self.task, QuickReturn | QuickSwing)
         return "" if closed else worst_violation(solution, self.bounds, self.constraints)
 
     def forces(self, solutions: Sequence[Solution]) -> list[PinForces] | None:
-        """Return the pin forces of solutions from runs of the plant; None if no constraint involves pin forces."""
+        """Compute the pin forces of solutions by simulation; None if no constraint involves pin forces."""
         if not any(isinstance(c, FORCES) for c in self.constraints):
             return None
         return [pin_forces(s.linkage, self.make, s.rotation_range) for s in solutions]
 
     def trade(self, *, progress: bool = False) -> TradeOff | None:
-        """Compute the trade-off that the file describes; None if there is none. See `trade_off`."""
+        """Compute the trade-off that the case file describes; None if the file describes none. See `trade_off`."""
         wanted = self.trade_off
         if wanted is None:
             return None

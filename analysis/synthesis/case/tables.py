@@ -40,12 +40,12 @@ FloatArray = NDArray[np.float64]
 
 
 def read_plane_points(value: Any, name: str, bare: str | None = None) -> FloatArray:
-    """Read points, shape (n, 2) in m; ``bare`` is the unit of numbers without one, by default m."""
+    """Read points, shape (n, 2) in m; ``bare`` is the unit of numbers that have no unit, by default m."""
     return np.array(Many(Many(Quantity("m", bare=bare), length=2))(value, name)).reshape(-1, 2)
 
 
 def _unit(value: Any, name: str, kind: str, si: str, example: str) -> str:
-    """Check the unit of numbers that are written without one, and return it."""
+    """Check and return the unit that applies to numbers written without a unit."""
     try:
         quantity(f"1 {value}", si, name)
     except ParameterError:
@@ -58,7 +58,7 @@ _angle_unit = partial(_unit, kind="angle", si="rad", example="'deg'")
 
 
 def _end(value: Any, name: str) -> float | str:
-    """Read an end of the range of a formula's parameter; "360 deg" is an angle, "2*pi" a formula."""
+    """Read one end of the range of a formula's parameter: an angle such as "360 deg", or a formula such as "2*pi"."""
     angle = r"\s*[-+]?[\d.]+(?:[eE][-+]?\d+)?\s*[A-Za-z]+\s*"
     if isinstance(value, str) and not re.fullmatch(angle, value):
         return value
@@ -78,7 +78,7 @@ class Steps:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Window:
-    """A weight for a range of targets: from one crank rotation, or index of a point, to another."""
+    """A weight for a range of targets, between two crank rotations or, for an untimed task, between two indices of points."""
 
     begin: float = entry(Quantity("rad"), key="from")
     end: float = entry(Quantity("rad"), key="to")
@@ -125,9 +125,9 @@ def _rotation(value: Any, n: int) -> FloatArray | None:
 
 
 def _weights(value: Any, rotation: FloatArray | None, n: int = 0) -> FloatArray | None:
-    """Read the weights of n targets: a list, or windows of crank rotations; for an untimed task windows of point indices.
+    """Read the weights of targets, given as a list or as windows of crank rotations; see `Window`.
 
-    The ends of a window are included.
+    For an untimed task, with n targets, the windows are ranges of point indices. A window includes its ends.
     """
     if value is None:
         return None
@@ -151,7 +151,7 @@ def _weights(value: Any, rotation: FloatArray | None, n: int = 0) -> FloatArray 
 
 
 def _only_source(table: Any, sources: tuple[str, ...]) -> str:
-    """Return the name of the one entry among ``sources`` that gives the target; raise InputError unless there is just one."""
+    """Return the name of the entry among ``sources`` that gives the target; raise InputError unless there is exactly one."""
     there = [name for name in sources if getattr(table, name) is not None]
     if len(there) != 1:
         ways = " or ".join(f"task.{name}" for name in sources)
@@ -168,7 +168,7 @@ def _refuse_entries(table: Any, names: tuple[str, ...], source: str) -> None:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _ObjectiveAndRange:
-    """Entries of several tasks: the objective and, for a target given by a formula, number and range of parameter values."""
+    """Entries shared by several tasks: the objective; for a target given by a formula, number and range of its parameter."""
 
     objective: Objective = entry(Choice(get_args(Objective)), "error")
     n: int | None = entry(Whole(3), None)
@@ -221,7 +221,7 @@ class _Curve(_ObjectiveAndRange):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class TimedPathTable(_Curve):
-    """The table of a `TimedPath`."""
+    """The table ``[task]`` of a `TimedPath`."""
 
     rotation: Any = entry(_steps_or_list, None)
     weights: Any = entry(any_value, None)
@@ -235,7 +235,7 @@ class TimedPathTable(_Curve):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class UntimedPathTable(_Curve):
-    """The table of a `UntimedPath`."""
+    """The table ``[task]`` of an `UntimedPath`."""
 
     measure: Any = entry(Choice(("area", "distance")), "area")
     samples: int = entry(Whole(8), 72)
@@ -264,7 +264,7 @@ class UntimedPathTable(_Curve):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PrecisionPointsTable(_Curve):
-    """The table of a `PrecisionPoints`."""
+    """The table ``[task]`` of `PrecisionPoints`."""
 
     angle: Any = entry(any_value, None)
     angle_unit: str | None = entry(_angle_unit, None)
@@ -272,7 +272,7 @@ class PrecisionPointsTable(_Curve):
     length: float | None = entry(Quantity("m"), None)
 
     def _body(self, folder: Path) -> dict[str, Any]:
-        """Return the points and directions of a body, rotated and shifted together."""
+        """Return the arguments that `PrecisionPoints` and `Motion` share; the body's directions rotate with the points."""
         points, _ = self._target_points(folder)
         rotation = _rotation(self.rotation, len(points))
         angle = None
@@ -289,7 +289,7 @@ class PrecisionPointsTable(_Curve):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class MotionTable(PrecisionPointsTable):
-    """The table of a `Motion`."""
+    """The table ``[task]`` of a `Motion`."""
 
     weights: Any = entry(any_value, None)
 
@@ -302,7 +302,7 @@ class MotionTable(PrecisionPointsTable):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RockerFunctionTable(_ObjectiveAndRange):
-    """The table of a `RockerFunction`."""
+    """The table ``[task]`` of a `RockerFunction`."""
 
     angle: Any = entry(any_value, None)
     angle_unit: str | None = entry(_angle_unit, None)
@@ -337,7 +337,7 @@ class RockerFunctionTable(_ObjectiveAndRange):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SliderFunctionTable(_ObjectiveAndRange):
-    """The table of a `SliderFunction`."""
+    """The table ``[task]`` of a `SliderFunction`."""
 
     position: Any = entry(any_value)
     unit: str | None = entry(_length_unit, None)
@@ -360,7 +360,7 @@ class SliderFunctionTable(_ObjectiveAndRange):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class QuickReturnTable:
-    """The table of a `QuickReturn`, or of a `QuickSwing`."""
+    """The table ``[task]`` of a `QuickReturn` or a `QuickSwing`."""
 
     stroke: float | None = entry(Quantity("m", above=0.0), None)
     swing: float | None = entry(Quantity("rad"), None)

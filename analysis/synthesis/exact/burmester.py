@@ -1,15 +1,16 @@
 """Rigid-body guidance in closed form: find every four-bar that carries a body exactly through four or five poses.
 
-A dyad is a fixed pivot m and a point of the body whose distance from m is the same in all poses. Let the body's reference point
-be at p_j and the body be rotated by e_j = exp(i theta_j) from the first pose. The distance of its point z is constant if
+A dyad is a fixed pivot m and a point of the body whose distance from m is the same in all poses. In pose j let the body's
+reference point be at p_j and the body be rotated by e_j = exp(i theta_j) from the first pose. The body's point z has a constant
+distance from m if
 
     |p_j|^2 / 2 + Re(conj(p_j) e_j z) - Re(conj(p_j) m) - Re((e_j - 1) w) = 0,   w = conj(m) z,   j = 2 ... n,
 
 which is linear in (1, z, m, w). Five poses leave a plane of solutions, in which w = conj(m) z represents two conics. These meet
 in four points, so that there are four dyads, real or complex (L. Burmester, Lehrbuch der Kinematik, 1888; J. M. McCarthy and
-G. S. Soh, Geometric Design of Linkages, 2nd ed., 2011, chapter 5). Two real dyads make a four-bar: there are at most six, each
-driven from either side. All are checked for defects: if none is sound, this proves that no sound four-bar exists for the poses.
-Four poses leave a cubic curve of points z, each with its pivot m.
+G. S. Soh, Geometric Design of Linkages, 2nd ed., 2011, chapter 5). Two real dyads make a four-bar: there are at most six
+four-bars, and either dyad can be the crank. All are checked for defects: if none is sound, there is no sound four-bar
+for the poses. Four poses leave a cubic curve of points z, each with its pivot m.
 """
 
 from __future__ import annotations
@@ -33,11 +34,11 @@ ComplexArray = NDArray[np.complex128]
 Poses = PrecisionPoints | Motion
 #: Singular value, relative to the largest, below which the conditions of the poses are not independent.
 INDEPENDENT = 1e-10
-#: Imaginary part, in units of the poses' size, up to which a dyad is real.
+#: Largest imaginary part, in units of the poses' size, with which a dyad counts as real.
 REAL = 1e-7
 #: Number of lines through a pole that sample the curve of four poses: each meets the curve in two further points.
 CURVE_POINTS = 180
-#: Greatest length of links in the map of four poses, in sizes of the poses; the same as in a search without bounds.
+#: Greatest length of links in the map of four poses, in units of the poses' size; the same as in a search without bounds.
 LONGEST = 5.0
 
 
@@ -48,9 +49,9 @@ class Dyad:
     Attributes
     ----------
     pivot : complex
-        Its fixed end (m): a point of the centre-point curve.
+        The link's fixed end (m): a point of the centre-point curve.
     point : complex
-        Its other end with the body in the first pose (m): a point of the circle-point curve.
+        The link's other end with the body in the first pose (m): a point of the circle-point curve.
     """
 
     pivot: complex
@@ -94,10 +95,10 @@ class Guidance(Exact):
     complex_dyads : int
         Number of complex dyads, which cannot be built.
     nearest_complex : float
-        Least imaginary part of the complex dyads, as a fraction of the poses' size: if it is close to zero, a small change of
-        the poses makes a pair real. Infinite if all are real.
+        Least imaginary part of the complex dyads, as a fraction of the poses' size. If this number is close to zero, a small
+        change of the poses makes a pair of dyads real. Infinite if all dyads are real.
     solutions : tuple of Solution
-        Each pair of dyads, driven from either side; sound ones first, then by transmission angle.
+        Each pair of dyads, with either dyad as the crank; sound linkages first, then by transmission angle.
     """
 
     task: Poses
@@ -120,21 +121,21 @@ class Guidance(Exact):
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class GuidanceMap(NotebookResult):
-    """Four-bars that carry a body exactly through four poses: each consists of two dyads from a curve of dyads.
+    """Four-bars that carry a body exactly through four poses: each consists of two of n sampled dyads.
 
     Attributes
     ----------
     task : PrecisionPoints or Motion
     pivots, points : ndarray of complex, shape (n,)
-        Samples of the centre-point and the circle-point curve, one dyad per index (m). They lie on lines through a pole of two
-        poses: each line meets the circle-point curve in two further points.
+        Samples of the centre-point and the circle-point curve (m); each index is a dyad. The points lie on lines through a pole
+        of two poses: each line meets the circle-point curve in two further points.
     sound : ndarray of bool, shape (n, n)
-        Whether the linkage whose crank is the dyad of the row, and whose rocker that of the column, is free of defects.
+        Whether the linkage with the row's dyad as crank and the column's dyad as rocker is free of defects.
     transmission : ndarray, shape (n, n)
-        Least deviation of its transmission angle from 0 and pi between the first pose and the last (rad); 0 if the linkage
-        has a defect.
+        Least deviation of that linkage's transmission angle from 0 and pi between the first pose and the last (rad); 0 if the
+        linkage has a defect.
     solutions : tuple of Solution
-        The best linkages by this angle that differ clearly.
+        The linkages with the largest ``transmission`` that differ clearly from one another.
     """
 
     task: Poses
@@ -174,8 +175,8 @@ def guidance(task: Task, count: int = 6) -> Guidance | GuidanceMap:
     Raises
     ------
     InputError
-        If there are not four or five poses, crank rotations are given, or the poses are degenerate: two are the same, or the
-        body does not rotate.
+        If there are not four or five poses, crank rotations are given, or the poses are degenerate: two poses are the same, or
+        the body does not rotate.
 
     Examples
     --------
@@ -212,20 +213,20 @@ def dyads_of_five(p: ComplexArray, angle: FloatArray) -> tuple[ComplexArray, Com
     Parameters
     ----------
     p : ndarray of complex, shape (5,)
-        Positions of the body's reference point relative to the first one, in units of the poses' size.
+        Positions of the body's reference point relative to the first position, in units of the poses' size.
     angle : ndarray, shape (5,)
-        rad.
+        Angles of the body (rad).
 
     Returns
     -------
     z, m : ndarray of complex, shape (4, 2)
-        Cartesian coordinates of point and pivot relative to the first position, in the same units; real for a dyad that can be
-        built.
+        Cartesian coordinates (x, y) of point and pivot of each dyad relative to the first position, in the same units; real
+        for a dyad that can be built.
 
     Raises
     ------
     InputError
-        If the conditions are not independent.
+        If the conditions of the poses are not independent.
     """
     rows = _conditions(p, angle)
     plane = _null_space(rows, 3)
@@ -259,9 +260,9 @@ _FORMS = _forms()
 
 
 def _null_space(rows: FloatArray, size: int) -> FloatArray:
-    """Return a basis of the null space of the rows, in ``size`` columns.
+    """Return a basis of the null space of the matrix ``rows``, in ``size`` columns.
 
-    Raises InputError if the rows are dependent, so that the null space is larger.
+    Raises InputError if the rows are linearly dependent, so that the null space has more dimensions.
     """
     _, values, right = np.linalg.svd(rows)
     if values[-1] < INDEPENDENT * values[0]:
@@ -273,7 +274,7 @@ def _null_space(rows: FloatArray, size: int) -> FloatArray:
 
 
 def _intersect_conics(first: FloatArray, second: FloatArray) -> ComplexArray:
-    """Intersect two conics by the resultant of their quadratics in x; return points (x, y, 1) in rows, shape (4, 3)."""
+    """Intersect two conics by the resultant of their quadratics in x; return the points (x, y, 1) as rows, shape (4, 3)."""
 
     def quadratics(y: complex) -> list[tuple[complex, complex, complex]]:
         return [
@@ -342,7 +343,7 @@ def _guide_five_poses(task: Poses, p: ComplexArray, angle: FloatArray) -> Guidan
 
 
 def build_four_bar(task: Poses, crank: Dyad, rocker: Dyad) -> Solution:
-    """Build the four-bar from two dyads, and check it for defects from the first pose to the last."""
+    """Build the four-bar from two dyads, and check the linkage for defects from the first pose to the last."""
     points, angle = np.asarray(task.points) @ np.array([1.0, 1j]), np.asarray(task.angle)
     turned = np.exp(1j * (angle - angle[0]))
     b, c = (points + turned * (dyad.point - points[0]) for dyad in (crank, rocker))
@@ -369,8 +370,9 @@ def build_four_bar(task: Poses, crank: Dyad, rocker: Dyad) -> Solution:
 def exact_solution(task: Task, linkage: Linkage, rotation: FloatArray, sides: FloatArray) -> Solution:
     """Return the solution of a linkage that meets all targets of a task exactly, with its defects.
 
-    ``sides`` has the assembly at each target, +1 with C to the left of B -> D. If the targets need both assemblies there is a
-    branch defect, and also a circuit defect if, by Grashof's criterion, the linkage cannot pass from one to the other.
+    ``sides`` has the assembly at each target: +1 with C to the left of B -> D, -1 to the right. If the targets need both
+    assemblies, there is a branch defect. There is also a circuit defect if, by Grashof's criterion, the linkage cannot pass
+    from one assembly to the other.
     """
     verdicts = judge(linkage, rotation, closed=False)
     if (sides != sides[0]).any():
@@ -380,7 +382,7 @@ def exact_solution(task: Task, linkage: Linkage, rotation: FloatArray, sides: Fl
 
 
 def unwrap_in_order(turned: FloatArray) -> FloatArray:
-    """Convert angles that are known up to whole turns to rotations from the first angle, monotonic if possible (rad)."""
+    """Convert angles known up to whole turns to rotations from the first angle (rad), monotonic if possible."""
     forward = turned % (2.0 * pi)
     # the first is 0, even if rounding made it a whole turn
     forward[0] = 0.0
@@ -391,7 +393,7 @@ def unwrap_in_order(turned: FloatArray) -> FloatArray:
 
 
 def dyads_of_four(p: ComplexArray, angle: FloatArray) -> tuple[ComplexArray, ComplexArray]:
-    """Compute points of the circle-point curve of four poses, relative to the first position, and their pivots.
+    """Compute points of the circle-point curve of four poses and their pivots, relative to the first position.
 
     For a point z, each pose after the first gives a line on which the pivot m lies. The condition that the three lines meet is
     a cubic in z, which is zero at the pole of two poses: a line through the pole meets the cubic in two further points. Points
@@ -461,10 +463,10 @@ def _guide_four_poses(task: Poses, p: ComplexArray, angle: FloatArray, count: in
 def _check_pairs(
     p: ComplexArray, e: ComplexArray, z: ComplexArray, m: ComplexArray
 ) -> tuple[NDArray[np.bool_], FloatArray]:
-    """Check every pair of a crank (row) and a rocker (column) for defects.
+    """Check the linkage of every pair of dyads, crank (row) and rocker (column), for defects.
 
-    ``p`` and ``e`` are the poses, ``z`` and ``m`` points and pivots of the dyads; the result is ``sound`` and ``transmission``
-    of `GuidanceMap`.
+    ``p`` and ``e`` are positions and rotations of the poses, ``z`` and ``m`` points and pivots of the dyads; the result is
+    ``sound`` and ``transmission`` of `GuidanceMap`.
     """
     places = p[:, None] + e[:, None] * z
     arms = places - m

@@ -5,10 +5,11 @@ linkages, Trans. ASME 77, 1955), with th2 = phi + th20 and th4 = psi - the outpu
 
     R1 cos th4 - R2 cos th2 + R3 = cos(th2 - th4),   R1 = l1/l2,  R2 = l1/l4,  R3 = (l1^2 + l2^2 - l3^2 + l4^2)/(2 l2 l4).
 
-Three points determine R1, R2, R3 if crank phase and mounting angle are known. With a fourth point one of the two is unknown:
-the determinant of the four equations is a trigonometric polynomial of second degree in it. With a fifth point both are
-unknown: relative to the crank the rocker is a body in five poses, and C has a constant distance from B, which is the problem
-of `burmester`. In one of its four dyads C is always at D and B at A, so that there are at most three linkages.
+Three points determine R1, R2, R3 if crank phase and mounting angle are known. With a fourth point one of the two may be
+unknown: the determinant of the four equations is a trigonometric polynomial of second degree in that angle. With a fifth point
+both may be unknown: relative to the crank the rocker is a body in five poses, and C has a constant distance from B, which is
+the problem of `burmester`. One of its four dyads is always the ground link, C at D and B at A, so that there are at most three
+linkages.
 """
 
 from __future__ import annotations
@@ -46,7 +47,7 @@ class Generators(Exact):
     ----------
     task : RockerFunction
     solutions : tuple of Solution
-        Sound ones first, then by transmission angle.
+        Sound linkages first, then by transmission angle.
     """
 
     task: RockerFunction
@@ -78,12 +79,12 @@ def function_generators(
     Parameters
     ----------
     task : RockerFunction
-        A function with as many points as unknowns: three ratios of lengths, the crank's phase unless it is given, and the
-        mounting angle if it is free (``mounting``).
+        A function with as many points as unknowns. The unknowns are three ratios of lengths, the crank's phase unless it is
+        given, and the mounting angle if it is free (``mounting``).
     crank_phase : float, optional
-        th20 (rad), if it is known.
+        th20 (rad); unknown by default.
     ground_length : float
-        Length of the ground link (m); the size does not affect the function.
+        Length of the ground link (m), which scales the linkage and does not affect the function.
 
     Raises
     ------
@@ -116,7 +117,7 @@ def function_generators(
 
 
 def _count_message(n: int, free: int, mounting: bool, crank_phase: object) -> str:
-    """Return the error message for a number n of points that differs from the number of unknowns; ``free`` is that number."""
+    """Return the error message for n points and ``free`` unknowns, if the two numbers differ."""
     unknown = ["three ratios of lengths"]
     unknown += ["the crank's phase"] if crank_phase is None else []
     unknown += ["the output's mounting"] if mounting else []
@@ -125,15 +126,15 @@ def _count_message(n: int, free: int, mounting: bool, crank_phase: object) -> st
 
 
 def _rows(th2: FloatArray, th4: FloatArray) -> FloatArray:
-    """Return the coefficients (R1, R2, R3, 1) of Freudenstein's equation at each point, shape (n, 4)."""
+    """Return the coefficients of (R1, R2, R3, 1) in Freudenstein's equation at each point, shape (n, 4)."""
     return np.column_stack([np.cos(th4), -np.cos(th2), np.ones(len(th2)), -np.cos(th2 - th4)])
 
 
 def _roots(rows: Callable[[float], FloatArray]) -> list[float]:
     """Return the angles in (-pi/2, pi/2] at which the determinant of four equations is zero.
 
-    The determinant is a trigonometric polynomial of first degree in twice the angle: an angle half a turn greater means the
-    same link with a negative length.
+    ``rows`` returns the matrix (4, 4) for an angle. The determinant is a trigonometric polynomial of first degree in twice the
+    angle: an angle half a turn greater means the same link with a negative length.
     """
     samples = [rows(0.5 * at) for at in turn(3)]
     scale = np.linalg.svd(np.array(samples), compute_uv=False)
@@ -148,7 +149,7 @@ def _roots(rows: Callable[[float], FloatArray]) -> list[float]:
 def _links(th2: FloatArray, th4: FloatArray, crank_phase: float, mounting: float) -> Links | None:
     """Compute the links, in units of the ground link, from points with common R1, R2, R3; None if no real links exist.
 
-    For a negative length, the link points in the opposite direction: its angle is changed by pi.
+    A link of negative length points in the opposite direction: its length becomes positive, and its angle changes by pi.
 
     Raises InputError if the points leave infinitely many linkages.
     """
@@ -173,10 +174,10 @@ def _links(th2: FloatArray, th4: FloatArray, crank_phase: float, mounting: float
 
 
 def _five_point_links(phi: FloatArray, psi: FloatArray) -> list[Links | None]:
-    """Compute the links of the four-bars, three at most, through five precision points.
+    """Compute the links of the four-bars, three at most, that generate a function at five precision points.
 
-    Relative to the crank the rocker takes five poses. Each real dyad that guides it through them, except the ground link, is a
-    coupler, with its pivot at B and its point at C.
+    Relative to the crank the rocker takes five poses. Each real dyad that guides the rocker through these poses, except the
+    ground link, is a coupler, with its pivot at B and its point at C.
     """
     places = np.exp(-1j * phi)
     try:
@@ -202,7 +203,7 @@ def _make_generator(
     crank_phase: float,
     mounting: float,
 ) -> Solution:
-    """Build the four-bar with these links, in units of the ground link (m), and check it between first and last point."""
+    """Build the four-bar with these links, in units of the ground link ``ground`` (m), and check it between the end points."""
     th2 = np.asarray(task.rotation) + crank_phase
     th4 = np.asarray(task.angle) - mounting
     b, c = crank * np.exp(1j * th2), 1.0 + rocker * np.exp(1j * th4)
@@ -231,21 +232,21 @@ def cognates(linkage: Linkage, rotation: ArrayLike = 0.0) -> tuple[Linkage, Link
     linkage : Linkage
         A four-bar with a fixed rocker pivot whose coupler point is neither B nor C.
     rotation : float
-        Crank rotation of the original (rad) at which the rotation of the second and third cognate is 0; the first cognate
-        has the rotation of the original.
+        Crank rotation of the original (rad) at which the crank rotation of the second and third cognate is 0. The first cognate
+        has the same crank rotation as the original.
 
     Returns
     -------
     tuple of Linkage
-        Three cognates, where G is the third fixed pivot: the one with the pivots G and D, driven at G; the one with the pivots
-        A and G, driven at A; and the latter driven at G.
+        Three four-bars with the same coupler curve; G is the third fixed pivot. The first has the pivots G and D and its crank
+        at G. The second has the pivots A and G and its crank at A. The third is the second with its crank at G.
 
     Raises
     ------
     ParameterError
-        If the rocker pivot moves, or the coupler point's curve is a circle.
+        If the linkage is not a four-bar with a fixed rocker pivot, or the coupler point is B or C.
     AssemblyError
-        If the links cannot be joined at that rotation.
+        If the links cannot be joined at ``rotation``.
 
     Examples
     --------
@@ -272,20 +273,20 @@ def cognates(linkage: Linkage, rotation: ArrayLike = 0.0) -> tuple[Linkage, Link
 
 
 def alternatives(solution: Solution) -> tuple[Solution, ...]:
-    """Return the cognates of a solution as solutions of its task: the same curve from other pivots.
+    """Return the cognates of a solution as solutions of its task: the same coupler curve with other pivots.
 
-    For a task with crank rotations only the cognate whose crank turns with that of the original is returned; for a closed path
-    only those whose cranks can turn fully.
+    If the task gives crank rotations, only the cognate whose crank turns as that of the original is returned; for a closed path
+    only the cognates whose cranks can turn fully.
 
     Returns
     -------
     tuple of Solution
-        Sound ones first.
+        Sound linkages first.
 
     Raises
     ------
     InputError
-        If the task is not a path: the couplers of cognates have other angles.
+        If the task is not a path: the coupler of a cognate has other angles than that of the original.
     ParameterError
         As `cognates`.
     AssemblyError
@@ -312,7 +313,7 @@ def alternatives(solution: Solution) -> tuple[Solution, ...]:
 
 
 def _cognate_sides(linkage: Linkage, rotation: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return the assemblies of the cognates with the pivots A and G, driven at A and driven at G, at the crank rotations.
+    """Return the assemblies of the second and the third cognate (see `cognates`) at crank rotations of the original.
 
     An assembly is +1 with C to the left of B -> D, -1 to the right.
     """
@@ -345,12 +346,12 @@ def _is_off_pins(linkage: Linkage) -> bool:
 
 
 def _coupler_ratio(linkage: Linkage) -> complex:
-    """Return (P - B)/(C - B)."""
+    """Return (P - B)/(C - B), the complex ratio of coupler point and coupler."""
     return linkage.point_distance / linkage.coupler_length * complex(np.exp(1j * linkage.point_angle))
 
 
 def _checked_coupler_ratio(linkage: Linkage) -> complex:
-    """Return (P - B)/(C - B); raises ParameterError as `cognates`."""
+    """Return `_coupler_ratio` of a linkage that has cognates; raise ParameterError as `cognates` for any other."""
     if linkage.kind != "four-bar" or linkage.pivot is not None:
         raise ParameterError("pivot", linkage.pivot, "be fixed: only a four-bar has cognates")
     if not _is_off_pins(linkage):
@@ -363,7 +364,7 @@ def _checked_coupler_ratio(linkage: Linkage) -> complex:
 
 
 def _pinned_four_bar(a: complex, b: complex, c: complex, d: complex, p: complex) -> Linkage:
-    """Build the four-bar whose pins and coupler point have these positions at a crank rotation of 0."""
+    """Build the four-bar whose pins A to D and coupler point P have these positions at a crank rotation of 0."""
     ground, arm, coupler, to_point = d - a, b - a, c - b, p - b
     return Linkage(
         pivot_x=a.real,

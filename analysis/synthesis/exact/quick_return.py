@@ -1,14 +1,14 @@
 """Find the best slider-crank for a stroke, or crank-rocker for a swing, with a given time ratio, in closed form.
 
-In the dead centres C has the distances l3 + l2 and l3 - l2 from A, in two directions with the angle
-advance = pi (Q - 1)/(Q + 1) between them. The laws of cosines and sines give
+In the dead centres C is at the distances l3 + l2 and l3 - l2 from A. The angle between the two directions of A -> C is
+advance = pi (Q - 1)/(Q + 1). The laws of cosines and sines give
 
     l2^2 (1 + cos advance) = H^2/2 - l3^2 (1 - cos advance),    l1 H = (l3^2 - l2^2) sin advance
 
-with the stroke H, the time ratio Q and the offset l1. One unknown remains, l3; it minimises (l1 + l2)/l3, the cosine of the
-least transmission angle. For a crank-rocker the same holds for the two positions of C, whose distance is the chord
-H = 2 l4 sin(swing/2) of its swing about D. D lies on A's side of that chord if a crank that turns counter-clockwise is slow
-while the rocker turns counter-clockwise. See R. L. Norton, Design of Machinery, 6th ed., 2020, chapters 3 and 4.
+with the stroke H, the time ratio Q and the offset l1. One unknown remains, l3: it is chosen so that (l1 + l2)/l3, the cosine
+of the least transmission angle, is least. For a crank-rocker the same equations hold, with the chord H = 2 l4 sin(swing/2)
+between the two extreme positions of C. D lies on A's side of that chord if, with a counter-clockwise crank, the slow
+swing of the rocker is counter-clockwise, too. See R. L. Norton, Design of Machinery, 6th ed., 2020, chapters 3 and 4.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ from ..task.limits import GROUND, LARGEST
 from ..task.task import RockerFunction, SliderFunction
 
 FloatArray = NDArray[np.float64]
-#: Number of couplers that are tried before the best one is found exactly.
+#: Number of coupler lengths that are tried before the best one is found exactly.
 COUPLERS = 2001
 #: Dimensions of a slider-crank that may have bounds.
 BOUNDED = ("ground_length", "crank_length", "coupler_length")
@@ -50,9 +50,9 @@ class QuickReturn(SliderFunction):
     stroke : float
         Distance between the ends of the slider's travel (m).
     time_ratio : float
-        Duration of the slow stroke divided by that of the quick one, at constant crank speed: at least 1.
+        Duration of the slow stroke divided by the duration of the quick stroke, at constant crank speed: at least 1.
     position, rotation : ndarray, shape (3,)
-        Computed from stroke and time ratio: the positions 0, stroke and 0, and the crank rotations there.
+        Computed from stroke and time ratio: slider positions 0, stroke and 0 (m), and the crank rotations there (rad).
     """
 
     stroke: Amount
@@ -78,18 +78,18 @@ class QuickReturn(SliderFunction):
 @in_si(swing="rad")
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class QuickSwing(RockerFunction):
-    """Task: the rocker of a crank-rocker turns by an angle in the slow part of a turn, and back in the quick part.
+    """Task: the rocker of a crank-rocker swings by an angle in the slow part of a turn, and back in the quick part.
 
     Attributes
     ----------
     swing : float
-        Swing of the rocker, counter-clockwise while the crank turns counter-clockwise (rad), less than half a turn. If it is
-        negative, both turn clockwise, which is the same linkage seen from behind.
+        Swing of the rocker in the slow part (rad), less than half a turn: counter-clockwise, with a counter-clockwise crank.
+        If the swing is negative, rocker and crank turn clockwise, which is the same linkage seen from behind.
     time_ratio : float
         See `QuickReturn`.
     angle, rotation : ndarray, shape (3,)
-        Computed from swing and time ratio: the angles 0, swing and 0, relative to a free mounting angle, and the crank
-        rotations there.
+        Computed from swing and time ratio: rocker angles 0, swing and 0 (rad), relative to a free mounting angle, and the crank
+        rotations there (rad).
     """
 
     swing: Amount
@@ -121,10 +121,10 @@ def _advance(time_ratio: float) -> float:
 def quick_returns(
     task: QuickReturn | QuickSwing, bounds: Mapping[str, tuple[float, float]] | None, constraints: Sequence[Any]
 ) -> tuple[Solution, ...]:
-    """Find the linkage with the greatest least transmission angle, and return it in either assembly.
+    """Find the linkage whose least transmission angle is greatest; return it in each allowed assembly.
 
     Raises InputError or ParameterError if a bound or a constraint is not supported here; InfeasibleError if there is no
-    linkage, or none with the transmission angle that is asked for: the message names the greatest one.
+    linkage, or no linkage has the required transmission angle: the message names the greatest possible angle.
     """
     for c in constraints:
         if not isinstance(c, LeastTransmission | FullTurn | LargestLink | Assembly):
@@ -175,7 +175,7 @@ def _best_coupler(cosine: Callable[[float], float], ends: tuple[float, float]) -
 
 
 class _SwingShapes:
-    """Crank-rockers with a given swing and time ratio; ``l3`` is the ratio of coupler to rocker, bounds determine the size."""
+    """Crank-rockers with a given swing and time ratio. ``l3`` is the ratio of coupler to rocker; bounds determine the size."""
 
     def __init__(self, task: QuickSwing, bounds: Any, constraints: Sequence[Any]) -> None:
         self.task, self.advance = task, _advance(task.time_ratio)
@@ -191,7 +191,7 @@ class _SwingShapes:
         self.chord = chord
 
     def links(self, l3: float) -> tuple[float, float, float, float] | None:
-        """Return l1 ... l4 (m) for a ratio l3; None if the dead centres need both assemblies, or a bound is violated."""
+        """Return l1 ... l4 (m) for a ratio l3; None if the dead centres need different assemblies, or a bound is violated."""
         e, l2 = _lengths(l3, self.advance, self.chord)
         far = sqrt(max((l3 + l2) ** 2 - e * e, 0.0))
         x, y = far - 0.5 * self.chord, sqrt(max(1.0 - 0.25 * self.chord**2, 0.0)) - e
@@ -210,7 +210,7 @@ class _SwingShapes:
         return made if kept else None  # type: ignore[return-value]
 
     def cosine(self, l3: float) -> float:
-        """Return the cosine of the least transmission angle over a turn; 1 without a linkage, or if a bound is violated."""
+        """Return the cosine of the least transmission angle over a turn; 1 if no linkage exists or a bound is violated."""
         links = self.links(l3)
         if links is None:
             return 1.0
@@ -219,7 +219,7 @@ class _SwingShapes:
         return min(1.0, max(both))
 
     def linkage(self, l3: float, branch: int) -> Linkage:
-        """Build the crank-rocker for a ratio l3; its rotation is 0 in the dead centre at which the slow part begins."""
+        """Build the crank-rocker for a ratio l3; the crank rotation is 0 in the dead centre at which the slow part begins."""
         links = self.links(l3)
         assert links is not None
         l1, l2, l3, l4 = links
@@ -261,13 +261,13 @@ def _dimension_ranges(task: QuickReturn, bounds: Any, constraints: Sequence[Any]
 
 
 def _lengths(l3: float, turned: float, h: float) -> tuple[float, float]:
-    """Return offset and crank length for a coupler l3, a crank advance ``turned`` (rad) and a stroke h (m)."""
+    """Return offset and crank length (m) for a coupler length l3, a crank advance ``turned`` (rad) and a stroke or chord h."""
     l2 = sqrt(max(0.5 * h * h - l3 * l3 * (1.0 - cos(turned)), 0.0) / (1.0 + cos(turned)))
     return max(l3 * l3 - l2 * l2, 0.0) * sin(turned) / h, l2
 
 
 def _transmission_cosine(l3: float, task: QuickReturn, ends: Mapping[str, tuple[float, float]]) -> float:
-    """Return the cosine of the least transmission angle over a turn; 1 without a linkage, or if a bound is violated."""
+    """Return the cosine of the least transmission angle over a turn; 1 if no linkage exists or a bound is violated."""
     l1, l2 = _lengths(l3, task.advance, float(task.stroke))
     for name, value in (("ground_length", l1), ("crank_length", l2)):
         low, high = ends[name]
@@ -277,7 +277,7 @@ def _transmission_cosine(l3: float, task: QuickReturn, ends: Mapping[str, tuple[
 
 
 def _make_slider_crank(task: QuickReturn, l3: float, branch: int) -> SliderCrank:
-    """Build the slider-crank with its guide below the shaft: with a counter-clockwise crank the stroke to the right is slow."""
+    """Build the slider-crank, its guide below the shaft: with a counter-clockwise crank the stroke to the right is slow."""
     l1, l2 = _lengths(l3, task.advance, float(task.stroke))
     far, near = (sqrt(max((l3 + side * l2) ** 2 - l1 * l1, 0.0)) for side in (1.0, -1.0))
     # crank angle with the slider at 0: crank and coupler folded, or stretched on the other side of the shaft

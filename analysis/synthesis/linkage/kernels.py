@@ -1,14 +1,14 @@
 """Compute coupler curves and their exact derivatives for many crank angles or many linkages: compiled kernels.
 
-The loop is closed by `kinematics.close_loop`, the plant's own function; the derivatives are those of loop closure, projected on
-the rocker and on the coupler as in `kinematics.coefficients`, with respect to every dimension. The loops run over arrays
-without branches, so that the compiler can vectorise over crank angles; if the links cannot be joined the square root is NaN,
-which the callers check.
+The loop of links is closed by `kinematics.close_loop` of the five-bar model. The derivatives with respect to every dimension
+follow from loop closure, projected on the rocker and on the coupler as in `kinematics.coefficients`. The kernels loop over
+arrays without conditional branches, so that the compiler can vectorise over crank angles. If the links cannot be joined, a
+square root is NaN, which the callers check.
 
-A linkage is the vector ``q`` of `PLACES`: the thesis's ten parameters in its order. The arguments ``c, s`` are cosines and
-sines of the crank's rotations, which a timed task computes only once. The rocker pivot D may be displaced by (dx, dy) in the
-frame of the ground link, by a slider or a second crank. A rocker of length zero means a slider-crank: C runs on a guide at the
-end of the ground link, at right angles to it, and the rocker pivot lies at infinity.
+A linkage is the vector ``q`` of `PLACES`: the ten parameters in the thesis's order. The arguments ``c, s`` are cosines and
+sines of the crank's rotations, which a timed task computes only once. A slider or a second crank may displace the rocker pivot
+D by (dx, dy), in the frame of the ground link. A rocker of length zero means a slider-crank: C runs on a guide through the end
+of the ground link, perpendicular to this link, and the rocker pivot lies at infinity.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ from ...numerics.codegen import CUBE, MATRIX, VECTOR, inner, kernel
 def close_slider_crank(c2, s2, dx, dy, l3, l4, branch):
     """Close the loop of a slider-crank and return its `kinematics.Position`.
 
-    C is on a guide at right angles to the ground link, at the distance dx from B. The arguments are those of `close_loop`, and
+    C is on a guide perpendicular to the ground link, at the distance dx from B. The arguments are those of `close_loop`, and
     may be CasADi symbols. For branch +1, C lies to the left of the perpendicular from B to the guide.
     """
     c3 = dx / l3
@@ -34,7 +34,7 @@ def close_slider_crank(c2, s2, dx, dy, l3, l4, branch):
     return kinematics.Position(c2, s2, c3, s3, -1.0, 0.0, -c3, s3)
 
 
-#: The plant's own loop closure, and that of a slider-crank, for use in the kernels.
+#: Loop closure of the five-bar model and of a slider-crank, for use in the kernels.
 close_loop, _close_slider_crank = inner(kinematics.close_loop), inner(close_slider_crank)
 
 
@@ -59,7 +59,7 @@ PLACES = (
     "crank_phase",
     "point_angle",
 )
-#: Order of derivatives: those with respect to q, then those with respect to the displacement of D.
+#: Order of derivatives: first with respect to q, then with respect to the displacement of D.
 COLUMNS = (*PLACES, "dx", "dy")
 
 
@@ -156,8 +156,8 @@ def link_directions(c, s, dx, dy, q, branch, out):
 def link_jacobian(c, s, dx, dy, q, branch, out, jac):
     """Compute the angles of coupler and rocker, out = th3, th4 in (-pi, pi], shape (2, n), and their derivatives.
 
-    jac[k, 0] = dth3/d(k), jac[k, 1] = dth4/d(k) for k in `COLUMNS`, shape (12, 2, n): loop closure differentiated, projected on
-    the rocker for the coupler and on the coupler for the rocker.
+    jac[k, 0] = dth3/d(k), jac[k, 1] = dth4/d(k) for k in `COLUMNS`, shape (12, 2, n). They follow from the derivative of loop
+    closure, projected on the rocker to find dth3 and on the coupler to find dth4.
     """
     l1, l2, l3, l4 = q[2], q[3], q[4], q[5]
     ct, st = cos(q[8]), sin(q[8])
@@ -193,9 +193,9 @@ def link_jacobian(c, s, dx, dy, q, branch, out, jac):
 def many_directions(c, s, cg, sg, shapes, branch, coupler, rocker):
     """Compute the directions of coupler and rocker of many linkages at the same crank rotations.
 
-    ``shapes`` has the rows (l1, l2, l3, l4, crank phase, l5, second crank's phase), shape (m, 7), with l5 = 0 without a second
-    crank; ``c, s`` are cosines and sines of the crank's rotations, ``cg, sg`` of the second crank's. The results ``coupler``
-    and ``rocker`` are complex, shape (m, n), NaN where the links cannot be joined.
+    ``shapes`` has the rows (l1, l2, l3, l4, crank phase, l5, second crank's phase), shape (m, 7); l5 = 0 means no second crank.
+    ``c, s`` are cosines and sines of the crank's rotations, ``cg, sg`` cosines and sines of the second crank's rotations. The
+    results ``coupler`` and ``rocker`` are complex, shape (m, n), NaN where the links cannot be joined.
     """
     for i in range(shapes.shape[0]):
         l1, l2, l3, l4, l5 = shapes[i, 0], shapes[i, 1], shapes[i, 2], shapes[i, 3], shapes[i, 5]
@@ -215,10 +215,10 @@ def many_directions(c, s, cg, sg, shapes, branch, coupler, rocker):
 def match_windows(curves, target, starts, spans, best):
     """Find the piece of each curve that fits an open target best, up to position, rotation and scale.
 
-    Each curve is given at equal steps of the crank over a turn, shape (m, n); a piece begins at one of ``starts`` and has one
-    of ``spans`` steps. At equal steps of arc length it is compared with the points of ``target``, shape (k,), whose mean is 0,
-    forwards and backwards. ``best`` receives, for each curve, the misfit relative to the target's sum of squares, the start,
-    the span, and the direction (1 or -1), shape (m, 4). Pieces with a point that is not finite are skipped.
+    Each curve is given at equal steps of the crank over a turn, shape (m, n). A piece begins at one of ``starts`` and is one of
+    ``spans`` steps long. Points of the piece at equal steps of arc length are compared with the points of ``target``, shape
+    (k,), whose mean is 0, in either direction. ``best`` receives, for each curve, the misfit relative to the target's sum of
+    squares, the start, the span, and the direction (1 or -1), shape (m, 4). Pieces with a point that is not finite are skipped.
     """
     m, n = curves.shape
     k = target.shape[0]

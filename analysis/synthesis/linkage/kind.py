@@ -2,5 +2,5 @@
 
 from typing import Literal
 
-#: A kind of linkage need not be one of the mechanisms that can be run.
+#: The kinds of linkages; a kind need not be one of the mechanisms that can be simulated.
 Kind = Literal["four-bar", "slider-crank", "geared-five-bar"]

@@ -1,15 +1,15 @@
 """Define planar linkages: the four-bar of the thesis's chapter VI, the slider-crank, and the five-bar with two cranks.
 
-Each is a class with the methods that search, report and drawing use.
+Each linkage is a class; the search, the report and the drawing use its methods.
 
 The coupler point is, with the thesis's symbols (appendix 5),
 
     x = X0 + l2 cos(th2 + a1) + r cos(th3 + a1 + a2),   y alike with sines,   th2 = phi + th20,
 
 where phi is the crank's rotation from the start of the motion. Equation (6.17) as printed drops a1 in the second term.
-Angles th2, th3, th4 are those of the plant, from the ground link; a1 turns the whole linkage. Loop closure and derivatives are
-evaluated by `kernels`. A slider-crank is the four-bar whose rocker pivot lies at infinity: its ground link is the
-perpendicular from the crank shaft to the guide of C, l1 the offset, and it has no rocker.
+Angles th2, th3, th4 are measured from the ground link, as in the five-bar model; a1 rotates the whole linkage. `kernels`
+evaluates loop closure and derivatives. A slider-crank is a four-bar whose rocker pivot lies at infinity: it has no rocker, its
+ground link is the perpendicular from the crank shaft to the guide of C, and l1 is the offset.
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ LENGTHS = ("pivot_x", "pivot_y", *LINKS, "point_distance")
 ANGLES = ("ground_angle", "crank_phase", "point_angle", "output_angle")
 #: SI unit of each dimension.
 UNITS: Mapping[str, str] = MappingProxyType(dict.fromkeys(LENGTHS, "m") | dict.fromkeys(ANGLES, "rad"))
-#: Grashof type of a four-bar, one link of which can turn fully, if the shortest link is the first, second, ... of `LINKS`.
+#: Grashof type of a four-bar with a link that can turn fully, if the shortest link is the first, second, ... of `LINKS`.
 BY_SHORTEST = ("drag-link", "crank-rocker", "double-rocker", "rocker-crank")
 #: Number of crank rotations at which a full turn is evaluated.
 TURN = 360
@@ -136,7 +136,7 @@ class Linkage:
     branch : int
         Assembly: +1 with C to the left of B -> D, -1 to the right.
     pivot : SliderMotion, optional
-        Motion of the rocker pivot; without it the pivot is fixed.
+        Motion of the rocker pivot; None for a fixed pivot.
 
     Raises
     ------
@@ -151,7 +151,7 @@ class Linkage:
     pivots: ClassVar[tuple[type, ...]] = (SliderMotion, type(None))
     #: Words for reports: the driven link, its motions, and the meaning of its mechanical advantage.
     driven: ClassVar[tuple[str, str, str]] = ("rocker", "swings", "torque of the rocker for one of the crank")
-    #: Bars of a drawing as (layer, letters of the two pins); pins that are labelled with their letters.
+    #: Bars of a drawing as (layer, letters of the two pins); letters of the pins that are labelled.
     bars: ClassVar[tuple[tuple[str, str], ...]] = (("ground", "AE"), ("crank", "AB"), ("rocker", "DC"))
     letters: ClassVar[str] = "ABCD"
 
@@ -194,7 +194,7 @@ class Linkage:
 
     @property
     def turns(self) -> int:
-        """Return the number of turns of the crank per turn of the input shaft: more than 1 for gear ratios such as 1/2."""
+        """Return the number of turns of the crank per turn of the input shaft: more than 1 with gear ratios such as 1/2."""
         return 1
 
     def crank_angle(self, rotation: ArrayLike) -> FloatArray:
@@ -204,7 +204,7 @@ class Linkage:
 
     @classmethod
     def from_vector(cls, q: ArrayLike, branch: int = 1, **more: Any) -> Linkage:
-        """Build a linkage from its parameters in the order of `kernels.PLACES`; an eleventh one is the output angle.
+        """Build a linkage from its parameters in the order of `kernels.PLACES`; an eleventh value is the output angle.
 
         ``more`` are further fields, such as the pivot.
         """
@@ -244,7 +244,7 @@ class Linkage:
     def path(self, rotation: ArrayLike, displacement: tuple[ArrayLike, ArrayLike] | None = None) -> FloatArray:
         """Return the coupler point at crank rotations, shape (n, 2) in m; NaN if the links cannot be joined.
 
-        A given ``displacement`` of the rocker pivot (m) replaces that of the pivot's own motion, as in `directions`.
+        A given ``displacement`` of the rocker pivot (m) replaces the pivot's own motion, as in `directions`.
         """
         out = np.empty((2, np.size(rotation)))
         coupler_path(*self._arguments(rotation, displacement), out)
@@ -265,7 +265,7 @@ class Linkage:
         return out, jacobian
 
     def directions(self, rotation: ArrayLike, displacement: tuple[ArrayLike, ArrayLike] | None = None) -> FloatArray:
-        """Return cosine and sine of th3, th4 and th4 - th3, shape (6, n), in the frame of the ground link."""
+        """Return cosine and sine of th3, of th4 and of th4 - th3, shape (6, n); angles from the ground link."""
         out = np.empty((6, np.size(rotation)))
         link_directions(*self._arguments(rotation, displacement), out)
         return out
@@ -285,7 +285,7 @@ class Linkage:
     def slider(self, rotation: ArrayLike) -> tuple[FloatArray, float] | None:
         """Return the position of the slider on its guide from E (m), and the guide's direction from the ground link (rad).
 
-        None for a linkage without a slider.
+        The result is None for a linkage without a slider.
         """
         return (self.pivot.series(rotation), self.pivot.guide_angle) if isinstance(self.pivot, SliderMotion) else None
 
@@ -324,7 +324,7 @@ class Linkage:
         return {name: (float(z.real), float(z.imag)) for name, z in places.items()}
 
     def with_pivot(self, pivot: SliderMotion | SecondCrank | None) -> Linkage:
-        """Return the linkage with another motion of its rocker pivot: with a second crank a five-bar, otherwise a four-bar."""
+        """Return the linkage with another motion of its rocker pivot: a five-bar for a second crank, otherwise a four-bar."""
         made: Callable[..., Linkage] = FiveBar if isinstance(pivot, SecondCrank) else Linkage
         return made(**self.values(), pivot=pivot)
 
@@ -354,7 +354,7 @@ class Linkage:
 
     @property
     def title(self) -> str:
-        """Return Grashof's type; for a moving pivot, to which his criterion does not apply, "four-bar with a moved pivot"."""
+        """Return Grashof's type; for a moving pivot, where the criterion does not hold, "four-bar with a moved pivot"."""
         return self.grashof if self.pivot is None else "four-bar with a moved pivot"
 
     def reach(self, rotation: ArrayLike) -> FloatArray:
@@ -372,39 +372,42 @@ class Linkage:
 
     @staticmethod
     def closure() -> Callable[..., Any]:
-        """Return the function that closes the loop, also for CasADi symbols: for a four-bar the plant's `close_loop`."""
+        """Return the function that closes the loop, also for CasADi symbols: here `close_loop` of the five-bar model."""
         joined: Callable[..., Any] = symbolic_equations(FIVE_BAR).close_loop
         return joined
 
     @staticmethod
     def square(along: Any, across: Any) -> Any:
-        """Return the square of `distance`, also for symbols."""
+        """Return the square of `distance`, also for CasADi symbols."""
         return along * along + across * across
 
     @staticmethod
     def transmission_excess(l3: Any, l4: Any, nearest: Any, farthest: Any, cosine: Any) -> tuple[Any, ...]:
-        """Return the values g of constraints g <= 0 that bound ``|cos mu|`` by ``cosine``, with the transmission angle mu at C.
+        """Return the values g of constraints g <= 0 that bound ``|cos mu|`` by ``cosine``; mu is the transmission angle at C.
 
-        The arguments are numbers, arrays or symbols; ``nearest`` and ``farthest`` are the squares of the least and greatest
-        `reach`.
+        The arguments are numbers, arrays or symbols; ``nearest`` and ``farthest`` are the least and greatest `square`, the
+        squared `reach`.
         """
         joint, product = l3 * l3 + l4 * l4, 2.0 * l3 * l4 * cosine
         return joint - nearest - product, farthest - joint - product
 
     @staticmethod
     def excess_slope(l3: Any, l4: Any, cosine: Any) -> Any:
-        """Return the derivative of `transmission_excess` with respect to the cosine, with the opposite sign."""
+        """Return minus the derivative of `transmission_excess` with respect to ``cosine``."""
         return 2.0 * l3 * l4
 
     @staticmethod
     def slack(l1: Any, l2: Any, cosine: Any) -> Any:
-        """Return the greatest change of `square` while the crank turns from an extreme of it, by an angle with this cosine."""
+        """Return a bound on the change of `square` when the crank turns from a position in which `square` is extreme.
+
+        ``cosine`` is the cosine of that rotation. For a four-bar the bound is exact.
+        """
         return 2.0 * l1 * l2 * (1.0 - cosine)
 
     def cosine_at_c(self, reach: FloatArray) -> FloatArray:
         """Return the cosine of the angle between coupler and rocker, from `reach`.
 
-        It is outside [-1, 1] if the links cannot be joined.
+        The result is outside [-1, 1] if the links cannot be joined.
         """
         l3, l4 = self.coupler_length, self.rocker_length
         cosine: FloatArray = (l3 * l3 + l4 * l4 - reach * reach) / (2.0 * l3 * l4)
@@ -426,13 +429,13 @@ class Linkage:
 
     @property
     def least_transmission(self) -> float:
-        """Return the transmission angle's least deviation from 0 and pi over a turn (rad); 0 without a full turn."""
+        """Return the transmission angle's least deviation from 0 and pi over a turn (rad); 0 if the crank cannot turn fully."""
         low, high = self.transmission_range()
         return min(low, pi - high)
 
     @property
     def turns_fully(self) -> bool:
-        """Return whether the crank can turn fully; a moving pivot makes its motion meanwhile."""
+        """Return whether the crank can turn fully, while a moving pivot follows its motion."""
         return self.least_transmission > 0.0
 
     def to_five_bar(
@@ -446,10 +449,10 @@ class Linkage:
         slider_coulomb_friction: float = 0.0,
         gravity: float = 9.81,
     ) -> FiveBarParameters:
-        """Return the parameters of the plant and its FMU, with masses from density and section.
+        """Return the parameters of the five-bar model and its FMU, with masses from density and section.
 
-        The links are bars, see `link_mass_properties`. The plant's x axis is the ground link; its inclination to the
-        horizontal is the ground angle. A fixed rocker pivot becomes a slider: give it a spring, or hold it by a force.
+        The links are bars, see `link_mass_properties`. The model's x axis is the ground link; its inclination to the
+        horizontal is the ground angle. A fixed rocker pivot becomes a slider: give the slider a spring, or hold it by a force.
 
         Parameters
         ----------
@@ -496,16 +499,16 @@ class Linkage:
 @in_si(**UNITS)
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class SliderCrank(Linkage):
-    """A slider-crank with a coupler point, placed in the plane: C runs on a guide instead of a rocker.
+    """A slider-crank with a coupler point, placed in the plane: a guide, instead of a rocker, carries C.
 
     Attributes
     ----------
     ground_length : float
-        l1, the offset: the distance of the guide from A, of either sign (m).
+        l1, the offset: the distance of the guide from A (m), positive or negative.
     rocker_length : float
         Always 0.
     ground_angle : float
-        a1: direction from A to the guide, at right angles to the guide (rad).
+        a1: direction of the perpendicular from A to the guide (rad).
     """
 
     kind: ClassVar[Kind] = "slider-crank"
@@ -544,7 +547,7 @@ class SliderCrank(Linkage):
 
     @staticmethod
     def distance(along: Any, across: Any) -> Any:
-        """Return the distance from B to the guide, along the ground link."""
+        """Return the distance from B to the guide, which is the component ``along``."""
         return along
 
     @staticmethod
@@ -570,7 +573,7 @@ class SliderCrank(Linkage):
         return 2.0 * (l1 + l2) * l2 * (1.0 - cosine)
 
     def cosine_at_c(self, reach: FloatArray) -> FloatArray:
-        """Return the cosine of the angle between coupler and the normal of the guide, from `reach`."""
+        """Return the cosine of the angle between the coupler and the normal of the guide, from `reach`."""
         cosine: FloatArray = -reach / self.coupler_length
         return cosine
 
@@ -583,7 +586,7 @@ class FiveBar(Linkage):
     Attributes
     ----------
     pivot : SecondCrank
-        Geared to the first crank, or turned independently.
+        Motion of the second crank: geared to the first crank, or independent.
     """
 
     kind: ClassVar[Kind] = "geared-five-bar"
@@ -595,7 +598,7 @@ class FiveBar(Linkage):
 
     @property
     def title(self) -> str:
-        """Return "five-bar", with the gear ratio if gears alone turn the second crank."""
+        """Return "five-bar", followed by the gear ratio if gears alone turn the second crank."""
         return "five-bar" if self.pivot.series.order else f"five-bar, gears {format_ratio(self.pivot.ratio)}"
 
     @property

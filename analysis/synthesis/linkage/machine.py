@@ -1,4 +1,6 @@
-"""Turn a linkage into a machine: material, speed and load give the plant's parameters and the pin forces."""
+"""Compute parameters and pin forces of a machine: a linkage with material, speed and load.
+
+The plant is the model that simulates the machine: the slider-crank, or the five-bar with a slider at the rocker pivot D."""
 
 from __future__ import annotations
 
@@ -27,7 +29,7 @@ from .linkage import Linkage, SliderCrank, is_on_line
 
 #: Links that have a mass.
 WEIGHED = ("crank", "coupler", "rocker")
-#: Distance at which a rocker pivot counts as being at infinity, in coupler lengths.
+#: Length of the rocker that represents the guide of a slider-crank, in coupler lengths.
 FAR = 1e7
 #: Least natural frequency of a slider that represents a fixed pivot: in rad/s, and as a multiple of the crank's speed.
 STIFF, STIFF_TURNS = 1000.0, 50.0
@@ -35,7 +37,7 @@ STIFF, STIFF_TURNS = 1000.0, 50.0
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class MachineSpec:
-    """Material, speed and load of a linkage; see `Linkage.to_five_bar`.
+    """Material, bar sections, slider, speed and load of a linkage; see `Linkage.to_five_bar`.
 
     Attributes
     ----------
@@ -89,7 +91,7 @@ class MachineSpec:
         return 0.4 * self.width if self.pin is None else self.pin
 
     def describe(self, *, forces: bool = True) -> str:
-        """Describe the bars and, with ``forces``, speed, gravity and load in one line."""
+        """Return one line on the bars and, with ``forces``, on speed, gravity and load."""
         bars = f"bars {1e3 * self.width:g} x {1e3 * self.thickness:g} mm of {self.density:g} kg/m³, pins {1e3 * self.hole:g} mm"
         if not forces:
             return bars
@@ -98,16 +100,16 @@ class MachineSpec:
         )
 
     def describe_masses(self) -> str:
-        """Describe where the masses come from, in a sentence for the head of a file."""
+        """Return a sentence that says where the masses come from, for the head of a file."""
         given = [f"{link}.mass" for link in (*WEIGHED, "slider") if getattr(self, f"{link}_mass") is not None]
         weighed = f"; as given: {', '.join(given)}" if given else ""
         bars = self.describe(forces=False).partition(",")[0]
         return f"masses, centres of mass and moments of inertia: {bars}{weighed}; [make] of the task changes them"
 
     def link_masses(self, made: Mapping[str, Any]) -> dict[str, Any]:
-        """Return masses and moments of inertia of the links, as in ``made`` unless the mass of a link is given.
+        """Return masses and moments of inertia of the links: the values in ``made``, or the given masses.
 
-        The moment of inertia of a link with a given mass changes in proportion.
+        The moment of inertia of a link with a given mass changes in proportion to its mass.
         """
         own: dict[str, Any] = {}
         for link in WEIGHED:
@@ -117,7 +119,7 @@ class MachineSpec:
         return own
 
     def load_components(self, c: Any, s: Any) -> tuple[Any, Any]:
-        """Return the components of the load along and across the ground link (N), whose direction has cosine c and sine s."""
+        """Return the load's components along and across the ground link (N); c and s are cosine and sine of its direction."""
         x, y = self.load
         return c * x + s * y, c * y - s * x
 
@@ -129,7 +131,8 @@ class MachineSpec:
     def slider_crank(self, linkage: Linkage) -> SliderCrankParameters:
         """Return the parameters of the slider-crank's plant, with the guide at right angles to the crank shaft.
 
-        The plant's rod has its mass on the line of its joints: the arm to a coupler point off that line is projected onto it.
+        The plant's rod has its mass on the line of its joints. The arm to a coupler point off this line is projected onto the
+        line.
         """
         made = self.sliding_five_bar(linkage)
         a1 = linkage.ground_angle
@@ -155,9 +158,10 @@ class MachineSpec:
         )
 
     def sliding_five_bar(self, linkage: Linkage) -> FiveBarParameters:
-        """Return the parameters of the five-bar plant for a linkage, with a slider that is free to move.
+        """Return the parameters of the five-bar plant for a linkage, whose slider at D is free to move.
 
-        A slider-crank becomes a four-bar whose rocker pivot is `FAR` away; its slider is the mass at the rocker's end.
+        A slider-crank becomes a four-bar with a very long rocker, of `FAR` coupler lengths. The mass of its slider is at C, at
+        the end of this rocker.
         """
         far, sliding, four_bar = FAR * linkage.coupler_length, isinstance(linkage, SliderCrank), linkage
         if sliding:
@@ -182,16 +186,16 @@ class MachineSpec:
         return {"rocker_mass": self.block_mass, "rocker_inertia": 0.0, "rocker_cog_distance": far}
 
     def plant(self, linkage: Linkage) -> FiveBarParameters | SliderCrankParameters:
-        """Return the parameters of the plant that simulates a linkage: `slider_crank` for a slider-crank, else `five_bar`."""
+        """Return the parameters of the plant for a linkage: `slider_crank` for a slider-crank, otherwise `five_bar`."""
         return self.slider_crank(linkage) if isinstance(linkage, SliderCrank) else self.five_bar(linkage)
 
     def five_bar(self, linkage: Linkage) -> FiveBarParameters:
-        """Return the parameters of the five-bar plant for a linkage, with its slider held by spring and damper."""
+        """Return the parameters of the five-bar plant for a linkage, whose slider at D is held by spring and damper."""
         free = self.sliding_five_bar(linkage)
         mass = free.slider_mass + free.rocker_mass + free.coupler_mass
         frequency = max(STIFF, STIFF_TURNS * abs(self.speed))
         stiffness = mass * frequency**2 if self.slider_stiffness is None else self.slider_stiffness
-        # seven tenths of critical
+        # seven tenths of critical damping
         damping = 1.4 * (stiffness * mass) ** 0.5 if self.slider_damping is None else self.slider_damping
         return replace(free, slider_stiffness=stiffness, slider_damping=damping)
 
@@ -211,15 +215,15 @@ HEAVY = 1e8
 def pin_functions(
     d: Any, make: MachineSpec, crank_angle: Any, *, straight: bool = False, linkage: type[Linkage] = Linkage
 ) -> dict[str, tuple[Any, Any]]:
-    """Return the components of each pin's force along and across the ground link (N), for CasADi symbols and numbers.
+    """Return the components of each pin's force along and across the ground link (N), by pin, for CasADi symbols or numbers.
 
     Parameters
     ----------
     d : namespace
-        Dimensions by their names in `Linkage`, the branch too.
+        Dimensions and branch, by their names in `Linkage`.
     make : MachineSpec
-    crank_angle : column
-        th2 (rad).
+    crank_angle : CasADi column
+        th2, one or more angles (rad).
     straight : bool
         Whether the coupler point is on the line of B and C, see `link_mass_properties`.
     linkage : type
@@ -273,7 +277,7 @@ def pin_functions(
 
 @cache
 def _trace_plant() -> tuple[Any, Any, Any]:
-    """Return the class of the plant's parameters, its functions, and `link_mass_properties`, all for CasADi symbols."""
+    """Return the five-bar plant's parameter class and functions, and `link_mass_properties`, all for CasADi symbols."""
     casadi = symbolic.library()
     plant = parameter_symbols(FIVE_BAR)
     law = symbolic.symbolic_functions((geometry,), min=casadi.fmin, max=casadi.fmax)
@@ -294,11 +298,11 @@ class PinForces:
     Attributes
     ----------
     rotation : ndarray, shape (n,)
-        Crank rotations from the start of the task (rad).
+        Crank rotations relative to the start of the task (rad).
     force : ndarray, shape (n, 4)
         Magnitudes of the forces on the pins A to D (N).
     moved : float
-        Greatest displacement of the slider that represents the fixed pivot (m).
+        Greatest displacement of the slider that represents the fixed pivot D (m).
     """
 
     rotation: FloatArray
@@ -312,7 +316,7 @@ class PinForces:
 
     @property
     def pin(self) -> str:
-        """Return the pin with the greatest force."""
+        """Return the letter of the pin with the greatest force."""
         return PINS[int(self.force.max(axis=0).argmax())]
 
     @property
@@ -321,17 +325,17 @@ class PinForces:
         return float(self.rotation[int(self.force.max(axis=1).argmax())])
 
     def greatest_force(self, pins: str) -> float:
-        """Return the greatest force on any of the pins with the letters ``pins`` (N)."""
+        """Return the greatest force on any of the pins whose letters are in ``pins`` (N)."""
         return float(self.force[:, [PINS.index(pin) for pin in pins]].max())
 
 
 def pin_forces(
     linkage: Linkage, make: MachineSpec, rotation: tuple[float, float] | None = None, *, run: bool = True
 ) -> PinForces:
-    """Compute the forces on the pins of a linkage at constant speed.
+    """Compute the forces on the pins of a linkage at constant crank speed.
 
-    With ``run`` the compiled plant is run; its slider is so heavy that it hardly moves, and the control force carries the
-    slider's weight. Otherwise the plant's equations are evaluated with the slider held.
+    With ``run`` the compiled plant is simulated; its slider at D is so heavy that it hardly moves, and the control force
+    carries the slider's weight. Otherwise the plant's equations are evaluated with the slider fixed.
 
     Parameters
     ----------
@@ -341,14 +345,14 @@ def pin_forces(
     rotation : (float, float), optional
         First and last crank rotation (rad); a turn by default.
     run : bool
-        Whether to run the plant.
+        Whether to simulate the plant.
 
     Raises
     ------
     ParameterError
         If the rocker pivot moves.
     AssemblyError
-        If the links cannot be joined somewhere.
+        If the links cannot be joined at some crank rotation.
     """
     if linkage.pivot is not None:
         raise ParameterError("pivot", linkage.pivot, "be fixed: of a moved one see motion.inverse_dynamics")
@@ -374,7 +378,7 @@ def pin_forces(
 
 
 def _evaluate_forces(linkage: Linkage, make: MachineSpec, rotation: FloatArray) -> PinForces:
-    """Compute the pin forces at crank rotations from the plant's equations, with its slider held."""
+    """Compute the pin forces at crank rotations from the equations of the five-bar plant, with the slider at D fixed."""
     casadi, d = symbolic.library(), SimpleNamespace(**linkage.values())
     straight = is_on_line(linkage.coupler_length, linkage.point_distance, linkage.point_angle)
     th2 = casadi.DM(linkage.crank_angle(rotation))

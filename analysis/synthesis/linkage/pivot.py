@@ -1,4 +1,4 @@
-"""Define motions of the rocker pivot on a guide or on a second crank: known motions, and the unknowns of a search."""
+"""Define motions of the rocker pivot on a guide or on a second crank: known motions, and motions that a search finds."""
 
 from __future__ import annotations
 
@@ -59,9 +59,9 @@ class SliderMotion:
 
 
 def gear_turns(ratio: float) -> tuple[int, int]:
-    """Return the least whole numbers k and m of turns that the first and the second crank make in the same time.
+    """Return the least whole numbers k and m: the first crank turns k times while the second crank turns m times.
 
-    Their quotient m/k is the ratio.
+    The quotient m/k is the ratio.
 
     Raises ParameterError if the ratio is neither zero nor a quotient of whole numbers up to six.
     """
@@ -73,13 +73,13 @@ def gear_turns(ratio: float) -> tuple[int, int]:
 
 
 def format_ratio(ratio: float) -> str:
-    """Format a ratio of gears, such as "2", "-1" or "1/2"."""
+    """Format a gear ratio, as in "2", "-1" or "1/2"."""
     return str(Fraction(ratio).limit_denominator(TEETH))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SecondCrank:
-    """Motion of the rocker pivot D on a second crank, geared to the first or turned independently: that of a five-bar.
+    """Motion of the rocker pivot D of a five-bar: on a second crank, geared to the first or turned independently.
 
     D = E + l5 exp(i psi) about the end E of the ground link, with psi = m phi + phase + series(phi), where m/k is the ratio.
     The input shaft, with the rotation phi, turns once per period of the linkage, in which the first crank turns k times.
@@ -93,7 +93,7 @@ class SecondCrank:
     phase : float
         psi at phi = 0, without the series (rad).
     series : FourierSeries
-        Rotation added to that by the gears, a function of phi (rad); zero if gears alone turn the crank.
+        Rotation that is added to the rotation by the gears, a function of phi (rad); zero if gears alone turn the crank.
 
     Raises
     ------
@@ -137,17 +137,18 @@ class SliderUnknown:
     Attributes
     ----------
     harmonics : int
-        Number of harmonics; 0 for a slider that is adjusted once and stays there.
+        Number of harmonics; 0 for a slider that is adjusted once and does not move.
     guide_angle : (float, float)
         Bounds of the guide's direction from the ground link (rad); equal bounds fix it.
     position : (float, float), optional
-        Least and greatest slider position (m); by default a ground length to either side of the end of the ground link.
+        Least and greatest slider position (m); by default minus and plus the ground link's length.
     stroke : float
         Greatest length of the slider's travel (m).
     speed, acceleration : float
         Greatest ``|du/dphi|`` (m/rad) and ``|d2u/dphi2|`` (m/rad2).
     smoothness : float
-        Weight of the mean of (d2u/dphi2)^2, which is added to the quality: it trades error for smoothness.
+        Weight of the mean of (d2u/dphi2)^2, which is added to the quality function: a larger weight gives a smoother motion
+        and a larger error.
     """
 
     harmonics: int
@@ -189,7 +190,7 @@ class CrankUnknown:
     length : (float, float)
         Bounds of the second crank's length (m).
     harmonics : int
-        Number of harmonics of the rotation that is added to that by the gears; 0 for gears alone.
+        Number of harmonics of the rotation that is added to the rotation by the gears; 0 for gears alone.
     speed : float
         Greatest magnitude of the derivative of the added rotation with respect to phi.
     """

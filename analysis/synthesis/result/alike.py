@@ -19,10 +19,10 @@ SHARE, RATIO = 0.03, 1.25
 
 
 def group_similar(solutions: Sequence[Solution]) -> tuple[Solution, ...]:
-    """Group similar solutions; return the first of each group, with the others of the group as its ``variants``.
+    """Group similar solutions; return the first solution of each group, with the rest of the group as its ``variants``.
 
-    Solutions count as similar if their linkages differ only in position in the plane, sense of rotation or start of the crank,
-    or for a rocker function in size. Linkages with a commanded pivot are never grouped.
+    Solutions count as similar if their linkages differ only in position in the plane, sense of rotation or start of the crank;
+    for a rocker function they may also differ in size. Linkages with a commanded pivot are never grouped.
     """
     groups: list[list[Solution]] = []
     for solution in solutions:
@@ -67,9 +67,9 @@ def _gear_ratio(linkage: Linkage) -> float | None:
 
 
 def _coupler_sides(linkage: Linkage) -> tuple[int, ...]:
-    """Return the sides of B -> D on which C can lie, +1 left or -1 right.
+    """Return the sides of B -> D on which C can lie: +1 left, -1 right.
 
-    It is the side of the assembly, but both sides, that of the assembly first, for a slider-crank with almost no offset.
+    The assembly determines one side. A slider-crank with almost no offset has both sides, the side of its assembly first.
     """
     if not isinstance(linkage, SliderCrank):
         return (linkage.branch,)
@@ -83,7 +83,7 @@ def _shape(linkage: Linkage, side: int) -> NDArray[np.float64]:
     point = linkage.point_distance * np.exp(1j * side * linkage.point_angle)
     second, pivot = 0j, linkage.pivot
     if isinstance(pivot, SecondCrank):
-        # from its angle while the first crank lies along the ground link, times the turns k so that whole turns do not count
+        # its angle while the first crank lies along the ground link, times the turns k so that whole turns do not matter
         k, m = gear_turns(pivot.ratio)
         second = pivot.length * np.exp(1j * side * (k * pivot.phase - m * linkage.crank_phase))
     links = (abs(getattr(linkage, name)) for name in LINKS)

@@ -1,4 +1,4 @@
-"""Write a solution as a described linkage, which can be simulated, exported as an FMU and shown in the studio."""
+"""Write a linkage as tables of a case file, from which it can be simulated, exported as an FMU and shown in the studio."""
 
 from __future__ import annotations
 
@@ -22,7 +22,8 @@ def description(
 ) -> dict[str, Any]:
     """Return the table ``[linkage]`` with the description of a four-bar, a slider-crank or a five-bar.
 
-    A rocker pivot that moves on a guide, or on a crank without gears, is a second freedom: `drives` returns both speeds.
+    A rocker pivot that moves on a guide, or on a crank without gears, is a second degree of freedom. For such a linkage
+    `drives` returns the speeds of crank and pivot.
 
     Parameters
     ----------
@@ -32,7 +33,7 @@ def description(
     rotation : float
         Rotation of the input shaft at the start (rad).
     direction : float
-        +1 or -1: sense in which the crank turns.
+        Sense in which the crank turns: +1 counter-clockwise, -1 clockwise.
     """
     a1, shaft = linkage.ground_angle, complex(linkage.pivot_x, linkage.pivot_y)
     end = shaft + rect(linkage.ground_length, a1)
@@ -75,7 +76,7 @@ def description(
         angle = with_unit(a1 + float(second.angle(rotation)), "rad")
         tables["freedoms"]["pivot"] = {"joint": "E", "start": angle, "driven": True}
     elif isinstance(second, SecondCrank):
-        # angle of the second crank while the first points along x
+        # angle of the second crank while the first crank points along x
         phase = a1 + second.phase - second.ratio * (a1 + linkage.crank_phase)
         tables["gears"] = {
             "teeth": {
@@ -99,9 +100,10 @@ def loads(linkage: Linkage, make: MachineSpec) -> dict[str, Any]:
 
 
 def drives(linkage: Linkage, make: MachineSpec, *, rotation: float = 0.0, direction: float = 1.0) -> dict[str, Any]:
-    """Return the drive tables of a linkage whose rocker pivot is a second freedom: the speeds of crank and pivot over time.
+    """Return the drive tables of a linkage whose pivot is a second degree of freedom: speeds of crank and pivot over time.
 
-    The arguments are those of `description`. For other linkages the result is empty, because `description` gives the speed.
+    The arguments are those of `description`. For any other linkage the result is empty, because `description` contains the
+    crank speed.
     """
     pivot = linkage.pivot
     if pivot is None or not pivot.series.order:
@@ -122,7 +124,7 @@ def drives(linkage: Linkage, make: MachineSpec, *, rotation: float = 0.0, direct
 
 
 def _coupler_masses(linkage: Linkage, make: MachineSpec) -> dict[str, Any]:
-    """Return mass, centre of mass and moment of inertia of a coupler with an arm to its point, as in the plant."""
+    """Return mass, centre of mass and moment of inertia of a coupler with an arm to its point; see `link_mass_properties`."""
     line = make.density * make.width * make.thickness
     r, a2 = linkage.point_distance, linkage.point_angle
     straight = is_on_line(linkage.coupler_length, r, a2)
@@ -138,12 +140,12 @@ def _coupler_masses(linkage: Linkage, make: MachineSpec) -> dict[str, Any]:
 
 
 def _point_entry(z: complex) -> list[Any]:
-    """Return a point in the form of a file; exact zeros stay the number 0."""
+    """Return a point as a case file gives it, [x, y] with units; exact zeros are the number 0."""
     return [0 if c == 0.0 else with_unit(c, "m") for c in (z.real, z.imag)]
 
 
 def _bar_table(ends: str, length: float, make: MachineSpec, mass: float | None) -> dict[str, Any]:
-    """Return the table of a bar with the section of ``make``, and its mass if it is given."""
+    """Return the table of a bar with the section of ``make``, and with ``mass`` (kg) if it is given."""
     section = {"kind": "bar", "width": with_unit(make.width, "m"), "thickness": with_unit(make.thickness, "m")}
     table = {"bar": list(ends), "length": with_unit(length, "m"), "section": section | {"material": make.density}}
     return table if mass is None else table | {"mass": with_unit(mass, "kg")}

@@ -43,7 +43,7 @@ LAYERS = {
 
 @dataclass(frozen=True, eq=False)
 class LinkageScene:
-    """The geometry of a solution that pictures and drawings show, in m and rad, with a title."""
+    """Geometry of a solution that pictures and drawings show, in m and rad, with a title."""
 
     solution: Solution
     title: str = ""
@@ -54,7 +54,7 @@ class LinkageScene:
         return self.solution.linkage
 
     def pins(self, rotation: float) -> Mapping[str, tuple[float, float]] | None:
-        """Return the positions of A to E and, if the task has target points, of P; None if the links cannot be joined."""
+        """Return the positions (m) of A to E and, if the task has target points, of P; None if the links cannot be joined."""
         try:
             pins = self.linkage.pins(rotation)
         except AssemblyError:
@@ -69,7 +69,7 @@ class LinkageScene:
 
     @cached_property
     def turn(self) -> FloatArray:
-        """Return crank rotations over a whole turn, from the least rotation of the task, shape (n,)."""
+        """Return evenly spaced crank rotations over a whole turn from the least rotation of the task, shape (n,)."""
         begin = 0.0 if self._closed else float(self.solution.rotation.min())
         return begin + np.linspace(0.0, 2.0 * pi, 2 * CURVE + 1)
 
@@ -83,7 +83,7 @@ class LinkageScene:
 
     @property
     def rotation(self) -> FloatArray:
-        """Return the crank rotations of the task in order: those of its stations, or of a turn."""
+        """Return the crank rotations of the task's stations, or those of `turn` if the task takes a whole turn."""
         return self.turn if self.task_rotations is self.turn else self.solution.rotation
 
     @cached_property
@@ -105,7 +105,7 @@ class LinkageScene:
 
     @cached_property
     def stations(self) -> dict[str, FloatArray]:
-        """Return the columns by name with unit, such as ``error [m]``; see `Solution.columns`."""
+        """Return crank rotation, target, traced value and error at each target, by name with unit; see `Solution.columns`."""
         return self.solution.columns()
 
     @cached_property
@@ -120,12 +120,12 @@ class LinkageScene:
 
     @cached_property
     def traced_curve(self) -> FloatArray | None:
-        """Return the part of the coupler curve that belongs to the task, shape (n, 2); None for a rocker function."""
+        """Return the coupler curve over the range of the task, shape (n, 2); None for a rocker function."""
         return None if self.target is None else self.linkage.path(self.task_rotations)
 
     @cached_property
     def function(self) -> FloatArray | None:
-        """Return crank rotation and rocker angle of a rocker function, shape (2, n); None for another task."""
+        """Return crank rotations and rocker angles over a rocker function, shape (2, n); None for any other task."""
         return (
             np.vstack([self.task_rotations, self.linkage.rocker_angle(self.task_rotations)])
             if self.target is None
@@ -134,7 +134,7 @@ class LinkageScene:
 
     @cached_property
     def guide(self) -> FloatArray | None:
-        """Return the ends of the slider's travel, shape (2, 2); None without a slider."""
+        """Return the two ends of the slider's travel as points, shape (2, 2); None without a slider."""
         linkage, slider = self.linkage, self.linkage.slider(self.turn)
         if slider is None:
             return None
@@ -164,7 +164,7 @@ class LinkageScene:
 
     @property
     def motion(self) -> tuple[str, FloatArray] | None:
-        """Return heading and values of the motion of a second crank or a slider over a turn; None if there is neither."""
+        """Return heading and values of the second crank's or slider's position at each `turn` rotation; None without either."""
         if isinstance(self.linkage, FiveBar):
             return "second crank [rad]", self.linkage.pivot.angle(self.turn)
         slider = self.linkage.slider(self.turn)
@@ -177,7 +177,7 @@ PIN, LETTER = 0.008, 0.022
 
 
 def drawing(solution: Solution, rotation: float | None = None, *, poses: int = 0, title: str = "") -> Drawing:
-    """Draw links with their lengths, pins, guide, coupler curve and target, in the coordinates of the plane (m).
+    """Draw a linkage: links with their lengths, pins, guide, coupler curve and target, in coordinates of the plane (m).
 
     Parameters
     ----------
@@ -191,7 +191,7 @@ def drawing(solution: Solution, rotation: float | None = None, *, poses: int = 0
     Raises
     ------
     AssemblyError
-        If the links cannot be joined at that rotation, or at any.
+        If the links cannot be joined at ``rotation``, or at any rotation.
     """
     scene = LinkageScene(solution, title)
     tried = (*scene.rotation, *scene.transmission[0]) if rotation is None else (rotation,)
@@ -265,7 +265,7 @@ def drawing(solution: Solution, rotation: float | None = None, *, poses: int = 0
 def _link_dimensions(
     pins: Mapping[str, Point], linkage: Linkage, height: float, others: Sequence[LineString]
 ) -> Iterator[Dimension]:
-    """Yield the dimension of each link, placed beside the link and clear of other lines; for a slider-crank also the offset."""
+    """Yield the dimension of each link, placed beside it with few overlaps; for a slider-crank also the offset."""
     named = [ends for _, ends in linkage.bars]
     names: list[str] = [name for name in ("AE", "AB", "BC", "ED", "DC") if name == "BC" or name in named]
     names += ["BP"] if "P" in pins and not linkage.point_is_pin else []
@@ -274,14 +274,14 @@ def _link_dimensions(
     placed: list[Dimension] = []
 
     def count_overlaps(one: Dimension) -> tuple[int, int]:
-        """Return two counts of overlaps: with links and dimensions, dimensions counted three times; and with other lines."""
+        """Return the overlaps with links and dimensions (a dimension counts three times), and with other lines."""
         room, strokes = _number_box(one), _dimension_lines(one)
         count = sum(room.intersects(link) for link in links)
         count += 3 * sum(room.intersects(shape(other)) for other in placed for shape in (_number_box, _dimension_lines))
         count += 3 * sum(strokes.intersects(_number_box(other)) for other in placed)
         return int(count), sum(bool(room.intersects(line)) for line in others)
 
-    # short links last: they have the fewest places
+    # the dimensions of long links are placed first
     for start, end in sorted(((pins[n[0]], pins[n[1]]) for n in names), key=lambda ends: -dist(*ends)):
         if dist(start, end) > height:
             choices = [
@@ -289,7 +289,7 @@ def _link_dimensions(
                 for rank in (2.0, 3.5, 5.0, 6.5, 8.0, 9.5, 11.0, 12.5)
                 for side in (1.0, -1.0)
             ]
-            # the nearest place with the fewest overlaps
+            # the place with the fewest overlaps and, among these, nearest to the link
             placed.append(min(choices, key=count_overlaps))
     yield from placed
 
@@ -300,7 +300,7 @@ def _dimension_lines(dimension: Dimension) -> Any:
 
 
 def _number_box(dimension: Dimension) -> Any:
-    """Return the box that the text of a dimension needs, with gaps around it, on either side of the dimension line."""
+    """Return a box about the middle of the dimension line, with room for the text of the dimension on either side."""
     (x0, y0), (x1, y1) = dimension.line
     middle, way = np.array([x0 + x1, y0 + y1]) / 2.0, np.array([x1 - x0, y1 - y0]) / hypot(x1 - x0, y1 - y0)
     return LineString([middle - 2.2 * dimension.height * way, middle + 2.2 * dimension.height * way]).buffer(
@@ -311,8 +311,8 @@ def _number_box(dimension: Dimension) -> Any:
 def plates(solution: Solution, *, width: float, thickness: float, pin: float, title: str = "") -> Drawing:
     """Draw the links as plates with round ends and holes for the pins, one below the other, with dimensions.
 
-    The ground link is drawn if both its ends are pivots, but not the guide of a slider. The coupler includes the coupler point
-    if the task has one.
+    The ground link is drawn if both its ends are pivots; the guide of a slider is not drawn. The coupler includes the coupler
+    point if the task has one.
 
     Parameters
     ----------
@@ -383,9 +383,9 @@ def plates(solution: Solution, *, width: float, thickness: float, pin: float, ti
 
 
 def _hole_dimensions(places: NDArray[np.complex128], width: float) -> Iterator[tuple[Point, Point, float]]:
-    """Yield the ends and the offset (m) of the dimension between each two distinct holes.
+    """Yield the two end points and the offset (m) of the dimension between each two distinct holes.
 
-    The dimensions lie outside the plate and not over one another.
+    The dimensions lie outside the plate and do not overlap.
     """
     for number, (i, k) in enumerate(combinations(range(len(places)), 2)):
         way = places[k] - places[i]
@@ -399,7 +399,7 @@ def _hole_dimensions(places: NDArray[np.complex128], width: float) -> Iterator[t
 
 
 def rounded_hull(places: NDArray[np.complex128], radius: float) -> tuple[FloatArray, tuple[float, ...]]:
-    """Return the outline at a radius (m) around two or three points: its corners, and bulges of its arcs as in `Polyline`."""
+    """Return the outline at a radius (m) around two or three points: its vertices, and its bulges as in `Polyline`."""
     farthest = max(combinations(range(len(places)), 2), key=lambda pair: float(abs(places[pair[0]] - places[pair[1]])))
     ends = places[list(farthest)]
     if len(places) == 3:

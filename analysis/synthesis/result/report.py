@@ -1,4 +1,4 @@
-"""Compute the effect of each dimension on the error by exact derivatives and the cost of rounding; write the text report."""
+"""Compute the effect of each dimension on the error and the cost of rounding the dimensions; write the text report."""
 
 from __future__ import annotations
 
@@ -49,8 +49,8 @@ class Sensitivity:
     value : float
         Value of the dimension (m or rad).
     slope : float
-        Derivative of the sum of weighted squared errors with respect to the dimension; it is zero at an optimum of the sum
-        inside the bounds. The sum is the quality function, or replaces it for a path whose quality function is an area.
+        Derivative of the sum of weighted squared errors with respect to the dimension: zero at an optimum of this sum inside
+        the bounds. The sum is the quality function; if the quality function is an area, the sum replaces it here.
     shift : float
         Root mean square displacement of the traced point, or change of angle, per unit of the dimension.
     """
@@ -68,14 +68,14 @@ class Rounding:
     Attributes
     ----------
     linkage : Linkage
-        The rounded linkage, in which a link is at least one step long. The coefficients of a commanded motion, of a slider or
-        a second crank, are not rounded.
+        The rounded linkage, in which each link is at least one step long. The Fourier coefficients of the motion of a slider
+        or a second crank are not rounded.
     error : float
         Quality function of the rounded linkage.
     expected : float
-        Mean quality function if the dimensions have random errors, uniform within half a step. For a sum of squares it is
-        computed to second order, from exact first and finite-difference second derivatives of the errors; for an area the
-        distances are taken as normal variables. Infinite if there are no derivatives.
+        Mean quality function if the dimensions have random errors, uniformly distributed within half a step to either side.
+        For a sum of squares the mean is computed to second order, from exact first and finite-difference second derivatives
+        of the errors. For an area the distances are taken as normally distributed. Infinite if derivatives do not exist.
     """
 
     linkage: Linkage
@@ -90,10 +90,10 @@ def length_step(linkage: Linkage) -> float:
 
 
 def derivatives(solution: Solution) -> tuple[list[str], FloatArray, FloatArray, FloatArray]:
-    """Compute how the residuals of the quality function depend on the dimensions.
+    """Compute the derivatives of the quality function's residuals with respect to the dimensions.
 
-    The result is: the names of the k dimensions; the derivatives of the residuals with respect to them, (m, k); the residuals,
-    (m,); their weights, (m,). For an untimed path the residuals are the distances along the target's normals.
+    Returns the names of the k dimensions; the derivatives of the m residuals, shape (m, k); the residuals, (m,); and the
+    weights of the residuals, (m,). For an untimed path the residuals are the distances along the target's normals.
     """
     task, linkage = solution.task, solution.linkage
     normal = normal_form(task)
@@ -108,7 +108,7 @@ def derivatives(solution: Solution) -> tuple[list[str], FloatArray, FloatArray, 
 
 
 def _residuals(linkage: Linkage, normal: Normal, at: FloatArray, across: bool) -> tuple[FloatArray, FloatArray]:
-    """Compute derivatives (m, k) and values (m,) of the residuals at crank rotations ``at``.
+    """Compute the derivatives of the m residuals by the k dimensions, (m, k), and the residuals, (m,), at rotations ``at``.
 
     The residuals of points come first, then those of angles. The residuals of points are in x and y or, if ``across``, along
     the normals of the curve.
@@ -176,7 +176,7 @@ def sensitivities(solution: Solution) -> tuple[Sensitivity, ...]:
 
 
 def round_dimensions(solution: Solution, length: float | None = None, angle: float = ANGLE_STEP) -> Rounding:
-    """Round lengths and angles to whole steps, and compute the cost of this.
+    """Round lengths and angles to whole steps, and compute the increase of the error.
 
     Parameters
     ----------
@@ -206,7 +206,7 @@ def round_dimensions(solution: Solution, length: float | None = None, angle: flo
 
 
 def _expected_error(solution: Solution, steps: Mapping[str, float]) -> float:
-    """Return the mean quality function if the dimensions have random errors, uniform within half a step."""
+    """Return the mean quality function for random errors within half a step of each dimension; see `Rounding.expected`."""
     task, linkage = solution.task, solution.linkage
     area = isinstance(task, UntimedPath) and task.measure == "area"
     if isinstance(task, UntimedPath) and area:
@@ -253,9 +253,9 @@ def _expected_error(solution: Solution, steps: Mapping[str, float]) -> float:
 
 
 def costs(solution: Solution, length: float, angle: float) -> dict[str, float]:
-    """Compute, for each dimension, how much the quality function grows by an error of one step in the worse direction.
+    """Compute, for each dimension, how much an error of one step in the worse direction increases the quality function.
 
-    The changed linkages are evaluated, so that steps may have any size; the growth is infinite if the links cannot be joined.
+    The changed linkages are evaluated, so that steps may have any size. The increase is infinite if the links cannot be joined.
 
     Parameters
     ----------
@@ -265,7 +265,7 @@ def costs(solution: Solution, length: float, angle: float) -> dict[str, float]:
     Returns
     -------
     dict
-        Growth of the quality function by name of the dimension, without those of a slider's motion.
+        Increase of the quality function by name of the dimension, without guide angle and Fourier coefficients of a motion.
     """
     linkage, grown = solution.linkage, {}
     for name, value in _manufactured_dimensions(linkage).items():
@@ -298,13 +298,13 @@ def _mean_absolute(mean: FloatArray, spread: FloatArray) -> FloatArray:
 
 
 def _names(linkage: Linkage, normal: Normal) -> list[str]:
-    """Return the names of the dimensions with respect to which derivatives are computed, in order."""
+    """Return the names of the dimensions in the columns of `_residuals`, in order."""
     mounted = [] if normal.angle is None else ["output_angle"]
     return [*PLACES, *mounted, *(name for name, _, _ in _pivot_dimensions(linkage, np.zeros(1)))]
 
 
 def _pivot_dimensions(linkage: Linkage, at: FloatArray) -> list[tuple[str, float, tuple[FloatArray, FloatArray]]]:
-    """Return, for each dimension of a moving pivot: name, value, and derivatives of x and y of D at crank rotations ``at``."""
+    """Return name, value and derivatives of x and y of D, at rotations ``at``, for each dimension of a moving pivot."""
     pivot = linkage.pivot
     if isinstance(pivot, SliderMotion):
         c, s, u = np.cos(pivot.guide_angle), np.sin(pivot.guide_angle), pivot.series(at)
@@ -329,7 +329,7 @@ def _dimension_values(linkage: Linkage) -> dict[str, float]:
 
 
 def _manufactured_dimensions(linkage: Linkage) -> dict[str, float]:
-    """Return by name the dimensions that are manufactured, and so can have errors: those of a commanded motion are left out."""
+    """Return the dimensions that are manufactured, by name; the coefficients of a commanded motion are not."""
     values = _dimension_values(linkage)
     made = (*LENGTHS, *ANGLES, SECOND_LENGTH, *PIVOT_ANGLES)
     return {name: values[name] for name in made if name in values and name not in linkage.absent_dimensions}
@@ -348,12 +348,12 @@ def _replace_dimension(linkage: Linkage, name: str, value: float) -> Linkage:
 
 
 def quality_unit(task: Task) -> tuple[float, str]:
-    """Return the factor from SI, and the unit in which a task's quality function is written."""
+    """Return the factor from SI to the unit in which a task's quality function is written, and the name of this unit."""
     return ((180.0 / pi) ** 2, "deg²") if isinstance(task, RockerFunction) else (1e6, "mm²")
 
 
 def error_unit(task: Task) -> tuple[float, str]:
-    """Return the factor from SI, and the unit in which a task's errors are written."""
+    """Return the factor from SI to the unit in which a task's errors are written, and the name of this unit."""
     return (180.0 / pi, "deg") if isinstance(task, RockerFunction) else (1e3, "mm")
 
 
@@ -380,7 +380,7 @@ def format_dimension(name: str, value: float) -> str:
 
 
 def headline(solution: Solution) -> str:
-    """Return error, size, transmission angle and defects, in three to six lines."""
+    """Return the lines at the head of a report: error, size, transmission angle and defects, in three to six lines."""
     factor, unit = quality_unit(solution.task)
     scale, length = error_unit(solution.task)
     v = solution.verdicts
@@ -431,18 +431,18 @@ def table(rows: Sequence[Sequence[str]]) -> str:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Assessment:
-    """A solution with the cost of errors in its dimensions, computed once for the shell, the report and the drawing sheet.
+    """The cost of errors in the dimensions of a solution, computed once for command line, report and drawing sheet.
 
     Attributes
     ----------
     solution : Solution
     dimensions : list of tuple
-        Headings, then a row for each dimension: name, value, an error in it, and the effect of the error on output and
-        quality function.
+        Headings, then a row for each dimension: name, value, an error of the dimension, and the effect of this error on the
+        output and on the quality function.
     rounding : str
         The cost of rounding the dimensions, in one line.
     poor : str
-        `format_poor` of the solution.
+        The note of `format_poor` on the solution.
     """
 
     solution: Solution
@@ -452,7 +452,7 @@ class Assessment:
 
     @property
     def report(self) -> str:
-        """Return the report: verdicts, dimensions with the cost of an error in each, rounding, and the error at each target."""
+        """Return the text report: verdicts, dimensions with the cost of errors, rounding, and the error at each target."""
         solution, linkage = self.solution, self.solution.linkage
         task, pivot = solution.task, linkage.pivot
         error, rms, worst = quality_cells(solution, digits=6)
@@ -512,7 +512,7 @@ def quality_headings(task: Task) -> tuple[str, str, str]:
 
 
 def quality_cells(solution: Solution, digits: int = 5) -> tuple[str, str, str]:
-    """Return three texts: quality function, rms error and greatest error of a solution; "0" for errors of mere rounding."""
+    """Return quality function, rms error and greatest error of a solution as texts; "0" for errors due to rounding."""
     factor, scale = quality_unit(solution.task)[0], error_unit(solution.task)[0]
     found = solution.evaluation
     if _meets_task(solution):
@@ -521,7 +521,7 @@ def quality_cells(solution: Solution, digits: int = 5) -> tuple[str, str, str]:
 
 
 def _slider_line(linkage: Linkage) -> str:
-    """Return a line with the offset and the stroke of a slider-crank; empty for another linkage."""
+    """Return a line with the offset and the stroke of a slider-crank; empty for any other linkage."""
     if not isinstance(linkage, SliderCrank):
         return ""
     line = f"\nslider at C on a guide {1e3 * abs(linkage.ground_length):.6g} mm from A"
@@ -531,7 +531,7 @@ def _slider_line(linkage: Linkage) -> str:
 def _limit_lines(linkage: Linkage, rotation: NDArray[np.float64]) -> str:
     """Return lines with dead centres, toggles, time ratio and mechanical advantage of a four-bar or slider-crank.
 
-    The mechanical advantage is the least one over the crank rotations.
+    The mechanical advantage is the least over the crank rotations ``rotation``.
     """
     last, motions, what = linkage.driven
     lines = _rotation_line(f"{last} at rest", dead_centres(linkage)) + _rotation_line("toggles", toggles(linkage))
@@ -545,7 +545,7 @@ def _limit_lines(linkage: Linkage, rotation: NDArray[np.float64]) -> str:
 
 
 def _rotation_line(what: str, places: Sequence[float]) -> str:
-    """Return a line with crank rotations in degrees; empty if there are none."""
+    """Return a line with the title ``what`` and crank rotations in degrees; empty if ``places`` is empty."""
     return f"\n{what} at crank rotations of {', '.join(f'{degrees(at):.2f}' for at in places)} deg" if places else ""
 
 
@@ -587,7 +587,7 @@ def _station_rows(solution: Solution) -> list[list[str]]:
 
 
 def solution_columns(solutions: Sequence[Solution]) -> dict[str, list[float]]:
-    """Return the columns of `Synthesis.columns` for any solutions; a missing link has the length 0."""
+    """Return the columns of `Synthesis.columns` for given solutions: a row for each; a missing link has the length 0."""
     columns: dict[str, list[float]] = {}
 
     def put(name: str, value: float) -> None:

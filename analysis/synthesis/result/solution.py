@@ -1,4 +1,4 @@
-"""Evaluate a linkage in a task: its errors, and verdicts on its defects."""
+"""Evaluate a linkage in a task: compute its errors, and judge its defects."""
 
 from __future__ import annotations
 
@@ -39,12 +39,12 @@ class Evaluation:
     Attributes
     ----------
     error : float
-        The task's quality function: m2, for a rocker function rad2.
+        The task's quality function (m2, for a rocker function rad2).
     value : float
         The value of the task's objective: the quality function, or the greatest error (m, for a rocker function rad).
     errors : ndarray, shape (n,)
-        Error at each target: a distance (m), for an untimed path from the target's point to the curve; for a rocker function
-        an angle (rad).
+        Error at each target: a distance (m), or for a rocker function an angle (rad). For an untimed path it is the distance
+        from the target point to the coupler curve.
     angle_errors : ndarray, shape (n,), or None
         Angular errors of a motion (rad).
     rotation : ndarray, shape (n,), or None
@@ -62,7 +62,7 @@ class Evaluation:
 
     @property
     def combined_errors(self) -> FloatArray:
-        """Return the errors of position and angle combined, as they count in the quality function (m or rad), shape (n,)."""
+        """Return the combined errors of position and angle, as they enter the quality function (m or rad), shape (n,)."""
         if self.angle_errors is None:
             return np.abs(self.errors)
         both: FloatArray = np.hypot(self.errors, self.length * self.angle_errors)
@@ -80,7 +80,7 @@ class Evaluation:
 
 
 def evaluate(task: Task, linkage: Linkage, rotation: FloatArray | None = None) -> Evaluation:
-    """Compute the errors of a linkage in a task by the task's measure.
+    """Compute the errors and the quality function of a linkage in a task.
 
     The errors do not depend on the sampling of a search: for an untimed path the coupler curve is a polygon of `CURVE` points.
 
@@ -89,7 +89,7 @@ def evaluate(task: Task, linkage: Linkage, rotation: FloatArray | None = None) -
     task : Task
     linkage : Linkage
     rotation : ndarray, optional
-        Crank rotations of an untimed task's stations; needed except for closed paths.
+        Crank rotations (rad) of an untimed task's stations; required except for closed paths.
 
     Raises
     ------
@@ -119,7 +119,7 @@ def evaluate(task: Task, linkage: Linkage, rotation: FloatArray | None = None) -
 
 
 def _objective_values(task: Task, squares: FloatArray) -> tuple[float, float]:
-    """Return the values of quality function and objective from the weighted squared errors; infinite if one is not finite."""
+    """Return quality function and objective from the weighted squared errors; both infinite if an error is not finite."""
     error = float(squares.sum())
     if not np.isfinite(error):
         return inf, inf
@@ -176,7 +176,7 @@ class Verdicts:
     order : bool
         Whether the targets are reached in order while the crank turns in one direction.
     least_transmission, greatest_transmission : float
-        Range of the angle between coupler and rocker during the task (rad), or over a turn if the task takes a whole one.
+        Range of the angle between coupler and rocker during the task (rad), or over a turn if the task takes a whole turn.
     """
 
     grashof: str
@@ -189,7 +189,7 @@ class Verdicts:
 
     @property
     def defects(self) -> tuple[str, ...]:
-        """Return the defects, such as "circuit defect"."""
+        """Return the names of the defects, such as "circuit defect"."""
         return tuple(f"{name} defect" for name in ("circuit", "branch", "order") if not getattr(self, name))
 
     @property
@@ -234,14 +234,14 @@ def judge(linkage: Linkage, rotation: FloatArray, *, closed: bool) -> Verdicts:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class StraightPart:
-    """Straight part of a path as the linkage traces it, sampled densely.
+    """Straight part of a path, as the linkage traces it; from closely spaced points.
 
     Attributes
     ----------
     travel, flatness : float
-        Length along the wanted line from the first traced point to the last, and extent across that line (m).
+        Extent of the traced points along the wanted line, from first to last, and across this line (m).
     begin, end : float
-        Crank rotations at its ends (rad).
+        Crank rotations at the ends of the straight part (rad).
     """
 
     travel: float
@@ -251,7 +251,7 @@ class StraightPart:
 
     @property
     def rotation(self) -> float:
-        """Return the crank's rotation on the part (rad)."""
+        """Return the angle by which the crank turns on the straight part (rad)."""
         return abs(self.end - self.begin)
 
     def __str__(self) -> str:
@@ -270,7 +270,7 @@ class Solution(NotebookResult):
     evaluation : Evaluation
     verdicts : Verdicts
     variants : tuple of Solution
-        Mirror images and near copies that it represents in a ranking, the best first.
+        Mirror images and near copies that the solution represents in a ranking, the best first.
     """
 
     task: Task
@@ -280,7 +280,7 @@ class Solution(NotebookResult):
     variants: tuple[Solution, ...] = ()
 
     def __repr__(self) -> str:
-        return f"<Solution.from_linkage a {type(self.task).__name__}: {self.describe()}>"
+        return f"<Solution of a {type(self.task).__name__}: {self.describe()}>"
 
     def describe(self) -> str:
         """Return error and verdicts in one line."""
@@ -312,7 +312,7 @@ class Solution(NotebookResult):
 
     @property
     def measures_area(self) -> bool:
-        """Return whether the error is the area between two closed curves, without weights."""
+        """Return whether `error` is the unweighted area between two closed curves."""
         task = self.task
         if not (isinstance(task, UntimedPath) and task.path.closed and task.measure == "area"):
             return False
@@ -322,8 +322,8 @@ class Solution(NotebookResult):
     def share(self) -> float:
         """Return the error relative to the target.
 
-        If `measures_area`, it is the area between the curves divided by the area that the target encloses. Otherwise it is the
-        rms error divided by the target's size, the diagonal of its bounding box, or by the swing of a rocker function.
+        If `measures_area`, the result is the area between the curves divided by the area that the target encloses. Otherwise
+        it is the rms error divided by the diagonal of the target's bounding box, or by the swing of a rocker function.
         """
         task = self.task
         if self.measures_area:
@@ -334,7 +334,7 @@ class Solution(NotebookResult):
 
     @property
     def rotation(self) -> FloatArray:
-        """Return the crank rotations over which the task is done: those of its stations, or a turn."""
+        """Return the crank rotations of the task: those of its stations, or rotations over a whole turn."""
         if self.evaluation.rotation is not None and not (isinstance(self.task, UntimedPath) and self.task.path.closed):
             return self.evaluation.rotation
         return np.linspace(0.0, 2.0 * pi, CURVE, endpoint=False)
@@ -360,19 +360,19 @@ class Solution(NotebookResult):
         return StraightPart(travel=part.travel, flatness=part.flatness, begin=begin, end=end)
 
     def curve(self, n: int = CURVE) -> FloatArray:
-        """Return the traced path, shape (n, 2) in m: over a turn, or from the first station to the last."""
+        """Return n points of the traced path (m), shape (n, 2): over a turn, or from the first station to the last."""
         at = self.rotation
         if isinstance(self.task, UntimedPath) and not self.task.path.closed:
             return self.linkage.path(np.linspace(at[0], at[-1], n))
         return self.linkage.path(np.linspace(0.0, 2.0 * pi, n, endpoint=False))
 
     def to_five_bar(self, **made_of: Any) -> FiveBarParameters:
-        """Return the parameters of the plant and its FMU; see `Linkage.to_five_bar`."""
+        """Return the parameters of the five-bar model and its FMU; see `Linkage.to_five_bar`."""
         return self.linkage.to_five_bar(**made_of)
 
     @property
     def largest_link(self) -> float:
-        """Return the length that `LargestLink` bounds: that of the longest link or, with target points, of B to P (m)."""
+        """Return the length that `LargestLink` bounds (m): the longest link or, for target points, B to P if that is longer."""
         point = 0.0 if target_points(self.task) is None else self.linkage.point_distance
         return max(self.linkage.largest_link, point)
 
@@ -385,7 +385,7 @@ class Solution(NotebookResult):
     def run_case(self, make: MachineSpec, title: str) -> dict[str, Any]:
         """Return the tables of a case file that runs the linkage through its task at constant speed.
 
-        A slider-crank runs as the slider-crank's plant, any other linkage as the five-bar slider; see `docs/case-files.md`.
+        A slider-crank runs as the slider-crank mechanism, any other linkage as the five-bar slider; see `docs/case-files.md`.
         """
         linkage, at = self.linkage, self.evaluation.rotation
         start = (0.0 if at is None else float(at[0])) + linkage.crank_phase
@@ -422,9 +422,9 @@ class Solution(NotebookResult):
         return {"title": title, "linkage": tables, **moved, **loads(self.linkage, make), "run": run}
 
     def columns(self) -> dict[str, FloatArray]:
-        """Return crank rotation, target, traced point or angle, error and transmission angle at each target; SI.
+        """Return crank rotation, target, traced point or angle, error and transmission angle at each target, by name; SI.
 
-        For an untimed path the traced point is the one nearest to each of the target's points.
+        For an untimed path the traced point is the point of the curve nearest to the target point.
         """
         task = self.task
         at = self.evaluation.rotation
@@ -485,9 +485,9 @@ def angle_at_c(linkage: Linkage, rotation: FloatArray) -> FloatArray:
 
 
 def path_rate(linkage: Linkage, at: FloatArray, both: NDArray[np.complex128]) -> NDArray[np.complex128]:
-    """Return the derivative of the coupler point with respect to the crank rotation, including the pivot's motion (m/rad).
+    """Return the derivative of the coupler point with respect to the crank rotation ``at``, with the pivot's motion (m/rad).
 
-    ``both`` are the derivatives of `Linkage.path_jacobian`, as complex numbers x + iy.
+    ``both`` are the derivatives of `Linkage.path_jacobian`, as complex numbers x + iy; the result is complex, too.
     """
     step = 1e-6
     ahead, behind = linkage.displacement(at + step), linkage.displacement(at - step)
@@ -499,9 +499,9 @@ def path_rate(linkage: Linkage, at: FloatArray, both: NDArray[np.complex128]) ->
 def nearest_rotations(
     linkage: Linkage, points: NDArray[np.complex128], begin: float = 0.0, end: float = 2.0 * pi
 ) -> FloatArray:
-    """Return the crank rotations at which the coupler point is nearest to points (complex, m), without jumps of a turn.
+    """Return the crank rotation at which the coupler point is nearest to each of ``points`` (complex, m).
 
-    The search covers the rotations from ``begin`` to ``end``, by default a whole turn.
+    Successive rotations are continued without jumps of a turn. The search covers rotations from ``begin`` to ``end`` (rad).
     """
     whole = end - begin >= 2.0 * pi - 1e-9
     phi = np.linspace(begin, end, 4 * CURVE, endpoint=not whole)
@@ -521,7 +521,7 @@ def nearest_rotations(
 
 
 def rank_solutions(solutions: Sequence[Solution]) -> tuple[Solution, ...]:
-    """Rank solutions: sound ones first, then by the task's objective.
+    """Rank solutions: sound solutions first, then by the task's objective.
 
     Solutions that are exact to rounding are ranked by their transmission angles.
     """

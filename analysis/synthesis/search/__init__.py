@@ -1,6 +1,6 @@
-"""Search for linkages: a scan in closed form gives starts for least squares and nonlinear programs; trade-offs.
+"""Search for linkages: scan for starts in closed form, optimise from the starts, and compute trade-offs.
 
-The names are those of ``__init__.pyi``; each is imported from its module when it is first used.
+The public names are listed in ``__init__.pyi``; each is imported from its module when it is first used.
 """
 
 from __future__ import annotations

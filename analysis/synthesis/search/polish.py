@@ -1,7 +1,8 @@
 """Optimise from the starts of a scan: SciPy's least squares if there are only bounds, IPOPT if there are constraints.
 
-Both use exact Jacobians. If the objective is not a sum of squares, squares are fitted first. Then `refine` minimises the area
-or the greatest distance of a path, and IPOPT the greatest error at given stations, an unknown that bounds all errors.
+Both solvers use exact Jacobians. If the objective is not a sum of squares, the squared errors are minimised first. Then
+`refine` minimises the area or the greatest distance between an untimed path and its target. For other tasks IPOPT minimises the
+greatest error at the stations: an unknown that bounds all errors.
 """
 
 from __future__ import annotations
@@ -64,18 +65,19 @@ FINISHED, LONG = 4, 1500
 PIECES = 3
 #: Greatest number of starts per piece of work on several cores; an interruption loses the piece.
 MOST = 32
-#: Linkages that differ by less than this, relative to the longest link and in rad, count as one.
+#: Linkages that differ by less than this, relative to the longest link and in rad, count as the same.
 DIFFERENT = 1e-3
-#: The same for paths during refinement: closer ones end at the same optimum.
+#: The same for linkages whose paths are being refined: closer linkages end at the same optimum.
 RACED = 0.02
 #: Quality below which points count as passed exactly (units squared).
 EXACT = 1e-14
 
 
 class _OneThread(ContextDecorator):
-    """A context in which linear algebra runs on one thread, as long as any of our threads is in it.
+    """A context in which linear algebra runs on one thread; several threads of this process may be in it at once.
 
-    The last digits of a sum depend on the number of threads, and on a flat slope they decide where a search ends.
+    The last digits of a sum depend on the number of threads. Where the objective is flat, these digits decide where a search
+    ends.
     """
 
     def __init__(self) -> None:
@@ -99,9 +101,9 @@ ONE_THREAD = _OneThread()
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Polished:
-    """Answers of the searches from all starts: ``kept`` are the feasible ones, best first, ``others`` the infeasible ones.
+    """The answers of the searches from all starts: feasible answers in ``kept``, best first, infeasible answers in ``others``.
 
-    ``done`` is the number of searches; ``begun`` are the starts that are feasible before any search, as answers.
+    ``done`` is the number of searches. ``begun`` has, as answers, the starts that are feasible before any search.
     """
 
     kept: tuple[Answer, ...]
@@ -114,7 +116,7 @@ class Polished:
     def from_answers(
         cls, found: Sequence[Answer], kept: Sequence[Answer], interrupted: bool, begun: Sequence[Answer] = ()
     ) -> Polished:
-        """Build the record from all answers ``found``, the feasible answers in order, and the starts that are feasible."""
+        """Build the record from all answers ``found``, feasible answers ``kept`` in order, and feasible starts ``begun``."""
         others = tuple(a for a in found if not a.feasible)
         return cls(kept=tuple(kept), others=others, done=len(found), interrupted=interrupted, begun=tuple(begun))
 
@@ -202,10 +204,11 @@ def _refine_in_laps(
     given: Sequence[Answer],
     laps: Sequence[tuple[int, int]],
 ) -> tuple[list[Answer], bool]:
-    """Refine many answers by few iterations each, then the best by more; return the answers, and whether Ctrl-C came.
+    """Refine many answers by few iterations each, then the best by more; return the answers, and whether Ctrl-C was pressed.
 
-    ``given`` are guesses, which take part in the first lap in any case; ``laps`` has for each lap how many of the best answers
-    take part, and their iterations. ``spread`` calls a method of `Polisher` for many items.
+    The refinement has several laps. ``laps`` has, for each lap, the number of answers that take part, the best ones, and their
+    limit of iterations. The guesses ``given`` always take part in the first lap. ``spread`` calls a method of `Polisher` for
+    many items.
     """
     for lap, (count, iterations) in enumerate(laps):
         # guesses take part in the first lap however poor they are; answers that do not take part are dropped
@@ -236,7 +239,10 @@ def _call_polisher(name: str, normal: Normal, limits: Limits, pivot: PivotUnknow
 def distinct_answers(
     answers: Sequence[Answer], count: int, pivot: PivotUnknown | None = None, *, distance: float = DIFFERENT
 ) -> list[Answer]:
-    """Return the first ``count`` answers that differ by ``distance`` in a dimension; lengths relative to the longest link."""
+    """Return the first ``count`` answers that are distinct: any two differ by at least ``distance`` in a dimension.
+
+    Lengths are compared relative to the longest link.
+    """
 
     def mark(answer: Answer) -> FloatArray:
         q, v = answer.start.q, answer.start.pivot
@@ -267,7 +273,7 @@ def distinct_answers(
 
 
 class Polisher:
-    """Optimiser for one task; its programs are built when they are first needed."""
+    """An optimiser for one task; it builds its nonlinear programs when they are first needed."""
 
     def __init__(self, normal: Normal, limits: Limits, pivot: PivotUnknown | None) -> None:
         self.normal, self.limits, self.pivot = normal, limits, pivot
@@ -277,7 +283,7 @@ class Polisher:
         self._programs: dict[tuple[str, bool, bool], Program] = {}
 
     def program(self, objective: Objective, *, exact: bool = False, judged: bool = False) -> Program:
-        """Return the program with this objective; with a fixed pivot ``exact`` has no effect."""
+        """Return the program with this objective; see `Statement`. With a fixed pivot ``exact`` has no effect."""
         key = objective, exact and self.pivot is not None, judged
         if key not in self._programs:
             self._programs[key] = Program(self.normal, self.limits, self.pivot, objective, exact=key[1], judged=judged)
@@ -299,14 +305,14 @@ class Polisher:
         return answer
 
     def fit_all(self, starts: Sequence[Start]) -> list[Answer]:
-        """Fit each of the starts."""
+        """Fit every start; see `fit`."""
         return [self.fit(start) for start in starts]
 
     def _solve_squares(self, start: Start) -> Answer:
         """Minimise the squared errors by IPOPT.
 
-        If a pivot's region consists of several triangles, the program is solved for those nearest to the pivot, again from each
-        better answer, until none is better.
+        If the region of a pivot consists of several triangles, the program is solved for the triangles nearest to the pivot.
+        This is repeated from the best answer until no answer is better.
         """
         program = self.program("squares")
         if all(len(triangles) == 1 for _, triangles in self.limits.regions):
@@ -329,10 +335,10 @@ class Polisher:
         return best
 
     def finish_squares(self, answer: Answer) -> Answer:
-        """Finish a fit of squared errors: continue it if it reached its limit of iterations, then settle its extremes.
+        """Finish a fit of squared errors: continue an unfinished search, then impose the bounds at the extremes of its result.
 
-        The last step imposes the bounds at the extremes of the solution, see `Program.settle_extremes`. On a flat slope the
-        result of an unfinished search would depend on rounding.
+        Where the objective is flat, the result of an unfinished search would depend on rounding. For the bounds at extremes see
+        `Program.settle_extremes`.
         """
         if self.by_least_squares:
             return answer
@@ -347,7 +353,7 @@ class Polisher:
         return last.settle_extremes(answer, lambda start, places: last.solve(start, places=places))
 
     def minimise_objectives(self, answers: Sequence[Answer]) -> list[Answer]:
-        """Minimise, from each answer, the objective that replaces the error."""
+        """Minimise, from each answer, the objective `Limits.least`, which replaces the error."""
         return [self._minimise_objective(answer) for answer in answers]
 
     def _minimise_objective(self, answer: Answer) -> Answer:
@@ -374,7 +380,7 @@ class Polisher:
         )
 
     def with_measure(self, answer: Answer) -> Answer:
-        """Return the answer with another quality: the measure of the deviation of its path from the target."""
+        """Return the answer with the area or the greatest distance between its path and the target as its quality."""
         curve, _ = self.refinement.trace(*self.refinement.program.unknowns_and_parameters(answer.start))
         return replace(answer, start=replace(answer.start, quality=self.refinement.measure(curve)))
 
@@ -411,7 +417,7 @@ class Polisher:
         return self._refinement
 
     def judge_start(self, start: Start) -> Answer:
-        """Judge a start as it is: return it as an answer that says whether it meets every constraint and bound."""
+        """Evaluate a start without optimising it; return an answer that says whether it meets every constraint and bound."""
         if self.by_least_squares:
             within = distances_from_bounds(self.normal, self.limits.low, self.limits.high, start).max() <= KEPT
             quality = sum_of_squares(self.normal, start)
@@ -427,7 +433,7 @@ class Polisher:
 def worst_violation(
     solution: Solution, bounds: Mapping[str, tuple[float, float]] | None, constraints: Sequence[Constraint | Stroke]
 ) -> str:
-    """Return as text which constraint a linkage violates most, and by how much; empty if it violates none."""
+    """Return as text the constraint or bound that a linkage violates most, and by how much; empty if it violates none."""
     task, linkage = solution.task, solution.linkage
     normal = normal_form(task)
     ratios = [linkage.pivot.ratio] if isinstance(linkage, FiveBar) else []
@@ -456,7 +462,7 @@ def residuals(
     Returns
     -------
     residual : ndarray, shape (m,)
-        n residuals each of x, y and angle, in this order, if the task has them.
+        n residuals of x, then n of y, then n of the angle, if the task has these targets.
     jacobian : ndarray, shape (m, 11)
         Derivatives with respect to `UNKNOWNS`.
     rate : ndarray, shape (m,)
@@ -499,7 +505,7 @@ def sum_of_squares(normal: Normal, start: Start) -> float:
 
 
 def fit_least_squares(normal: Normal, limits: Limits, start: Start) -> Answer:
-    """Minimise the squared errors within bounds by SciPy's trust region method, with the exact Jacobian of the kernels."""
+    """Minimise the squared errors within bounds by SciPy's trust region method, with the exact Jacobian."""
     free = np.nonzero(limits.high > limits.low)[0]
     timed, n = normal.timed, normal.n
     base = clip_to_bounds(start.q, limits.low, limits.high)

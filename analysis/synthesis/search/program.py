@@ -1,7 +1,8 @@
 """Solve the nonlinear program of a synthesis by IPOPT, with exact derivatives from CasADi.
 
-`statement` states the program. This module evaluates it, converts a start into unknowns and parameters and back, solves it, and
-checks the answer: whether it meets the constraints, for a moving pivot at the extremes of its motion.
+The module `statement` states the program. This module converts a start into unknowns and parameters of the program and back,
+evaluates and solves the program, and checks whether the answer meets the constraints; if the pivot moves, also at the extremes
+of its motion.
 """
 
 from __future__ import annotations
@@ -47,7 +48,10 @@ class Program(Statement):
 
     @cached_property
     def _evaluate(self) -> Any:
-        """Return objective and constraints as a CasADi function, whose values are finite if a start can be evaluated."""
+        """Return a CasADi function of unknowns and parameters: the objective and the constraints.
+
+        The values are finite if the links can be joined.
+        """
         return self._casadi.Function("value", [self._nlp["x"], self._nlp["p"]], [self._nlp["f"], self._nlp["g"]])
 
     @cached_property
@@ -95,7 +99,10 @@ class Program(Statement):
 
     @cached_property
     def trace(self) -> Any:
-        """Return a CasADi function: the coupler point at a fraction of a path's rotation, (2, 1), and its derivatives."""
+        """Return a CasADi function of the unknowns, the parameters and a fraction of the crank rotation of a path.
+
+        The function computes the coupler point, shape (2, 1), and its derivatives with respect to the k unknowns, shape (2, k).
+        """
         casadi, x, p = self._casadi, self._nlp["x"], self._nlp["p"]
         share = casadi.SX.sym("share")
         first, last = self._ends
@@ -153,9 +160,10 @@ class Program(Statement):
         places: Sequence[FloatArray] | None = None,
         share: float | None = None,
     ) -> tuple[FloatArray, FloatArray]:
-        """Return the unknowns and parameters of a start; see `solve`.
+        """Convert a start to the unknowns and parameters of the program; for the other arguments see `solve`.
 
-        ``share`` is the fraction of its bounds that the pivot's motion may use at the rotations at which it is bounded.
+        ``share`` is the fraction of its bounds that the pivot's motion may use at the rotations at which it is bounded; by
+        default it leaves the margin that `solve` needs.
         """
         count = pivot_size(self.pivot)
         pivot = np.zeros(count) if len(start.pivot) == 0 else start.pivot
@@ -212,14 +220,14 @@ class Program(Statement):
         ----------
         start : Start
         size : float
-            Magnitude of the greatest error (units) or greatest value, if that is minimised.
+            Magnitude of the greatest error (units) or of the greatest value, if the program minimises one of these.
         iterations : int
             Limit of iterations.
         pieces : sequence of int, optional
             Index of the triangle of each region in which the pivot must lie; by default the nearest.
         places : sequence of ndarray, optional
-            Rotations of `extremes` at which the bounds of the pivot's motion are imposed. Without them the bounds are imposed
-            on a grid, with a margin that guarantees them everywhere.
+            Crank rotations, from `extremes`, at which the bounds of the pivot's motion are imposed. Without these rotations the
+            bounds are imposed on a grid, with a margin that guarantees the bounds everywhere.
         """
         z0, parameters = self.unknowns_and_parameters(start, size=size, pieces=pieces, places=places)
         if not all(np.isfinite(value).all() for value in self.evaluate(z0, parameters)):
@@ -236,9 +244,9 @@ class Program(Statement):
         )
 
     def judge_unknowns(self, z: FloatArray, parameters: FloatArray, start: Start) -> Answer:
-        """Return the answer that the unknowns z, reached from ``start``, stand for.
+        """Evaluate the program at unknowns z, reached from ``start``, and return the result as an answer.
 
-        The program is evaluated anew, because CasADi's own values are zero if IPOPT ends at NaN.
+        The values that CasADi returns with a solution are not used, because they are zero if IPOPT ends at NaN.
         """
         f, g = self.evaluate(z, parameters)
         over = np.maximum(self.g_low - g, g - self.g_high) if np.isfinite(g).all() else np.full(len(g), inf)
@@ -259,7 +267,7 @@ class Program(Statement):
         )
 
     def recover_start(self, z: FloatArray, start: Start, quality: float) -> Start:
-        """Convert unknowns to a start; the stations' rotations are those of ``start`` unless all of them are unknowns."""
+        """Convert unknowns z to a start; unless z has the rotations of all stations, they are taken from ``start``."""
         end = len(UNKNOWNS) + pivot_size(self.pivot)
         rotation = None if self.normal.timed else start.rotation
         if not self.normal.timed and len(self.knots) == self.normal.n:
@@ -274,7 +282,7 @@ class Program(Statement):
         )
 
     def judge_start(self, start: Start) -> Answer:
-        """Judge a start as it is: return it as an answer, with whether it meets all constraints and its worst violation."""
+        """Evaluate a start without optimising it; return an answer with its feasibility and its worst violation."""
         places = self.extremes(start)
         ways = product(*(range(len(triangles)) for _, triangles in self.limits.regions))
         best: Answer | None = None
@@ -289,10 +297,10 @@ class Program(Statement):
         return replace(best, feasible=best.feasible and within)
 
     def settle_extremes(self, answer: Answer, solve: Callable[[Start, Sequence[FloatArray]], Answer]) -> Answer:
-        """Solve repeatedly, each time with bounds at the extremes of the previous solution, until the pivot's motion settles.
+        """Solve repeatedly, with bounds at the extremes of the previous solution, until the pivot's motion no longer changes.
 
-        The extremes are those of the pivot's motion, and of functions that are bounded along the crank's rotation. ``solve``
-        returns an answer from a start and its extremes.
+        The extremes are the crank rotations that `extremes` returns. ``solve`` computes an answer from a start and its
+        extremes.
         """
         if not (self._peaks or self._along_functions):
             return answer
@@ -314,9 +322,9 @@ class Program(Statement):
         return better_answer(now) if kept.feasible else replace(answer, feasible=first.feasible)
 
     def extremes(self, start: Start) -> list[FloatArray]:
-        """Return the crank rotations at which bounded motions of the pivot, or functions `RotationRequirement`, are extreme.
+        """Return the crank rotations at which each bounded motion of the pivot, and each `RotationRequirement`, is extreme.
 
-        Extremes of a motion or of one of its derivatives are roots of the next derivative, a trigonometric polynomial.
+        The extremes of a motion, or of a derivative of it, are roots of the next derivative, a trigonometric polynomial.
         """
         if not self._peaks:
             return self._peak_rotations(start)
@@ -332,7 +340,7 @@ class Program(Statement):
         return found + self._peak_rotations(start)
 
     def _peak_rotations(self, start: Start) -> list[FloatArray]:
-        """Return the rotations at which each function `RotationRequirement` has its greatest values; see `find_peaks`."""
+        """Return the peaks of each `RotationRequirement`: crank rotations and curvatures, as `find_peaks` returns them."""
         values = dict(zip(UNKNOWNS, start.q.tolist())) | {"branch": float(start.branch)}
         p = convert_to_si(SimpleNamespace(**values), self.normal.unit, self.normal.origin)
         return [find_peaks(along, p, FURTHER) for along, _ in self._along_functions]
@@ -341,7 +349,8 @@ class Program(Statement):
 def _grashof_rows(type_: str | None, links: FloatArray) -> FloatArray:
     """Return rows r with r . (l1, l2, l3, l4) <= 0 for a four-bar of this type, shape (6, 4); unused rows are zero.
 
-    Triple-rockers do not form a convex set of lengths: the shortest and the longest link of ``links`` must remain so.
+    The lengths of all triple-rockers do not form a convex set. For this type the rows therefore also require that the shortest
+    and the longest of ``links`` remain the shortest and the longest.
     """
     rows = np.zeros((6, 4))
     if type_ is None:

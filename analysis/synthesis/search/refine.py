@@ -1,10 +1,10 @@
-"""Refine untimed paths: minimise the measure between the whole curve and its target.
+"""Refine linkages for untimed paths: minimise the area or the greatest distance between the whole curve and its target.
 
-A least-squares fit at ordered stations cannot cut a corner, and its sum of squares is not an area. Here the curve is the
-polygon by which a solution is evaluated, and the measure is that of `task.target`: the area of the symmetric difference, the
-area of the strip along an open path, or the Hausdorff distance. The areas have a continuous gradient, which follows from the
-polygons and the exact derivatives of the coupler point; the Hausdorff distance becomes an unknown that bounds many distances.
-SciPy's SLSQP starts from an optimum of the squares, in scaled coordinates that each move the curve by the same amount.
+A least-squares fit at ordered stations cannot cut a corner, and its sum of squares is not an area. Here the curve is the same
+polygon as in the evaluation of a solution. The measure is one of `task.target`: the area of the symmetric difference, the area
+of the strip along an open path, or the Hausdorff distance. The areas have a continuous gradient, which follows from the
+polygons and the exact derivatives of the coupler point. The Hausdorff distance becomes an unknown that bounds many distances.
+SciPy's SLSQP starts from a least-squares optimum; a unit step in any of its scaled coordinates moves the curve equally far.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ FloatArray = NDArray[np.float64]
 Made = TypeVar("Made")
 #: Iterations of SLSQP, and the change of the measure, relative to its first value, at which it ends.
 ITERATIONS, CHANGE = 100, 1e-7
-#: Added to the mean square displacement by which a direction is scaled, relative to the greatest: it limits the scaling.
+#: Number added to the mean square displacement by which a direction is scaled, relative to the greatest one, as a limit.
 STIFF = 1e-6
 #: Least number of pieces of the target at which distances are computed.
 PIECES = 360
@@ -49,6 +49,7 @@ class Distances(NamedTuple):
     Attributes
     ----------
     distance : ndarray, shape (k,)
+        Distances (units).
     before, after : ndarray of int, shape (k,)
         Indices of the two points of the curve on which each distance depends.
     early, late : ndarray, shape (2, k)
@@ -63,7 +64,10 @@ class Distances(NamedTuple):
 
 
 class Refinement:
-    """Minimisation of the measure of a path, for a program with the objective "curve" or "least curve"."""
+    """Minimisation of the measure (area or greatest distance) between a curve and its target path.
+
+    ``program`` has the objective "curve" or "least curve"; see `Statement`.
+    """
 
     def __init__(self, program: Program) -> None:
         self.program, normal = program, program.normal
@@ -145,7 +149,7 @@ class Refinement:
     # Minimisation
 
     def value(self, z: FloatArray, parameters: FloatArray, curve: FloatArray) -> float:
-        """Return the value that is minimised: the measure or, if that is only bounded, the program's objective.
+        """Return the value that is minimised: the measure or, if the measure is only bounded, the program's objective.
 
         The result is infinite if the bound is exceeded.
         """
@@ -154,7 +158,7 @@ class Refinement:
         return self.program.evaluate(z, parameters)[0] if self.excess_over_bound(curve) <= WITHIN * self.limit else inf
 
     def excess_over_bound(self, curve: FloatArray) -> float:
-        """Return by how much the greatest distance exceeds its bound (units), negative within it."""
+        """Return by how much the greatest distance exceeds its bound (units); negative if it does not."""
         if self.limit is None or not np.isfinite(curve).all():
             return inf
         return hausdorff(curve.T, self._target, closed=self.normal.closed) - self.limit
@@ -167,7 +171,10 @@ class Refinement:
         places: Sequence[FloatArray] | None = None,
         size: float = 1.0,
     ) -> Answer:
-        """Minimise the measure near an answer; return the best answer that meets the constraints, or else the given one."""
+        """Minimise the measure near an answer; return the best answer found that meets the constraints.
+
+        If there is none, return the given answer, marked as infeasible. For ``places`` and ``size`` see `Program.solve`.
+        """
         program = self.program
         z0, parameters = program.unknowns_and_parameters(answer.start, places=places, size=size)
         curve, slopes = self.trace(z0, parameters)
@@ -206,7 +213,7 @@ class Refinement:
         return replace(ended, start=start, converged=bool(found.success), iterations=int(found.nit))
 
     def _distance_choices(self) -> Sequence[Callable[[FloatArray], Sequence[Any]]]:
-        """Return, for each round, a function that chooses the distances to be constrained: first a few, then the large ones."""
+        """Return, for each round, a function that chooses which distances of a curve are bounded: a few, then the large."""
         if self.normal.quality != "worst":
             return (lambda _: (),)
 
@@ -223,7 +230,10 @@ class Refinement:
         return choose_few, choose_large, choose_large
 
     def _scaled_directions(self, curve: FloatArray, slopes: FloatArray) -> FloatArray:
-        """Return directions of the unknowns, shape (k, free); each moves the curve across itself by 1, root mean square."""
+        """Return scaled directions in the space of the k unknowns, shape (k, number of free unknowns).
+
+        A step of 1 along a direction moves the curve perpendicular to itself by 1, in the root mean square.
+        """
         tangent = np.roll(curve, -1, axis=1) - np.roll(curve, 1, axis=1)
         normal = np.array([-tangent[1], tangent[0]]) / np.maximum(np.hypot(*tangent), 1e-300)
         across = (slopes * normal[:, :, None]).sum(axis=0)[:, self.free]
@@ -234,7 +244,10 @@ class Refinement:
         return stretch
 
     def met(self, start: Start, z: FloatArray, parameters: FloatArray) -> FloatArray:
-        """Find the crank rotations in order at which the curve is nearest to the stations, by dynamic programming."""
+        """Find, by dynamic programming, the crank rotations at which the curve is nearest to the stations.
+
+        The rotations are in the order of the stations. With a straight part the program's own rotations are returned.
+        """
         normal, program = self.normal, self.program
         assert normal.points is not None
         assert start.rotation is not None
@@ -273,9 +286,9 @@ class Refinement:
 
 
 class _Descent:
-    """The problem for SLSQP: the measure, relative to its first value, as a function of steps y along scaled directions.
+    """The problem for SLSQP: minimise the measure, relative to its first value, over steps y along scaled directions.
 
-    If the greatest distance is minimised, y has one more component, the bound of all distances.
+    If the greatest distance is minimised, y has one more component: the bound of all distances.
     """
 
     def __init__(
@@ -306,12 +319,12 @@ class _Descent:
         return y
 
     def unknowns(self, y: FloatArray) -> FloatArray:
-        """Return the program's unknowns, clipped to their bounds."""
+        """Return the program's unknowns at steps y, clipped to their bounds."""
         z = self._z0 + self._stretch @ y[: self._stretch.shape[1]]
         return np.clip(z, self._program.low, self._program.high)
 
     def value(self, y: FloatArray) -> tuple[float, FloatArray]:
-        """Return the function that is minimised, and its gradient; a large value if the links cannot be joined."""
+        """Return the minimised function at steps y, and its gradient; a large value if the links cannot be joined."""
         if self._bound_unknown:
             return float(y[-1]), np.append(np.zeros(len(y) - 1), 1.0)
         z = self.unknowns(y)
@@ -326,11 +339,11 @@ class _Descent:
         return (area + added) / self._size, whole @ self._stretch / self._size
 
     def _bounded_distances(self, z: FloatArray) -> list[tuple[Distances, Any]]:
-        """Return the two sets of distances of `Refinement.both_distances`, each with the indices of the bounded ones."""
+        """Return the two sets of distances of `Refinement.both_distances`, each with the indices of its bounded distances."""
         return list(zip(self._refinement.both_distances(self.curve(z)[0]), self._chosen))
 
     def constraints(self) -> list[dict[str, Any]]:
-        """Return the constraints for SLSQP: those of the program, its bounds, and the bound of the distances."""
+        """Return the constraints for SLSQP: the program's constraints, the bounds of its unknowns, and bounds of distances."""
         program = self._program
         low, high = program.g_low, program.g_high
         equal = low == high
@@ -385,7 +398,7 @@ class _Descent:
 
 
 def _cache_last(function: Callable[[FloatArray], Made]) -> Callable[[FloatArray], Made]:
-    """Return a function that keeps the last value of ``function``, for a second call with the same unknowns."""
+    """Return ``function`` with a cache of its last value, for a second call with the same unknowns."""
     last: list[tuple[bytes, Made]] = []
 
     def cached(z: FloatArray) -> Made:
@@ -402,7 +415,7 @@ def _coordinates(points: NDArray[np.complex128]) -> FloatArray:
 
 
 def _midpoints(line: FloatArray, closed: bool) -> FloatArray:
-    """Return the midpoints of the pieces of a polyline, rows x, y."""
+    """Return the midpoints of a polyline's segments, shape (2, number of segments)."""
     both = 0.5 * (line + np.roll(line, -1, axis=1))
     return np.ascontiguousarray(both if closed else both[:, :-1])
 
@@ -410,7 +423,7 @@ def _midpoints(line: FloatArray, closed: bool) -> FloatArray:
 def _nearest(
     points: FloatArray, line: FloatArray, closed: bool
 ) -> tuple[FloatArray, NDArray[np.int64], FloatArray, FloatArray]:
-    """Return each point's distance from a polyline, its nearest piece, the fraction along this piece, and the nearest point."""
+    """Return each point's distance from a polyline, the nearest segment, the fraction along it, and the nearest point."""
     count = points.shape[1]
     distance, piece, share = np.empty(count), np.empty(count, dtype=np.int64), np.empty(count)
     find_nearest(points, line, closed, distance, piece, share)
@@ -421,7 +434,7 @@ def _nearest(
 def cut_into_pieces(
     outline: NDArray[np.complex128], weights: FloatArray, closed: bool
 ) -> tuple[FloatArray, FloatArray]:
-    """Cut the segments of an outline into short pieces; return their ends, rows x, y, and the weight of each piece."""
+    """Cut the segments of an outline into short pieces; return the ends of the pieces, shape (2, n), and their weights."""
     points = np.append(outline, outline[0]) if closed else outline
     around = np.append(weights, weights[0]) if closed else weights
     lengths = np.abs(np.diff(points))

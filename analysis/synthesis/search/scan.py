@@ -1,15 +1,16 @@
-"""Scan many thousand linkages globally; the best position, size and coupler point of each follow in closed form.
+"""Scan many thousand linkages; compute the best position, size and coupler point of each in closed form.
 
-Variable projection: let the shape of the linkage and the crank's phase be given. The shape is the ratios of the links to the
-ground link, for a slider-crank to the coupler, and for a geared five-bar also the second crank and its phase. Then the coupler
-point is z0 + c1 exp(i th2) + c2 exp(i th3), linear in three complex unknowns: position, size with direction, and coupler point.
-The other unknowns are sampled by a Sobol sequence, which a seed scrambles.
+Variable projection: let the shape of the linkage and the phase of its crank be given. The shape of a four-bar is the ratios of
+its links to the ground link; for a slider-crank, to the coupler. The shape of a geared five-bar also includes length and phase
+of the second crank. Then the coupler point is z0 + c1 exp(i th2) + c2 exp(i th3). It is linear in three complex unknowns: the
+position z0, the size and direction c1, and the coupler point c2. All other unknowns are sampled by a Sobol sequence, which is
+scrambled by a seed.
 
 - Timed tasks: shape and phase are sampled.
 - Few untimed stations: shape, phase and the stations' crank rotations, in order, are sampled.
 - Untimed paths: shape and coupler point are sampled. Each coupler curve is laid over the target by the best similarity
-  transformation, at equal arc lengths, over all starting points (by a fast Fourier transform of their correlation), or, for an
-  open path, over all pieces of the curve.
+  transformation. Curve and target are compared at equal arc lengths, for all starting points on the curve (by a fast Fourier
+  transform of their correlation); for an open path, they are compared for many pieces of the curve.
 - Rocker functions: shape and phase are sampled; the mounting angle is the mean of the differences.
 """
 
@@ -40,7 +41,7 @@ SHAPES = ((0.01, 3.0), (0.05, 6.0), (0.05, 6.0))
 GUIDED, SECOND, AROUND = ((1e-3, 2.0), (0.01, 3.0)), (0.01, 3.0), 48
 #: Number of candidates that are placed together.
 CHUNK = 4096
-#: Of this many coupler points one is at the crank pin.
+#: One of this many coupler points is at the crank pin.
 PINNED = 64
 #: Number of coupler curves of a chunk that are placed over the target: the most similar ones.
 PLACED = 160
@@ -50,16 +51,16 @@ CURVE, EVEN = 128, 64
 PIECE = 24
 STARTS = np.arange(0, CURVE, 8)
 SPANS = np.array([10, 16, 24, 36, 52, 72, 96, 124])
-#: Starts that differ by less than this in the logarithms of their shape and in phase count as one.
+#: Starts that differ by less than this in the logarithms of their shape and in phase count as the same.
 APART = 0.08
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Candidates:
-    """Candidates: their quality (m,), infinite for those that were not placed, and their `UNKNOWNS` ``q`` (m, 11).
+    """A set of m candidates: quality, shape (m,), and dimensions ``q`` in the order of `UNKNOWNS`, shape (m, 11).
 
-    ``rotation`` (m, n) are the stations' crank rotations, None if the task gives them; ``pivot`` (m, 2) are length and phase of
-    a second crank.
+    The quality is infinite for a candidate that was not placed over the target. ``rotation``, shape (m, n), has the crank
+    rotations of the stations; None if the task gives them. ``pivot``, shape (m, 2), has length and phase of a second crank.
     """
 
     quality: FloatArray
@@ -70,16 +71,16 @@ class Candidates:
 
 
 class _FourBarShapes:
-    """Shapes of four-bars: the ratios of links that are sampled, and which shapes the constraints allow.
+    """Shapes of four-bars: the ratios of links that are sampled, and methods that check a shape.
 
-    The ratios are those of the unknowns ``others`` to the unknown ``base``, by their indices, within ``ranges``.
+    Each ratio is a link of ``others`` divided by the link ``base`` (indices in `UNKNOWNS`); ``ranges`` limits the ratios.
     """
 
     base, others, ranges = 2, slice(3, 6), SHAPES
 
     @staticmethod
     def links(shapes: FloatArray, limits: Limits) -> FloatArray:
-        """Return rows (l1, l2, l3, l4, l5), relative to the base; 0 for a link that is absent."""
+        """Return the links (l1, l2, l3, l4, l5) of each shape relative to its base link, shape (m, 5); 0 for an absent link."""
         return np.column_stack([np.ones(len(shapes)), shapes[:, :3], np.zeros(len(shapes))])
 
     @staticmethod
@@ -93,7 +94,7 @@ class _FourBarShapes:
 
     @staticmethod
     def ratios(start: Start) -> FloatArray:
-        """Return the ratios of links by which starts are distinguished."""
+        """Return the ratios of a start's links, by which similar starts are recognised."""
         ratios: FloatArray = start.q[3:6] / start.q[2]
         return ratios
 
@@ -115,7 +116,7 @@ class _SliderCrankShapes(_FourBarShapes):
 
 
 class _FiveBarShapes(_FourBarShapes):
-    """Shapes of geared five-bars: those of a four-bar, with length and phase of the second crank."""
+    """Shapes of geared five-bars: the ratios of a four-bar, with length and phase of the second crank."""
 
     @staticmethod
     def links(shapes: FloatArray, limits: Limits) -> FloatArray:
@@ -126,7 +127,7 @@ class _FiveBarShapes(_FourBarShapes):
     def meets_transmission(shapes: FloatArray, links: FloatArray, limits: Limits, least: float) -> NDArray[np.bool_]:
         """Return for each shape whether it meets the least transmission angle (rad) at `AROUND` rotations.
 
-        Some rotations are tried first, and the others only for the shapes that are left.
+        A few rotations are tried first; the remaining rotations are tried only for the shapes that passed.
         """
         turned = limits.gears
         allowed = np.ones(len(shapes), dtype=bool)
@@ -150,7 +151,7 @@ _SHAPES: Mapping[Kind, type[_FourBarShapes]] = {
 
 
 def scan(normal: Normal, limits: Limits, *, seed: int, candidates: int, starts: int) -> list[Start]:
-    """Find the best starts of both assemblies, no two of them close together, best first.
+    """Find the best starts of all allowed assemblies, the best first; no two of them are similar.
 
     Parameters
     ----------
@@ -183,9 +184,10 @@ def scan(normal: Normal, limits: Limits, *, seed: int, candidates: int, starts: 
 
 
 def _allowed_shapes(limits: Limits, seed: int, count: int) -> Iterator[FloatArray]:
-    """Yield allowed shapes, with the other sampled numbers in [0, 1), in chunks.
+    """Yield ``count`` shapes that the limits allow, in arrays with one row per shape; fewer if allowed shapes are rare.
 
-    A row has the ratios (l2/l1, l3/l1, l4/l1), for a slider-crank (l1/l3, l2/l3, 1), followed by six numbers.
+    A row has the ratios (l2/l1, l3/l1, l4/l1), for a slider-crank (l1/l3, l2/l3, 1), followed by six sampled numbers in [0, 1)
+    for phase, coupler point and second crank.
     """
     sequence = qmc.Sobol(9, seed=seed)
     kept, tried = 0, 0
@@ -200,7 +202,7 @@ def _allowed_shapes(limits: Limits, seed: int, count: int) -> Iterator[FloatArra
 
 
 def _merge_chunks(chunks: Iterator[FloatArray]) -> Iterator[FloatArray]:
-    """Yield the same rows in chunks of at least `CHUNK`: of the curves of a chunk only the best are placed."""
+    """Merge chunks of shapes until each has at least `CHUNK` rows: only the best curves of a chunk are placed."""
     rows: list[FloatArray] = []
     for chunk in chunks:
         rows.append(chunk)
@@ -212,7 +214,7 @@ def _merge_chunks(chunks: Iterator[FloatArray]) -> Iterator[FloatArray]:
 
 
 def _impossible_limit(limits: Limits, seed: int) -> str:
-    """Describe in words the limit that alone leaves no shape, or all limits if only all together leave none."""
+    """Return, in words, the limit that no shape meets; all limits if each one alone can be met."""
     free = replace(limits, low=np.full(len(limits.low), 1e-9), high=np.full(len(limits.high), 1e9))
     alone = {"is within the bounds of the links": replace(limits, turn=None, grashof=None)}
     if limits.turn is not None:
@@ -228,13 +230,13 @@ def _impossible_limit(limits: Limits, seed: int) -> str:
 
 
 def _sample_shapes(unit: FloatArray, limits: Limits) -> FloatArray:
-    """Map rows of numbers in [0, 1) to rows of `_allowed_shapes`."""
+    """Convert rows of nine numbers in [0, 1) to shapes: rows as in `_allowed_shapes`."""
     low, high = np.log(_ratio_ranges(limits)).T
     return np.hstack([np.exp(low + (high - low) * unit[:, :3]), unit[:, 3:]])
 
 
 def _ratio_ranges(limits: Limits) -> FloatArray:
-    """Return the least and greatest ratios of `_allowed_shapes`, shape (3, 2), within the bounds of the links."""
+    """Return the least and the greatest value of each sampled ratio of links, shape (3, 2), within the links' bounds."""
     own = _SHAPES[limits.linkage.kind]
     base, of = own.base, own.others
     given = np.column_stack([limits.low[of] / limits.high[base], limits.high[of] / limits.low[base]])
@@ -265,13 +267,16 @@ def _is_allowed(shapes: FloatArray, limits: Limits) -> NDArray[np.bool_]:
 
 
 def _second_phase(shapes: FloatArray, phase: FloatArray | float, limits: Limits) -> FloatArray:
-    """Return the second crank's phase: a sampled angle plus ratio times ``phase``, which then does not affect the curve."""
+    """Return the phase of the second crank: a sampled angle plus the gear ratio times ``phase``, the first crank's phase.
+
+    With this sum the first crank's phase does not affect the coupler curve.
+    """
     turned: FloatArray = 2.0 * pi * shapes[:, 7] + limits.ratio * phase
     return turned
 
 
 def _size_range(links: FloatArray, limits: Limits) -> tuple[FloatArray, FloatArray]:
-    """Return the least and greatest factor with which all links are within their bounds."""
+    """Return the least and the greatest factor that brings all ``links`` of a shape within their bounds, each shape (m,)."""
     second = limits.second or (0.0, inf)
     there = links > 0.0
     low, high = (
@@ -306,9 +311,9 @@ def _directions(
     limits: Limits,
     turned: FloatArray | float = 0.0,
 ) -> tuple[ComplexArray, ComplexArray]:
-    """Compute the directions of coupler and rocker, complex, shape (m, n), at n crank rotations of m shapes.
+    """Compute the directions of coupler and rocker as complex unit numbers, shape (m, n), for m shapes at n crank rotations.
 
-    Each shape may have its own rotation ``turned`` (rad), which is added to all of its rotations.
+    ``phase`` is the crank phase of each shape. ``turned`` (rad) is added to all crank rotations; it may differ between shapes.
     """
     first, second = limits.gears
     links = _SHAPES[limits.linkage.kind].links(shapes, limits)
@@ -322,7 +327,7 @@ def _directions(
 
 
 def _place_functions(normal: Normal, limits: Limits, shapes: FloatArray, branch: int) -> Candidates:
-    """Place rocker functions: shape and phase are sampled; the mounting angle follows."""
+    """Compute the best mounting angle of sampled shapes and phases for a rocker function, and return them as candidates."""
     assert normal.rotation is not None
     assert normal.angle is not None
     phase = 2.0 * pi * shapes[:, 3]
@@ -343,7 +348,7 @@ def _place_functions(normal: Normal, limits: Limits, shapes: FloatArray, branch:
 
 
 def _place_slider_functions(normal: Normal, limits: Limits, shapes: FloatArray, branch: int) -> Candidates:
-    """Place slider functions: shape and phase are sampled; size and position of the shaft follow."""
+    """Compute the best size and shaft position of sampled shapes and phases for a slider function; return candidates."""
     assert normal.rotation is not None
     assert normal.points is not None
     phase = 2.0 * pi * shapes[:, 3]
@@ -369,7 +374,10 @@ def _place_slider_functions(normal: Normal, limits: Limits, shapes: FloatArray, 
 def _place_timed(
     normal: Normal, limits: Limits, shapes: FloatArray, branch: int, random: np.random.Generator | None
 ) -> Candidates:
-    """Place timed paths and motions by variable projection; untimed ones at random rotations, in order."""
+    """Place sampled shapes at the targets of a path or motion by variable projection; return candidates.
+
+    If the task gives no crank rotations, the stations get random rotations in order, from ``random``.
+    """
     phase = 2.0 * pi * shapes[:, 3]
     links = _SHAPES[limits.linkage.kind].links(shapes, limits)
     n = normal.n
@@ -414,7 +422,10 @@ def _place_timed(
 
 
 def _solve_projection(basis: ComplexArray, p: ComplexArray, w: FloatArray) -> ComplexArray:
-    """Solve p = z . basis for every row by weighted least squares; basis (m, k, n), p (n,) or (m, n); z (m, k)."""
+    """Solve p = z . basis for z, shape (m, k), by weighted least squares in each of m rows.
+
+    ``basis`` has shape (m, k, n), ``p`` shape (n,) or (m, n), and the weights ``w`` shape (n,).
+    """
     weighted = basis.conj() * w
     gram = weighted @ basis.transpose(0, 2, 1)
     # transposed: gram[a, b] = sum of conj(basis_a) w basis_b
@@ -427,7 +438,7 @@ def _solve_projection(basis: ComplexArray, p: ComplexArray, w: FloatArray) -> Co
 
 
 def _place_paths(normal: Normal, limits: Limits, shapes: FloatArray, branch: int) -> Candidates:
-    """Place untimed paths: coupler curves are laid over the target by a similarity transformation."""
+    """Lay the coupler curves of sampled shapes over an untimed path by similarity transformations; return candidates."""
     links = _SHAPES[limits.linkage.kind].links(shapes, limits)
     rotation = np.linspace(0.0, 2.0 * pi, CURVE, endpoint=False)
     coupler, _ = _directions(shapes, np.zeros(len(shapes)), rotation, branch, limits)
@@ -534,7 +545,7 @@ def _place_open_paths(
 def _clip_sizes(
     scale: ComplexArray, links: FloatArray, point: ComplexArray, limits: Limits
 ) -> tuple[FloatArray, ComplexArray]:
-    """Return sizes, shape (m,), and complex scales, clipped to the bounds of links and coupler point."""
+    """Clip the complex scales of m curves to the bounds of links and coupler point; return their magnitudes and the scales."""
     least, most = _size_range(links, limits)
     most = np.minimum(most, limits.high[6] / np.maximum(np.abs(point), 1e-300))
     size = np.abs(scale)
@@ -552,7 +563,10 @@ def _pack_unknowns(
 
 
 def _resample_evenly(curves: ComplexArray, k: int) -> tuple[ComplexArray, FloatArray]:
-    """Resample closed curves at equal arc lengths, shape (m, k); return the crank rotation at each of these points, too."""
+    """Return k points at equal arc lengths on each of m closed curves, shape (m, k), and the crank rotations of these points.
+
+    The points of ``curves`` are at equal crank rotations over a turn.
+    """
     m, n = curves.shape
     ring = np.hstack([curves, curves[:, :1]])
     length = np.hstack([np.zeros((m, 1)), np.cumsum(np.abs(np.diff(ring, axis=1)), axis=1)])
@@ -570,7 +584,7 @@ def _resample_evenly(curves: ComplexArray, k: int) -> tuple[ComplexArray, FloatA
 
 
 def _distinct_starts(found: list[Candidates], starts: int, limits: Limits) -> list[Start]:
-    """Return the best candidates as starts, none of them within `APART` of a better one."""
+    """Return the best candidates as starts, at most ``starts``; none of them is within `APART` of a better start."""
     best = [
         Start(
             q=c.q[i],

@@ -64,9 +64,10 @@ class Synthesis(NotebookResult):
     task : Task
         The task with the weights of the search.
     solutions : tuple of Solution
-        Those without defects first, then by error. Each also represents its mirror images and near copies, its ``variants``.
+        Solutions without defects come first, then in order of error. A solution also represents its mirror images and near
+        copies, which are its ``variants``.
     method : str
-        How they were found: "scan" or "closed form".
+        How the solutions were found: "scan" or "closed form".
     seed : int
         Seed of the search.
     starts : int
@@ -95,7 +96,7 @@ class Synthesis(NotebookResult):
 
     @property
     def best(self) -> Solution:
-        """Return the first solution."""
+        """Return the best solution, the first."""
         return self.solutions[0]
 
     def columns(self) -> dict[str, list[float]]:
@@ -148,9 +149,9 @@ def synthesize(
     task : TimedPath, UntimedPath, RockerFunction, SliderFunction, QuickReturn, QuickSwing, Motion or PrecisionPoints
     bounds : mapping, optional
         (least, greatest) of dimensions by their name in `Linkage` (m, rad, or text such as "5 cm"), or of a five-bar's
-        ``second_crank_length``; equal bounds fix a dimension, and kinds of linkages without it ignore them. By default links
-        are at most five times the target's size; for a rocker function the ground link is 0.1 m and the other links are at
-        most five times that.
+        ``second_crank_length``. Equal bounds fix a dimension. Kinds of linkages without the dimension ignore its bounds. By
+        default links are at most five times the target's size; for a rocker function the ground link is 0.1 m and the other
+        links are at most 0.5 m.
     constraints : sequence
         See `task.constraint`; by default a transmission angle of at least 40 degrees over a full turn.
     weights : array_like, optional
@@ -158,9 +159,9 @@ def synthesize(
     pivot : SliderUnknown or CrankUnknown, optional
         Unknown motion of the rocker pivot, which is found together with the links.
     guesses : sequence of Solution
-        Solutions from which searches start in addition to the scan's.
+        Solutions from which searches start, in addition to the starts of the scan.
     search : Search
-        Method, starts, seed, cores.
+        Settings of the search: starts, seed, cores.
     kinds : sequence of "four-bar", "slider-crank", "geared-five-bar", optional
         Kinds of linkages that are tried and ranked together; the best of each kind is among the solutions. By default
         four-bars, for a slider function slider-cranks.
@@ -172,7 +173,7 @@ def synthesize(
     InputError
         If an argument is not usable, or a kind of linkage cannot do the task or meet a constraint.
     InfeasibleError
-        If no linkage meets all bounds and constraints; it names the one that the nearest linkage violates most.
+        If no linkage meets all bounds and constraints; the message names the constraint that the nearest linkage violates most.
     SynthesisInterrupted
         On Ctrl-C, with the best solutions so far.
 
@@ -278,7 +279,7 @@ def _search_kind(
 
 
 def _merge_kinds(found: Sequence[Sequence[Solution]], count: int) -> tuple[Solution, ...]:
-    """Return the best ``count`` solutions, which include the best one of each kind."""
+    """Return the best ``count`` solutions, which include the best solution of each kind of linkage."""
     every = rank_solutions([s for part in found for s in part])
     first = {s.linkage.kind: s for s in reversed(every)}.values()
     rest = [s for s in every if not any(s is best for best in first)]
@@ -297,15 +298,19 @@ def improve(
     kept: Collection[str] = (),
     search: Search = USUAL_SEARCH,
 ) -> Synthesis:
-    """Let the rocker pivot of a linkage move: optimise from ``search.starts`` random motions of the pivot, and from guesses.
+    """Improve a linkage by letting its rocker pivot move: optimise its dimensions and the motion of the pivot.
+
+    The optimisation starts from ``search.starts`` random motions of the pivot, and from guesses.
 
     Parameters
     ----------
     task, bounds, constraints, guesses, search
         See `synthesize`; there is no scan.
     linkage : Linkage or Solution
-        The linkage; for an open path a solution, with the crank rotations of its stations. The same holds for each guess.
+        The linkage to be improved. For an open path it must be a `Solution`, because the crank rotations of the stations are
+        needed. The same holds for each guess.
     pivot : SliderUnknown or CrankUnknown
+        Unknown motion of the rocker pivot.
     kept : collection of str
         Dimensions that are fixed and returned unchanged.
 
@@ -404,7 +409,7 @@ def make_solutions(
 
 
 def _task_rotations(task: Task, normal: Normal, rotation: NDArray[np.float64] | None) -> NDArray[np.float64] | None:
-    """Return the crank rotations of the task's stations, interpolated from those of a search that has other stations."""
+    """Return the crank rotations of the task's stations; interpolate the rotations of a search that has other stations."""
     own = normal_form(task)
     if rotation is None or len(rotation) == own.n:
         return rotation
@@ -436,12 +441,12 @@ class TradeOff:
 
     @property
     def error(self) -> np.ma.MaskedArray:
-        """Return the quality function at each limit, masked where there is no linkage; shape (n,)."""
+        """Return the value of the quality function at each limit, masked where there is no linkage; shape (n,)."""
         values = [np.nan if s is None else s.error for s in self.solutions]
         return np.ma.masked_invalid(np.array(values))
 
     def columns(self) -> dict[str, list[float]]:
-        """Return rank, errors, verdicts (1 or 0) and dimensions of each solution; SI, units in the names."""
+        """Return the limit, errors, verdicts (1 or 0) and dimensions of each solution; SI, units in the names."""
         there = [(float(limit), s) for limit, s in zip(self.limit, self.solutions) if s is not None]
         over = OVER[self.over]
         columns = solution_columns([s for _, s in there])
@@ -469,7 +474,7 @@ OVER: Mapping[str, TradedQuantity] = {
 
 
 class TradeOffInterrupted(Interrupted):
-    """A trade-off was interrupted by Ctrl-C; ``trade_off`` has the best solution so far at each limit, or None."""
+    """A trade-off was interrupted by Ctrl-C; ``trade_off`` has the best solution so far at each limit, if any."""
 
     def __init__(self, trade_off: TradeOff, done: int, problems: int) -> None:
         self.trade_off = trade_off
@@ -492,9 +497,9 @@ def trade_off(
 ) -> TradeOff:
     """Trade error against size, transmission angle or pin force, by the epsilon-constraint method with warm starts.
 
-    From the loosest limit to the tightest, each problem starts from its own scan and from the solutions of the previous one. A
-    second pass in the opposite direction uses solutions for tighter limits at looser ones, too, as they are or optimised again:
-    the error of the best linkage can only grow as the limit is tightened.
+    From the loosest limit to the tightest, each problem starts from its own scan and from the solutions of the previous
+    problem. A second pass in the opposite direction uses the solution of a tighter limit for the next looser limit as well,
+    unchanged or optimised again: it meets the looser limit, too. Thus the error can only grow as the limit is tightened.
 
     Parameters
     ----------
@@ -513,7 +518,7 @@ def trade_off(
     InputError
         If ``over`` or the limits are not usable.
     TradeOffInterrupted
-        On Ctrl-C, with the best so far at each limit.
+        On Ctrl-C, with the best solution so far at each limit.
     """
     if over not in OVER:
         raise InputError(f"a trade-off over {over!r}: it must be one of {', '.join(OVER)}")
@@ -555,7 +560,8 @@ def solve_both_ways(
     order : sequence of int
         Indices of the problems, the loosest first.
     search : callable
-        Function of a problem's index, guesses, and whether it is the way back; returns solutions or raises `InfeasibleError`.
+        Function of the index of a problem, the guesses, and whether the pass goes back from the tightest problem to the
+        loosest; it returns solutions or raises `InfeasibleError`.
     begin : sequence of Solution
         Guesses for the first problem.
 
@@ -565,7 +571,7 @@ def solve_both_ways(
         The best solution of each problem that has one. A solution that meets a tighter limit also meets a looser one, so that
         errors can only grow as the limit is tightened.
     done : int or None
-        If it was interrupted by Ctrl-C, the number of solved problems, each counted in both directions.
+        Number of solved problems, counted in both directions, if Ctrl-C interrupted the series; otherwise None.
     """
     found: dict[int, Solution] = {}
     for back in (False, True):

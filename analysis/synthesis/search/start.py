@@ -39,11 +39,12 @@ class Search:
     solutions : int
         Greatest number of different linkages that are returned.
     seed : int
-        The same seed gives the same solutions, on any number of cores.
+        Seed of the random numbers; the same seed gives the same solutions, on any number of cores.
     candidates : int
         Number of linkages in the scan.
     n_jobs : int, optional
-        Number of processes, -1 for one per core; inside `joblib.parallel_config` for a cluster, all cores of the cluster.
+        Number of processes, -1 for one per core; by default one, or inside `joblib.parallel_config` for a cluster all cores of
+        the cluster.
     progress : bool
         Show a progress bar.
     """
@@ -67,7 +68,7 @@ class Search:
 
     @property
     def cores(self) -> int:
-        """Return the number of workers."""
+        """Return the number of workers that share the searches."""
         return worker_count(self.n_jobs)
 
 
@@ -100,7 +101,7 @@ AMPLITUDE = 0.1
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Start:
-    """A point at which a search starts or ends, in normal form (see `Normal`).
+    """Dimensions and assembly of a linkage at which a search starts or ends, in normal form (see `Normal`).
 
     Attributes
     ----------
@@ -114,9 +115,9 @@ class Start:
     rotation : ndarray, shape (n,), or None
         Crank rotations of the stations if they are unknown.
     quality : float
-        Value of the objective: in units squared, for a greatest error in units.
+        Value of the objective (units squared; units for a greatest error).
     given : bool
-        Whether it is a guess, not a candidate of the scan.
+        Whether the start is a guess, not a candidate of the scan.
     linkage : type
         Type of the linkage; a five-bar is a `Linkage` with a second crank in ``pivot``.
     """
@@ -132,10 +133,10 @@ class Start:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Answer:
-    """Result of an optimisation: the point that it reached, and whether it meets every constraint.
+    """Result of an optimisation: the linkage that it reached, as a `Start`, and whether it meets every constraint.
 
-    ``worst`` is the name of the constraint that is violated most, ``violation`` by how much, in units, rad or fractions of a
-    bound, and ``excess`` the same as text with its unit. ``status`` is the solver's message.
+    ``worst`` is the name of the constraint that is violated most. ``violation`` is the amount of this violation (units, rad, or
+    a fraction of the bound), and ``excess`` is the amount as text with its unit. ``status`` is the solver's message.
     """
 
     start: Start
@@ -163,7 +164,9 @@ class Answer:
 
 
 def random_pivot(unknown: PivotUnknown, ground: float, unit: float, random: np.random.Generator) -> FloatArray:
-    """Draw random unknowns of a pivot: harmonics that decrease with their order, within the bounds of stroke and length.
+    """Draw random unknowns of a moving pivot, within the bounds of its stroke or length.
+
+    The coefficients of the harmonics decrease with their order.
 
     Parameters
     ----------
@@ -192,6 +195,7 @@ def pivot_size(pivot: PivotUnknown | None) -> int:
 
 
 def pivot_bounds(pivot: PivotUnknown | None, unit: float) -> tuple[FloatArray, FloatArray]:
+    """Return the least and the greatest values of the unknowns of a moving pivot; ``unit`` is the target's size (m)."""
     if pivot is None:
         return np.empty(0), np.empty(0)
     low, high = np.full(pivot_size(pivot), -inf), np.full(pivot_size(pivot), inf)
@@ -203,7 +207,7 @@ def pivot_bounds(pivot: PivotUnknown | None, unit: float) -> tuple[FloatArray, F
 
 
 def clip_to_bounds(q: FloatArray, low: FloatArray, high: FloatArray) -> FloatArray:
-    """Return the unknowns clipped to their bounds; angles are first shifted by whole turns."""
+    """Return the unknowns clipped to their bounds; angles outside their bounds are first shifted by whole turns."""
     q = q.copy()
     angles = slice(UNKNOWNS.index("ground_angle"), len(UNKNOWNS))
     middle = 0.5 * (low[angles] + high[angles])
@@ -214,7 +218,10 @@ def clip_to_bounds(q: FloatArray, low: FloatArray, high: FloatArray) -> FloatArr
 
 
 def distances_from_bounds(normal: Normal, low: FloatArray, high: FloatArray, start: Start) -> FloatArray:
-    """Return the distance of each unknown of a start from its bounds (units, rad); 0 if it does not affect the task."""
+    """Return by how much each unknown of a start lies outside its bounds (units, rad), shape (11,).
+
+    The value is 0 for an unknown that does not affect the task.
+    """
     q = clip_to_bounds(start.q, low[: len(UNKNOWNS)], high[: len(UNKNOWNS)])
     off = np.abs(wrap_angles(q - start.q))
     off[:7] = np.abs(q - start.q)[:7]
@@ -228,7 +235,7 @@ def distances_from_bounds(normal: Normal, low: FloatArray, high: FloatArray, sta
 def make_linkage(
     start: Start, normal: Normal, pivot: PivotUnknown | None = None, limits: Limits | None = None
 ) -> Linkage:
-    """Build the linkage of a start, in SI; angles are wrapped to [-pi, pi) unless ``limits`` then exclude them."""
+    """Build the linkage of a start, in SI; an angle is wrapped to [-pi, pi) if ``limits`` allow the wrapped angle."""
     q = start.q.copy()
     q[:7] *= normal.unit
     q[0] += normal.origin.real
@@ -254,9 +261,10 @@ def make_linkage(
 def make_start(
     linkage: Linkage, normal: Normal, pivot: PivotUnknown | None = None, rotation: FloatArray | None = None
 ) -> Start:
-    """Convert a linkage to a start; the series of its pivot is cut off, or padded with zeros, at the unknown harmonics.
+    """Convert a linkage to a start.
 
-    ``rotation`` has the crank rotations of the stations, if they are unknown.
+    The Fourier series of its pivot's motion is truncated, or padded with zeros, to the harmonics of ``pivot``. ``rotation`` has
+    the crank rotations of the stations, if the task does not give them.
     """
     q = np.append(linkage.vector, linkage.output_angle)
     q[0] -= normal.origin.real
@@ -278,9 +286,10 @@ def make_start(
 
 
 def convert_to_start(of: Linkage | Solution, normal: Normal, pivot: PivotUnknown | None) -> Start:
-    """Convert a linkage or solution to a start, with untimed stations at the solution's rotations or the nearest ones.
+    """Convert a linkage or solution to a start, with crank rotations for untimed stations.
 
-    Raises InputError for an open path if the rotations are not known: the nearest ones are found for closed paths only.
+    These are the rotations of the solution, or else the rotations at which the linkage is nearest to the stations. Raises
+    InputError if the rotations are not known and the path is open: nearest rotations are found for closed paths only.
     """
     linkage, rotation = (of.linkage, of.evaluation.rotation) if isinstance(of, Solution) else (of, None)
     if normal.timed:
@@ -296,7 +305,10 @@ def convert_to_start(of: Linkage | Solution, normal: Normal, pivot: PivotUnknown
 
 
 def closed_form_solutions(task: Task) -> tuple[Solution, ...]:
-    """Return the sound four-bars that do a task exactly, if a closed form exists: for untimed poses and function points."""
+    """Return the four-bars without defects that do a task exactly, found in closed form; empty if there are none.
+
+    Closed forms exist for untimed poses and for rocker functions, if there are as many targets as unknowns.
+    """
     try:
         if isinstance(task, RockerFunction):
             return function_generators(task).sound
@@ -309,9 +321,10 @@ def closed_form_solutions(task: Task) -> tuple[Solution, ...]:
 
 
 def keep_distinct(items: Iterable[Item], mark: Callable[[Item], FloatArray], distance: float, count: int) -> list[Item]:
-    """Return the first ``count`` items that are distinct from those chosen before.
+    """Return the first ``count`` items that are distinct from one another.
 
-    ``mark`` gives an item's vector. Two items are distinct if a component of their vectors differs by at least ``distance``.
+    ``mark`` returns the vector that represents an item. Two items are distinct if a component of their vectors differs by at
+    least ``distance``.
     """
     chosen: list[Item] = []
     marks: list[FloatArray] = []

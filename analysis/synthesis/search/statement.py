@@ -1,8 +1,8 @@
-"""State a synthesis as a nonlinear program in CasADi symbols; `program` evaluates and solves it.
+"""State a synthesis as a nonlinear program in CasADi symbols; the module `program` evaluates and solves the program.
 
-Loop closure is that of the plant, traced (`analysis.numerics.symbolic`). The program is in normal form (`Normal`, `Limits`).
-The choices that depend on the start - assembly, direction of travel, triangle of a region, shortest link - are parameters, so
-that one program serves all starts.
+The equations of loop closure are converted to symbols by `analysis.numerics.symbolic`. Task and limits are in normal form
+(`Normal`, `Limits`). Choices that depend on the start are parameters, so that one program serves all starts: the assembly, the
+direction of crank rotation, the triangle of a pivot's region, and the shortest link.
 """
 
 from __future__ import annotations
@@ -31,8 +31,8 @@ Objective = Literal["squares", "worst", "transmission", "curve", "least", "least
 GRID, BETWEEN = 96, 2.5e-3
 #: Margin of a Grashof type, relative to the sum of the links: at zero a four-bar is a change-point.
 MARGIN = 1e-4
-#: Number of parts between two stations at whose ends a search bounds the transmission angle; number of rotations over the
-#: whole task at which a linkage is judged, more than a search can afford.
+#: Number of parts into which a search divides the rotation between two stations, to bound the transmission angle at the ends of
+#: each part; number of rotations over the whole task at which a linkage is judged, more than a search can afford.
 PARTS, JUDGED = 4, 400
 #: Least crank rotation between untimed stations, relative to equal steps.
 ADVANCE = 1e-3
@@ -42,16 +42,16 @@ LEAST_WAY = 1e-3
 GAP = 8.0
 #: Objectives that replace an error.
 SOUGHT = ("least", "least curve")
-#: Name of the bound of the greatest error; fraction of it that smooths the absolute value at an error of zero.
+#: Name of the bound of the greatest error; fraction of this bound by which the absolute value is smoothed near zero error.
 ERROR, SMOOTH = "bound of the greatest error", 1e-3
 #: Number of further rotations at which a `RotationRequirement` is bounded: those of its peaks in the previous solution.
 FURTHER = 8
 
 
 class Label(NamedTuple):
-    """Name of a constraint, with the unit in which its violation is written, and the factor that converts to this unit.
+    """Name of a constraint, the unit in which its violation is written, and the factor that converts a violation to this unit.
 
-    For the unit "transmission" the factor is the least transmission angle (rad).
+    For the unit "transmission" the factor is instead the least transmission angle (rad).
     """
 
     name: str
@@ -60,9 +60,10 @@ class Label(NamedTuple):
     linkage: type[Linkage] = Linkage
 
     def format_violation(self, violation: float, q: FloatArray) -> str:
-        """Format a violation with its unit; that of a transmission angle is given in degrees below its limit.
+        """Format a violation with its unit.
 
-        The unknowns q determine how the transmission angle follows from the violation.
+        For a transmission angle the text says by how many degrees the angle falls below its limit. This depends on the
+        unknowns q, the values of `UNKNOWNS`.
         """
         if self.unit == "transmission":
             least = self.factor
@@ -83,16 +84,16 @@ class Statement:
     objective : "squares", "worst", "transmission", "curve", "least" or "least curve"
         "squares": minimise the weighted squared errors. "worst": minimise the greatest weighted error, an unknown that bounds
         all errors. "transmission": meet the stations exactly and maximise the least transmission angle. "curve": only the
-        constraints of a path, for `refine`, whose measure needs no stations; only the rotations at the ends of an open path
-        and of its straight part are unknown. "least" and "least curve": minimise the objective of the limits instead of an
+        constraints of a path, for `refine`, which compares whole curves without stations; the only unknown crank rotations are
+        the ends of an open path and of its straight part. "least" and "least curve": minimise `Limits.least` instead of an
         error, with and without stations.
     exact : bool
-        Whether bounds can be imposed at the extremes of the pivot's motion, see `Program.exact`; False makes a first search
-        quicker.
+        Whether bounds can be imposed at the extremes of the pivot's motion, see `Program.settle_extremes`; False makes a first
+        search quicker.
     judged : bool
         Whether linkages are only judged. A search bounds the transmission angle at few rotations between two stations, with a
-        margin that guarantees the bound between them. A judgement bounds it at its extremes, without a margin, or with a
-        moving pivot at many rotations.
+        margin that guarantees the bound between these rotations. A judgement bounds the angle at its extremes, without a
+        margin; if the pivot moves, it bounds the angle at many rotations.
     """
 
     def __init__(
@@ -114,7 +115,7 @@ class Statement:
         self._unknowns: list[tuple[Any, FloatArray, FloatArray]] = []
         self._initial: list[Any] = []
         #: For each bounded motion of the pivot, or derivative of it: the order of the derivative, and parameters for the
-        #: rotations of its extremes and for the curvature there; their number; the first two derivatives there.
+        #: rotations of its extremes and for the curvature there; number of extremes; the first two derivatives at them.
         self._peaks: list[tuple[int, Any, Any]] = []
         self._peak_count = 2 * pivot.harmonics if pivot is not None and exact else 0
         self._peak_derivatives: list[Any] = []
@@ -179,7 +180,7 @@ class Statement:
         self._nlp = {"x": casadi.vertcat(*z), "f": quality, "g": g, "p": parameters}
 
     def _unknown(self, name: str, low: FloatArray, high: FloatArray) -> Any:
-        """Add a column of unknowns between bounds, and return its symbols."""
+        """Add a vector of unknowns with their bounds to the program, and return its symbols."""
         symbol = self._casadi.SX.sym(name, len(low))
         self._unknowns.append((symbol, low, high))
         return symbol
@@ -187,7 +188,7 @@ class Statement:
     def _auxiliary(self, name: str, initial: Any, low: float = -inf, high: float = inf) -> Any:
         """Add an auxiliary unknown, such as a greatest value or the middle of a range, and return its symbol.
 
-        ``initial`` is its starting value.
+        ``initial`` is the starting value, an expression of the other unknowns.
         """
         self._initial.append(initial)
         return self._unknown(name, np.array([low]), np.array([high]))
@@ -199,7 +200,10 @@ class Statement:
         return self.limits.least
 
     def _trace(self, require: Require, p: Any) -> Any:
-        """Return a required function in CasADi symbols; a `RotationRequirement` also at the rotations given by parameters."""
+        """Return the values of a required function, in CasADi symbols, for the dimensions p.
+
+        A `RotationRequirement` is evaluated at its own rotations and at further rotations, which are parameters of the program.
+        """
         casadi, values = self._casadi, convert_to_si(p, self.normal.unit, self.normal.origin)
         if not isinstance(require, RotationRequirement):
             return trace_requirement(require, values)
@@ -218,7 +222,10 @@ class Statement:
     # Objective
 
     def _close_loop(self, p: Any, v: Any, phi: Any, branch: Any) -> tuple[Any, Any]:
-        """Return the directions of the links and the coupler point (x, y) at rotations, by the plant's loop closure."""
+        """Return the directions of the links and the coupler point (x, y) at crank rotations ``phi``, by loop closure.
+
+        ``p`` has the dimensions, ``v`` the unknowns of a moving pivot.
+        """
         casadi = self._casadi
         th2 = self._turns[0] * phi + p.crank_phase
         c2, s2 = casadi.cos(th2), casadi.sin(th2)
@@ -250,7 +257,11 @@ class Statement:
         return v[0] * casadi.cos(psi), v[0] * casadi.sin(psi)
 
     def _quality(self, p: Any, v: Any, phi: Any, branch: Any, size: Any) -> Any:
-        """Return the objective, and add the constraints that belong to it."""
+        """Return the objective, and add the constraints that belong to it.
+
+        ``p`` has the dimensions, ``v`` the unknowns of a moving pivot, ``phi`` the crank rotations of the stations; ``size`` is
+        the magnitude of the greatest error or value.
+        """
         casadi, normal = self._casadi, self.normal
         g, point = self._close_loop(p, v, phi, branch)
         ex: Any = None
@@ -294,7 +305,10 @@ class Statement:
         return quality + self._straight_part(p, v, phi, branch, ex, ey)
 
     def _straight_part(self, p: Any, v: Any, phi: Any, branch: Any, ex: Any, ey: Any) -> Any:
-        """Constrain a straight part; return the term of the quality that favours flatness, 0 if flatness is bounded."""
+        """Constrain the straight part of a path; return the term of the objective that favours flatness, or 0.
+
+        The term is 0 if the flatness is bounded. ``ex`` and ``ey`` are the errors at the stations.
+        """
         casadi, straight, points = self._casadi, self.normal.straight, self.normal.points
         if straight is None or points is None:
             return 0.0
@@ -322,7 +336,7 @@ class Statement:
     # Constraints
 
     def _display_factor(self, share: float) -> float:
-        """Return the factor to mm, or to degrees for a rocker function, of an error in multiples of ``share`` units."""
+        """Return the factor that converts an error in multiples of ``share`` units to mm, for a rocker function to degrees."""
         return share * (degrees(1.0) if self.normal.of_rocker else 1e3 * self.normal.unit)
 
     def excess(self, violation: float) -> dict[str, Any]:
@@ -333,7 +347,10 @@ class Statement:
     def _constrain(
         self, value: Any, low: float, high: float, name: str, unit: str = "mm", factor: float | None = None
     ) -> None:
-        """Constrain a value between bounds; ``factor`` converts it to its unit, by default from units of length or rad."""
+        """Add the constraint that a value lies between two bounds.
+
+        ``factor`` converts a violation to ``unit``; by default it converts from the target's size to mm, or from rad to deg.
+        """
         usual = {"mm": 1e3 * self.normal.unit, "deg": degrees(1.0)}
         label = Label(name, usual.get(unit, 1.0) if factor is None else factor, unit, self.limits.linkage)
         self._constraints.append((value, low, high, label))
@@ -342,7 +359,7 @@ class Statement:
         self._constrain(value, -inf, 0.0, name, unit, factor)
 
     def _order_stations(self, phi: Any, direction: Any) -> None:
-        """Constrain the rotations of the stations to be in order and within a turn."""
+        """Constrain the crank rotations of the stations to be in order, in ``direction`` (+1 or -1), and within a turn."""
         n = self.normal.n
         least = ADVANCE * 2.0 * pi / n
         steps = direction * (phi[1:] - phi[:-1])
@@ -353,7 +370,10 @@ class Statement:
         self._constrain(total, *closing, "stations within a turn", "deg")
 
     def _path_rotations(self, direction: Any) -> tuple[Any, Any]:
-        """Return the rotations of a path's stations, at equal steps between a few unknown rotations, and the unknown ones."""
+        """Return the crank rotations of a path's stations, and the unknown rotations between which they are evenly spaced.
+
+        Unknown are the rotations at the ends of an open path and of its straight part; None if there are no such ends.
+        """
         casadi, normal = self._casadi, self.normal
         ends = set() if normal.closed else {0, normal.n - 1}
         part = () if normal.straight is None else (normal.straight.start, normal.straight.end)
@@ -392,7 +412,7 @@ class Statement:
             self._constrain_nonpositive(casadi.mtimes(plane, casadi.vertcat(x, y, 1.0)), f"region of pivot {name}")
 
     def _constrain_transmission(self, p: Any, v: Any, phi: Any, tilt: Any) -> None:
-        """Constrain the transmission angle over a turn, over the task, or both."""
+        """Constrain the transmission angle over a turn, over the task, or both; see `_bound_transmission` for ``tilt``."""
         casadi, limits = self._casadi, self.limits
         l1, l2 = p.ground_length, p.crank_length
         if limits.turn is not None and self.pivot is None:
@@ -416,7 +436,11 @@ class Statement:
             self._bound_transmission(p, d2 - slack, d2 + slack, limits.way or 0.0, tilt)
 
     def _bound_transmission(self, p: Any, nearest: Any, farthest: Any, least: float, tilt: Any) -> None:
-        """Constrain |cos mu| below cos(least) and, if given, below ``tilt``, from squares of the least and greatest BD."""
+        """Constrain |cos mu| to at most cos(least) and at most ``tilt``, if given, where mu is the transmission angle.
+
+        ``nearest`` and ``farthest`` are the squares of the least and the greatest distance BD. ``tilt`` is the unknown greatest
+        |cos mu| that is minimised.
+        """
         least = least if self._judged else max(least, TURNING)
         for cosine in (cos(least), *([] if tilt is None else [tilt])):
             links = p.coupler_length, p.rocker_length
@@ -426,7 +450,7 @@ class Statement:
                 )
 
     def _squared_reach(self, p: Any, v: Any, x: Any) -> Any:
-        """Return the square of the distance from crank pin to rocker pivot, or to the guide, at rotations."""
+        """Return the square of the distance from crank pin to rocker pivot, or to the guide, at crank rotations x."""
         casadi = self._casadi
         dx, dy = self._displacement(v, x)
         th2 = self._turns[0] * x + p.crank_phase
@@ -435,14 +459,17 @@ class Statement:
         return self.limits.linkage.square(bx, by)
 
     def _dense_rotations(self, phi: Any) -> tuple[Any, Any]:
-        """Return the rotations of the stations, followed by rotations between them, and the step from each to the next."""
+        """Return the stations' crank rotations, followed by rotations between them, and the step after each rotation."""
         steps = (phi[1:] - phi[:-1]) / self._parts
         between = [phi[:-1] + k * steps for k in range(1, self._parts)]
         casadi = self._casadi
         return casadi.vertcat(phi, *between), casadi.vertcat(steps, steps[-1], *[steps] * len(between))
 
     def _constrain_slider(self, pivot: SliderUnknown, ground: Any, v: Any) -> Any:
-        """Add the constraints on the slider's motion; return the smoothness term of the quality function, or 0."""
+        """Add the constraints on the slider's motion; return the smoothness term of the objective, or 0 without one.
+
+        ``ground`` is the ground link, ``v`` the unknowns of the motion.
+        """
         casadi, unit = self._casadi, self.normal.unit
 
         def position(x: Any) -> Any:
@@ -473,7 +500,7 @@ class Statement:
         return pivot.smoothness * casadi.sumsqr(_series(casadi, v[1:], x, order=2)) / x.numel()
 
     def _bound_derivative(self, v: Any, order: int, bound: float, name: str, unit: str) -> None:
-        """Bound the magnitude of a derivative of the slider's position (m/rad, m/rad2) by ``bound``."""
+        """Bound the magnitude of the slider's speed (order 1, m/rad) or acceleration (order 2, m/rad2) by ``bound``."""
         if isfinite(bound):
             scale = self.normal.unit / bound
             self._bound_motion(
@@ -488,12 +515,13 @@ class Statement:
     def _bound_motion(
         self, value: Callable[[Any], Any], order: int, name: str, unit: str = "", factor: float = 1.0, size: float = 1.0
     ) -> None:
-        """Constrain a trigonometric polynomial of the crank's rotation to [-1, 1]; IPOPT gets it multiplied by ``size``.
+        """Constrain ``value``, a trigonometric polynomial of the crank rotation, to [-1, 1].
 
-        It is bounded at grid points over the turn and at rotations given by parameters, with a margin. In a first solution the
+        The polynomial is the pivot's motion or its derivative of this order; IPOPT receives it multiplied by ``size``. It is
+        bounded at grid points over the turn and at rotations given by parameters, with a margin. In a first solution the
         margin guarantees the bound between the grid points: there a trigonometric polynomial is at most its greatest value at
-        the points divided by a cosine (Ehlich and Zeller 1964). Later the margin is almost zero, since the extremes of the
-        previous solution are among the rotations (`Program.exact`).
+        the points divided by a cosine (Ehlich and Zeller 1964). Later solutions use almost no margin, since the parameters
+        are the rotations at which the previous solution is extreme (`Program.settle_extremes`).
         """
         casadi, harmonics = self._casadi, self.pivot.harmonics if self.pivot else 0
         number = len(self._peaks)
@@ -512,7 +540,10 @@ class Statement:
 
 
 def _series(casadi: Any, coefficients: Any, x: Any, *, mean: bool = True, order: int = 0) -> Any:
-    """Evaluate a Fourier series or a derivative of it; coefficients: mean (if any), then cosine and sine of each harmonic."""
+    """Evaluate a Fourier series, or its derivative of the given order, at rotations x.
+
+    The coefficients are the mean (unless ``mean`` is False), then the cosine and sine coefficient of each harmonic.
+    """
     value = (coefficients[0] if order == 0 else 0.0) + 0.0 * x if mean else 0.0 * x
     first = 1 if mean else 0
     for k in range((coefficients.numel() - first) // 2):

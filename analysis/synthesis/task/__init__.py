@@ -1,6 +1,6 @@
 """Define the problem of a synthesis: targets and tasks, constraints and bounds, and their normal form.
 
-The names are those of ``__init__.pyi``; each is imported from its module when it is first used.
+The public names are listed in ``__init__.pyi``; each is imported from its module when it is first used.
 """
 
 from __future__ import annotations

@@ -40,7 +40,7 @@ _LEAST_TRANSMISSION = radians(40.0)
 @in_si(angle="rad")
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LeastTransmission:
-    """The transmission angle, between coupler and rocker, deviates from 0 and pi by at least ``angle``.
+    """Constraint: the transmission angle, between coupler and rocker, deviates from 0 and pi by at least ``angle``.
 
     Attributes
     ----------
@@ -62,12 +62,12 @@ class LeastTransmission:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FullTurn:
-    """The crank can turn fully, with any transmission angle."""
+    """Constraint: the crank can turn fully, with any transmission angle."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Grashof:
-    """The four-bar has this Grashof type; see `Linkage.grashof`."""
+    """Constraint: the four-bar has this Grashof type; see `Linkage.grashof`."""
 
     type: GrashofType
 
@@ -79,7 +79,7 @@ class Grashof:
 @in_si(length="m")
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LargestLink:
-    """No link is longer than ``length`` (m), and the coupler point is no farther than that from B."""
+    """Constraint: no link is longer than ``length`` (m), and the coupler point is at most this far from B."""
 
     length: Amount
 
@@ -90,7 +90,7 @@ class LargestLink:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Assembly:
-    """C lies to the left (+1) or to the right (-1) of B -> D."""
+    """Constraint: C lies to the left (``branch`` +1) or to the right (-1) of the line from B to D."""
 
     branch: int
 
@@ -102,12 +102,12 @@ class Assembly:
 @in_si(polygon="m")
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class PivotRegion:
-    """A pivot lies inside a polygon, which need not be convex.
+    """Constraint: a pivot lies inside a polygon, which need not be convex.
 
     Attributes
     ----------
     pivot : "A" or "D"
-        The crank shaft, or the end of the ground link.
+        The crank shaft A, or the other end D of the ground link.
     polygon : array_like, shape (n, 2)
         Corners in order (m).
     """
@@ -149,13 +149,13 @@ def half_planes(triangle: FloatArray) -> FloatArray:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Require:
-    """A function of the dimensions is at most zero, or equal to zero.
+    """Constraint: a function of the dimensions is at most zero, or equal to zero.
 
     Attributes
     ----------
     function : callable
         Function of a namespace with the dimensions of `Linkage` by name (SI). It may use arithmetic and the elementary
-        functions of `math` or NumPy, but no branches; it is traced, so that its derivatives are exact.
+        functions of `math` or NumPy, but no branches. The search traces the function with symbols, to differentiate it exactly.
     equal : bool
         Whether the function must be zero, instead of at most zero.
     name : str
@@ -184,14 +184,16 @@ class Require:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class RotationRequirement(Require):
-    """A requirement that a function of dimensions and crank rotation is at most zero at given rotations, or between two.
+    """Constraint: a function of dimensions and crank rotation is at most zero at given rotations, or over a range.
 
     Attributes
     ----------
     rotation : ndarray, shape (n,)
-        Rotations at which it is bounded from the beginning (rad); ``function(d, rotation)`` has rows of n values each.
+        Crank rotations at which the function is bounded from the beginning (rad). ``function(d, rotation)``, with the
+        dimensions d, returns a matrix of n rows, one for each rotation.
     ends : (float, float) or None
-        Range of rotations in which its greatest values are found and bounded, too; None if only the given rotations count.
+        Range of rotations in which the peaks of the function are found and bounded as well; None if only the given rotations
+        count.
     """
 
     rotation: FloatArray
@@ -199,12 +201,12 @@ class RotationRequirement(Require):
 
 
 class RotationRange(NamedTuple):
-    """The range of crank rotations over which a constraint holds.
+    """What a constraint needs to know about a search: the crank rotations at which it must hold, and the kind of linkage.
 
     Attributes
     ----------
     turn : bool
-        Whether the crank turns fully.
+        Whether the crank turns fully, so that the constraint must hold over a full turn.
     rotation : ndarray or None
         The task's crank rotations, if it has any.
     straight : bool
@@ -219,9 +221,10 @@ class RotationRange(NamedTuple):
     linkage: type[Linkage] = Linkage
 
     def ends(self, what: str) -> tuple[float, float]:
-        """Return the first and last crank angle of a turn, or the first and last crank rotation of the task (rad).
+        """Return the ends of the range in which a constraint must hold (rad): a turn, or the range of the task's rotations.
 
-        Raises InputError if neither is known; the message names ``what`` needs them.
+        Raises InputError if the crank does not turn fully and the task gives no rotations; ``what`` is the constraint's name in
+        the message.
         """
         if self.turn:
             return 0.0, 2.0 * pi
@@ -229,7 +232,7 @@ class RotationRange(NamedTuple):
         return float(rotation.min()), float(rotation.max())
 
     def timed(self, what: str) -> FloatArray:
-        """Return the task's crank rotations; raises InputError if it gives none."""
+        """Return the task's crank rotations; raise InputError, which names ``what`` needs them, if the task has none."""
         if self.rotation is None:
             raise InputError(f"{what} needs crank rotations, and the task gives none")
         return self.rotation
@@ -246,15 +249,15 @@ class Demand:
     """A constraint that is expressed by functions of the dimensions that must be at most zero."""
 
     __slots__ = ()
-    #: Grashof type that it requires.
+    #: Grashof type that the constraint requires.
     grashof: ClassVar[GrashofType | None] = None
-    #: Whether a crank that meets it cannot turn fully.
+    #: Whether the constraint excludes a full turn of the crank.
     stops: ClassVar[bool] = False
-    #: Whether it is an objective that replaces the error.
+    #: Whether the constraint is an objective that replaces the error.
     seeks: ClassVar[bool] = False
 
     def requires(self, way: RotationRange) -> tuple[Require, ...]:
-        """Return the functions of the dimensions that must be at most zero."""
+        """Return the functions of the dimensions that must be at most zero, or equal to zero."""
         raise NotImplementedError
 
     def least_function(self, way: RotationRange, normal: Normal) -> MinimisedFunction | None:
@@ -264,7 +267,9 @@ class Demand:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class TimeRatio(Demand):
-    """The four-bar is a crank-rocker whose slow swing takes ``least`` to ``greatest`` times as long as its quick one.
+    """Constraint: the four-bar is a crank-rocker whose slow swing lasts ``least`` to ``greatest`` times the quick swing.
+
+    For a slider-crank the constraint bounds the same ratio of the slider's two strokes.
 
     Attributes
     ----------
@@ -282,7 +287,7 @@ class TimeRatio(Demand):
             raise ParameterError("time ratio", (self.least, self.greatest), "be two numbers in order, 1 or greater")
 
     def requires(self, way: RotationRange) -> tuple[Require, ...]:
-        """Return the required functions."""
+        """Return the functions of the dimensions that must be at most zero."""
 
         def differs(d: Any) -> Any:
             # directions of C from A with crank and coupler in line, by the law of cosines
@@ -321,12 +326,12 @@ def _constraint_names() -> list[str]:
 @in_si(least="m", greatest="m")
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Stroke:
-    """The stroke of a slider-crank, whose crank turns fully, is within bounds.
+    """Constraint: the crank of a slider-crank turns fully, and the stroke of its slider is within bounds.
 
     Attributes
     ----------
     least, greatest : float
-        Bounds (m).
+        Bounds of the stroke (m).
     """
 
     least: Amount = 0.0
@@ -337,7 +342,7 @@ class Stroke:
             raise ParameterError("stroke", (self.least, self.greatest), "be two lengths in order (m)")
 
     def requires(self) -> tuple[Require, ...]:
-        """Return the required functions."""
+        """Return the functions of the dimensions that must be at most zero."""
         found = []
         if self.least > 0.0:
             low = self.least
@@ -349,21 +354,24 @@ class Stroke:
 
 
 def stroke(d: Any) -> Any:
-    """Return the stroke of a slider-crank (m), for numbers and symbols."""
+    """Return the stroke of a slider-crank (m) with the dimensions d, which may be numbers or symbols."""
     l1, l2, l3 = d.ground_length, d.crank_length, d.coupler_length
     ends = [np.sqrt(np.maximum((l3 + side * l2) ** 2 - l1**2, 1e-18)) for side in (1.0, -1.0)]
     return ends[0] - ends[1]
 
 
 def advance(d: Any) -> Any:
-    """Return half a turn less than the crank rotation between a slider-crank's dead centres (rad), for numbers and symbols."""
+    """Return by how much the crank rotation during the slow stroke of a slider-crank exceeds half a turn (rad).
+
+    The dimensions d may be numbers or symbols.
+    """
     l1, l2, l3 = d.ground_length, d.crank_length, d.coupler_length
     angles = [np.arctan2(np.sqrt(np.maximum((l3 + side * l2) ** 2 - l1**2, 1e-18)), l1) for side in (1.0, -1.0)]
     return angles[0] - angles[1]
 
 
 def _slider_time_ratio(asked: TimeRatio) -> tuple[Require, ...]:
-    """Return functions that bound the time ratio of a slider-crank, (pi + advance)/(pi - advance)."""
+    """Return the constraints on the time ratio of a slider-crank, (pi + advance)/(pi - advance)."""
     low, high = (
         pi * (ratio - 1.0) / (ratio + 1.0) if isfinite(ratio) else pi for ratio in (asked.least, asked.greatest)
     )
@@ -379,14 +387,14 @@ def _check_pins(pins: str) -> None:
 
 
 class _Forces(Demand):
-    """A constraint on the forces on the pins."""
+    """Base class of the constraints on pin forces."""
 
     __slots__ = ()
     make: MachineSpec
     pins: str
 
     def pin_force_function(self, way: RotationRange) -> RotationRequirement:
-        """Return the magnitudes of the pin forces (N) as a function of the crank's rotation, with a column for each pin."""
+        """Return a function of dimensions and crank rotations: the magnitudes of the pin forces (N), with a column per pin."""
         ends, turn = way.ends("a force on the pins"), way.turn
 
         def magnitudes(d: Any, rotation: Any) -> Any:
@@ -410,7 +418,7 @@ class _Forces(Demand):
 @in_si(force="N")
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class MaxPinForce(_Forces):
-    """No pin force exceeds ``force``: over a turn of the crank or, if it need not turn fully, during the task.
+    """Constraint: no pin force exceeds ``force``, over a turn of the crank or, if it need not turn fully, during the task.
 
     Attributes
     ----------
@@ -419,7 +427,7 @@ class MaxPinForce(_Forces):
     make : MachineSpec
         Masses, gravity, load, and the constant speed of the crank.
     pins : str
-        Which pins: letters of "ABCD".
+        Letters of the pins whose forces count, of "ABCD".
     """
 
     force: Amount
@@ -432,7 +440,7 @@ class MaxPinForce(_Forces):
         _check_pins(self.pins)
 
     def requires(self, way: RotationRange) -> tuple[Require, ...]:
-        """Return the required functions."""
+        """Return the functions of dimensions and crank rotation that must be at most zero."""
         forces = self.pin_force_function(way)
 
         def excess(d: Any, rotation: Any) -> Any:
@@ -443,7 +451,7 @@ class MaxPinForce(_Forces):
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class LeastPinForce(_Forces):
-    """Objective: the greatest pin force, minimised while the greatest error is below a bound.
+    """Objective: minimise the greatest pin force while the greatest error is at most ``error``.
 
     Attributes
     ----------
@@ -452,7 +460,7 @@ class LeastPinForce(_Forces):
     make : MachineSpec
         Masses, gravity, load, and the constant speed of the crank.
     pins : str
-        Which pins: letters of "ABCD".
+        Letters of the pins whose forces count, of "ABCD".
     """
 
     seeks: ClassVar[bool] = True
@@ -493,6 +501,6 @@ def even_rotations(ends: tuple[float, float]) -> FloatArray:
 
 
 def search_range(ends: tuple[float, float]) -> tuple[float, float]:
-    """Return the range in which peaks are sought: a full turn is extended a little, so that a peak at its end is found."""
+    """Return the range in which peaks are sought (rad): a full turn is extended a little to find a peak at its end."""
     over = BEYOND if ends[1] - ends[0] >= 2.0 * pi else 0.0
     return ends[0] - over, ends[1] + over

@@ -51,9 +51,9 @@ _LONGEST = 1000
 def formula(text: str, variable: str = "t") -> Callable[[ArrayLike], FloatArray]:
     """Convert a text such as ``"70 + 100*abs(sin(t/2))"`` to a function of one variable.
 
-    It may contain numbers, ``+ - * / % **``, brackets, ``pi e tau``, ``sin cos tan asin acos atan atan2 sinh cosh tanh exp log
-    sqrt abs sign floor ceil hypot min max degrees radians``, and the variable; angles are in radians. The text is parsed with
-    `ast`, and anything else in it is refused, not evaluated.
+    The text may contain numbers, ``+ - * / % **``, brackets, ``pi e tau``, ``sin cos tan asin acos atan atan2 sinh cosh tanh
+    exp log sqrt abs sign floor ceil hypot min max degrees radians``, and the variable; angles are in radians. `ast` parses the
+    text, and anything else in the text is refused, not evaluated.
 
     Returns
     -------
@@ -63,7 +63,7 @@ def formula(text: str, variable: str = "t") -> Callable[[ArrayLike], FloatArray]
     Raises
     ------
     InputError
-        If the text is no such formula; the message names the wrong part.
+        If the text is not a formula of this kind; the message names the wrong part.
     """
     tree = _parse(text)
 
@@ -139,7 +139,7 @@ def _number(value: float | str) -> float:
 
 
 def _parameter(start: float | str, end: float | str, n: int, turn: bool) -> FloatArray:
-    """Return n values at equal steps from start to end; with ``turn`` without the end."""
+    """Return n evenly spaced values from start to end; ``turn`` leaves the end out."""
     a, b = _number(start), _number(end)
     if not (np.isfinite([a, b]).all() and b > a):
         raise InputError(f"the parameter goes from {start!r} to {end!r}: the end must be greater, and both finite")
@@ -212,14 +212,14 @@ def function_from_formula(
     unit : str
         Unit of the formula's value.
     start, end : float or str
-        Range of the crank angle; for whole turns the end, which is the start again, is left out.
+        Range of the crank angle. If it is a number of whole turns, the end is left out, because it repeats the start.
     spacing : "even" or "chebyshev"
         "chebyshev" is for precision points: see `chebyshev_spacing`.
 
     Returns
     -------
     crank_angle, angle : ndarray, shape (n,)
-        rad.
+        Crank angles and angles of the formula (rad).
 
     Raises
     ------
@@ -241,7 +241,7 @@ def function_from_formula(
 def chebyshev_spacing(low: float, high: float, n: int) -> FloatArray:
     """Return n precision points between two limits, spaced so that the error between them is nearly the least possible.
 
-    They are the roots of Chebyshev's polynomial of degree n, as Freudenstein recommends.
+    The points are the roots of Chebyshev's polynomial of degree n, as Freudenstein recommends.
 
     Raises
     ------
@@ -274,8 +274,8 @@ _MEASURE = re.compile(
 def requirement(text: Any, name: str = "constraints.require") -> Require:
     """Convert a text such as ``"crank_length + rocker_length <= 300 mm"`` to a constraint.
 
-    The text compares two sides by ``<=``, ``>=`` or ``==``. They may contain dimensions by their name in `Linkage`, numbers
-    with a unit of length or angle or without one (SI), ``+ - * / **``, brackets, ``pi`` and functions, nothing else.
+    The text compares two sides by ``<=``, ``>=`` or ``==``. A side may contain dimensions by their name in `Linkage`, numbers
+    with a unit of length or angle or without a unit (SI), ``+ - * / **``, brackets, ``pi`` and functions, nothing else.
 
     Raises InputError if the text is not a constraint; the message names the wrong part.
     """
@@ -358,7 +358,7 @@ class _Dimensions(ast.NodeTransformer):
 
 
 def _compile_dimensions(tree: ast.expr) -> Callable[[Any], Any]:
-    """Compile an expression to a function of a namespace of dimensions that may call the functions of `math`."""
+    """Compile an expression of dimensions and functions of `math` to a function of a namespace with the dimensions."""
     argument = ast.arguments(posonlyargs=[], args=[ast.arg(arg="p")], kwonlyargs=[], kw_defaults=[], defaults=[])
     body = ast.Expression(body=ast.Lambda(args=argument, body=_Dimensions().visit(tree)))
     code = compile(ast.fix_missing_locations(body), "<requirement>", "eval")
@@ -386,7 +386,10 @@ RENAMED: dict[str, Callable[..., Any]] = {
 
 
 def convert_to_si(p: SimpleNamespace, unit: float, origin: complex) -> SimpleNamespace:
-    """Convert dimensions from normal form to SI, in which users' functions take them."""
+    """Convert dimensions from normal form to SI, the units of users' functions.
+
+    ``unit`` is the size of the target and ``origin`` its centre (m); see `Normal`.
+    """
     values = dict(vars(p))
     for name in UNKNOWNS[:7]:
         values[name] = unit * values[name]
@@ -395,7 +398,9 @@ def convert_to_si(p: SimpleNamespace, unit: float, origin: complex) -> SimpleNam
 
 
 def trace_requirement(require: Require, values: SimpleNamespace, *rotation: Any) -> Any:
-    """Evaluate a required function with CasADi symbols; functions of `math` and NumPy are replaced by those of CasADi.
+    """Evaluate a required function with CasADi symbols; functions of `math` and NumPy are replaced by CasADi's functions.
+
+    ``values`` has the dimensions; ``rotation`` are the crank rotations, given only for a `RotationRequirement`.
 
     Raises
     ------
@@ -422,14 +427,15 @@ def trace_requirement(require: Require, values: SimpleNamespace, *rotation: Any)
 
 
 def find_peaks(along: RotationRequirement, values: SimpleNamespace, count: int) -> FloatArray:
-    """Find the greatest values of a function along the crank's rotation, and their curvature.
+    """Find the ``count`` highest peaks of a function of the crank rotation, and their curvatures.
 
     Returns
     -------
     ndarray, shape (count, 1 + n)
-        A row for each peak, the highest first: the rotation (rad), then for each of the n values of the function -1/2 divided
-        by its second derivative, from which, with the slope, the height of a nearby peak follows; 0 if this value has no peak
-        there. If there are fewer peaks, the first row is repeated.
+        A row for each peak, the highest first; the ends of the range count as peaks. The first column is the crank rotation
+        (rad). Then follows, for each of the n values of the function, -1/2 divided by the second derivative of this value, or
+        0 if this value has no peak there; with the slope this number gives the height of a nearby peak. If there are fewer
+        peaks, the first row is repeated.
     """
     assert along.ends is not None
     rotation = np.linspace(*along.ends, DENSE)
@@ -451,7 +457,10 @@ def find_peaks(along: RotationRequirement, values: SimpleNamespace, count: int) 
 
 
 def _replace_modules(value: Any, seen: dict[int, Any]) -> Any:
-    """Return a copy of a user's function that calls CasADi instead of `math` and NumPy, as do the functions that it calls."""
+    """Return a copy of a user's function, and of all functions called in it, with CasADi instead of `math` and NumPy.
+
+    A value that is no function is returned, or replaced if it is one of these modules. ``seen`` has the copies made so far.
+    """
     casadi = symbolic.library()
     if isinstance(value, ModuleType) and value.__name__ in ("math", "numpy"):
         known = {n: getattr(casadi, n) for n in TRACED} | RENAMED
@@ -481,5 +490,5 @@ def _replace_modules(value: Any, seen: dict[int, Any]) -> Any:
 
 
 def _global_names(code: CodeType) -> set[str]:
-    """Return the global names that code, or code nested in it, may use."""
+    """Return the global names that a code object, or a code object nested in it, may use."""
     return {*code.co_names}.union(*(_global_names(c) for c in code.co_consts if isinstance(c, CodeType)))

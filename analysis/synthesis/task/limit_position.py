@@ -38,12 +38,15 @@ class _FourBarConditions:
 
     @staticmethod
     def dead_cosine(l1: float, reach: float, l4: float) -> float:
-        """Return the cosine of the direction from A to C, with crank and coupler collinear and C at the distance ``reach``."""
+        """Return the cosine of the angle at A between ground link and AC in a dead centre, at the distance AC of ``reach``."""
         return (l1 * l1 + reach * reach - l4 * l4) / (2.0 * l1 * reach)
 
     @staticmethod
     def dead_gap(d: Any, reach: Any, c: Any) -> Any:
-        """Return the closure error of the triangle A, C, D, zero in a dead centre; c is the cosine of the angle at A."""
+        """Return the closure error of the triangle A, C, D, zero in a dead centre.
+
+        ``reach`` is the distance AC, ``c`` the cosine of the angle at A, ``d`` has the dimensions.
+        """
         l1, l3, l4 = d.ground_length, d.coupler_length, d.rocker_length
         return (l1**2 + reach**2 - l4**2 - 2.0 * l1 * reach * c) / (l1**2 + l3**2)
 
@@ -69,7 +72,7 @@ class _FourBarConditions:
 
     @staticmethod
     def advantage_numerator(linkage: Linkage, c3: Any, s3: Any, c4: Any, s4: Any) -> Any:
-        """Return the numerator of the mechanical advantage, zero in a toggle."""
+        """Return the numerator of the mechanical advantage, zero in a toggle, from the directions of coupler and rocker."""
         return linkage.rocker_length * (s3 * c4 - c3 * s4) / linkage.crank_length
 
     @staticmethod
@@ -119,7 +122,7 @@ POSITIONS: Mapping[Kind, type[_FourBarConditions]] = {
 
 
 def dead_centres(linkage: Linkage) -> tuple[float, ...]:
-    """Return the crank rotations of the dead centres, within a turn from 0 (rad), in increasing order; empty without any.
+    """Return the crank rotations of the dead centres, within a turn from 0 (rad), in increasing order; empty if there are none.
 
     Raises
     ------
@@ -144,7 +147,7 @@ def dead_centres(linkage: Linkage) -> tuple[float, ...]:
 def toggles(linkage: Linkage) -> tuple[float, ...]:
     """Return the crank rotations of the toggles, within a turn from 0 (rad); empty if the crank can turn fully.
 
-    With a moving rocker pivot they are rotations of the input shaft, which turns once per period of the linkage.
+    With a moving rocker pivot the results are rotations of the input shaft, which turns once per period of the linkage.
     """
     if linkage.pivot is not None:
         return _toggles_by_roots(linkage)
@@ -169,9 +172,9 @@ def _toggles_by_roots(linkage: Linkage) -> tuple[float, ...]:
 
 
 def time_ratio(linkage: Linkage) -> float | None:
-    """Return the time of the slow swing or stroke divided by that of the quick one, at constant crank speed: 1 at least.
+    """Return the duration of the slow swing or stroke divided by the duration of the quick one; at least 1.
 
-    None if the crank cannot turn fully, or the rocker turns fully, too.
+    The crank turns at constant speed. The result is None if the crank cannot turn fully, or if the rocker turns fully, too.
 
     Raises
     ------
@@ -188,9 +191,9 @@ def time_ratio(linkage: Linkage) -> float | None:
 def mechanical_advantage(linkage: Linkage, rotation: ArrayLike) -> FloatArray:
     """Return the torque on the rocker divided by the torque on the crank, without friction and masses.
 
-    For a slider-crank it is the force on the slider divided by the force on the crank pin perpendicular to the crank: the speed
-    of the pin divided by that of the slider. It is infinite in a dead centre, zero in a toggle, and NaN if the links cannot be
-    joined. The result has the shape of the rotations.
+    For a slider-crank the mechanical advantage is the force on the slider divided by the force on the crank pin perpendicular
+    to the crank, which equals the speed of the pin divided by the speed of the slider. It is infinite in a dead centre, zero
+    in a toggle, and NaN if the links cannot be joined. The result has the shape of ``rotation``, the crank rotations (rad).
 
     Raises
     ------
@@ -216,7 +219,7 @@ def _fixed_lengths(linkage: Linkage) -> tuple[float, float, float, float]:
 
 
 def _rotations(value: Any, name: str, longest: float = 2.0 * pi) -> tuple[float, float]:
-    """Return the ends of a range of crank rotations (rad) from two numbers, or from one for both ends.
+    """Return the ends of a range of crank rotations (rad) from two numbers, or from one number for both ends.
 
     Raises ParameterError if the range is longer than ``longest``.
     """
@@ -232,12 +235,12 @@ def _rotations(value: Any, name: str, longest: float = 2.0 * pi) -> tuple[float,
 @in_si(at="rad")
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class MechanicalAdvantage(Demand):
-    """The magnitude of the mechanical advantage is within bounds; see `mechanical_advantage`.
+    """Constraint: the magnitude of the mechanical advantage is within bounds; see `mechanical_advantage`.
 
     Attributes
     ----------
     least, greatest : float
-        Bounds.
+        Bounds of the magnitude.
     at : array_like, optional
         Crank rotations at which the bounds hold (rad). By default they hold everywhere: over a turn or, if the crank need not
         turn fully, from the first to the last of the task's rotations.
@@ -259,7 +262,7 @@ class MechanicalAdvantage(Demand):
             object.__setattr__(self, "at", at)
 
     def requires(self, way: RotationRange) -> tuple[Require, ...]:
-        """Return the required functions of the dimensions."""
+        """Return the functions of dimensions and crank rotation that must be at most zero."""
         all_the_way = self.at is None
         ends = way.ends("mechanical advantage") if all_the_way else None
         if ends is None:
@@ -298,12 +301,12 @@ class MechanicalAdvantage(Demand):
 @in_si(at="rad")
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _LimitPosition(Demand):
-    """Two links are collinear at a crank rotation, or somewhere within a range of rotations.
+    """Base class of the constraints that a dead centre or a toggle is at a crank rotation, or within a range of rotations.
 
     Attributes
     ----------
     at : float or (float, float)
-        Crank rotation, or range of it, counted as those of the task (rad).
+        Crank rotation, or range of crank rotations, counted as in the task (rad).
     position : "stretched" or "folded"
         Whether one link extends the other, or lies over it.
     """
@@ -322,7 +325,7 @@ class _LimitPosition(Demand):
         return Require(function=function, equal=equal, name=f"{self.position} {self._name}", symbolic=True)
 
     def _require_sign_change(self, way: RotationRange, distance: Callable[[Any, float], Any]) -> tuple[Require, ...]:
-        """Require that a function changes its sign within the range, so that its zero, the limit position, lies there."""
+        """Return constraints by which ``distance`` has a zero, the limit position, within the range: its sign changes there."""
         way.timed(f"a {self._name} at crank rotations")
         low, high = self.at
         if low == high:
@@ -331,12 +334,12 @@ class _LimitPosition(Demand):
 
 
 class DeadCentre(_LimitPosition):
-    """There is a dead centre, with crank and coupler collinear, at a crank rotation or within a range.
+    """Constraint: a dead centre, with crank and coupler collinear, is at a crank rotation or within a range of rotations.
 
     Attributes
     ----------
     at : float or (float, float)
-        Crank rotation, or range of it, counted as those of the task (rad).
+        Crank rotation, or range of crank rotations, counted as in the task (rad).
     position : "stretched" or "folded"
         The coupler extends the crank, or lies over it.
     """
@@ -345,7 +348,7 @@ class DeadCentre(_LimitPosition):
     _name: ClassVar[str] = "dead centre"
 
     def requires(self, way: RotationRange) -> tuple[Require, ...]:
-        """Return the required functions of the dimensions."""
+        """Return the functions of the dimensions that must be at most zero, or equal to zero."""
         stretched = self.position == "stretched"
 
         def closes(d: Any, rotation: float) -> Any:
@@ -363,14 +366,14 @@ class DeadCentre(_LimitPosition):
 
 
 class Toggle(_LimitPosition):
-    """There is a toggle, in which the crank can turn no further, at a crank rotation or within a range.
+    """Constraint: a toggle, in which the crank can turn no further, is at a crank rotation or within a range of rotations.
 
     In a slider-crank's toggle the coupler is perpendicular to the guide and points away from A, or towards it.
 
     Attributes
     ----------
     at : float or (float, float)
-        Crank rotation, or range of it, counted as those of the task (rad).
+        Crank rotation, or range of crank rotations, counted as in the task (rad).
     position : "stretched" or "folded"
         The coupler extends the rocker, or lies over it.
     """
@@ -380,7 +383,7 @@ class Toggle(_LimitPosition):
     stops: ClassVar[bool] = True
 
     def requires(self, way: RotationRange) -> tuple[Require, ...]:
-        """Return the required functions of the dimensions."""
+        """Return the functions of the dimensions that must be at most zero, or equal to zero."""
 
         def closes(d: Any, rotation: float) -> Any:
             c = symbolic.library().cos(rotation + d.crank_phase)
@@ -392,12 +395,12 @@ class Toggle(_LimitPosition):
 @in_si(between="rad")
 @dataclass(frozen=True, slots=True, kw_only=True)
 class NoToggle(Demand):
-    """There is no toggle between two crank rotations, and the links stay joined.
+    """Constraint: there is no toggle between two crank rotations, and the links stay joined.
 
     Attributes
     ----------
     between : (float, float)
-        Crank rotations, counted as those of the task (rad).
+        Crank rotations, counted as in the task (rad).
     """
 
     between: tuple[Amount, Amount]
@@ -406,7 +409,7 @@ class NoToggle(Demand):
         object.__setattr__(self, "between", _rotations(self.between, "rotations without a toggle"))
 
     def requires(self, way: RotationRange) -> tuple[Require, ...]:
-        """Return the required functions of the dimensions."""
+        """Return the functions of dimensions and crank rotation that must be at most zero."""
         way.timed("a range of crank rotations without a toggle")
 
         def excess(d: Any, rotation: Any) -> Any:

@@ -40,7 +40,7 @@ from .constraint import (
 from .task import Normal, RockerFunction, SliderFunction, Task
 
 FloatArray = NDArray[np.float64]
-#: Default upper bound of the links, in sizes of the target; for a rocker function in ground links.
+#: Default upper bound of the links, relative to the size of the target; for a rocker function relative to the ground link.
 LARGEST = 5.0
 #: Ground link of a rocker function by default (m): its angles do not depend on the size.
 GROUND = 0.1
@@ -57,8 +57,8 @@ class Limits:
     low, high : ndarray, shape (11,)
         Bounds of `UNKNOWNS`.
     turn, way : float or None
-        Least transmission angle (rad), over a turn and during the task. 0 only requires that the crank turns fully, or that
-        the links stay joined; None requires nothing.
+        Least transmission angles (rad): ``turn`` over a full turn of the crank, ``way`` during the task. A ``turn`` of 0 only
+        requires that the crank turns fully, a ``way`` of 0 that the links stay joined. None requires nothing.
     grashof : str or None
         Required Grashof type.
     branches : tuple of int
@@ -66,13 +66,13 @@ class Limits:
     regions : tuple
         For each region the pivot, "A" or "D", and the triangles, each shape (3, 2), in units.
     requires : tuple of Require
-        Functions that must be at most zero, or zero.
+        Functions that must be at most zero, or equal to zero.
     linkage : type
         Type of the linkages.
     second : (float, float), optional
         Bounds of the second crank's length of a geared five-bar, in units.
     ratio : float
-        Gear ratio of that five-bar.
+        Gear ratio of a geared five-bar.
     least : MinimisedFunction, optional
         The function that is minimised instead of an error.
     """
@@ -92,7 +92,7 @@ class Limits:
 
     @property
     def gears(self) -> tuple[int, int]:
-        """Return the turns of the first and of the second crank per turn of the input shaft."""
+        """Return the turns of the first and of the second crank per turn of the input shaft; (1, 0) without a second crank."""
         return (1, 0) if self.second is None else gear_turns(self.ratio)
 
     def second_crank(self, unit: float) -> CrankUnknown | None:
@@ -103,14 +103,14 @@ class Limits:
         return CrankUnknown(ratio=self.ratio, length=(unit * low, unit * high))
 
     def admits(self, linkage: Linkage) -> bool:
-        """Return whether a linkage has the kind and gears of these limits; with a pivot on a guide it is a four-bar."""
+        """Return whether a linkage has the kind and gear ratio of these limits; a pivot on a guide counts as a four-bar's."""
         if self.linkage is FiveBar:
             return isinstance(linkage, FiveBar) and linkage.pivot.ratio == self.ratio
         return isinstance(linkage, SliderCrank) == (self.linkage is SliderCrank)
 
     @property
     def bounds_rotations(self) -> bool:
-        """Return whether a function is bounded along the crank's rotation."""
+        """Return whether any constraint bounds a function of the crank rotation; see `RotationRequirement`."""
         return any(isinstance(require, RotationRequirement) for require in self.requires)
 
     def without_defects(self, normal: Normal) -> Limits | None:
@@ -121,7 +121,7 @@ class Limits:
 
     @property
     def bounds_only(self) -> bool:
-        """Return whether there are only bounds, so that a least squares method is sufficient."""
+        """Return whether there are only bounds and no constraints, so that a least squares method is sufficient."""
         return (
             self.turn is None
             and self.way is None
@@ -264,7 +264,7 @@ def _transmission_limits(constraints: Sequence[Constraint]) -> tuple[float | Non
 def _complete_bounds(
     name: str, ends: tuple[float | None, float | None], usual: tuple[float, float]
 ) -> tuple[float, float]:
-    """Return bounds as given, with the default for an end that is None or infinite."""
+    """Return the bounds of dimension ``name``: the given ``ends``, or the default for an end that is None or infinite."""
     try:
         low, high = (e if end is None or np.isinf(end) else float(end) for end, e in zip(ends, usual, strict=True))
     except (TypeError, ValueError):
@@ -280,7 +280,7 @@ def _complete_bounds(
 def _check_links(
     given: Mapping[str, tuple[float, float]], constraints: Sequence[Constraint], linkage: type[Linkage]
 ) -> None:
-    """Check that the bounds alone allow a linkage whose crank turns fully, if that is required."""
+    """Check that the bounds of the links allow a crank that turns fully, if the constraints require a full turn."""
     if not any(isinstance(c, FullTurn) or (isinstance(c, LeastTransmission) and c.over == "turn") for c in constraints):
         return
     l1, l2, l3, l4 = (given[name] for name in LINKS)
@@ -354,7 +354,9 @@ def limits_by_kind(
     kinds: Sequence[Kind] | None = None,
     gears: Sequence[float] = GEARS,
 ) -> list[Limits]:
-    """Return bounds and constraints for each kind of linkage, and for geared five-bars for each ratio; see `usual_kinds`.
+    """Return the bounds and constraints of a task: one `Limits` for each kind of linkage, or gear ratio of a five-bar.
+
+    By default the kinds are those of `usual_kinds`.
 
     Raises InputError if a kind is unknown, cannot do the task, or does not support a constraint; ParameterError,
     InfeasibleError as `make_limits` does.
@@ -451,9 +453,9 @@ def _five_bar_limits(
 
 
 def place_as_task(task: Task, linkage: Linkage) -> Linkage:
-    """Return a linkage placed as the task asks: for a slider function its guide is exactly on the x axis.
+    """Return a linkage placed as the task asks: for a slider function, with the guide exactly on the x axis.
 
-    Its coupler point is then the slider's pin; for other tasks the linkage is returned unchanged.
+    The coupler point is then the pin of the slider. For other tasks the linkage is returned unchanged.
     """
     if not isinstance(task, SliderFunction):
         return linkage

@@ -1,7 +1,7 @@
-"""Represent target curves as points in m, and measure the deviation of a traced curve from them.
+"""Represent target curves as points in m, and measure the deviation of a traced curve from its target.
 
-A curve is a polyline: straight segments join its points, and the last point to the first if it is closed. Length, centroid,
-size and areas are exact for the polyline.
+A curve is a polyline: straight segments join its points; in a closed curve a segment also joins the last point to the first.
+Length, centroid, size and areas are exact for the polyline.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ FREEDOM_WEIGHT = 1.4
 
 
 def plane_points(points: ArrayLike, what: str, least: int) -> FloatArray:
-    """Return points as an array of shape (n, 2) of finite numbers, a copy.
+    """Return a copy of the points as an array of finite numbers, shape (n, 2).
 
     Raises InputError, with ``what`` as the name of the points, if the shape is wrong, a coordinate is not finite, or there are
     fewer than ``least`` points.
@@ -50,7 +50,7 @@ def plane_points(points: ArrayLike, what: str, least: int) -> FloatArray:
 
 
 def closed_vertices(points: FloatArray, closed: bool) -> FloatArray:
-    """Return the vertices of a polyline in order, for a closed one with the first vertex again at the end."""
+    """Return the vertices of a polyline in order; for a closed polyline the first vertex is repeated at the end."""
     return np.vstack([points, points[:1]]) if closed else points
 
 
@@ -85,10 +85,10 @@ def interpolate_polyline(vertices: FloatArray, s: ArrayLike) -> FloatArray:
 def even_odd_area(*rings: FloatArray) -> float:
     """Compute the area of the points that closed polylines encircle an odd number of times in total (m2).
 
-    For one polyline it is the enclosed area by the even-odd rule: both lobes of a figure-eight count, an inner loop does not.
-    For two it is the area of the symmetric difference of the enclosed areas, whose points are inside exactly one of the
-    polylines. The polylines are cut at their crossings; a face between the pieces counts if a point inside it is encircled an
-    odd number of times.
+    For one polyline the result is the enclosed area by the even-odd rule: both lobes of a figure-eight count, an inner loop
+    does not. For two polylines the result is the area of the symmetric difference of the enclosed areas, whose points are
+    inside exactly one of the polylines. The polylines are cut at their crossings; a face between the pieces counts if a point
+    inside the face is encircled an odd number of times.
 
     Parameters
     ----------
@@ -227,8 +227,8 @@ class TargetPath:
     def normals(self) -> FloatArray:
         """Return the unit normals at the points, shape (n, 2): outward for a closed curve, to the right along an open one.
 
-        The tangent is that of the parabola through the point and its two neighbours (second order in the spacing), or at an
-        open end that of the end segment. For a closed curve that crosses itself, outward refers to the lobe with more area.
+        A normal is perpendicular to the parabola through the point and its two neighbours (second order in the spacing), or at
+        an open end to the end segment. For a closed curve that crosses itself, outward refers to the lobe with more area.
         """
         vertices = closed_vertices(self.points, self.closed)
         steps = np.diff(vertices, axis=0)
@@ -248,7 +248,7 @@ class TargetPath:
         return normals
 
     def reverse(self) -> TargetPath:
-        """Return the same curve in the opposite direction; a closed one starts at the same point."""
+        """Return the same curve in the opposite direction; a closed curve starts at the same point."""
         points = np.roll(self.points[::-1], 1, axis=0) if self.closed else self.points[::-1]
         return TargetPath(points=points, closed=self.closed)
 
@@ -271,7 +271,7 @@ class TargetPath:
     def transform(
         self, *, scale: float = 1.0, angle: float = 0.0, shift: tuple[float, float] = (0.0, 0.0)
     ) -> TargetPath:
-        """Return the curve scaled and turned (rad, counter-clockwise) about the origin, then shifted (m).
+        """Return the curve scaled and rotated (rad, counter-clockwise) about the origin, then shifted (m).
 
         Raises
         ------
@@ -283,18 +283,20 @@ class TargetPath:
         return TargetPath(points=transform_points(self.points, scale, angle, shift), closed=self.closed)
 
     def smooth(self, n: int, *, deviation: float | None = None) -> TargetPath:
-        """Fit a cubic smoothing spline to a noisy curve; return the curve through n points of it at equal arc lengths.
+        """Fit a cubic smoothing spline to a noisy curve; return n points of the spline at equal arc lengths as a curve.
 
         The spline z(u) over the chord length u of the points z_k = x + i y minimises::
 
             sum |z_k - z(u_k)|^2 + lambda * integral |z''|^2 du,
 
         periodic for a closed curve, with natural ends for an open one (Green and Silverman, Nonparametric Regression and
-        Generalized Linear Models, 1994, chapter 2). Both coordinates share lambda, so that turning the curve turns the result.
+        Generalized Linear Models, 1994, chapter 2). Both coordinates share lambda, so that a rotation of the curve rotates the
+        result.
 
         Parameters
         ----------
         n : int
+            Number of points of the result.
         deviation : float, optional
             Root mean square distance of the points from the spline (m), if the noise is known. By default lambda is chosen by
             generalised cross-validation, which assumes that the noise is not correlated from point to point; for a slow tremor
@@ -303,8 +305,8 @@ class TargetPath:
         Raises
         ------
         InputError
-            If the curve has fewer than 6 points, or the deviation is not between zero and that of the smoothest possible curve
-            (a point if closed, a straight line if open).
+            If the curve has fewer than 6 points, or the deviation is not between zero and the deviation of the smoothest
+            possible curve (a point if closed, a straight line if open).
         """
         from scipy.interpolate import CubicSpline
         from scipy.optimize import brentq, minimize_scalar
@@ -384,9 +386,9 @@ def curve_distance(curve: ArrayLike, points: ArrayLike, *, closed: bool = True) 
     Parameters
     ----------
     curve : array_like, shape (n, 2)
-        m.
+        Vertices of the curve (m).
     points : array_like, shape (m, 2)
-        m.
+        Points whose distances are computed (m).
     closed : bool
         Whether the curve's last point is joined to its first.
 
@@ -411,25 +413,25 @@ def _cut_into_pieces(vertices: FloatArray) -> tuple[FloatArray, float]:
 def area_difference(curve: ArrayLike, target: TargetPath, *, closed: bool = True) -> float:
     """Compute the area between a traced curve and its target (m2).
 
-    If both are closed it is the area of the symmetric difference of the enclosed areas, by the even-odd rule
-    (`even_odd_area`); exact for the polylines.
+    If both are closed, the result is the area of the symmetric difference of the enclosed areas, by the even-odd rule
+    (`even_odd_area`); it is exact for the polylines.
 
-    Otherwise, with d(p, S) the distance of a point p from the nearest point of a curve S, it is
+    Otherwise, with d(p, S) the distance of a point p from the nearest point of a curve S, the area is
 
         A = 1/2 (integral over the target of d(p, curve) ds + integral over the curve of d(p, target) ds),
 
-    which is symmetric and zero only for equal curves. For parallel curves it is the area of the strip between them, exactly
+    which is symmetric and zero only for equal curves. For parallel curves A is exactly the area of the strip between them
     (Steiner's formula: their distance times the mean of their lengths). If the target is open and the curve closed, only a part
     of the curve traces the target, and the rest of the curve does not count:
 
         A = integral over the target of d(p, curve) ds.
 
-    The integrals are sums over `PIECES` pieces of equal length by the midpoint rule: about 1e-6 of the value.
+    The integrals are sums over `PIECES` pieces of equal length by the midpoint rule, with an error of about 1e-6 of the value.
 
     Parameters
     ----------
     curve : array_like, shape (n, 2)
-        m.
+        Vertices of the traced curve (m).
     target : TargetPath
     closed : bool
         Whether the curve's last point is joined to its first.
@@ -454,7 +456,7 @@ def hausdorff(curve: ArrayLike, target: TargetPath, *, closed: bool = True) -> f
     """Compute the Hausdorff distance of a traced curve from its target (m).
 
     For an open target and a closed curve only the target's points count, as in `area_difference`. Distances are computed at the
-    vertices and at `PIECES` points at equal arc lengths: the result is below the true one by at most half their spacing.
+    vertices and at `PIECES` points at equal arc lengths: the result is below the true distance by at most half their spacing.
 
     Parameters
     ----------
@@ -511,8 +513,8 @@ def straightness(part: ArrayLike, *, direction: float | None = None) -> Straight
     part : array_like, shape (n, 2)
         Points of the part in order (m), for example those within a range of crank angles.
     direction : float, optional
-        Direction of the wanted line (rad). By default it is that of the narrowest strip that contains the points (the
-        minimum zone of ISO 1101; an edge of the convex hull lies along it).
+        Direction of the wanted line (rad). The default is the direction of the narrowest strip that contains the points (the
+        minimum zone of ISO 1101; an edge of the convex hull lies along the strip).
 
     Raises
     ------
@@ -558,14 +560,14 @@ def straightest_part(
     least_travel: float = 0.0,
     closed: bool = True,
 ) -> Straightness:
-    """Find the flattest part of ``count`` successive points in a curve, such as those of a range of crank angles.
+    """Find the flattest part of a curve that consists of ``count`` successive points.
 
     Parameters
     ----------
     curve : array_like, shape (n, 2)
-        m.
+        Points of the curve (m), for example at equal steps of the crank angle.
     count : int
-        Number of points: for a range of 120 deg at 5 deg steps it is 25.
+        Number of points of the part: for a range of 120 deg at 5 deg steps it is 25.
     direction : float, optional
         As for `straightness`.
     least_travel : float
@@ -576,7 +578,7 @@ def straightest_part(
     Raises
     ------
     InputError
-        If the curve has fewer points, or no part has the least travel.
+        If the curve has fewer than ``count`` points, or no part has the least travel.
     """
     parts = straight_parts(curve, count, direction=direction, closed=closed)
     longest = max(part.travel for part in parts)
@@ -590,7 +592,7 @@ def straightest_part(
 def straight_parts(
     curve: ArrayLike, count: int, *, direction: float | None = None, closed: bool = True
 ) -> list[Straightness]:
-    """Return travel and flatness of every part of ``count`` successive points in a curve: see `straightest_part`."""
+    """Return travel and flatness of every part of a curve with ``count`` successive points; see `straightest_part`."""
     points = plane_points(curve, "the curve", 2)
     if not 2 <= count <= len(points):
         raise InputError(f"a part of {count} points of {len(points)}: it must be from 2 to all of them")

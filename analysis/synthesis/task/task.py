@@ -114,7 +114,7 @@ def _set_fields(task: Any, **values: Any) -> None:
 
 
 def turn(n: int) -> FloatArray:
-    """Return n evenly spaced crank rotations over one turn, from 0 and without 2 pi (rad)."""
+    """Return n evenly spaced crank rotations over one turn (rad), from 0 to less than 2 pi."""
     return np.linspace(0.0, 2.0 * pi, n, endpoint=False)
 
 
@@ -154,8 +154,8 @@ class TimedPath:
 class SliderFunction(TimedPath):
     """Task: the slider of a slider-crank is at given positions at given crank rotations.
 
-    It is a path of the slider's pin C along the x axis: its points follow from the positions, and the search finds the position
-    of the crank shaft.
+    The task is a path of the slider's pin C along the x axis. The points of this path follow from the positions; the search
+    finds the position of the crank shaft.
 
     Attributes
     ----------
@@ -185,12 +185,12 @@ class Straight:
     start, end : int
         First and last of the path's points on the straight part, in the order of the points.
     rotation : float
-        Greatest crank rotation for that part (rad).
+        Greatest crank rotation for the straight part (rad).
     flatness : float, optional
         Greatest extent of the traced part across the line from start to end (m); if it is not given, ``weight`` only favours
         flatness.
     weight : float
-        Weight of the squared deviation across that line, 1 or greater.
+        Weight of the squared deviation across the line from start to end, 1 or greater.
     """
 
     start: int
@@ -226,7 +226,7 @@ class UntimedPath:
     samples : int
         Number of stations: points of the path at equal arc lengths, at which the curve is fitted.
     straight : Straight, optional
-        A straight part that is traced within a crank rotation; its points are those of ``path``.
+        A straight part of ``path`` that is traced within a given crank rotation.
     weights : ndarray, shape (number of the path's points,), optional
         Weight of each point of ``path``, interpolated between the points.
     objective : "error" or "worst"
@@ -263,7 +263,7 @@ class RockerFunction:
     angle : ndarray, shape (n,)
         th4 from the ground link (rad).
     rotation, weights : ndarray, shape (n,)
-        As in `TimedPath`; the weights are those of the squared angular errors.
+        As in `TimedPath`; the weights multiply the squared angular errors.
     mounting : bool
         Whether the output may be mounted on the rocker at any angle.
     objective : "error" or "worst"
@@ -308,6 +308,7 @@ class Motion:
         Length by which an angular error is multiplied to count as an error of position (m/rad); by default half the target's
         extent, or 50 mm for a body that only rotates.
     weights : ndarray, shape (n,)
+        Weights of the squared errors.
     objective : "error" or "worst"
         What is minimised: the quality function, or the greatest error, position and angle combined.
     """
@@ -336,8 +337,9 @@ class Motion:
 class PrecisionPoints:
     """Task: the coupler point passes exactly through a few points, in order, at any crank rotations or at given ones.
 
-    A four-bar can pass nine untimed points or five timed ones, but rarely with a good transmission angle; if it cannot pass
-    them exactly it comes as close as possible. With ``angle`` the targets are poses, of which it can pass five untimed ones.
+    A four-bar can pass nine untimed points or five timed points, but rarely with a good transmission angle. If it cannot pass
+    the points exactly, it comes as close as possible. With ``angle`` the targets are poses; a four-bar can pass five untimed
+    poses.
 
     Attributes
     ----------
@@ -476,7 +478,7 @@ class Normal:
 
     @property
     def shares(self) -> FloatArray:
-        """Return the arc length from the first station to each one as a fraction of the polyline's length, shape (n,)."""
+        """Return the arc length from the first station to each station as a fraction of the total length, shape (n,)."""
         assert self.points is not None
         steps = np.abs(np.diff(np.append(self.points, self.points[0]) if self.closed else self.points))
         length = np.concatenate([[0.0], np.cumsum(steps)])
@@ -485,9 +487,9 @@ class Normal:
 
 
 def replace_weights(task: Task, weights: ArrayLike | None) -> Task:
-    """Return the task with other weights, if any are given.
+    """Return the task with these weights; None leaves the task unchanged.
 
-    Raises InputError if the number of weights differs from that of the targets, or the task does not take weights.
+    Raises InputError if there is not one weight per target, or if the task does not take weights.
     """
     if weights is None:
         return task
