@@ -303,7 +303,8 @@ def _limits() -> tuple[Statement, ...]:
             "can go to the opposite side",
             f"none, the sign decides; {ROUNDING}, of zero",
             (*beyond, nothing("a4 = 0, 10, 20, 30 in, greatest S1", meeting, "in")),
-            "to which side the slider goes there depends on the forces and is not measured",
+            "the crank angle being given, as in the thesis: else the crank may stop there; at the thesis's own limits neither "
+            "occurs, see the row before; to which side the slider goes depends on the forces and is not measured",
         ),
         Statement(
             "When offset [a4] is 20 inches and crank axial displacement [S1] is zero, the program converges as long "

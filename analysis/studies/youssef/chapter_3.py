@@ -42,11 +42,11 @@ forces, and advise to integrate all second derivatives, so that the closure of t
 Sections 3.2 and 3.3 run Table 3.1: without a spring, with three springs, launched by a torque, and left to itself.
 
 **What stands.** The equations (3.8) and (3.10) are right, but for a minus that our scan lacks; the multipliers are the
-force at C and the crank torque; and the failure of closure does tell the error, being some five to fifteen times that
-of the slider. The program of appendix 1 prints the closure, but integrates the slider alone, so that its own check
-shows nothing. The torque reverses near 0 deg and hardly depends on the spring; the rise of the speed along a line in a
-launch, the decay by the damper, the phase planes, and the resonance of the second harmonic at half the natural
-frequency are as described.
+force at C and the crank torque; and at constant speed the failure of closure does tell the error, being some five to
+fifteen times that of the slider; in a launch, with short steps, it is far less than the error. The program of appendix
+1 prints the closure, but integrates the slider alone, so that its own check shows nothing. The torque reverses near 0
+deg and hardly depends on the spring; the rise of the speed along a line in a launch, the decay by the damper, the phase
+planes, and the resonance of the second harmonic at half the natural frequency are as described.
 
 **What does not.** Without a spring the slider does not drift along a line: the mean of the inertia forces pushes it
 towards the crank, the harder the nearer it comes, so that only with the two strongest dampers ten turns look straight;

@@ -366,6 +366,14 @@ def judge_coupler(found: Mapping[str, Sequence[Region]]) -> tuple[Statement, ...
     follow = "the angles follow the coupler"
     listed, moving = (axis(of(held(0.8, 0.5))) for of in (appendix_3, right))
     at_half = f"at I4 = 0.5, its value there (L8641), the listing has {listed:.4f}, the true motion {moving:.4f}"
+    half, *cranks = (
+        max(hill(mechanism(x, inertia_ratio)).width for x in SWEEPS[number].values)
+        for number, mechanism, inertia_ratio in (("5.3", held, 0.5), ("5.2", with_crank, 1.0), ("5.2", with_crank, 0.5))
+    )
+    halved = (
+        f"at I4 = 0.5, which the listing has (L8641), it would be {half / cranks[0]:.2f} of that of Fig 5.2 at I4 = 1 and "
+        f"{half / cranks[1]:.2f} of it at I4 = 0.5, by the right linear equation"
+    )
     both = {"angles held": found["true orbit"], "same ground link": found[SAME_GROUND]}
     seconds, ranges, by_listing = {}, [], []
     for number in SWEEPS:
@@ -406,8 +414,8 @@ def judge_coupler(found: Mapping[str, Sequence[Region]]) -> tuple[Statement, ...
         Statement(
             "This region is narrower than both regions of Figs. (5.1[)] and (5.2).",
             text("5.3.1, L3898-3900"),
-            "greatest width of the region of the true periodic motion, angles held, relative to that of each; on the "
-            f"same ground link it is {widths(found[SAME_GROUND]).max() / widest:.1f} times as great",
+            "greatest width of the region of the true periodic motion, angles held, relative to that of each; on the same "
+            f"ground link it is {widths(found[SAME_GROUND]).max() / widest:.1f} times as great as with the angles held",
             SIGN,
             (
                 Case(
@@ -415,7 +423,7 @@ def judge_coupler(found: Mapping[str, Sequence[Region]]) -> tuple[Statement, ...
                     computed=None,
                     why=f"the range of I4 there is not said: it would be {over_inertia}",
                 ),
-                at_most("Fig 5.2", 1.0, over_crank, why="at I4 = 0.5, which the listing has (L8641), it is narrower"),
+                at_most("Fig 5.2", 1.0, over_crank, why=halved),
             ),
         ),
         Statement(

@@ -299,10 +299,10 @@ def compute() -> StudyResult:
                 "application of the Lagrangian multiplier method stated in equation (2.5) the following equations are "
                 "obtained.",
                 text("4.2.1, eqs (4.9) to (4.20), L2495-2613"),
-                "residual of each, with the accelerations and, for the multipliers, the pin force at C by our equations of "
-                "motion, for the mechanism of Table 3.1 without gravity at 25 crank angles with slider positions and "
-                "velocities that are ours; the damper's term of (4.18), illegible in the scan, by (4.13); greatest, relative "
-                "to the greatest term",
+                "residual of each, with the accelerations and, for the multipliers, the pin force at C and the crank torque by "
+                "our equations of motion, for the mechanism of Table 3.1 without gravity at 25 crank angles with slider "
+                "positions and velocities that are ours; the damper's term of (4.18), illegible in the scan, by (4.13); "
+                "greatest, relative to the greatest term",
                 f"{ROUNDING:g}, above rounding errors",
                 tuple(at_most(name, ROUNDING, x) for name, x in residuals().items()),
             ),
