@@ -80,6 +80,7 @@ def test_modules_inside_carry_the_hash_of_their_content(fmu: Path, model: Model,
             return {Path(name).parts[1] for name in archive.namelist() if name.startswith("resources/")} - {
                 "pythonfmu",
                 "slavemodule.txt",
+                "guid.txt",
             }
 
     ours = modules(fmu)

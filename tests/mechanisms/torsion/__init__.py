@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import astuple, dataclass
+from dataclasses import dataclass
 from math import pi
 from typing import ClassVar
 
@@ -32,8 +32,16 @@ class Parameters(CheckedParameters):
     rotor_excitation: float = 0.0
 
     def constants(self) -> Constants:
-        """What the equations use: the parameters as they are, in the same order."""
-        return Constants(*astuple(self))
+        """What the equations use; traced parameters are no dataclass."""
+        return Constants(
+            self.rotor_inertia,
+            self.rotor_damping,
+            self.rotor_stiffness,
+            self.rotor_cubic_stiffness,
+            self.rotor_modulation,
+            self.rotor_weight,
+            self.rotor_excitation,
+        )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
