@@ -1,6 +1,6 @@
-"""``python build_fmu.py`` is ``linkwork build`` from a checkout: it builds and validates the FMUs of Linkwork.
+"""Build and validate Linkwork's FMUs from a checkout: ``python build_fmu.py`` does the same as ``linkwork build``.
 
-The exit code is 0 only if every FMU was built, found valid, and run.
+The exit code is 0 only if every FMU was built, is valid, and runs.
 """
 
 from __future__ import annotations

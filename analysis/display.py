@@ -49,7 +49,10 @@ def format_turns(turns: int) -> str:
 
 
 def format_rounds(rounds: Mapping[str, int], before: str) -> str:
-    """Format how often links go round; ``before`` precedes the text for each link: ", swing.angle goes round +1"."""
+    """Format the number of full turns of each link: ", swing.angle goes round +1".
+
+    ``rounds`` are the numbers of turns by coordinate; ``before`` precedes the text for each link.
+    """
     return "".join(f"{before}{name} goes round {times:+d}" for name, times in rounds.items())
 
 

@@ -209,8 +209,8 @@ InitialState = Any
 def name_in_files(mechanism: Mechanism, channel: Channel) -> str:
     """Return the name of a channel in case files.
 
-    The name is the FMI name of the input, such as ``slider.force``. The table in front is left out (``force``) if the table
-    also has parameters and no other input in such tables has the same last part.
+    The name is the FMI name of the input, such as ``slider.force``. The name of the table (``slider``) is left out if the
+    table also has parameters and no other input in such tables has the same last part (``force``).
     """
     tables = {name.partition(".")[0] for name in mechanism.mechanism_variables}
     bare = [c.name.rpartition(".")[2] for c in mechanism.channels if c.name.rpartition(".")[0] in tables]

@@ -154,7 +154,7 @@ class Bar(_Section):
         return float(self.width * self.thickness * self.density * _check_length(length))
 
     def inertia(self, length: Amount) -> float:
-        """Return the moment of inertia (kg.m2) about a normal axis through the centre of mass: m (L^2 + w^2)/12."""
+        """Return the moment of inertia (kg.m2) about the centre of mass, normal to the plane of motion: m (L^2 + w^2)/12."""
         return float(self.mass(length) * (self.width**2 + _check_length(length) ** 2) / 12.0)
 
 
@@ -163,7 +163,7 @@ Section = Rod | Tube | Bar
 
 
 class MassProperties(NamedTuple):
-    """Mass (kg), centre of mass (m, m), and moment of inertia (kg.m2) about the axis through the centre of mass."""
+    """Mass (kg), x and y of the centre of mass (m), and moment of inertia (kg.m2) about the axis through the centre of mass."""
 
     mass: float
     centre: tuple[float, float]

@@ -81,7 +81,7 @@ def quantity(value: Any, unit: str, name: str, *, bare: str | None = None) -> fl
     value : float or str
         ``0.1535`` or ``"15.35 cm"``. A text needs its unit: a bare "30" for an angle was hardly meant in radians.
     unit : str
-        SI unit of the contract, such as ``N.s/m``.
+        SI unit of the result, such as ``N.s/m``.
     name : str
         Name of the quantity for error messages.
     bare : str, optional
@@ -238,7 +238,10 @@ def _pint_spelling(text: str, unit: str) -> str:
 
 
 def _convert(text: str, unit: str, spelled: str, name: str, wanted: str) -> float:
-    """Convert a text with a unit to a number in SI with pint; ``wanted`` ends the error "it must ..."."""
+    """Convert a text with a unit to a number in the SI unit ``unit``, with pint.
+
+    ``spelled`` is ``unit`` in pint's spelling; ``wanted`` ends the error "it must ...".
+    """
     match = _GRAMMAR.fullmatch(_pint_spelling(text, unit)) if len(text) <= _LONGEST else None
     if match is None:
         shown = text if len(text) <= _LONGEST else f"{text[:_LONGEST]}..."

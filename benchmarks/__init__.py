@@ -1,1 +1,1 @@
-"""Benchmarks, run on demand: each prints a table, ratios within one run on one machine at a stated accuracy."""
+"""Benchmarks, run on demand: each prints a table of ratios that are measured in one run on one machine at a stated accuracy."""

@@ -1,4 +1,4 @@
-"""Compare times at equal accuracy: each solver runs at its loosest setting that reaches the accuracy."""
+"""Compare the times of solvers at equal accuracy: each solver runs at its loosest setting that reaches the accuracy."""
 
 from __future__ import annotations
 
@@ -15,14 +15,14 @@ from analysis.numerics.codegen import evaluate
 from analysis.run import Inputs, encode, machine
 from analysis.run.equations import DERIVATIVE
 
-#: Required error, relative to the largest value.
+#: Largest allowed error of a run, relative to the largest value.
 ACCURACY = 1e-6
 TOLERANCES = 10.0 ** np.arange(-3.0, -11.0, -0.1)
 SCIPY_METHODS = ("RK45", "DOP853", "LSODA", "Radau", "BDF")
 
 
 class Choice(NamedTuple):
-    """A setting, such as a tolerance or a time step, with its error, and whether it reaches `ACCURACY`."""
+    """A solver setting, such as a tolerance or a time step, with its error, and whether the error is within `ACCURACY`."""
 
     setting: float
     error: float
@@ -30,9 +30,10 @@ class Choice(NamedTuple):
 
 
 def loosest_setting(error: Callable[[float], float], settings: Iterable[float]) -> Choice:
-    """Return the first of the settings, from loose to tight, that reaches `ACCURACY`; if none does, the most accurate.
+    """Return the first of the settings, from loose to tight, that reaches `ACCURACY`; if none does, the most accurate one.
 
-    A setting counts only if the next tighter one reaches the accuracy as well, to exclude lucky cancellation.
+    ``error`` returns the error at a setting. A setting counts only if the next tighter one reaches the accuracy as well, to
+    exclude lucky cancellation.
     """
     tried: list[Choice] = []
     for setting in settings:
@@ -46,7 +47,7 @@ def loosest_setting(error: Callable[[float], float], settings: Iterable[float]) 
 
 
 def shortest_time(run: Callable[[], object], repeats: int = 7) -> float:
-    """Return the shortest processor time of several runs (s), which other work on the machine disturbs little."""
+    """Return the shortest processor time of several runs (s); other work on the machine disturbs it little."""
     times = []
     for _ in range(repeats):
         begun = process_time()
@@ -57,7 +58,7 @@ def shortest_time(run: Callable[[], object], repeats: int = 7) -> float:
 
 @njit(error_model="numpy")
 def _evaluate_in_turn(equation, modes, constants, states, forces):
-    """Evaluate an equation along states; each evaluation waits for the previous result, as do the stages of a step."""
+    """Evaluate an equation at each row of ``states``; each evaluation waits for the previous one, like the stages of a step."""
     x, out = np.empty(states.shape[1]), np.zeros(states.shape[1])
     for i in range(states.shape[0]):
         for j in range(x.shape[0]):
@@ -67,7 +68,7 @@ def _evaluate_in_turn(equation, modes, constants, states, forces):
 
 
 def right_hand_side_time(parameters: Parameters, inputs: Inputs, states: NDArray[np.float64]) -> float:
-    """Return the time of one compiled right-hand side (s), evaluated at states without forces one after the other."""
+    """Return the time of one compiled right-hand side (s), evaluated at each row of ``states`` in turn, without forces."""
     mechanism = find_mechanism(parameters)
     p = parameters.constants()
     equation = machine(mechanism, mechanism.is_switched_on(p)).addresses[DERIVATIVE]

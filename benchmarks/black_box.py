@@ -1,14 +1,15 @@
-"""Synthesise with the quality function as a black box: by differential evolution, and by the thesis's downhill simplex.
+"""Synthesise four-bars by black-box searches: differential evolution, and the downhill simplex of the thesis.
 
 Neither method uses derivatives. `synthesize` is compared with both; chapter VI of the thesis has only the simplex.
 
-The quality is that of the task in normal form. A path without crank rotations is compared with the coupler curve at equal
-shares of both lengths, in both directions of travel, so that a curve that collapses onto a piece of the target, or makes
-detours, is far from it. Constraints are those of the benchmarks: bounds, transmission angle, full turn, a straight part.
+The quality function is that of the task in normal form. For a path without crank rotations, it compares points of the path with
+points of the coupler curve at equal shares of the two lengths, in both directions of travel. A coupler curve that collapses
+onto a piece of the target, or makes detours, therefore has a large error. The constraints are those of the benchmarks: bounds,
+transmission angle, full turn, a straight part.
 
-Links that cannot be joined are stretched until they meet: C then lies on the line through B and D, where the circles of
-coupler and rocker have equal power, so that the quality stays continuous. The gap between them is a violated constraint, with
-a proportional penalty like every other inequality.
+If the links cannot be joined, they are stretched until they meet: C then lies on the line through B and D, where the circles of
+coupler and rocker have equal power, so that the quality stays continuous. The gap between the links is a violated constraint,
+with a proportional penalty like every other inequality.
 """
 
 from __future__ import annotations
@@ -34,28 +35,28 @@ FloatArray = NDArray[np.float64]
 ComplexArray = NDArray[np.complex128]
 #: Violation up to which a constraint counts as satisfied.
 KEPT = 1e-4
-#: Points of a coupler curve with which a path is compared.
+#: Number of steps of a coupler curve that is compared with a path.
 CURVE = 128
 #: Least crank rotation over which an open path is traced (rad).
 SPAN = 0.1
-#: Generations of differential evolution, and members of a generation for each unknown.
+#: Generations of differential evolution, and number of members of a generation per unknown.
 GENERATIONS, MEMBERS = 400, 10
 #: Number of random linkages, the best of which is the first vertex of a simplex; edge of this simplex (units, rad).
 DRAWS, EDGE = 64, 0.2
-#: Factor of violated constraints in the simplex's quality function, in mean squared sizes of the target.
+#: Factor of constraint violations in the penalised quality, in squares of the target's size.
 PENALTY = 10.0
-#: Greatest number of evaluations of a simplex for each unknown.
+#: Greatest number of evaluations of a simplex search per unknown.
 EVALUATIONS = 600
-#: The plant's loop closure over arrays; its square root is zero where the links cannot be joined.
+#: Loop closure of the five-bar model for arrays; square roots of negative numbers, where links cannot be joined, are zero.
 _close_loop = rebind_functions((kinematics,), {"sqrt": lambda square: np.sqrt(np.maximum(square, 0.0))}).close_loop
 
 
 def initial_simplex(first: FloatArray, edge: float) -> FloatArray:
     """Return the regular simplex with a given first vertex and edge length, shape (n + 1, n).
 
-    The thesis's rule (6.11). Its formula is not legible in the copy at hand; this is the regular simplex of Spendley, Hext and
-    Himsworth (Technometrics 4 (1962), p 441), which its description fits: the vertex k is off by p in the unknown k and by q
-    in every other,
+    This is the thesis's rule (6.11). Its formula is not legible in the copy at hand; the regular simplex of Spendley, Hext and
+    Himsworth (Technometrics 4 (1962), p 441) fits its description: the vertex k is off by p in the unknown k and by q in every
+    other unknown,
 
         p = e (sqrt(n + 1) + n - 1) / (n sqrt 2),   q = e (sqrt(n + 1) - 1) / (n sqrt 2).
     """
@@ -75,7 +76,7 @@ def evolve(
     maxiter: int = GENERATIONS,
     tol: float = 1e-8,
 ) -> OptimizeResult:
-    """Minimise a quality, by default the box's, by SciPy's differential evolution over whole generations.
+    """Minimise a quality function, by default that of the box, by SciPy's differential evolution on whole generations.
 
     ``callback(intermediate_result)`` is called after each generation, and ends the search if it returns true.
     """
@@ -111,7 +112,10 @@ def descend(
 
 
 def minimise_score(box: BlackBox, first: FloatArray, score: Callable[[FloatArray], float]) -> OptimizeResult:
-    """Minimise a score by Nelder and Mead's method, from a regular simplex at a linkage that extends away from near bounds."""
+    """Minimise a score by Nelder and Mead's method from a regular simplex with its first vertex at the linkage ``first``.
+
+    In each unknown the simplex extends away from the nearer bound.
+    """
     away = np.where(first > 0.5 * (box.low + box.high), -1.0, 1.0)
     simplex = first + away * initial_simplex(np.zeros(len(first)), EDGE)
     return minimize(
@@ -124,9 +128,10 @@ def minimise_score(box: BlackBox, first: FloatArray, score: Callable[[FloatArray
 
 
 class BlackBox:
-    """The quality function of one assembly, and the violation of each constraint, for rows of unknowns.
+    """Quality function and constraint violations of a task for one assembly of the linkage, as functions of the unknowns.
 
-    The unknowns are those of `constraints.UNKNOWNS` that are free, and of an open path the rotation over which it is traced.
+    The unknowns are the free ones of `constraints.UNKNOWNS` and, for an open path, the crank rotation over which it is traced.
+    Methods take m linkages at once: ``x`` has the shape (m, k).
 
     Attributes
     ----------
@@ -140,7 +145,7 @@ class BlackBox:
         whole = high[7:] - low[7:] >= 2.0 * pi
         low[7:][whole], high[7:][whole] = -pi, pi
         if normal.points is not None:
-            # farther off no point of the coupler reaches the target
+            # from a pivot farther away no point of the coupler reaches the target
             reach = high[3] + high[6] + 1.0
             near, far = np.maximum(low[:2], -reach), np.minimum(high[:2], reach)
             sensible = near <= far
@@ -153,7 +158,10 @@ class BlackBox:
             self.low, self.high = np.append(self.low, SPAN), np.append(self.high, 2.0 * pi)
 
     def quality(self, x: FloatArray) -> FloatArray:
-        """Return the sums of weighted squared errors at the stations, shape (m,), in units squared."""
+        """Return the sum of weighted squared errors at the stations, or the greatest weighted error if the task asks for it.
+
+        The result has the shape (m,); lengths are in units of the normal form.
+        """
         q = self._linkages(x)
         return self._errors(q, self._rotations(x, q))
 
@@ -166,11 +174,11 @@ class BlackBox:
         return charged
 
     def penalised_quality(self, x: FloatArray) -> float:
-        """Return the penalised quality of one linkage, see `penalised_qualities`."""
+        """Return the penalised quality of one linkage; see `penalised_qualities`."""
         return float(self.penalised_qualities(x[None, :])[0])
 
     def violations(self, x: FloatArray) -> FloatArray:
-        """Return the left sides of the inequalities g(x) <= 0, shape (m, number of inequalities)."""
+        """Return the left sides g of the inequalities g(x) <= 0, shape (m, number of inequalities)."""
         q = self._linkages(x)
         # constraints over a whole turn do not need the stations' rotations, which take most of the time
         needed = self.limits.turn is None or self.normal.straight is not None
@@ -186,7 +194,7 @@ class BlackBox:
         worst, violation = max(((name, float(value[0])) for name, value in inequalities), key=lambda pair: pair[1])
         start = Start(q=q[0], branch=self.branch, rotation=None if self.normal.timed else rotation[0])
         quality = sum_of_squares(self.normal, start)
-        # the simplex ends on a constraint, not inside it
+        # the simplex may end at a constraint with a small violation
         kept = violation <= KEPT and bool(np.isfinite(quality))
         return Answer(
             start=replace(start, quality=quality),
@@ -212,7 +220,10 @@ class BlackBox:
         return q[:, 2, None] - q[:, 3, None] * np.cos(th2), -q[:, 3, None] * np.sin(th2)
 
     def _directions(self, q: FloatArray, rotation: FloatArray) -> tuple[ComplexArray, ComplexArray]:
-        """Return the directions of coupler and rocker, shape (m, n); they are not unit vectors if the links are stretched."""
+        """Return the directions of coupler and rocker as complex numbers, shape (m, n).
+
+        They are not unit vectors if the links are stretched.
+        """
         dx, dy = self._pins(q, rotation)
         with np.errstate(divide="ignore", invalid="ignore"):
             g = _close_loop(0.0, 0.0, dx, dy, q[:, 4, None], q[:, 5, None], float(self.branch))
@@ -242,7 +253,7 @@ class BlackBox:
     def _angle_errors(
         self, q: FloatArray, rotation: FloatArray, coupler: ComplexArray, rocker: ComplexArray, angle: FloatArray
     ) -> FloatArray:
-        """Return the errors of an angle, converted to lengths; for a stretched link those of its direction."""
+        """Return the errors of the rocker or coupler angle, converted to lengths; a stretched link counts by its direction."""
         own = rocker if self.normal.of_rocker else coupler * np.exp(1j * q[:, 7])[:, None]
         left: FloatArray = self.normal.leverage * np.angle(own * np.exp(1j * (q[:, 10, None] - angle)))
         return left
@@ -274,11 +285,11 @@ class BlackBox:
     # Constraints
 
     def _inequalities(self, q: FloatArray, rotation: FloatArray) -> list[tuple[str, FloatArray]]:
-        """Return the names and left sides of the inequalities g <= 0, each of shape (m,)."""
+        """Return the name and the left side g of each inequality g <= 0; each g has the shape (m,)."""
         limits, normal = self.limits, self.normal
         l1, l2, l3, l4 = (q[:, k] for k in range(2, 6))
         found: list[tuple[str, FloatArray]] = []
-        # distances from crank pin to rocker pivot: over the turn, and over the way of the task
+        # least and greatest distance from crank pin to rocker pivot: over the whole turn, and over the rotations of the task
         spans: list[tuple[FloatArray, FloatArray, float | None]] = []
         if limits.turn is not None:
             spans.append((np.abs(l1 - l2), l1 + l2, limits.turn))
@@ -291,7 +302,7 @@ class BlackBox:
                 ("loop closure", np.abs(l3 - l4) - nearest),
             ]
             if least is not None:
-                # as lengths, so that no constraint outweighs another
+                # converted to lengths, so that no constraint outweighs another
                 both = Linkage.transmission_excess(l3, l4, nearest**2, farthest**2, cos(max(least, TURNING)))
                 found += [("transmission angle", excess / (l3 + l4)) for excess in both]
         straight = normal.straight

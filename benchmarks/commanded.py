@@ -1,10 +1,11 @@
-"""Measure how well each master follows a varying commanded speed: error of the coordinate after 0.2 s, and its order.
+"""Measure how well each master follows a varying commanded speed: error of the coordinate after 0.2 s, and order of this error.
 
     python -m benchmarks.commanded                   # all masters, two minutes; writes docs/commanded.csv
-    python -m benchmarks.commanded --master FMPy     # one of them (repeatable); prints what it finds
+    python -m benchmarks.commanded --master FMPy     # one of them (repeatable); prints its results
 
-The command is a + b sin(20 t), which is set at the communication points, alone or with its rate; the coordinate is its
-integral. Each master has a process of its own. `docs/generate.py` puts the table into docs/fmu.md.
+The command is the speed a + b sin(20 t). It is set at the communication points, alone or together with its rate of change. The
+coordinate is the integral of the speed. Each master runs in a process of its own. `docs/generate.py` puts the table into
+docs/fmu.md.
 """
 
 from __future__ import annotations
@@ -23,16 +24,16 @@ from linkwork.mechanism import Mechanism
 from tests.fmu.runner import run_in_process
 
 RESULTS = Path(__file__).parents[1] / "docs" / "commanded.csv"
-#: Communication steps (s), and the number of steps of the greater length.
+#: Both communication steps (s), and the number of steps of a run at the first, longer one.
 STEPS, COUNT = (2e-3, 1e-3), 100
-#: Errors below this are those of the solvers and of rounding.
+#: Errors below this limit come from the solvers and from rounding.
 LEAST = 1e-9
-#: Rows of text by the headings of the table.
+#: Rows of a table: texts by heading.
 Table = list[dict[str, str]]
 
 
 class Command(NamedTuple):
-    """A command of a mechanism: FMI names of speed, rate and coordinate, and the numbers a and b of its law."""
+    """A commanded speed of a mechanism: FMI names of speed, rate of change and coordinate, and a and b of a + b sin(20 t)."""
 
     mechanism: str
     speed: str
@@ -48,13 +49,16 @@ COMMANDS = (
 )
 
 
-# The masters: each function runs in a process of its own, and imports what it needs itself. It takes cases, each with an
-# FMU, the fields of a `Command`, whether the rate is also set, the communication step, the number of steps, and arguments
-# of a `Row`; it returns the coordinate at the end of each case.
+# The masters: each function runs in a process of its own and imports there what it needs. It takes cases. A case has an FMU,
+# the fields of a `Command`, whether the rate is also set, the communication step, the number of steps, and the arguments of
+# a `Row`. The function returns the coordinate at the end of each case.
 
 
 def by_fmpy(cases: list[Any]) -> list[float]:
-    """Run by FMPy's `simulate_fmu`; its CVode sets inputs only at the ends of its own steps: the command is given densely."""
+    """Run the cases by FMPy's `simulate_fmu`.
+
+    With CVode it sets inputs only at the ends of CVode's own steps; the table of the command is therefore dense.
+    """
     import numpy as np
     from fmpy import simulate_fmu
 
@@ -84,7 +88,7 @@ def by_fmpy(cases: list[Any]) -> list[float]:
 
 
 def by_libcosimpy(cases: list[Any]) -> list[float]:
-    """Run by libcosim's fixed-step algorithm."""
+    """Run the cases by libcosim's fixed-step algorithm."""
     from math import cos, sin
 
     from fmpy import read_model_description
@@ -112,7 +116,7 @@ def by_libcosimpy(cases: list[Any]) -> list[float]:
 
 
 def by_ecospy(cases: list[Any]) -> list[float]:
-    """Run by ecos."""
+    """Run the cases by ecos."""
     from math import cos, sin
 
     from ecospy import EcosSimulation, EcosSimulationStructure
@@ -137,11 +141,11 @@ def by_ecospy(cases: list[Any]) -> list[float]:
 
 
 def by_cofmupy(cases: list[Any]) -> list[float]:
-    """Run by CoFMUPy, which sets all inputs; an input without a value is set to zero."""
+    """Run the cases by CoFMUPy, which sets all inputs: to zero if an input is not connected."""
     import sys
     from math import cos, sin
 
-    sys.path.insert(0, f"{sys.prefix}/cofmupy")  # with the version of FMPy that it is for
+    sys.path.insert(0, f"{sys.prefix}/cofmupy")  # with the version of FMPy that CoFMUPy needs
     from cofmupy import Coordinator
 
     def run(fmu: str, of: list[Any], rated: bool, step: float, count: int) -> float:
@@ -161,7 +165,7 @@ def by_cofmupy(cases: list[Any]) -> list[float]:
 
 
 def by_pathsim(cases: list[Any]) -> list[float]:
-    """Run by PathSim's block for co-simulation, or, if a solver is given, by its block for model exchange."""
+    """Run the cases by PathSim's block for co-simulation or, if a solver is given, by its block for model exchange."""
     from math import cos, sin
 
     import pathsim.solvers
@@ -182,7 +186,7 @@ def by_pathsim(cases: list[Any]) -> list[float]:
         connections = [Connection(source, block[place]) for place, source in enumerate(sources)]
         options = {"Solver": getattr(pathsim.solvers, solver), "tolerance_lte_rel": 1e-9} if solver else {}
         simulation = Simulation([*sources, block], connections, dt=step, log=False, **options)
-        # the block for co-simulation steps at the beginning of each period
+        # the block for co-simulation takes its step at the beginning of each period
         simulation.run(count * step if solver else (count - 1.5) * step)
         return float(dict(zip(block.fmu_wrapper.output_refs, block.fmu_wrapper.get_outputs_as_array()))[coordinate])
 
@@ -190,7 +194,7 @@ def by_pathsim(cases: list[Any]) -> list[float]:
 
 
 def by_cosimulate(cases: list[Any]) -> list[float]:
-    """Run by `analysis.cosimulate`, which sets the rate itself; return the change of the coordinate."""
+    """Run the cases by `analysis.cosimulate`, which sets the rate itself; return the change of the coordinate in each case."""
     from math import cos, sin
 
     from analysis import Function, Inputs, cosimulate
@@ -215,7 +219,10 @@ def by_cosimulate(cases: list[Any]) -> list[float]:
 
 
 class Row(NamedTuple):
-    """A master on FMUs of some kinds, with one interface; ``sets_rate``: it sets the rate of a command itself."""
+    """A row of the table: a master with one interface, on FMUs of some kinds.
+
+    ``by`` runs the master with ``arguments``; ``sets_rate`` tells whether the master sets the rate of a command by itself.
+    """
 
     master: str
     interface: str
@@ -251,7 +258,7 @@ COLUMNS = [_column(command, rated) for command in COMMANDS for rated in (False, 
 
 
 def built_fmu(mechanism: Mechanism, kind: str, folder: Path) -> Path:
-    """Return the path of an FMU in a folder; build it if it is not there."""
+    """Return the path of a mechanism's FMU of the given kind in a folder; build the FMU if it is missing."""
     target = folder / KINDS[kind].file_name(mechanism)
     if not target.is_file():
         target = build(mechanism, folder) if kind == "python" else build_native(mechanism, KINDS[kind], folder)
@@ -259,7 +266,10 @@ def built_fmu(mechanism: Mechanism, kind: str, folder: Path) -> Path:
 
 
 def exact_end(command: Command, row: Row) -> float:
-    """Return the exact coordinate at the end; for `cosimulate`, which starts like the published set, its exact change."""
+    """Return the exact coordinate at the end of a run.
+
+    For `cosimulate`, which starts from another coordinate, the result is the exact change of the coordinate.
+    """
     end = COUNT * STEPS[0]
     start = {v.name: v.start for v in MECHANISMS[command.mechanism].variables}[
         f"initial.{command.coordinate.replace('.', '_')}"
@@ -268,7 +278,7 @@ def exact_end(command: Command, row: Row) -> float:
 
 
 def format_errors(errors: list[float]) -> str:
-    """Format the error at the smaller step and the order."""
+    """Format the error at the smaller step and the order of the error, from the errors at both steps."""
     coarse, fine = errors
     if fine < LEAST:
         return f"below {LEAST:.0e}"
@@ -277,7 +287,7 @@ def format_errors(errors: list[float]) -> str:
 
 
 def measure_master(master: str, folder: Path) -> Table:
-    """Measure a master and return its rows; if FMUs of several kinds differ, a cell has all results."""
+    """Measure a master and return its rows of the table; a cell has several results if the kinds of FMU differ."""
     looked = [
         (row, command, rated, kind)
         for row in ROWS
@@ -312,13 +322,13 @@ def measure_master(master: str, folder: Path) -> Table:
 
 
 def read(path: Path) -> Table:
-    """Read a table of results."""
+    """Read the table of results from a CSV file."""
     with path.open(newline="", encoding="utf-8") as file:
         return list(csv.DictReader(file))
 
 
 def write(path: Path, table: Table) -> None:
-    """Write a table of results."""
+    """Write the table of results to a CSV file."""
     with path.open("w", newline="", encoding="utf-8") as file:
         rows = csv.DictWriter(file, list(table[0]), lineterminator="\n")
         rows.writeheader()
@@ -326,7 +336,7 @@ def write(path: Path, table: Table) -> None:
 
 
 def markdown(table: Table) -> str:
-    """Write the table of the page."""
+    """Return the table in Markdown, as docs/fmu.md shows it."""
     rows = [list(table[0]), ["---"] * len(table[0]), *(list(row.values()) for row in table)]
     return "\n".join(f"| {' | '.join(row)} |" for row in rows)
 

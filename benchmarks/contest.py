@@ -3,10 +3,10 @@
 All searches have the same unknowns, bounds and constraints and the same measure: when a search improves, its clock is stopped
 and the linkage is evaluated by the task's own measure, unless it violates a constraint.
 
-pylinkage (extra ``bench``) optimises link lengths only: `PlacedFourBar` gives its optimisers the other dimensions. They see the
-coupler curve of its own compiled solver, proportional penalties for violated constraints, as our simplex does, and infinity if
-the links cannot be joined. Its population methods are followed by its Nelder-Mead, as its manual advises. Its swarm takes no
-seed.
+pylinkage (extra ``bench``) optimises link lengths only: `PlacedFourBar` gives its optimisers the other dimensions. These
+optimisers minimise a score of the coupler curve of pylinkage's own compiled solver. Violated constraints have proportional
+penalties, as for our simplex; the score is infinite if the links cannot be joined. pylinkage's population methods are followed
+by its Nelder-Mead, as its manual advises. Its particle swarm takes no seed.
 """
 
 from __future__ import annotations
@@ -42,14 +42,14 @@ Score = Callable[[FloatArray], float]
 PHASES = 360
 #: Least relative improvement of a score for which a linkage is measured, because measuring takes long.
 SLIGHT = 1e-4
-#: How often the population of the evolution strategy is doubled before a new start.
+#: Number of population sizes of the evolution strategy, each twice the one before, until it starts again with the first.
 DOUBLED = 8
 
 # A problem, and the progress of a search
 
 
 class Problem(Protocol):
-    """A problem of chapter VI, or one of `targets.TARGETS`."""
+    """A synthesis problem: one of chapter VI, or one of `targets.TARGETS`."""
 
     @property
     def task(self) -> Task: ...
@@ -71,7 +71,8 @@ class Contest:
     """A problem in the form that all searches share.
 
     For each assembly it has two `BlackBox`: one of the task (``boxes``), and one without the requirements for a straight part
-    (``plain``), because at the stations of a `BlackBox`, equal shares of the length, these are stricter than the task's.
+    (``plain``). A `BlackBox` checks these requirements at stations at equal shares of the length, where they are stricter than
+    in the task.
 
     With ``on_area``, searches for a path whose measure is the area first use stations at equal shares of the length, and then
     minimise the area itself.
@@ -86,7 +87,7 @@ class Contest:
 
     @classmethod
     def of(cls, problem: Problem, *, on_area: bool = False) -> Contest:
-        """Prepare the contest for a problem."""
+        """Return the contest for a problem."""
         normal = normal_form(problem.task)
         limits = make_limits(problem.task, normal, problem.bounds, problem.constraints)
         boxes = tuple(BlackBox(normal, limits, branch) for branch in limits.branches)
@@ -96,26 +97,26 @@ class Contest:
         return cls(problem=problem, normal=normal, limits=limits, boxes=boxes, plain=plain, on_area=on_area)
 
     def area(self, curve: ComplexArray) -> float:
-        """Return the area between a closed curve and the target, in units squared."""
+        """Return the area between a closed curve and the target, in squared units of the normal form."""
         assert self.normal.outline is not None
         place, target = (np.ascontiguousarray([z.real, z.imag]) for z in (curve, self.normal.outline))
         return float(symmetric_difference(place, target, np.empty_like(place)))
 
     def unknowns(self, x: FloatArray) -> FloatArray:
-        """Return all of `constraints.UNKNOWNS`, from the free ones."""
+        """Return the values of all `constraints.UNKNOWNS`, given the free ones."""
         q = self.limits.low.copy()
         q[self.limits.high > self.limits.low] = x
         return q
 
     def penalised_area(self, box: BlackBox, x: FloatArray) -> float:
-        """Return the area plus proportional penalties for violated constraints."""
+        """Return the area of one linkage plus proportional penalties for violated constraints."""
         if (x < box.low).any() or (x > box.high).any():
             return inf
         curve = Linkage.from_vector(self.unknowns(x)[:10], box.branch).path(turn(AREA_N)) @ np.array([1.0, 1j])
         return self.area(curve) + self.penalty(box, x) if np.isfinite(curve).all() else inf
 
     def penalty(self, box: BlackBox, x: FloatArray) -> float:
-        """Return the penalty to add to an area: PENALTY times the sum of the constraint violations."""
+        """Return the penalty to add to an area: `PENALTY` times the sum of the constraint violations."""
         return PENALTY * float(np.maximum(self.plain[box.branch].violations(x[None, :]), 0.0).sum())
 
     def error(self, box: BlackBox, x: FloatArray) -> float:
@@ -129,7 +130,10 @@ class Contest:
 
 
 def meets_packaging(linkage: Linkage) -> bool:
-    """Return whether the coupler point has the required travel and flatness within the required crank rotation, to a degree."""
+    """Return whether the coupler point has the travel and flatness that the packaging machine requires.
+
+    The required crank rotation is rounded to a degree.
+    """
     x, y = linkage.path(turn(360)).T
     window = (np.arange(360)[:, None] + np.arange(round(degrees(PACKAGING_ROTATION)) + 1)) % 360
     across, travel = y[window], np.abs(x[window] - x[:, None])
@@ -138,7 +142,7 @@ def meets_packaging(linkage: Linkage) -> bool:
 
 
 class Trace:
-    """The best error of a search over its time; the clock is stopped while a linkage is measured.
+    """The best error of a search as a function of its time; the clock is stopped while a linkage is measured.
 
     Parameters
     ----------
@@ -148,7 +152,7 @@ class Trace:
     enough : float
         Error at which the search ends, in the reported unit.
     clock : callable
-        Function that returns the time (s), by the wall clock or of the processor.
+        Function that returns the wall-clock or processor time (s).
     """
 
     def __init__(
@@ -160,11 +164,11 @@ class Trace:
 
     @property
     def best(self) -> float:
-        """Least error so far, in the reported unit."""
+        """Least error so far, in the reported unit; infinite if there is none."""
         return self.points[-1][1] if self.points else inf
 
     def tick(self) -> float:
-        """Return the time that the search has taken (s).
+        """Return the time that the search has taken so far (s).
 
         Raises
         ------
@@ -177,7 +181,7 @@ class Trace:
         return seconds
 
     def record_if_best(self, box: BlackBox, x: FloatArray) -> None:
-        """Measure a linkage, and record it if it is the best.
+        """Measure a linkage, and record its error with the time if it is the least so far.
 
         Raises
         ------
@@ -193,7 +197,7 @@ class Trace:
             raise TimeUp
 
     def watch(self, box: BlackBox, score: Score) -> Score:
-        """Wrap a function to be minimised so that each improvement by `SLIGHT` is recorded."""
+        """Wrap a function to be minimised: a linkage is measured whenever it improves the function by more than `SLIGHT`."""
         least = inf
 
         def value(x: FloatArray) -> float:
@@ -228,7 +232,7 @@ def search_with_scipy(trace: Trace, box: BlackBox, random: np.random.Generator) 
 
 
 def search_with_cma(trace: Trace, box: BlackBox, random: np.random.Generator) -> None:
-    """Run Hansen's evolution strategy by its own package, for each assembly, repeatedly with twice as many members."""
+    """Run Hansen's evolution strategy (package ``cma``) on each assembly, several times with a doubled population."""
     import cma
 
     contest = trace.contest
@@ -270,7 +274,8 @@ def search_with_simplex(trace: Trace, box: BlackBox, random: np.random.Generator
 class PlacedFourBar:
     """pylinkage's four-bar with all unknowns of a problem as dimensions, including place, phase and direction.
 
-    pylinkage's optimisers take any object with its linkage's methods, and set the values that it returns as constraints.
+    pylinkage's optimisers accept any object that has the methods of its linkages. They call `set_constraints` with values in
+    the form that `get_constraints` returns.
 
     Parameters
     ----------
@@ -279,7 +284,7 @@ class PlacedFourBar:
     free : ndarray of int
         Indices of the free unknowns.
     branch : int
-        Assembly; pylinkage continues from the place of C.
+        Assembly; pylinkage itself continues from the position of C.
     n : int
         Steps in a turn.
     """
@@ -299,21 +304,21 @@ class PlacedFourBar:
 
     @classmethod
     def of(cls, linkage: Linkage, n: int) -> PlacedFourBar:
-        """Return the four-bar of a given linkage."""
+        """Return the four-bar of a given linkage, with n steps in a turn."""
         return cls(np.append(linkage.vector, 0.0), np.arange(10), linkage.branch, n)
 
     def get_constraints(self) -> list[float]:
-        """Return the free unknowns."""
+        """Return the values of the free unknowns."""
         values: list[float] = self.q[self.free].tolist()
         return values
 
     def get_coords(self) -> list[tuple[float | None, float | None]]:
-        """Return the places of A, D, B, C, P."""
+        """Return the positions of A, D, B, C, P."""
         coords: list[tuple[float | None, float | None]] = self.linkage.get_coords()
         return coords
 
     def set_constraints(self, values: Sequence[float]) -> None:
-        """Set the free unknowns, and put the joints a step before the start."""
+        """Set the free unknowns, and put the joints at their positions one step before the start."""
         self.q[self.free] = values
         x, y, l1, l2, l3, l4, r, a1, th20, a2 = self.q[:10].tolist()
         self.linkage.set_constraints([l2, l3, l4, r, a2])
@@ -327,29 +332,32 @@ class PlacedFourBar:
         self.linkage.set_coords([(z.real, z.imag) for z in (a, d, b, c, b)])
 
     def track(self) -> ComplexArray:
-        """Return A, D, B, C, P over the turn by pylinkage's compiled solver, shape (n, 5); NaN where it cannot join them."""
+        """Return A, D, B, C, P over the turn by pylinkage's compiled solver, shape (n, 5); NaN if the links do not close."""
         track: ComplexArray = self.linkage.step_fast(self.n) @ np.array([1.0, 1j])
         return track
 
 
 class PylinkageScore:
-    """A problem's quality function and penalties on pylinkage's own curve, in the form that its optimisers take."""
+    """Quality function and penalties of a problem, in the form that pylinkage's optimisers take.
+
+    The coupler curve is that of pylinkage's solver.
+    """
 
     def __init__(self, contest: Contest, box: BlackBox) -> None:
         self.contest, self.normal, self.box = contest, contest.normal, box
         low, high = contest.limits.low, contest.limits.high
-        # with longer steps pylinkage may change to the other assembly, because it takes the nearer place of C
+        # with longer steps pylinkage may change to the other assembly, because it takes the nearer position of C
         steps = AREA_N
         if self.normal.rotation is not None:
             own = round(tau / float(np.abs(np.diff(self.normal.rotation)).min()))
             steps = own * -(-N // own)
             self.least_error = np.rint(self.normal.rotation * steps / tau).astype(int) % steps
         self.four_bar = PlacedFourBar(0.5 * (low + high), np.nonzero(high > low)[0], box.branch, steps)
-        # the straight part is judged on pylinkage's curve
+        # the straight part is judged on pylinkage's curve, not by the box
         self.plain = contest.plain[box.branch]
 
     def __call__(self, linkage: PlacedFourBar, values: Sequence[float], coords: object = None) -> float:
-        """Return the score to be minimised."""
+        """Return the penalised quality of the four-bar with these values."""
         x = np.asarray(values, dtype=float)
         if (x < self.box.low).any() or (x > self.box.high).any():
             return inf
@@ -363,7 +371,7 @@ class PylinkageScore:
         return quality + PENALTY * float(self.normal.weights.sum()) * excess
 
     def penalised_area(self, linkage: PlacedFourBar, values: Sequence[float], coords: object = None) -> float:
-        """Return `Contest.penalised_area` on pylinkage's own curve."""
+        """Return `Contest.penalised_area` on the curve of pylinkage's solver."""
         x = np.asarray(values, dtype=float)
         if (x < self.box.low).any() or (x > self.box.high).any():
             return inf
@@ -372,7 +380,11 @@ class PylinkageScore:
         return self.contest.area(curve) + self.contest.penalty(self.box, x) if np.isfinite(curve).all() else inf
 
     def errors_and_excess(self, track: ComplexArray, mounting: float) -> tuple[float, float]:
-        """Return the weighted squared errors, and the violation of the straight part's requirements."""
+        """Return the weighted sum of squared errors, and the violation of the straight part's requirements.
+
+        ``track`` has the joints at the stations, or over the whole turn if the path is untimed. ``mounting`` is the angle (rad)
+        at which the output of a rocker function is mounted on the rocker.
+        """
         normal = self.normal
         if normal.angle is not None:
             left = np.angle((track[:, 3] - track[:, 1]) * np.exp(1j * (mounting - normal.angle)))
@@ -383,7 +395,10 @@ class PylinkageScore:
         return min(self._errors_at_equal_shares(track[:, 4], way) for way in (1, -1))
 
     def _errors_at_equal_shares(self, curve: ComplexArray, way: int) -> tuple[float, float]:
-        """Return errors and violation as `errors_and_excess` does, at equal shares of the lengths of curve and target."""
+        """Return errors and violation as `errors_and_excess` does, at equal shares of the lengths of curve and target.
+
+        ``way`` is the direction of travel on the curve, 1 or -1.
+        """
         normal = self.normal
         points = normal.points
         assert points is not None
@@ -404,7 +419,7 @@ class PylinkageScore:
 
 
 def _search_with_pylinkage(trace: Trace, box: BlackBox, *stages: tuple[Callable[..., Any], dict[str, Any]]) -> None:
-    """Run optimisers of pylinkage one after another; if the measure is an area, its Nelder-Mead minimises the area at last."""
+    """Run optimisers of pylinkage one after another; if the measure is an area, its Nelder-Mead finally minimises the area."""
     from pylinkage.optimization import chain_optimizers, minimize_linkage
 
     score = PylinkageScore(trace.contest, box)
@@ -445,7 +460,7 @@ def search_with_pylinkage_simplex(trace: Trace, box: BlackBox, random: np.random
 
 
 def search_with_freudenstein(trace: Trace, box: BlackBox, random: np.random.Generator) -> None:
-    """Run pylinkage's function generation once at every phase; it solves Freudenstein's equation by least squares."""
+    """Run pylinkage's function generation once for each phase; it solves Freudenstein's equation by least squares."""
     from pylinkage.synthesis import function_generation
 
     task = trace.contest.problem.task

@@ -5,9 +5,9 @@
     python -m benchmarks.coupling --masters                # the other masters alone: ten minutes
     python -m benchmarks.coupling --decades 2              # a hundredth of the time
 
-The truth is the system as one model, by SciPy at a tolerance of 1e-12. Of each coupling of ours the error is the greatest of
-all connected outputs over the run; of the other masters, which hold inputs, that of the crank speed at its end. The tables are
-printed, the plots go into ``--out``.
+The reference is the system as one model, integrated by SciPy at a tolerance of 1e-12. For our couplings the error is the
+greatest error of all connected outputs over the run. For the other masters, which hold inputs, the error is that of the crank
+speed at the end of the run. The tables are printed; the plots go into the folder ``--out``.
 """
 
 from __future__ import annotations
@@ -27,9 +27,9 @@ from tests.fmu.runner import run_in_process
 from tests.systems import masters
 from tests.systems.conftest import started_in_its_modes
 
-#: Communication points of the run at the greatest step.
+#: Number of communication steps of a run at the greatest step.
 POINTS = 20
-#: Other masters, and whether they need FMUs that start in their modes.
+#: Other masters, and whether they need FMUs with the values of their modes as start values, since they set no integers.
 MASTERS = {
     "FMPy": (masters.by_fmpy, False),
     "libcosimpy": (masters.by_libcosimpy, False),
@@ -41,7 +41,7 @@ CONSOLE = Console(width=128)
 
 
 def show(found: Convergence, powers: bool = True) -> None:
-    """Print errors, orders, and the ratio of the error to the share of work that the coupling has added."""
+    """Print errors and orders; with ``powers`` also the ratio of the error to the share of work that the coupling has added."""
     table = Table(title=f"{found.title}: greatest relative error")
     for name in ("step [ms]", *found.errors):
         table.add_column(name, justify="right")
@@ -60,7 +60,7 @@ def show(found: Convergence, powers: bool = True) -> None:
 
 
 def measure_our_couplings(name: str, decades: int, out: Path) -> None:
-    """Measure the couplings of our master on a system of the library."""
+    """Measure all couplings of our master on a system of the library; print the errors and save the plot."""
     system = load_system(library()[name])
     periods = [m.values.get("sample_time", 1e-3) for m in system.members.values() if m.controller]
     first = min([system.run.step, *periods])
@@ -70,7 +70,7 @@ def measure_our_couplings(name: str, decades: int, out: Path) -> None:
 
 
 def measure_other_masters(steps: Sequence[float], stop_time: float, out: Path) -> None:
-    """Measure the other masters on the system motor-crank with inputs held."""
+    """Measure the other masters, which hold inputs, on the system motor-crank; print the errors and save the plot."""
     system = load_system(library()["motor-crank"]).without_rates()
     name = "linkage.crank.speed"
     right = JoinedSystem(system).run(stop_time, stop_time)[name][-1]

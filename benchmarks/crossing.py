@@ -3,10 +3,11 @@
     python -m benchmarks.crossing                           # runs all, writes the results, prints the table
     python -m benchmarks.crossing --budget 60 --target eight
 
-Each target is asked for with a transmission angle of 40 degrees over a full turn, and with a full turn alone. SciPy's
-differential evolution has the same unknowns, bounds and constraints, the measure compiled and a generation at a time; it is
-restarted, alternating the assemblies, until its processor time is over, and each run ends with a simplex. Both are
-measured alike, by `analysis.synthesis.evaluate`. The results are a row for each target and constraint.
+Each target is searched for under two constraints: a transmission angle of 40 degrees over a full turn, and a full turn alone.
+SciPy's differential evolution has the same unknowns, bounds and constraints as `synthesize`; compiled code computes the areas
+of a whole generation at once. It is restarted, alternating the assemblies, until its processor time is over, and each run ends
+with a simplex. `analysis.synthesis.evaluate` measures the results of both searches. The table has a row for each target and
+constraint.
 """
 
 from __future__ import annotations
@@ -42,28 +43,28 @@ FloatArray = NDArray[np.float64]
 
 RESULTS = Path("out/crossing.csv")
 BUDGET = 10.0
-#: Points of the curves that evolution compares, generations of one run, and allowed violation of a constraint.
+#: Number of points of the curves in the differential evolution, generations of one run, and allowed constraint violation.
 CURVE, GENERATIONS, KEPT = 120, 800, 1e-4
 ASKED: Mapping[str, tuple[Constraint, ...]] = {"40 degrees": USUAL, "full turn": (FullTurn(),)}
 
 
 def eight(t: FloatArray) -> FloatArray:
-    """Return points of Gerono's eight, twice as long as wide."""
+    """Return points of Gerono's figure-eight curve, twice as long as wide, shape (n, 2)."""
     return np.column_stack([0.5 * np.sin(t), 0.25 * np.sin(2.0 * t)])
 
 
 def lemniscate(t: FloatArray) -> FloatArray:
-    """Return points of Bernoulli's lemniscate."""
+    """Return points of Bernoulli's lemniscate, shape (n, 2)."""
     return np.column_stack([np.cos(t), np.sin(t) * np.cos(t)]) / (1.0 + np.sin(t)[:, None] ** 2)
 
 
 def limacon(t: FloatArray) -> FloatArray:
-    """Return points of a limaçon with an inner loop."""
+    """Return points of a limaçon with an inner loop, shape (n, 2)."""
     return (0.5 + np.cos(t))[:, None] * np.column_stack([np.cos(t), np.sin(t)])
 
 
 def targets() -> dict[str, TargetPath]:
-    """Return the targets by name; all open ones except the last return to their first point."""
+    """Return the targets by name; all open targets except the last return to their first point."""
     round_, there = turn(40), np.linspace(0.0, tau, 41)
     s = np.linspace(-1.3, 1.3, 41)
     return {
@@ -94,7 +95,10 @@ _path, _nearest, _difference = (njit()(kernel.py_func) for kernel in _KERNELS)
 
 @njit
 def _areas(rows, spans, branch, target, middles, lengths, closed, areas):
-    """Compute the areas between curves of linkages and a target; infinite if the links cannot be joined."""
+    """Write the areas between the curves of linkages and a target into ``areas``; infinite if the links do not close.
+
+    Each of ``rows`` is a linkage; ``spans`` are the crank rotations (rad) over which its curve is traced.
+    """
     n, m = CURVE, middles.shape[1]
     zero, out, gradient, half = np.zeros(n), np.empty((2, n)), np.empty((2, n)), np.empty((2, n - 1))
     distance, segment, share = np.empty(max(n, m)), np.empty(max(n, m), np.int64), np.empty(max(n, m))
@@ -117,7 +121,7 @@ def _areas(rows, spans, branch, target, middles, lengths, closed, areas):
 
 
 class Evolution:
-    """Differential evolution on the area between a path and the curve of one assembly."""
+    """Differential evolution of linkages of one assembly; it minimises the area between a path and the coupler curve."""
 
     def __init__(self, task: UntimedPath, normal: Normal, box: BlackBox) -> None:
         self.task, self.normal, self.box = task, normal, box
@@ -128,7 +132,7 @@ class Evolution:
         self._lengths = np.hypot(*np.diff(line, axis=1))
 
     def areas(self, x: FloatArray) -> FloatArray:
-        """Compute the areas for rows of unknowns, in units squared."""
+        """Return the area for each row of unknowns, in squared units of the normal form."""
         q, areas = np.ascontiguousarray(self.box._linkages(x)[:, :10]), np.empty(len(x))
         spans = np.full(len(x), tau) if self.normal.closed else np.ascontiguousarray(x[:, -1])
         branch = float(self.box.branch)
@@ -142,7 +146,7 @@ class Evolution:
         return float(self.areas(x[None, :])[0]) + PENALTY * float(self.box.violations(x[None, :]).clip(min=0.0).sum())
 
     def error(self, x: FloatArray) -> float:
-        """Return the error by the task's own measure (m2); infinite if a constraint is violated."""
+        """Return the error of one linkage by the task's own measure (m2); infinite if a constraint is violated."""
         if self.box.violations(x[None, :]).max() > KEPT:
             return inf
         start = self.box.answer(OptimizeResult(x=x, success=True, message="", nit=0)).start
@@ -150,7 +154,10 @@ class Evolution:
         return evaluate(self.task, make_linkage(start, self.normal), np.linspace(0.0, span, self.normal.n)).error
 
     def run(self, random: np.random.Generator, over: Callable[[], bool]) -> float:
-        """Make one run, stopped when its time is over, and continue with a simplex."""
+        """Make one run of evolution, until it converges or ``over`` returns true, and continue with a simplex.
+
+        Returns the least error (m2).
+        """
         found = evolve(
             self.box,
             random,
@@ -163,7 +170,7 @@ class Evolution:
 
 
 def search_with_evolution(task: UntimedPath, constraints: Sequence[Constraint], budget: float) -> float:
-    """Return the least error of all runs within the time (m2)."""
+    """Return the least error (m2) of all runs of differential evolution within the processor time ``budget`` (s)."""
     normal = normal_form(task)
     limits = make_limits(task, normal, None, constraints)
     searches = [Evolution(task, normal, BlackBox(normal, limits, branch)) for branch in limits.branches]
@@ -181,7 +188,7 @@ def search_with_evolution(task: UntimedPath, constraints: Sequence[Constraint], 
 
 
 def run(name: str, path: TargetPath, asked: str, budget: float) -> Row:
-    """Run both searches on a target."""
+    """Run both searches on a target with the constraints named ``asked``; ``budget`` is the processor time of evolution (s)."""
     task, constraints = UntimedPath(path=path), ASKED[asked]
     with threadpool_limits(1):
         begun = process_time()
@@ -194,14 +201,14 @@ def run(name: str, path: TargetPath, asked: str, budget: float) -> Row:
 
 
 def read(path: Path) -> list[Row]:
-    """Read the rows of a file."""
+    """Read the rows of results from a file."""
     with path.open(newline="", encoding="utf-8") as file:
         _, *rows = csv.reader(file)
     return [Row(row[0], row[1], *map(float, row[2:])) for row in rows]
 
 
 def write(path: Path, rows: Iterable[Row]) -> None:
-    """Write rows to a file."""
+    """Write the rows of results to a file."""
     path.parent.mkdir(parents=True, exist_ok=True)
     with path.open("w", newline="", encoding="utf-8") as file:
         table = csv.writer(file, lineterminator="\n")
@@ -210,7 +217,7 @@ def write(path: Path, rows: Iterable[Row]) -> None:
 
 
 def markdown(rows: Iterable[Row]) -> str:
-    """Write the table of a page."""
+    """Return the table of results in Markdown."""
     lines = [
         f"| {row.target} | {row.asked} | {row.ours:.4g} | {row.evolution:.4g} | {row.ours / row.evolution - 1.0:+.1%} |"
         for row in rows

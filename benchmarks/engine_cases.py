@@ -1,7 +1,7 @@
 """Define the runs of the five-bar slider for which solvers and engines are timed, and measure their accuracy.
 
-Accuracy is the largest error of the slider position on a sample grid, relative to its largest magnitude, against the reduced
-equations of `linkwork` integrated to 1e-13.
+Accuracy is the largest error of the slider position at the sample times, relative to the position's largest magnitude. The
+reference is the solution of `linkwork`'s reduced equations at a tolerance of 1e-13.
 """
 
 from __future__ import annotations
@@ -24,8 +24,8 @@ from linkwork.five_bar.published import DYN_CM_PER_NEWTON_METRE, SETS
 class Case:
     """A run from th2 = u = u' = 0: parameters, drive, duration (s) and number of sample intervals.
 
-    With ``crank_speed`` (rad/s) the crank turns at that constant speed. Without it the crank starts from rest under the
-    torsion bar of fig. 3.6: T = torque (1 - th2/switch_angle) until th2 reaches ``switch_angle``, then none.
+    With ``crank_speed`` (rad/s) the crank turns at that constant speed. Without it the crank starts from rest under the torsion
+    bar of fig. 3.6: T = torque (1 - th2/switch_angle) until th2 reaches ``switch_angle`` (rad), then T = 0.
     """
 
     name: str
@@ -42,7 +42,7 @@ class Case:
 
     @property
     def times(self) -> np.ndarray:
-        """Sample times (s), the start included."""
+        """Sample times (s), including the start."""
         return np.linspace(0.0, self.duration, self.samples + 1)
 
     @property
@@ -58,7 +58,7 @@ def step_count(interval: float, time_step: float) -> int:
 
 _TABLE_3_1 = SETS["table-3.1"]
 
-#: Table 3.1 at 420 rpm for three turns, and the torsion bar of fig. 3.6 with T0 = 1e8 dyn.cm; k = 1e6, mu = 3e4 (cgs).
+#: Table 3.1 at 420 rpm for three turns, and under the torsion bar of fig. 3.6 with T0 = 1e8 dyn.cm; k = 1e6, mu = 3e4 (cgs).
 CASES: tuple[Case, ...] = (
     Case(
         name="constant-speed",
@@ -79,10 +79,10 @@ CASES: tuple[Case, ...] = (
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class EngineRun:
-    """Time and accuracy of a run.
+    """Time and accuracy of a run in an engine.
 
-    ``seconds`` is the wall time of the integration alone, ``error`` the largest error of u on the sample grid relative to
-    the largest magnitude of u (infinite where the engine failed), ``steps`` the number of time steps.
+    ``seconds`` is the processor time of the integration alone, ``error`` the largest error of u at the sample times relative to
+    the largest magnitude of u (infinite if the engine failed), ``steps`` the number of time steps.
     """
 
     seconds: float
@@ -102,7 +102,7 @@ def reference(case: Case) -> np.ndarray:
 def run_scipy(case: Case, method: str, rtol: float, atol: float | np.ndarray) -> np.ndarray:
     """Compute the slider position (m) by `solve_ivp` on the reduced equations in plain Python; NaN if the method fails.
 
-    It integrates the four mechanical states only, and switches the torque at an event.
+    Only the four mechanical states are integrated; the torque is switched off at an event.
     """
     p = case.parameters.constants()
     speed_drive = 0.0 if case.crank_speed is None else 1.0
@@ -146,7 +146,7 @@ def relative_error(case: Case, u: np.ndarray) -> float:
 
 
 class Start(NamedTuple):
-    """Angles (rad) and rates (rad/s) of coupler and rocker at th2 = u = u' = 0 that close the loop."""
+    """Angles (rad) and rates (rad/s) of coupler and rocker that close the loop at th2 = u = u' = 0."""
 
     th3: float
     th4: float
@@ -155,12 +155,12 @@ class Start(NamedTuple):
 
 
 def start(case: Case, p: Constants) -> Start:
-    """Return the start of a case."""
+    """Return the angles and rates of coupler and rocker at the start of a case."""
     g = position(0.0, 0.0, p)
     k = coefficients(g, p)
     return Start(*link_angles(g, p), k.k32 * case.start_speed, k.k42 * case.start_speed)
 
 
 def centre(distance: float, angle: float) -> tuple[float, float]:
-    """Return the centre of mass in the frame of its link (m)."""
+    """Return the centre of mass (x, y) in the frame of its link (m), given its distance from the origin and its angle."""
     return distance * cos(angle), distance * sin(angle)

@@ -1,13 +1,14 @@
 """Time the five-bar slider in two general multibody engines, MuJoCo and Exudyn, at a stated accuracy.
 
-Each engine gets the formulation, the integrator and the solver settings that reach the accuracy soonest: the closed loop as
-relative joints with one closing pin in MuJoCo, as planar bodies with three pins in Exudyn, no Python code inside the
-integration. Accuracy is that of `benchmarks.engine_cases`.
+Each engine gets the formulation, the integrator and the solver settings that reach the accuracy in the shortest time. In MuJoCo
+the closed loop is a tree of relative joints with one closing pin; in Exudyn it is planar bodies with three pins. No Python code
+runs inside the integration. Accuracy is that of `benchmarks.engine_cases`.
 
     python -m benchmarks.engines
 
-prints steps, errors and times of both engines for both cases. Needs MuJoCo 3.7 or later, whose ``connect`` constraint includes
-the velocity term J' q' (without it this model is of no use: 3.6 misses u by 70 %), and Exudyn 1.13 or later.
+prints steps, errors and times of both engines for both cases. It needs Exudyn 1.13 or later and MuJoCo 3.7 or later, whose
+``connect`` constraint includes the velocity term J' q'. Without this term the model is of no use: the error of u in MuJoCo 3.6
+is 70 %.
 """
 
 from __future__ import annotations
@@ -32,14 +33,14 @@ Run = Callable[[Case, float], EngineRun]
 
 # --- MuJoCo -------------------------------------------------------------------------------------------------------------
 
-#: The prescribed speed is that of a flywheel of this inertia (kg.m2) on the crank's shaft. The mechanism's torque of about
-#: 1 N.m changes it by a relative 1e-11, and from 1e9 to 1e14 the error is the same. A velocity servo is no substitute: a
-#: gain of 10 N.m.s leaves an error of 2e-3, one of 100 is unstable under RK4 even at a step of 5e-5 s.
+#: A flywheel of this inertia (kg.m2) on the crank's shaft prescribes the speed. The mechanism's torque of about 1 N.m changes
+#: the speed by a relative 1e-11; the error of u is the same for inertias from 1e9 to 1e14. A velocity servo is no substitute:
+#: a gain of 10 N.m.s leaves an error of 2e-3, a gain of 100 N.m.s is unstable under RK4 even at a step of 5e-5 s.
 FLYWHEEL = 1e9
 
-#: Rates (1/s) of the critically damped return of the closing pin to closure, with the speed prescribed and under torque: of
-#: 20 to 200 those that allow the longest steps. The constraint on the pin's acceleration includes J' q', so the return
-#: removes no more than truncation errors; a fast one is stiff and spoils the RK4 step.
+#: Rates (1/s) at which a closure error of the pin decays, critically damped, with prescribed speed and under torque. They are
+#: the rates between 20 and 200 that allow the longest steps. The constraint on the pin's acceleration includes J' q', so that
+#: only truncation errors decay in this way; a high rate is stiff and spoils the RK4 step.
 CLOSURE_RATE_SPEED, CLOSURE_RATE_TORQUE = 30.0, 100.0
 
 _MJCF = """
@@ -78,12 +79,12 @@ _MJCF = """
 """
 _CRANK, _COUPLER, _SLIDER, _ROCKER = range(4)  # order of the joints in the tree
 
-#: Least mass and inertia that MuJoCo takes for a moving body, with room (kg, kg.m2).
+#: Mass and inertia of a massless link: a little above the least values that MuJoCo accepts for a moving body (kg, kg.m2).
 _NEGLIGIBLE = 1e-12
 
 
 def _mujoco_model(case: Case, iterations: int, *, stiffened: bool = True) -> tuple[Any, Any]:
-    """Build the model, and its data at the start of the run."""
+    """Return MuJoCo's model of a case, and its data at the start of the run."""
     import mujoco
 
     q = case.parameters
@@ -111,8 +112,9 @@ def _mujoco_model(case: Case, iterations: int, *, stiffened: bool = True) -> tup
     )
     model = mujoco.MjModel.from_xml_string(text)
     model.opt.iterations = iterations
-    # The constraint is softened in proportion to the bodies' inverse weight by (1 - d)/d, where the impedance d ends at
-    # 0.9999: an error of 3e-5 in u. A smaller weight stiffens it; a second Newton iteration removes the rounding error of that.
+    # MuJoCo softens the constraint in proportion to the bodies' inverse weight by (1 - d)/d. The impedance d is at most 0.9999,
+    # which causes an error of 3e-5 in u. A smaller inverse weight stiffens the constraint; the rounding error that this causes
+    # is removed by a second Newton iteration.
     if stiffened:
         model.body_invweight0 *= 1e-4 if iterations == 1 else 1e-6
     data = mujoco.MjData(model)
@@ -123,9 +125,10 @@ def _mujoco_model(case: Case, iterations: int, *, stiffened: bool = True) -> tup
 
 
 def _mujoco_until_switch(model: Any, data: Any, case: Case, n: int) -> tuple[int, float | None]:
-    """Take ``n`` steps, or fewer up to the switch angle; Newton's method shortens the last one to end at that angle.
+    """Take ``n`` steps, or fewer up to the switch angle; Newton's method shortens the last step to end at that angle.
 
-    Returns the number of steps and what remains of the ``n`` steps' time (s) after the switch, None if it was not reached.
+    Returns the number of steps, and the time (s) from the switch to the end of the ``n`` steps, None if the switch angle is
+    not reached.
     """
     import mujoco
 
@@ -150,10 +153,10 @@ def _mujoco_until_switch(model: Any, data: Any, case: Case, n: int) -> tuple[int
 def run_mujoco(case: Case, time_step: float, *, iterations: int = 1, stiffened: bool = True) -> EngineRun:
     """Run ``case`` in MuJoCo: RK4 on relative joints, stepped in C from sample to sample.
 
-    ``iterations`` is that of the constraint solver: with one the error ends at about 1e-7 and a step is cheapest, with two
-    it falls with the fourth power of the step to below 1e-9. Not ``stiffened``, the constraint is as soft as MuJoCo's model
-    file leaves it, without a change to the compiled model's inverse weights. `mujoco.rollout` takes the same time per
-    step.
+    ``iterations`` is the number of iterations of the constraint solver. With one iteration a step is cheapest, but the error
+    does not fall below about 1e-7; with two it falls with the fourth power of the step to below 1e-9. If not ``stiffened``,
+    the constraint is as soft as MuJoCo's model file makes it: the inverse weights of the compiled model stay unchanged.
+    `mujoco.rollout` takes the same time per step.
     """
     import mujoco
 
@@ -188,7 +191,7 @@ def run_mujoco(case: Case, time_step: float, *, iterations: int = 1, stiffened: 
 
 
 def _import_exudyn() -> tuple[Any, Any]:
-    """Import Exudyn's fast build, without range checks, and its item classes, silently."""
+    """Import Exudyn's fast build, without range checks, and its item classes, silently; return both modules."""
     if "exudyn" not in sys.modules:
         sys.exudynFast = True  # type: ignore[attr-defined]
     with contextlib.redirect_stdout(io.StringIO()):
@@ -198,14 +201,14 @@ def _import_exudyn() -> tuple[Any, Any]:
 
 
 class _Bar(NamedTuple):
-    """A link as a planar body: its object, and the local position of its centre of mass in the frame of the link."""
+    """A link as a planar body of Exudyn: its object, and the position of its centre of mass in the frame of the link."""
 
     body: Any
     x: float
     y: float
 
 
-#: Indices of the coordinates of crank and slider, the first two nodes, in the vector of all coordinates.
+#: Indices of the coordinates of crank and slider in the vector of all coordinates; their nodes are the first two.
 _EXUDYN_CRANK, _EXUDYN_SLIDER = 0, 1
 
 
@@ -227,7 +230,11 @@ class _Assembly:
     def bar(
         self, x: float, angle: float, speed: float, w: float, m: float, inertia: float, g: tuple[float, float]
     ) -> _Bar:
-        """Add a link whose frame is at ``x`` and ``angle``, with ``speed`` along y; ``g`` is its centre of mass."""
+        """Add a link as a planar body; ``g`` is its centre of mass in the frame of the link.
+
+        The origin of that frame is at ``x`` on the x axis, its angle is ``angle``. The origin has the velocity ``speed`` along
+        y; the link has the angular velocity ``w``.
+        """
         rx, ry = cos(angle) * g[0] - sin(angle) * g[1], sin(angle) * g[0] + cos(angle) * g[1]
         node = self.mbs.AddNode(
             self.items.NodeRigidBody2D(
@@ -280,7 +287,7 @@ class _Assembly:
         return node, body
 
     def drive(self, case: Case, node: Any) -> Any:
-        """Drive the crank at its speed, or by a spring; return the spring, or None."""
+        """Drive the crank at its prescribed speed, or by a torsion spring; return the spring, or None without one."""
         if case.crank_speed is not None:
             markers = [self.ground, self.coordinate(node)]
             self.mbs.AddObject(
@@ -293,11 +300,11 @@ class _Assembly:
 
 
 def _exudyn_model(case: Case) -> tuple[Any, Any, Any]:
-    """Build the system at the start of the run; return it, the sensor of the slider position, and the torque drive's spring.
+    """Build the system at the start of the run; return it, the sensor of the slider position, and the torsion spring or None.
 
-    Crank and slider have one coordinate each, a rotation and a translation, coupler and rocker three: eight coordinates and
-    six pin conditions. Four planar bodies with a prismatic joint (twelve coordinates, ten conditions) give the same numbers
-    in twice the time, as do two kinematic trees with one pin.
+    Crank and slider have one coordinate each, a rotation and a translation, coupler and rocker three each: eight coordinates
+    and six pin conditions. Four planar bodies with a prismatic joint (twelve coordinates, ten conditions) give the same
+    numbers in twice the time; so do two kinematic trees with one pin.
     """
     q = case.parameters
     p = q.constants()
@@ -327,7 +334,7 @@ def _exudyn_model(case: Case) -> tuple[Any, Any, Any]:
 
 
 class _ExudynSolver:
-    """A solver that runs in legs, each a call of the engine's own loop; ``seconds`` is the total wall time of these loops."""
+    """A solver that integrates a run in pieces, each by one call of the engine; ``seconds`` is the total processor time."""
 
     def __init__(self, mbs: Any, newton_tolerance: float) -> None:
         self.exu, _ = _import_exudyn()
@@ -346,7 +353,7 @@ class _ExudynSolver:
         integration.newton.absoluteTolerance = 1e-14
 
     def run(self, start: float, end: float, steps: int, sampling: float) -> None:
-        """Integrate from the initial configuration in equal steps; the result is the current configuration."""
+        """Integrate from the initial configuration in equal steps; the result becomes the current configuration."""
         integration = self.settings.timeIntegration
         integration.startTime, integration.endTime, integration.numberOfSteps = start, end, steps
         self.settings.solution.sensors.writePeriod = sampling
@@ -361,19 +368,22 @@ class _ExudynSolver:
             raise ArithmeticError(f"Exudyn stopped between t = {start:g} s and {end:g} s")
 
     def state(self, which: str = "Current") -> tuple[np.ndarray, np.ndarray]:
-        """Return the current coordinates and velocities, or with ``Initial`` those from which the next leg starts."""
+        """Return coordinates and velocities of the configuration ``which``: "Current", or "Initial" for the next start."""
         data, configuration = self.mbs.systemData, getattr(self.exu.ConfigurationType, which)
         return data.GetODE2Coordinates(configuration), data.GetODE2Coordinates_t(configuration)
 
     def set_start(self, state: tuple[np.ndarray, np.ndarray]) -> None:
-        """Make ``state`` the initial configuration of the next leg."""
+        """Make ``state`` the initial configuration of the next piece."""
         data, initial = self.mbs.systemData, self.exu.ConfigurationType.Initial
         data.SetODE2Coordinates(state[0], initial)
         data.SetODE2Coordinates_t(state[1], initial)
 
 
 def _exudyn_until_switch(case: Case, solver: _ExudynSolver, spring: Any, time_step: float) -> list[float]:
-    """Return the slider positions up to the first sample after the torque's switch, which Newton's method locates."""
+    """Return the slider positions (m) up to the first sample after the torque is switched off.
+
+    Newton's method finds the time of the switch.
+    """
     interval = case.duration / case.samples
     n = step_count(interval, time_step)
     u: list[float] = [0.0]
@@ -410,10 +420,10 @@ def _exudyn_until_switch(case: Case, solver: _ExudynSolver, spring: Any, time_st
 def run_exudyn(case: Case, time_step: float, *, newton_tolerance: float = 1e-6) -> EngineRun:
     """Run ``case`` in Exudyn: the implicit trapezoidal rule with the constraints at velocity level, full Newton steps.
 
-    It is of second order, as is generalised-alpha, whose numerical damping makes it 1.7 times less accurate. The explicit
-    integrators take no pins; with stiff springs for pins they need five times as long. With the default
-    ``newton_tolerance`` a step is one Newton iteration: at equal steps it is three times less accurate than with 1e-8, at
-    equal accuracy as fast or faster.
+    The rule is of second order. So is generalised-alpha, but its numerical damping makes it 1.7 times less accurate. The
+    explicit integrators accept no pins; with stiff springs for pins they need five times as long. With the default
+    ``newton_tolerance`` a step takes one Newton iteration. At equal steps this is three times less accurate than with 1e-8; at
+    equal accuracy it is as fast or faster.
     """
     mbs, sensor, spring = _exudyn_model(case)
     solver = _ExudynSolver(mbs, newton_tolerance)
@@ -429,7 +439,7 @@ def run_exudyn(case: Case, time_step: float, *, newton_tolerance: float = 1e-6) 
     return EngineRun(seconds=solver.seconds, error=error, label="Exudyn trapezoidal", steps=solver.steps)
 
 
-# --- the choice of the step -----------------------------------------------------------------------------------------------
+# --- choice of the step ---------------------------------------------------------------------------------------------------
 
 
 def time_steps(case: Case, first: float, last: float, ratio: float = 2.0**-0.25) -> Iterator[float]:
@@ -441,12 +451,12 @@ def time_steps(case: Case, first: float, last: float, ratio: float = 2.0**-0.25)
 
 
 def fastest_run(run: Run, case: Case, time_step: float, repeats: int = 7) -> EngineRun:
-    """Return the fastest of several equal runs, the one that the machine has disturbed least."""
+    """Return the fastest of several equal runs, which the machine has disturbed least."""
     return min((run(case, time_step) for _ in range(repeats)), key=lambda result: result.seconds)
 
 
 class Engine(NamedTuple):
-    """An engine: its run, the first and last step (s), and a run with the least error and its step (s)."""
+    """An engine: its run, the first and last time step of a series (s), and the run of least error with its time step (s)."""
 
     run: Run
     first_step: float
@@ -462,7 +472,7 @@ ENGINES: tuple[Engine, ...] = (
 
 
 def main() -> None:
-    """Print step, error and time of each engine and case: down the steps, at the accuracy asked for, and at the finest."""
+    """Print step, error and time of each engine and case: for a series of steps, at the accuracy, and at the finest step."""
 
     def line(case: Case, remark: str, time_step: float, result: EngineRun) -> None:
         print(

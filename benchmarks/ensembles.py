@@ -3,9 +3,9 @@
     python -m benchmarks.ensembles
     python -m benchmarks.ensembles --runs 1000000 --disk
 
-Runs of the five-bar slider of Table 3.1 with springs of an array, at commanded speeds and under torques: three turns at samples
-of 1 ms, and 0.1 s. Beside them the same runs alone, and the same ensemble without lanes. Times and ratios are of the
-processor, so that they hold on a busy machine; the speed-up of two threads by the clock needs two free cores.
+The runs are of the five-bar slider of Table 3.1 with different springs, at commanded speeds and under torques: three turns with
+samples of 1 ms, and 0.1 s. They are compared with the same runs alone, and with the same ensemble without lanes. Times and
+ratios are of processor time, so that they hold on a busy machine; the wall-clock speed-up of two threads needs two free cores.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ from analysis.run import batches, compiled, lanes
 from linkwork.five_bar.published import SETS, TABLE_3_1
 
 REPEATS = 7
-#: Number of runs solved one by one.
+#: Number of runs that are also solved alone.
 FEW = 20
 SPEED = SETS["table-3.1"].crank_speed
 LENGTHS = {"three turns": 6.0 * pi / SPEED, "0.1 s": 0.1}
@@ -65,7 +65,7 @@ def time_kernels(spent: list[float]) -> Iterator[None]:
 
 
 def integration_time(run: Callable[[], object], repeats: int) -> float:
-    """Return the shortest CPU time (s) that the compiled solver takes within a run of one mechanism."""
+    """Return the shortest CPU time (s) that the compiled solver takes within ``run``, a call of `simulate`."""
     spent: list[float] = []
     with time_kernels(spent):
         for _ in range(repeats):
@@ -74,7 +74,7 @@ def integration_time(run: Callable[[], object], repeats: int) -> float:
 
 
 def measure_runs(runs: list[Callable[[], object]]) -> list[tuple[float, float, float]]:
-    """Return for each run the shortest CPU time, CPU time within the compiled solver, and clock time (s); runs alternate."""
+    """Return for each run the shortest CPU time, CPU time in the compiled solver, and clock time (s); the runs alternate."""
     times = []
     for _ in range(REPEATS + 1):
         row = []
@@ -85,12 +85,12 @@ def measure_runs(runs: list[Callable[[], object]]) -> list[tuple[float, float, f
                 run()
                 row.append((process_time() - begun, sum(spent), perf_counter() - clock))
         times.append(row)
-    # the first compiles
+    # the first repetition compiles
     return [tuple(map(min, zip(*column))) for column in zip(*times[1:])]
 
 
 def report_memory(count: int) -> None:
-    """Print the peak memory of an ensemble that is kept in a folder, and of this process before it."""
+    """Print the peak memory of an ensemble whose results are kept in a folder, and the peak memory before the ensemble."""
 
     def peak() -> float:
         return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024.0

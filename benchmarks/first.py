@@ -1,14 +1,14 @@
-"""Measure waiting times: imports, first results with an empty cache of compiled code, and the same again.
+"""Measure waiting times of imports and of first results: with an empty cache of compiled code, and again with the filled cache.
 
     python -m benchmarks.first
     python -m benchmarks.first linkages
     python -m benchmarks.first linkages klann watt-1
 
-The second and third are of the library's linkages: from the file to a run and to a native FMU, on an empty cache, on one
-that another linkage has filled, and once more. An empty cache is measured twice: without the kernels that an installation
-carries, and with them.
+The second and third commands measure linkages of the library: from the file to a run and to a native FMU, with an empty cache,
+with a cache that another linkage has filled, and once more. An empty cache is measured twice: without the kernels that an
+installation carries, and with them.
 
-Each is a process of its own; times are by the clock, and of the processor, which other programs change less.
+Each measurement is a process of its own. Times are wall-clock times and processor times; other programs change the latter less.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from time import perf_counter
 from rich.console import Console
 from rich.table import Table
 
-#: Code for Python and its arguments; what is written goes to the folder in which they run.
+#: Code for Python and its arguments, by name; the code runs in a folder of its own, into which it writes its files.
 COMMAND = "from analysis.cli import main; main()"
 WAITS = {
     "import analysis": ("import analysis",),
@@ -32,12 +32,12 @@ WAITS = {
     "simulate, Table 3.1": ("import analysis; analysis.simulate('table-3.1', stop_time=0.5)",),
     "linkwork resonance --published rig-2-spring-c": (COMMAND, "resonance", "--published", "rig-2-spring-c"),
 }
-#: Of these, what uses no compiled code.
+#: Names of the entries of `WAITS` that use no compiled code.
 IDLE = ("import analysis", "linkwork --version")
-#: Comes before, where nothing is carried.
+#: Code that runs first to hide the kernels that the installation carries.
 WITHOUT = "from pathlib import Path; from analysis.numerics import codegen; codegen.CARRIED = Path('none'); "
 
-#: What is done with the file of a linkage, whose path follows.
+#: Commands on the file of a linkage, whose path is the last argument.
 FROM_A_FILE = {
     "run": (COMMAND, "run"),
     "native FMU": (COMMAND, "build", "--kinds", "native", "--dest", "."),
@@ -45,12 +45,12 @@ FROM_A_FILE = {
 LIBRARY = Path(__file__).parents[1] / "examples" / "linkages"
 #: The linkage that fills the cache for the others.
 BEFORE = "toggle-press"
-#: Two legs, one with gears, one with springs as bearings.
+#: Linkages measured by default: two walking legs, one linkage with gears, one with springs as bearings.
 MEASURED = ("klann", "jansen", "geared-five-bar", "elastic-bearing")
 
 
 def measure_waiting(arguments: tuple[str, ...], folder: str) -> tuple[str, str, str]:
-    """Run Python with these arguments; return clock time and processor time (s), and the number of compilations announced."""
+    """Run Python with these arguments; return wall-clock and processor time (s) and the number of announced compilations."""
     before, begin = resource.getrusage(resource.RUSAGE_CHILDREN), perf_counter()
     environment = os.environ | {"LINKWORK_CACHE_DIR": folder}
     done = subprocess.run(
@@ -62,14 +62,14 @@ def measure_waiting(arguments: tuple[str, ...], folder: str) -> tuple[str, str, 
 
 
 def measure_first(arguments: tuple[str, ...], *, carried: bool) -> tuple[str, str, str]:
-    """Return what `measure_waiting` does, for an empty cache; ``carried``: with the kernels that the installation carries."""
+    """Return the result of `measure_waiting` for an empty cache, with or without the kernels that the installation carries."""
     code, *others = arguments
     with tempfile.TemporaryDirectory() as folder:
         return measure_waiting((code if carried else WITHOUT + code, *others), folder)
 
 
 def linkages(names: list[str]) -> Table:
-    """Measure how long a linkage takes from its file to a run and to a native FMU."""
+    """Return a table of the time that each linkage takes from its file to a run and to a native FMU."""
     table = Table(title="from file; seconds by the clock, of the processor; compilations")
     for heading in (
         "",

@@ -2,9 +2,10 @@
 
     python -m benchmarks.fmu
 
-Table 3.1 at 420 rpm, steps of 1 ms. In each step all inputs are set and all outputs read. The trivial slave of PythonFMU has
-as many variables and does nothing; the smallest native FMU is a pendulum. Each number is the best of several runs. The
-right-hand sides of a step are counted, and timed in a C loop of their own at the states that the steps call them with.
+The mechanism is Table 3.1 at 420 rpm, with steps of 1 ms. In each step all inputs are set and all outputs read. For comparison,
+a trivial slave of PythonFMU has as many variables and does nothing, and the smallest native FMU is a pendulum. Each number is
+the best of several runs. The evaluations of the right-hand side in a step are counted, and timed in a C loop of their own at
+the states at which the steps evaluate them.
 """
 
 from __future__ import annotations
@@ -48,7 +49,7 @@ from tests.mechanisms.pendulum import MECHANISM as PENDULUM
 STEP = 1e-3
 STEPS = 430
 REPEATS = 7
-GOALS = (2.0, 100.0)  # at most, in times of the bare right-hand sides; at least, in speed relative to the Python FMU
+GOALS = (2.0, 100.0)  # largest time relative to the bare right-hand sides; least speed relative to the Python FMU
 
 TRIVIAL = """
 from pythonfmu import Fmi2Causality, Fmi2Slave, Real
@@ -70,7 +71,7 @@ class Trivial(Fmi2Slave):
 
 
 def least_measurement(measure: Callable[[], float]) -> float:
-    """Return the least of several measurements."""
+    """Return the smallest of several measurements."""
     return min(measure() for _ in range(REPEATS))
 
 
@@ -113,7 +114,7 @@ def time_with_host(host: Path, fmu: Path, folder: Path) -> float:
     unpacked = unpack(fmu, folder / fmu.stem)
     inputs = {s.name: float(s.attributes["start"]) for s in unpacked.reals("input")}
     python = (unpacked.folder / "resources" / "slavemodule.txt").is_file()
-    # PythonFMU's library without our guard expects Python's library in the process
+    # PythonFMU's library, if it is without our guard, expects Python's library in the process
     preload = {"LD_PRELOAD": str(sysconfig.get_config_var("INSTSONAME"))} if python else {}
 
     def measure() -> float:
@@ -125,7 +126,7 @@ def time_with_host(host: Path, fmu: Path, folder: Path) -> float:
 
 
 def count_and_time_right_hand_sides(folder: Path) -> tuple[float, float]:
-    """Return the number of right-hand sides in a step, and the time of a bare one (s)."""
+    """Return the number of right-hand side evaluations in a step, and the time of one evaluation (s)."""
     files = source_files(MECHANISM, NATIVE)
     driver = Path(__file__).with_name("right_hand_sides.c")
     for name, text in files.items():
@@ -142,7 +143,7 @@ def count_and_time_right_hand_sides(folder: Path) -> tuple[float, float]:
 
 
 def time_plain_step() -> float:
-    """Measure the time (s) of a step of the plant in plain Python, with its outputs."""
+    """Measure the time (s) of a step of the mechanism in plain Python, with its outputs."""
     entry = MECHANISM.published["table-3.1"]
     plant = Plant(MECHANISM, entry.parameters, entry.initial, inputs={"drive.speed": entry.crank_speed}, drive_mode=1)
     begun = time.perf_counter()
@@ -153,7 +154,7 @@ def time_plain_step() -> float:
 
 
 def time_compiled_step() -> float:
-    """Measure the time (s) of a step in this process, with inputs held as in the FMU."""
+    """Measure the time (s) of a step of the compiled solver in this process, with inputs held as in the FMU."""
     entry = MECHANISM.published["table-3.1"]
     begun = time.perf_counter()
     run = simulate(entry.parameters, Inputs(speed=entry.crank_speed), stop_time=STEPS * STEP, step=STEP, hold=STEP)
@@ -162,10 +163,10 @@ def time_compiled_step() -> float:
 
 
 def compare_component(native: Path, component: Path) -> list[tuple[float, float, float]]:
-    """Compare a WebAssembly component with the native library.
+    """Compare the step times of a WebAssembly component with those of the native library.
 
-    Returns triples of a step length (s) and ratios of the times of a step: of the whole, and of what wasmtime takes of it
-    without its Python, which looks at the types of all values.
+    Returns for each step length (s) two ratios to the native time: of the whole step, and of the time inside wasmtime's
+    library. The difference is the time of wasmtime's Python code, which looks up the types of all values.
     """
     entry = MECHANISM.published["table-3.1"]
     inputs, initial = check_run(MECHANISM, Inputs(speed=entry.crank_speed), entry.initial)
@@ -197,7 +198,7 @@ def compare_component(native: Path, component: Path) -> list[tuple[float, float,
 
 @contextmanager
 def timed_calls(times: list[float]) -> Iterator[None]:
-    """Append the time (s) of every call of a component to a list, without the Python of wasmtime."""
+    """Append the time (s) of every call of a component to a list while the context lasts, without wasmtime's Python code."""
     library: Any = importlib.import_module("wasmtime._ffi")
     call = library.wasmtime_component_func_call
 

@@ -1,4 +1,4 @@
-"""Measure the accuracy of long runs: a million turns, a start at 1e9 s, an angle of 1e9 turns. The tables of docs/solvers.md.
+"""Measure the accuracy of long runs: a million turns, a start at 1e9 s, an angle of 1e9 turns; print tables of docs/solvers.md.
 
     python -m benchmarks.long_runs turns --turns 1e5
     python -m benchmarks.long_runs turns --turns 1e6 --tolerances 1e-9
@@ -7,8 +7,8 @@
     python -m benchmarks.long_runs fmu
     python -m benchmarks.long_runs built
 
-Both mechanisms run freely, without damping, drive and load, so that their energy is constant. Residuals are relative to the
-kinetic energy at the start.
+Except in the table ``times`` both mechanisms run freely, without damping, drive and load, so that their energy is constant.
+Residuals are relative to the kinetic energy at the start.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ from linkwork.five_bar.published import TABLE_3_1
 from linkwork.plant import Plant
 from linkwork.slider_crank.published import OFFSET_CASE
 
-#: Parameters, start, and crank speed there (rad/s), by name.
+#: Parameters, initial state and initial crank speed (rad/s) of the mechanisms, by name.
 FREE: Mapping[str, tuple[Any, Any, float]] = {
     "five-bar": (replace(TABLE_3_1, slider_damping=0.0), InitialState(crank_speed=44.0), 44.0),
     "slider-crank": (*OFFSET_CASE, OFFSET_CASE[1].crank_speed),
@@ -44,10 +44,10 @@ FREE: Mapping[str, tuple[Any, Any, float]] = {
 LATE = 1e9
 MANY = 1e9
 TOLERANCES = (1e-9, 1e-12)
-#: Frequency (rad/s) and amplitude (N) of a force.
+#: Frequency (rad/s) and amplitude (N) of the harmonic force.
 _WAVE = (30.0, 5.0)
 
-#: Inputs of the five-bar from a time on.
+#: Functions that return inputs of the five-bar for a run that starts at a time t0 (s), by name.
 ACTING: Mapping[str, Callable[[float], Inputs]] = {
     "constant speed": lambda t0: Inputs(speed=44.0),
     "ramp of the speed": lambda t0: Inputs(speed=ramp(0.0, 44.0, t0, t0 + 0.25)),
@@ -61,7 +61,7 @@ ACTING: Mapping[str, Callable[[float], Inputs]] = {
 
 
 def free_run(mechanism: str, turns: float, *, begun: float = 0.0, **options: Any) -> tuple[float, float]:
-    """Run a number of turns at the speed of the start, from an angle of ``begun`` turns on.
+    """Run a mechanism for a number of turns at its initial speed, from a crank angle of ``begun`` turns.
 
     Returns
     -------
@@ -79,14 +79,16 @@ def free_run(mechanism: str, turns: float, *, begun: float = 0.0, **options: Any
 
 
 def compare_late_run(what: str, late: float = LATE, **options: Any) -> tuple[float, float]:
-    """Compare a run of half a second that begins at ``late`` with one that begins at zero.
+    """Compare a run of half a second that begins at the time ``late`` (s) with a run that begins at zero.
+
+    ``what`` is the name of their inputs in `ACTING`.
 
     Returns
     -------
     difference, steps : float
-        Largest difference of the slider's position relative to its largest, ratio of the numbers of steps.
+        Largest difference of the slider position relative to its largest magnitude, and ratio of the numbers of steps.
     """
-    # sample times that are exact floats in either run
+    # sample times that are exact floats in both runs
     samples = np.arange(513) * 2.0**-10
     runs = [simulate(TABLE_3_1, ACTING[what](t0), samples=t0 + samples, **options) for t0 in (0.0, late)]
     u = [run["slider.position"] for run in runs]
@@ -96,7 +98,10 @@ def compare_late_run(what: str, late: float = LATE, **options: Any) -> tuple[flo
 
 
 def plant_run(mechanism: str, *, time: float = 0.0, begun: float = 0.0, tolerance: float = 1e-9) -> tuple[float, float]:
-    """Make 300 steps of 1 ms of the Python FMU's plant; return the residual of the energy and the turned angle (rad)."""
+    """Take 300 steps of 1 ms with the Python FMU's plant, beginning at a time (s) and at a crank angle of ``begun`` turns.
+
+    Returns the relative residual of the energy and the angle (rad) by which the crank has turned.
+    """
     parameters, start, _ = FREE[mechanism]
     start = replace(start, crank_angle=2.0 * pi * begun)
     plant = Plant(MECHANISMS[mechanism], parameters, start, tolerance=tolerance, time=time)
@@ -110,7 +115,7 @@ def plant_run(mechanism: str, *, time: float = 0.0, begun: float = 0.0, toleranc
 def compare_late_fmu(
     file: str | Path, mechanism: str, step: float, interface: str = "co-simulation", late: float = LATE
 ) -> tuple[float, float]:
-    """Compare 512 steps of a built FMU from ``late`` on with those from zero.
+    """Compare 512 steps of a built FMU from the time ``late`` (s) with 512 steps from zero.
 
     Returns
     -------
@@ -130,7 +135,10 @@ def compare_late_fmu(
 
 
 def turns_table(turns: float, tolerances: Sequence[float] = TOLERANCES) -> Table:
-    """Tabulate energy and angle after many turns, the angle relative to the balanced method at the tightest tolerance."""
+    """Tabulate energy and angle after many turns.
+
+    Angles are relative to the result of the balanced method at the tightest tolerance.
+    """
     out = Table("mechanism", "tolerance", "method", "energy residual", "angle, off (rad)", title=f"{turns:g} turns")
     for mechanism in FREE:
         reference = None
@@ -167,7 +175,7 @@ def angles_table() -> Table:
 
 
 def fmu_table() -> Table:
-    """Tabulate runs of the FMU's plant that begin late."""
+    """Tabulate runs of the Python FMU's plant that begin at a late time or after many turns."""
     out = Table(
         "mechanism", "from", "energy residual", "angle, difference (rad)", title="300 steps of 1 ms of the plant"
     )

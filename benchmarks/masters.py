@@ -1,10 +1,10 @@
 """Find out which features of this project's FMUs each master uses, by runs with FMUs that log all calls.
 
     python -m benchmarks.masters                     # all masters, five minutes; writes docs/masters.csv
-    python -m benchmarks.masters --master FMPy       # one of them (repeatable); prints what it finds
+    python -m benchmarks.masters --master FMPy       # one of them (repeatable); prints its results
 
-Each run is a process of its own, on Linux; `tests/fmu/spy.c` takes the place of an FMU's library, and passes each call on.
-`docs/generate.py` puts the table into docs/masters.md.
+Each run is a process of its own, on Linux. `tests/fmu/spy.c` takes the place of an FMU's library; it logs each call and passes
+it on to that library. `docs/generate.py` puts the table into docs/masters.md.
 """
 
 from __future__ import annotations
@@ -33,10 +33,11 @@ YES, NO, NONE = "yes", "no", "-"
 
 
 class Run(NamedTuple):
-    """A run of a master on a `material`.
+    """A run of a master on an FMU or archive.
 
-    ``on`` names the `material`, ``by`` is the function that runs the master. ``label`` names the option of the master that is
-    used, `YES` without one; ``fails`` is a part of its message if the run must fail.
+    ``on`` is the name of the FMU or archive, see `material`; ``by`` is the function that runs the master. ``label`` names the
+    option of the master that is used, or is `YES` without an option. If the run must fail, ``fails`` is a part of the master's
+    message.
     """
 
     on: str
@@ -65,7 +66,7 @@ def _exchange(by: Callable[..., Any]) -> list[Run]:
     return [_alone("jump", by, interface=STATES), _alone("limit", by, _LIMIT, STATES)]
 
 
-#: The runs of each master. A master that sets integers at no place runs FMUs that start in their modes.
+#: The runs of each master. A master that never sets integers runs FMUs that have the values of their modes as start values.
 RUNS = {
     "FMPy": [
         _system(together.by_fmpy, YES, False),
@@ -110,16 +111,16 @@ RUNS = {
         _system(together.by_linkwork, on="wrong")._replace(fails="the units do not match"),
     ],
 }
-#: Those that read an archive themselves.
+#: Functions of masters that read an archive themselves.
 READERS = (together.by_fmpy, together.by_libcosimpy, together.by_ecospy, together.by_linkwork)
 
 
 class Capability(NamedTuple):
-    """A capability of a master, and how it is found."""
+    """A capability of a master, and how a run shows it."""
 
     name: str
-    on: tuple[str, ...]  # materials whose runs are examined
-    line: str  # line of a run that shows the capability
+    on: tuple[str, ...]  # names of the FMUs and archives whose runs are examined
+    line: str  # line of the result of `lines` that shows the capability
 
 
 _FMI2 = ("archive", "started", "FMI 2.0")
@@ -139,8 +140,8 @@ CAPABILITIES = (
 
 
 def _cross(folder: Path) -> None:
-    """Connect the torque of the shaft to the force on the slider, in an archive that is unpacked."""
-    # in the text: two of the masters know elements by their prefixes
+    """Connect the torque of the shaft to the force on the slider, in the folder of an unpacked archive."""
+    # changed in the text, not as XML, because two of the masters recognise elements only by their prefixes
     path = folder / "SystemStructure.ssd"
     text = path.read_text(encoding="utf-8").replace('"drive.torque"', '"slider.force"')
     text, count = re.subn(r'(name="slider\.force"[^>]*>\s*<ssc:Real) unit="N\.m"', r"\1", text)
@@ -154,7 +155,7 @@ def _watch(folder: Path) -> None:
 
 
 def material(folder: Path, on: str) -> Path:
-    """Return the FMU or archive for a run, which logs all calls; make it if it is not in the folder."""
+    """Return the path of the FMU or archive of this name, which logs all calls; make it if it is not in the folder."""
     name = {"jump": "FMI 2.0", "limit": "FMI 2.0"}.get(on, on)
     target = folder / f"{name}.{'fmu' if name.startswith('FMI') else 'ssp'}"
     if target.exists():
@@ -175,7 +176,7 @@ def material(folder: Path, on: str) -> Path:
 
 
 def lines(run: Run, material: Path) -> set[str]:
-    """Run a master; return its calls, and whether it read the archive itself or refused it for its units, as lines."""
+    """Run a master; return the calls that it makes, with "read" if it reads archives, "refused" if it refuses the units."""
     with tempfile.TemporaryDirectory() as folder:
         calls = Path(folder, "calls")
         calls.touch()
@@ -194,7 +195,7 @@ def lines(run: Run, material: Path) -> set[str]:
 
 
 def find(master: str, folder: Path) -> dict[str, str]:
-    """Return for each capability of a master `YES`, an option that it needs, `NO`, or `NONE` where it does not come to run."""
+    """Return for each capability of a master `YES`, the option that it needs, `NO`, or `NONE` if no run can show it."""
     told = [(run, lines(run, material(folder, run.on))) for run in RUNS[master]]
     found = {}
     for capability in CAPABILITIES:
@@ -222,7 +223,7 @@ def write(path: Path, table: Table) -> None:
 
 
 def markdown(table: Table) -> str:
-    """Write the table of the page, a column for each master."""
+    """Return the table in Markdown, with a column for each master."""
     rows: Iterable[Sequence[str]] = [(c.name, *(found[c.name] for found in table.values())) for c in CAPABILITIES]
     return "\n".join(f"| {' | '.join(row)} |" for row in [("", *table), ["---"] * (len(table) + 1), *rows])
 

@@ -1,11 +1,11 @@
-"""Check whether `periodic.find_orbits` misses a stable motion in which long runs end.
+"""Check whether `periodic.search_orbits` misses a stable motion in which long runs end.
 
     python -m benchmarks.motions --mechanisms 20
     python -m benchmarks.motions --light 77
 
-The first draws five-bars at random about the published rigs, with weak dampers; the second takes rig 1 with spring B and a
-damper of 2 N.s/m at a number of speeds from 1120 to 2640 rpm. The mechanism runs for 600 turns from 129 starts; if it repeats
-itself after one to four turns, Newton's method confirms the motion, which `find_orbits` must have found.
+The first command draws five-bars at random near the published rigs, with weak dampers. The second takes rig 1 with spring B and
+a damper of 2 N.s/m at a number of speeds from 1120 to 2640 rpm. The mechanism runs for 600 turns from 129 starts. If its motion
+then repeats after one to four turns, Newton's method confirms this motion, and `search_orbits` must have found it.
 """
 
 from __future__ import annotations
@@ -26,7 +26,8 @@ from linkwork.errors import LinkworkError
 from linkwork.five_bar.published import SETS
 
 STARTS, TURNS, MOST = 128, 600, 4
-#: Relative change of y over a period below which a run is settled; relative distance of two starts of one motion.
+#: A run is settled if the state changes less than this over a period; two starts closer than this belong to one motion (both
+#: relative to the scales of the motion).
 SETTLED, SAME = 1e-4, 1e-3
 RIGS = [known.parameters for known in SETS.values() if known.parameters.slider_stiffness > 0.0]
 
@@ -51,7 +52,7 @@ def draw_five_bar(random: np.random.Generator):
 
 
 def settled_ends(parameters, drive):
-    """Yield, for each run that settles, the number of turns after which it repeats itself, and y at its end."""
+    """Yield, for each run that settles, the number of turns after which its motion repeats, and the state y at its end."""
     point, guess = operating_point(parameters, drive), np.zeros(2)
     scale, turn = point.scale(guess), np.array([0.0, point.flow.period])
     section = point.section(guess, PLAIN, tolerance=1e-8)
@@ -68,7 +69,7 @@ def settled_ends(parameters, drive):
 
 
 def compare(parameters, drive) -> tuple[Counter, int]:
-    """Count runs by the turns of their final motion, and the final motions that `find_orbits` has missed."""
+    """Count the runs by the number of turns of their final motion, and the runs whose final motion `search_orbits` misses."""
     scale, seen, missed = motion_scales(parameters, drive, np.zeros(2)), Counter(), 0
     known = {turns: search_orbits(parameters, drive, turns=turns).orbits for turns in range(1, MOST + 1)}
     starts = {turns: np.array([p for o in found for p in o.passages()]) for turns, found in known.items()}

@@ -3,9 +3,9 @@
     python -m benchmarks.precision docs
     python -m benchmarks.precision docs --runs 10000
 
-writes ``work-precision.png`` and ``cost-of-runs.png`` into a folder, and prints the second as a table. Times are ratios: to the
-integration in process at the accuracy of `benchmarks.accuracy`, and to one run alone. Each is the least of several, measured in
-one process. Engines that are not installed (extra ``bench``) are left out and named.
+writes ``work-precision.png`` and ``cost-of-runs.png`` into a folder, and prints the costs of runs as a table. Times are ratios:
+in the first picture to the compiled integration at the accuracy of `benchmarks.accuracy`, in the second to one run alone. Each
+time is the least of several, measured in one process. Engines that are not installed (extra ``bench``) are left out and named.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ from linkwork.five_bar.published import SETS, TABLE_3_1
 
 #: Tolerances of the solvers.
 TOLERANCES = 10.0 ** np.arange(-3.0, -12.5, -0.5)
-#: Numbers of runs of the ensembles.
+#: Numbers of runs in the ensembles.
 COUNTS = (1, 10, 100, 1_000, 10_000, 100_000, 1_000_000)
 OURS = "Linkwork, integration"
 _TITLES = {"constant-speed": "Table 3.1, 420 rpm, three turns", "torsion-bar": "under a torsion bar, 0.5 s"}
@@ -64,7 +64,7 @@ def measure_in_process(case: Case, of: str) -> list[Point]:
 
 
 def measure_tolerances(case: Case, run: Callable[[float], np.ndarray], repeats: int = 2) -> list[Point]:
-    """Measure a solver at every other tolerance."""
+    """Measure a solver at every other one of `TOLERANCES`; ``run`` returns the slider position (m) at a tolerance."""
     points = []
     for tolerance in TOLERANCES[::2].tolist():
         error = relative_error(case, run(tolerance))
@@ -73,21 +73,21 @@ def measure_tolerances(case: Case, run: Callable[[float], np.ndarray], repeats: 
 
 
 def measure_scipy(case: Case, method: str) -> list[Point]:
-    """Measure one of SciPy's methods on the plain right-hand side."""
+    """Measure one of SciPy's methods on the right-hand side in plain Python."""
     length, speed = case.parameters.crank_length, max(1.0, case.start_speed)
     scale = np.array([1.0, length, speed, length * 40.0])
     return measure_tolerances(case, lambda rtol: run_scipy(case, method, rtol, rtol * scale))
 
 
 def measure_engine(case: Case, engine: engines.Engine, run: engines.Run) -> list[Point]:
-    """Measure a multibody engine at its steps."""
+    """Measure a multibody engine over a series of steps."""
     steps = engines.time_steps(case, engine.first_step, engine.last_step, 0.5)
     found = (engines.fastest_run(run, case, step, 2) for step in steps)
     return [Point(result.error, result.seconds) for result in found]
 
 
 def measure_case(case: Case, say: Callable[[str], None]) -> dict[str, list[Point]]:
-    """Return the points of all solvers that are installed, ours first."""
+    """Measure all solvers that are installed on a case; return their points by name, ours first."""
     found = {OURS: measure_in_process(case, "integration"), "Linkwork, all outputs": measure_in_process(case, "whole")}
     found |= {f"SciPy {method}": measure_scipy(case, method) for method in SCIPY_METHODS}
     found["multiplier form, SciPy DOP853"] = measure_tolerances(case, partial(run_multipliers, case), 1)
@@ -110,7 +110,7 @@ def least_time_at_accuracy(points: Iterable[Point]) -> float:
 
 
 def picture(found: dict[str, dict[str, list[Point]]]) -> Any:
-    """Plot error against time, a panel for each case."""
+    """Return a figure of the error over time, with a panel for each case; ``found`` has the points by case and solver."""
     panels = []
     for case, solvers in found.items():
         unit = least_time_at_accuracy(solvers[OURS])
@@ -118,7 +118,7 @@ def picture(found: dict[str, dict[str, list[Point]]]) -> Any:
         for name, points in solvers.items():
             usable = [p for p in points if isfinite(p.error) and p.error < 1.0]
             width = 2.2 if name.startswith("Linkwork") else 1.0
-            # there are fewer colours than solvers
+            # there are fewer colours than solvers: the others repeat a colour with a broken line
             again = len(curves) >= len(COLOURS)
             line, label = "--" if again else "-", "" if panels else name
             curves.append(
@@ -146,7 +146,10 @@ def picture(found: dict[str, dict[str, list[Point]]]) -> Any:
 
 
 def costs(most: int) -> list[tuple[int, float, float]]:
-    """Measure ensembles: number of runs, and time per run divided by that of one run alone, with and without lanes."""
+    """Measure ensembles of up to ``most`` runs.
+
+    Returns a row for each: number of runs, and time per run divided by that of one run alone, with and without lanes.
+    """
     speed = SETS["table-3.1"].crank_speed
     settings = {"stop_time": 0.1, "step": 1e-2}
     alone = shortest_time(lambda: simulate(TABLE_3_1, Inputs(speed=speed), **settings), 40)
@@ -166,7 +169,7 @@ def costs(most: int) -> list[tuple[int, float, float]]:
 
 
 def cost_picture(rows: list[tuple[int, float, float]]) -> Any:
-    """Plot the cost of a run over the number of runs."""
+    """Return a figure of the cost of a run over the number of runs."""
     counts, lanes, apart = zip(*rows)
     curves = [
         Curve(x=counts, y=apart, label="one after the other", marker="o"),

@@ -4,15 +4,15 @@
     python -m benchmarks.race --again Linkwork             # runs a search afresh on all targets
     python -m benchmarks.race --budget 1 --target square --results out/few.csv
 
-pylinkage's differential evolution is SciPy's, which takes part with whole generations at a time.
+pylinkage's differential evolution calls SciPy's. SciPy's takes part directly, and evaluates a whole generation at once.
 
 Every search has the same unknowns, bounds, constraints and measure (`benchmarks.contest`), and the same processor time on one
-thread, so that other work on the machine does not matter. Code is compiled before. No search knows when to stop: each is
-restarted until its time is over. `synthesize` is called with `FIRST`, then with other seeds and twice the candidates and starts
-each time; the answer of a call counts from its end on, if that is in time.
+thread, so that other work on the machine does not matter. Code is compiled beforehand. Each search is restarted until its time
+is over. `synthesize` is called with `FIRST`, then with other seeds and twice the candidates and starts each time. The answer of
+a call counts from the end of the call, if that is in time.
 
-The results are a row for each target and search: the least error after `TIMES`, infinite as long as no linkage satisfies the
-constraints. The file is rewritten after every row: a run that is stopped keeps its rows, and the next one continues.
+The results have a row for each target and search: the least error after each of `TIMES`, infinite as long as no linkage
+satisfies the constraints. The file is rewritten after every row. A run that is stopped keeps its rows; the next run continues.
 """
 
 from __future__ import annotations
@@ -53,16 +53,19 @@ RESULTS = Path("out/race.csv")
 #: Times at which the error is recorded (s), and the time for each search.
 TIMES = (0.05, 0.07, 0.1, 0.15, 0.2, 0.3, 0.5, 0.7, 1.0, 1.5, 2.0, 3.0, 4.0, 5.0, 7.0, 10.0)
 BUDGET = 3.0
-#: The first call of `synthesize`, and how often its effort is doubled.
+#: Settings of the first call of `synthesize`, and how often their effort is doubled.
 FIRST, DOUBLED = Search(candidates=1 << 11, starts=1), 5
-#: Relative difference of errors that count as level; error, in sizes of the target, that counts as exact.
+#: Largest relative difference of errors that count as equal; largest error that counts as exact, in sizes of the target.
 LEVEL, EXACT = 1e-3, 1e-6
-#: Relative distance from the least error of all searches at the end that counts as found.
+#: A search has found a target if its error is at most this fraction above the least final error of all searches.
 FOUND = 0.05
 
 
 class Row(NamedTuple):
-    """Errors of a search on a target over the time, in m2, for a function in rad2."""
+    """Errors of a search on a target at `TIMES`: in m2, or in rad2 for a function.
+
+    An error of at most ``exact`` counts as exact.
+    """
 
     kind: str
     target: str
@@ -71,7 +74,7 @@ class Row(NamedTuple):
     errors: tuple[float, ...]
 
     def least_error(self, seconds: float) -> float:
-        """Return the least error after one of `TIMES` (s), but not less than the error that counts as exact."""
+        """Return the error at one of `TIMES` (s), or the error that counts as exact if this is greater."""
         return max(self.exact, self.errors[TIMES.index(seconds)])
 
 
@@ -79,7 +82,7 @@ class Row(NamedTuple):
 
 
 def search_with_linkwork(trace: Trace, box: BlackBox, random: np.random.Generator) -> None:
-    """Call `synthesize` with growing effort, and measure its answers as those of the other searches."""
+    """Call `synthesize` with growing effort; measure its answers in the same way as those of the other searches."""
     contest = trace.contest
     problem, limits = contest.problem, contest.limits
     for k in count():
@@ -125,7 +128,7 @@ def prepare_searches() -> None:
 
 
 def read(path: Path) -> list[Row]:
-    """Read the rows of a file, none if there is no file."""
+    """Read the rows of a file; return an empty list if there is no file."""
     if not path.exists():
         return []
     with path.open(newline="", encoding="utf-8") as file:
@@ -134,7 +137,7 @@ def read(path: Path) -> list[Row]:
 
 
 def write(path: Path, rows: Iterable[Row]) -> None:
-    """Write rows to a file, which replaces the old file at once."""
+    """Write rows to a file; the old file is replaced in one operation."""
     path.parent.mkdir(parents=True, exist_ok=True)
     beside = path.with_name(f"{path.name}.new")
     with beside.open("w", newline="", encoding="utf-8") as file:
@@ -145,7 +148,7 @@ def write(path: Path, rows: Iterable[Row]) -> None:
 
 
 def sort_rows(rows: Iterable[Row]) -> list[Row]:
-    """Sort rows by targets and searches."""
+    """Sort rows by target, then by search, in the order of `TARGETS` and `RACERS`."""
     targets = [(target.kind, target.name) for target in TARGETS]
     return sorted(rows, key=lambda row: (targets.index(row[:2]), list(RACERS).index(row.search)))
 
@@ -153,7 +156,7 @@ def sort_rows(rows: Iterable[Row]) -> list[Row]:
 def run_missing(
     path: Path, targets: Sequence[Target], searches: Sequence[str], budget: float, say: Callable[..., Any]
 ) -> None:
-    """Run the searches that are missing in a file."""
+    """Run the searches whose rows are missing in the file of results, and add the rows; report each one by ``say``."""
     rows = {row[:3]: row for row in read(path)}
     wanted = [(target, search) for target in targets for search in searches]
     missing = [(t, s) for t, s in wanted if (t.kind, t.name, s) not in rows]
@@ -170,12 +173,12 @@ def run_missing(
 
 
 def last_time(rows: Iterable[Row]) -> float:
-    """Return the last of `TIMES` at which all rows have an error (s)."""
+    """Return the last of `TIMES` (s) at which all rows have an error."""
     return max(seconds for k, seconds in enumerate(TIMES) if not any(np.isnan(row.errors[k]) for row in rows))
 
 
 def by_target(rows: Iterable[Row]) -> dict[tuple[str, str], dict[str, Row]]:
-    """Return the rows of each target by search, for targets on which all searches have run."""
+    """Return, for each target on which all searches have run, its rows by search."""
     found: dict[tuple[str, str], dict[str, Row]] = {}
     for row in rows:
         found.setdefault(row[:2], {})[row.search] = row
@@ -183,28 +186,28 @@ def by_target(rows: Iterable[Row]) -> dict[tuple[str, str], dict[str, Row]]:
 
 
 def rival_error(of: Mapping[str, Row], seconds: float) -> float:
-    """Return the least error of the searches other than ours after a time (s); ``of`` has the rows of a target by search."""
+    """Return the least error of all searches except ours after a time (s); ``of`` has the rows of a target by search."""
     return min(row.least_error(seconds) for search, row in of.items() if search != OURS)
 
 
 def is_ahead(of: Mapping[str, Row], seconds: float) -> bool:
-    """Return whether no other search has a smaller error than ours, within `LEVEL`."""
+    """Return whether no other search has a smaller error than ours; differences within `LEVEL` do not count."""
     ours = of[OURS].least_error(seconds)
     return isfinite(ours) and ours <= (1.0 + LEVEL) * rival_error(of, seconds)
 
 
 def is_level(of: Mapping[str, Row], seconds: float) -> bool:
-    """Return whether our search is ahead and another one is equal to it within `LEVEL`."""
+    """Return whether our search is ahead and the best other search is equal to it within `LEVEL`."""
     return is_ahead(of, seconds) and rival_error(of, seconds) <= (1.0 + LEVEL) * of[OURS].least_error(seconds)
 
 
 def has_found(of: Mapping[str, Row], search: str, seconds: float, end: float) -> bool:
-    """Return whether a search has come within `FOUND` of the least error that any search has at the end."""
+    """Return whether a search is within `FOUND` of the least error that any search has at the time ``end`` (s)."""
     return of[search].least_error(seconds) <= (1.0 + FOUND) * min(row.least_error(end) for row in of.values())
 
 
 def standings(rows: Sequence[Row]) -> list[list[str]]:
-    """Count, at each time, the targets on which Linkwork is ahead or level, and the targets that each search has found."""
+    """Count, for each time, the targets on which Linkwork is ahead or level, and the targets that each search has found."""
     targets, end = by_target(rows).values(), last_time(rows)
     return [
         [
@@ -219,7 +222,7 @@ def standings(rows: Sequence[Row]) -> list[list[str]]:
 
 
 def finals(rows: Sequence[Row]) -> list[list[str]]:
-    """List the errors of each search at the end by target, the least in bold."""
+    """List the final errors of all searches, a row for each target, with the least error in bold."""
     end = last_time(rows)
     lines = []
     for (kind, name), of in by_target(rows).items():
@@ -235,7 +238,7 @@ def finals(rows: Sequence[Row]) -> list[list[str]]:
 
 
 def list_lost(rows: Sequence[Row]) -> list[str]:
-    """List the targets on which another search has a smaller error at the end, and the difference."""
+    """List the targets on which another search has a smaller final error, with the relative difference."""
     end = last_time(rows)
     return [
         f"- {kind}, {name}: {of[OURS].least_error(end) / rival_error(of, end) - 1.0:.2%} above "
@@ -246,7 +249,7 @@ def list_lost(rows: Sequence[Row]) -> list[str]:
 
 
 def markdown(rows: Sequence[Row], of: str) -> str:
-    """Write a part of a page: the table "standings" or "targets", or the list "lost"."""
+    """Return a part of the page of results in Markdown: the table "standings" or "targets", or the list "lost"."""
     if of == "lost":
         return "\n".join(list_lost(rows) or ["None."])
     headings, lines = {
@@ -257,7 +260,7 @@ def markdown(rows: Sequence[Row], of: str) -> str:
 
 
 def picture(rows: Sequence[Row]) -> Any:
-    """Plot the number of targets that each search has found over time, and its distance from the best at the end."""
+    """Return a figure: the number of targets that each search has found over time, and final errors divided by the least."""
     from analysis.figures import Curve, Panel, plot_curves
 
     targets, end = by_target(rows).values(), last_time(rows)

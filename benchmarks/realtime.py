@@ -1,10 +1,10 @@
-"""Measure step times and missed deadlines of a system in one C program: motor, five-bar slider, controllers, `motor-tracking`.
+"""Measure step times and missed deadlines of `motor-tracking`, a motor, five-bar slider and controllers, in one C program.
 
     python -m benchmarks.realtime [--steps 1000000] [--seconds 10]
 
-The program takes so many steps as fast as they go, and then for so many seconds 1000 and 4000 of them a second, each begun at
-its time and due when the next begins: as any other process, and with the priority of a real-time one where `chrt` may give it.
-The same system is also timed in the Python master.
+The program first takes the given number of steps as fast as it can. Then it takes 1000 and 4000 steps a second for the given
+number of seconds: each step begins at its scheduled time and must end before the next one begins. These runs are made with
+normal priority and, where `chrt` is permitted, with real-time priority. The same system is also timed in the Python master.
 """
 
 from __future__ import annotations
@@ -30,7 +30,10 @@ PERCENTILES = ("median", "99%", "99.9%", "99.99%", "worst")
 
 
 def run_host(host: Path, steps: int, rate: float | None = None, *, by: Sequence[str] = ()) -> dict[str, float]:
-    """Run the program, by the command ``by`` if it is given, and return the numbers that it prints, by name."""
+    """Run the C program and return the numbers that it prints, by name; ``by`` is a command that starts it, such as `chrt`.
+
+    ``rate`` is the number of steps a second; without it the steps are taken as fast as possible.
+    """
     words = [*by, str(host), str(steps), *([] if rate is None else [f"{rate:g}"])]
     done = subprocess.run(words, capture_output=True, text=True, check=False)
     if done.returncode:
@@ -39,7 +42,7 @@ def run_host(host: Path, steps: int, rate: float | None = None, *, by: Sequence[
 
 
 def python_step(wiring: Wiring, steps: int = 1000) -> float:
-    """Measure a step of the Python master, without the start (s)."""
+    """Measure the time (s) of a step of the Python master, without its start."""
 
     def run(count: int) -> float:
         begun = time.perf_counter()
@@ -50,7 +53,7 @@ def python_step(wiring: Wiring, steps: int = 1000) -> float:
 
 
 def may_be_real_time() -> bool:
-    """Return whether a process may have the priority of a real-time one here."""
+    """Return whether `chrt` may give a process real-time priority on this machine."""
     return (
         shutil.which(REAL_TIME[0]) is not None
         and not subprocess.run([*REAL_TIME, "true"], capture_output=True).returncode
@@ -58,7 +61,7 @@ def may_be_real_time() -> bool:
 
 
 def processor() -> str:
-    """Return the model of the processor."""
+    """Return the name of the processor's model."""
     try:
         found = re.search(r"model name\s*: (.*)", Path("/proc/cpuinfo").read_text())
     except OSError:

@@ -3,9 +3,9 @@
     python -m benchmarks.resonance
     python -m benchmarks.resonance rig-1-spring-b
 
-The whole is a process of its own, started once before it counts, so that the machine code is in the cache; the parts are
-what the command does, in this process, one after the other. Both are times of the processor, which others on the machine hardly
-change.
+The whole command runs as a process of its own. It is run once before it is timed, so that the machine code is in the cache. Its
+parts are then run in this process, one after the other. All times are processor times; other work on the machine hardly
+changes them.
 """
 
 from __future__ import annotations
@@ -23,12 +23,12 @@ from typing import Any
 from rich.console import Console
 from rich.table import Table
 
-#: Range of speeds relative to the natural frequency, and how often the period is doubled, as the command has them.
+#: Defaults of the command: range of speeds relative to the natural frequency, and how many period doublings are followed.
 RANGE, DOUBLINGS = (0.15, 2.3), 3
 
 
 def command(name: str, folder: str) -> float:
-    """Measure the processor time of the command (s)."""
+    """Return the processor time (s) of the whole command on a published set."""
     before = resource.getrusage(resource.RUSAGE_CHILDREN)
     arguments = [sys.executable, "-m", "analysis.cli", "resonance", "--published", name, "--out", folder]
     subprocess.run(arguments, capture_output=True, check=False)
@@ -37,7 +37,7 @@ def command(name: str, folder: str) -> float:
 
 
 def parts(name: str, folder: str) -> dict[str, float]:
-    """Measure the processor time of each part of the command (s)."""
+    """Return the processor time (s) of each part of the command, by name."""
     times: dict[str, float] = {}
 
     def time_part(what: str, does: Callable[[], Any]) -> Any:
@@ -47,7 +47,7 @@ def parts(name: str, folder: str) -> dict[str, float]:
         return result
 
     def imports() -> None:
-        import numba  # noqa: F401 - with what it brings
+        import numba  # noqa: F401 - with its dependencies
 
         from analysis import figures, periodic, youssef
 
@@ -76,7 +76,7 @@ def parts(name: str, folder: str) -> dict[str, float]:
 
 
 def main(name: str) -> None:
-    """Measure and print."""
+    """Measure the command and its parts, and print the times."""
     table = Table(title=f"linkwork resonance --published {name}, processor time")
     table.add_column("")
     table.add_column("s", justify="right")

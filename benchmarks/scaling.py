@@ -2,9 +2,9 @@
 
     python -m benchmarks.scaling
 
-A worker is a process. Times are by the clock, which needs as many free cores as workers, and of the processors in all processes
-together, which show the cost of distributing the work even on a busy machine. Each is the best of several, taken in turn. The
-results are compared bit by bit.
+A worker is a process. Wall-clock times need as many free cores as workers. Processor times, summed over all processes, show the
+cost of distributing the work even on a busy machine. Each time is the best of several, measured in turn. The results are
+compared bit by bit.
 """
 
 from __future__ import annotations
@@ -67,13 +67,13 @@ WORK: dict[str, Callable[[], Any]] = {
 
 
 def processor_time() -> float:
-    """Return the processor time of this process and of those that it started (s)."""
+    """Return the processor time (s) of this process and its child processes."""
     own = psutil.Process()
     return sum(sum(process.cpu_times()[:2]) for process in [own, *own.children(recursive=True)])
 
 
 def time_work(work: Callable[[], Any], backend: str | None) -> tuple[float, float, Any]:
-    """Run work on one worker or on two of a backend; return clock time, processor time (s) and the result."""
+    """Run work on one worker, or on two workers of a backend; return wall-clock and processor time (s) and the result."""
     with joblib.parallel_config(backend, n_jobs=2) if backend else nullcontext():
         begun, spent = perf_counter(), processor_time()
         result = work()
@@ -81,7 +81,7 @@ def time_work(work: Callable[[], Any], backend: str | None) -> tuple[float, floa
 
 
 def import_packages(_: int) -> None:
-    """Do no work but import the packages that a worker needs."""
+    """Import the packages that a worker needs, so that the import is not timed."""
     import analysis.periodic.chart.grid
     import analysis.run.compiled
     import analysis.slider_crank
@@ -102,7 +102,7 @@ def main() -> None:
                 list(run_in_parallel(import_packages, range(8)))
         for name, work in WORK.items():
             found = [[time_work(work, backend) for backend in backends] for _ in range(repeats + 1)]
-            # the first compiles
+            # the first repetition compiles
             times = [min(row[n][what] for row in found[1:]) for n in range(len(backends)) for what in (0, 1)]
             alike = all(np.array_equal(result, found[0][0][2], equal_nan=True) for row in found for *_, result in row)
             table.add_row(name, *(f"{t:.2f} s" for t in times), "the same" if alike else "DIFFERENT")

@@ -2,9 +2,9 @@
 
     python -m benchmarks.slider_crank
 
-Runs: Rahman's case a4 = 10 in, S1 = 3.5 in from 50 rpm, a constant torque, 2.4 s. Error is the largest difference in slider
-position from a run at 1e-13, relative to the stroke; each solver gets the loosest tolerance whose error is at most 1e-6. Times
-are the best of several, ratios within this one process.
+The runs are Rahman's case a4 = 10 in, S1 = 3.5 in: 2.4 s from 50 rpm under a constant torque. The error is the largest
+difference in slider position from a run at a tolerance of 1e-13, relative to the stroke. Each solver gets the loosest tolerance
+whose error is at most 1e-6. Times are the best of several; ratios are of times measured in this one process.
 """
 
 from __future__ import annotations
@@ -37,13 +37,13 @@ ANGLES = np.linspace(0.0, 2.0 * np.pi, 361)
 
 
 def run_in_process(tolerance: float) -> Trajectory:
-    """Run the compiled solver."""
+    """Run the case with the compiled solver."""
     inputs = Inputs(torque=TORQUE)
     return simulate(PARAMETERS, inputs, initial=INITIAL, stop_time=STOP, samples=TIMES, tolerance=tolerance)
 
 
 def constant_torque(torque: float) -> dynamics.Inputs:
-    """Return the plant's inputs: a torque on the crank, the shift held."""
+    """Return the inputs of the plant: a torque (N.m) on the crank, and the shift held constant."""
     return dynamics.apply_inputs((0.0, 1.0), (torque, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0), PARAMETERS.constants())
 
 
@@ -61,12 +61,12 @@ def run_scipy(method: str, tolerance: float) -> np.ndarray:
 
 @cache
 def reference() -> np.ndarray:
-    """Compute the slider position at `TIMES` at a tolerance of 1e-13."""
+    """Return the slider position at `TIMES` by the compiled solver at a tolerance of 1e-13."""
     return run_in_process(1e-13)["slider.position"]
 
 
 def error(position: np.ndarray) -> float:
-    """Return the error of a slider position relative to the stroke."""
+    """Return the largest error of slider positions at `TIMES`, relative to the stroke."""
     return float(np.abs(position - reference()).max() / np.ptp(reference()))
 
 
@@ -113,7 +113,7 @@ def _dual_turn() -> None:
 
 
 def forces() -> None:
-    """Measure and print all joint forces over a turn of 361 points."""
+    """Measure all joint forces over a turn of 361 points by each method, and print the times."""
     shift = ConstantShift(INITIAL.shift_position)
     arrays = shortest_time(lambda: force_turn(PARAMETERS, crank_speed=INITIAL.crank_speed, shift=shift, angles=ANGLES))
     times = {
@@ -130,7 +130,7 @@ def forces() -> None:
 
 
 def tolerances() -> None:
-    """Measure and print Monte Carlo with a million samples at one angle."""
+    """Measure Monte Carlo simulations with a million samples at one crank angle, and print the times."""
     turn = force_turn(
         PARAMETERS,
         crank_speed=INITIAL.crank_speed,

@@ -2,10 +2,10 @@
 
     python -m benchmarks.solvers
 
-Two cases: Table 3.1 at 420 rpm for three revolutions, and a torsion bar of 1e8 dyn.cm released at 1 rad, 0.5 s in all. Error is
-the largest difference in u from a 1e-13 reference on a grid of samples, relative to the largest u; each solver gets the loosest
-setting whose error is at most 1e-6, and its best method. Times are the best of several runs, ratios within this one process.
-MuJoCo and Exudyn (extra ``bench``) are left out with a word where they are not installed.
+There are two cases: Table 3.1 at 420 rpm for three turns, and 0.5 s under a torsion bar of 1e8 dyn.cm that acts up to 1 rad.
+The error is the largest difference in u at the sample times from a reference at 1e-13, relative to the largest u. Each solver
+gets its best method and the loosest setting whose error is at most 1e-6. Times are the best of several runs, and ratios are of
+times in this one process. MuJoCo and Exudyn (extra ``bench``) are left out, with a note, if they are not installed.
 """
 
 from __future__ import annotations
@@ -45,7 +45,10 @@ class Timing:
 
 
 def time_in_process(case: Case) -> tuple[list[Timing], str]:
-    """Time the compiled solver: the whole call of `simulate`, the integration inside it, and the bare right-hand sides."""
+    """Time the compiled solver on a case; return the timings, and a sentence on the cost of the right-hand sides.
+
+    The timings are of the integration alone and of the whole call of `simulate`.
+    """
     inputs = Inputs(speed=case.crank_speed) if case.crank_speed else Inputs(torque=TorsionBar(torque=case.torque))
 
     def run(tolerance: float) -> Any:
@@ -77,14 +80,14 @@ def time_in_process(case: Case) -> tuple[list[Timing], str]:
 
 
 def _states(case: Case) -> np.ndarray:
-    """Return states like those of the case, for its right-hand side."""
+    """Return states like those of the case, at which its right-hand side is timed."""
     angles = np.linspace(0.0, 2.0 * np.pi, 20_000)
     none, speed = np.zeros_like(angles), np.full_like(angles, case.crank_speed or 70.0)
     return np.column_stack([angles, 0.01 * np.sin(angles), speed, 0.2 * np.cos(angles), none, none])
 
 
 def time_scipy(case: Case) -> Timing:
-    """Time `solve_ivp` on the plain-Python right-hand side, by the method that is fastest at the accuracy."""
+    """Time `solve_ivp` on the right-hand side in plain Python, with the method that reaches the accuracy soonest."""
     length, speed = case.parameters.crank_length, max(1.0, case.start_speed)
     scale = np.array([1.0, length, speed, length * 40.0])
     timings = []
@@ -107,7 +110,7 @@ def time_scipy(case: Case) -> Timing:
 
 
 def time_multipliers(case: Case) -> Timing:
-    """Time the multiplier form under SciPy's DOP853; the torsion bar's time of release is given to it, and not timed."""
+    """Time the multiplier form with SciPy's DOP853; the time at which the torsion bar releases is computed beforehand."""
     rtol, error, reached = loosest_setting(
         lambda rtol: relative_error(case, run_multipliers(case, rtol)), TOLERANCES[::5]
     )
@@ -119,7 +122,7 @@ def time_multipliers(case: Case) -> Timing:
 
 
 def run_multipliers(case: Case, rtol: float) -> np.ndarray:
-    """Compute the slider position (m) by the multiplier form under SciPy's DOP853."""
+    """Compute the slider position (m) at the sample times by the multiplier form with SciPy's DOP853."""
 
     def run(start: InitialState, torque: float, times: np.ndarray, **drive: Any) -> Any:
         def applied_forces(t: float, q: np.ndarray, qd: np.ndarray) -> tuple[float, ...]:

@@ -5,10 +5,10 @@
 The chart has 200 x 200 points of rig 1 with spring A, damping over crank speed. Each point has its own periodic orbit. The
 chart is computed on two cores from an empty cache of results.
 
-SciPy computes a sample of the rows, and its time per point is scaled to the whole chart. It takes the same Newton iterations;
-solve_ivp's DOP853 integrates the orbit and two neighbours together at the same tolerance, and their differences replace the
-variational equations. Chart and sample are timed in the same run on the same cores. With --cores 1 processor time is measured
-instead of elapsed time; it hardly depends on other programs.
+SciPy computes pieces of a few rows of the chart; its time per point is scaled to the whole chart. The orbits are found by the
+same Newton iterations. solve_ivp's DOP853 integrates the orbit and two neighbouring motions together at the same tolerance; the
+differences of these motions replace the variational equations. Chart and pieces are timed in the same run on the same cores.
+With --cores 1 processor time is measured instead of elapsed time; it hardly depends on other programs.
 """
 
 from __future__ import annotations
@@ -32,18 +32,18 @@ from linkwork.five_bar.parameters import FiveBarParameters
 from linkwork.five_bar.published import SETS
 
 POINTS = 200
-#: Rows of the sample, and number of points in each.
+#: Number of rows in the sample, and number of points in each.
 ROWS, RUN = 4, 10
 SPEEDS = np.linspace(200.0, 1200.0, POINTS) * RAD_S_PER_RPM
 DAMPINGS = np.linspace(3.0, 40.0, POINTS)
-#: Difference of the neighbours' starts, relative to crank length and speed; it balances truncation and rounding.
+#: Distance of the neighbouring motions' starts, relative to crank length and speed; it balances truncation and rounding.
 STEP = 1e-6
 
 
 def scipy_orbit(
     parameters: FiveBarParameters, drive: Drive, guess: NDArray[np.float64]
 ) -> tuple[NDArray[np.float64], float]:
-    """Find the start of the orbit and its largest multiplier, by shooting with SciPy on the plain equations."""
+    """Return the start of the periodic orbit and its largest Floquet multiplier, by shooting with SciPy."""
     p = parameters.constants()
     speed = drive.speed
     assert speed is not None
@@ -71,14 +71,17 @@ def scipy_orbit(
         matrix = np.column_stack([(end[2:4] - end[:2]) / (STEP * scale[0]), (end[4:] - end[:2]) / (STEP * scale[1])])
         correction = np.linalg.solve(np.eye(2) - matrix, end[:2] - y)
         y = y + correction
-        # the differences' error leaves Newton's method linear at the end
+        # the errors of the differences make the convergence of Newton's method linear at the end
         if np.abs(correction / scale).max() < 10.0 * ORBIT_TOLERANCE:
             break
     return y, float(np.abs(np.linalg.eigvals(matrix)).max())
 
 
 def scipy_row(operation: Plane, damping: float, speeds: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Find the largest multipliers along a piece of a row, with the secant through the last two orbits as the first guess."""
+    """Return the largest Floquet multipliers at several speeds: a piece of a row of the chart.
+
+    The first guess of each orbit is extrapolated from the last two orbits.
+    """
     starts: list[NDArray[np.float64]] = []
     values = []
     for speed in speeds.tolist():
@@ -90,13 +93,13 @@ def scipy_row(operation: Plane, damping: float, speeds: NDArray[np.float64]) -> 
 
 
 def main(points: int = POINTS, cores: int = 2) -> None:
-    """Measure and print."""
+    """Time the chart and SciPy's pieces of the chart, and print the comparison."""
     clock = time.perf_counter if cores > 1 else time.process_time
     rig = SETS["rig-1-spring-a"].parameters
     operation = plane(rig, Drive(speed=float(SPEEDS[0])), "drive.speed", "slider.damping")
     speeds, dampings = (np.linspace(axis[0], axis[-1], points) for axis in (SPEEDS, DAMPINGS))
     with tempfile.TemporaryDirectory() as folder:
-        # the workers are started and the machine code is loaded before the clock
+        # the workers are started and the machine code is loaded before the timing begins
         grid(operation, speeds[:4], dampings[:4], folder=folder, n_jobs=cores)
         begin = clock()
         chart = grid(operation, speeds, dampings, folder=folder, n_jobs=cores)

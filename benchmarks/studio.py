@@ -1,10 +1,12 @@
 """Measure how smooth the studio is: `python -m benchmarks.studio [seconds]`, in headless Chromium by Playwright.
 
-First sight is the time from the beginning of the page's loading to the first motion shown; the verdict is the time from a
-change of a dimension to its Floquet multipliers on the page; frames are the times between frames while a joint is dragged with
-its path and forces drawn anew, and a stability chart is computed beside it. A display of 60 frames a second has one every
-16.67 ms, which a clock of 0.1 ms reads as 16.6 to 16.8: whether the page keeps up says the work of its own thread for each
-frame (events, scripts, layout and paint, by the trace of the browser), and how many frames came late.
+First sight is the time from the beginning of the page's loading to the first motion shown. The verdict is the time from a
+change of a dimension to its Floquet multipliers on the page. Frames are the times between frames while a joint is dragged, its
+path and forces are drawn anew, and a stability chart is computed in parallel.
+
+A display of 60 frames a second shows one every 16.67 ms; a clock with a resolution of 0.1 ms reads 16.6 to 16.8 ms. Whether the
+page keeps up is seen from the processor time of its own thread for each frame (events, scripts, layout and paint, by the
+browser's trace), and from the number of late frames.
 """
 
 from __future__ import annotations
@@ -22,8 +24,11 @@ from analysis.studio import PAGE
 
 
 class Figures(NamedTuple):
-    """Times in ms: first sight; verdicts after changes (median, greatest); frames of a drag, and the page's own processor time
-    for each, whatever else the machine does (both median, p95, greatest). ``late`` is the share of late frames.
+    """Measured times of the page (ms).
+
+    ``first`` is the first sight, ``verdict`` the median and greatest time to a verdict. ``frame`` is the time between frames of
+    a drag, ``work`` the processor time of the page's own thread for each frame; both are median, 95th percentile and greatest
+    value. ``late`` is the share of late frames, ``squares`` the number of squares of the chart computed during the drag.
     """
 
     first: float
@@ -38,7 +43,7 @@ class Figures(NamedTuple):
 REFRESH = 1000.0 / 60.0
 
 
-#: Times from a change to its verdict: each change is made when the page is at rest.
+#: Script that measures the times from a change to its verdict; each change is made when the page is at rest.
 _VERDICTS = """async (count) => {
   const root = document.documentElement, times = [];
   const field = document.getElementById("field crank.length");
@@ -63,19 +68,19 @@ _FRAMES = """() => {
 
 
 def chromium() -> str | None:
-    """Return the path of the system's Chromium."""
+    """Return the path of the system's Chromium, or None without one."""
     return next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
 
 
 def measure_page(browser: Any, seconds: float = 4.0) -> Figures:
-    """Measure the built page in a browser of Playwright."""
+    """Measure the built page in a browser of Playwright; ``seconds`` is the length of the drag."""
     page = browser.new_page(viewport={"width": 1400, "height": 1000})
     page.goto(PAGE.as_uri())
     page.wait_for_function("document.documentElement.dataset.ready", timeout=120_000)
     first = float(page.evaluate("Number(document.documentElement.dataset.ready)"))
     page.click("#play")
     verdicts = page.evaluate(_VERDICTS, 20)
-    # the chart goes on in its worker while the forces are looked at
+    # the chart is computed in its worker while the page shows the forces
     page.click('[id="tab stability"]')
     page.wait_for_function("window.studio.charts.stability.cells.size > 0", timeout=120_000)
     page.click('[id="tab forces"]')
@@ -129,7 +134,7 @@ def figures_in_words(found: Figures) -> str:
 
 
 def main() -> None:
-    """Print the figures of three openings of the page."""
+    """Measure the page three times, and print the results."""
     from playwright.sync_api import sync_playwright
 
     with sync_playwright() as playwright:

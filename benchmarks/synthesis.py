@@ -4,17 +4,19 @@
 
 Three tables, all in one run:
 
-1. a coupler curve of 72 points and its Jacobian in a compiled loop, beside NumPy over arrays and pylinkage's steps;
-2. every problem of chapter VI: time until the goal is reached, and until the error is within 1 % of the best that any search
-   of the run found. `synthesize` counts with its whole call, as it comes and with `FEW` candidates and starts. Each other
-   search is begun afresh, in turn of either assembly, until the time given to it is over (``--budget``, s) or it has come to
-   ours. All have the same unknowns, bounds and constraints, and all are measured alike: where one improves, its clock is
-   stopped, the linkage evaluated by the task's own measure, and left out if it violates a constraint;
-3. of 40 starts each, with bounds alone, how many reach the optimum, and the time a start takes: exact Jacobians (SciPy's least
-   squares, IPOPT) and the simplex.
+1. the time of a coupler curve of 72 points and of its Jacobian in a compiled loop, compared with NumPy over arrays and with
+   pylinkage's steps;
+2. for every problem of chapter VI, the time until the goal is reached, and until the error is within 1 % of the best that any
+   search of the run found. `synthesize` is timed as a whole call, with its default settings and with `FEW` candidates and
+   starts. Each other search is restarted, alternating the assemblies, until its time (``--budget``, s) is over or it has
+   reached our error. All searches have the same unknowns, bounds and constraints, and all are measured alike: when a search
+   improves, its clock is stopped, and the linkage is evaluated by the task's own measure, unless it violates a constraint;
+3. how many of 40 starts reach the optimum, with bounds alone, and the time of a start: with exact Jacobians (SciPy's least
+   squares, IPOPT) and with the simplex.
 
-How pylinkage is put to these problems: `benchmarks.contest`. Its closed-form synthesis of paths takes five points; that of
-functions knows the phase and no weights, so that it is tried over `PHASES` phases, on the unweighted function alone.
+`benchmarks.contest` tells how pylinkage is applied to these problems. Its closed-form synthesis of paths takes only five points
+and is not used. Its synthesis of functions needs the phase and knows no weights. It is therefore tried for `PHASES` phases, on
+the unweighted function alone.
 """
 
 from __future__ import annotations
@@ -61,16 +63,16 @@ from .contest import PHASES, SEARCHES, Contest, PlacedFourBar, Trace, run_search
 FloatArray = NDArray[np.float64]
 ComplexArray = NDArray[np.complex128]
 
-#: Time given to each search but ours on each problem (s).
+#: Time given to each search except ours on each problem (s).
 BUDGET = 15.0
-#: A search ends when it comes this near to ours: what more it could find is not worth the time.
+#: A search ends when its error is within this fraction of ours: a further improvement is not worth the time.
 ENOUGH = 1e-4
-#: "Within 1 % of the best".
+#: Fraction above the best error that counts as "within 1 % of the best".
 NEAR = 0.01
-#: Starts of the third table.
+#: Number of starts for the third table.
 STARTS = 40
 REPEATS = 15
-#: Least effort of `synthesize` that is timed beside its defaults.
+#: Settings of a shorter call of `synthesize`, which is timed besides the default one.
 FEW = Search(candidates=1 << 12, starts=4)
 
 
@@ -84,7 +86,7 @@ _path, _jacobian = (njit(error_model="numpy")(kernel.py_func) for kernel in _KER
 def _curves(repeats, c, s, zero, q, out):
     total = 0.0
     for _ in range(repeats):
-        # a new linkage each time and a result that is used, so that the compiler cannot drop the call
+        # the linkage changes each time and the result is used, so that the compiler cannot drop the call
         q[8] += 1e-9
         _path(c, s, zero, zero, q, 1.0, out)
         total += out[0, 0]
@@ -102,7 +104,7 @@ def _jacobians(repeats, c, s, zero, q, out, jacobian):
 
 
 def curve_by_numpy(linkage: Linkage, rotation: FloatArray) -> ComplexArray:
-    """Compute the coupler curve over arrays, by the plant's own loop closure with NumPy's square root."""
+    """Compute the coupler curve over arrays, by the five-bar model's loop closure with NumPy's square root."""
     close_loop = rebind_functions((kinematics,), {"sqrt": np.sqrt}).find(kinematics.close_loop)
     q = linkage
     th2 = rotation + q.crank_phase
@@ -117,7 +119,7 @@ def curve_by_numpy(linkage: Linkage, rotation: FloatArray) -> ComplexArray:
 
 
 def time_per_call(run: Callable[[int], object], calls: int) -> float:
-    """Return the median time of one call (s), from `REPEATS` measurements of a number of calls."""
+    """Return the median time of one call (s), from `REPEATS` measurements; ``run`` makes the given number of calls."""
     run(1)
     times = []
     for _ in range(REPEATS):
@@ -128,7 +130,7 @@ def time_per_call(run: Callable[[int], object], calls: int) -> float:
 
 
 def kernel_times(linkage: Linkage, n: int = N) -> dict[str, float]:
-    """Return the times of a coupler curve of n points and of its Jacobian (s), ours first."""
+    """Return the times (s) of a coupler curve of n points and of its Jacobian, by method, ours first."""
     rotation = turn(n)
     c, s, zero = np.cos(rotation), np.sin(rotation), np.zeros(n)
     q, out, jacobian = linkage.vector, np.empty((2, n)), np.empty((12, 2, n))
@@ -169,7 +171,7 @@ def _kernel_times_of_pylinkage(linkage: Linkage, n: int) -> dict[str, float]:
 
 
 def run_synthesize(contest: Contest, search: Search) -> Trace:
-    """Run `synthesize` on a problem; its answer counts from the end of the call."""
+    """Run `synthesize` on a problem; its answer is recorded at the end of the call."""
     problem = contest.problem
     trace = Trace(contest, inf)
     begun = perf_counter()
@@ -179,7 +181,7 @@ def run_synthesize(contest: Contest, search: Search) -> Trace:
 
 
 def run_contest(contest: Contest, budget: float) -> dict[str, Trace]:
-    """Run every search on a problem, ours first; without those of pylinkage if it is not installed."""
+    """Run every search on a problem, ours first; searches of pylinkage are left out if it is not installed."""
     traces = {
         "synthesize": run_synthesize(contest, Search()),
         "synthesize, 2 cores": run_synthesize(contest, Search(n_jobs=2)),
@@ -201,7 +203,7 @@ def run_contest(contest: Contest, budget: float) -> dict[str, Trace]:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Statistics:
-    """Qualities of the runs of a method from some starts, and the mean time of a run (s)."""
+    """Values of the quality function that a method reaches from several starts, and the mean time of a run (s)."""
 
     method: str
     qualities: tuple[float, ...]
@@ -209,7 +211,10 @@ class Statistics:
 
 
 def convergence(weighted: bool, scanned: bool, number: int = STARTS) -> list[Statistics]:
-    """Fit ellipse a, with bounds only, from starts of the scan or from the best of some random linkages each."""
+    """Fit ellipse a, with bounds only, from many starts by each method; return the statistics of the methods.
+
+    With ``scanned`` the starts come from the scan of `synthesize`; otherwise each is the best of some random linkages.
+    """
     phi = turn(N)
     weights = np.where((np.degrees(phi) >= 60.0) & (np.degrees(phi) <= 260.0), WEIGHT, 1.0) if weighted else np.ones(N)
     task = TimedPath(points=ellipse(10.0, N), weights=weights)
@@ -227,7 +232,7 @@ def convergence(weighted: bool, scanned: bool, number: int = STARTS) -> list[Sta
     def simplex(start: Start) -> float:
         box = boxes[start.branch]
         first = np.clip(start.q[free], box.low, box.high)
-        # angles within the turn that the box has
+        # angles are wrapped into the turn that the box allows
         first[-3:] = (start.q[free][-3:] + pi) % tau - pi
         return float(box.quality(minimise_score(box, first, box.penalised_quality).x[None, :])[0])
 
@@ -259,7 +264,7 @@ def _random_starts(boxes: dict[int, BlackBox], normal: Normal, number: int) -> I
 
 
 def kernel_table() -> Table:
-    """Measure the first table."""
+    """Measure and return the first table, of coupler curves and Jacobians."""
     times = kernel_times(PROBLEMS["ellipse-a"].linkage)
     table = Table(title=f"coupler curve of {N} points")
     for heading in ("", "microseconds", "times the compiled curve"):
@@ -271,7 +276,7 @@ def kernel_table() -> Table:
 
 
 def contest_table(names: Sequence[str], budget: float, console: Console) -> Table:
-    """Measure the second table."""
+    """Measure and return the second table, of the searches on the problems of chapter VI."""
     table = Table(
         title=f"problems of chapter VI; {budget:g} s for each search but ours; one core but where two are named"
     )
@@ -304,7 +309,7 @@ def _seconds(value: float) -> str:
 
 
 def start_table() -> Table:
-    """Measure the third table."""
+    """Measure and return the third table, of the results from many starts."""
     table = Table(title=f"ellipse a with bounds alone, {STARTS} starts")
     for heading in ("path", "starts", "method", "at the optimum", "ms a start", "times least squares"):
         table.add_column(heading, justify="left" if heading in ("path", "starts", "method") else "right")
@@ -327,11 +332,11 @@ def start_table() -> Table:
 
 
 def main(budget: float = BUDGET, names: Sequence[str] = tuple(PROBLEMS)) -> None:
-    """Measure and print."""
+    """Measure and print the three tables."""
     console = Console(width=150)
     begun = perf_counter()
     console.print(kernel_table())
-    # machine code, CasADi and the workers are loaded before the clock
+    # machine code, CasADi and the workers are loaded before the timing begins
     for cores in (1, 2):
         run_synthesize(Contest.of(PROBLEMS["ellipse-a"]), Search(n_jobs=cores))
     console.print(contest_table(names, budget, console))

@@ -1,10 +1,11 @@
 """Define the fifty targets of `benchmarks.race`, ten of each of five kinds.
 
-The published ones are Youssef's (chapter VI), the 18 points of Acharyya and Mandal, Mech. Mach. Theory 44 (2009), and the six
-points of a vertical line of the same literature. Youssef's and the vertical line keep the bounds and constraints under which
-they are posed; all others have the defaults of `synthesize`: a least transmission angle of 40 degrees over a full turn, no
-link longer than five sizes of the target. The drawn ones are the example's drawing and nine curves from the seeds 1 to 9; the
-last two functions come from the seeds 1 and 2. No target was removed or changed because of a result.
+The published targets are Youssef's (chapter VI), the 18 points of Acharyya and Mandal, Mech. Mach. Theory 44 (2009), and the
+six points of a vertical line from the same literature. Youssef's targets and the vertical line keep the bounds and constraints
+with which they were published. All other targets have the defaults of `synthesize`: a least transmission angle of 40 degrees
+over a full turn, and no link longer than five sizes of the target. The drawn targets are the example's drawing and nine curves
+from the random seeds 1 to 9; the last two functions come from the seeds 1 and 2. No target was removed or changed because of a
+result.
 """
 
 from __future__ import annotations
@@ -26,7 +27,7 @@ from analysis.synthesis.task.target import closed_vertices, interpolate_polyline
 FloatArray = NDArray[np.float64]
 Points = Sequence[tuple[float, float]]
 
-#: Points of a timed path, and of an untimed one; noise of a hand that draws, in sizes.
+#: Number of points of a timed path and of an untimed path; noise of a hand-drawn path, in sizes of the path.
 TIMED, CURVE, TREMOR = 36, 72, 0.01
 HAND_DRAWN = Path(__file__).parents[1] / "examples" / "hand-drawn.svg"
 #: Closed curve of Acharyya and Mandal, at crank angles 20 degrees apart.
@@ -52,7 +53,7 @@ POLYGONS: Mapping[str, Points] = {
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Target:
-    """A task with its bounds and constraints; errors in SI."""
+    """A synthesis task with its bounds and constraints; errors are in SI units."""
 
     kind: str
     name: str
@@ -61,12 +62,12 @@ class Target:
     constraints: tuple[Constraint, ...] = USUAL
 
     def convert(self, error: float) -> float:
-        """Return an error in the reported unit, which is SI."""
+        """Return the error unchanged: the reported unit is SI."""
         return error
 
 
 def curves(n: int) -> dict[str, FloatArray]:
-    """Return simple closed curves at n even steps of their parameter, each of shape (n, 2)."""
+    """Return closed curves by name, at n equal steps of their parameter, each of shape (n, 2)."""
     t = turn(n)
     c, s = np.cos(t), np.sin(t)
     bean = 1.0 + 0.5 * c**3 + 0.5 * s**3
@@ -98,10 +99,10 @@ def hand_drawn(seed: int) -> TargetPath:
 
 
 def random_waves(seed: int) -> RockerFunction:
-    """Draw a periodic function of two random harmonics, with a range of 40 degrees."""
+    """Return the task of a random periodic rocker angle of two harmonics, with a range of 40 degrees."""
     random = np.random.default_rng(seed)
     t = turn(TIMED)
-    # the second harmonic is about a quarter of the first
+    # the amplitude of the second harmonic is about a quarter of the first
     a, b = random.normal(size=(2, 2)) / np.array([1.0, 4.0])
     both = np.outer([1.0, 2.0], t)
     angle = a @ np.cos(both) + b @ np.sin(both)
@@ -109,7 +110,10 @@ def random_waves(seed: int) -> RockerFunction:
 
 
 def function_target(function: Any, low: float, high: float, output_deg: float = 60.0) -> RockerFunction:
-    """Return the task that the rocker angle is y = f(x) over 90 degrees of the crank, both scales linear, both zeros free."""
+    """Return the task of generating y = f(x), with x as the crank angle over 90 degrees and y as the rocker angle.
+
+    Both scales are linear, both zeros free; y varies over ``output_deg`` degrees of the rocker.
+    """
     x = np.linspace(low, high, 31)
     y = function(x)
     return RockerFunction(
@@ -118,7 +122,10 @@ def function_target(function: Any, low: float, high: float, output_deg: float = 
 
 
 def rise_and_dwell() -> RockerFunction:
-    """Return a cycloidal rise of 40 degrees over 120, a dwell over 60, a return over 120, and a dwell over 60."""
+    """Return a task with a cycloidal rise of the rocker by 40 degrees over 120 degrees of the crank, and a like return to zero.
+
+    A dwell over 60 degrees of the crank follows each.
+    """
     t = np.degrees(turn(72))
     up = np.clip(t / 120.0, 0.0, 1.0) - np.clip((t - 180.0) / 120.0, 0.0, 1.0)
     return RockerFunction(angle=radians(40.0) * (up - np.sin(tau * up) / tau), mounting=True)

@@ -1,4 +1,4 @@
-"""Settings of the documentation's site: ``make docs`` builds it with Sphinx into build/site, and it works without a network."""
+"""Settings of the documentation site: ``make docs`` builds it with Sphinx into build/site; the site works without a network."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ version = release = __version__
 
 extensions = ["myst_nb", "numpydoc", "sphinx.ext.autodoc", "sphinx_click"]
 exclude_patterns = ["**.ipynb_checkpoints"]
-html_theme = "furo"  # its fonts are those of the reader's machine
+html_theme = "furo"  # uses the fonts of the reader's machine
 html_title = f"Linkwork {__version__}"
 html_static_path = ["site.css"]
 html_css_files = ["site.css"]
@@ -30,16 +30,16 @@ html_extra_path = ["../analysis/studio/page.html"]  # the studio, which the link
 
 myst_enable_extensions = ["dollarmath"]
 myst_heading_anchors = 3
-smartquotes = False  # would make a dash of the two hyphens before an option
+smartquotes = False  # they would turn the two hyphens before an option into a dash
 
 # notebooks are stored without outputs, and run when the site is built; an error in a cell is an error of the build
 nb_execution_mode = "force"
 nb_execution_timeout = 300
 nb_execution_raise_on_error = True
 nb_merge_streams = True
-nb_output_stderr = "remove"  # what is compiled, once on a machine
+nb_output_stderr = "remove"  # messages of the compiler, which appear only once on a machine
 
-default_role = "py:obj"  # of a docstring's single backticks: a link where the name is known
+default_role = "py:obj"  # single backticks in a docstring link to the object if its name is known
 autodoc_member_order = "bysource"
 autodoc_typehints = "none"  # the signature would repeat what the sections of numpydoc state
 numpydoc_show_class_members = False
@@ -47,7 +47,7 @@ add_module_names = False
 
 html_math_renderer = "mathml"
 
-#: Links between files of the repository, which are other pages or none on the site.
+#: Patterns of links between files of the repository, each with its replacement: the page on the site, or no link.
 LINKS = (
     (r"\]\((?:\.\./)?(CONTRIBUTING|CHANGELOG)\.md", lambda match: f"]({match[1].lower()}.md"),
     (r"\]\((?:\.\./)?docs/", lambda match: "]("),
@@ -57,7 +57,10 @@ LINKS = (
 
 
 def relink(text: list[str]) -> None:
-    """Redirect the links of a source page to the pages of the site."""
+    """Replace links to files of the repository in a source page by links to pages of the site.
+
+    ``text`` has the page as its only element, as Sphinx passes it; it is changed in place.
+    """
     for pattern, replacement in LINKS:
         text[0] = re.sub(pattern, replacement, text[0])
 
@@ -72,9 +75,9 @@ def write_formula(translator: Any, node: Any) -> None:
 
 
 def list_commands(app: Any, name: str, text: list[str]) -> None:
-    """Put every command with its options on the page of commands.
+    """Add every command with its options to the page of commands.
 
-    Groups of commands import their members only when called, so that Sphinx cannot list them by itself.
+    Sphinx cannot list the commands by itself, because groups of commands import their members only when called.
     """
     if name != "reference/commands":
         return
@@ -84,7 +87,7 @@ def list_commands(app: Any, name: str, text: list[str]) -> None:
 
 
 def open_in_the_studio(app: Any, name: str, text: list[str]) -> None:
-    """Put links that open a page's mechanisms in the studio under its heading."""
+    """Add a line with links that open the page's mechanisms in the studio, under the page's heading."""
     heading, line, rest = text[0].partition("\n")
     if "/" not in name and (found := openings.links(name, text[0])):
         text[0] = f"{heading}{line}\n{found}\n{rest}"

@@ -1,12 +1,13 @@
-"""Write the tables that the documentation repeats from the code, and draw its pictures.
+"""Write the tables that the documentation takes from the code, and draw its pictures.
 
 python docs/generate.py             fills the tables between the markers of docs/*.md
 python docs/generate.py --check     writes nothing, and fails if a table is out of date
-python docs/generate.py --figures   fills the pages of the theses too, and draws the pictures (a quarter of an hour on two cores)
-python docs/generate.py --figures 3 R   fills only chapter III of Youssef's thesis, and Rahman's
+python docs/generate.py --figures   fills the pages of the theses too, and draws the pictures (15 minutes on two cores)
+python docs/generate.py --figures 3 R   fills only Youssef's chapter III and Rahman's figures on these pages, and draws no other
+                                        pictures
 
 A table stands between the lines ``<!-- TABLE SUBJECT: begin -->`` and ``<!-- TABLE SUBJECT: end -->``. `TABLES` has the
-function of each TABLE.
+function that makes each TABLE; its arguments are the SUBJECT (``of``) and the text of the page.
 """
 
 from __future__ import annotations
@@ -43,12 +44,12 @@ def _range(variable: Variable) -> str:
 
 
 def _markdown(headings: str, rows: Iterator[tuple[str, ...]]) -> str:
-    """Return a table; the headings come with their bars."""
+    """Return a table in Markdown; ``headings`` is its first line, bars included."""
     return "\n".join([headings, re.sub(r"[^|]+", " --- ", headings), *(f"| {' | '.join(row)} |" for row in rows)])
 
 
 def symbols(of: str, page: str) -> str:
-    """Return the FMI variables of a mechanism with their symbols in the thesis and their identifiers in Python."""
+    """Return the table of a mechanism's FMI variables, with their symbols in the thesis and their identifiers in Python."""
     mechanism = MECHANISMS[of]
 
     def identifier(variable: Variable) -> str:
@@ -80,7 +81,7 @@ def symbols(of: str, page: str) -> str:
 
 
 def figures(of: str, page: str) -> str:
-    """Compute the studies of one of `CHAPTERS`, draw their plots, and return them with their verdicts."""
+    """Compute the studies of a part of `CHAPTERS` and draw their plots; return the text with the plots and the verdicts."""
     from analysis.studies import ENTRIES, is_figure
     from analysis.studies.page import figures
 
@@ -91,21 +92,21 @@ def figures(of: str, page: str) -> str:
 
 
 def count(of: str, page: str) -> str:
-    """Return a sentence with the number of statements on the page by their verdicts."""
+    """Return a sentence that says how many statements on the page have each verdict."""
     from analysis.studies.page import count
 
     return count(page)
 
 
 def rule(of: str, page: str) -> str:
-    """Return the rule for the theses' words of degree."""
+    """Return the rule by which the studies judge the theses' words of degree, such as "slightly"."""
     from analysis.studies.rules import RULE
 
     return RULE
 
 
 def probe(of: str, page: str) -> str:
-    """Return the checks of `linkwork probe`, or its forbidden calls."""
+    """Return a table for `linkwork probe`: its checks, or the calls that it makes against the standard."""
     from analysis.probe import QUESTIONABLE, WRONG
     from analysis.probe.checks import CHECKS
     from analysis.probe.faults import ACCEPT, FAULTS
@@ -136,7 +137,7 @@ def accuracy(of: str, page: str) -> str:
 
 
 def race(of: str, page: str) -> str:
-    """Return a table of the searches' results in docs/race.csv."""
+    """Return a table, or a list, of the searches' results in docs/race.csv; ``of`` names it."""
     from benchmarks.race import markdown, read
 
     return markdown(read(HERE / "race.csv"), of)
@@ -164,16 +165,16 @@ def commanded(of: str, page: str) -> str:
 
 
 def sentences() -> str:
-    """Return what the studies on the pages of both theses are about, as `linkwork figures --list` prints it."""
+    """Return the statements of all studies on the pages of both theses, shortened, as JSON for `linkwork figures --list`."""
     from analysis.studies.page import sentences
 
     found = [sentences((HERE / f"{page}.md").read_text(encoding="utf-8")) for page in ("youssef", "rahman")]
     return json.dumps({**found[0], **found[1]}, indent=0, ensure_ascii=False) + "\n"
 
 
-#: The parts of the pages of the theses: chapters of Youssef's, Rahman's figures, and our own studies.
+#: Parts of the pages of the theses: chapters of Youssef's thesis, Rahman's figures, and our own studies.
 CHAPTERS = (*"345678", "R", "ours")
-#: Functions that fill a table, from its subject and the text of its page; `figures` takes long.
+#: Functions that make a table from its subject and the text of its page; `figures` takes long.
 TABLES: dict[str, Callable[[str, str], str]] = {
     "symbols": symbols, "figures": figures, "count": count, "rule": rule, "probe": probe, "race": race,
     "crossing": crossing, "accuracy": accuracy, "masters": masters, "commanded": commanded,
@@ -181,18 +182,18 @@ TABLES: dict[str, Callable[[str, str], str]] = {
 
 
 def filled(page: str, *, chapters: Container[str] = ()) -> str:
-    """Return the text of a page with its tables brought up to date; figures only of ``chapters``, since they take long."""
+    """Return the text of a page with its tables brought up to date; of the figures, only those of ``chapters``."""
 
     def fill(match: re.Match[str]) -> str:
         table, of = match.groups()
         return f"<!-- {table} {of}: begin -->\n{TABLES[table](of, page)}\n<!-- {table} {of}: end -->"
 
-    # first the figures, whose verdicts are counted
+    # the figures come first, because other tables count their verdicts
     page = MARKED.sub(lambda match: fill(match) if match[1] == "figures" and match[2] in chapters else match[0], page)
     return MARKED.sub(lambda match: match[0] if match[1] == "figures" else fill(match), page)
 
 
-#: A picture: name of the file, figure, dots per inch.
+#: A picture: name of its file without the suffix, figure, dots per inch.
 Picture = tuple[str, "Figure", int]
 
 
@@ -261,13 +262,13 @@ def hand_drawn_pictures() -> Iterator[Picture]:
 
 
 def closed_form_pictures() -> Iterator[Picture]:
-    """Draw the pictures of docs/closed-form.md, from the examples."""
+    """Draw the pictures of docs/closed-form.md, from the tasks in examples/."""
     from analysis.figures import plot
     from analysis.synthesis import guidance, load_synthesis_case
 
     for name, dpi in (("five-poses", 100), ("four-poses", 92)):
         case = load_synthesis_case(HERE.parent / "examples" / f"{name}.toml")
-        # as many as the command asks for
+        # as many solutions as the command computes by default
         yield name, plot(guidance(case.task, 6), title=case.title), dpi
 
 
@@ -339,21 +340,21 @@ def slider_crank_pictures() -> Iterator[Picture]:
 
 
 def save_picture(figure: Figure, path: Path, dpi: int) -> None:
-    """Write a picture in 256 colours, which take a third of the bytes."""
+    """Save a figure as a picture of 256 colours, which takes a third of the bytes."""
     from PIL import Image
 
     from analysis.files import save_figure
 
     save_figure(figure, path, dpi=dpi)
     with Image.open(path) as image:
-        # the other methods lose a colour that only a legend has
+        # the other methods lose a colour that occurs only in a legend
         way = Image.Quantize.MAXCOVERAGE
         few = image.convert("RGB").quantize(256, method=way, dither=Image.Dither.NONE)
     few.save(path, optimize=True)
 
 
 def main(arguments: list[str]) -> int:
-    """Fill the pages, or check them."""
+    """Bring the pages up to date, or check them, as the command line asks; return the exit code."""
     with_figures, *chosen = arguments if "--figures" in arguments else ("",)
     chapters = chosen or CHAPTERS if with_figures else ()
     if with_figures and not chosen:

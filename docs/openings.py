@@ -1,4 +1,4 @@
-"""Mechanisms of the documentation that open in the studio: published sets, examples, and results of the example tasks.
+"""List the mechanisms that the documentation opens in the studio: published sets, examples, and results of example tasks.
 
 python docs/openings.py              solves all examples that are tasks, for openings.json (minutes)
 python docs/openings.py ellipse ...  solves these examples only
@@ -22,11 +22,11 @@ from linkwork import five_bar, slider_crank
 
 HERE = Path(__file__).resolve().parent
 EXAMPLES = HERE.parent / "examples"
-#: The first result of each example task, as a state of the page.
+#: File with the first result of each example task, as a state of the studio's page.
 ANSWERS = HERE / "openings.json"
-#: Options that restrict a search to mechanisms of the FMUs.
+#: Options that restrict a search to the kinds of linkage for which there are FMUs.
 OF_THE_FMUS = ("--set", 'search.kinds=["four-bar", "slider-crank"]')
-#: Published sets of the mechanisms of the FMUs, not of linkages that somebody has described.
+#: Published sets of the five-bar slider and the slider-crank; sets of described linkages are not among them.
 PUBLISHED = (*five_bar.published.SETS, *slider_crank.published.SETS)
 #: Published sets by page; examples appear on the pages that name them.
 SETS = {
@@ -39,20 +39,20 @@ SETS = {
     "slider-crank": ("rahman-ideal", "rahman-a4-10-s1-3.5", "rahman-a4-20-s1-3.5"),
     "youssef": ("table-3.1", "appendix-1", "rig-1-spring-a", "rig-1-spring-b", "rig-2-spring-c", "rig-2-spring-d"),
 }
-#: Constant inputs that replace those that vary over time or angle in an example, since the page has constant inputs. A torsion
+#: Constant inputs for examples whose inputs vary over time or angle, since the studio has only constant inputs. A torsion
 #: bar is replaced by its mean torque (N.m).
 CONSTANT = {
     "run-up": {"force": 0.0},
     "slider-crank": {"axial.speed": 0.0, "load": 0.0},
     "torsion-bar": {"drive.torque": 5.0},
 }
-#: The page that lists all of them.
+#: The documentation page that lists all mechanisms.
 ALL = "studio"
 
 
 @cache
 def states() -> dict[str, dict[str, Any]]:
-    """Return all states that open, by the name of a published set or of an example."""
+    """Return the states that the documentation opens in the studio, by the name of a published set or of an example."""
     found = {name: page_state(read_case({"published": name}, folder=EXAMPLES, title=name)) for name in PUBLISHED}
     found |= json.loads(ANSWERS.read_text(encoding="utf-8"))
     for path in filter(is_run, sorted(EXAMPLES.glob("*.toml"))):
@@ -69,7 +69,7 @@ def is_run(path: Path) -> bool:
 
 
 def named(page: str, text: str) -> list[str]:
-    """Return the sets of a page and the examples that it names, in its order."""
+    """Return the names of a page's published sets and of the examples that its text mentions, in the order of the text."""
     if page == ALL:
         return list(states())
     examples = dict.fromkeys(re.findall(r"examples/([\w-]+)\.toml", text))
@@ -77,7 +77,7 @@ def named(page: str, text: str) -> list[str]:
 
 
 def links(page: str, text: str) -> str:
-    """Return a line of HTML with links to all states of a page, or an empty text."""
+    """Return a line of HTML with links that open a page's mechanisms in the studio; empty if there are none."""
     known = states()
     parts = [
         f'<a href="{escape(page_address(known[name], "page.html"))}" title="{escape(known[name]["title"])}">{name}</a>'
@@ -87,7 +87,10 @@ def links(page: str, text: str) -> str:
 
 
 def _answer(path: Path, folder: Path) -> dict[str, Any]:
-    """Solve a task and return its first result that is a mechanism of the FMUs; a moved slider is released."""
+    """Solve a task; return its first result that the FMUs can represent, as a state of the studio.
+
+    The slider of a slider motion is released in that state.
+    """
     text = path.read_text(encoding="utf-8")
     command = "tune" if "[tune]" in text else "slider-motion" if "[tracking]" in text else "synthesize"
     words = [sys.executable, "-m", "analysis.cli", command, str(path), "--out", str(folder)]

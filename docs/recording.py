@@ -1,6 +1,6 @@
-"""Record the moving picture of README.md: `python docs/recording.py` writes docs/studio.webp; it needs Chromium.
+"""Record the animation in README.md: `python docs/recording.py` writes docs/studio.webp; it needs Chromium.
 
-The page of the studio is opened with a published set and a coupler point, and photographed over one turn of the crank.
+It opens the studio's page with a published set and a coupler point, and takes screenshots over one turn of the crank.
 """
 
 from __future__ import annotations
@@ -18,14 +18,14 @@ from analysis.run import read_case
 from analysis.studio import make_page, page_state
 
 TARGET = Path(__file__).resolve().parent / "studio.webp"
-#: Pixels of the page, and the share of them that the picture has.
+#: Width and height of the page (pixels), and scale of the animation relative to the page.
 WIDTH, HEIGHT, SHARE = 1000, 600, 0.8
-#: Number of pictures, and how long each is shown (ms).
+#: Number of frames, and how long each is shown (ms).
 PICTURES, SHOWN = 40, 60
 
 
 def main() -> None:
-    """Write the picture."""
+    """Write the animation."""
     browser_path = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))))
     point = {"point_distance": "12 cm", "point_angle": "30 deg"}
     machine = read_case({"published": "table-3.1", "coupler": point}, folder=Path())

@@ -1,7 +1,7 @@
-"""An ensemble over a Dask cluster: the steady travel of the slider for many springs and speeds.
+"""Simulate an ensemble on a Dask cluster: the steady travel of the slider for many springs and crank speeds.
 
-The cluster here is a local one. To use another, give its scheduler's address to `distributed.Client`; nothing else
-changes, for `simulate_many` hands its batches to joblib, and joblib to whatever backend is chosen.
+The cluster here is a local one. To use another one, give its scheduler's address to `distributed.Client`. Nothing else
+changes: `simulate_many` hands its batches to joblib, and joblib hands them to the chosen backend.
 
     python examples/dask_ensemble.py --mechanisms 2000 --workers 2
 """
@@ -39,7 +39,7 @@ def main() -> None:
     ):
         ensemble = simulate_many(mechanisms, inputs, stop_time=2.0, step=2e-3, tolerance=1e-8)
 
-    # masked where a run ended early
+    # values after a run has ended early are masked
     steady = ensemble.output("slider.position")[:, ensemble.time > 1.5]
     travel_mm = 1e3 * np.ma.ptp(steady, axis=1)
     widest = int(np.argmax(travel_mm))

@@ -1,8 +1,8 @@
-"""Hold the slider by its force: designs on linear models, closed around the nonlinear plant.
+"""Control the slider by a force on it: controllers are designed on linear models and tested on the nonlinear mechanism.
 
-Three tasks: the slider of rig 2 at its resonance kept still against the turning crank; the slider of Table 3.1 at 420 rpm
-moved to other places by small and large steps; the free crank balanced where it would fall over. The controller samples at
-1 kHz and holds its force, around the plant in process or, with --fmu, around its FMU.
+Three tasks: keep the slider of rig 2 still at its resonance while the crank turns; move the slider of Table 3.1 at 420 rpm by
+small and large steps; balance the free crank of Table 3.1 at an unstable equilibrium. The controller samples at 1 kHz and holds
+its force between samples. The mechanism is simulated in this process or, with --fmu, by its FMU.
 
     python examples/slider_lqr.py
     python examples/slider_lqr.py --fmu build/FiveBarSlider.fmu
@@ -42,12 +42,12 @@ from linkwork.five_bar.published import SETS, TABLE_3_1
 RIG_2 = SETS["rig-2-spring-c"].parameters
 PERIOD = 1e-3
 
-#: 1 mm weighs as much as 1 N, 0.1 m/s as much as 1 N.
+#: Weights of the LQR cost: 1 mm costs as much as 1 N, 0.1 m/s as much as 1 N.
 WEIGHTS = {"slider.position": 1e6, "slider.velocity": 1e2}
 
 
 def turning(title: str, parameters: FiveBarParameters, speed: float) -> tuple[PeriodicModel, InitialState]:
-    """Linear models along the motion at a constant crank speed, and the start of that motion; print what they say of it."""
+    """Return the linear models along the motion at a constant crank speed, and the start of that motion; print a summary."""
     inputs = Inputs(speed=speed)
     motion = settled_motion(parameters, inputs)
     th2, u, w2, v = motion[0, :4].tolist()
@@ -70,7 +70,10 @@ def describe(design: Design) -> str:
 
 
 def still(fmu: Path | None) -> tuple[PeriodicModel, list[Design], LoopResult]:
-    """Rig 2, spring C, at 585 rpm: the slider kept at the middle of its travel."""
+    """Keep the slider of rig 2 with spring C at the middle of its travel, at 585 rpm; print how well each controller does.
+
+    Returns the linear models, the designs, and the run of the last design.
+    """
     speed = 585.0 * RAD_S_PER_RPM
     models, start = turning("Rig 2, spring C, 585 rpm: keep the slider still", RIG_2, speed)
     mean = models.mean()
@@ -99,7 +102,7 @@ def still(fmu: Path | None) -> tuple[PeriodicModel, list[Design], LoopResult]:
 
 
 def steps(fmu: Path | None) -> None:
-    """Table 3.1 at 420 rpm: reference steps of four sizes."""
+    """Move the slider of Table 3.1 at 420 rpm by reference steps of three sizes; print how fast and how exactly it follows."""
     speed = SETS["table-3.1"].crank_speed
     title = "Table 3.1, 420 rpm: steps of the reference from the middle of the travel after 1 s, force up to 400 N"
     models, start = turning(title, TABLE_3_1, speed)
@@ -117,7 +120,7 @@ def steps(fmu: Path | None) -> None:
                 TABLE_3_1, controller, reference, Inputs(speed=speed), initial=start, stop_time=2.0, fmu=fmu
             )
             linear = predict_loop(models, controller, reference, stop_time=2.0)
-            # what the turning crank leaves counts as settled
+            # settled: within 1.1 times the error that the turning crank causes at the end, and 5 % of the step
             bound = 1.1 * np.abs(loop.position - loop.reference)[-143:].max() + 0.05 * size
             a, b = (run.metrics(band=bound, start=1.0, window=models.period) for run in (loop, linear))
             print(
@@ -133,7 +136,7 @@ def _ms(seconds: float | None) -> str:
 
 
 def balance(fmu: Path | None) -> None:
-    """Table 3.1, the crank free: the unstable equilibrium of least energy held by the slider force alone."""
+    """Balance the free crank of Table 3.1 at its lowest unstable equilibrium by the slider force alone; print the results."""
     upper = next(one for one in find_equilibria(TABLE_3_1) if not one.stable)
     model = linearise(TABLE_3_1, upper.state, upper.inputs)
     design = design_lqr(model, {"crank.angle": 1e2, "slider.position": 1e6}, 1.0)

@@ -1,7 +1,7 @@
-"""What every slave of Linkwork shares: its lifecycle, its values, its saved state, its log.
+"""Base class of all slaves of Linkwork: lifecycle, values of variables, saved state and log.
 
-A concrete slave names its mechanism. Its variables are not registered with pythonfmu, which would only describe them: the
-model description comes with the archive.
+A subclass names the mechanism. The variables are not registered with pythonfmu, which would use them only for the model
+description: the archive contains its own model description.
 """
 
 from __future__ import annotations
@@ -51,7 +51,7 @@ STATUS = (
     (ParameterError, 6),
 )
 
-#: Why a value is not taken, by causality.
+#: Reason why a new value is refused during a run, by causality of the variable.
 _NOT_TAKEN = {
     "output": "an output",
     "local": "a local variable",
@@ -60,7 +60,7 @@ _NOT_TAKEN = {
 
 
 def _guarded(call: Callable[..., Any]) -> Callable[..., Any]:
-    """Make a method that the wrapper calls safe to raise from."""
+    """Wrap a method of a slave: log an internal error, and keep the instance usable after any exception."""
 
     @wraps(call)
     def method(self: LinkworkSlave, *arguments: Any) -> Any:
@@ -77,10 +77,10 @@ def _guarded(call: Callable[..., Any]) -> Callable[..., Any]:
 
 
 class LinkworkSlave(Fmi2Slave):
-    """A co-simulation slave around a plant.
+    """Base of the co-simulation slaves: a slave simulates one mechanism with a `Plant`.
 
-    A step that cannot be taken is refused (fmi2Discard), logged in one sentence, and leaves the last good state readable;
-    ``solver.status`` and ``solver.message`` say why. A bad parameter fails the initialisation.
+    A step that fails returns fmi2Discard and is logged in one sentence. The last good outputs stay readable;
+    ``solver.status`` and ``solver.message`` give the reason. With an invalid parameter the initialisation fails.
     """
 
     mechanism: ClassVar[Mechanism]
@@ -97,7 +97,7 @@ class LinkworkSlave(Fmi2Slave):
         super().__init__(**kwargs)
         self._wrapped = "logger" in kwargs
         if self._wrapped:
-            # put there by the wrapper at each instantiation; everything is imported by now
+            # the wrapper adds this folder at each instantiation; all modules are imported by now
             if self.resources in sys.path:
                 sys.path.remove(self.resources)
             outlive_exception(self)
@@ -112,14 +112,14 @@ class LinkworkSlave(Fmi2Slave):
         self._plant: Plant | None = None
         self._phase = INSTANTIATED
         self._stale = True
-        #: status and sentence of what went wrong first since the last good step, other than calls out of order
+        #: status and message of a failure since the last good step; calls out of order do not count
         self._cause: tuple[int, str] | None = None
         self._start_time = 0.0
         self._stop_time: float | None = None
         self._master_tolerance: float | None = None
 
     def _build(self) -> Plant:
-        """Build the plant for the present parameters and inputs, at its start."""
+        """Build the plant from the present parameters and inputs, in its initial state."""
         values = dict(zip(self._names, self._values))
         own, master = values["solver.tolerance"], self._master_tolerance
         tolerance = own if master is None else min(own, max(master, TOLERANCE_RANGE[0]))
@@ -128,7 +128,7 @@ class LinkworkSlave(Fmi2Slave):
     # Lifecycle
 
     def _expect(self, call: str, phase: str) -> None:
-        """Refuse a call in another phase than the one it belongs to."""
+        """Raise StepError if the slave is not in the ``phase`` in which FMI allows the ``call``."""
         if self._phase != phase:
             raise self._fail(StepError(f"{call} out of order: the slave is {self._phase}, not {phase}"))
 
@@ -181,18 +181,18 @@ class LinkworkSlave(Fmi2Slave):
         except StepError as error:
             if self._cause is None:
                 return self._refuse(_status(error), str(error))
-            # a master that goes on after a refused step leaves a gap: what is to be known is why the first was refused
+            # the master went on after a refused step: the message must also say why that step was refused
             return self._refuse(self._cause[0], f"{error}; before that, {self._cause[1]}")
         except LinkworkError as error:
             self._cause = (_status(error), str(error))
             return self._refuse(*self._cause)
         except Exception as error:
-            # the wrapper frees an instance whose step raises: the master would be left with nothing
+            # the wrapper frees an instance whose step raises: the master could not even read the reason
             self._cause = (STATUS_INTERNAL, f"internal error at t = {current_time:.9g} s: {error!r}")
             return self._refuse(*self._cause)
 
     def terminate(self) -> None:
-        # whatever the phase: a master that cleans up does no harm
+        # allowed in every phase, because masters clean up after errors
         if self._wrapped and self._phase != TERMINATED:
             end_in_order(self)
         self._phase = TERMINATED
@@ -204,7 +204,10 @@ class LinkworkSlave(Fmi2Slave):
         return False
 
     def _fail(self, error: LinkworkError) -> LinkworkError:
-        """Log the sentence of an error that must be raised, for the wrapper's own message may leave it out."""
+        """Log an error, store it in ``solver.status`` and ``solver.message``, and return it, for the caller to raise.
+
+        The error is logged because the message of the wrapper may leave out its text.
+        """
         said = self._values[self._status_at], self._values[self._message_at] = (_status(error), str(error))
         if not isinstance(error, StepError):
             self._cause = said
@@ -212,9 +215,9 @@ class LinkworkSlave(Fmi2Slave):
         return error
 
     def _refresh(self) -> LinkworkError | None:
-        """Bring the outputs up to date with state and inputs, making the plant first if need be.
+        """Compute the outputs for the present state and inputs; build the plant first if there is none.
 
-        Returns what stood in the way, if anything did: the outputs then stay as they were.
+        Returns the error if the computation failed, else None. After an error the outputs keep their last values.
         """
         if not self._stale:
             return None
@@ -237,7 +240,7 @@ class LinkworkSlave(Fmi2Slave):
         for reference in references:
             self._check_reference(reference, kind)
         if self._stale and any(self._computed[r] for r in references):
-            # a read does not fail, for there are masters that take what it returns all the same: the last good outputs
+            # an error here does not fail the read, because some masters use the values all the same: the last good outputs
             # stay, and the initialisation or the next step will be refused
             error = self._refresh()
             refused = self._phase in (RUNNING, TERMINATED) and self._values[self._status_at] != STATUS_GOOD
@@ -248,7 +251,7 @@ class LinkworkSlave(Fmi2Slave):
         return [values[reference] for reference in references]
 
     def _check_reference(self, reference: int, kind: str) -> None:
-        # unsigned in FMI, but the wrapper hands it on as a signed number
+        # a value reference is unsigned in FMI, but the wrapper passes a signed number
         if not 0 <= reference < len(self._names):
             raise self._fail(LinkworkError(f"there is no variable with the value reference {reference}"))
         if self._kinds[reference] != kind:
@@ -275,7 +278,7 @@ class LinkworkSlave(Fmi2Slave):
             name = self._names[reference]
             causality = self._causalities[reference]
             if self._computed[reference]:
-                continue  # a guess for the initialisation, which is solved without one
+                continue  # a guess of an output; the initialisation needs no guess
             self._values[reference] = value
             self._stale = True
             if causality == "parameter" and not running:

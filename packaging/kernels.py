@@ -1,6 +1,6 @@
-"""Compile all kernels for any processor of this kind into the package, from where an installation takes them: see `linking`.
+"""Compile all kernels for any processor of this architecture, into the folder of the package from which it loads them.
 
-Run it as ``python packaging/kernels.py``.
+Run it as ``python packaging/kernels.py``; see `analysis.numerics.linking`.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from joblib import Parallel, delayed
 
 from analysis.numerics.codegen import CARRIED, Kernel
 
-#: Modules that have kernels.
+#: Modules that define kernels.
 MODULES = (
     "analysis.numerics.overlap",
     "analysis.periodic.chart.kernels",
@@ -33,12 +33,12 @@ def kernels() -> list[Kernel]:
 
 
 def carry(number: int) -> Path:
-    """Compile one of the kernels; return its path."""
+    """Compile the kernel of this index in `kernels`; return the path of its file."""
     return kernels()[number].carry()
 
 
 def main() -> None:
-    """Compile those that are missing, on all cores, and remove the others."""
+    """Compile the kernels that are missing, on all cores, and remove files of kernels that no longer exist."""
     wanted = [kernel.carried_path for kernel in kernels()]
     for path in CARRIED.glob("*"):
         if path not in wanted:

@@ -1,4 +1,4 @@
-"""Fixtures that all tests share, the marks that go by place, and which tests go to one worker together."""
+"""Fixtures for all tests, marks of tests by their place, and the distribution of tests to workers."""
 
 from __future__ import annotations
 
@@ -22,12 +22,12 @@ from .mechanisms import pendulum, rotor_on_cart
 if TYPE_CHECKING:
     from playwright.sync_api import Browser
 
-# a drawn example has no time limit: the first of a run loads libraries, and machines are loaded
+# examples drawn by hypothesis have no time limit: the first one loads libraries, and the computer may be busy
 settings.register_profile("unhurried", settings.default, deadline=None)
 settings.load_profile("unhurried")
 
-#: The units of work that tests are sent to workers in, by their names: a file, whose tests share results, and each page of the
-#: documentation.
+#: Units of work that are sent to workers: patterns of the tests' names, and the name of the unit. A unit is a file, whose tests
+#: share results, or the test of one page of the documentation.
 UNITS = (
     (r"(.*/test_docs\.py::test_the_page_.*)", r"\1"),
     (r"(.*?)::.*", r"\1"),
@@ -35,13 +35,13 @@ UNITS = (
 
 
 def unit(nodeid: str) -> str:
-    """Unit of work to which a test belongs."""
+    """Return the unit of work to which a test belongs."""
     return next(match.expand(name) for pattern, name in UNITS if (match := re.fullmatch(pattern, nodeid)))
 
 
 @pytest.hookimpl(optionalhook=True)
 def pytest_xdist_make_scheduler(config: pytest.Config, log: Any) -> Any:
-    """With ``--dist loadfile``: units of work go to the workers in the order in which they are collected."""
+    """Return a scheduler for ``--dist loadfile`` that sends units of work in the order in which they are collected."""
     from xdist.scheduler import LoadFileScheduling
 
     class Units(LoadFileScheduling):
@@ -50,12 +50,12 @@ def pytest_xdist_make_scheduler(config: pytest.Config, log: Any) -> Any:
 
     if config.getoption("dist") != "loadfile":
         return None
-    # else those with the most tests would go first, and the few that take long last
+    # otherwise units with the most tests would go first, and the few long tests last
     config.option.loadscopereorder = False
     return Units(config, log)
 
 
-#: The tests that took so many seconds and more when they were last measured: ``make durations`` writes the file.
+#: A test is long from this number of seconds on; the file lists the tests that were long when ``make durations`` last ran.
 SECONDS, LONGER = 1.5, Path(__file__).parent / "seconds.txt"
 
 
@@ -66,7 +66,7 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 
 
 def pytest_terminal_summary(terminalreporter: Any) -> None:
-    """Write the names of the tests that took longer, their fixtures not counted, which others share."""
+    """Write the names of the long tests to `LONGER`; the time of fixtures, which tests share, does not count."""
     if terminalreporter.config.getoption("note_seconds"):
         calls = (report for report in terminalreporter.stats.get("passed", ()) if report.when == "call")
         names = sorted(
@@ -76,7 +76,7 @@ def pytest_terminal_summary(terminalreporter: Any) -> None:
 
 
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
-    """Mark what takes longer, what builds or runs an FMU, and what is long as slow; on several cores the longest goes first."""
+    """Mark tests that take longer, build or run an FMU, or are slow because they are long; the longest go to workers first."""
     longer = frozenset(LONGER.read_text(encoding="utf-8").splitlines())
     if hasattr(config, "workerinput"):
         items.sort(key=lambda item: item.path.name not in ("test_docs.py", "test_chapter_8.py"))
@@ -91,18 +91,18 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
 
 @pytest.fixture(scope="session")
 def fmus(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
-    """Every FMU by its name, built from the sources as they are."""
+    """Return every Python FMU by its name, built from the present sources."""
     folder = tmp_path_factory.mktemp("fmu")
     return {name: build(mechanism, folder) for name, mechanism in FMUS.items()}
 
 
-#: Those of the project, and those of the tests: without modes, inputs that command, or energies among the outputs.
+#: Mechanisms of the project, and mechanisms of the tests, which lack modes, commanding inputs, or energies as outputs.
 NATIVE_MECHANISMS = (*FMUS.values(), rotor_on_cart.MECHANISM, pendulum.MECHANISM)
 
 
 @pytest.fixture(scope="session")
 def natives(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
-    """Every native FMU by the name of its file, for this machine; LINKWORK_NATIVE_FMUS names a folder of others to test."""
+    """Return every native FMU for this machine by the name of its file; LINKWORK_NATIVE_FMUS may name a folder of others."""
     given = os.environ.get("LINKWORK_NATIVE_FMUS")
     if given:
         return {path.stem: path for path in Path(given).glob("*.fmu")}
@@ -113,7 +113,7 @@ def natives(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
 
 @pytest.fixture(scope="session")
 def launched() -> Iterator[Callable[..., Browser]]:
-    """Starts the system's Chromium, with these arguments besides."""
+    """Return a function that starts the system's Chromium with additional arguments."""
     path = chromium()
     try:
         from playwright.sync_api import sync_playwright
@@ -137,7 +137,7 @@ def launched() -> Iterator[Callable[..., Browser]]:
 
 @pytest.fixture(scope="module")
 def browser(launched: Callable[..., Browser]) -> Iterator[Browser]:
-    """Chromium."""
+    """Return a running Chromium."""
     made = launched()
     yield made
     made.close()
@@ -145,7 +145,7 @@ def browser(launched: Callable[..., Browser]) -> Iterator[Browser]:
 
 @pytest.fixture
 def linkwork(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[..., Result]:
-    """The command line, called with words in a folder of its own."""
+    """Return a function that calls the command line with the given words, in a folder of its own."""
     monkeypatch.chdir(tmp_path)
 
     def call(*words: object) -> Result:

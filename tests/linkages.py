@@ -1,4 +1,4 @@
-"""Linkages in the plane and a target for the tests: one that is fixed, and random ones, every dimension general."""
+"""Planar linkages and a target for the tests: a fixed linkage, and random linkages with general values of all dimensions."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from analysis.synthesis import Linkage, turn
 
-#: A crank-rocker for the tests that move its rocker pivot.
+#: A crank-rocker for tests that move its rocker pivot.
 BASE = Linkage(
     pivot_x=0.02, pivot_y=-0.03, ground_length=0.20, crank_length=0.06, coupler_length=0.18,
     rocker_length=0.16, point_distance=0.12, ground_angle=0.3, crank_phase=0.7, point_angle=0.8,
@@ -18,20 +18,20 @@ BASE = Linkage(
 
 
 def ellipse(n: int) -> NDArray[np.float64]:
-    """The thesis's first target, an ellipse of 20 cm by 10 cm, at n equal steps of the crank; shape (n, 2) in m."""
+    """Return the thesis's first target, an ellipse of 20 cm by 10 cm, at n equal steps of the crank; shape (n, 2) in m."""
     phi = turn(n)
     return np.column_stack([0.20 + 0.10 * np.cos(phi), 0.15 + 0.05 * np.sin(phi)])
 
 
 def drawn(random: np.random.Generator, *, least: float = 0.3) -> Linkage:
-    """A four-bar whose crank turns fully, its transmission angle never within ``least`` (rad) of 0 or pi.
+    """Return a random four-bar whose crank turns fully, with transmission angles at least ``least`` (rad) from 0 and pi.
 
-    Built backwards: ground link and crank, then two angles of the range; coupler and rocker follow from the law of cosines
-    at the crank's two positions along the ground link.
+    Ground link and crank are drawn first, then the least and greatest transmission angle. Coupler and rocker follow from
+    the law of cosines at the crank's two positions along the ground link.
     """
     l1 = random.uniform(0.5, 1.5)
     branch = int(random.choice([-1, 1]))
-    # (l3 - l4)^2 + 2 l3 l4 (1 - cos mu) = d^2 at both: two equations for the product and the difference
+    # (l3 - l4)^2 + 2 l3 l4 (1 - cos mu) = d^2 at both positions: two equations for l3 l4 and (l3 - l4)^2
     while True:
         l2 = l1 * random.uniform(0.1, 0.6)
         near, far = (l1 - l2) ** 2, (l1 + l2) ** 2
@@ -62,5 +62,5 @@ def drawn(random: np.random.Generator, *, least: float = 0.3) -> Linkage:
 
 
 def linkages() -> st.SearchStrategy[Linkage]:
-    """As a hypothesis strategy."""
+    """Return a hypothesis strategy of the linkages of `drawn`."""
     return st.integers(0, 2**32 - 1).map(lambda seed: drawn(np.random.default_rng(seed)))

@@ -1,14 +1,14 @@
-"""Mutation of one module or folder: does some test fail for every small change of the code?
+"""Test the tests of a module or folder by mutation: does some test fail for every small change of the code?
 
     python -m tests.mutate fmu_src/linkwork/integrate.py analysis/files
     python -m tests.mutate --sample 40 fmu_src/linkwork fmu_src/native analysis/files analysis/run
 
-One operator or number is changed at a time in a copy of the tree, of Python by Cosmic Ray, of C by the same kinds of changes
-below, and the tests run that `tool.mutation.tests` of pyproject.toml names for the module or its folder. Printed are the
-survivors, the mutants whose tests did not end, which count as killed, and the share of mutants that a test killed. With
-``--sample`` so many mutants of all modules together are drawn, the same ones for the same ``--draw`` while the code stays as
-it is, and the share has its Wilson interval of 95 %. They are tried as they are drawn, so that those up to a Ctrl-C, which
-ends with the share so far, are a sample too.
+One operator or number is changed at a time in a copy of the tree. Changes of Python are made by Cosmic Ray, changes of C are
+similar and made below. Then the tests run that `tool.mutation.tests` of pyproject.toml names for the module or its folder. The
+output has the surviving mutants, the mutants whose tests did not end (they count as killed), and the share of killed mutants.
+``--sample`` draws that many mutants of all modules together and adds the Wilson interval of 95 % for the share. The sample is
+the same for the same ``--draw`` as long as the code is unchanged. Mutants are tested in the order in which they are drawn, so
+that Ctrl-C ends the run with the share of a smaller sample.
 """
 
 from __future__ import annotations
@@ -43,7 +43,7 @@ from rich.markup import escape
 ROOT = Path(__file__).parents[1]
 SETTINGS: dict[str, Any] = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["tool"]["mutation"]
 LEFT_OUT = re.compile("|".join(SETTINGS["exclude-operators"]))
-#: in C a number that labels no case and is part of no name, and operators of two sides, which clang-format puts spaces around
+#: in C: numbers that are neither case labels nor parts of names, and binary operators, which clang-format surrounds by spaces
 IN_C = re.compile(
     r"(?<![\w.])(?<!case )(?<!case -)\d+\b(?!\.)|\d+\.\d+|(?<= )(?:[-+*/]=?|[<>=!]=|[<>]|&&|\|\|)(?= )|!(?=[\w(])|"
     r"\b(?:true|false)\b"
@@ -69,14 +69,14 @@ NO_CODE = re.compile(
 
 @dataclass(frozen=True)
 class Mutant:
-    """One single change of a module: its text with the change, from its text."""
+    """A single change of a module; ``changed`` returns the changed text for the module's text."""
 
     module: Path
     changed: Callable[[str], str]
 
 
 def tests_of(module: Path) -> str:
-    """The command that tests a module, by its own entry in the settings, or the nearest folder's that has one."""
+    """Return the command that tests a module: by the module's own entry in the settings, or by that of the nearest folder."""
     for place in (module, *module.parents):
         if (tests := SETTINGS["tests"].get(place.as_posix())) is not None:
             python = shlex.quote(sys.executable)
@@ -87,7 +87,7 @@ def tests_of(module: Path) -> str:
 
 
 def copied(folder: Path) -> Path:
-    """The tree as git would have it, with what is not committed yet."""
+    """Copy all files of the repository into a folder, including changes that are not committed and new files."""
     listed = subprocess.run(
         ["git", "ls-files", "-co", "--exclude-standard", "-z"], cwd=ROOT, capture_output=True, text=True, check=True
     ).stdout
@@ -99,7 +99,7 @@ def copied(folder: Path) -> Path:
 
 
 def mutants(module: Path) -> Iterator[Mutant]:
-    """Every single change of a module."""
+    """Yield every single change of a module."""
     yield from (_of_python if module.suffix == ".py" else _of_c)(module)
 
 
@@ -126,7 +126,7 @@ def _with(text: str, start: int, end: int, new: str) -> str:
 
 
 def outcome(mutant: Mutant, tests: str) -> tuple[TestOutcome, bool, str]:
-    """Whether a test kills the mutant, whether the tests did not end, and the change as a diff."""
+    """Test a mutant; return the outcome, whether the tests did not end, and the change as a diff."""
     text = mutant.module.read_text(encoding="utf-8")
     changed = mutant.changed(text)
     mutant.module.write_text(changed, encoding="utf-8")
@@ -139,7 +139,7 @@ def outcome(mutant: Mutant, tests: str) -> tuple[TestOutcome, bool, str]:
 
 
 def interval(killed: int, count: int) -> str:
-    """Wilson's interval of 95 % for the share of all mutants of which these were drawn."""
+    """Return Wilson's interval of 95 % for the share of killed mutants, from a sample of ``count``."""
     z = 1.96
     middle = (killed + z**2 / 2) / (count + z**2)
     half = z / (count + z**2) * sqrt(killed * (count - killed) / count + z**2 / 4)

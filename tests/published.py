@@ -1,8 +1,8 @@
-"""Numbers to compare with: what the thesis prints, what it states, and an independent derivation.
+"""Published numbers for comparison: what the thesis prints and states, and the results of an independent derivation.
 
 Source, unless said otherwise: A. H. Youssef, thesis on linkage mechanisms with two degrees of freedom, Newcastle upon
-Tyne. Everything is in cgs, as printed, with the unit in the name; the factors to SI are at the top.
-Nothing here is the output of this program.
+Tyne. Numbers are in cgs units, as printed, with the unit in the name; the factors to SI are at the top.
+Nothing here is an output of this program.
 """
 
 from __future__ import annotations
@@ -10,7 +10,7 @@ from __future__ import annotations
 from types import MappingProxyType
 from typing import Mapping, NamedTuple
 
-# One of the unit, in SI
+# One unit in SI
 CM = 1e-2
 GRAM = 1e-3
 G_CM2 = 1e-7
@@ -22,7 +22,7 @@ RPM = 0.10471975511965977
 
 
 class CgsTable(NamedTuple):
-    """A table of data as printed."""
+    """A table of data of the thesis as printed, in cgs units."""
 
     lengths_cm: tuple[float, float, float, float]
     coupler_cog_cm: float
@@ -65,21 +65,21 @@ FORCE_AT_C_AT_360_DEG_DYN = (79534.254, 537313.426)
 STEADY_U_CM = -0.89553115
 STEADY_U_RATE_CM_S = -21.92156554
 
-# The same with T = T0 (1 - th2) up to th2 = 1 rad and none after, from rest, T0 = 1e8 dyn.cm, k = 1e6, mu = 3e4
+# The same from rest under the torque T = T0 (1 - th2) up to th2 = 1 rad, then T = 0; T0 = 1e8 dyn.cm, k = 1e6, mu = 3e4
 TORQUE_T0_DYN_CM = 1e8
 TORQUE_END_TIME_S = 0.02137446194
 TORQUE_AT_0_25_S = MappingProxyType({"th2_rad": 17.8051227, "u_cm": -0.61160400, "th2_rate_rad_s": 72.7805553})
 
 # --- Statements of chapter III, as checked by that derivation
-# fig. 3.2, k = 0: turns after which coupler and rocker come to sin(th4 - th3) = 0.3, by mu in dyn.s/cm. The thesis calls
-# the drift linear; it accelerates, and is near linear only from mu = 5e5 on
+# fig. 3.2, k = 0: turns after which coupler and rocker reach sin(th4 - th3) = 0.3, by mu in dyn.s/cm. The thesis calls
+# the drift linear; it accelerates, and is nearly linear only for mu of 5e5 and more
 TURNS_TO_SINE_0_3: Mapping[float, float] = MappingProxyType({1e4: 3.0, 5e4: 4.9, 1e5: 8.0, 5e5: 36.0})
 # fig. 3.3: u after forty turns at mu = 1e6 dyn.s/cm, by gravity in m/s2; the thesis calls M "slightly reduced" without gravity
 U_AFTER_40_TURNS_CM: Mapping[float, float] = MappingProxyType({9.81: -1.93, 0.0: -2.38})
 # fig. 3.4: crank angle of the least steady u, and mean u, by k in dyn/cm ("220" in the scan is 22 deg)
 LEAST_STEADY_U_AT_DEG: Mapping[float, float] = MappingProxyType({5e5: 23.45, 1e6: 17.5, 2e6: 5.2})
 MEAN_STEADY_U_CM: Mapping[float, float] = MappingProxyType({5e5: -0.611, 1e6: -0.280, 2e6: -0.142})
-# fig. 3.5: the steady torque between k = 5e5 and 2e6 differs by this part of its peak, and reverses steeply
+# fig. 3.5: the steady torque at k = 5e5 and at k = 2e6 differs by this fraction of its peak; where it reverses steeply
 TORQUE_DIFFERENCE_OF_PEAK = 0.096
 TORQUE_REVERSAL_DEG_DYN_CM = ((327.0, 1.46e7), (16.0, -2.00e7))
 # fig. 3.14, k = 2e6: half the natural frequency with the mean effective mass (rad/s); the thesis has "around 27"
@@ -107,7 +107,7 @@ SLIDER_EQUATION: Mapping[str, tuple[float, float, float]] = MappingProxyType(
 
 
 class ThesisAndRight(NamedTuple):
-    """A result of the thesis's code, and the right one."""
+    """A result of the thesis's code, and the correct result."""
 
     thesis: float
     right: float
@@ -161,14 +161,14 @@ CHAPTER_6: Mapping[str, tuple[float, ...]] = MappingProxyType(
         "packaging": (94.53, -48.55, 137.54, 36.05, 134.05, 40.06, 435.15, 116.73, 0.0, 345.01),
     }
 )
-# ERRATA: by problem, the place in the row above and what it must be read as
+# ERRATA: by problem, the index of a misprinted number in the row above, and the number that must be meant
 CHAPTER_6_READ: Mapping[str, tuple[int, float]] = MappingProxyType(
     {"ellipse-a-bounded": (7, -93.8), "path-a": (0, 15.485), "path-b": (5, 184.443)}
 )
 
 
 class PrintedAndTrue(NamedTuple):
-    """An error as printed, what the printed linkage really has to the digits given, and what can be reached."""
+    """An error as printed, the true error of the printed linkage with its tolerance, and the error that can be reached."""
 
     printed: float
     true: float
@@ -188,7 +188,7 @@ CHAPTER_6_ERRORS: Mapping[str, PrintedAndTrue] = MappingProxyType(
         "path-b": PrintedAndTrue(12.6, 12.61, 5e-3, 0.31),
     }
 )
-# the unweighted rocker function at N = 48: true error and the least found; ellipse (a) over the rounding of its printed digits
+# the unweighted rocker function at N = 48: true and least error found; range of ellipse (a)'s error as its digits are rounded
 ROCKER_AT_48 = (721.0, 695.8)
 ELLIPSE_A_OVER_ROUNDING = (4.86, 6.54)
 # weighted rocker function, N = 72: sum of squared errors from 60 to 260 deg, of the printed linkage and with a free mounting

@@ -1,9 +1,9 @@
-"""Numbers to compare with for the slider-crank: Rahman's data and statements, and an independent derivation.
+"""Published numbers on the slider-crank for comparison: Rahman's data and statements, and an independent derivation.
 
 Source: S. Rahman, "Dynamic analysis of the generalized slider crank", MS thesis, NJIT, May 1991; section 3.1 (data) and 3.2
-(statements). The thesis's figures are not legible in the copy there is: spot values, dead centres, strokes and limits of
-the shift are from an independent derivation of the closed form, given to the digits shown. Inches, pounds force, seconds
-and degrees, as printed; the factors to SI are at the top. Nothing here is the output of this program.
+(statements). The thesis's figures are not legible in the copy at hand. Spot values, dead centres, strokes and limits of the
+shift are therefore from an independent derivation of the closed form, with the digits shown. Units are inches, pounds force,
+seconds and degrees, as printed; the factors to SI are at the top. Nothing here is an output of this program.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from collections.abc import Mapping
 from types import MappingProxyType
 from typing import NamedTuple
 
-# One of the unit, in SI
+# One unit in SI
 INCH = 0.0254
 POUND_FORCE = 4.4482216152605
 POUND_INCH = POUND_FORCE * INCH
@@ -33,7 +33,7 @@ TORQUE_LB_IN = 100.0
 
 
 class Spot(NamedTuple):
-    """Values at theta1 = 30 deg, 50 rpm, branch +.
+    """Spot values of the motion at theta1 = 30 deg, 50 rpm, branch +.
 
     The last two are the slider force along -k4 at a torque of 100 lb.in, and the torque without a slider force.
     """
@@ -62,8 +62,8 @@ STROKES_IN: Mapping[float, float] = MappingProxyType({0.0: 24.000, 10.0: 24.528,
 STROKES_BY_TWIST_IN: Mapping[float, float] = MappingProxyType({232.0: 21.85, 310.0: 21.39})
 #: Greatest shifts at which the crank turns fully at 270 deg, by the offset: sqrt(a2^2 - (a1 + |a4|)^2).
 GREATEST_SHIFTS_IN: Mapping[float, float] = MappingProxyType({0.0: 48.539, 10.0: 44.900, 20.0: 38.419, 30.0: 27.129})
-#: Greatest magnitude of 2F2k and half a unit of its last figure (lb), by a4, S1 (in) and alpha4 (deg). We read it as the
-#: greatest more than 10 deg from a dead centre, since it is unbounded there.
+#: Greatest magnitude of the force 2F2k and half a unit of its last digit (lb), by a4, S1 (in) and alpha4 (deg). We take it as
+#: the greatest magnitude more than 10 deg away from a dead centre, since the force is unbounded at a dead centre.
 AXIAL_LB: Mapping[tuple[float, float, float], tuple[float, float]] = MappingProxyType(
     {(10.0, 3.5, 270.0): (4.1, 0.05), (20.0, 0.0, 310.0): (27.0, 0.5)}
 )

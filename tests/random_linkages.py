@@ -1,4 +1,4 @@
-"""Random planar linkages: chains of dyads of all kinds, made from places of their joints, so that they can be assembled."""
+"""Generate random planar linkages: chains of dyads of all kinds, made from given positions so that they can be assembled."""
 
 from __future__ import annotations
 
@@ -10,7 +10,10 @@ KINDS = ("RRR", "RRP", "PRP", "RPR", "RPP", "gear", "slot")
 
 
 class Maker:
-    """A description that grows dyad by dyad; every body has a place, from which its own coordinates follow."""
+    """Builder of a random linkage description, dyad by dyad.
+
+    Every body has a place (x, y, angle) in the ground frame; coordinates of points in the body follow from it.
+    """
 
     def __init__(self, seed: int) -> None:
         self.rng = np.random.default_rng(seed)
@@ -18,9 +21,9 @@ class Maker:
         self.data |= {"slides": {}, "slots": {}, "gears": {}, "racks": {}, "springs": {}, "assembly": {}, "loads": []}
         self.places: dict[str, tuple[float, float, float]] = {"ground": (0.0, 0.0, 0.0)}
         self.count = 0
-        #: bodies with angles that are linear in the freedoms, pinned to the ground: mates of gears
+        #: bodies whose freedom is the angle at a pin on the ground, with the pin's position: possible mates of gears
         self.mates: list[tuple[str, np.ndarray]] = []
-        #: bodies that freedoms pin to others: gears of racks
+        #: bodies whose freedom is the angle at a pin on another body, with that body: possible gears of racks
         self.pinned: list[tuple[str, str]] = []
 
     def name(self, prefix: str) -> str:
@@ -31,7 +34,7 @@ class Maker:
         return self.rng.uniform(-0.5, 0.5, 2)
 
     def new(self, place: np.ndarray | None = None, angle: float | None = None) -> str:
-        """A body somewhere, with a mass."""
+        """Add a body with a mass, at a given or random place; return its name."""
         name, rng = self.name("b"), self.rng
         x, y = self.spot() if place is None else place
         self.places[name] = (float(x), float(y), float(rng.uniform(-3, 3) if angle is None else angle))
@@ -44,7 +47,7 @@ class Maker:
         return name
 
     def mark(self, body: str, own: str, place: np.ndarray) -> None:
-        """Give a body a point at a place in the ground."""
+        """Add a point ``own`` to a body; ``place`` is its position in the ground frame."""
         x, y, angle = self.places[body]
         c, s = np.cos(angle), np.sin(angle)
         dx, dy = place[0] - x, place[1] - y
@@ -61,7 +64,7 @@ class Maker:
         return own
 
     def slide(self, on: str, block: str) -> str:
-        """A slide of a block, along its x axis, on another body."""
+        """Add a slide of ``block``, along its x axis, on the body ``on``; return the slide's name."""
         name, own = self.name("s"), self.name("o")
         x, y, angle = self.places[block]
         way = self.rng.uniform(-0.3, 0.3)
@@ -71,14 +74,14 @@ class Maker:
         return name
 
     def joined(self, kind: str, base: str, body: str) -> str:
-        """A joint between a base and a body: P with either of them as the block."""
+        """Add a joint between two bodies, "R" or "P"; either body may be the block of "P". Return the joint's name."""
         if kind == "R":
             return self.pin(base, body)
         swap = base != "ground" and self.rng.uniform() < 0.5
         return self.slide(body, base) if swap else self.slide(base, body)
 
     def freedom(self) -> None:
-        """A body pinned to a known one, or sliding on it, as a freedom."""
+        """Add a body as a freedom: pinned to an existing body, or sliding on it."""
         base, body = self.known(), self.new()
         kind = self.rng.choice(["R", "R", "P"])
         joint = self.joined(kind, base, body)
@@ -96,7 +99,7 @@ class Maker:
         }
 
     def position(self, slide: str) -> float:
-        """Position of a slide at the places of its bodies."""
+        """Return the position of a slide (m) at the places of its bodies."""
         s = self.data["slides"][slide]
         x, y, angle = self.places[s["on"]]
         ox, oy = self.place_of(s["on"], s["through"])
@@ -139,13 +142,16 @@ class Maker:
         if kind[1] == "R":
             self.pin(one, other)
         else:
-            # the block's axis is its own, so that any two bodies can slide on each other
+            # the slide is along the block's own axis, so that any two bodies can slide on each other
             pair = (one, other) if self.rng.uniform() < 0.5 else (other, one)
             self.slide(*pair)
         return None
 
     def group(self) -> None:
-        """A four-bar in a body that is pinned to a known one, its own coupler to a lever: a dyad with a dyad inside."""
+        """Add a four-bar on a body that is pinned to an existing one; its coupler drives a lever.
+
+        This is a dyad that contains a dyad.
+        """
         base, other = self.known(), self.known()
         first, upper, lower, coupler, lever = (self.new() for _ in range(5))
         self.pin(base, first)
@@ -169,7 +175,7 @@ class Maker:
         self.data["gears"][self.name("g")] = {"bodies": [mate, body], "ratio": ratio, "phase": float(phase)}
 
     def rack(self) -> None:
-        """A rack on the carrier of a pinned freedom, or a gear on either body of a slide."""
+        """Add a rack on the carrier of a pinned freedom, or a gear on either body of a slide."""
         slides = list(self.data["slides"])
         if self.pinned and (not slides or self.rng.uniform() < 0.5):
             gear, carrier = self.pinned[int(self.rng.integers(len(self.pinned)))]
@@ -188,7 +194,7 @@ class Maker:
         self.data["racks"][self.name("r")] = {"gear": gear, "rack": rack, "radius": radius, "offset": offset}
 
     def actions(self) -> None:
-        """Springs, dampers, a load and gravity."""
+        """Add springs, dampers, a load and gravity."""
         rng, data = self.rng, self.data
         data |= {"gravity": 9.81, "gravity_direction": float(rng.uniform(-3, 3))}
         owned = [(body, own) for body, table in data["bodies"].items() for own in table["points"]]
@@ -215,7 +221,7 @@ class Maker:
         self.drives()
 
     def drives(self) -> None:
-        """Laws and drives of the springs, a motor at a pin that is no freedom, and a shaft between two bodies."""
+        """Add laws and drives to the springs, a motor at a pin that is no freedom, and a shaft between two bodies."""
         rng, data = self.rng, self.data
         for spring in data["springs"].values():
             if rng.uniform() < 0.4:
@@ -235,9 +241,9 @@ class Maker:
 def random_linkage(
     seed: int, kinds: tuple[str, ...] = KINDS, dyads: tuple[int, int] = (1, 4)
 ) -> tuple[dict[str, Any], dict[str, tuple[float, float, float]]]:
-    """Return the tables of a random linkage and the places of its bodies (x, y, angle).
+    """Return the tables of a random linkage's description and the places of its bodies (x, y, angle).
 
-    Its dyads are at least ``dyads[0]`` and fewer than ``dyads[1]``.
+    The number of dyads is at least ``dyads[0]`` and less than ``dyads[1]``.
     """
     for attempt in range(100):
         maker = Maker(100 * seed + attempt)
@@ -246,7 +252,7 @@ def random_linkage(
         for _ in range(int(maker.rng.integers(*dyads))):
             maker.dyad(str(maker.rng.choice(kinds)))
         blocks = [slide["body"] for slide in maker.data["slides"].values()]
-        # two slides along the axis of one block are parallel
+        # a block may have only one slide: two slides of one block would be parallel
         if len(set(blocks)) == len(blocks):
             break
     maker.actions()

@@ -1,4 +1,4 @@
-"""The scripts of docs/, which are no package, as modules."""
+"""Load the scripts of docs/, which is not a package, as modules."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from types import ModuleType
 
 
 def script_of_docs(name: str) -> ModuleType:
-    """A script by its name, loaded anew."""
+    """Load a script of docs/ by its name and return it as a new module."""
     spec = importlib.util.spec_from_file_location(name, Path(__file__).parents[1] / "docs" / f"{name}.py")
     assert spec is not None
     assert spec.loader is not None

@@ -1,8 +1,8 @@
-"""Random valid slider-cranks in random states, with every parameter general.
+"""Generate random valid slider-cranks in random states, with nonzero values of all parameters.
 
-As in `strategies`, one description over two functions that supply numbers: `seeded` makes cases reproducible from a seed,
-`cases` makes them a hypothesis strategy that shrinks. The rod's length is chosen last, so that it reaches the guide at the
-state drawn and, with room, where the groove would have the crank.
+As in `strategies`, `draw` describes a case by two functions that supply numbers and choices. `seeded` makes cases reproducible
+from a seed; `cases` is a hypothesis strategy that shrinks. The rod's length is chosen last, so that the rod reaches the guide
+both at the drawn state and where the groove puts the crank.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from linkwork.slider_crank import dynamics
 from linkwork.slider_crank.parameters import Constants, InitialState, SliderCrankParameters
 from tests.strategies import Uniform, suppliers
 
-#: What drives crank and shift: speed_drive, shift_drive, groove of `dynamics.Inputs`.
+#: Drives of crank and shift by name, as the values speed_drive, shift_drive, groove of `dynamics.Inputs`.
 DRIVES = {
     "torque-force": (0.0, 0.0, 0.0),
     "torque-shift": (0.0, 1.0, 0.0),
@@ -27,7 +27,7 @@ DRIVES = {
 
 
 class Case(NamedTuple):
-    """A mechanism, a state of it, and the inputs: torque, accelerations, axial force, load."""
+    """A mechanism, a state of it, and its inputs: torque, accelerations, axial force, load."""
 
     parameters: SliderCrankParameters
     state: dynamics.State
@@ -43,13 +43,12 @@ class Case(NamedTuple):
 
     @property
     def initial(self) -> InitialState:
-        """The state as the start of a run."""
+        """Return the state as the initial state of a run."""
         th, s1, w, v, _, _ = self.state
         return InitialState(crank_angle=th, crank_speed=w, shift_position=s1, shift_velocity=v)
 
     def inputs(self, drive: str) -> dynamics.Inputs:
-        """The inputs under one of `DRIVES`. An input that a drive does not read is there all the same, but for the torque
-        and the axial force, which a drive by speed or shift adds to."""
+        """Return the inputs under one of `DRIVES`; inputs that the drive should not read have values too, see `read`."""
         speed_drive, shift_drive, groove = DRIVES[drive]
         return dynamics.Inputs(
             speed_drive,
@@ -63,7 +62,7 @@ class Case(NamedTuple):
         )
 
     def read(self, drive: str) -> dynamics.Inputs:
-        """The inputs as a plant under the drive has to read them: those of the other drives are none."""
+        """Return the inputs as the plant should read them under a drive: inputs that belong to other drives are zero."""
         i = self.inputs(drive)
         return i._replace(
             torque=0.0 if i.speed_drive else i.torque,
@@ -73,7 +72,7 @@ class Case(NamedTuple):
         )
 
     def fmi_inputs(self) -> dict[str, float]:
-        """The inputs by their FMI names, the commanded speeds those of the state."""
+        """Return the inputs by their FMI names; the commanded speeds are those of the state."""
         return {
             "drive.torque": self.torque,
             "drive.speed": self.state[2],
@@ -85,12 +84,12 @@ class Case(NamedTuple):
         }
 
     def under(self, drive: str) -> dynamics.State:
-        """The state as one of `DRIVES` has it: a groove determines shift and axial velocity."""
+        """Return the state under one of `DRIVES`: a groove determines shift and axial velocity."""
         return dynamics.impose_groove(self.state, DRIVES[drive][2], self.p)
 
 
 def draw(uniform: Uniform, choose: Callable[[], bool]) -> Case:
-    """A case, from a source of numbers ``uniform(low, high)`` and of choices (signs, either assembly)."""
+    """Draw a case; ``uniform(low, high)`` supplies numbers, ``choose()`` choices such as a sign or the assembly."""
 
     def either(low: float, high: float) -> float:
         return uniform(low, high) * (1.0 if choose() else -1.0)

@@ -1,8 +1,8 @@
-"""Random valid five-bar sliders in random states, with every parameter general.
+"""Generate random valid five-bar sliders in random states, with nonzero values of all parameters.
 
-`draw` describes them once, over two functions that supply numbers: `seeded` makes them reproducible from a seed,
-`cases` makes them a hypothesis strategy that shrinks. A configuration is built backwards, so that none has to be thrown
-away: ground link, guide, crank and freedoms first, then the transmission angle, then the coupler and rocker that have it.
+`draw` describes a case by two functions that supply numbers and choices. `seeded` makes cases reproducible from a seed; `cases`
+is a hypothesis strategy that shrinks. No case is rejected, because each is built backwards: first ground link, guide, crank and
+freedoms, then the transmission angle, then the lengths of coupler and rocker that have this angle.
 """
 
 from __future__ import annotations
@@ -18,17 +18,17 @@ from hypothesis import strategies as st
 from linkwork.five_bar import dynamics
 from linkwork.five_bar.parameters import Constants, FiveBarParameters, InitialState
 
-#: Least |sin(rocker angle - coupler angle)| of the states drawn.
+#: Least |sin(rocker angle - coupler angle)| in the drawn states.
 LEAST_SINE = 0.1
 
 T = TypeVar("T")
 Uniform = Callable[[float, float], float]
-#: A description of something random, over the two sources of numbers and of choices.
+#: A function that makes a random case from a source of numbers and a source of choices.
 Draw = Callable[[Uniform, Callable[[], bool]], T]
 
 
 class Case(NamedTuple):
-    """A mechanism, a state of it, and inputs of both drives."""
+    """A mechanism, a state of it, and its inputs under drives by torque and by speed."""
 
     parameters: FiveBarParameters
     state: dynamics.State
@@ -40,15 +40,15 @@ class Case(NamedTuple):
         return self.parameters.constants()
 
     def inputs(self, drive: str) -> dynamics.Inputs:
-        """The inputs under a drive by "torque" or "speed"."""
+        """Return the inputs under the drive "torque" or "speed"."""
         return self.torque_inputs if drive == "torque" else self.speed_inputs
 
     def read(self, drive: str) -> dynamics.Inputs:
-        """The inputs as a plant under the drive has to read them: the same."""
+        """Return the inputs as the plant should read them under a drive: they are the same as `inputs`."""
         return self.inputs(drive)
 
     def fmi_inputs(self) -> dict[str, float]:
-        """The inputs by their FMI names, the commanded speed that of the state."""
+        """Return the inputs by their FMI names; the commanded speed is that of the state."""
         i = self.torque_inputs
         return {
             "drive.torque": i.torque,
@@ -60,25 +60,25 @@ class Case(NamedTuple):
         }
 
     def under(self, drive: str) -> dynamics.State:
-        """The state under a drive: the same for both."""
+        """Return the state under a drive: it is the same for both drives."""
         return self.state
 
     @property
     def initial(self) -> InitialState:
-        """The state as the start of a run."""
+        """Return the state as the initial state of a run."""
         th2, u, w2, v, _, _ = self.state
         return InitialState(crank_angle=th2, crank_speed=w2, slider_position=u, slider_velocity=v)
 
 
 def draw(uniform: Uniform, choose: Callable[[], bool]) -> Case:
-    """A case, from a source of numbers ``uniform(low, high)`` and of choices (either assembly)."""
+    """Draw a case; ``uniform(low, high)`` supplies numbers, ``choose()`` the assembly."""
     l1 = uniform(0.1, 0.5)
     l2 = l1 * uniform(0.1, 0.5)
     alpha = uniform(-pi, pi)
     th2 = uniform(-2.0 * pi, 2.0 * pi)
     u = l1 * uniform(-0.3, 0.3)
     branch = 1 if choose() else -1
-    # BD is at least l1 - l2 - |u|, 0.2 l1; the transmission angle and the ratio l3 : l4 then give both lengths
+    # BD is at least l1 - l2 - |u| >= 0.2 l1; the transmission angle and the ratio l3 / l4 then determine both lengths
     bd = hypot(l1 + u * cos(alpha) - l2 * cos(th2), u * sin(alpha) - l2 * sin(th2))
     margin = asin(1.01 * LEAST_SINE)
     angle = uniform(margin, pi - margin)
@@ -87,7 +87,7 @@ def draw(uniform: Uniform, choose: Callable[[], bool]) -> Case:
     l3 = ratio * l4
 
     def link(length: float) -> tuple[float, float, float, float]:
-        """Mass, inertia about the centre of mass, distance and angle of the centre of mass."""
+        """Return mass, inertia about the centre of mass, and distance and angle of the centre of mass of a link."""
         mass = uniform(0.05, 1.0)
         return mass, mass * (length * uniform(0.2, 0.5)) ** 2, length * uniform(-0.2, 1.0), uniform(-pi, pi)
 
@@ -135,7 +135,7 @@ def draw(uniform: Uniform, choose: Callable[[], bool]) -> Case:
 
 @st.composite
 def drawn(draw_from: st.DrawFn, draw: Draw[T]) -> T:
-    """Hypothesis strategy of what ``draw`` makes."""
+    """Return a hypothesis strategy of the cases that ``draw`` makes."""
     return draw(
         lambda low, high: draw_from(st.floats(low, high, allow_subnormal=False)),
         lambda: draw_from(st.booleans()),
@@ -143,7 +143,10 @@ def drawn(draw_from: st.DrawFn, draw: Draw[T]) -> T:
 
 
 def suppliers(draw: Draw[T]) -> tuple[Callable[[int], T], Callable[[], st.SearchStrategy[T]], Callable[[], Any]]:
-    """What makes of ``draw`` the case of a seed, the same on every machine; a strategy of cases; one of mechanisms."""
+    """Return three functions for ``draw``: the case of a seed, a strategy of cases, and a strategy of mechanisms.
+
+    The case of a seed is the same on every machine.
+    """
 
     def seeded(seed: int) -> T:
         source = random.Random(seed)
@@ -157,13 +160,16 @@ def suppliers(draw: Draw[T]) -> tuple[Callable[[int], T], Callable[[], st.Search
 
 seeded, cases, mechanisms = suppliers(draw)
 
-#: Parameters of friction by contact forces.
+#: Names of the parameters of friction that depends on the joint forces.
 PINS = tuple(f"pin_{pin}_friction_radius" for pin in "ABCD")
 FRICTION = ("slider_friction_coefficient", *PINS)
 
 
 def rough(seed: int, drive: str, *only: str) -> Case:
-    """The case of a seed with friction, in what is named alone or everywhere, as strong as the mechanism bears it."""
+    """Return the case of a seed with friction in the joints, in the named parameters only or in all.
+
+    The friction is reduced until the mechanism does not jam.
+    """
     case, source = seeded(seed), random.Random(seed)
     most = dict.fromkeys(PINS, 0.3 * case.parameters.crank_length) | {"slider_friction_coefficient": 0.8}
     values = {name: source.uniform(0.3, 1.0) * most[name] for name in only or FRICTION}

@@ -51,7 +51,7 @@ _QUANTITY = re.compile(rf"(?<![-'\w.])({NUMBER}) (N\.m|N|m)(?!\w|[./](?!rad\b)\w
 def in_units(text: str, shown: Callable[[str], tuple[str, float]]) -> str:
     """Return a sentence with its lengths, forces and torques converted from SI to other units.
 
-    ``shown`` returns the name of the other unit and the factor to it, for an SI unit.
+    ``shown`` receives an SI unit and returns the name of the other unit and the factor to it.
     """
 
     def convert(found: re.Match[str]) -> str:
@@ -73,9 +73,9 @@ def print_paths(paths: Iterable[Path]) -> None:
 
 
 def report_errors(command: Callable[..., Any]) -> Callable[..., Any]:
-    """Decorate a command: report errors as a message and an exit code, and do not overwrite files of others.
+    """Decorate a command: report errors as a message and an exit code, and protect files that the command did not write.
 
-    Files that the command did not write itself are protected: see `analysis.files.outputs`.
+    See `analysis.files.outputs` for the protection of files.
     """
 
     @wraps(command)
@@ -377,7 +377,7 @@ def quantity(text: str, unit: str, option: str) -> float:
 
 
 def changes(settings: Sequence[str], read: Callable[[str], Any], example: str) -> dict[str, Any]:
-    """Return the values of the options ``--set NAME=VALUE`` by name.
+    """Return the new values that the options ``--set NAME=VALUE`` give, by name.
 
     ``read`` converts the text of a value; ``example`` is an example for error messages.
     """

@@ -51,7 +51,7 @@ def linkage(file: str, equations: bool, out: str, animation: bool) -> None:
 
 
 def _print_structure(package: Package) -> None:
-    """Print the number of bodies, joints and freedoms, and the steps by which the positions of the bodies are computed."""
+    """Print the number of bodies, joints and degrees of freedom, and the steps by which the bodies' positions are computed."""
     from ..linkages import Dyad, GearStep, RackStep
 
     d, structure = package.description, package.structure
@@ -80,7 +80,7 @@ def _print_structure(package: Package) -> None:
 
 
 def _print_reach(made: Mechanism) -> None:
-    """Print the range of motion of each freedom, with the other freedoms at their initial values."""
+    """Print the range of motion of each coordinate, with the other coordinates at their initial values."""
     from ..linkages import reach
 
     rows = []
@@ -99,7 +99,7 @@ def _print_reach(made: Mechanism) -> None:
 
 
 def _print_dead_centres(package: Package) -> None:
-    """Print the dead centres: the values of each freedom at which a body that is joined to the ground is at rest."""
+    """Print the dead centres: the values of each coordinate at which a body that is joined to the ground is at rest."""
     from ..linkages import dead_centres
     from ..units import display_scale
 

@@ -1,4 +1,4 @@
-"""`linkwork new`: write a case file to start from; its entries come from the code that reads it, so that none is missing."""
+"""`linkwork new`: write a case file to start from; the code that reads the file gives its entries, so that none is missing."""
 
 from __future__ import annotations
 

@@ -193,7 +193,7 @@ def _print_extremes(title: str, result: Any) -> None:
 
 
 def _with_magnitudes(result: Any) -> Iterator[tuple[str, Any, str]]:
-    """Yield name, values and SI unit of each output of a run; after the force components of a joint, the magnitude."""
+    """Yield name, values and SI unit of each output of a run; the magnitude of a joint force follows its components."""
     import numpy as np
 
     from ..mechanisms import find_mechanism
@@ -296,7 +296,7 @@ def check(
 
 
 def _find_fmus(model: str, fmu: str | None, only: str | None) -> list[tuple[Path, str, str]]:
-    """Return what to check: (path of the FMU, interface, interface in words), for each interface of each FMU.
+    """Return the FMUs to check as (path, interface, interface in words), one for each interface of each FMU.
 
     The FMUs are ``fmu`` if it is given, otherwise all FMUs of the model in the folder build. With ``only`` just this interface
     is returned.

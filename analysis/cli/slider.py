@@ -189,7 +189,7 @@ def _motion_columns(series: FourierSeries, rotation: Any) -> dict[str, Any]:
 
 
 def _dynamics(chosen: SliderCase, solution: Solution, folder: Path, plots: bool) -> list[Path]:
-    """Compute and write force, torque and pin forces of a slider motion, and a case of a run; return the paths.
+    """Compute and write force, torque and pin forces of a slider motion, and a case file of a run; return the paths.
 
     If the case has a table [tracking], also simulate the motion with a controller.
     """

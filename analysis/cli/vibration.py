@@ -361,7 +361,7 @@ def stability(
     stem = output_folder(chosen.folder) / f"{chosen.stem}-stability"
 
     def write_first_picture(found: Any) -> None:
-        """Write the picture of a chart that has only its grid; its boundaries take longer."""
+        """Write a picture of the chart when only its grid of points is computed; computing its boundaries takes longer."""
         print_paths(save_picture(figures.picture(found, title=chosen.case.title), stem, html=html))
         say("its boundaries follow; after Ctrl-C the picture stays without them")
 

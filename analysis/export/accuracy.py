@@ -1,7 +1,8 @@
-"""Compute work and precision for several tolerances, and write them as a table in the documentation of each FMU.
+"""Compute the work and the errors of simulations for several tolerances, as a table for the documentation of each FMU.
 
 For a mechanism with standard cases the table is in `DATA`, which ``python -m analysis.export.accuracy`` rewrites in some
-seconds; `tests/fmu/test_accuracy.py` checks that it is current. For any other it is computed when the FMU is built.
+seconds; `tests/fmu/test_accuracy.py` checks that it is current. For any other mechanism the table is computed when the FMU is
+built.
 """
 
 from __future__ import annotations
@@ -42,7 +43,7 @@ CAPTION = (
     "that is small beside its like is compared with a thousandth of these. Evaluations of the equations are per second of "
     "simulated time{}; shorter communication steps need more, and err less."
 )
-#: The runs and the evaluations that the caption speaks of: for the standard cases, and for the default experiment.
+#: Words for the two gaps in the caption, for the standard cases and for the default experiment.
 STANDARD_CASES = ("the standard cases, the largest of all", ", the most of all cases")
 DEFAULT = ("the default experiment in ten communication steps", "")
 
@@ -87,13 +88,13 @@ def stored_rows(mechanism: Mechanism) -> list[list[float]]:
 def default_rows(mechanism: Mechanism, reference: str) -> list[list[float]]:
     """Return the rows of the table for the default experiment of a mechanism, computed by the plant in plain Python.
 
-    A tolerance with which the run ends early has no row.
+    A tolerance has no row if the run with this tolerance ends early.
 
     Parameters
     ----------
     mechanism : Mechanism
     reference : str
-        Reference results as CSV: the times and all outputs but residuals, with a heading.
+        Reference results as CSV, with a heading: the time, and all outputs except residuals.
     """
     heading, *lines = csv.reader(reference.splitlines())
     right = np.array(lines, dtype=float)
@@ -102,7 +103,7 @@ def default_rows(mechanism: Mechanism, reference: str) -> list[list[float]]:
     unit_of = {v.name: v.unit for v in mechanism.variables}
     units = np.array([unit_of[name] for name in heading[1:]])
     starts = {v.name: v.start for v in mechanism.variables}
-    # as `compare` has it: angles by themselves, others by the output's largest magnitude or a thousandth of its like
+    # scales as in `compare`: 1 for angles; else the output's largest magnitude, or a thousandth of the largest in its unit
     largest = np.abs(right).max(axis=0)
     like = np.array([largest[units == unit].max() for unit in units])
     scale = np.where(
@@ -124,7 +125,7 @@ def default_rows(mechanism: Mechanism, reference: str) -> list[list[float]]:
         except LinkworkError:
             continue
         difference = np.abs(np.array(values)[:, places] - right)
-        # angles of bodies leap by a turn
+        # angles of bodies jump by 2 pi
         angles = units == "rad"
         difference[:, angles] = np.abs(np.remainder(difference[:, angles] + pi, 2.0 * pi) - pi)
         worst = (difference / scale).max(axis=0)
@@ -135,7 +136,7 @@ def default_rows(mechanism: Mechanism, reference: str) -> list[list[float]]:
 
 
 class Counted:
-    """Function that counts its calls."""
+    """A function that counts its calls."""
 
     def __init__(self, function: Callable[..., Any]) -> None:
         self._function, self.count = function, 0
@@ -146,12 +147,12 @@ class Counted:
 
 
 def format_row(row: list[float]) -> list[str]:
-    """Return the numbers of a row as they are printed."""
+    """Return the numbers of a row of the table as texts."""
     return [f"{row[0]:.0e}", f"{row[1]:.0f}", *(f"{value:.1e}" for value in row[2:])]
 
 
 def to_html(mechanism: Mechanism, files: Mapping[str, bytes]) -> str:
-    """Return the table for the page of an FMU, with the files of the FMU's experiments."""
+    """Return the table as HTML for the page of an FMU; ``files`` are those of the FMU's `experiments`, by path."""
     rows, words = stored_rows(mechanism), STANDARD_CASES
     if not rows:
         rows, words = default_rows(mechanism, files[f"{EXPERIMENTS}/default-ref.csv"].decode()), DEFAULT
@@ -162,7 +163,7 @@ def to_html(mechanism: Mechanism, files: Mapping[str, bytes]) -> str:
 
 
 def main() -> None:
-    """Compute the data of all mechanisms and write the file."""
+    """Compute the tables of all mechanisms and write them to `DATA`."""
     lines = (
         f' "{name}": [\n  ' + ",\n  ".join(map(json.dumps, rows(mechanism))) + "\n ]"
         for name, mechanism in MECHANISMS.items()

@@ -1,4 +1,4 @@
-"""Write the archive of an FMU, with the parts that every kind of FMU has, and try it out."""
+"""Write the archive of an FMU, with the files that every kind of FMU contains, and test the FMU by a short run."""
 
 from __future__ import annotations
 
@@ -48,11 +48,11 @@ class BuildError(LinkworkError):
 
 
 def write(entries: Mapping[str, bytes], target: Path) -> Path:
-    """Write an FMU, compressed, in a fixed order and with fixed time stamps, and return its path.
+    """Write an FMU as a compressed archive, with its files in a fixed order and with fixed time stamps, and return its path.
 
-    Raises BuildError, and leaves an older file in place, if the FMU is not valid.
+    If the FMU is not valid, BuildError is raised and an older file at this path stays.
     """
-    # moved into place whole: a reader never sees half an FMU, and a failed build leaves the old one
+    # written under another name, then renamed: nobody reads half an FMU, and a failed build leaves the old one
     part = target.with_suffix(".part.fmu")
     try:
         with zipfile.ZipFile(part, "w", zipfile.ZIP_DEFLATED, compresslevel=9) as archive:
@@ -60,7 +60,7 @@ def write(entries: Mapping[str, bytes], target: Path) -> Path:
             for name in sorted(entries, key=lambda entry: (entry != "modelDescription.xml", entry)):
                 info = zipfile.ZipInfo(name, EPOCH)
                 info.compress_type = zipfile.ZIP_DEFLATED
-                info.external_attr, info.create_system = 0o644 << 16, 3  # those of Unix, on Windows too
+                info.external_attr, info.create_system = 0o644 << 16, 3  # attributes of Unix, on Windows too
                 archive.writestr(info, entries[name])
         problems = validate_fmu(str(part))
         if problems:
@@ -81,8 +81,8 @@ def documentation(
 ) -> dict[str, bytes]:
     """Return experiments, icon, licence and the HTML page of an FMU by path in the archive.
 
-    The page describes the model and how the FMU is ``made``, and has tables of its accuracy and its variables. ``icon`` is the
-    icon's path.
+    The page describes the model, says how the FMU is ``made``, and has tables of the accuracy and of the ``variables``.
+    ``icon`` is the path of the icon.
     """
     files = experiments(mechanism)
     rows = []
@@ -137,7 +137,7 @@ assert len(result) == 21, len(result)
 
 
 def run_trial(fmu: Path, script: str = _TRIAL, *arguments: str) -> None:
-    """Run the FMU through FMPy in a process of its own, by default for twenty steps.
+    """Run the FMU with FMPy in a separate process, by default for twenty steps.
 
     Parameters
     ----------
@@ -148,7 +148,7 @@ def run_trial(fmu: Path, script: str = _TRIAL, *arguments: str) -> None:
     Raises
     ------
     BuildError
-        With what the run printed, if it failed.
+        If the run fails; the message has what the run printed.
     """
     done = subprocess.run(
         [sys.executable, "-c", script, str(fmu), *arguments],

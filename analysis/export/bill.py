@@ -1,4 +1,4 @@
-"""Bill of materials of an FMU, in CycloneDX: what is inside, what made it, and the hash of every file."""
+"""Bill of materials of an FMU, in CycloneDX: components in the FMU, programs that made it, and the hash of every file."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from typing import Any
 
 import linkwork
 
-#: Place in the archive, and its type.
+#: Path of the bill in the archive, and its media type.
 BILL = "extra/org.cyclonedx/bom.json"
 TYPE = "application/vnd.cyclonedx+json"
 #: Programs that determine the bytes of an FMU, by its kind.
@@ -28,7 +28,7 @@ def add_bill(name: str, entries: Mapping[str, bytes], *, native: bool, fmi: int)
     entries : mapping
         Content of the files by path in the archive.
     native : bool
-        Whether it is a native FMU, not one in Python.
+        Whether the FMU is native; else it is a Python FMU.
     fmi : int
         Major version of FMI.
     """
@@ -67,7 +67,7 @@ def add_bill(name: str, entries: Mapping[str, bytes], *, native: bool, fmi: int)
         "components": [*({"bom-ref": c["name"], **c} for c in inside), *listed],
         "dependencies": [{"ref": "fmu", "dependsOn": [c["name"] for c in inside]}],
     }
-    # the same content has the same number
+    # the same content has the same serial number
     number = uuid.uuid5(uuid.NAMESPACE_URL, json.dumps(content, sort_keys=True))
     content = {
         "$schema": "http://cyclonedx.org/schema/bom-1.6.schema.json",
@@ -78,7 +78,7 @@ def add_bill(name: str, entries: Mapping[str, bytes], *, native: bool, fmi: int)
 
 
 def _component(name: str, version: str, licence: str = "", *, text: str = "", index: str = "pypi") -> dict[str, Any]:
-    """Return a component; ``index`` is the registry of its package, empty if it is in none."""
+    """Return a component of the bill; ``index`` is the registry of the component's package, empty if there is none."""
     component: dict[str, Any] = {"type": "library", "name": name, "version": version}
     if text:
         component["description"] = text

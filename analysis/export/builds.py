@@ -42,16 +42,16 @@ def build_all(
     dest : path
         Folder for the FMUs; made if it is not there.
     kinds : sequence of str, optional
-        Of `KINDS`; by default all.
+        Names in `KINDS`; by default all.
     platforms : sequence of str, optional
         Platforms for which native FMUs are compiled: names in `PLATFORMS`, or ``all``; by default this platform. `WASM` is
-        for FMUs of FMI 3.0 only and left out of the others.
+        only for FMUs of FMI 3.0 and is ignored for all others.
     publish_to : path, optional
         Folder into which `publish` writes each FMU that runs here.
 
     Yields
     ------
-    Built
+    BuiltFmu
 
     Raises
     ------

@@ -32,10 +32,11 @@ RELATIVE, ABSOLUTE = 1e-6, 1e-6
 
 
 def publish(mechanism: Mechanism, kind: Kind, fmu: Path, folder: Path | str) -> Path:
-    """Copy an FMU with its compatibility information into a subfolder of ``folder`` with its name; return the subfolder.
+    """Copy an FMU with its compatibility information into a subfolder of ``folder`` named after the FMU; return the subfolder.
 
-    The files are `{name}.fmu`, its inputs `{name}_in.csv`, reference results `{name}_ref.csv`, the options of their
-    computation `{name}_ref.opt`, and `Readme.txt`. The plant in Python computes the reference; FMPy must find the same.
+    The files are the FMU `{name}.fmu`, the inputs `{name}_in.csv`, the reference results `{name}_ref.csv`, the options of
+    their computation `{name}_ref.opt`, and `Readme.txt`. The plant in Python computes the reference results; FMPy must get
+    the same results.
 
     Raises
     ------
@@ -80,7 +81,7 @@ for place, name in enumerate(names):
 
 
 def reference_results(mechanism: Mechanism) -> tuple[list[str], list[list[float]]]:
-    """Run the default experiment with the plant in Python; return names and, for each step, time and the main outputs."""
+    """Run the default experiment with the plant in Python; return the names and, for each step, time and the main outputs."""
     start, stop, step, _ = mechanism.experiment
     first = [name for freedom in mechanism.freedoms for name in (freedom.coordinate, freedom.rate)]
     names = list(dict.fromkeys([*first, *mechanism.output_names]))[: VARIABLES - 1]
@@ -116,7 +117,7 @@ def format_options(mechanism: Mechanism) -> str:
 
 
 def readme_text(mechanism: Mechanism, kind: Kind) -> str:
-    """Return a text on the FMU, the parts of FMI that it tests, and its importers."""
+    """Return the text of Readme.txt: the FMU, the features of FMI that can be tested with it, and the importers that run it."""
     features = {
         2: "saved and serialised states, directional derivatives, derivatives of inputs and outputs over time, a state event",
         3: "saved and serialised states, directional and adjoint derivatives, intermediate update, early return, terminals, "
@@ -145,6 +146,6 @@ Importers that the tests of this version run it in, by kind of FMU:
 
 
 def _version(package: str) -> str | None:
-    """Return the version of an installed package; CoFMUPy has a folder of its own."""
+    """Return the version of an installed package, None if it is not installed; CoFMUPy is looked for in a folder of its own."""
     found = metadata.distributions(name=package, path=[*sys.path, f"{sys.prefix}/cofmupy"])
     return next((distribution.version for distribution in found), None)

@@ -1,8 +1,9 @@
 """Write a WebAssembly component around a native FMU, after the draft of FMI-LS-WASM.
 
 The draft is commit c1aac17 of modelica/fmi-ls-wasm of July 2026. One component has both interfaces, co-simulation and model
-exchange. It contains the core module that Zig compiles from the FMU's C, in a frame that is written here: types, resources,
-and one lifted function for each method. `native/component.c` has these functions under the names of the methods.
+exchange. It contains the core module that Zig compiles from the FMU's C code. The frame around the core module is written here:
+types, resources, and one lifted function for each method. `native/component.c` has the C functions of the methods, under the
+names of the methods.
 """
 
 from __future__ import annotations
@@ -122,7 +123,7 @@ def component(module: bytes) -> bytes:
         If wasmtime, which assembles the component's text to binary, is not installed.
     """
     frame = _frame()
-    # replace the second core module of the frame, an empty one; a section is a number, a length and a content
+    # put the module in the place of the frame's second core module, which is empty; a section is number, length and content
     parts, place, number = [frame[:8]], 8, 0
     while place < len(frame):
         size, begin = _length(frame, place + 1)
@@ -136,7 +137,7 @@ def component(module: bytes) -> bytes:
 
 
 def manifest() -> bytes:
-    """Return the manifest of the layered standard."""
+    """Return the manifest of the layered standard FMI-LS-WASM as XML."""
     text = "FMI Layered Standard for WebAssembly"
     return to_xml_bytes(layered_standard("fmiLayeredStandardManifest", STANDARD, "0.1.0", text))
 
@@ -168,7 +169,7 @@ def _frame() -> bytes:
 
 
 def _split(text: str) -> list[str]:
-    """Split a list at the commas outside brackets."""
+    """Split the text of a list at the commas outside brackets."""
     parts, depth, begin = [], 0, 0
     for place, letter in enumerate(text):
         depth += (letter == "<") - (letter == ">")
@@ -195,7 +196,7 @@ class _Types:
         return self.known[text]
 
     def define_named(self, text: str) -> str:
-        """Return the name of a type, as `define` does, but define a primitive type under a name as well."""
+        """Return the name of a type, as `define` does; give a primitive type a name, too."""
         if text in _PRIMITIVE:
             self.lines.append(f"(type $t{len(self.lines)} {text})")
             return f"$t{len(self.lines) - 1}"
@@ -230,7 +231,7 @@ def _interface(name: str) -> str:
 
 
 def _methods(interface: str) -> Iterator[tuple[str, str, str, str]]:
-    """Yield for each method of an interface the name of its C function, its own name, its parameters and its result."""
+    """Yield for each method of an interface: the name of its C function, the method's name, its parameters and its result."""
     _, making, own = _INTERFACES[interface]
     resource = f"{interface}-instance"
     yield f"instantiate-{interface}", f"[static]{resource}.instantiate-{interface}", making, f"option<own<{resource}>>"
@@ -329,7 +330,7 @@ def _resource(interface: str) -> list[str]:
 
 
 def _inner_lines(interface: str) -> list[str]:
-    """Return the lines of the inner component that exports an interface: its imports, under the interface's own names."""
+    """Return the lines of the inner component of an interface, which exports its imports under the names of the interface."""
     own, resource = _INTERFACES[interface][0], f"{interface}-instance"
     lines: list[str] = []
     outer, inner = _Types(lines), _Types(lines)

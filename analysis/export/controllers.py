@@ -1,8 +1,8 @@
 """Sampled controllers as Python FMUs; their outputs are held between two samples.
 
-A sample uses the inputs at its instant, and its outputs are available at the end of the communication step. A step shorter
-than the sample time therefore delays the outputs by the step, a step as long as the sample time by one sample, as does a
-computer that needs that time for its answer.
+A sample uses the inputs at its instant; its outputs are available at the end of the communication step. If the step is shorter
+than the sample time, the outputs are therefore delayed by one step. If the step is as long as the sample time, they are delayed
+by one sample, like the outputs of a computer that needs the whole sample time for the calculation.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ from linkwork.wrapper import (
 
 
 class Row(NamedTuple):
-    """A variable: a parameter, an input, an output, or a local one that is a state of the controller.
+    """A variable of a controller: a parameter, an input, an output, or a local variable, which is a state.
 
     ``rule``, a key of `RULES`, is a condition on a parameter besides being finite.
     """
@@ -50,7 +50,7 @@ RULES: dict[str, tuple[str, Callable[[float], bool]]] = {
     "not negative": ("not be negative", lambda value: value >= 0.0),
 }
 
-#: The parameter of every controller, and the only one that is fixed.
+#: Parameter of every controller; it is the only fixed parameter.
 SAMPLE_TIME = Row("sample_time", "parameter", "s", 1e-3, "Time between two samples", "positive")
 
 #: Exponents of the base units.
@@ -74,9 +74,10 @@ UNITS: dict[str, dict[str, int]] = {
 
 
 class Controller(Fmi2Slave):  # type: ignore[misc]
-    """Base of the controllers: each has ``rows``, its variables, and `sample`, which reads and sets attributes of their names.
+    """Base of the controllers.
 
-    All parameters except the sample time may be set between steps; they act from the next sample on.
+    A controller has the table ``rows`` of its variables, and `sample`, which reads and sets the attributes with the names of
+    the variables. All parameters except the sample time may be set between steps; they act from the next sample on.
     """
 
     rows: ClassVar[tuple[Row, ...]]
@@ -135,14 +136,14 @@ class Controller(Fmi2Slave):  # type: ignore[misc]
         return root
 
     def get_real(self, vrs: list[int]) -> list[float]:
-        """Return values; until the first sample is taken, outputs are those of the present inputs."""
+        """Return values of variables; before the first sample, outputs are computed from the present inputs."""
         if self.count == 0:
             self.preview()
         values: list[float] = super().get_real(vrs)
         return values
 
     def set_real(self, vrs: list[int], values: list[float]) -> None:
-        """Set all values or none. Once the first sample is taken, invalid parameters and any new sample time are refused."""
+        """Set all values, or none if one is refused: after the first sample, an invalid parameter or any sample time."""
         self._expect("fmi2SetReal", INSTANTIATED, INITIALISING, RUNNING)
         for reference, value in zip(vrs, values):
             if reference not in self.vars:
@@ -178,7 +179,7 @@ class Controller(Fmi2Slave):  # type: ignore[misc]
         raise ValueError(sentence)
 
     def preview(self) -> None:
-        """Set the outputs that a sample at the start would give, without changing the states."""
+        """Set the outputs to the values that a sample at the start would give, without changing the states."""
         if not all(self._is_valid(name, getattr(self, name)) for name in self.parameters):
             return
         states = {row.name: getattr(self, row.name) for row in self.rows if row.causality == "local"}
@@ -207,7 +208,7 @@ class Controller(Fmi2Slave):  # type: ignore[misc]
         self._sample_before_end(self.start_time + 0.5 * self.sample_time)
 
     def do_step(self, current_time: float, step_size: float) -> bool:
-        """Take the samples in a step, without one at its end; return False if the step is not valid."""
+        """Take the samples in a step, except a sample at the end of the step; return False if the step is not valid."""
         end = current_time + step_size
         if self.phase != RUNNING:
             wrong = f"the controller is {self.phase}"
@@ -233,7 +234,7 @@ class Controller(Fmi2Slave):  # type: ignore[misc]
         return state | times | {"model": type(self).__name__, "phase": self.phase}
 
     def _set_fmu_state(self, state: dict[str, Any]) -> None:
-        """Refuse a state that is damaged or of another controller."""
+        """Restore a saved state; refuse a state that is damaged or belongs to another controller."""
         if "damaged" in state:
             self._refuse(f"the serialised state is damaged: {state['damaged']}")
         kind = type(self).__name__
@@ -256,10 +257,10 @@ def _clamp(value: float, limit: float) -> float:
 
 
 class Pid(Controller):
-    """PID controller of a position by a force, with feed-forward and a limit that does not wind up the integral.
+    """PID controller of a position, with feed-forward; the output is a force, limited without windup of the integral.
 
-    The derivative is that of the error after a first-order filter. While the force is at its limit, the integral is driven
-    back with the tracking time (K. J. Astrom and T. Hagglund, Advanced PID Control, 2006, section 3.5).
+    The derivative term uses the error after a first-order filter. While the force is at its limit, the integral is driven back
+    with the tracking time (K. J. Astrom and T. Hagglund, Advanced PID Control, 2006, section 3.5).
     """
 
     rows = (
@@ -294,7 +295,7 @@ class Pid(Controller):
 
 
 class StateFeedback(Controller):
-    """State feedback of position and velocity with feed-forward and a limit; `linearise` and `design_lqr` give its gains."""
+    """State feedback of position and velocity with feed-forward and force limit; `design_lqr` gives its gains."""
 
     rows = (
         Row("position_gain", "parameter", "N/m", 0.0, "Force against the deviation of the position"),
@@ -353,7 +354,7 @@ class MotionReference(Controller):
         return value, slope
 
 
-#: Points of a `ForceTable` over a turn.
+#: Number of points of a `ForceTable` per revolution.
 POINTS = 72
 
 
@@ -374,9 +375,9 @@ class ForceTable(Controller):
 
 
 class DcServo(Controller):
-    """DC motor with a current loop, limits of voltage and current, and an encoder; its rotor belongs to the load.
+    """DC motor with a current loop, limits of voltage and current, and an encoder; the rotor's inertia belongs to the load.
 
-    Over a sample the voltage and the speed are held, and the current follows exactly.
+    Within a sample, voltage and speed are constant; the current is computed exactly.
     """
 
     rows = (

@@ -1,6 +1,6 @@
-"""Write the descriptions inside FMUs of every kind from the mechanism's table of variables.
+"""Write the description files of FMUs of every kind from the mechanism's table of variables.
 
-They are ``modelDescription.xml`` and, for FMI 3.0, ``buildDescription.xml``.
+The files are ``modelDescription.xml`` and, for FMI 3.0, ``buildDescription.xml``.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from ..numerics import symbolic
 from ..run import expressions
 from .interface import Entry, derivatives, indicator, interface, states
 
-#: Namespace of the GUIDs, so that an interface of the same variables always has the same one.
+#: Namespace of the GUIDs, so that an interface with the same variables always has the same GUID.
 GUID_NAMESPACE = uuid.uuid5(uuid.NAMESPACE_URL, "urn:linkwork:fmi")
 
 AUTHOR = "The Linkwork developers"
@@ -43,11 +43,11 @@ class Kind(NamedTuple):
     fmi : int
         Major version of FMI.
     suffix : str
-        End of its model identifier, after the name of the mechanism's FMU; in its file name with hyphens.
+        End of the model identifier, after the name of the mechanism's FMU. The file name has hyphens in place of underscores.
     tool : str
-        Generation tool.
+        Program that generates the FMU.
     interfaces : mapping
-        Its interface types, each with its capability flags.
+        Interface types, each with its capability flags.
     """
 
     fmi: int
@@ -57,7 +57,7 @@ class Kind(NamedTuple):
 
     @property
     def native(self) -> bool:
-        """Whether it has model exchange and all variables of `interface`, not only the mechanism's variables."""
+        """Return whether FMUs of this kind have model exchange, and with it all variables of `interface`."""
         return "ModelExchange" in self.interfaces
 
     def identifier(self, mechanism: Mechanism) -> str:
@@ -117,7 +117,10 @@ KINDS = {"python": PYTHON, "native": NATIVE, "native-fmi3": NATIVE_FMI3}
 
 
 def token(mechanism: Mechanism, kind: Kind) -> str:
-    """Return the GUID or instantiation token, which changes only with a variable, its type, unit or start value."""
+    """Return the GUID or instantiation token of an FMU.
+
+    The result depends only on the kind and on the name, causality, type, unit, start value and bounds of every variable.
+    """
     lines = [
         "|".join((v.name, v.causality, v.kind, v.unit, repr(v.start), repr(v.minimum), repr(v.maximum)))
         for v in (entry.variable for entry in _entries(mechanism, kind))
@@ -128,7 +131,7 @@ def token(mechanism: Mechanism, kind: Kind) -> str:
 def description(mechanism: Mechanism, kind: Kind, sources: Sequence[str] = ()) -> bytes:
     """Return ``modelDescription.xml`` of an FMU.
 
-    The same mechanism gives the same bytes; there is a date of generation only where ``SOURCE_DATE_EPOCH`` sets it.
+    The same mechanism gives the same bytes; the date of generation is written only if ``SOURCE_DATE_EPOCH`` sets it.
 
     Parameters
     ----------
@@ -189,7 +192,7 @@ def _date() -> dict[str, str]:
 
 
 def layered_standard(tag: str, name: str, version: str, text: str) -> Element:
-    """Return the root of a layered standard's manifest."""
+    """Return the root element of the manifest of a layered standard."""
     stated = {"name": name, "version": version, "description": text}
     space = {"xmlns:fmi-ls": "http://fmi-standard.org/fmi-ls-manifest"}
     return Element(tag, space | {f"fmi-ls:fmi-ls-{key}": value for key, value in stated.items()})
@@ -241,7 +244,7 @@ def _variables(mechanism: Mechanism, kind: Kind, entries: Iterable[Entry]) -> El
         if variable.causality in _INITIAL:
             attributes["initial"] = _INITIAL[variable.causality]
         value = _value(variable, starts.get(variable.name, variable.start))
-        if entry.derivative_of in scale:  # only for states: OMSimulator takes every other variable for one, too
+        if entry.derivative_of in scale:  # only for states: OMSimulator would take any other variable for a state, too
             value["derivative"] = _index_or_reference(kind, entry.derivative_of)
         nominal = scale.get(entry.reference, variable.nominal)
         if nominal is not None:
@@ -298,7 +301,7 @@ def start_plant(mechanism: Mechanism) -> Plant:
 
 
 def _index_or_reference(kind: Kind, reference: int) -> str:
-    """Return how the model structure refers to a variable: by its index in FMI 2.0, by its value reference in FMI 3.0."""
+    """Return the number by which the model structure refers to a variable: index in FMI 2.0, value reference in FMI 3.0."""
     return str(reference + 1 if kind.fmi == 2 else reference)
 
 
@@ -337,7 +340,7 @@ def _structure(mechanism: Mechanism, kind: Kind, entries: Sequence[Entry]) -> El
 
 
 def _declared_dependencies(mechanism: Mechanism) -> dict[int, References]:
-    """Return, by output, the inputs on which it depends by the mechanism's table of variables; all are value references."""
+    """Return the inputs on which each output depends according to the mechanism's table; all are value references."""
     reference = {entry.variable.name: entry.reference for entry in interface(mechanism)}
     inputs = {
         "state": frozenset[int](),
@@ -349,7 +352,7 @@ def _declared_dependencies(mechanism: Mechanism) -> dict[int, References]:
 
 @cache
 def traced_dependencies(mechanism: Mechanism) -> dict[int, References]:
-    """Return, by output, derivative or event indicator, the states and inputs on which it depends; all are value references.
+    """Return the states and inputs on which each output, derivative and event indicator depends; all are value references.
 
     The dependencies follow from the equations: direct ones, and those through the jump of a commanded rate.
     """

@@ -1,4 +1,4 @@
-"""Write the experiments in every FMU: the mechanism's standard cases, with reference results of the plant in Python.
+"""Write the experiments inside every FMU: the mechanism's standard cases, with reference results of the plant in Python.
 
 The files are those of the layered standard FMI-LS-REF; `analysis.run.experiments` reads and runs them.
 """
@@ -24,9 +24,9 @@ from ..run import ALLOWED, EXPERIMENTS, MANIFEST, STANDARD, Case, input_sampler,
 from .bill import BILL, TYPE
 from .description import layered_standard, to_xml_bytes
 
-#: Communication steps of an experiment, rows of its reference, and digits of its numbers.
+#: Communication steps of an experiment, rows of its reference after the start, and digits of its numbers.
 STEPS, ROWS, DIGITS = 100, 10, 12
-#: Greatest number of the plant's steps in a default experiment: more take plain Python seconds.
+#: Greatest number of solver steps of the plant in a default experiment: more steps take seconds in plain Python.
 LONGEST = 200
 #: Tolerances of the reference and of the experiment; the greatest relative difference that is allowed between them.
 REFERENCE, TOLERANCE, DIFFERENCE = 1e-12, 1e-10, 1e-6
@@ -38,10 +38,10 @@ _EXPERIMENTS = ("smoke-tests.exp", "application/x-ma-hs-experiments")
 
 @cache
 def experiments(mechanism: Mechanism) -> dict[str, bytes]:
-    """Return the files of a mechanism's experiments and their manifest, by their places in the archive.
+    """Return the files of a mechanism's experiments and their manifest, by their paths in the archive.
 
-    An unregistered mechanism, or one without cases, has only its default experiment; this is halved until it does not meet the
-    limit of assembly, and the plant takes at most `LONGEST` steps.
+    A mechanism that is not registered or has no cases has only its default experiment. The duration of this experiment is
+    halved until the motion does not reach the limit of assembly and the solver takes at most `LONGEST` steps.
     """
     cases = standard_cases(mechanism) if mechanism.cases and mechanism.name in MECHANISMS else {}
     root = Element("Experiments", {"name": mechanism.fmu, "description": "Standard cases of Linkwork"})
@@ -96,7 +96,7 @@ def experiments(mechanism: Mechanism) -> dict[str, bytes]:
 
 
 def format_csv(names: Sequence[str], rows: Sequence[Sequence[float]]) -> str:
-    """Return comma-separated values in the form of fmi-standard.org: names in quotes, numbers as in C."""
+    """Return comma-separated values in the format of fmi-standard.org: names in quotes, numbers as in C."""
     text = io.StringIO()
     csv.writer(text, quoting=csv.QUOTE_ALL, lineterminator="\n").writerow(names)
     csv.writer(text, lineterminator="\n").writerows([[repr(float(value)) for value in row] for row in rows])
@@ -130,7 +130,7 @@ def _result_indices(mechanism: Mechanism) -> list[int]:
 
 
 class _TooLongError(Exception):
-    """The plant has taken too many steps at a ``time`` (s)."""
+    """The solver of the plant has already taken too many steps at a ``time`` (s) before the end."""
 
     def __init__(self, time: float) -> None:
         self.time = time
@@ -139,10 +139,10 @@ class _TooLongError(Exception):
 def _reference(
     mechanism: Mechanism, values: Mapping[str, Any], times: Sequence[float], inputs: _Inputs, longest: float
 ) -> tuple[list[list[float]], list[list[float]]]:
-    """Return the rows of inputs, one for each step, and `ROWS` rows of results; each row begins with the time.
+    """Return the rows of inputs for all ``times``, and rows of results at the start and at `ROWS` later times.
 
-    Results are taken before the inputs of the next step are set. Raises `_TooLongError` after about ``longest`` steps of the
-    plant's solver.
+    Each row begins with the time. Results are taken before the inputs of the next step are set. Raises `_TooLongError`
+    after about ``longest`` steps of the plant's solver.
     """
 
     def rounded_inputs(number: int, outputs: Sequence[float] | None) -> dict[str, float]:
@@ -172,7 +172,10 @@ def _reference(
 
 
 def _round_results(mechanism: Mechanism, rows: list[list[float]]) -> list[list[float]]:
-    """Round results to `DIGITS` digits of the largest value of their unit, so that another C library gives the same texts."""
+    """Round results, so that another C library gives the same texts.
+
+    In each unit the largest result gets `DIGITS` significant digits, all others as many decimal places as this result.
+    """
     units = [v.unit for v in mechanism.variables if v.name in mechanism.output_names]
     units = ["", *(units[place] for place in _result_indices(mechanism))]
     largest: dict[str, float] = {}
@@ -184,7 +187,7 @@ def _round_results(mechanism: Mechanism, rows: list[list[float]]) -> list[list[f
 
 
 def _parameter_set(name: str, values: Mapping[str, Any]) -> bytes:
-    """Return a parameter set of SSP."""
+    """Return a parameter set of the standard SSP as XML; ``values`` are by FMI name."""
     root = Element("ssv:ParameterSet", {"xmlns:ssv": _SSV, "version": "1.0", "name": name})
     listed = SubElement(root, "ssv:Parameters")
     for key, value in values.items():

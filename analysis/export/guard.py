@@ -1,4 +1,7 @@
-"""The guard of the Python FMUs: a library in C before PythonFMU's, which mends what no slave can (``fmu_src/guard.c``)."""
+"""The guard of the Python FMUs, ``fmu_src/guard.c``: a C library between the master and PythonFMU's library.
+
+The guard corrects errors of PythonFMU's library that a slave in Python cannot correct.
+"""
 
 from __future__ import annotations
 
@@ -16,7 +19,7 @@ SOURCE = "sources/guard.c"
 #: Name of PythonFMU's library by the folder of its platform.
 PYTHONFMU = {"linux64": "libpythonfmu-export.so", "win64": "pythonfmu-export.dll"}
 
-#: Options beside `OPTIONS`. For Windows the guard calls the system alone: the C library would take a minute to compile.
+#: Options in addition to `OPTIONS`. On Windows the guard calls only the system: the C library takes a minute to compile.
 _OPTIONS = {
     "linux64": ("-Os", "-ldl"),
     "win64": ("-Os", "-ffreestanding", "-nostdlib", "-lkernel32", "-Wl,--entry,DllMain"),
@@ -24,9 +27,10 @@ _OPTIONS = {
 
 
 def add_guard(entries: Mapping[str, bytes], model: str, source: bytes) -> dict[str, bytes]:
-    """Give PythonFMU's libraries in the files of an FMU their own names, and their places to the guard.
+    """Put the guard in the place of PythonFMU's libraries, which are renamed; return all files by path.
 
-    The source of the guard is added, and the GUID, which the guard compares with the master's.
+    The source of the guard is added, and a file with the FMU's GUID. The guard compares this GUID with the GUID that the master
+    gives.
 
     Parameters
     ----------
@@ -35,7 +39,7 @@ def add_guard(entries: Mapping[str, bytes], model: str, source: bytes) -> dict[s
     model : str
         Model identifier of the FMU.
     source : bytes
-        The guard's C.
+        C source of the guard.
 
     Raises
     ------
@@ -59,7 +63,7 @@ def compile_guard(source: bytes) -> dict[str, bytes]:
     with tempfile.TemporaryDirectory(prefix="linkwork-guard-") as folder:
         (Path(folder) / "guard.c").write_bytes(source)
         for name in HEADERS[2]:
-            # of the C library they need a type alone
+            # the headers need only a type of the C library
             text = (headers / name).read_text(encoding="utf-8").replace("<stdlib.h>", "<stddef.h>")
             (Path(folder) / name).write_text(text, encoding="utf-8")
         for platform in PLATFORMS.values():

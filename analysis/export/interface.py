@@ -34,11 +34,11 @@ class Entry(NamedTuple):
     variable : Variable
         Its causality may also be ``independent``.
     reference : int
-        Value reference: its place among the entries. The index of FMI 2.0 is one more.
+        Value reference, which is the index among the entries, from 0. The index of FMI 2.0 is greater by one.
     derivative_of : int or None
-        Value reference of the variable whose time derivative it is.
+        Value reference of the variable whose time derivative this variable is.
     role : str
-        Where its value comes from: ``parameter`` (a field of the mechanism's parameters), ``mode``, ``initial`` (a field of
+        Where the value comes from: ``parameter`` (a field of the mechanism's parameters), ``mode``, ``initial`` (a field of
         the state at the start), ``tolerance``, ``input`` (a channel), ``output`` (a component of ``equations.outputs``),
         ``status``, ``time``, ``state`` (a component of the state that is no output), ``derivative`` (a component of
         ``equations.derivative`` that is no output) or ``indicator``.
@@ -56,7 +56,7 @@ def with_starts(mechanism: Mechanism, values: Mapping[str, float]) -> Mechanism:
     Raises
     ------
     UnknownNameError
-        If it has no such parameter or input.
+        If the mechanism has no such parameter or input.
     """
     known = [v.name for v in mechanism.variables if v.causality in ("parameter", "input")]
     for name in values:

@@ -61,7 +61,7 @@ OPTIONS = (
     "-ffunction-sections", "-Wl,--gc-sections", "-s",
 )  # fmt: skip
 
-#: Options for one WebAssembly module, which imports nothing but what it is told to.
+#: Options for a WebAssembly module, which imports only what the source declares as an import.
 WASM_OPTIONS = (
     *(option for option in OPTIONS if option not in ("-shared", "-fPIC", "-fvisibility=hidden")),
     "-mexec-model=reactor", "-Wl,-z,stack-size=262144",
@@ -93,7 +93,7 @@ def this_platform() -> str:
     Raises
     ------
     BuildError
-        If it is none of `PLATFORMS`.
+        If this platform is not in `PLATFORMS`.
     """
     architecture = {"amd64": "x86_64", "arm64": "aarch64"}.get(machine.machine().lower(), machine.machine().lower())
     name = f"{architecture}-{machine.system().lower()}"
@@ -115,7 +115,7 @@ def build_native(
     dest : path
         Folder for the FMU; made if it is not there.
     platforms : sequence of str, optional
-        Names of `PLATFORMS`, or `WASM`; that of this process by default.
+        Names in `PLATFORMS`, or `WASM`; by default the platform of this process.
 
     Raises
     ------
@@ -158,8 +158,8 @@ def source_files(mechanism: Mechanism, kind: Kind, *, web: bool = False) -> dict
 
     With ``web`` there is also the file for a WebAssembly component.
 
-    `COMPILED` includes all the others. The functions of the standard have the prefix FMI2_FUNCTION_PREFIX or
-    FMI3_FUNCTION_PREFIX if it is defined; nothing else is visible outside.
+    Only all.c (`COMPILED`) is compiled; it includes all other C files. The functions of the standard have the prefix
+    FMI2_FUNCTION_PREFIX or FMI3_FUNCTION_PREFIX if this macro is defined; no other symbols are exported.
     """
     shell = SOURCES / "native"
     headers = resources.files("fmpy") / "c-code"
@@ -175,7 +175,10 @@ def source_files(mechanism: Mechanism, kind: Kind, *, web: bool = False) -> dict
 
 
 def _with_prefix(fmi2: str, fmi3: str) -> str:
-    """Return the FMI 2.0 header with the standard's lines for a function prefix, which FMPy omits, from the FMI 3.0 header."""
+    """Return the FMI 2.0 header with lines for a function prefix, made from the FMI 3.0 header.
+
+    FMPy omits these lines of the standard in its FMI 2.0 header.
+    """
     first, last = fmi2.index("/*\nExport FMI2 API functions"), "#define fmi2FullName(name) name\n"
     lines = fmi3[fmi3.index("#if !defined(FMI3_OVERRIDE") : fmi3.index("/* FMI version */")]
     return fmi2[:first] + lines.replace("FMI3", "FMI2").replace("fmi3", "fmi2") + fmi2[fmi2.index(last) + len(last) :]
@@ -184,7 +187,10 @@ def _with_prefix(fmi2: str, fmi3: str) -> str:
 def compile_binaries(
     identifier: str, kind: Kind, sources: dict[str, str], platforms: Sequence[str]
 ) -> dict[str, bytes]:
-    """Compile the libraries and return them by path in the archive; two architectures of macOS share one file."""
+    """Compile the library for each platform; return the libraries by path in the archive.
+
+    The libraries for two architectures of macOS are in one file.
+    """
     found: dict[str, list[bytes]] = {}
     with tempfile.TemporaryDirectory(prefix="linkwork-native-") as folder:
         for name, text in sources.items():
@@ -207,12 +213,13 @@ def compile_library(
 ) -> None:
     """Compile C files of a folder to a library in the same folder.
 
-    What Zig compiles for its own use, such as the C library, is cached with hashes and compiled again if a file has changed.
+    What Zig compiles for its own use, such as the C library, is cached with hashes and compiled again if a cached file has
+    changed.
 
     Raises
     ------
     BuildError
-        With what the compiler printed, if it failed.
+        If the compiler fails; the message has what the compiler printed.
     MissingLibraryError
         If Zig is not installed.
     """

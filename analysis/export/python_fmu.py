@@ -1,7 +1,7 @@
 """Build the Python FMUs.
 
-Each contains the plant, its slave and pythonfmu, and only needs a Python of `OLDEST` or newer in the importing process. The
-plant and the slave have names with a short hash of their content, because FMUs in one process share one interpreter: so
+Each Python FMU contains the plant, its slave and pythonfmu, and needs only Python `OLDEST` or newer in the importing process.
+All FMUs in one process share one interpreter. The names of plant and slave therefore contain a short hash of their content:
 different mechanisms, builds and versions run side by side, each with its own equations.
 """
 
@@ -40,7 +40,7 @@ _NEEDS_PYTHON = (
 
 
 def build(mechanism: Mechanism, dest: Path | str = "build", sources: Path | str = SOURCES) -> Path:
-    """Build the FMU of a mechanism and return its path.
+    """Build the Python FMU of a mechanism and return its path.
 
     Parameters
     ----------
@@ -106,7 +106,7 @@ class {name}(LinkworkSlave):
 
 
 class _StagedFiles(NamedTuple):
-    """Files inside an FMU: script of its slave, package of the plant, module that all slaves share; name of the mechanism."""
+    """Files inside an FMU: script of the slave, package of the plant, module of all slaves; import name of the mechanism."""
 
     script: Path
     package: Path
@@ -115,7 +115,10 @@ class _StagedFiles(NamedTuple):
 
 
 def _stage(mechanism: Mechanism, sources: Path, stage: Path) -> _StagedFiles:
-    """Copy plant and slave under names with a hash of their content; a mechanism of another package is put into the plant's."""
+    """Copy plant and slave under names with a hash of their content.
+
+    A mechanism from another package is copied into the package of the plant.
+    """
     shared = sources / "linkwork"
     package = str(mechanism.modules[-1].__package__)
     folder = package.rpartition(".")[2]
@@ -150,7 +153,7 @@ def _stage(mechanism: Mechanism, sources: Path, stage: Path) -> _StagedFiles:
 
 
 def _describe(staged: _StagedFiles) -> bytes:
-    """Return the model description of the staged files, not of the modules imported here, and give its slave the GUID."""
+    """Return the model description of the staged mechanism, not of the module imported here; write its GUID to the slave."""
     sys.path.insert(0, str(staged.script.parent))
     mechanism = import_module(staged.mechanism).MECHANISM
     guid = f'guid_of_interface = "{token(mechanism, PYTHON)}"'
@@ -168,9 +171,9 @@ def build_controller(name: str, dest: Path | str = "build") -> Path:
     Parameters
     ----------
     name : str
-        One of `controllers.CONTROLLERS`.
+        A key of `controllers.CONTROLLERS`.
     dest : path
-        Folder of the subfolder; if it already has the FMU of the same content, this is kept.
+        Folder in which the subfolder is made; an FMU that is already there is kept.
     """
     text, shared = (Path(str(module.__file__)).read_text(encoding="utf-8") for module in (controllers, wrapper))
     guard = (SOURCES / "guard.c").read_bytes()
@@ -196,7 +199,7 @@ def build_controller(name: str, dest: Path | str = "build") -> Path:
 
 @contextmanager
 def _import_state() -> Iterator[None]:
-    """Undo the changes that pythonfmu's builder makes to the import state of this process."""
+    """Restore at the end of the block the import state of this process, which pythonfmu's builder changes."""
     path, modules = list(sys.path), set(sys.modules)
     writes_bytecode = sys.dont_write_bytecode
     sys.dont_write_bytecode = True

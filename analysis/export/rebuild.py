@@ -1,4 +1,4 @@
-"""Build the binaries of an FMU of Linkwork again from the sources that it carries, and compare."""
+"""Build the binaries of an FMU of Linkwork again from the sources in the FMU, and compare them with the binaries in the FMU."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ _FAT, _X86, _ARM = b"\xca\xfe\xba\xbe", b"\x07\x00\x00\x01", b"\x0c\x00\x00\x01"
 
 
 class Comparison(NamedTuple):
-    """A comparison: what was compared, whether it is the same, and a text on what it was compared with."""
+    """Result of one comparison: the files compared, whether they are the same, and a text on differences or versions."""
 
     what: str
     same: bool
@@ -31,15 +31,15 @@ class Comparison(NamedTuple):
 
 
 def rebuild(fmu: Path | str) -> Iterator[Comparison]:
-    """Compare an FMU with its bill of materials, and its libraries with those that its sources give here.
+    """Compare an FMU with its bill of materials, and its libraries with libraries compiled here from its sources.
 
-    The libraries of a native FMU are compiled again, and so is the guard of a Python FMU, whose library and modules of
-    PythonFMU are compared with the installed package. They have the same bytes if the programs have the versions that the
-    bill names.
+    The libraries of a native FMU and the guard of a Python FMU are compiled again. PythonFMU's libraries and modules in a
+    Python FMU are compared with the installed package. All bytes are the same if the programs installed here have the
+    versions named in the bill.
 
     Yields
     ------
-    Compared
+    Comparison
 
     Raises
     ------
@@ -57,7 +57,7 @@ def rebuild(fmu: Path | str) -> Iterator[Comparison]:
             bill = json.loads(files[BILL])
             stated = {c["name"]: c["hashes"][0]["content"] for c in bill["components"] if c["type"] == "file"}
             tools = {c["name"]: c["version"] for c in bill["metadata"]["tools"]["components"]}
-        except Exception as error:  # zipfile and zlib raise their own
+        except Exception as error:  # zipfile and zlib raise exceptions of their own
             raise BuildError(f"{fmu}: {BILL} cannot be read: {first_line(error)}") from error
     found = {name: hashlib.sha256(content).hexdigest() for name, content in files.items() if name != BILL}
     wrong = sorted(name for name in {*stated, *found} if stated.get(name) != found.get(name))
@@ -73,7 +73,7 @@ def _versions(tools: dict[str, str], name: str) -> str:
 
 
 def _compare_libraries(files: dict[str, bytes], tools: dict[str, str]) -> Iterator[Comparison]:
-    """Compile the sources for every platform of the binaries and compare the results."""
+    """Compile the sources for every platform of the FMU's binaries and compare the results with these binaries."""
     root = ElementTree.fromstring(files["modelDescription.xml"])
     kind = NATIVE_FMI3 if root.get("fmiVersion", "").startswith("3") else NATIVE
     part = root.find("CoSimulation")
@@ -100,7 +100,7 @@ def _compare_libraries(files: dict[str, bytes], tools: dict[str, str]) -> Iterat
 
 
 def _compare_pythonfmu(files: dict[str, bytes], tools: dict[str, str]) -> Iterator[Comparison]:
-    """Compare library and modules of PythonFMU with those of the installed package, and compile the guard again."""
+    """Compare PythonFMU's libraries and modules with the installed package, and the guard with a guard compiled again."""
     package: Any = resources.files("pythonfmu")
     for folder, name in PYTHONFMU.items():
         content = (package / "resources" / "binaries" / folder / name).read_bytes()

@@ -22,7 +22,7 @@ _ICONS: Mapping[str, Callable[[float, float], bool]] = {
 
 
 def terminal_files(mechanism: Mechanism) -> dict[str, bytes]:
-    """Return ``terminalsAndIcons.xml`` and the icons that it names, by their places in the archive."""
+    """Return ``terminalsAndIcons.xml`` and its icons, by their paths in the archive."""
     files = {"terminalsAndIcons.xml": terminals(mechanism)}
     files |= {f"{kind}.png": _icon(inside) for kind, inside in _ICONS.items()}
     return {f"terminalsAndIcons/{name}": content for name, content in files.items()}
@@ -31,8 +31,9 @@ def terminal_files(mechanism: Mechanism) -> dict[str, bytes]:
 def terminals(mechanism: Mechanism) -> bytes:
     """Return ``terminalsAndIcons.xml`` with the terminals of shafts, sliders and loaded points.
 
-    Each freedom has a terminal with its coordinate, rate and acceleration, its inputs, and the torque or force applied; each
-    loaded point has one with its load inputs and its displacement. Forces and torques are inflows, all others signals.
+    Each degree of freedom has a terminal with coordinate, rate, acceleration, inputs, and the torque or force applied. Each
+    loaded point has a terminal with its load inputs and its displacement. Forces and torques are inflows; all other variables
+    are signals.
     """
     root = Element("fmiTerminalsAndIcons", {"fmiVersion": "3.0"})
     picture = SubElement(root, "GraphicalRepresentation")
@@ -61,7 +62,7 @@ def terminals(mechanism: Mechanism) -> bytes:
 
 
 def _terminals(mechanism: Mechanism) -> dict[str, tuple[str, dict[str, str]]]:
-    """Return the terminals by name: description, and variables by the name of the member."""
+    """Return by name each terminal's description, and the terminal's variables by the name that they have in the terminal."""
     rate = {v.rate_of: v.name for v in mechanism.variables if v.rate_of}
     found: dict[str, tuple[str, dict[str, str]]] = {}
 
@@ -91,7 +92,7 @@ def _terminals(mechanism: Mechanism) -> dict[str, tuple[str, dict[str, str]]]:
 
 
 def _icon(inside: Callable[[float, float], bool]) -> bytes:
-    """Return a PNG (ISO/IEC 15948) that is black where ``inside`` and transparent elsewhere."""
+    """Return a PNG image (ISO/IEC 15948) that is black at the points ``inside`` and transparent elsewhere."""
     places = [(2 * n + 1) / _PIXELS - 1.0 for n in range(_PIXELS)]
     rows = b"".join(b"\0" + b"".join(b"\0\xff" if inside(x, y) else b"\0\0" for x in places) for y in places)
 

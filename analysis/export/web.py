@@ -1,6 +1,6 @@
 """Build a mechanism for a browser: the C of a native FMU with an interface of its own, as WebAssembly without imports.
 
-The arrays have the sizes of the mechanism, so that each mechanism has a module of its own.
+The sizes of the arrays depend on the mechanism; each mechanism therefore has a WebAssembly module of its own.
 """
 
 from __future__ import annotations
@@ -48,7 +48,7 @@ def build_web(mechanism: Mechanism) -> bytes:
 
 
 def web_sources(mechanism: Mechanism) -> dict[str, str]:
-    """Return all C files of a mechanism's module by name."""
+    """Return all C files of a mechanism's WebAssembly module by name."""
     files = {name: (SOURCES / "native" / name).read_text(encoding="utf-8") for name in _SHARED}
     files |= {path.name: path.read_text(encoding="utf-8") for path in sorted(_OWN.glob("*.[ch]"))}
     others = [f"Equation driven_{name};\n#define equations_{name} driven_{name}\n" for name in _DRIVEN]
@@ -59,7 +59,7 @@ def web_sources(mechanism: Mechanism) -> dict[str, str]:
 
 
 def crank_index(mechanism: Mechanism) -> int:
-    """Return the index of the first freedom that turns; -1 if there is none."""
+    """Return the index of the first degree of freedom that is a crank; -1 if there is none."""
     return next(iter(mechanism.cyclic_freedoms), -1)
 
 
@@ -100,12 +100,15 @@ def _header(mechanism: Mechanism) -> str:
 
 
 def _torque_input(mechanism: Mechanism, crank: int) -> int:
-    """Return the index of the input that is the torque on the freedom with index ``crank``; -1 if there is none."""
+    """Return the index of the input that is the torque on the crank; -1 if there is none.
+
+    ``crank`` is the index of the crank among the degrees of freedom, -1 without a crank.
+    """
     return next((n for n, c in enumerate(mechanism.channels) if c.kind == "force" and c.freedom == crank >= 0), -1)
 
 
 def _drawing(mechanism: Mechanism) -> str:
-    """Return the text of drawing.c: positions of the joints and their derivatives with respect to the given values."""
+    """Return the text of drawing.c: positions of the joints and their derivatives by parameters and initial state."""
     casadi = symbolic.library()
     join, sx = casadi.vertcat, casadi.SX
     modes, u = sx.sym("modes", len(mechanism.modes)), sx.sym("u", len(mechanism.channels))
@@ -127,10 +130,10 @@ def _drawing(mechanism: Mechanism) -> str:
 
 
 def _motor_functions(mechanism: Mechanism) -> list[tuple[Any, ...]]:
-    """Return the functions of the page's motor, each as (name, arguments, *results).
+    """Return the functions for the motor on the studio's page, each as (name, arguments, *results).
 
-    They are the motor torque and its derivative, the derivative of the state and of the accelerations with the motor, and, for
-    the natural frequency, inertia and stiffness of the freedom beside the crank, at rest.
+    The functions are: the motor torque and its derivative; the derivative of the state with the motor, and the derivatives of
+    the accelerations; and, for the natural frequency, inertia and stiffness at rest in the coordinate beside the crank angle.
     """
     casadi = symbolic.library()
     join, sx, freedoms = casadi.vertcat, casadi.SX, len(mechanism.freedoms)

@@ -40,9 +40,9 @@ def plot_bode(
     systems : mapping
         Linear systems of python-control, by their names in the legend.
     unit : str
-        Unit of output/input; the magnitude is not in decibels.
+        Unit of the output divided by the unit of the input; the magnitude is not in decibels.
     frequencies : array_like, shape (n,), optional
-        rad/s; by default python-control chooses them for all systems together.
+        Frequencies (rad/s); by default python-control chooses common frequencies for all systems.
     margins : bool
         Whether to mark gain and phase margins and state them in the legend; the systems must be open loops.
     title : str
@@ -135,7 +135,7 @@ def plot_linear_model(
 ) -> Figure:
     """Plot magnitude and phase of a linear model from one input to one output, by FMI names; see `plot_bode`.
 
-    By default the input is the force on the last free coordinate, and the output is that coordinate.
+    By default the output is the last coordinate that is not commanded, and the input is the force along this coordinate.
     """
     units = {v.name: v.unit for v in model.mechanism.variables}
     source = model.force_channel()[0] if input is None else input

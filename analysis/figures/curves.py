@@ -46,10 +46,10 @@ _Arguments = ParamSpec("_Arguments")
 class Curve:
     """One curve of a panel.
 
-    ``x`` and ``y`` are points (n,) in the units of the axes, ``label`` is the entry of the legend, ``order`` the drawing order
-    (Matplotlib's zorder); the panel chooses colour, width and order that are None. A marker between dollars, such as "$2$", is
-    drawn as these letters. With ``cut`` markers are cut at the edge of the axes. ``hover`` has arrays (n,), by name with unit,
-    that an HTML page shows under the pointer beside x and y.
+    ``x`` and ``y`` are the coordinates of the points, shape (n,), in the units of the axes. ``label`` is the entry of the
+    legend, ``order`` the drawing order (Matplotlib's zorder). If colour, width or order is None, the panel chooses it. For a
+    marker such as "$2$" the text between the dollars is drawn. If ``cut`` is true, markers are cut off at the edge of the axes.
+    ``hover`` has arrays (n,), by name with unit, that an HTML page shows under the pointer beside x and y.
     """
 
     x: ArrayLike
@@ -106,7 +106,7 @@ class Panel:
     verticals : mapping
         Places along x of dotted vertical lines, by name; the names are written where they cover as little as possible.
     dashed : sequence of float
-        Places along x of dashed lines without a name.
+        Places along x of dashed vertical lines without a name.
     legend : str, optional
         Heading of the legend, which is drawn if any curve has a label.
     legend_at : str
@@ -117,7 +117,7 @@ class Panel:
     equal : bool
         Whether both axes have the same scale.
     filled : sequence of sequence of ndarray, shape (n, 2)
-        Areas to shade, each as the list of its closed boundaries; clockwise ones are holes.
+        Areas to shade, each as the list of its closed boundaries; clockwise boundaries are holes.
     x_ticks : sequence of float, optional
     shades : sequence of Shade
     labels : sequence of Label

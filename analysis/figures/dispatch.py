@@ -177,7 +177,10 @@ def _has_planar_drawing(parameters: object) -> bool:
 
 
 def last_samples(run: Trajectory) -> tuple[slice, str]:
-    """Return the samples over which paths are drawn, of a long run only the last, and a phrase that names the samples."""
+    """Return the slice of a run's samples over which paths are drawn, and a phrase that names these samples.
+
+    For a long run the slice has only the last samples.
+    """
     if len(run) <= _TRACED:
         return slice(None), "over the run"
     return slice(-_TRACED, None), f"over the last {run.time[-1] - run.time[-_TRACED]:.3g} s"

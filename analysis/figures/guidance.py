@@ -46,7 +46,10 @@ VIEW = 2.2
 
 @plot.register
 def plot_guidance(found: Guidance, *, title: str = "") -> Figure:
-    """Plot the poses, all dyads that guide the body through them, and below each four-bar of two dyads with its defects."""
+    """Plot the poses with all dyads that guide the body through them; in panels below, plot the four-bars and their defects.
+
+    Each four-bar consists of two of the dyads.
+    """
     count = len(found.solutions)
     columns = 3
     rows = ceil(count / columns)
@@ -133,7 +136,7 @@ def _parts(z: NDArray[Any]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
 
 
 def _poses(found: Guidance | GuidanceMap) -> tuple[NDArray[np.complex128], NDArray[np.float64], float]:
-    """Return positions of the poses (complex, mm), their angles (rad), and the diagonal of the box about them (mm)."""
+    """Return positions of the poses (complex, mm), their angles (rad), and the diagonal of the box around them (mm)."""
     points = MM_PER_METRE * np.asarray(found.task.points)
     return points @ np.array([1.0, 1j]), np.asarray(found.task.angle), float(np.hypot(*np.ptp(points, axis=0)))
 
@@ -173,9 +176,10 @@ def _pins(solution: Solution) -> dict[str, complex]:
 
 
 def _draw_links(axis: Axes, solution: Solution, dyads: Sequence[Dyad] = (), *, named: bool = False) -> None:
-    """Draw the links in the first pose, the crank thick.
+    """Draw the links in the first pose; the crank is a thick line.
 
-    With ``dyads`` crank and rocker have the colours of their dyads; with ``named`` the links have entries in the legend.
+    If ``dyads`` are given, crank and rocker have the colours of their dyads; if ``named`` is true, the links have entries in
+    the legend.
     """
     names = ("crank", "rocker", "body with its point, pose 1", "fixed pivots") if named else (None,) * 4
     pins = _pins(solution)

@@ -87,7 +87,7 @@ def to_plotly(picture: Picture) -> dict[str, Any]:
 
 
 class _Figure:
-    """Plotly's traces and layout of a picture, to which `_Axes` adds; ``heights`` are relative heights of the rows."""
+    """Plotly's traces and layout of a picture, filled by `_Axes`; ``heights`` are relative heights of the rows."""
 
     def __init__(self, picture: Picture, heights: Sequence[float]) -> None:
         self.columns, self.shared = picture.columns, bool(picture.heights)
@@ -154,7 +154,7 @@ class _Axes:
         self.figure.layout["shapes"].append(box | shape)
 
     def add_arrow(self, x: float, y: float, text: str = "", **look: Any) -> None:
-        """Add an arrow to the point (x, y); ``look`` says where it starts: at a text, or at another y."""
+        """Add an arrow to the point (x, y); ``look`` are Plotly's options, such as the start of the arrow."""
         references = {"xref": f"x{self.suffix}", "yref": f"y{self.suffix}"}
         if "ayref" in look:
             look |= {"axref": references["xref"], "ayref": references["yref"]}
@@ -226,7 +226,7 @@ def _(panel: Panel, axes: _Axes) -> None:
     logarithmic = {axis: axis in panel.logarithmic for axis in "xy"}
 
     def at(axis: str, value: float) -> float:
-        """Return a value as Plotly's annotations and ranges take it: its logarithm on a logarithmic axis."""
+        """Return a value as Plotly expects it in annotations and ranges: its logarithm if the axis is logarithmic."""
         return log10(value) if logarithmic[axis] else value
 
     for arrow in panel.arrows:

@@ -125,7 +125,7 @@ class _Scene:
         axis.set_axis_off()
 
     def draw(self, axis: Axes, q: _Pins, *, letters: bool = True, trace: NDArray[np.float64] | None = None) -> None:
-        """Draw everything at one configuration; ``trace`` is the path of P, shape (n, 2), in cm."""
+        """Draw the whole mechanism at one configuration; ``trace`` is the path of P in cm, shape (n, 2)."""
         self._ground(axis, letters)
         if trace is not None and len(trace):
             axis.plot(*trace.T, color=TRACE, linewidth=LINE, zorder=2, solid_capstyle="round")
@@ -271,7 +271,7 @@ def draw_linkage(
     ----------
     parameters : FiveBarParameters
     crank_angle, slider_position : float
-        rad, m.
+        Crank angle (rad) and slider position (m).
     title : str
     trace : array_like, shape (n, 2), optional
         A path of the coupler point P (m), such as an arc of `analysis.youssef.coupler_curve`.

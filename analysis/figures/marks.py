@@ -234,7 +234,7 @@ def _place(
 
 
 def _move_name(mark: Annotation, top: float, side: _Side) -> Bbox:
-    """Move a name to a height (0 to 1) and a side of its vertical line, and return its box there."""
+    """Move a name to a relative height (0 to 1) and a side of its vertical line, and return the box of the name there."""
     mark.xy = (mark.xy[0], top)
     mark.set_horizontalalignment(side)
     mark.set_position((-_GAP if side == "right" else _GAP, -3.0))

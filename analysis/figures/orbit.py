@@ -21,13 +21,14 @@ _SAMPLES = 512
 def plot_orbit(orbit: PeriodicOrbit, *, title: str = "") -> Figure:
     """Plot a periodic motion over the crank angle and in the phase plane, and its Floquet multipliers.
 
-    The curves over the crank angle are the free coordinates, the crank speed if it varies, and the driving torque.
+    The quantities over the crank angle are the coordinates that are not commanded, the crank speed if a torque drives the
+    crank, and the driving torques.
 
     Parameters
     ----------
     orbit : PeriodicOrbit
     title : str
-        By default the speed, the period and the stability.
+        By default the title states the speed, the period and the stability.
     """
     turn, mechanism = orbit.turn(_SAMPLES), find_mechanism(orbit.parameters)
     variables = {v.name: v for v in mechanism.variables}
@@ -96,7 +97,10 @@ def _title(orbit: PeriodicOrbit, period: float) -> str:
 
 @plot.register
 def plot_orbits(found: Orbits, *, title: str = "") -> Figure:
-    """Plot the first free coordinate of all motions found at one speed over the crank angle, unstable ones dashed."""
+    """Plot a coordinate of all motions found at one speed over the crank angle; unstable motions are dashed.
+
+    The coordinate is the first that is not commanded.
+    """
     curves, label = [], "first free coordinate"
     for orbit in found.orbits:
         turn = orbit.turn(_SAMPLES)

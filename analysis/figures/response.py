@@ -84,7 +84,7 @@ class _Scale:
         return f"{name} [{self.unit}]" if self.unit else name
 
     def place(self, value: float) -> str:
-        """Return a value of the parameter in its display unit as text, to four digits, or to whole units from 1000 on."""
+        """Return a value of the parameter in its display unit as text, to four digits; values from 1000 on as whole numbers."""
         number = self.factor * value
         return f"{number:.0f} {self.unit}" if abs(number) >= 1e3 else f"{number:.4g} {self.unit}".rstrip()
 
@@ -103,8 +103,8 @@ def plot_branches(
 ) -> Figure:
     """Plot amplitude, harmonics, crank torque and pin force along branches, stable parts solid, unstable ones dashed.
 
-    At folds an arrow leads to the motion that the machine jumps to. The relative errors of approximations have a
-    panel. An approximation that cannot be told apart from the true motion is drawn in that panel only.
+    At folds an arrow leads to the motion that the machine jumps to. A panel shows the relative errors of the approximations.
+    An approximation that cannot be told apart from the true motion is drawn in this panel only.
 
     Parameters
     ----------
@@ -114,8 +114,8 @@ def plot_branches(
     rpm : bool
         Whether a speed in rad/s is drawn in rpm.
     beside : callable, optional
-        ``beside(values)`` returns the amplitudes (m) of approximations by name, at values (m,) of the parameter, each of shape
-        (m,). Their errors are relative to the stable motions with a period of one crank turn.
+        ``beside(values)`` receives values of the parameter, shape (k,), and returns the amplitudes of each approximation in
+        metres, shape (k,), by its name. The errors are relative to the stable motions with a period of one crank turn.
     avoid : sequence of Avoided
         Ranges of the parameter to shade.
     """
@@ -353,7 +353,7 @@ def _legend_entries(branches: Sequence[Branch]) -> list[Curve]:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Approximation:
-    """Amplitude by an approximation over the parameter, both of shape (m,), and errors of the approximation.
+    """Amplitudes of an approximation at values of the parameter, both of shape (k,), and errors of the approximation.
 
     ``errors`` has an array (3, n) for each branch of motions with a period of one turn; its rows are parameter, relative error
     (%) and true amplitude, with NaN at gaps.
@@ -440,7 +440,7 @@ def _visible_approximations(
 
 
 def _harmonics(branches: Sequence[Branch], look: _Scale, shades: Sequence[Shade]) -> Panel:
-    """Return the panel of the first harmonics of one-turn motions, with their numbers along the curves."""
+    """Return the panel of the lowest harmonics of motions with a period of one crank turn, with the orders along the curves."""
     single = [(n, branch) for n, branch in enumerate(branches) if branch.periods == 1] or list(enumerate(branches))
     names = [name for name in branches[0].columns() if name.startswith("harmonic ")]
     tops = [float(np.nanmax(branch.columns()[name], initial=0.0)) for _, branch in single for name in names]

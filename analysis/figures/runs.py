@@ -186,7 +186,7 @@ def _oscillations(values: FloatArray) -> int:
 
 
 def _mechanism(run: Trajectory) -> Mechanism:
-    """Return the mechanism of a run; if the run has no parameters, the mechanism with most outputs in common."""
+    """Return the mechanism of a run; if the run has no parameters, the mechanism that shares most outputs with the run."""
     if run.parameters is not None:
         return find_mechanism(run.parameters)
     return max(MECHANISMS.values(), key=lambda m: len(set(m.output_names) & set(run.names)))
@@ -271,7 +271,7 @@ def plot_comparison(
     title: str = "",
     labels: tuple[str, str] = ("first", "second"),
 ) -> Figure:
-    """Plot outputs of two runs in one row each, and beside them the second run minus the first.
+    """Plot each output of two runs in a row of its own, and beside it the difference: the second run minus the first.
 
     A difference that is only rounding is stated in words; if all differences are only rounding, this is stated at the foot.
 

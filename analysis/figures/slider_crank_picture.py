@@ -194,7 +194,7 @@ class _Scene:
         self.lines: list[FloatArray] = []
 
     def at(self, slide: float, x: float = 0.0, y: float = 0.0) -> FloatArray:
-        """Return the point (3,), in the ground frame, at a slider position, displaced from the guide by x and y of frame 4."""
+        """Return the point (3,), in the ground frame, at a slider position, displaced by x and y along i and j of frame 4."""
         return np.asarray(self.foot + np.array([x, y, -slide]) @ self.frame4)
 
     def page(self, points: ArrayLike) -> FloatArray:
@@ -224,7 +224,7 @@ class _Scene:
         axis.set_axis_off()
 
     def draw(self, axis: Axes, pose: _Pose, *, letters: bool = True) -> None:
-        """Draw everything at one configuration."""
+        """Draw the whole mechanism at one configuration, with the paths of its pins."""
         self.lines = []
         self._centre_lines(axis, pose)
         self._paths(axis, pose, letters)
@@ -375,7 +375,7 @@ def plot_mechanism(
     """Draw the generalised slider-crank in space at one configuration, in orthographic projection.
 
     The drawing has the links with their dimensions, frames 1 and 4, the paths of the pins, and, as thin lines, crank and rod at
-    the dead centres and at the limits of assembly, if the crank cannot turn fully. All directions have one scale.
+    the dead centres and at the limits of assembly, if the crank cannot turn fully. The scale is the same in all directions.
 
     Parameters
     ----------
@@ -449,7 +449,7 @@ def animate_mechanism(
     frames_per_second: int = 20,
     title: str = "",
 ) -> Path:
-    """Write a GIF of the mechanism over a period of the shift, with the slider position over the crank angle below it.
+    """Write a GIF of the mechanism over a period of the shift; a plot below it shows the slider position over the crank angle.
 
     If the crank cannot turn fully, it moves to and fro in the widest range of assembly.
 
@@ -522,9 +522,9 @@ def plot_range(
 ) -> Figure:
     """Draw the range of assembly on the crank pin's circle and over the crank angle.
 
-    On the circle, seen along the crank axis, the range of assembly is a solid line and the rest is dotted. Beside it are the
-    assembly margin (rod length minus distance of the crank pin from the guide) and the slider position, with dead centres and
-    limits.
+    On the circle, seen along the crank axis, the range of assembly is a solid line and the rest is dotted. Plots beside it show
+    the assembly margin (rod length minus distance of the crank pin from the guide) and the slider position, with dead centres
+    and limits.
 
     Parameters
     ----------

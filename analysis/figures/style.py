@@ -1,4 +1,4 @@
-"""Style of all figures: Matplotlib's settings, and colours, line widths and letter sizes.
+"""Style of all figures: Matplotlib's settings, and colours, line widths and font sizes.
 
 Figures are made inside ``with figure_style():``, so that the user's own settings of Matplotlib have no effect.
 """
@@ -35,7 +35,7 @@ LIGHT = ("#C6DFF0", "#F6C99F", "#A8DDB5", "#E7B9D6", "#F2E394", "#E0E0E0")
 #: Shades of ranges in order: colour, Matplotlib's hatching, Plotly's hatching.
 SHADES = (("#E69F00", "", ""), ("#56B4E9", "//", "/"), ("#009E73", "..", "."), ("#D55E00", "xx", "x"))
 
-#: Letter sizes (points): figure titles, drawings, titles of panels and axes, legends and notes, marks in a panel.
+#: Font sizes (points): figure titles, drawings, titles of panels and axes, legends and notes, marks in a panel.
 TITLE, LETTER, PLAIN, SMALL, TINY = 10.5, 10.5, 9.0, 8.0, 7.5
 #: Line widths (points): important curves, curves, secondary curves, reference lines.
 BOLD, LINE, THIN, HAIR = 1.8, 1.3, 0.9, 0.7
@@ -87,7 +87,7 @@ def figure_style(*, laid_out: bool = True) -> Iterator[None]:
 
 
 def write_title(figure: Figure, title: str) -> None:
-    """Write the title of a figure over as many lines as it needs; write nothing if it is empty."""
+    """Write the title of a figure over as many lines as it needs; write nothing if the title is empty."""
     if title.strip():
         width = int(_LETTERS * figure.get_figwidth())
         lines, longest = len(wrap(title, width)), max(map(len, title.split()))

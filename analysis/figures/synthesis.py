@@ -285,7 +285,7 @@ def _plot_rocker(axis: Axes, scene: LinkageScene) -> None:
 
 
 def _is_met(scene: LinkageScene) -> bool:
-    """Return whether all errors are only rounding."""
+    """Return whether the linkage meets the target: all errors are only rounding errors."""
     errors = [scene.stations[name] for name in ("error [m]", "error of angle [rad]") if name in scene.stations]
     return all(np.nanmax(np.abs(error), initial=0.0) < 1e-3 * ROUNDING for error in errors)
 
@@ -332,7 +332,7 @@ def _plot_transmission(axis: Axes, scene: LinkageScene) -> None:
 
 
 def _plot_pivot_motion(axis: Axes, scene: LinkageScene) -> None:
-    """Plot the motion of the rocker pivot, of a slider or a second crank, over a crank turn."""
+    """Plot the motion of a movable rocker pivot, on a slider or a second crank, over a crank turn."""
     assert scene.motion is not None
     name, values = scene.motion
     if name.endswith("[m]"):
@@ -452,7 +452,7 @@ def plot_sheet(
 
 
 def _plot_forces(axis: Axes, forces: PinForces, last: str) -> None:
-    """Plot the resultant force on each pin over the crank rotation; ``last`` is the name of the fourth: D or the guide."""
+    """Plot the resultant force on each pin over the crank rotation; ``last`` labels the fourth force: D or the guide."""
     for pin, force, colour in zip(("A", "B", "C", last), forces.force.T, COLOURS):
         axis.plot(np.degrees(forces.rotation), force, color=colour, label=f"{pin}: {force.max():.3g} N at most")
     _tick_quarter_turns(axis, np.degrees(forces.rotation))
@@ -495,7 +495,7 @@ def plot_alternatives(synthesis: Synthesis, *, title: str = "") -> Figure:
 
 @plot.register
 def plot_trade_off(traded: TradeOff, *, title: str = "") -> Figure:
-    """Plot quality function and worst error over the limit that was varied; limits without a linkage are marked.
+    """Plot quality function and worst error over the limit that was varied; limits at which no linkage was found are marked.
 
     Raises
     ------

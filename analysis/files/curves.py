@@ -42,10 +42,10 @@ def read_points(
     lines that start with # are ignored. If the last point repeats the first point, it is omitted and the curve is closed.
 
     SVG: the first path is read; if there is no path, the first ellipse, circle, polygon, polyline, rectangle or line. ``name``
-    selects an element by its ``id``, or a group, of which the first path or shape is read. Transforms are applied. y points
-    down in SVG, and is turned upwards: a point (x, y) in the user space of the drawing's ``viewBox`` becomes (x, -y). Chords
-    replace curves, with a deviation below 1e-4 of the curve's extent. The curve is closed if the SVG path is closed, or if its
-    end is its beginning.
+    selects an element by its ``id``; if the element is a group, the first path or shape in the group is read. Transforms are
+    applied. y points down in SVG, and is turned upwards: a point (x, y) in the user space of the drawing's ``viewBox`` becomes
+    (x, -y). Curves are replaced by chords, with a deviation below 1e-4 of the curve's extent. The curve is closed if the SVG
+    path is closed, or if the path ends at its first point.
 
     Parameters
     ----------

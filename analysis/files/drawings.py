@@ -135,7 +135,10 @@ class Text(_Shape):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Dimension(_Shape):
-    """The distance between two points (m), written on a parallel line at the distance ``offset`` (m) to their left."""
+    """The distance between two points (m), written on a line parallel to the line from ``start`` to ``end``.
+
+    ``offset`` is the distance (m) between these lines, positive to the left as seen from ``start`` to ``end``.
+    """
 
     start: Point
     end: Point
@@ -214,7 +217,7 @@ class Drawing:
 
     @property
     def extents(self) -> tuple[Point, Point]:
-        """Lower left and upper right corner (m) of the box around all shapes; a text counts only with its start."""
+        """Lower left and upper right corner (m) of the box around all shapes; of a text only the start is counted."""
         points = np.vstack(
             [np.array([p for line in self.lines for p in (line.start, line.end)]).reshape(-1, 2)]
             + [np.array(c.centre) + side * c.radius for c in self.circles for side in (-1.0, 1.0)]

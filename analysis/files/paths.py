@@ -103,7 +103,10 @@ def read_text(path: Path) -> str:
 
 
 def check_plain(path: Path) -> None:
-    """Raise InputError if a path is not a regular file, OSError if nothing is there; devices and pipes may never end."""
+    """Raise InputError if a path is not a regular file, OSError if nothing is there.
+
+    Devices and pipes are refused because reading them might never end.
+    """
     mode = os.stat(path).st_mode
     if not stat.S_ISREG(mode):
         kinds = ((stat.S_ISDIR, "a folder"), (stat.S_ISFIFO, "a pipe"), (stat.S_ISSOCK, "a socket"))

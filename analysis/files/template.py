@@ -120,7 +120,7 @@ def line(name: str, value: Any, comment: str, *, active: bool) -> str:
 
 
 def _default(of: Any, read: Reader) -> Any:
-    """Return the default ``of`` an entry as it is written in a TOML file; None if TOML cannot express it."""
+    """Return ``of``, the default of an entry, in the form for a TOML file; None if TOML cannot express it."""
     if isinstance(read, Quantity) and isinstance(of, (int, float)):
         return (float(of) if read.unit == "1" else in_words(of, read.unit)) if isfinite(of) else None
     if isinstance(read, Range) and isinstance(of, tuple):
@@ -139,7 +139,7 @@ def entries(
     Parameters
     ----------
     kind : dataclass, or dict with ``readers``
-        What the table is read into; its fields are the entries.
+        Class of the object into which the table is read; the fields of the class are the entries.
     given : mapping
         Values of the given entries by name.
     readers : mapping, optional

@@ -6,7 +6,8 @@ from this equilibrium:
 
     F = F0 + F_s (r - u0) - k (x - x0 - x_s (r - u0)) - k_i * integral of (u - r)
 
-LQR determines k and k_i from weights, PID from poles, PI (no gain on the velocity) from crossover and phase margin.
+LQR determines k and k_i from weights; PID determines them from poles; PI, without gain on the velocity, determines them from
+the crossover frequency and the phase margin.
 """
 
 from __future__ import annotations
@@ -34,7 +35,7 @@ else:
 
 
 class DesignError(LinkworkError):
-    """A controller cannot be designed for these requirements."""
+    """No controller can be designed for these requirements."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -50,21 +51,21 @@ class Design:
     channel : str
         FMI name of the force.
     freedom : int
-        Index of the controlled freedom, on which the force acts.
+        Index of the controlled degree of freedom, on which the force acts.
     gains : ndarray, shape (2 n,)
         Gains k of the model's state (q, q'), in N per unit of each component.
     integral_gain : float
         k_i (N/(m.s)); zero if there is no integral action.
     target, target_slope : ndarray, shape (2 n,)
-        x0, and its change x_s per m of the reference.
+        The state x0 of the operating point, and the change x_s of the equilibrium state per m of the reference.
     force, force_slope : float
-        F0 (N), and its change F_s per m of the reference (N/m).
+        The force F0 of the operating point (N), and the change F_s of the equilibrium force per m of the reference (N/m).
     poles : ndarray
         Poles of the closed loop (1/s), by magnitude.
     gain_margin : float
-        Factor by which the loop's gain can grow until the loop loses its stability; infinite if it never does.
+        Factor by which the loop's gain can grow until the closed loop becomes unstable; infinite if the loop never does.
     phase_margin : float
-        Phase margin (rad); infinite if the loop's gain nowhere crosses 1.
+        Phase margin (rad); infinite if the loop's gain is 1 at no frequency.
     crossover : float
         Highest frequency at which the loop's gain is 1 (rad/s); zero if there is none.
     delay_margin : float
@@ -110,7 +111,10 @@ class Design:
         return self.plant.loop(self.gains, self.integral_gain)
 
     def closed_loop(self, outputs: Sequence[str] | None = None) -> control.StateSpace:
-        """Return the closed loop, from a disturbing force to outputs by FMI name, by default the controlled coordinate."""
+        """Return the closed loop from a disturbing force to the outputs with the given FMI names.
+
+        The default output is the controlled coordinate.
+        """
         chosen = (self.coordinate,) if outputs is None else outputs
         a, b, row = self.plant.feedback_matrices(self.gains, self.integral_gain)
         whole = self.model.to_state_space(chosen, (self.channel,))
@@ -119,7 +123,7 @@ class Design:
         return control.ss(a - b @ row, b, c, whole.D, **names)
 
     def sampled_poles(self, period: float) -> NDArray[np.complex128]:
-        """Compute the poles (in z) of the closed loop if the law is sampled every ``period`` s and its force is held."""
+        """Compute the poles in z of the closed loop if the law is sampled every ``period`` seconds and the force is held."""
         check_period(period)
         a, b = self.plant.a, self.plant.b
         held = control.sample_system(control.ss(a, b, np.eye(len(a)), np.zeros((len(a), 1))), period, method="zoh")
@@ -134,7 +138,7 @@ class Design:
         return sort_by_magnitude(np.linalg.eigvals(kept))
 
     def continuous_law(self, reference: float) -> Function:
-        """Return the control law without sampling, as a force for `analysis.run.Inputs`.
+        """Return the control law as a force for `analysis.run.Inputs` that depends continuously on the state, without sampling.
 
         Raises
         ------
@@ -156,7 +160,7 @@ class Design:
         return Function(force)
 
     def plant_values(self, values: FloatArray) -> FloatArray:
-        """Extend an array over the model's state to all coordinates and rates of the plant, with zeros for the others."""
+        """Extend an array over the model's state to all coordinates and rates of the plant; the other entries are zero."""
         whole = np.zeros(2 * len(self.model.mechanism.freedoms))
         whole[self.model.places] = values
         return whole
@@ -183,7 +187,7 @@ class _Plant:
         return whole, np.vstack([self.b, [[0.0]]])
 
     def feedback_matrices(self, gains: FloatArray, integral_gain: float) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Return A, B and the gains, shape (1, states); the integral is the last state if its gain is not zero."""
+        """Return A, B and the gains as a row, shape (1, states); the last state is the integral if its gain is not zero."""
         if integral_gain:
             return *self.with_integral_state(), np.append(gains, integral_gain)[None, :]
         return self.a, self.b, gains[None, :]
@@ -194,7 +198,7 @@ class _Plant:
 
 
 def _design(method: str, model: LinearModel, channel: str | None, gains: FloatArray, integral_gain: float) -> Design:
-    """Check the stability of the closed loop with these gains, and return the design; raises DesignError if it is unstable."""
+    """Check that the closed loop with these gains is stable, and return the design; raise DesignError if it is unstable."""
     plant, freedoms = _Plant(model, channel), model.mechanism.freedoms
     for n in model.layout.free:
         if freedoms[n].period and model.state[len(freedoms) + n] != 0.0:
@@ -252,7 +256,7 @@ def design_lqr(
     integral: float = 0.0,
     channel: str | None = None,
 ) -> Design:
-    """Design state feedback that minimises the integral of x' Q x + r F^2 (+ integral * (integral of u)^2).
+    """Design a state feedback that minimises the time integral of x' Q x + r F^2 (+ integral * (integral of u)^2).
 
     Parameters
     ----------
@@ -266,7 +270,8 @@ def design_lqr(
     integral : float
         Weight of the integral of the coordinate (1/s2); if the weight is above zero, the law has integral action.
     channel : str, optional
-        FMI name of the force; by default the force on the last free freedom (`LinearModel.force_channel`).
+        FMI name of the force; by default the force on the last degree of freedom that is not commanded:
+        see `LinearModel.force_channel`.
 
     Raises
     ------
@@ -323,24 +328,25 @@ def design_pid(
     damping: float = 0.7,
     channel: str | None = None,
 ) -> Design:
-    """Design a PID controller by the three poles of the closed loop; the derivative part acts on the measured velocity.
+    """Design a PID controller from the three poles of the closed loop; the derivative part acts on the measured velocity.
 
     Parameters
     ----------
     model : LinearModel
-        A model with one free freedom, such as a five-bar in speed drive.
+        A model with one degree of freedom that is not commanded, such as a five-bar with commanded crank speed.
     poles : sequence of 3 complex, optional
         Poles (1/s), real or in conjugate pairs, with negative real parts.
     bandwidth, damping : float
         Instead of poles: bandwidth in rad/s and damping ratio. The poles are -bandwidth and
         -bandwidth (damping +- i sqrt(1 - damping^2)).
     channel : str, optional
-        FMI name of the force; by default the force on the last free freedom (`LinearModel.force_channel`).
+        FMI name of the force; by default the force on the last degree of freedom that is not commanded:
+        see `LinearModel.force_channel`.
 
     Raises
     ------
     DesignError
-        If the model has more than one free freedom, or the poles are not usable.
+        If the model has more than one degree of freedom that is not commanded, or the poles are not usable.
 
     Examples
     --------
@@ -380,9 +386,9 @@ def design_pid(
 def design_pi(
     model: LinearModel, *, bandwidth: Amount, phase_margin: Amount = pi / 3.0, channel: str | None = None
 ) -> Design:
-    """Design a PI controller with crossover at ``bandwidth`` and at least a given phase margin.
+    """Design a PI controller with the crossover frequency ``bandwidth`` and at least a given phase margin.
 
-    If an integral part alone gives more than this phase margin, there is no proportional part.
+    If integral action alone gives more than this phase margin, there is no proportional part.
 
     Parameters
     ----------
@@ -392,7 +398,8 @@ def design_pi(
     phase_margin : float
         Least phase margin (rad).
     channel : str, optional
-        FMI name of the force; by default the force on the last free freedom (`LinearModel.force_channel`).
+        FMI name of the force; by default the force on the last degree of freedom that is not commanded:
+        see `LinearModel.force_channel`.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""Find equilibria of a mechanism, with all freedoms free or some of them held.
+"""Find equilibria of a mechanism, with no degree of freedom held in place, or with some of them held.
 
 Newton's method makes the generalised forces at rest, M a, zero, with exact derivatives by CasADi (`analysis.run.expressions`).
 """
@@ -42,9 +42,9 @@ class EquilibriumError(LinkworkError):
 def _statics(mechanism: Mechanism, modes: Modes) -> tuple[Any, Any]:
     """Return two CasADi functions of coordinates, channels and constants: statics alone, and statics with derivatives.
 
-    Both functions first return the generalised forces at rest on the free freedoms. The first function also returns the
-    clearance from the limit of assembly. The second function also returns the negative derivatives of the generalised forces
-    with respect to the free coordinates, and the derivatives with respect to the forces of the channels. Friction, which a
+    Both functions first return the generalised forces at rest on the free degrees of freedom. The first function also returns
+    the clearance from the limit of assembly. The second function also returns the negative derivatives of these forces with
+    respect to the free coordinates, and their derivatives with respect to the forces of the channels. Friction, which a
     mechanism's switch turns on, does not act at rest.
     """
     casadi, traces, its = symbolic.library(), expressions(mechanism), layout(mechanism, modes)
@@ -76,13 +76,14 @@ class Equilibrium:
     parameters
         Parameters of the mechanism.
     coordinates : ndarray
-        Coordinates of all freedoms (rad, m).
+        Coordinates of all degrees of freedom (rad, m).
     inputs : Inputs
-        Acting inputs; a held freedom has the commanded rate 0.
+        Acting inputs; a held degree of freedom has the commanded rate 0.
     holding : dict
-        Generalised force (N.m or N) that keeps each held freedom in place, by the name of the freedom's coordinate.
+        Generalised force (N.m or N) that keeps each held degree of freedom in place, by the name of its coordinate.
     stiffness : ndarray
-        Negative derivatives of the generalised forces on the free and held freedoms with respect to their coordinates.
+        Negative derivatives of the generalised forces on the free and the held degrees of freedom, with respect to the
+        coordinates of these degrees of freedom.
     residual : float
         Norm of the imbalance, relative to the forces that balance each other.
     iterations : int
@@ -127,7 +128,7 @@ class Equilibrium:
 
     @property
     def stable(self) -> bool:
-        """Whether the potential energy of springs, gravity and constant forces has a minimum in the free freedoms."""
+        """Whether the potential energy of springs, gravity and constant forces is at a minimum over the free coordinates."""
         balance = _Balance.build(self.parameters, self.inputs)
         free = (balance.scale[:, None] * self.stiffness * balance.scale)[np.ix_(balance.free, balance.free)]
         values = np.linalg.eigvalsh(free)
@@ -135,7 +136,7 @@ class Equilibrium:
 
     @property
     def potential(self) -> float:
-        """Potential energy (J) of springs, gravity and constant forces; the energy of a force is zero at displacement 0."""
+        """Potential energy (J) of springs, gravity and constant forces; the energy of a force is zero at zero displacement."""
         mechanism = find_mechanism(self.parameters)
         work = 0.0
         for channel in mechanism.channels:
@@ -148,16 +149,17 @@ class Equilibrium:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Balance:
-    """Equations of rest: generalised forces on the free freedoms, scaled by the mechanism's own scales.
+    """Equilibrium equations: generalised forces on the free degrees of freedom, divided by the mechanism's scales.
 
     Attributes
     ----------
     modes : tuple of int
-        Modes in which held freedoms count as free, under no force: the unbalanced forces on them are the holding forces.
+        Modes in which held degrees of freedom count as free, with no applied force: the unbalanced forces on them are the
+        holding forces.
     its : Layout
-        Layout in these modes; ``its.free`` has the free and the held freedoms.
+        Layout in these modes; ``its.free`` has the free and the held degrees of freedom.
     free : list of int
-        Indices, in ``its.free``, of the freedoms that are not held.
+        Indices, in ``its.free``, of the degrees of freedom that are not held.
     scale : ndarray
         Scales of the coordinates of ``its.free``.
     """
@@ -204,9 +206,9 @@ class _Balance:
         return np.array([*self.parameters.constants(), 0.0])
 
     def imbalance(self, coordinates: FloatArray) -> FloatArray:
-        """Return the norms of the scaled forces on the free freedoms, shape (n,), at coordinates of shape (freedoms, n).
+        """Return the norms of the scaled forces on the free degrees of freedom at n configurations, shape (n,).
 
-        A norm is infinite beyond the limit of assembly.
+        ``coordinates`` has the shape (freedoms, n). A norm is infinite beyond the limit of assembly.
         """
         n = coordinates.shape[1]
         columns = (np.tile(value[:, None], n) for value in (self.channels, self.constants))
@@ -246,7 +248,7 @@ class _Balance:
         )
 
     def _size(self, q: FloatArray, stiffness: FloatArray, of_inputs: FloatArray) -> float:
-        """Return the magnitude, in units of energy, of the generalised forces that have to balance each other (N.m)."""
+        """Return the magnitude, in units of energy (N.m), of the generalised forces that have to balance each other."""
         # a cyclic freedom has no displacement that loads a spring
         far = [0.0 if self.mechanism.freedoms[n].period else abs(q[n]) for n in self.its.free]
         elastic = self.scale @ np.abs(stiffness) @ (self.scale + far)
@@ -273,7 +275,7 @@ class _Balance:
         return (*q.tolist(), *[0.0] * (self.mechanism.size - len(q)))
 
     def starts(self, held: FloatArray) -> list[FloatArray]:
-        """Return starts for Newton's method: the points of a grid at which the imbalance has a local minimum."""
+        """Return starting points for Newton's method: the points of a grid at which the imbalance has a local minimum."""
         lengths = [
             abs(getattr(self.parameters, field.name))
             for field in fields(self.parameters)
@@ -296,7 +298,7 @@ class _Balance:
 def _balance_with_held(
     parameters: Parameters, inputs: Inputs | None, held: Mapping[str, float] | None
 ) -> tuple[_Balance, FloatArray]:
-    """Return the equations of rest, and all coordinates: given values for held freedoms, zero for the others."""
+    """Return the equilibrium equations, and all coordinates: given values for held degrees of freedom, zero for the others."""
     mechanism = find_mechanism(parameters)
     inputs, _ = check_run(mechanism, inputs, None)
     coordinates = np.zeros(len(mechanism.freedoms))
@@ -323,19 +325,21 @@ def find_equilibria(
     parameters
         Parameters of the mechanism.
     inputs : Inputs, optional
-        Constant forces; by default none. A freedom with a commanded rate is held; the rate must be 0.
+        Constant forces; by default none. A degree of freedom with a commanded rate is held; the rate must be 0.
     held : mapping, optional
-        Coordinates (rad, m) of held freedoms, such as ``{"crank.angle": "30 deg"}``; 0 for a freedom held by the inputs alone.
+        Coordinates (rad, m) of held degrees of freedom, such as ``{"crank.angle": "30 deg"}``; 0 for a degree of freedom held
+        by the inputs alone.
 
     Returns
     -------
     tuple of Equilibrium
-        The equilibria, with angles of cyclic freedoms in (-pi, pi]. If they are not isolated, only some of them are found.
+        The equilibria, with angles of cyclic degrees of freedom in (-pi, pi]. If they are not isolated, only some of them are
+        found.
 
     Raises
     ------
     InputError
-        If a force is not constant, a held freedom moves or is driven by a force, or no freedom is free.
+        If a force is not constant, a held degree of freedom moves or is driven by a force, or no degree of freedom is free.
     """
     balance, coordinates = _balance_with_held(parameters, inputs, held)
     found: list[Equilibrium] = []
@@ -365,15 +369,15 @@ def find_equilibrium(
     held: Mapping[str, Amount] | None = None,
     guess: ArrayLike | None = None,
 ) -> Equilibrium:
-    """Find an equilibrium of a mechanism, with all freedoms free or some of them held.
+    """Find an equilibrium of a mechanism, with no degree of freedom held in place, or with some of them held.
 
     Parameters
     ----------
     parameters, inputs, held
         As for `find_equilibria`.
     guess : array_like, optional
-        All coordinates (rad, m) to start from; the values for held freedoms are ignored. Without a guess the stable equilibrium
-        of least potential energy is returned or, if none is stable, the equilibrium of least potential energy.
+        All coordinates (rad, m) to start from; the values for held degrees of freedom are ignored. Without a guess the stable
+        equilibrium of least potential energy is returned or, if none is stable, the equilibrium of least potential energy.
 
     Raises
     ------

@@ -1,6 +1,6 @@
-"""Simulate a closed loop of a sampled controller with the nonlinear plant or with its linear model.
+"""Simulate a closed loop: a sampled controller with the nonlinear plant or with a linear model of the plant.
 
-In `control_loop` the controller samples the plant, or its FMU, and holds its force for each step, as a digital controller does.
+In `control_loop` the controller samples the plant, or the plant's FMU, and holds the force for each step, like a digital one.
 `predict_loop` runs the same controller with the linear model.
 """
 
@@ -64,17 +64,17 @@ def check_limit(limit: float) -> None:
 
 
 def rms(values: FloatArray) -> float:
-    """Return the root mean square."""
+    """Return the root mean square of the values."""
     return float(np.sqrt(np.mean(values**2)))
 
 
 def peak(values: FloatArray) -> float:
-    """Return the largest magnitude."""
+    """Return the largest magnitude of the values."""
     return float(np.abs(values).max())
 
 
 class SampledController:
-    """A design as a sampled controller: measures the state, computes the force, and holds the force for a period.
+    """A design as a sampled controller: it measures the state, computes the force, and holds the force for a period.
 
     Parameters
     ----------
@@ -99,7 +99,7 @@ class SampledController:
         self._slope: list[float] = design.plant_values(design.target_slope).tolist()
 
     def reset(self) -> None:
-        """Set the integral to zero."""
+        """Set the integral of the control error to zero."""
         self.integral = 0.0
 
     @property
@@ -116,13 +116,13 @@ class SampledController:
         return self._limit_force(wanted, measured[self._place] - reference)
 
     def holding_force(self, reference: float) -> float:
-        """Return the force that holds the coordinate at a reference on the linear model."""
+        """Return the force that, by the linear model, holds the coordinate at a reference."""
         return self.design.force + self.design.force_slope * (reference - self._target[self._place])
 
     def follow(self, feedforward: float, position_error: float, velocity_error: float) -> float:
         """Return the force for the next period along a moving reference, from the errors of the coordinate and its rate.
 
-        ``feedforward`` replaces the holding force; the gains of other freedoms are not used.
+        ``feedforward`` replaces the holding force; the gains of other coordinates are not used.
         """
         k_u, k_v = self._gains[self._place], self._gains[len(self._gains) // 2 + self._place]
         return self._limit_force(feedforward - k_u * position_error - k_v * velocity_error, position_error)
@@ -170,17 +170,17 @@ class LoopResult:
     Attributes
     ----------
     time : ndarray, shape (n,)
-        Sampling times (s).
+        The n sampling times (s).
     states : ndarray, shape (n, 2 f)
         All coordinates, then all rates: for a five-bar (th2, u, th2', u').
     force, reference : ndarray, shape (n,)
         Force (N) and reference (m); each value holds until the next sample.
     freedom : int
-        Index of the controlled freedom; by default the last.
+        Index of the controlled degree of freedom; by default the last.
     trajectory : Trajectory or None
         All outputs of the plant; None for a linear model.
     status : int
-        0 if the run reached its end, otherwise the solver.status of the FMI contract.
+        0 if the run reached its end, otherwise the value of ``solver.status`` in the FMI contract.
     message : str
         Reason why the run ended early; empty if the run reached its end.
     """
@@ -196,7 +196,7 @@ class LoopResult:
 
     @property
     def position(self) -> FloatArray:
-        """Controlled coordinate (m), shape (n,)."""
+        """Controlled coordinate (m) at the sampling times, shape (n,)."""
         return self.states[:, : self.states.shape[1] // 2][:, self.freedom]
 
     def end(self, window: float) -> NDArray[np.bool_]:
@@ -217,7 +217,7 @@ class LoopResult:
         Parameters
         ----------
         band : float
-            Half width of the band in which the coordinate counts as settled (m).
+            Half width of the band about the reference in which the coordinate counts as settled (m).
         start : float
             Time at which the reference jumps, or control begins (s).
         window : float, optional
@@ -287,7 +287,7 @@ class _Plant(Protocol):
 def _run_loop(
     plant: _Plant, controller: Controller, reference: Reference, times: FloatArray, freedom: int
 ) -> LoopResult:
-    """Reset the controller and run a closed loop: measure, compute the force and step with it, at each sampling time."""
+    """Reset the controller and run a closed loop: at each sampling time measure, compute the force, and advance the plant."""
     controller.reset()
     rows: list[tuple[float, ...]] = []
     status, message = 0, ""
@@ -317,7 +317,7 @@ def _run_loop(
 
 
 class _DrivenPlant:
-    """Base of the nonlinear plants; all inputs but the controller's force are sampled and held at the controller's times."""
+    """Base class of the nonlinear plants; inputs other than the controller's force are held between the sampling times."""
 
     def __init__(self, mechanism: Mechanism, inputs: Inputs, channel: str, times: FloatArray) -> None:
         self.mechanism, self.channel = mechanism, channel
@@ -327,13 +327,13 @@ class _DrivenPlant:
         self.rows: list[Sequence[float]] = []
 
     def inputs(self, time: float, ahead: float, measured: Sequence[float]) -> dict[str, float]:
-        """Return all inputs from ``time`` to ``ahead`` by FMI name, with 0 for the controller's force."""
+        """Return all inputs for the step from ``time`` to ``ahead`` by FMI name, with 0 for the controller's force."""
         x = np.array([*measured, 0.0, 0.0])
         return dict(zip(self.mechanism.input_names, sample(self._encoded, time, x, self._laws, ahead=ahead).tolist()))
 
 
 class _InProcess(_DrivenPlant):
-    """The nonlinear plant in this process."""
+    """The nonlinear plant, simulated in this process."""
 
     plant: Plant
 
@@ -354,7 +354,7 @@ class _InProcess(_DrivenPlant):
 
 
 class _Fmu(_DrivenPlant):
-    """The nonlinear plant as its FMU."""
+    """The nonlinear plant, simulated by its FMU."""
 
     run: FmuRun
 
@@ -372,7 +372,7 @@ class _Fmu(_DrivenPlant):
 
 
 def _channel(mechanism: Mechanism, name: str) -> Channel:
-    """Return the channel with an FMI name; raises InputError if the channel is no force on a freedom."""
+    """Return the channel with an FMI name; raise InputError if the channel is no force on a degree of freedom."""
     for channel in mechanism.channels:
         if channel.name == name and channel.kind == "force" and channel.freedom >= 0:
             return channel
@@ -403,8 +403,8 @@ def control_loop(
     reference : float or function of time
         Reference of the controlled coordinate, such as the slider position (m).
     inputs : Inputs, optional
-        All other inputs, such as the speed of the crank (0 for a held crank), sampled and held at the controller's times; none
-        by default.
+        Inputs other than the controller's force, such as the speed of the crank (0 for a held crank); none by default. They
+        are sampled and held at the controller's times.
     initial
         State at the start.
     stop_time : float
@@ -462,7 +462,7 @@ def control_loop(
 
 
 class _Linear:
-    """Deviations of a linear model from its equilibrium or periodic motion."""
+    """Linear model as the plant of a loop: simulates deviations from the model's equilibrium or periodic motion."""
 
     def __init__(
         self,
@@ -535,7 +535,7 @@ def predict_loop(
     deviation: ArrayLike | None = None,
     averaged: bool = False,
 ) -> LoopResult:
-    """Run a closed loop of a controller and the linear model, to predict `control_loop`.
+    """Run a closed loop of a controller and the linear model, to predict the result of `control_loop`.
 
     Parameters
     ----------
@@ -545,12 +545,12 @@ def predict_loop(
     controller, reference, stop_time
         As for `control_loop`.
     inputs : Inputs, optional
-        Forces that act; commanded freedoms move as at the operating point. By default all forces are those of the operating
-        point.
+        Forces that act; commanded degrees of freedom move as at the operating point. By default all forces are those of the
+        operating point.
     deviation : array_like, shape (2 n,), optional
         Deviation of the model's state from its operating point at the start.
     averaged : bool
-        Take the time-averaged model of a periodic motion instead of the time-periodic one.
+        Whether the time-averaged model of a periodic motion is used instead of the time-periodic model.
 
     Raises
     ------
@@ -586,7 +586,7 @@ def _check_rest(model: LinearModel) -> None:
 
 
 def largest_difference(first: LoopResult, second: LoopResult) -> float:
-    """Return the largest difference of the controlled coordinate between two runs of the same length (m)."""
+    """Return the largest difference (m) between the controlled coordinates of two runs of the same length."""
     if first.time.shape != second.time.shape:
         raise InputError(f"runs of {len(first.time)} and {len(second.time)} samples: there must be as many in both")
     return float(np.abs(first.position - second.position).max())

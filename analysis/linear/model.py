@@ -1,13 +1,14 @@
 """Linearise a mechanism about one state.
 
-With q the deviations of the coordinates of the free freedoms, and w the deviations of the inputs, the linear model is
+With q the deviations of the free coordinates, and w the deviations of the inputs, the linear model is
 
     M q'' + C q' + K q = F w
 
 Its matrices are exact derivatives of the mechanism's own equations, traced with CasADi (`analysis.run.expressions`). M is the
 Hessian of the energy with respect to the rates. The accelerations a(q, q', w) give K = -M da/dq, C = -M da/dq' and F = M da/dw.
-Away from an equilibrium the accelerations are not zero, and K = -d(M a)/dq + (dM/dq) a. A freedom whose rate is commanded is
-not part of q; it acts through three inputs: acceleration, speed and coordinate.
+Away from an equilibrium the accelerations are not zero, and K = -d(M a)/dq + (dM/dq) a. A degree of freedom is free if its rate
+is not commanded. A commanded degree of freedom is not part of q; it acts through three inputs: acceleration, speed and
+coordinate.
 """
 
 from __future__ import annotations
@@ -38,12 +39,12 @@ FloatArray = NDArray[np.float64]
 #: Values of a mechanism's modes, in the mechanism's order.
 Modes = tuple[int, ...]
 
-#: Largest difference between a commanded rate and the rate in the state, relative to the larger of the latter and 1.
+#: Largest difference between a commanded rate and the rate in the state, relative to the rate in the state or, if larger, to 1.
 SAME_RATE = 1e-6
 
 
 class LinearModelError(LinkworkError):
-    """The linear model has no such input, output or force, or the model could not be computed."""
+    """The linear model does not have a requested input, output or force, or the model could not be computed."""
 
 
 def signal_name(name: str) -> str:
@@ -53,19 +54,19 @@ def signal_name(name: str) -> str:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Layout:
-    """Free and commanded freedoms and acting forces of a mechanism in given modes.
+    """Which degrees of freedom of a mechanism are free or commanded, and which forces act, in given modes.
 
     Attributes
     ----------
     free, commanded : tuple of int
-        Indices of the freedoms that forces move, and of the freedoms with commanded rates. A freedom that is tied to another
-        freedom, as by a groove, is in neither.
+        Indices of the degrees of freedom that forces move, and of those with commanded rates. A degree of freedom that is tied
+        to another one, as by a groove, is in neither.
     forces : tuple of int
         Indices of the channels whose forces act.
     input_names : tuple of str
-        Inputs of a linear model: the forces, then the acceleration, speed and coordinate of each commanded freedom.
+        Inputs of a linear model: the forces, then the acceleration, speed and coordinate of each commanded degree of freedom.
     state_names : tuple of str
-        States of a linear model: coordinates of the free freedoms, then their rates.
+        States of a linear model: the free coordinates, then their rates.
     """
 
     free: tuple[int, ...]
@@ -77,7 +78,7 @@ class Layout:
 
 @cache
 def layout(mechanism: Mechanism, modes: Modes) -> Layout:
-    """Return the layout of a mechanism in given modes: free and commanded freedoms, and acting forces."""
+    """Return the layout of a mechanism in given modes: free and commanded degrees of freedom, and acting forces."""
     names = {mode.name: mode.arguments[value] for mode, value in zip(mechanism.modes, modes)}
 
     def acts(number: int) -> bool:
@@ -179,9 +180,9 @@ def _derivatives(mechanism: Mechanism, modes: Modes, switched: bool) -> Any:
 class Matrices:
     """Arrays of a linear model, or of many models stacked along the first axis.
 
-    n is the number of free freedoms: for a five-bar 2 in torque drive, with q = (crank angle, slider position), and 1 in speed
-    drive, with q = (slider position). m is the number of inputs, l the number of outputs, f the number of all freedoms. States
-    and inputs are deviations from the operating point, in SI.
+    n is the number of free degrees of freedom. For a five-bar driven by a torque n is 2, with q = (crank angle, slider
+    position); with commanded crank speed n is 1, with q = (slider position). m is the number of inputs, l the number of
+    outputs, f the number of all degrees of freedom. States and inputs are deviations from the operating point, in SI.
 
     Attributes
     ----------
@@ -200,7 +201,7 @@ class Matrices:
     outputs : ndarray, shape (..., l)
         The outputs at the operating point.
     acceleration : ndarray, shape (..., f)
-        Accelerations of all freedoms at the operating point.
+        Accelerations of all degrees of freedom at the operating point.
     """
 
     parameters: Parameters
@@ -221,17 +222,17 @@ class Matrices:
 
     @property
     def layout(self) -> Layout:
-        """Free and commanded freedoms and acting forces, in the model's modes."""
+        """Free and commanded degrees of freedom and acting forces, in the model's modes."""
         return layout(self.mechanism, self.modes)
 
     @property
     def input_names(self) -> tuple[str, ...]:
-        """FMI names of the inputs; a commanded freedom has three: acceleration, speed and coordinate."""
+        """FMI names of the inputs; a commanded degree of freedom has three: acceleration, speed and coordinate."""
         return self.layout.input_names
 
     @property
     def state_names(self) -> tuple[str, ...]:
-        """FMI names of the first-order state (q, q')."""
+        """FMI names of the components of the first-order state (q, q')."""
         return self.layout.state_names
 
     @property
@@ -241,7 +242,7 @@ class Matrices:
 
     @property
     def places(self) -> list[int]:
-        """Indices of the components of (q, q') in the state of the plant."""
+        """Indices of the components of (q, q') in the plant's state."""
         free, n = self.layout.free, len(self.mechanism.freedoms)
         return [*free, *(n + k for k in free)]
 
@@ -297,12 +298,12 @@ class LinearModel(Matrices):
         return np.sort(np.sqrt(squares.real[(squares.real > 0.0) & (squares.imag == 0.0)]))
 
     def force_channel(self, name: str | None = None) -> tuple[str, int]:
-        """Return the FMI name of a force that drives a free freedom, and the index of this freedom.
+        """Return the FMI name of a force that acts on a free degree of freedom, and the index of this degree of freedom.
 
         Parameters
         ----------
         name : str, optional
-            FMI name of the force; by default the force on the last free freedom, for a five-bar ``slider.force``.
+            FMI name of the force; by default the force on the last free degree of freedom, for a five-bar ``slider.force``.
 
         Raises
         ------
@@ -358,7 +359,7 @@ class LinearModel(Matrices):
 
 
 def sort_by_magnitude(values: ArrayLike) -> NDArray[np.complex128]:
-    """Return complex numbers sorted by magnitude, and numbers of equal magnitude by imaginary part."""
+    """Return complex numbers sorted by magnitude; numbers of equal magnitude are sorted by imaginary part."""
     whole = np.asarray(values, dtype=complex)
     return whole[np.lexsort((whole.imag, np.abs(whole)))]
 
@@ -382,8 +383,8 @@ def constant_inputs(mechanism: Mechanism, modes: Modes, channels: ArrayLike) -> 
 def evaluate(parameters: Parameters, modes: Modes, states: FloatArray, channels: FloatArray) -> dict[str, FloatArray]:
     """Return the arrays of `Matrices` by name, at states (s, size) with channels (s, channels), stacked along the first axis.
 
-    Raises InputError if a state or a channel is not finite or no freedom is free; AssemblyError if the links cannot be joined
-    at a state.
+    Raises InputError if a state or a channel is not finite or no degree of freedom is free; AssemblyError if the links cannot
+    be joined at a state.
     """
     mechanism = find_mechanism(parameters)
     its, p, n = layout(mechanism, modes), parameters.constants(), len(states)
@@ -421,7 +422,10 @@ def evaluate(parameters: Parameters, modes: Modes, states: FloatArray, channels:
 
 
 def full_states(mechanism: Mechanism, states: ArrayLike) -> FloatArray:
-    """Extend states (n, 2 f) to full states (n, 2 f + 2) by zeros for the two works; return full states unchanged."""
+    """Extend states, shape (n, 2 f), to full states, (n, 2 f + 2), by zeros for work dissipated and supplied.
+
+    Full states are returned unchanged.
+    """
     array, n = np.array(states, dtype=float), 2 * len(mechanism.freedoms)
     if array.ndim != 2 or array.shape[1] not in (n, mechanism.size) or len(array) == 0:
         raise InputError(
@@ -434,7 +438,7 @@ def full_states(mechanism: Mechanism, states: ArrayLike) -> FloatArray:
 def sample_channels(
     mechanism: Mechanism, inputs: Inputs | None, times: FloatArray, states: FloatArray
 ) -> tuple[Modes, FloatArray]:
-    """Return the modes, and the values of the channels at s times and states, shape (s, channels), for given inputs.
+    """Return the modes, and the values of the channels at s given times and states, shape (s, channels), under given inputs.
 
     Raises InputError if the inputs belong to another mechanism, a state is not finite, or the inputs command a rate that
     differs from the rate in a state.
@@ -469,12 +473,12 @@ def linearise(parameters: Parameters, state: ArrayLike, inputs: Inputs | None = 
         an equilibrium. Otherwise the deviations are measured from the motion through this state, and the model holds at this
         instant.
     inputs : Inputs, optional
-        Inputs at time 0, such as `Equilibrium.inputs`; they decide which freedoms are free. By default no input acts.
+        Inputs at time 0, such as `Equilibrium.inputs`; they decide which degrees of freedom are free. By default no input acts.
 
     Raises
     ------
     InputError
-        If state or inputs are not finite, of the wrong shape, or do not match; or if no freedom is free.
+        If state or inputs are not finite, of the wrong shape, or do not match; or if no degree of freedom is free.
     AssemblyError
         If the links cannot be joined in this state.
 

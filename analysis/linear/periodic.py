@@ -38,7 +38,7 @@ MOST_ITERATIONS = 60
 
 
 class Turn(Protocol):
-    """One period of a motion, sampled at equal steps of the crank angle, without the end point; such as `periodic.Turn`."""
+    """One period of a motion, sampled at equal steps of the crank angle, without the end point, such as `periodic.Turn`."""
 
     @property
     def time(self) -> FloatArray: ...
@@ -51,7 +51,7 @@ class Turn(Protocol):
 
     @property
     def inputs(self) -> FloatArray:
-        """Values of the mechanism's channels, shape (n, channels)."""
+        """Values of the mechanism's channels at the n samples, shape (n, channels)."""
         ...
 
     @property
@@ -130,7 +130,7 @@ class PeriodicModel(Matrices):
         return lambda t: periodic(t) + t * rates
 
     def _mean_rates(self) -> FloatArray:
-        """Return the mean rates of all f freedoms: whole turns per period for cyclic freedoms, zero for the others."""
+        """Return the mean rates of all f degrees of freedom: whole turns per period for cyclic ones, zero for the others."""
         freedoms = self.mechanism.freedoms
         way = self.states[:, len(freedoms) : 2 * len(freedoms)].mean(axis=0) * self.period
         return (
@@ -138,14 +138,14 @@ class PeriodicModel(Matrices):
         )
 
     def check(self) -> None:
-        """Check that the rates of the free freedoms are the derivatives of their coordinates over the period.
+        """Check that the free coordinates and their rates fit together: each rate is the derivative of its coordinate.
 
         The check fails if the period is wrong, the samples include the end of the period, or the motion has not settled.
 
         Raises
         ------
         InputError
-            If a rate is not the derivative of its coordinate; the message names the freedom.
+            If a rate is not the derivative of its coordinate; the message names the coordinate.
         """
         mechanism, n, secular = self.mechanism, len(self), self._mean_rates()
         scale = mechanism.error_scale(self.parameters, tuple(self.states[0].tolist()))
@@ -166,7 +166,7 @@ class PeriodicModel(Matrices):
         """Compute the monodromy matrix: integrate Phi' = A(t) Phi from the unit matrix over a period; shape (2 n, 2 n).
 
         A(t) is the trigonometric polynomial through its samples. The eigenvalues are the Floquet multipliers; in torque drive
-        one of them is 1 along a motion of the free plant.
+        one multiplier is 1 along a motion of the free plant.
 
         Raises
         ------
@@ -250,7 +250,7 @@ def linearise_orbit(
 
 
 def _turn_time(mechanism: Mechanism, modes: Modes, states: FloatArray) -> float:
-    """Return the time of a turn (s) of the first cyclic freedom with a constant commanded speed."""
+    """Return the time of one turn (s) of the first cyclic coordinate with a constant commanded speed."""
     for n in layout(mechanism, modes).commanded:
         rate, speed = states[:, len(mechanism.freedoms) + n], float(states[0, len(mechanism.freedoms) + n])
         if mechanism.freedoms[n].period and speed != 0.0 and np.ptp(rate) <= 1e-9 * abs(speed):
@@ -259,7 +259,7 @@ def _turn_time(mechanism: Mechanism, modes: Modes, states: FloatArray) -> float:
 
 
 def _resample(mechanism: Mechanism, turn: Turn) -> tuple[FloatArray, FloatArray]:
-    """Resample a period from equal steps of the crank angle to equal steps of time; return states and channels."""
+    """Resample a period at equal time steps instead of equal steps of the crank angle; return the states and the channels."""
     n, count, period = len(turn.time), len(mechanism.freedoms), turn.period
     ways = (turn.states[:, :count] - turn.states[0, :count]).T
     # the crank is the cyclic freedom whose angle has equal steps
@@ -312,7 +312,7 @@ def settled_motion(
     parameters
         Parameters of the mechanism.
     inputs : Inputs
-        Constant inputs with the speed of a cyclic freedom, such as ``Inputs(speed=40.0)``.
+        Constant inputs with the speed of a cyclic degree of freedom, such as ``Inputs(speed=40.0)``.
     initial : optional
         Initial state of the run; by default all coordinates and all rates are zero, except the commanded speed.
     samples : int

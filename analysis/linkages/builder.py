@@ -202,7 +202,8 @@ class Builder:
         points : mapping of str to (x, y), optional
             Further points, or all points of a body that is not a bar (m).
         mass, cog, inertia : optional
-            Mass (kg), centre of mass (m), by default the middle of the bar, and moment of inertia about it (kg.m2).
+            Mass (kg), centre of mass (m), and moment of inertia about the centre of mass (kg.m2). By default the centre of
+            mass is the middle of the bar.
         section : mapping, optional
             Cross-section from which mass, centre of mass and inertia are computed: a ``material`` and a ``kind``, which is
             ``"bar"`` with ``width`` and ``thickness``, ``"rod"`` with ``diameter``, ``"tube"`` with ``outer`` and ``inner``, or
@@ -319,7 +320,7 @@ class Builder:
         bodies : (str, str), optional
             Two bodies whose relative rotation twists the spring.
         stiffness, damping : optional
-            In N/m and N.s/m; about a pin or between two bodies in N.m/rad and N.m.s/rad.
+            Stiffness and damping in N/m and N.s/m; about a pin or between two bodies in N.m/rad and N.m.s/rad.
         free : optional
             Length, position (m) or angle (rad) at which the spring exerts no force.
         friction : optional
@@ -328,7 +329,7 @@ class Builder:
             A further force that opposes the stretch: a formula in the stretch x and its rate v, such as ``"a*x**3 + 4*v"``, or
             a table of stretch and force (SI).
         constants : mapping, optional
-            Constants of the law, by their names in it.
+            Constants of the law, by their names in the formula.
         driven : bool, optional
             Whether an input adds a force that lengthens the spring, as a cylinder does, or a torque that twists it, as a motor
             does. A driven spring may also be at a joint whose coordinate is not a freedom.
@@ -384,7 +385,7 @@ class Builder:
         between : (str, str), optional
             Two points; the force between them is an input.
         speed, start : optional
-            For a joint: see `freedom`.
+            Commanded rate and initial coordinate of the joint; see `freedom`.
 
         Raises
         ------

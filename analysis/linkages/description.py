@@ -67,7 +67,7 @@ class Body:
     Attributes
     ----------
     points : mapping of str to (x, y)
-        Coordinates of its points (m). Give points, or a ``bar``, or a bar and further points.
+        Coordinates of the body's points (m). Give points, or a ``bar``, or a bar and further points.
     bar : tuple of str
         Two points: the first is the body's origin, the second lies at ``length`` along its x axis.
     length : float
@@ -187,14 +187,14 @@ class Spring:
     Attributes
     ----------
     between : tuple of str
-        Two points, or
+        Two points. Give one of ``between``, ``at`` and ``bodies``.
     at : str
-        a joint, or
+        A pin or a slide.
     bodies : tuple of str
-        two bodies, which need not be joined. The spring is twisted by the angle of the second relative to the first, which is
-        counted up to half a turn.
+        Two bodies, which need not be joined. The twist is the angle of the second body relative to the first, minus the angle
+        ``free``, reduced to at most half a turn in either direction.
     stiffness, damping : float
-        In N/m and N.s/m; about a pin in N.m/rad and N.m.s/rad.
+        Stiffness and damping in N/m and N.s/m; of a torsion spring in N.m/rad and N.m.s/rad.
     free : float
         Length, position (m) or angle (rad) at which the spring exerts no force.
     friction : float
@@ -203,7 +203,7 @@ class Spring:
         A further force that opposes the stretch: a formula in the stretch x and its rate v, such as "2e5*x**3 + 4*v", or a
         table of stretch and force, which is interpolated linearly. The work of this force counts as dissipated.
     constants : mapping of str to (float, str)
-        Values and units of the constants in the formula, by name. They become parameters of the mechanism.
+        Values and units of the constants in the formula, by name. The constants become parameters of the mechanism.
     driven : bool
         Whether an input drives the spring with a force that lengthens it, as a cylinder does, or a torque that twists it.
     """
@@ -248,7 +248,8 @@ class FreedomTable:
     Attributes
     ----------
     joint : str
-        A pin, whose coordinate is the angle of its second body relative to the first; or a slide: the position of its block.
+        A pin, whose coordinate is the angle of its second body relative to the first; or a slide, whose coordinate is the
+        position of the block.
     start : float
         Initial coordinate (rad, m).
     speed : float
@@ -282,9 +283,9 @@ class Description:
     ground : mapping of str to (x, y)
         Points of the ground (m).
     bodies, slides, slots, gears, racks, springs : mapping
-        By name.
+        Parts of the linkage, by name.
     freedoms : mapping of str to FreedomTable
-        By name, one to four; if none is given, they are chosen automatically.
+        One to four degrees of freedom, by name; if none is given, they are chosen automatically.
     assembly : mapping of str to int
         Assembly of each dyad, +1 or -1, by the name of the joint between its two bodies; +1 by default.
     friction : mapping

@@ -77,7 +77,10 @@ class Picture:
         return joints, parts
 
     def tick(self, pair: str, gear: str, pin: str, arm: str) -> PicturePoint:
-        """Return a mark on the pitch circle of a gear; ``arm`` is the expression of the vector from its ``pin`` to the mark."""
+        """Return a mark on the pitch circle of a gear.
+
+        ``arm`` is the expression of the vector from the gear's ``pin`` to the mark.
+        """
         return PicturePoint(
             f"{pair}{gear}Tick", f"mark on {gear}", f"*(b.at_{pin}.x + {arm}.x, b.at_{pin}.y + {arm}.y, 0.0)"
         )
@@ -97,7 +100,7 @@ class Picture:
         return function(signature, "Compute the places of the points of the picture.", rows)
 
     def drag_argument(self, own: str) -> str:
-        """Return the source of the argument `Joint.moves` of a point: the parameters that change when the point is dragged.
+        """Return the source of the argument `Joint.moves` of the point ``own``: the parameters that change when it is dragged.
 
         The result is empty if no parameter changes.
         """
@@ -121,7 +124,10 @@ class Picture:
         return ""
 
     def paths(self) -> list[str]:
-        """Return the points whose paths are drawn: all that are no joints, or else the last pin between moving bodies."""
+        """Return the points whose paths are drawn: all points of moving bodies that are not joints.
+
+        If there are none, return the last pin between moving bodies.
+        """
         moving = [own for body in self.description.bodies for own in self.interface.points[body]]
         alone = [own for own in dict.fromkeys(moving) if own not in self.structure.joints]
         return alone or [own for own in dict.fromkeys(moving) if own not in self.description.ground][-1:]

@@ -23,7 +23,7 @@ class Reaction(NamedTuple):
 
 
 def springs_by_freedom(description: Description, interface: Interface) -> dict[str, int]:
-    """Return the springs that act along a freedom, by name, each with the index of that freedom."""
+    """Return, for each spring that acts along a freedom, the index of this freedom, by the name of the spring."""
     numbers = {drive.joint: n for n, drive in enumerate(interface.drives)}
     return {name: numbers[s.at] for name, s in description.springs.items() if s.at in numbers}
 
@@ -322,7 +322,10 @@ class Motion:
         yield function(signature, "Return what acts on the linkage from the values of the modes and the inputs.", rows)
 
     def _commanded_rates(self) -> tuple[str, str]:
-        """Return the expressions of two tuples by freedom: 1 if its rate is commanded, and the commanded acceleration."""
+        """Return the expressions of two tuples with an entry for each freedom.
+
+        The first entry is 1 if the rate is commanded, otherwise 0; the second is the commanded acceleration.
+        """
         held = ", ".join(f"i.{d.name}_held" if d.table else "0.0" for d in self.interface.drives)
         known = ", ".join(f"i.{d.name}_given" if d.table else "0.0" for d in self.interface.drives)
         return f"({held},)", f"({known},)"

@@ -1,7 +1,7 @@
 """Write the equations of a described linkage as a Python module that calls `linkwork.planar`.
 
 The pose of a body, its `Frame`, is the position of its origin and its direction. A direction is a `Turn`: cosine and sine
-of the angle, with its derivatives. The methods below write the lines of that module, or return expressions in them.
+of the angle, with its derivatives. The methods below write lines of the generated module, or return expressions for them.
 """
 
 from __future__ import annotations
@@ -63,7 +63,7 @@ class PoseWriter:
     def incline_turn(self, turn: str, joint: Slider, sign: int = 1) -> str:
         """Return the expression of the direction of a slide's line; ``turn`` is the direction of the body that has the line.
 
-        With ``sign`` -1 it is the reverse: ``turn`` is the direction of the line, and the result the direction of the body.
+        If ``sign`` is -1, ``turn`` is the direction of the line, and the result is the direction of the body.
         """
         if not joint.inclined:
             return turn
@@ -105,7 +105,7 @@ class PoseWriter:
         """Write the assignment of the direction of ``step.body``; return the expression of the body's pose.
 
         The body is the block or the guide of the slide ``joint`` on its parent. ``travel`` is the vector from the start of the
-        guide line to the block.
+        guide line to the block. ``own`` is the variable of the parent's pose, see ``frame`` in `point`.
         """
         turn = f"{step.body}_turn"
         if joint.bodies[1] == step.body:
@@ -158,7 +158,10 @@ class PoseWriter:
         self.lines.append(f"{step.body}_frame = {frame}")
 
     def derivative_tuple(self, terms: dict[int, str]) -> str:
-        """Return the source of the tuple of derivatives with respect to the coordinates; ``terms`` has the nonzero ones."""
+        """Return the source of the tuple of derivatives with respect to the coordinates.
+
+        ``terms`` has the derivatives that are not zero, by index of the coordinate.
+        """
         return f"({', '.join(terms.get(n, '0.0') for n in range(self.n))},)"
 
     def linear_turn(self, terms: dict[int, str], constants: Iterable[str]) -> str:

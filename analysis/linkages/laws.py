@@ -1,4 +1,4 @@
-"""Read force laws of springs: formulas with constants, or tables, written as arithmetic without branches."""
+"""Read force laws of springs, formulas with constants or tables, and write them as arithmetic without branches."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ def law(value: Any, name: str) -> Law:
     Raises
     ------
     ParameterError
-        If a formula has anything but names, arithmetic and the known functions, or a table is not of at least two pairs.
+        If a formula has anything but names, arithmetic and the known functions, or a table has fewer than two pairs.
     """
     if isinstance(value, list):
         return _ROWS(value, name)

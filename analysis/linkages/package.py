@@ -196,7 +196,7 @@ class Package:
         Raises
         ------
         LinkageError
-            If the bodies cannot be joined at the start, or a mechanism of Linkwork has the name.
+            If the bodies cannot be joined at the start, or a mechanism of Linkwork has the same name.
         """
         name = self.description.name
         known = MECHANISMS.get(name)
@@ -299,7 +299,10 @@ class Package:
             return False
 
     def _check_twists(self, made: Mechanism) -> None:
-        """Raise LinkageError if a torsion spring whose turns no freedom counts is twisted by over half a turn at the start."""
+        """Raise LinkageError if a torsion spring is twisted by more than half a turn at the start.
+
+        Springs about a pin whose angle is a freedom are not checked: there the freedom counts the turns.
+        """
         start = made.published[made.name]
         places = made.modules[-1].places(made.state(start.initial), start.parameters.constants())
         for name, spring in self.description.springs.items():

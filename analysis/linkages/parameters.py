@@ -75,7 +75,7 @@ class Drive(NamedTuple):
 
 
 class Load(NamedTuple):
-    """An applied force or torque that drives no freedom: FMI name, unit, meaning, and the output along which it acts."""
+    """An applied force or torque that drives no freedom: FMI name, unit, meaning, and output for its displacement, if any."""
 
     name: str
     unit: str
@@ -98,12 +98,12 @@ class Interface:
     structure : Structure
     parameters : tuple of Parameter
     drives : tuple of Drive
-        The freedoms in their order.
+        The degrees of freedom, in the order of the coordinates.
     loads : tuple of Load
     points : mapping
         Coordinates of each point in the frame of its body, as expressions in the parameters.
     centres : mapping
-        Coordinates of the centre of mass of each body, as such expressions; massless bodies are left out.
+        Coordinates of the centre of mass of each body, also as expressions in the parameters; massless bodies are left out.
     """
 
     description: Description
@@ -437,7 +437,7 @@ def _spring(name: str, description: Description, structure: Structure, drive: Dr
 
 
 def length_and_mass(found: Interface) -> tuple[float, float]:
-    """Return the greatest length or coordinate (m) and the total mass of the bodies (kg), each 1 if there is none."""
+    """Return the greatest length or coordinate (m), and the total mass of the bodies (kg); 1 instead of zero."""
     lengths = [abs(p.value) for p in found.parameters if p.unit == "m" and p.role not in ("spring", "law", "friction")]
     masses = [p.value for p in found.parameters if p.unit == "kg"]
     return max(lengths, default=1.0) or 1.0, sum(masses) or 1.0

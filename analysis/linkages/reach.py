@@ -23,7 +23,7 @@ class Reach(NamedTuple):
     ----------
     freedom : int
     unit : str
-        Unit of its coordinate, rad or m.
+        Unit of the freedom's coordinate, rad or m.
     low, high : float
         Ends of the range (rad, m): limits of assembly, or the ends of a turn or of the search.
     open : (bool, bool)
@@ -31,7 +31,7 @@ class Reach(NamedTuple):
     turns : bool
         Whether the freedom can make a whole turn.
     least : float
-        Least clearance of any dyad in the range: the sine of its transmission angle.
+        Least clearance of any dyad in the range; the clearance of a dyad is the sine of its transmission angle.
     """
 
     freedom: int
@@ -52,9 +52,10 @@ def reach(mechanism: Mechanism, freedom: int = 0, *, most: float | None = None, 
     freedom : int
     most : float, optional
         Greatest distance from the start that is searched: by default half the period of the coordinate. If the coordinate is
-        not periodic, the default is four turns, for a slide 1 m.
+        not periodic, the default is four turns for an angle and 1 m for a displacement.
     samples : int
-        Number of positions that are tried on each side of the start: for an angle per half turn, for a slide in all.
+        Number of positions tried on each side of the start: per half turn if the coordinate is an angle, in total if it is a
+        displacement.
     """
     coordinate, period = mechanism.freedoms[freedom].coordinate, mechanism.freedoms[freedom].period
     unit = next(v.unit for v in mechanism.variables if v.name == coordinate)

@@ -30,7 +30,7 @@ class LinkBody:
         return MassProperties(self.section.mass(body), (0.5 * length, 0.0), self.section.inertia(body))
 
     def origin(self, weighed: bool) -> str:
-        """Return in words where the mass properties come from: the section, or with ``weighed`` weighing and the section."""
+        """Return in words where the mass properties come from: the section, or weighing and the section if ``weighed``."""
         return f"{'weighed, shaped as a ' if weighed else 'of a '}{self.words}"
 
 

@@ -277,7 +277,7 @@ def _removal_hint(description: Description) -> str:
             others: Any = {table: {own: entry for own, entry in entries.items() if own != name}}
             try:
                 count = _count_freedoms(replace(description, **others))
-            except LinkworkError:  # something else needs it
+            except LinkworkError:  # another entry refers to the removed entry
                 continue
             if 1 <= count <= MOST_FREEDOMS:
                 hints.append((count, f"; without linkage.{table}.{name} it has {count}"))

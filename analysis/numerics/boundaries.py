@@ -34,7 +34,7 @@ class Gap:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Line:
-    """Roots and signs of a test function along a line.
+    """Roots of a test function along a line, and the intervals on which the function is negative.
 
     Attributes
     ----------
@@ -209,8 +209,8 @@ class Boundary:
     tangents : ndarray, shape (n, 2)
         Unit tangents in coordinates in which the box is 1 by 1.
     residual : float
-        Largest distance of a point from the true boundary, estimated from the test function and its slope, in the same
-        coordinates.
+        Largest distance of a point from the true boundary, estimated from the test function and its slope, in coordinates
+        in which the box is 1 by 1.
     ends : (End, End)
         Ends at the first and at the last point.
     """
@@ -273,7 +273,7 @@ class _Zero:
         return np.array([value * self.box.size[0]])
 
     def evaluate(self, x: NDArray[np.float64], y: float) -> Evaluation:
-        """Return the residual, its derivatives by second-order differences, and the distance from the boundary as data."""
+        """Return the residual and its derivatives by second-order differences; ``data`` is the distance from the boundary."""
         place, low, high = np.array([x[0], y]), self.box.corner, self.box.corner + self.box.size
         here, slope = float(self.residual(x, y)[0]), np.empty(2)
         for axis, size in enumerate(self.box.size):
@@ -304,7 +304,7 @@ def trace(test: Test, seed: tuple[float, float], box: Box, *, step: float = 0.02
     Parameters
     ----------
     test : callable
-        Smooth function of (x, y), negative on one side.
+        Smooth function of (x, y), negative on one side of the boundary.
     seed : (float, float)
         A point near the boundary.
     box : Box
@@ -414,7 +414,7 @@ def chart(
     Raises
     ------
     InputError
-        If no lines are searched, or only one line x = const or y = const, since its position would be arbitrary.
+        If both numbers of lines are zero, or one is 1: the position of a single line would be arbitrary.
     """
     if 1 in lines or min(lines) < 0 or lines == (0, 0):
         raise InputError(f"lines is {lines}: none or two and more of each kind, and at least one kind")

@@ -64,14 +64,14 @@ class MachineCode:
     Parameters
     ----------
     functions : sequence of casadi.Function
-        Of SX, with the inputs (t, a, b, c, d) and dense outputs. The outputs follow one another in ``out``, matrices column
-        by column.
+        Functions of SX symbols with the inputs (t, a, b, c, d) and dense outputs. The outputs follow one another in
+        ``out``, matrices column by column.
     lanes : int
         Number of sets of arguments that a call evaluates at once. With several lanes each entry of an array is a vector, and t
         is the same for all lanes.
     rows : sequence of str
         Names of the functions whose outputs are read lane by lane: all outputs of the first lane are written first, then those
-        of the next lane. On some processors gathering them afterwards takes longer than computing them.
+        of the next lane. On some processors gathering a lane's outputs afterwards takes longer than computing them.
     shared : bool
         Whether b, c and d are the same for all lanes; they are then plain arrays.
 
@@ -516,7 +516,7 @@ def fingerprint(function: Any, signature: Any = None) -> str:
     files = {Path(__file__), Path(linking.__file__)}
 
     def add(value: Any) -> None:
-        """Add a value to the hash, with all that it refers to."""
+        """Add a value to the hash, and all objects to which the value refers."""
         digest.update(repr(sorted(getattr(value, "targetoptions", {}).items(), key=str)).encode())
         value = getattr(value, "py_func", getattr(value, "_defn", value))
         if isinstance(value, ModuleType):

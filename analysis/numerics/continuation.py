@@ -34,7 +34,11 @@ Vector = NDArray[np.float64]
 
 
 class Evaluation(NamedTuple):
-    """G, its derivatives with respect to y and lambda, shapes (n,), (n, n), (n,), and ``data`` that the `Point` keeps."""
+    """The value of G at a point, the derivatives of G, and data that the `Point` keeps.
+
+    ``residual`` is G, shape (n,), ``jacobian`` its derivative with respect to y, shape (n, n), ``slope`` its derivative with
+    respect to lambda, shape (n,).
+    """
 
     residual: Vector
     jacobian: Vector
@@ -47,7 +51,7 @@ Evaluate = Callable[[Vector, float], Evaluation]
 
 
 class ContinuationError(LinkworkError):
-    """No point of a curve was found near the given point."""
+    """Error: no point of a curve was found near the given point."""
 
 
 class Reason(Enum):
@@ -253,10 +257,11 @@ class Follower:
             self.low[number], self.high[number] = low, high
 
     def start(self, y: ArrayLike, parameter: float, direction: int, across: ArrayLike | None = None) -> Point:
-        """Find the point of the curve at a parameter, near ``y``, with its tangent to higher (+1) or lower (-1) parameters.
+        """Find the point of the curve at a parameter, near ``y``, with the tangent to higher (+1) or lower (-1) parameters.
 
-        With ``across``, scaled and of shape (n + 1,), the point is sought in the plane through the guess normal to ``across``
-        instead, and ``direction`` is the sign of the tangent along ``across``.
+        With ``across``, a vector in scaled unknowns and parameter of shape (n + 1,), the point is sought instead in the plane
+        normal to ``across`` through the guess (``y``, ``parameter``). ``direction`` is then the sign of the tangent's component
+        along ``across``.
 
         Raises
         ------
@@ -285,7 +290,10 @@ class Follower:
         )
 
     def resume(self, y: ArrayLike, parameter: float, ahead: ArrayLike) -> Point:
-        """Return a first `Point` at a known solution, with the tangent in the sense nearer to ``ahead`` (scaled, (n + 1,))."""
+        """Return a first `Point` at a known solution.
+
+        Of the two opposite tangents, the point has the one nearer to ``ahead``, which is scaled and has shape (n + 1,).
+        """
         whole = np.append(np.asarray(y, dtype=float), parameter)
         found = _Landing(whole / self.scale, self.evaluate(whole[:-1], parameter), 0)
         return self._point(found, np.asarray(ahead, dtype=float))
@@ -480,7 +488,10 @@ class Follower:
         return scaled
 
     def _find_outer_turn(self, last: Point, point: Point, length: float) -> tuple[Point, float]:
-        """Return the turning point and its distance if a step leaves the bounds and comes back; else the end of the step."""
+        """Find the outermost point of a step that leaves the bounds and comes back; return it and its distance along the step.
+
+        For any other step, return the end of the step and the length of the step.
+        """
         for axis in np.flatnonzero(last.tangent * point.tangent < 0.0).tolist():
             ahead, behind = abs(last.tangent[axis]), abs(point.tangent[axis])
             bound = (self.high if last.tangent[axis] > 0.0 else self.low)[axis] / self.scale[axis]

@@ -1,6 +1,6 @@
-"""Compute damping and natural frequency of a freedom on a spring from the logarithmic decrement of its free decay.
+"""Compute damping and natural frequency of a mass on a spring from the logarithmic decrement of its free decay.
 
-A freedom of mass m on a spring k with a damper c and dry friction F has its turning points at
+A mass m on a spring k with a damper c and dry friction F has its turning points at
 
     x_n = b + (-1)^n [(A + f) q^n - f],  f = r (1 + q) / (1 - q),  r = F / k,
 
@@ -35,7 +35,7 @@ class Decay:
     Attributes
     ----------
     time, position : ndarray, shape (n,)
-        Turning points (s, and the record's unit).
+        Times (s) and positions (in the record's unit) of the turning points.
     fitted : ndarray, shape (n,)
         Positions of the turning points by the fit.
     decrement : float
@@ -45,7 +45,7 @@ class Decay:
     friction : float
         Dry friction divided by the spring's stiffness, in the record's unit; 0 if it was not fitted.
     offset : float
-        Position of rest without friction.
+        Position of rest without friction, in the record's unit.
     residual : float
         Root mean square of ``position - fitted``, relative to the first amplitude.
     """
@@ -73,7 +73,7 @@ class Decay:
 
     @property
     def natural_frequency(self) -> float:
-        """Natural frequency of the freedom without its damper (rad/s)."""
+        """Natural frequency of the mass on its spring without the damper (rad/s)."""
         return self.frequency * self._phase / (2.0 * pi)
 
     @property
@@ -116,7 +116,7 @@ def fit_decay(
     Parameters
     ----------
     time, position : array_like, shape (n,)
-        The record (s, and any unit) after the impulse; it need not begin at a turning point.
+        The record after the impulse: times (s), and positions in any unit. It need not begin at a turning point.
     friction : bool
         Whether to fit dry friction besides the damper.
     least_swing : float
@@ -196,7 +196,10 @@ def _turning_points(x: NDArray[np.float64], swing: float) -> list[int]:
 
 
 def _vertex(t: NDArray[np.float64], x: NDArray[np.float64], turn: int, reach: float) -> tuple[float, float]:
-    """Fit a parabola to the samples within ``reach`` of a turning point, at least three; return its vertex (time, position)."""
+    """Return the vertex (time, position) of a parabola fitted to the samples within ``reach`` of a turning point.
+
+    The parabola is fitted to at least three samples.
+    """
     first, last = np.searchsorted(t, (t[turn] - reach, t[turn] + reach))
     near = slice(max(min(int(first), turn - 1), 0), max(int(last), turn + 2))
     middle, scale = t[turn], t[turn + 1] - t[turn - 1]

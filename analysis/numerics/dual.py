@@ -51,7 +51,10 @@ _UNARY: dict[Any, Callable[[Array, Array], Any]] = {
 
 
 def _power(a: Dual, b: Dual) -> Dual:
-    """Return a^b; log a is computed only where b has a derivative, so that a negative a can have a constant exponent."""
+    """Return a^b.
+
+    log a is computed only where the dual part of b is not zero, so that a negative a can have a constant exponent.
+    """
     value = np.power(a.real, b.real)
     # b a^(b-1), which is 0 for b = 0 whatever a is
     slope = b.real * np.power(a.real, np.where(b.real == 0.0, 1.0, b.real - 1.0)) * a.dual
@@ -107,10 +110,10 @@ class Dual(NDArrayOperatorsMixin):
     Parameters
     ----------
     real, dual : array_like
-        The parts, broadcast to a common shape. The dual part may have additional axes in front, one entry for each direction of
-        differentiation: ``Dual(2.0, [1.0, 0.0])`` is a number with its derivatives in two directions, and a real part of shape
-        (n,) with m directions has a dual part of shape (m, n). In calculations axes of real parts are matched with each other,
-        and axes of directions with each other.
+        The real and the dual part, broadcast to a common shape. The dual part may have additional axes in front, one entry for
+        each direction of differentiation: ``Dual(2.0, [1.0, 0.0])`` is a number with its derivatives in two directions, and a
+        real part of shape (n,) with m directions has a dual part of shape (m, n). In calculations axes of real parts are
+        matched with each other, and axes of directions with each other.
     """
 
     __slots__ = ("dual", "real")
@@ -143,7 +146,7 @@ class Dual(NDArrayOperatorsMixin):
 
     @property
     def directions(self) -> int:
-        """Number of axes of directions, the first axes of the dual part."""
+        """Number of axes for directions of differentiation; they are the first axes of the dual part."""
         return self.dual.ndim - self.real.ndim
 
     def __len__(self) -> int:

@@ -5,8 +5,8 @@ depend neither on the other lanes nor on their number. Argument reductions and p
 Tang; coefficients of Sun's fdlibm, or of Taylor series where these suffice). ``pow``, and sine and cosine of angles beyond
 `GREATEST_ANGLE`, cannot be written without branches: they call the C library for each lane.
 
-`BOUNDS` has the largest errors in units in the last place, which the tests check against mpmath. They hold for arguments
-between 1e-150 and 1e150; the sign of a result that is zero is not kept.
+`BOUNDS` has the largest errors in units in the last place, which the tests check against mpmath. The bounds hold for arguments
+between 1e-150 and 1e150. The sign of a result that is zero is not kept.
 """
 
 from __future__ import annotations

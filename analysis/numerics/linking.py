@@ -2,8 +2,9 @@
 
 By default Numba optimises each function together with the functions that it calls, makes machine code, and does the same again
 for its caller. If Python calls only the kernel, the separate machine code of the inner functions is never used, but takes a
-third of the time. Numba has no public option for this: the classes below override private classes of Numba, hence the upper
-bound of its version. Numba also does not notice damaged machine code on disk: here every file ends with a hash of its bytes.
+third of the compile time. Numba has no public option to omit it: the classes below override private classes of Numba, hence
+the upper bound of its version. Numba also does not notice damaged machine code on disk: here every file ends with a hash of
+its bytes.
 
 An installation may carry kernels *for any processor* whose lanes have the same width: Numba's output before LLVM optimises it.
 This saves Numba's type inference, which takes most of the time. The final machine code is the same as if the kernel were
@@ -81,7 +82,7 @@ class PartCompiler(KernelCompiler):
 
 
 class _Noted(JITCodeLibrary):
-    """Code of a kernel that also keeps its form before optimisation, which is valid for any processor."""
+    """Code of a kernel together with its form before optimisation, which is valid for any processor."""
 
     def _optimize_final_module(self) -> None:
         self.noted = self._final_module.as_bitcode()

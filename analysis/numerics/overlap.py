@@ -41,6 +41,7 @@ def _segments(curve, target):
 def _sort_into_bands(box, floor, scale):
     """Sort segments into horizontal bands; return the first and the last band of each segment, and the segments of each band.
 
+    ``box`` has the ranges of x and y of the segments, ``floor`` is the lowest y, ``scale`` the number of bands per unit of y.
     The segments of band b are ``members[begin[b] : begin[b + 1]]``; the return value is (first, last, begin, members).
     """
     total = box.shape[1]
@@ -67,7 +68,8 @@ def _cut(i, ends, box, bands, near, cuts, twins, spans):
     """Find where other segments cross segment i, and which segments coincide with part of it.
 
     Fills ``cuts`` with the crossings, fractions of the segment from 0 to 1, ``twins`` with the coinciding segments and
-    ``spans`` with the fractions between which they coincide. Returns the numbers of pieces and of coinciding segments.
+    ``spans`` with the fractions between which they coincide; ``near`` is the distance up to which parallel segments coincide.
+    Returns the numbers of pieces and of coinciding segments.
     """
     first, last, begin, members = bands
     dx, dy = ends[2, i] - ends[0, i], ends[3, i] - ends[1, i]

@@ -30,7 +30,7 @@ def library() -> Any:
 
 
 def symbolic_functions(modules: tuple[ModuleType, ...], **others: Any) -> ReboundFunctions:
-    """Return copies of the functions of ``modules`` for CasADi symbols; ``others`` replace further functions by their names."""
+    """Return copies of the functions of ``modules`` for CasADi symbols; ``others`` replace further functions, by name."""
     casadi = library()
     functions = {name: getattr(casadi, {"pow": "power"}.get(name, name)) for name in ELEMENTARY}
     return rebind_functions(modules, functions | others)
@@ -124,7 +124,10 @@ def wrap_function(name: str, inputs: int, outputs: int, evaluate: Callable[..., 
 
 
 def ipopt(name: str, program: dict[str, Any], **options: Any) -> Any:
-    """Return an IPOPT solver for a CasADi program that prints nothing; its ``stats()`` say whether it found a solution."""
+    """Return an IPOPT solver, which prints nothing, for a nonlinear program given as CasADi expressions.
+
+    The solver's ``stats()`` say whether it found a solution.
+    """
     settings = {
         "print_time": False,
         "error_on_fail": False,

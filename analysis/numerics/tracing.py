@@ -16,7 +16,7 @@ from linkwork.errors import LinkworkError
 
 
 class ReboundFunctions(SimpleNamespace):
-    """Copies of functions that calculate with another kind of number, as attributes by name.
+    """Copies of functions that calculate with symbols, arrays or dual numbers instead of floats, as attributes by name.
 
     If two modules have a function of the same name, the attribute is that of the later module. Methods are found by `find`
     only.
@@ -46,9 +46,10 @@ def rebind_functions(modules: tuple[ModuleType, ...], elementary: Mapping[str, A
     Parameters
     ----------
     modules : tuple of modules
-        Functions that the modules import by name from one another are replaced too.
+        Modules whose functions are copied. A function that one of these modules imports by name from another of them is
+        replaced by its copy.
     elementary : mapping
-        Functions for that kind of number, by the names of the functions of `math` or built-in functions that they replace.
+        Replacements, for symbols, arrays or dual numbers, of functions of `math` and of built-in functions, by their names.
     """
     spaces = [dict(vars(module)) for module in modules]
     functions: dict[Callable[..., Any], FunctionType] = {}

@@ -40,7 +40,7 @@ class _Model(PrimitiveModel):  # type: ignore[misc]
 
 
 def _to_vector(builder: Any, kind: Any, value: Any) -> Any:
-    """Return a value of the Numba type ``kind`` as a vector; a number becomes the same in all lanes."""
+    """Return a value of the Numba type ``kind`` as a vector; a number is repeated in all lanes."""
     return value if isinstance(kind, Lanes) else repeat_number(builder, value, LANES)
 
 

@@ -41,7 +41,7 @@ _PATIENCE = 60.0
 
 
 class WorkersLost(LinkworkError):
-    """The workers failed: they were killed again and again, or the scheduler of a cluster is gone."""
+    """Error for workers that failed: they were killed again and again, or the scheduler of a cluster is gone."""
 
 
 class Interrupts(list[bool]):

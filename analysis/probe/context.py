@@ -19,7 +19,7 @@ AFTER_FATAL, FAILED = 3, 70
 
 @dataclass(slots=True, kw_only=True)
 class Context:
-    """What a check uses: the FMU, the journal of calls, and the file of findings.
+    """The context of a check: the FMU, the journal of calls, and the file of findings.
 
     Parameters
     ----------
@@ -56,7 +56,7 @@ class Context:
         return Session(self.library, self.model, self.journal, self.folder)
 
     def random(self, case: int, check: str = "") -> random.Random:
-        """Return the random number generator for a case of a check, by default this check; every run gives the same numbers."""
+        """Return the random number generator of a case of a check, by default this check; every run gives the same numbers."""
         return random.Random(f"{self.seed}/{self.model.interface}/{check or self.check}/{case}")
 
     def replay(self) -> str:

@@ -91,7 +91,7 @@ class Run:
         return bool(needed)
 
     def set(self, values: Inputs) -> None:
-        """Set the scalar variables among ``values`` to the given values."""
+        """Set the scalar variables among ``values`` to their values in this mapping; leave out arrays."""
         for group in dict.fromkeys(variable.group for variable in values):
             chosen = [variable for variable in values if variable.group == group and variable.size == 1]
             if chosen:

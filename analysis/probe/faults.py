@@ -125,7 +125,10 @@ def _use_unknown_category(walk: Walk, name: str, arguments: list[Any]) -> list[A
 
 
 def _change_start(position: int, value: float) -> Change:
-    """Return a change of a time or the tolerance in the call of SetupExperiment (FMI 2) or EnterInitializationMode (FMI 3)."""
+    """Return a change of a time or the tolerance in the call of SetupExperiment (FMI 2) or EnterInitializationMode (FMI 3).
+
+    ``position`` is the index of the argument, ``value`` the new value.
+    """
 
     def change(walk: Walk, name: str, arguments: list[Any]) -> list[Any] | None:
         if len(arguments) != 5:

@@ -1,4 +1,4 @@
-"""Check for memory leaks: over many instances that are made and freed, and over many steps and saved states of one instance."""
+"""Check for memory leaks: over many instances that are made and freed, over many steps, and over many saved states."""
 
 from __future__ import annotations
 
@@ -65,7 +65,7 @@ def memory() -> Memory | None:
 
 
 def check_leaks(context: Context, case: int) -> None:
-    """Check the growth of memory over instances that are made and freed (case 0), steps (case 1), or saved states (case 2)."""
+    """Check the growth of memory over many instances made and freed (case 0), many steps (1), or many saved states (2)."""
     if memory() is None:
         context.say("not made: this system does not say how much memory is used")
         return

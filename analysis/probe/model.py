@@ -241,7 +241,7 @@ def _variable(variable: Any, version: int, is_state: bool) -> Variable:
 def _capabilities(folder: Path, interface: str) -> set[str]:
     """Return the names of the capability flags of an interface that are true.
 
-    They are read from the XML file, because FMPy does not read all of them.
+    The flags are read from the XML file, because FMPy does not read all of them.
     """
     root = ElementTree.parse(folder / "modelDescription.xml").getroot()
     element = root.find({"cs": "CoSimulation", "me": "ModelExchange"}[interface])

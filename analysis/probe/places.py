@@ -61,7 +61,7 @@ def _all(part: str) -> str:
 
 
 def count(model: Model) -> int:
-    """Return the number of cases of `check_places`: folders and resource locations."""
+    """Return the number of cases of `check_places`: one for each unusual folder and each unusual resource location."""
     return len(FOLDERS) + len(_URIS if model.version == 2 else _PATHS)
 
 

@@ -1,4 +1,4 @@
-"""Compare runs that must be equal: repeated, after a reset, beside another instance, restored, serialized; and half steps."""
+"""Compare runs that must be equal, such as a run and its repetition after a reset, and one step with two half steps."""
 
 from __future__ import annotations
 
@@ -67,7 +67,7 @@ def check_repetition(context: Context, case: int) -> None:
 
 
 def check_restoring(context: Context, case: int) -> None:
-    """Check that a run that continues from a restored state gives the same bits, whatever the instance did in between."""
+    """Check that a run from a restored state gives the same values bit by bit, whatever the instance did after the saving."""
     rng = context.random(case)
     steps = random_inputs(rng, context.model, 2 * _STEPS)
     run = Run(context.session())

@@ -20,7 +20,7 @@ DERIVATIVE_TOLERANCE = 1e-4
 
 
 def check_derivatives(context: Context, case: int) -> None:
-    """Check, at a random state, directional derivatives by finite differences, and adjoint by directional derivatives."""
+    """Check directional derivatives by finite differences, and adjoint by directional derivatives, at a random state."""
     model, rng = context.model, context.random(case)
     run = _run_at_random_state(context, case)
     worst, name = 0.0, ""
@@ -49,7 +49,7 @@ def _floor(unknown: Variable) -> float:
 
 
 def _run_at_random_state(context: Context, case: int) -> Run:
-    """Return a run in a mode in which derivatives may be read: continuous-time mode; initialization mode for co-simulation."""
+    """Return a run in a mode in which derivatives may be read: continuous-time mode; in co-simulation initialization mode."""
     exchange = context.model.interface == "me"
     run = Run(context.session(), finish=exchange)
     for inputs in random_inputs(context.random(case), context.model, 5 * case) if exchange else ():
@@ -83,7 +83,7 @@ def _difference(run: Run, unknown: Variable, known: Variable, step: float, decla
 def _state(run: Run, known: Variable) -> float:
     """Return the value of an input or a continuous state.
 
-    In model exchange it is read from the state vector, because the variable of the same name may differ between events.
+    In model exchange the state is read from the state vector, because the variable of the same name may differ between events.
     """
     names = run.model.state_names
     if known.is_state and run.model.interface == "me" and known.name in names:

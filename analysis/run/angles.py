@@ -1,7 +1,7 @@
 """Keep angles small in long runs: subtract whole turns from the state, and add them back to the outputs.
 
-An angle of 1e9 turns is rounded to 1e-6 rad. An integrator would take this rounding for motion. Its tolerance is relative to
-the state, and would allow errors of whole turns.
+An angle of 1e9 turns is rounded to 1e-6 rad. An integrator would take this rounding for motion. The integrator's tolerance is
+relative to the state, and would allow errors of whole turns.
 """
 
 from __future__ import annotations
@@ -24,7 +24,10 @@ TURNS = 1024
 
 
 class WholeTurns:
-    """Whole turns subtracted from the angles of a run; never any if an input or an event is a user's function."""
+    """Whole turns subtracted from the angles of a run.
+
+    No turns are subtracted if an input or an event is a user's function.
+    """
 
     def __init__(
         self, mechanism: Mechanism, p: Any, modes: Sequence[float], encoded: Encoded, events: Sequence[Event]
@@ -42,8 +45,9 @@ class WholeTurns:
     ) -> None:
         """Subtract whole turns from large angles of the state x, in place, if the mechanism behaves the same without them.
 
-        ``u`` are the channels, ``laws`` the torque laws of the inputs; nothing is subtracted while a torsion bar acts.
-        ``first`` is the index of the next sample. ``watch`` has the table of events, where levels of angles are reduced too.
+        ``u`` are the values of the input channels, ``laws`` the torque laws of the inputs; nothing is subtracted while a
+        torsion bar acts. ``first`` is the index of the next sample. ``watch`` has the table of events, in which levels of
+        angles are reduced too.
         """
         if not self.has_many_turns(x) or laws[:, 2].any():
             return
@@ -77,12 +81,12 @@ class WholeTurns:
 
     @property
     def _columns(self) -> list[int]:
-        """Return for each freedom the index of the output that is its coordinate."""
+        """Return for each degree of freedom the index of the output that is its coordinate."""
         return coordinate_outputs(self._mechanism)
 
 
 def coordinate_outputs(mechanism: Mechanism) -> list[int]:
-    """Return for each freedom of a mechanism the index of the output that is its coordinate."""
+    """Return for each degree of freedom of a mechanism the index of the output that is its coordinate."""
     return [mechanism.output_names.index(freedom.coordinate) for freedom in mechanism.freedoms]
 
 
@@ -96,7 +100,8 @@ def repeats(
 ) -> bool:
     """Return whether the derivatives, and all outputs except the coordinates, are equal at the states x and x + way.
 
-    ``way`` is for instance a whole turn of each angle; ``u`` are the channels, the same at both states.
+    ``way`` is for instance a whole turn of each angle; ``p`` are the constants of the equations; ``u`` are the values of the
+    input channels, the same at both states.
     """
     equations = mechanism.equations
     acting = equations.apply_inputs(modes, tuple(u.tolist()), p)

@@ -38,7 +38,7 @@ def published_set(known: str | PublishedSet) -> PublishedSet:
 
 
 def takes_published(**fills: Fill) -> Callable[[_Function], _Function]:
-    """Decorate a function so that its argument ``parameters`` may be a published set, its name, or a list with these.
+    """Decorate a function so that its argument ``parameters`` may also be a published set, the name of one, or a list of these.
 
     Parameters
     ----------
@@ -81,7 +81,9 @@ def takes_published(**fills: Fill) -> Callable[[_Function], _Function]:
 
 
 def takes_options(kind: type) -> Callable[[_Function], _Function]:
-    """Decorate a function to reject keywords that are neither its arguments nor keys of ``kind``, its TypedDict of options.
+    """Decorate a function to reject keywords that are neither arguments of the function nor keys of the TypedDict ``kind``.
+
+    ``kind`` lists the options that the function accepts besides its arguments.
 
     If the argument ``method`` is a class, all keywords are accepted, as the class may have options of its own.
     """
@@ -102,7 +104,7 @@ def takes_options(kind: type) -> Callable[[_Function], _Function]:
 
 
 def complete_inputs(known: PublishedSet, inputs: Any) -> Any:
-    """Complete inputs with the drives of the published set, for freedoms that the inputs do not drive."""
+    """Complete inputs with the drives of the published set, for degrees of freedom that the inputs do not drive."""
     inputs = Inputs() if inputs is None else inputs
     if not isinstance(inputs, Inputs):
         return inputs
@@ -111,7 +113,10 @@ def complete_inputs(known: PublishedSet, inputs: Any) -> Any:
 
 
 def _without_drives(known: PublishedSet, names: Iterable[str]) -> PublishedSet:
-    """Return a published set without the drives of freedoms that inputs with these names (in `Inputs` or FMI) drive."""
+    """Return a published set without the drives of degrees of freedom that the named inputs drive.
+
+    The names are those in `Inputs` or in FMI.
+    """
     mechanism, names = find_mechanism(known.parameters), {*names}
     given = names | {channel.argument for channel in mechanism.channels if channel.name in names}
     modes = [mode.arguments for mode in mechanism.modes]
@@ -154,7 +159,8 @@ def usual_times(
     """Return the stop time and the sampling step of a run (s).
 
     The default stop time needs a crank that is driven at constant speed: it is the time of three revolutions of the slowest
-    such crank. The step is then by default one degree of the fastest. With a given stop time the default step is 1 ms.
+    such crank. The step is then by default the time of one degree of the fastest crank. With a given stop time the default
+    step is 1 ms.
 
     Raises
     ------

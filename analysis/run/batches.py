@@ -1,4 +1,4 @@
-"""Batches of an ensemble: many runs prepared together with arrays, solved by compiled calls, and saved in files."""
+"""Batches of an ensemble: many runs prepared together by array operations, solved by compiled calls, and saved in files."""
 
 from __future__ import annotations
 
@@ -71,13 +71,13 @@ class Task:
 
     @property
     def shapes(self) -> list[tuple[int, ...]]:
-        """Return the shapes of the arrays ``ends`` and ``samples`` of `_integrate`."""
+        """Return the shapes of the arrays ``ends`` and ``samples`` that `_integrate` fills."""
         m, n, size = len(self.parameters), len(self.settings.times), self.mechanism.size
         samples = (size, len(self.mechanism.channels)) if self.outputs is None else (len(self.outputs),)
         return [(m, 5 + size + len(self.mechanism.channels)), *((m, n, numbers) for numbers in samples)]
 
     def parts(self, flat: NDArray[np.float64]) -> list[NDArray[np.float64]]:
-        """Split a flat array into views with the shapes `shapes`."""
+        """Split a flat array into views that have the shapes `shapes`."""
         ends = np.cumsum([prod(shape) for shape in self.shapes])
         return [part.reshape(shape) for part, shape in zip(np.split(flat, ends[:-1]), self.shapes)]
 

@@ -18,7 +18,7 @@ class Case:
     ----------
     title : str
     parameters, initial, inputs
-        Parameters, initial state and inputs of one mechanism; by default it is at rest and nothing acts on it.
+        Parameters, initial state and inputs of one mechanism; by default the mechanism is at rest and nothing acts on it.
     stop_time : float
         End of the run (s), which starts at 0.
     step : float

@@ -84,7 +84,7 @@ def parameter_tables(parameters: Parameters) -> dict[str, Any]:
 
 
 def save_parameters(path: str | Path, parameters: Parameters, *, head: str = "") -> Path:
-    """Write parameters to a file, TOML or JSON as the path ends; ``head`` is a comment at the top of a TOML file."""
+    """Write parameters to a TOML or JSON file, according to the path's ending; ``head`` is a comment at the top of TOML."""
     return files.write_tables(path, parameter_tables(parameters), head=head)
 
 
@@ -141,8 +141,8 @@ class ActingInput(NamedTuple):
 def case_inputs(mechanism: Mechanism) -> dict[str, ActingInput]:
     """Return the inputs of a mechanism by their names in case files.
 
-    The function `name_in_files` gives the name of a channel: ``force`` for ``slider.force``. A flag that drives a freedom is
-    an entry in the table of the freedom's mode: ``axial.groove``.
+    The function `name_in_files` gives the name of a channel: ``force`` for ``slider.force``. A flag that drives a degree of
+    freedom, such as ``axial.groove``, is an entry in the table (``axial``) of the mode of the degree of freedom.
     """
     units = {variable.name: variable.unit for variable in mechanism.variables}
     found = {}
@@ -273,7 +273,10 @@ def _case_file_name(name: str, mechanism: Mechanism) -> str:
 def _without_rivals(
     data: Mapping[str, Any], overrides: Mapping[str, Any], mechanism: Mechanism, acting: Mapping[str, ActingInput]
 ) -> dict[str, Any]:
-    """Return the tables without the entries that an override replaces: drives of the same freedom, or the end of the run."""
+    """Return the tables of a case without the entries that an override replaces.
+
+    These entries are drives of the same degree of freedom, or entries that set the end of the run.
+    """
     result = dict(data)
     for given, rival in (("run.stop_time", "revolutions"), ("run.revolutions", "stop_time")):
         if given in overrides and isinstance(run := result.get("run"), Mapping):
@@ -322,7 +325,7 @@ def _split_tables(
 def _check_drives(
     mechanism: Mechanism, inputs: Inputs, parameters: Any, initial: Any, acting: Mapping[str, ActingInput]
 ) -> None:
-    """Raise ParameterError if a groove of zero amplitude is a drive, or if a freedom that is held has an initial rate."""
+    """Raise ParameterError if a groove of zero amplitude is a drive, or if a coordinate that is held has an initial rate."""
     if inputs.parts("groove") and getattr(parameters, "groove_amplitude", None) == 0.0:
         raise ParameterError(
             "groove.amplitude", 0.0, "be given with axial.groove: a groove without it holds the shift at zero"

@@ -89,7 +89,10 @@ def begin_interval(motion):
 
 @inner
 def _end_of_interval(piece, motion):
-    """Return the time up to which the inputs are smooth (polynomials with the index ``piece``), or held."""
+    """Return the time at which an interval ends: the inputs are smooth, or held, up to this time.
+
+    ``piece`` is the index of the polynomials of the inputs in this interval.
+    """
     end, breaks = motion.problem.end, motion.source.breaks
     if motion.problem.hold > 0.0:
         later = motion.carry.interval + 1
@@ -151,7 +154,10 @@ def _attempt(h, motion):
 
 @inner
 def _accept(h, last, t_new, motion):
-    """Return whether to accept a step, whether an event or a sample may lie inside it, and the clearance at its end."""
+    """Return whether to accept a step, whether an event or a sample may lie inside it, and the clearance at its end.
+
+    The clearance is that to the limit of assembly.
+    """
     watch, carry, samples, y, u = motion.watch, motion.carry, motion.samples, motion.room.y, motion.u
     renew(carry.elapsed + h, y, u, motion)
     if watch.balance.shape[0] > 0:
@@ -366,7 +372,7 @@ def lane_motion(i, problem, source, batch, watch, samples, room, state):
 
 @kernel(types.void(float64, SOURCE, BATCH, MATRIX, MATRIX), purpose="the inputs of ensembles")
 def channels_of_many(t, source, batch, x, u):
-    """Compute the channels of each run of a batch at time t: row i of u receives those of run i at the state in row i of x."""
+    """Compute the input channels of each run of a batch at time t: row i of u receives those at the state in row i of x."""
     for i in range(x.shape[0]):
         own = _run_source(i, source, batch)
         write_channels(t, 0.0, find(t, own.breaks), x[i], own, u[i])

@@ -12,20 +12,21 @@ from fmpy.fmi1 import FMICallException
 
 from ..libraries import require
 
-#: Folder of the component in the archive, and name of the draft's interfaces with package and version.
+#: Folder of the component in an FMU, and names of the interfaces in the draft of FMI-LS-WASM, with package and version.
 FOLDER = "wasm32-wasip2"
 _INTERFACE = "fmi:fmi3/{}@3.0.0"
 
 
 def component_path(folder: str | Path, identifier: str) -> Path:
-    """Return the path of the component in the folder of an unpacked FMU, by its model identifier."""
+    """Return the path of the component with a model identifier in the folder of an unpacked FMU."""
     return Path(folder) / "binaries" / FOLDER / f"{identifier}.wasm"
 
 
 class _Component:
-    """An instance of the component of an unpacked FMU.
+    """An instance of the WebAssembly component of an unpacked FMU.
 
-    Other methods are those of the component's interface, under FMPy's names: ``getFloat64`` calls ``get-float64``.
+    Methods that are not defined here are those of the component's interface, under FMPy's names: ``getFloat64`` calls
+    ``get-float64``.
     """
 
     _interface: ClassVar[str]
@@ -53,13 +54,13 @@ class _Component:
         self._log(message.encode())
 
     def call(self, method: str, *values: Any, kind: str = "method") -> Any:
-        """Call a method of the interface; raise FMICallException if it fails."""
+        """Call a method of the component's interface; raise FMICallException if it fails."""
         if method not in self._functions:
             name = f"[{kind}]{self._interface}-instance.{method}"
             index = self._instance.get_export_index(self._store, name, self._interface_index)
             assert index is not None, name
             function: Any = self._instance.get_func(self._store, index)
-            # wasmtime asks for the types of a function in every call, which takes a third of its time
+            # wasmtime looks up the types of a function in every call, which takes a third of the call's time
             kind_of = function.type(self._store)
             kept = SimpleNamespace(params=kind_of.params, result=kind_of.result)
             function.type = lambda store: kept
@@ -93,7 +94,7 @@ class _Component:
 
 
 class ComponentSlave(_Component):
-    """An instance for co-simulation."""
+    """An instance of a component for co-simulation."""
 
     _interface, _further_arguments = "co-simulation", (False, False, [])
 
@@ -105,7 +106,7 @@ class ComponentSlave(_Component):
 
 
 class ComponentModel(_Component):
-    """An instance for model exchange; states are in arrays of ctypes, as in FMPy."""
+    """An instance of a component for model exchange; arrays of states are arrays of ctypes, as in FMPy."""
 
     _interface, _further_arguments = "model-exchange", ()
 

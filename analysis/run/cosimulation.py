@@ -182,7 +182,10 @@ class _Stepwise:
         return name_channels(self.encoded, sample(self.encoded, t, x, self.laws, ahead=ahead))
 
     def slopes(self, number: int, row: list[float]) -> dict[str, float]:
-        """Return the slopes of the inputs over the next step; the state at its end is predicted from the outputs ``row``."""
+        """Return the slopes of the inputs over the next step.
+
+        The outputs ``row`` at the beginning of the step are used to predict the state at its end.
+        """
         t, ahead = float(self.times[number]), float(self.times[number + 1])
         h, x = ahead - t, self.state(row)
         n, laws = len(self.rates), self.laws.copy()
@@ -263,7 +266,10 @@ class _Continuous:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class OutputDifference:
-    """Difference of one output between two runs: largest and root mean square, in its unit, and the output's ``scale``."""
+    """Difference of one output between two runs.
+
+    ``largest`` and ``rms`` (root mean square) are in the output's unit; ``scale`` is the scale of the output, see `compare`.
+    """
 
     name: str
     unit: str

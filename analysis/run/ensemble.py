@@ -179,10 +179,10 @@ def simulate_many(
 ) -> Ensemble:
     """Run many mechanisms, or one mechanism under many inputs, in batches of compiled calls.
 
-    ``inputs`` and ``initial`` are one object for all runs, or a list with one for each run. All inputs must drive the same
-    freedoms in the same way and have the same Python functions, if any. The batches are solved by ``n_jobs`` threads of this
-    process, or by the workers of the backend that `joblib.parallel_config` has set: "dask" for a Dask cluster, "loky" for
-    processes.
+    ``inputs`` and ``initial`` are one object for all runs, or a list with one object for each run. All inputs must drive the
+    same degrees of freedom in the same way and have the same Python functions, if any. The batches are solved by ``n_jobs``
+    threads of this process, or by the workers of the backend that `joblib.parallel_config` has set: "dask" for a Dask
+    cluster, "loky" for processes.
 
     Runs whose inputs are constant between jumps, or held, are integrated side by side in the vector lanes of the processor; all
     other runs one after the other.

@@ -51,10 +51,10 @@ def constants(mechanism: Mechanism, switched: bool = False) -> tuple[Any, Any]:
 
 @cache
 def inertia_and_stiffness(mechanism: Mechanism, cranks: tuple[int, ...], freedom: int) -> Any:
-    """Return a CasADi function that computes inertia and stiffness of a freedom, at rest and at the coordinate 0.
+    """Return a CasADi function that computes inertia and stiffness of a degree of freedom, at rest and at the coordinate 0.
 
     Inertia and stiffness are the second derivatives of the energy with respect to the rate and to the coordinate of the
-    freedom. The arguments of the function are the angle of each of ``cranks``, and the constants as a column.
+    degree of freedom. The arguments of the function are the angle of each of ``cranks``, and the constants as a column.
     """
     casadi = symbolic.library()
     s, v, *angles = (casadi.SX.sym(name) for name in ("s", "v", *(f"angle{n}" for n in cranks)))

@@ -1,7 +1,8 @@
 """Run the experiments that an FMU contains (inputs, parameters and reference results) and compare the results.
 
-In the layered standard FMI-LS-REF (https://github.com/modelica/fmi-ls-ref, tag v1.0.0-beta.1) they are listed in
-``extra/org.fmi-standard.fmi-ls-ref/fmi-ls-manifest.xml``, in the format of https://github.com/modelica/ma-hs-experiments.
+The file ``extra/org.fmi-standard.fmi-ls-ref/fmi-ls-manifest.xml`` lists the experiments, as the layered standard FMI-LS-REF
+(https://github.com/modelica/fmi-ls-ref, tag v1.0.0-beta.1) requires. Their format is that of
+https://github.com/modelica/ma-hs-experiments.
 """
 
 from __future__ import annotations
@@ -34,18 +35,18 @@ EXPERIMENTS = f"extra/{STANDARD}"
 MANIFEST = f"{EXPERIMENTS}/fmi-ls-manifest.xml"
 #: Type of Linkwork's annotation for the largest relative difference that an experiment allows.
 ALLOWED = "org.linkwork.allowed"
-#: Without that annotation the first number times the tolerance is allowed, at least the second; without a tolerance the third.
+#: Without that annotation: factor of the tolerance, and least value of their product; allowed difference without a tolerance.
 _FACTOR, _LEAST_ALLOWED, _DEFAULT_ALLOWED = 100.0, 1e-6, 1e-3
 #: Smallest scale of a variable's differences, as a fraction of the largest magnitude of variables with the same unit.
 _LEAST_SCALE = 1e-3
 
 
 class ExperimentError(LinkworkError):
-    """The experiments in an FMU cannot be read or run."""
+    """Error for experiments in an FMU that cannot be read or run."""
 
 
 def unpacking_folder() -> str:
-    """Return a folder in which to unpack any FMU: the temporary folder, or another if PythonFMU cannot read that one.
+    """Return a folder in which to unpack any FMU: the temporary folder, or another one if PythonFMU cannot read its name.
 
     An FMU receives the URI of its folder. PythonFMU's library decodes only "%20" in the URI; if it then does not find its
     files, it ends the process. Linkwork's own Python FMUs have a guard against this.
@@ -68,13 +69,15 @@ def unpacking_folder() -> str:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Experiment:
-    """An experiment of an FMU; a field that is not in its file is None or empty.
+    """An experiment of an FMU; an attribute that the file does not give is None or empty.
 
     Attributes
     ----------
     name, description : str
-    start, stop, step, tolerance : float or None
-        Times (s) and tolerance of the solver.
+    start, stop, step : float or None
+        Times (s).
+    tolerance : float or None
+        Relative tolerance of the solver.
     allowed : float or None
         Largest relative difference from the reference that the FMU allows.
     parameters : mapping
@@ -97,7 +100,7 @@ class Experiment:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Deviation:
-    """Largest difference of a variable from its reference: its time, both values, and the difference relative to the scale."""
+    """Largest difference of a variable from its reference: its time (s), both values, and the relative difference."""
 
     name: str
     unit: str
@@ -109,7 +112,7 @@ class Deviation:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Outcome:
-    """Result of an experiment: deviations of all variables, largest first; the allowed deviation; why the run failed."""
+    """Result of an experiment: deviations of all variables, largest first; the allowed deviation; a message if it failed."""
 
     experiment: str
     description: str
@@ -120,7 +123,7 @@ class Outcome:
 
     @property
     def passed(self) -> bool:
-        """Return whether the run reached its end and the deviation of every variable is allowed."""
+        """Return whether the run reached its end and the deviation of every variable is within the allowed one."""
         return not self.message and all(d.relative <= self.allowed for d in self.deviations)
 
 
@@ -151,13 +154,13 @@ def read_experiments(fmu: str | Path) -> tuple[Experiment, ...]:
 
 
 class _Reader:
-    """Reader of the files in an FMU that its manifest names."""
+    """Reader of an FMU's manifest and of the files that it names."""
 
     def __init__(self, fmu: str | Path, archive: ZipFile) -> None:
         self.fmu, self.archive, self.names = fmu, archive, set(archive.namelist())
 
     def place(self, base: str, node: ElementTree.Element) -> str:
-        """Return the path in the archive of the file that the attribute ``source`` of a node in the file ``base`` names."""
+        """Return the path in the archive of the file that the ``source`` of ``node`` names, relative to the file ``base``."""
         source = node.get("source", "")
         parts = urlsplit(source)
         place = posixpath.normpath(posixpath.join(posixpath.dirname(base), unquote(parts.path)))
@@ -168,11 +171,11 @@ class _Reader:
     def text(self, place: str) -> str:
         try:
             return self.archive.read(place).decode("utf-8-sig")
-        except Exception as error:  # zipfile and zlib raise their own
+        except Exception as error:  # zipfile and zlib raise exceptions of their own
             raise ExperimentError(f"{self.fmu}: {place} cannot be read: {first_line(error)}") from error
 
     def xml(self, place: str) -> ElementTree.Element:
-        """Read an XML file; the names of elements are returned without namespaces."""
+        """Read an XML file of the FMU; return its root, with the namespaces removed from all element names."""
         try:
             root = ElementTree.fromstring(self.text(place))
         except ElementTree.ParseError as error:
@@ -182,10 +185,10 @@ class _Reader:
         return root
 
     def experiments(self, place: str) -> Iterator[Experiment]:
-        """Yield the experiments of a file."""
+        """Yield the experiments that a file of the FMU describes."""
         for node in self.xml(place).iter("Experiment"):
             name = node.get("name", "")
-            # times are attributes of the kind of analysis in the schema, of the experiment in the text of the standard
+            # in the schema the times are attributes of the kind of analysis; in the standard's text, of the experiment
             kinds = [child for child in node if child.tag not in ("Parameters", "Stimuli", "References", "Annotations")]
             if kinds and kinds[0].tag != "TransientSimulation":
                 raise ExperimentError(
@@ -223,7 +226,7 @@ class _Reader:
         return number
 
     def _parameters(self, place: str) -> dict[str, str]:
-        """Read a parameter set in SSP's format: values as texts, by name."""
+        """Read a parameter set in SSP's format; return the values as texts, by name."""
         values = {}
         for node in self.xml(place).iter("Parameter"):
             value = next((child.get("value") for child in node if "value" in child.attrib), None)
@@ -233,7 +236,7 @@ class _Reader:
         return values
 
     def _table(self, place: str) -> NDArray[Any]:
-        """Read a CSV table whose first column is the time."""
+        """Read a CSV table of the FMU whose first column is the time."""
         names, *rows = list(csv.reader(self.text(place).splitlines())) or [[]]
         names = [name.strip() for name in names]
         if len(names) < 2 or len(set(names)) < len(names) or not rows or any(len(row) != len(names) for row in rows):
@@ -251,8 +254,9 @@ def verify(fmu: str | Path, *, allowed: float | None = None) -> Iterator[Outcome
     """Run the experiments that an FMU from any tool contains, with FMPy, and compare them with its reference results.
 
     An experiment is run in co-simulation if the FMU has that interface: inputs are held over each step, and the reference has
-    the outputs at the end of the step, before the next inputs. Differences are relative to the scale of a variable: the largest
-    magnitude of its reference, but at least a thousandth of that of all variables with the same unit.
+    the outputs at the end of the step, before the next inputs are set. Differences are relative to the scale of a variable.
+    The scale is the largest magnitude of the variable's reference, but at least a thousandth of the largest magnitude of all
+    variables with the same unit.
 
     Parameters
     ----------
@@ -319,7 +323,7 @@ def _run(experiment: Experiment, description: Any, folder: str, allowed: float |
                 start_values=dict(experiment.parameters), input=experiment.stimuli, output=list(names) or None,
                 record_events=False,
             )  # fmt: skip
-        except Exception as error:  # FMPy raises plain ones
+        except Exception as error:  # FMPy raises plain exceptions
             message = first_line(error)
         else:
             end = experiment.stop if reference is None else float(reference[-1][0])
@@ -338,12 +342,12 @@ def _run(experiment: Experiment, description: Any, folder: str, allowed: float |
 
 
 def _columns(table: NDArray[Any] | None) -> tuple[str, ...]:
-    """Return the names of the columns of a table except the first, the time."""
+    """Return the names of all columns of a table except the first one, the time."""
     return () if table is None else (table.dtype.names or ())[1:]
 
 
 def _deviations(found: NDArray[Any], reference: NDArray[Any], units: Mapping[str, str]) -> tuple[Deviation, ...]:
-    """Return the largest difference of each variable at the times of the reference, sorted from large to small."""
+    """Return the largest difference of each variable at the times of the reference, sorted by relative size, largest first."""
     clock, *names = reference.dtype.names or ()
     times = reference[clock]
     sizes = {name: float(np.abs(reference[name]).max()) for name in names}

@@ -28,7 +28,7 @@ from .messages import Messages
 
 
 class CosimulationError(LinkworkError):
-    """An FMU could not be loaded or initialised; the message is the FMU's own if it gave one."""
+    """Error for an FMU that could not be loaded or initialised; the message is that of the FMU if it gave one."""
 
 
 def _description(fmu: str | Path) -> Any:
@@ -54,7 +54,7 @@ def read_description(fmu: str | Path, *, validate: bool = False) -> Any:
         with ZipFile(fmu) as archive:
             root = ElementTree.fromstring(archive.read("modelDescription.xml"))
         description = read_model_description(str(fmu), validate=validate)
-    except Exception as error:  # FMPy raises plain ones
+    except Exception as error:  # FMPy raises plain exceptions
         # the findings of a validation are below its first line
         lines = [line.strip("- ") for line in str(error).splitlines()] or [type(error).__name__]
         said = " ".join(lines[:2]) if lines[0].endswith(":") else lines[0]
@@ -67,7 +67,7 @@ def read_description(fmu: str | Path, *, validate: bool = False) -> Any:
 
 
 def list_interfaces(fmu: str | Path) -> dict[str, str]:
-    """Return the interfaces of an FMU: descriptions by the names that `cosimulate` takes.
+    """Return the interfaces of an FMU: a description of each, by the name that `cosimulate` takes.
 
     Raises
     ------
@@ -106,7 +106,7 @@ class _Instance:
     """
 
     interface: ClassVar[str]
-    #: Attribute of FMPy's model description that describes the interface; classes that run it, by the version of FMI.
+    #: Attribute of FMPy's model description that describes the interface; FMPy's classes for it, by the version of FMI.
     described: ClassVar[str]
     _classes: ClassVar[Mapping[str, type]]
     _component: ClassVar[type]
@@ -152,7 +152,7 @@ class _Instance:
             values = {fmi_name(name): value for name, value in asdict(parameters).items()}
             values |= {f"initial.{name}": value for name, value in asdict(initial).items()}
             self._initialise(values | {"solver.tolerance": tolerance} | modes | inputs, tolerance, start_time)
-        except BaseException as error:  # FMPy raises plain ones, too
+        except BaseException as error:  # FMPy raises plain exceptions, too
             self.close()
             if not isinstance(error, Exception):
                 raise
@@ -164,7 +164,7 @@ class _Instance:
         self._get_reals = getattr(self._fmu, f"get{self._real}")
 
     def _instance_class(self, identifier: str) -> type:
-        """Return the class that runs the FMU: FMPy's, or the WebAssembly one if no library is there for this platform."""
+        """Return FMPy's class that runs the FMU, or the WebAssembly class if the FMU has no library for this platform."""
         assert self._folder is not None
         native = Path(self._folder) / "binaries" / (platform_tuple if self._fmi3 else platform)
         if native.is_dir() or not component_path(self._folder, identifier).is_file():
@@ -212,11 +212,11 @@ class _Instance:
         self._set_reals(self._inputs, [values[name] for name in self.input_names])
 
     def outputs(self) -> list[float]:
-        """Return all real outputs, in the order of the contract."""
+        """Return all real outputs, in the order of the mechanism's ``output_names``."""
         return list(self._get_reals(self._outputs))
 
     def trouble(self) -> tuple[int, str]:
-        """Read solver.status and solver.message."""
+        """Return the values of solver.status and solver.message."""
         found = []
         for name in ("solver.status", "solver.message"):
             variable = self._variables[name]
@@ -244,7 +244,7 @@ class FmuRun(_Instance):
     _component = ComponentSlave
 
     def step(self, time: float, step: float) -> tuple[int, str]:
-        """Take one communication step; return 0 and an empty text, or solver.status and solver.message if it is refused."""
+        """Take one communication step; return 0 and an empty text or, if it is refused, solver.status and solver.message."""
         try:
             self._fmu.doStep(time, step)
         except FMICallException:
@@ -253,7 +253,7 @@ class FmuRun(_Instance):
 
     @property
     def interpolates(self) -> bool:
-        """Return whether the FMU can have inputs that change linearly over a step."""
+        """Return whether the FMU accepts inputs that change linearly over a step."""
         return bool(getattr(self.description.coSimulation, "canInterpolateInputs", False))
 
     def set_slopes(self, values: Mapping[str, float]) -> None:
@@ -285,12 +285,12 @@ class FmuModel(_Instance):
         self.update()
 
     def put(self, time: float, x: Any) -> None:
-        """Set the time and the states, an array of ctypes."""
+        """Set the time and the states; ``x`` is an array of ctypes."""
         self._fmu.setTime(time)
         self._fmu.setContinuousStates(x, self.states)
 
     def get_states(self, x: Any) -> None:
-        """Write the states into an array of ctypes; the getters below do the same with their values."""
+        """Write the states into an array of ctypes; the getters below write their values in the same way."""
         self._fmu.getContinuousStates(x, self.states)
 
     def get_nominals(self, x: Any) -> None:

@@ -1,6 +1,7 @@
 """Inputs of a run: the class `Inputs`, and the arrays made from it for the compiled code.
 
-`simulate`, `cosimulate` and all mechanisms take the same class; the mechanism determines which channels there are.
+`simulate`, `cosimulate` and all mechanisms take the same class. The mechanism determines the channels, which are its input
+quantities, such as crank speed or slider force.
 """
 
 from __future__ import annotations
@@ -48,8 +49,8 @@ class Inputs:
     Raises
     ------
     InputError
-        If no mechanism has such a channel, one freedom is driven in two ways, a value is not finite or of the wrong kind, or
-        the unit of a text does not fit the channel.
+        If no mechanism has such a channel, one degree of freedom is driven by two inputs, a value is not finite or of the
+        wrong kind, or the unit of a text does not fit the channel.
 
     Examples
     --------
@@ -126,7 +127,10 @@ class Inputs:
         return _parts(self._given.get(channel))
 
     def modes(self, mechanism: Mechanism) -> dict[str, int]:
-        """Return the value of each mode of the mechanism, by name; the given inputs choose the modes."""
+        """Return the value of each mode of the mechanism, by name.
+
+        A mode says which of several inputs drives a degree of freedom; the given inputs choose its value.
+        """
         return {
             mode.name: next((n for n, name in enumerate(mode.arguments) if name in self._given), mode.default)
             for mode in mechanism.modes
@@ -148,7 +152,7 @@ class Inputs:
 
     @property
     def held_exactly(self) -> bool:
-        """Return whether all inputs are constant, so that holding them over a master's steps is exact."""
+        """Return whether all inputs are constant, so that holding them over the communication steps of a master is exact."""
         return all(isinstance(part, NUMBER) for name in self._given for part in self.parts(name))
 
 
@@ -169,7 +173,7 @@ def _arguments() -> tuple[tuple[str, ...], tuple[str, ...]]:
 
 
 def _rivals(mechanism: Mechanism, given: Iterable[str]) -> list[str]:
-    """Return the names of given inputs that drive the same freedom of a mechanism; empty if there are no such inputs."""
+    """Return the names of given inputs that drive the same degree of freedom of a mechanism; empty if there are none."""
     found = ([name for name in given if name in mode.arguments] for mode in mechanism.modes)
     return next((names for names in found if len(names) > 1), [])
 
@@ -424,7 +428,10 @@ def encode(inputs: Inputs, mechanism: Mechanism) -> Encoded:
 
 
 def _refine_breaks(part: Piecewise, breaks: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the polynomial coefficients of a signal on finer breaks, shape (n, 4); its outer pieces extend beyond its ends."""
+    """Return the polynomial coefficients of a signal on finer breaks, shape (n, 4).
+
+    The first and the last polynomial of the signal extend beyond the ends of the signal.
+    """
     left = breaks[:-1]
     index = np.clip(np.searchsorted(part.breaks, left, side="right") - 1, 0, len(part.coefficients) - 1)
     s = left - part.breaks[index]
@@ -457,6 +464,8 @@ def align(encoded: Encoded, times: NDArray[np.float64]) -> Encoded:
 @lru_cache(maxsize=256)
 def compile_function(function: StateFunction, freedoms: int) -> Any:
     """Compile a user's function to a C function of time and state that returns NaN where the original raises.
+
+    The state has the coordinates of all degrees of freedom, ``freedoms`` in number, followed by their rates.
 
     Raises
     ------

@@ -2,7 +2,8 @@
 
 The steps are those of `compiled`: the stages of all lanes are computed together, and each lane then accepts its step or tries
 a shorter one. When a run ends, its lane takes the next run. Beginning an interval of inputs and locating the limit of assembly
-is done by the functions for single runs. Arrays in lanes are flat: number i of lane l is at ``LANES * i + l``.
+is done by the functions for single runs. Arrays in lanes are flat: number i of lane l is at ``LANES * i + l``. Arguments ``v``
+are the work arrays `Lanes`, arguments ``w`` the `Work`.
 
 Only runs whose inputs are constant in each interval fit here; runs whose inputs must be evaluated at each stage are left to
 `compiled.run`.
@@ -191,7 +192,10 @@ def _motion(i, w):
 
 @inner
 def _take_run(lane, first, most, v, w):
-    """Give a lane the next run, from index ``first`` on, that fits and has steps to take; return the index after this run."""
+    """Give a lane the next run, from index ``first`` on, that fits and has steps to take; return the index after this run.
+
+    ``most`` is the largest number of steps of a run.
+    """
     i, end = first, w.status.shape[0]
     while i < end and not (w.fits[i] and w.status[i] == RUNNING and w.state.carries[i].steps < most):
         i += 1
@@ -282,7 +286,10 @@ def _end_at_limit(lane, v, w):
 
 @inner
 def _decide(lane, least, v, w):
-    """Decide on the outcome of a lane's step and choose the next step size; end the run if it cannot continue."""
+    """Decide on the outcome of a lane's step and choose the next step size; end the run if it cannot continue.
+
+    ``least`` is the shortest step size with which a rejected step is tried again.
+    """
     i, h = v.run[lane], v.h[lane]
     carry = w.state.carries[i]
     error = v.error[lane] / w.problem.tolerance

@@ -1,4 +1,4 @@
-"""Receive the log messages of FMUs of FMI 2.0 that run in FMPy."""
+"""Receive the log messages of FMUs that FMPy runs."""
 
 from __future__ import annotations
 
@@ -12,14 +12,14 @@ from fmpy.logging import addLoggerProxy
 
 
 class Messages(list[str]):
-    """The log messages of an FMU, in their order."""
+    """The log messages of one instance of an FMU, in the order in which they came."""
 
     def receive(self, *arguments: Any) -> None:
-        """Append a message, the last of the arguments in FMI 2.0 and in FMI 3.0."""
+        """Append a message to the list; it is the last argument in FMI 2.0 and in FMI 3.0."""
         self.append(arguments[-1].decode("utf-8", errors="replace"))
 
     def callbacks(self) -> Any:
-        """Return the callbacks of FMI 2.0 for `instantiate` of FMPy; keep them as long as the instance lives."""
+        """Return the FMI 2.0 callbacks for FMPy's `instantiate`; keep a reference to them as long as the instance lives."""
         found = fmi2CallbackFunctions(logger=_LOGGER, componentEnvironment=id(self))
         addLoggerProxy(byref(found))
         _listeners[id(self)] = self
@@ -37,6 +37,6 @@ def _receive(environment: int | None, *arguments: Any) -> None:
         listener.receive(*arguments)
 
 
-#: FMPy's proxy, which formats the messages, has one logger for all instances of the process, the last that it was given. This
-#: one lives as long as the process and finds the instance by its environment; messages of others are printed, as FMPy does.
+#: Logger for all instances. FMPy's proxy, which formats the messages, calls only the logger that it was given last. This logger
+#: therefore lives as long as the process and finds each instance by its environment; messages of other FMUs are printed.
 _LOGGER = fmi2CallbackLoggerTYPE(_receive)

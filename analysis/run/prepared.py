@@ -131,7 +131,7 @@ class Run:
     def stiffness_caution(self, x: NDArray[np.float64], u: NDArray[np.float64], steps: float, passed: float) -> str:
         """Return a caution that the run is stiff or vibrates fast, or an empty text.
 
-        ``x`` and ``u`` are state and channels after ``steps`` steps, which covered the time ``passed`` (s).
+        ``x`` and ``u`` are state and input channels after ``steps`` steps, which covered the time ``passed`` (s).
         """
         if steps < MANY_STEPS:
             return ""
@@ -240,7 +240,10 @@ class Run:
         return trajectory
 
     def describe_undefined_forces(self, x: NDArray[np.float64]) -> str:
-        """Return a text that names springs without a finite force 1 us or 1 ms after the state x; empty if there are none."""
+        """Return a text that names the springs whose law has no value just beyond the state x; empty if there are none.
+
+        The laws are evaluated at the positions 1 us and 1 ms after the state, extrapolated with constant rates.
+        """
         springs = {v.name: v.of for v in self.mechanism.variables if v.role == "spring force"}
         if not springs:
             return ""

@@ -43,10 +43,10 @@ class Problem(NamedTuple):
 class Watch(NamedTuple):
     """Events to look for, and those found.
 
-    Each event has a row in ``table`` (columns OUTPUT, LEVEL, DIRECTION, STOPS), the address of its function in ``addresses``,
-    0 if the event uses an output, and its last value in ``gaps``. A row of ``found`` has the index of an event, its time and
-    the state. ``balance`` are the indices of the outputs energy residual and kinetic energy if the energy balance is to be
-    restored, else empty.
+    Each event has a row in ``table`` (columns OUTPUT, LEVEL, DIRECTION, STOPS), the address of its function in ``addresses``
+    (0 if the event uses an output), and in ``gaps`` the last value of the function that is zero at the event. A row of
+    ``found`` has the index of an event, its time and the state. ``balance`` are the indices of the outputs energy residual and
+    kinetic energy if the energy balance is to be restored, else empty.
     """
 
     table: NDArray[np.float64]
@@ -173,7 +173,7 @@ def step_time(s, h, motion):
 
 @inner
 def renew(elapsed, x, u, motion):
-    """Update the channels u to the state x and the time ``elapsed`` in the interval, unless the channels are constant."""
+    """Update the input channels u to the state x and the time ``elapsed`` in the interval, unless the channels are constant."""
     if motion.carry.piece >= 0:
         write_channels(motion.carry.begin, elapsed, motion.carry.piece, x, motion.source, u)
 

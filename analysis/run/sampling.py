@@ -30,7 +30,7 @@ def sample(
     left: bool = False,
     ahead: float = -np.inf,
 ) -> NDArray[np.float64]:
-    """Sample the channels at time t and state x in Python, calling the user's functions uncompiled.
+    """Sample the input channels at time t and state x in Python, calling the user's functions uncompiled.
 
     Parameters
     ----------
@@ -39,9 +39,9 @@ def sample(
     left : bool
         Whether to take the limit from the left where an input jumps.
     ahead : float
-        If this time is later than t, the channels are sampled at t and held until then (s): commanded rates change linearly, a
-        torsion bar acts with the torque predicted for the middle of the step, and is marked as released in ``laws`` once it
-        has unwound.
+        Time (s). If it is later than t, the channels are sampled at t and held until ``ahead``: commanded rates change
+        linearly, a torsion bar acts with the torque predicted for the middle of the step, and is marked as released in
+        ``laws`` once it has unwound.
 
     Raises
     ------

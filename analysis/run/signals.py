@@ -266,8 +266,8 @@ class Source(NamedTuple):
         For each of `Mechanism.torques` a torsion bar (torque, release angle, and 1 while it acts, 0 after its release or
         without a bar) and a motor (breakdown torque, breakdown slip, synchronous speed; the torque is 0 without a motor).
     law_places : ndarray of int, shape (torques, 3)
-        For each of these torques its channel, and the components of the state that are the coordinate and the rate of its
-        freedom.
+        For each of `Mechanism.torques` the index of its channel, and the indices in the state of the coordinate and of the
+        rate on which the torque acts.
     functions : ndarray of int, shape (signals, 2)
         Addresses of the user's compiled functions for a signal and its derivative, or 0.
     """

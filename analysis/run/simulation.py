@@ -113,9 +113,9 @@ def simulate(
         "table-3.1". A published set also gives the initial state, and the crank speed unless the inputs drive the crank. See
         also `variant`.
     inputs : Inputs
-        What acts on the mechanism; by default nothing: a crank is free, the slider-crank's shift is held, and a freedom of a
-        described linkage that has a speed in its file is held at rest. With a published set a freedom has the speed of the
-        set; ``torque=0.0`` frees the crank.
+        What acts on the mechanism; by default nothing: a crank is free, the slider-crank's shift is held, and a coordinate
+        of a described linkage is held at rest if the file gives a speed for it. With a published set a coordinate has the
+        speed of the set; ``torque=0.0`` frees the crank.
     initial
         Initial state of the mechanism, or a mapping such as {"crank_speed": "420 rpm"}; by default at rest with all
         coordinates zero. Commanded speeds replace the rates in it.

@@ -39,10 +39,10 @@ def _find_piece(t, breaks):
 
 @inner
 def write_channels(begin, elapsed, piece, x, source, u):
-    """Write the channels at state x and time ``begin + elapsed`` into u, with the given piece of the polynomials.
+    """Write the input channels at state x and time ``begin + elapsed`` into u, with the given piece of the polynomials.
 
-    Polynomials and harmonics are not evaluated at the sum: at late times it is rounded so much that the inputs would change in
-    steps, which an integrator would try to follow.
+    Polynomials and harmonics are not evaluated at the sum ``begin + elapsed``. At late times the sum is rounded so much that
+    the inputs would change in steps, which an integrator would try to follow.
     """
     s = (begin - source.breaks[piece]) + elapsed
     for n in range(source.places.shape[0]):
@@ -103,7 +103,9 @@ def _held_bar_correction(law, angle, speed, step):
 
 @kernel(types.void(float64, float64, boolean, VECTOR, SOURCE, PLACES, VECTOR, VECTOR), purpose="the sampling of inputs")
 def channels(t, ahead, left, x, source, commands, u, there):
-    """Write the channels at time t and state x into u; where an input jumps, the limit from the left if ``left``, else right.
+    """Write the input channels at time t and state x into u.
+
+    Where an input jumps, u has the limit from the left if ``left`` is true, else the limit from the right.
 
     If ``ahead`` is later than t, the channels are those held from t to ``ahead``, see `hold`. ``there`` is a work array for
     channels.
@@ -115,7 +117,7 @@ def channels(t, ahead, left, x, source, commands, u, there):
 
 @inner
 def hold(t, ahead, x, source, commands, u, there):
-    """Replace the channels u at time t by the values that a master holds until the time ``ahead``.
+    """Replace the input channels u at time t by the values that a master holds until the time ``ahead``.
 
     A torsion bar acts with the torque predicted for the middle of the step. A commanded rate changes linearly, so that at
     ``ahead`` it is equal to the command.

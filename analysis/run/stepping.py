@@ -69,8 +69,8 @@ class Flow(NamedTuple):
 def attempt(flow, begin, elapsed, h, x, room, u, piece, source):
     """Take a step of size h from x at the time ``begin + elapsed`` into room.y; return its relative error (`_local_error`).
 
-    The rates at the start of the step must be in room.k[0]. ``u`` are the channels; if ``piece`` is not negative, they are
-    sampled from ``source`` at each stage.
+    The rates at the start of the step must be in room.k[0]. ``u`` are the input channels; if ``piece``, the index of a piece
+    of the polynomials, is not negative, the channels are sampled from ``source`` at each stage.
     """
     k, y = room.k, room.y
     for s in range(1, STAGES):

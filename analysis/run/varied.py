@@ -27,14 +27,14 @@ from .inputs import Inputs
 
 
 class VariedSequence(Sequence[Any]):
-    """A sequence of objects that differ in some fields; an object is made only when its index is used.
+    """A sequence of objects that differ in some fields; each object is made only when it is taken from the sequence.
 
     Attributes
     ----------
     base : object
-        Object with the values of the other fields.
+        Object with the values of the fields that do not differ.
     columns : dict of str to ndarray
-        Values of all objects, by field.
+        Values of the fields that differ, for all objects, by field.
     make : callable
         Function that makes an object from ``base`` and the object's own values, as keywords.
     """

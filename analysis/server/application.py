@@ -74,9 +74,9 @@ class _Refused(Exception):
 class Application:
     """WSGI application that serves a page and accepts its jobs.
 
-    A request must name this machine as its host (a foreign page that reaches the server by another name does not), must not
-    come from another page, and must have the token, in the address of the page or in a header. There are two paths, the page
-    and its job; a path is looked up in a table, never on a disk.
+    A request must name this machine as its host, must not come from another page, and must have the token, in the address of
+    the page or in a header. The first rule refuses foreign pages that reach the server under another name. The server has two
+    paths, the page and its job; a path is looked up in a table, never on a disk.
 
     Parameters
     ----------
@@ -174,7 +174,7 @@ def _json(content: Mapping[str, Any]) -> bytes:
 
 
 def _hashes(page: str) -> str:
-    """Return the hashes of a page's scripts, in quotes, for its content policy."""
+    """Return the hashes of a page's scripts, in quotes, for the page's content security policy."""
     scripts = re.findall(r"<script>(.*?)</script>", page, flags=re.DOTALL)
     found = (base64.b64encode(hashlib.sha256(script.encode()).digest()).decode() for script in scripts)
     return " ".join(f"'sha256-{one}'" for one in found)

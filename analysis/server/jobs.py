@@ -30,7 +30,11 @@ _ROWS = 5000
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Tuning:
-    """Options of tuning: range of speeds (rad/s), parameters that may change, by which share at most, and what to exclude."""
+    """Options of tuning.
+
+    The range of speeds (rad/s), the parameters that may change, the largest relative change of a parameter, and the faults that
+    the range must not contain.
+    """
 
     speeds: tuple[float, float] = entry(Many(Quantity("rad/s", above=0.0), length=2))
     change: tuple[str, ...] = entry(Many(text, least=1))

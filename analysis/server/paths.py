@@ -103,9 +103,9 @@ class Moved(_Drawn):
 
 
 def linkages(case: Case, wanted: Linkages) -> Answer:
-    """Find linkages for the drawn path; return them ranked, with pictures, page states, and the path in the frame of each.
+    """Find linkages for the drawn path; return them ranked, with pictures, page states, and the path in each linkage's frame.
 
-    As a geared five-bar cannot be run, the answer has a drawing for CAD and a case file instead of a state.
+    As a geared five-bar cannot be run, the answer has a drawing for CAD and a case file instead of the state of a five-bar.
     """
     found = synthesize(
         wanted.task(), constraints=wanted.constraints(), kinds=wanted.kinds, search=Search(starts=wanted.starts)

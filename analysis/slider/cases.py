@@ -75,11 +75,12 @@ class SliderTable:
     Attributes
     ----------
     harmonics : tuple of int
-        Numbers of harmonics, increasing: one search for each number, which starts from the solutions of the search before.
+        Numbers of harmonics, increasing. There is one search for each number; it starts from the solutions of the search
+        before.
     links : str
-        "kept", or "free": optimised together with the motion.
+        "kept", or "free" if the links are optimised together with the motion.
     guide_angle, position, stroke, speed, acceleration
-        Bounds, see `SliderUnknown`.
+        Bounds of the motion, see `SliderUnknown`.
     starts : int
         Number of starts of each search.
     """
@@ -116,7 +117,7 @@ class StrategyTable:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class DriveTable:
-    """The table ``[drive]``: crank speed (rad/s), samples per crank turn, and whether the best spring is added."""
+    """The table ``[drive]``: crank speed (rad/s), number of samples per crank turn, and whether the best spring is added."""
 
     speed: float = entry(Quantity("rad/s", above=0.0))
     samples: int = entry(Whole(72), 720)
@@ -140,9 +141,9 @@ class TrackingTable:
     limit : float
         Largest magnitude of the slider force (N).
     coulomb_friction : float, optional
-        Coulomb friction of the plant (N); by default the model's.
+        Coulomb friction of the plant (N); by default the same as in the model.
     mass_error : float
-        Relative error: the plant's masses and moments of inertia are larger than the model's by this fraction.
+        Fraction by which the plant's masses and moments of inertia are larger than the model's.
     load_known : bool
         Whether the feed-forward knows the load.
     """
@@ -159,7 +160,7 @@ class TrackingTable:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Load:
-    """The table ``[load]``: components of the force at the coupler point P (N) along the ground link and to the left of it."""
+    """The table ``[load]``: components of the force at P (N), along the ground link and perpendicular to it, to the left."""
 
     fx: float = entry(Quantity("N"), 0.0)
     fy: float = entry(Quantity("N"), 0.0)
@@ -219,7 +220,7 @@ class SliderCase:
         return _fixed_bounds(self.linkage)
 
     def find_four_bar(self, *, progress: bool = False) -> Solution:
-        """Evaluate the given linkage with a fixed pivot; if no linkage is given, search for the best."""
+        """Evaluate the given linkage with a fixed pivot; if no linkage is given, search for the best four-bar."""
         task = self.synthesis.task
         if self.linkage is None:
             return self.synthesis.solve(progress=progress).best
@@ -316,7 +317,10 @@ class SliderCase:
         )
 
     def system(self, drive: SliderDrive, case: str) -> dict[str, Any]:
-        """Return the tables of a system of linkage, reference and controller; ``case`` is the case file of the linkage."""
+        """Return the tables that describe a system of linkage, reference and controller.
+
+        ``case`` is the case file of the linkage.
+        """
         from ..export.controllers import HARMONICS
 
         wanted = self.tracking or TrackingTable()
@@ -368,7 +372,7 @@ def _fixed_bounds(linkage: Linkage) -> dict[str, tuple[float, float]]:
 
 
 def _free_bounds(linkage: Linkage, task: Task) -> dict[str, tuple[float, float]]:
-    """Return wide bounds for free links, for instance a quarter to four times a length; dimensions not named stay fixed."""
+    """Return wide bounds for free links, such as a quarter to four times a length; dimensions without bounds stay fixed."""
     near = {name: (0.25 * getattr(linkage, name), 4.0 * getattr(linkage, name)) for name in LINKS}
     near["crank_phase"] = (linkage.crank_phase - pi, linkage.crank_phase + pi)
     if isinstance(task, RockerFunction):
@@ -398,7 +402,7 @@ def run_case(drive: SliderDrive, title: str, force_file: str) -> dict[str, Any]:
     }
 
 
-#: Tables of a case that a synthesis case does not have, for `linkwork new`.
+#: Tables of a slider case that a synthesis case does not have, for `linkwork new`.
 TABLES: Mapping[str, type] = {
     "slider": SliderTable, "strategy": StrategyTable, "drive": DriveTable, "load": Load, "tracking": TrackingTable,
 }  # fmt: skip
@@ -408,7 +412,7 @@ TABLES: Mapping[str, type] = {
 
 
 def _read_strategy(value: Any, name: str, *, angular: bool) -> StrategyTable:
-    """Read the table ``[strategy]``; the tolerance is in m or rad, or for the quality function in m2 or rad2."""
+    """Read the table ``[strategy]``; the tolerance is a worst error (m, rad) or a value of the quality function (m2, rad2)."""
     unit = ("rad" if angular else "m") + "**2" * (as_table(value, name).get("criterion") == "error")
     return read(StrategyTable, value, name, readers={"tolerance": Quantity(unit, above=0.0)})
 

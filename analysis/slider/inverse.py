@@ -32,7 +32,7 @@ from ..units import Amount, in_si
 from ..youssef import require_no_contact_friction
 
 FloatArray = NDArray[np.float64]
-#: Force at P (N, N): constant, or a function of the crank angle (rad).
+#: The two components of the force at P (N): constant, or a function of the crank angle (rad).
 Load = tuple[float, float] | Callable[[float], tuple[float, float]]
 
 #: Names of the outputs of a prescribed motion: all except the energies, which are counted from the start of a run.
@@ -60,13 +60,15 @@ class TurnBalance:
 
     @property
     def residual(self) -> float:
-        """Return the work supplied minus the work dissipated (J): zero but for rounding if the samples resolve the motion."""
+        """Return the work supplied minus the work dissipated (J): zero apart from rounding if the samples are close enough."""
         return self.force + self.torque + self.load - self.dissipated
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class SliderDrive:
-    """One turn of the crank with a prescribed slider motion, sampled at n equal steps of the crank angle, without its end.
+    """One turn of the crank with a prescribed slider motion, sampled at n equally spaced crank angles.
+
+    The end of the turn is not a sample, because the motion repeats there.
 
     Attributes
     ----------
@@ -74,15 +76,15 @@ class SliderDrive:
     slider : FourierSeries
         Slider position u(th2) (m).
     crank_speed : float
-        rad/s.
+        Crank speed (rad/s).
     load : (float, float) or function of the crank angle
         Load at the coupler point P (N).
     crank_angle, time : ndarray, shape (n,)
-        rad, s; both zero at the start.
+        Crank angle (rad) and time (s), both zero at the start.
     states, inputs : ndarray, shape (n, 6)
-        States (th2, u, w2, v, 0, 0) and channels of the plant.
+        States (th2, u, w2, v, 0, 0) of the plant, and its inputs.
     values : ndarray, shape (n, 24)
-        Outputs of the FMI contract by `NAMES`.
+        Outputs of the plant, in the order of `NAMES`.
 
     Notes
     -----
@@ -235,7 +237,7 @@ def inverse_dynamics(
     slider : FourierSeries
         Slider position u (m) over the crank angle th2; `FourierSeries.from_samples` makes it from samples.
     crank_speed : float
-        rad/s, not zero; if negative, the crank turns clockwise.
+        Crank speed (rad/s), not zero; if negative, the crank turns clockwise.
     load : (float, float) or function of the crank angle (rad)
         Force at the coupler point P (N).
     samples : int
@@ -325,7 +327,7 @@ class BestSpring:
     parameters : FiveBarParameters
         Parameters of the mechanism with this spring.
     stiffness, free_position : float
-        Of the spring (N/m, m); a stiffness of zero means that no spring is best.
+        Stiffness (N/m) and free position (m) of the spring; a stiffness of zero means that it is best to have no spring.
     rms_force : float
         Rms control force with this spring (N).
     rms_force_without : float
@@ -352,8 +354,9 @@ def best_spring(
 ) -> BestSpring:
     """Find stiffness and free position of the spring that minimise the rms control force of a motion.
 
-    The force is affine in k and k u0, with the stiffness k and the free position u0. The minimum is therefore a linear
-    least-squares solution in the wedge k >= 0, low k <= k u0 <= high k: inside the wedge or on one of its two edges.
+    The force is affine in k and k u0, with the stiffness k and the free position u0 between the bounds low and high. The
+    minimum is therefore a linear least-squares solution in the wedge k >= 0, low k <= k u0 <= high k: inside the wedge or
+    on one of the two edges.
 
     Parameters
     ----------

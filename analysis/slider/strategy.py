@@ -48,7 +48,7 @@ class Step:
     solution : Solution or None
         Best solution of the mechanism; None if there is none.
     value : float
-        Value compared with the tolerance; infinite without a solution.
+        Quality function or worst error, whichever is compared with the tolerance; infinite without a solution.
     reason : str
         Reason why the mechanism was accepted or rejected.
     """
@@ -69,7 +69,7 @@ class Strategy:
     met : bool
         Whether the last step meets the tolerance, with no circuit, branch or order defect.
     tolerance : float
-        Greatest value allowed, in the unit of the criterion.
+        Greatest allowed value of the criterion, in the unit of the criterion.
     criterion : str
         "error" (the quality function) or "worst" (the worst error).
     """

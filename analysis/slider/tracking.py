@@ -4,8 +4,9 @@ The force over a sampling period h is
 
     F2 = F_ff + feedback on (u - u_ref, u' - u_ref')
 
-F_ff is the force by inverse dynamics of the model half a period ahead, at th2 + w2 h/2. The force is held over the period and
-exact in the middle of the period, so that the error is of order h^2; the force at the sample would give an error of order h.
+F_ff is computed by inverse dynamics of the model for half a period ahead, at th2 + w2 h/2. This force is held over the period.
+It is exact in the middle of the period, so that the error is of order h^2; the force at the sample would give an error of
+order h.
 F_ff and u_ref' are computed at the measured crank angle. `analysis.linear` defines gains, integral and limit of the feedback.
 
 The plant (the simulated five-bar slider) may differ from the model in friction, masses, and the load at P.
@@ -156,7 +157,7 @@ class TrackingResult:
     method : str
         Name of the control method.
     crank_speed : float
-        rad/s.
+        Crank speed (rad/s).
     loop : LoopResult
         The run, with the plant's outputs in ``loop.trajectory``.
     error : ndarray, shape (n,)
@@ -164,7 +165,7 @@ class TrackingResult:
     point_error : ndarray, shape (n,)
         Distance of P from the model's P on the reference (m).
     power : ndarray, shape (n,)
-        Mean power of the slider force over the period before each sample (W); zero at the first.
+        Mean power of the slider force over the period before each sample (W); zero at the first sample.
     """
 
     method: str

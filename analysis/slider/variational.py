@@ -9,9 +9,10 @@ and one degree of freedom is left, the slider position u. A change of u turns th
 
     ds/du = cos t / (l3 sin(t - s)),   dt/du = cos s / (l4 sin(t - s)).
 
-For a path, P turns with the coupler about B, and |P - p*|^2 grows with the angle between BP and the direction from B to p*; for
-a function the rocker has to be at th4*. The target link is therefore the coupler for a path, the rocker for a function; for a
-path its target angle is that at which BP points at p*. The error as a function of u has its minima where
+For a path, P turns with the coupler about B, and the squared distance |P - p*|^2 from the target point p* grows with the angle
+between BP and the direction from B to p*. For a function the rocker has to be at the target angle th4*. The target link is
+therefore the coupler for a path, the rocker for a function; the target angle of the coupler is the angle at which BP points at
+p*. The error as a function of u has its minima where
 
     the target link is at its target angle, with the other link on either side of the perpendicular to the guide;
     the other link is perpendicular to the guide, in either direction, with the target link on either side of the
@@ -43,8 +44,9 @@ FloatArray = NDArray[np.float64]
 KINDS = ("target", "perpendicular", "limit", "stroke")
 #: Rounding errors of sines and their products.
 ROUNDING = 1e-12
-#: Greatest number of bisections of a step in search of a continuous path of minima across it, and the gap, relative to l3 + l4,
-#: below which the path is found. Near the perpendicular u changes as a square root: 44 bisections reduce its gap to 2.4e-7.
+#: A continuous path of minima across a step is searched by bisection: greatest number of bisections, and the gap of u, relative
+#: to l3 + l4, below which the path is found. Near the perpendicular u changes as a square root: 44 bisections reduce the gap to
+#: 2.4e-7.
 HALVINGS = 44
 GAP = 1e-5
 #: Costs of the squared travel, which decides between equal errors, and of a jump, which exceeds the sum of all errors (1).
@@ -136,7 +138,7 @@ class _Minima(NamedTuple):
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class _Problem:
-    """Linkage, guide and bounds of the problem; a target is a complex number for a point, a real number for an angle."""
+    """Linkage, guide and bounds of the search for minima; a target is a complex number (point) or a real number (angle)."""
 
     linkage: Linkage
     guide_angle: float
@@ -164,7 +166,7 @@ class _Problem:
         return np.array(kinds * len(self.assemblies)), np.repeat(self.assemblies, len(kinds))
 
     def _limits(self) -> list[tuple[float, float, float]]:
-        """Return the limits of the distance BD: angle at C (rad), BD (m), and 1 for an upper or -1 for a lower limit."""
+        """Return the limits of the distance BD, each as (angle at C (rad), BD (m), 1 for an upper or -1 for a lower limit)."""
         l3, l4 = self.linkage.coupler_length, self.linkage.rocker_length
         low = self.least_transmission
         least = sqrt((l3 - l4) ** 2 + 4.0 * l3 * l4 * sin(0.5 * low) ** 2)
@@ -234,7 +236,7 @@ class _Problem:
         return _Minima(u, coupler + self.guide_angle, rocker + self.guide_angle, error, valid)
 
     def _ends(self, b: NDArray[np.complex128]) -> tuple[FloatArray, FloatArray, FloatArray, NDArray[np.bool_]]:
-        """Return the ends of the range of u for crank pins b, in four arrays (ends, n).
+        """Return the ends of the range of u for crank pins b: four arrays with a row for each end, a column for each crank pin.
 
         The arrays are position (m), angle at C (rad), direction into the range (1 or -1), and whether the end exists.
         """
@@ -367,7 +369,10 @@ def _wrap_angles(angle: FloatArray) -> FloatArray:
 
 
 def _describe_unreachable(problem: _Problem, phi: FloatArray, n: int) -> str:
-    """Return a sentence on ``phi``, those of ``n`` rotations at which the links cannot be joined, and the worst of them."""
+    """Return a sentence that says at which rotation ``phi`` the links are farthest from being joined, and by how much.
+
+    ``phi`` are the rotations at which the links cannot be joined, ``n`` is the number of all rotations.
+    """
     b = problem.pin(phi)
     limits = problem._limits()
     most = limits[0][1]
@@ -404,9 +409,9 @@ def _find_connections(
     The result, shape (n, m, m), says at [k, i, j] whether a path leads from minimum i at rotation k to minimum j at rotation
     k + 1. The last rotation is followed by the first, a turn later.
 
-    Between two rotations the target moves along a straight line. The step is bisected: in the middle, the minimum that leaves
-    the smallest gap of u is taken. Then the half with the wider gap is bisected, and so on. For a path the gap vanishes; for a
-    jump it remains.
+    Between two rotations the target moves along a straight line. The step is bisected: in the middle, the minimum whose u is
+    nearest to the values at both ends is taken. Then the half with the wider gap of u is bisected, and so on. For a path the
+    gap vanishes; for a jump it remains.
     """
     m, n = minima.u.shape
     following = (np.arange(n) + 1) % n

@@ -65,31 +65,32 @@ class Loops:
 
     @property
     def crank_frame(self) -> Dual:
-        """Return frame 2, with its origin on the crank axis, in frame 1: (n, 3, 3)."""
+        """Return the dual matrix of frame 2 relative to frame 1, (n, 3, 3); the origin of frame 2 is on the crank axis."""
         return about_k(Dual(self.crank_angle, self.shift))
 
     @property
     def rod_frame(self) -> Dual:
-        """Return a frame fixed to the rod, with its origin in the crank pin and i along the rod, in frame 1: (n, 3, 3).
+        """Return the dual matrix of a frame fixed to the rod relative to frame 1, (n, 3, 3).
 
-        This frame is not frame 3, in which components of forces are given (`JointLoads.components`): its axes j and k are
-        turned about the rod by the spin angle, which depends on the start of the iteration.
+        The origin of the frame is the crank pin, and its axis i is along the rod. This frame is not frame 3, in which
+        components of forces are given (`JointLoads.components`): the axes j and k are turned about the rod by the spin angle,
+        which depends on the start of the iteration.
         """
         return cast(Dual, _pin_frame(self.parameters, self.crank_angle, self.shift) @ self.crank_ball)
 
     @property
     def guide_frame(self) -> Dual:
-        """Return frame 4, with its origin in the slider pin, in frame 1: (n, 3, 3)."""
+        """Return the dual matrix of frame 4 relative to frame 1, (n, 3, 3); the origin of frame 4 is the slider pin."""
         return cast(Dual, self.rod_frame @ about_i(Dual(0.0, self.parameters.rod_length)) @ self.slider_ball)
 
     @property
     def crank_pin(self) -> FloatArray:
-        """Return the position of the crank pin in frame 1 (m): (n, 3)."""
+        """Return the position of the crank pin in frame 1 (m), shape (n, 3)."""
         return origin(self.rod_frame)
 
     @property
     def slider_pin(self) -> FloatArray:
-        """Return the position of the slider pin in frame 1 (m): (n, 3)."""
+        """Return the position of the slider pin in frame 1 (m), shape (n, 3)."""
         return origin(self.guide_frame)
 
     @property
@@ -285,7 +286,7 @@ def _pin_frame(p: SliderCrankParameters, th: Array, s1: Array) -> Dual:
 
 
 def _correction(product: Dual, rod: Dual, guide: Dual, length: float) -> FloatArray:
-    """Return Newton's step (n, 6): rotations about rod axes j, k and guide axes i, j, k; slide divided by ``length``.
+    """Return Newton's step (n, 6): rotations about the rod's j, k and the guide's i, j, k, and change of S4 / ``length``.
 
     A joint's motion q along its screw s changes the loop E by [s]E q. The vector of the antisymmetric part of this change is
     (tr(E) I - E) s q / 2, which is the exact derivative for closed and for open loops.
@@ -385,7 +386,10 @@ class Settled:
 
 
 def chain(p: SliderCrankParameters, th: Array, s1: Array, q: Array) -> tuple[Dual, Dual]:
-    """Return the product M1 L2 L3 M4 (n, 3, 3) for unknowns q (n, 5), and the joint screw of each in frame 1 (n, 3, 5)."""
+    """Return the product M1 L2 L3 M4 (n, 3, 3) for unknowns q (n, 5), and the joint screws of the unknowns in frame 1.
+
+    The screws have shape (n, 3, 5).
+    """
     zero = np.zeros_like(th)
     pin = about_k(Dual(th, s1)) @ about_i(Dual(zero, p.crank_length))
     turned = pin @ about_k(q[:, 0])

@@ -95,7 +95,7 @@ def solve(
     angle, shift, speed, acceleration
         theta1 (rad), the shift's motion, theta1' (rad/s) and theta1'' (rad/s2).
     given
-        The load (N), or with ``torque`` the torque (N.m).
+        The load (N) or, if ``torque`` is true, the torque (N.m).
     torque : bool
         Whether the torque is given and the load sought. The load is not finite where the ratio is zero.
     groove : bool
@@ -104,7 +104,8 @@ def solve(
     Returns
     -------
     Solution
-        ``ratio`` is minus the derivative of the torque by the load (m): kth, or dS4/dtheta1 with a groove in the shaft.
+        ``ratio`` is minus the derivative of the torque with respect to the load (m): kth, or dS4/dtheta1 if a groove in the
+        shaft makes the shift.
     """
     f = plant_functions()
     q = f.position(angle, shift.shift, p)
@@ -301,7 +302,7 @@ class ForceTurn:
         return np.ma.MaskedArray(_stack_components(turned, len(self)), mask=mask, fill_value=np.nan)
 
     def columns(self, units: str = "SI", frames: tuple[int, ...] = (1, 2, 3, 4)) -> dict[str, FloatArray]:
-        """Return all values by name with unit, for a file; masked values are NaN, and the last two columns give the reasons.
+        """Return all quantities as columns of a file, by name with unit; masked values are NaN, the last two columns say why.
 
         Parameters
         ----------
@@ -367,7 +368,7 @@ def force_turn(
     crank_speed, crank_acceleration : array_like, scalar or shape (n,)
         theta1' (rad/s), theta1'' (rad/s2). Here and below, a number may be given as text with its unit, such as "50 rpm".
     shift : ShiftLaw
-        `ConstantShift`, `GrooveShift`, `AngleShift`, `TimeShift` or another. The parameters' own groove is not used.
+        `ConstantShift`, `GrooveShift`, `AngleShift`, `TimeShift` or another law. The parameters' own groove is not used.
     angles : array_like, shape (n,), optional
         Crank angles (rad); 361 over the turn by default.
     load : array_like, scalar or shape (n,), optional

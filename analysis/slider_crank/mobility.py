@@ -50,11 +50,11 @@ class PeriodicShift:
     Parameters
     ----------
     at : callable
-        Function of the crank angle (rad) that returns the shift (m) and its first derivative by the angle (m/rad); further
-        items that it returns are ignored, so that `kinematics.groove` can be used.
+        Function of the crank angle (rad) that returns the shift (m) and the derivative of the shift with respect to the angle
+        (m/rad); further items of the result are ignored, so that `kinematics.groove` can be used.
     rate, curvature : float
-        Upper bounds of the absolute values of the first and second derivatives by the angle (m/rad, m/rad2), not
-        necessarily sharp.
+        Upper bounds of the absolute values of the first and second derivatives of the shift with respect to the angle (m/rad,
+        m/rad2), not necessarily sharp.
     turns : int
         Whole turns of the crank after which the law repeats.
 
@@ -191,7 +191,7 @@ class _Change(NamedTuple):
 
 
 def _change(middle: float, half: float, law: PeriodicShift, p: Constants, pitch: float) -> _Change:
-    """Return D, A, B and bounds of their changes over ``middle`` +- ``half``; A and B take ``pitch`` (1 or 0) times S1'."""
+    """Return D, A, B and bounds of their changes over ``middle`` +- ``half``; ``pitch`` (1 or 0) multiplies S1' in A and B."""
     s1, ds1 = law.at(middle)[:2]
     if not (isfinite(s1) and abs(ds1) <= law.rate * (1.0 + 1e-9)):
         raise InputError(
@@ -475,10 +475,10 @@ def dead_centres(parameters: SliderCrankParameters, law: PeriodicShift) -> tuple
 def singularities(parameters: SliderCrankParameters, law: PeriodicShift) -> tuple[DeadCentre, ...]:
     """Find the configurations along the law in which crank torque and slider force do not balance: kth = 0.
 
-    kth is the derivative of the slider position by the crank angle at constant shift. If the shift has a drive of its own, kth
-    multiplies the slider force in the crank's equation of motion (the thesis's force problem), whatever the rate of the shift.
-    The slider itself stops in these configurations only if the shift is constant. ``outer`` is true if, at constant shift, the
-    slider position would have a maximum (on branch +1) or a minimum (on branch -1).
+    kth is the derivative of the slider position with respect to the crank angle at constant shift. If the shift has a drive of
+    its own, kth multiplies the slider force in the crank's equation of motion (the thesis's force problem), whatever the rate
+    of the shift. The slider itself stops in these configurations only if the shift is constant. ``outer`` is true if, at
+    constant shift, the slider position would have a maximum (on branch +1) or a minimum (on branch -1).
     """
     p = parameters.constants()
     found = (_dead_centres(low, high, law, p, 0.0) for low, high in _find_ranges(law, p))

@@ -74,7 +74,7 @@ def unit_table(units: str) -> Mapping[str, tuple[str, float]]:
 
 
 def shown_units(units: str) -> Mapping[str, tuple[str, float]]:
-    """Return the units of a system as `unit_table`, for tables and figures: with "SI", lengths are in mm instead of m.
+    """Return the units of a system for tables and figures: those of `unit_table`, but with "SI" lengths are in mm.
 
     Raises
     ------

@@ -255,7 +255,10 @@ class Course:
         return tuple(centre for centre in moved if low <= centre.crank_angle <= high)
 
     def _sign_changes(self, low: float, high: float, pitch: float) -> tuple[DeadCentre, ...]:
-        """Find the zeros of kth + ``pitch`` S1' ks, with ks = dS4/dS1, from the signs at `_PIECES` angles per turn."""
+        """Find the zeros of kth + ``pitch`` S1' ks from the signs at `_PIECES` angles per turn.
+
+        kth and ks are the partial derivatives of S4 with respect to theta1 and S1.
+        """
         f, p = plant_functions(), self.parameters.constants()
 
         def slope(angle: FloatArray) -> FloatArray:

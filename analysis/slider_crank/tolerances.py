@@ -82,7 +82,7 @@ _CONSTANTS: Callable[[Any], Constants] = rebind_functions((parameters,), {"cos":
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Sensitivities:
-    """Exact first derivatives of quantities by errors, at the n angles of a turn.
+    """Exact first derivatives of quantities with respect to errors, at the n angles of a turn.
 
     Attributes
     ----------
@@ -93,8 +93,9 @@ class Sensitivities:
     values : mapping
         Nominal values of each quantity, by name: masked array (n,).
     derivatives : mapping
-        Derivatives of each quantity by the errors, by name: masked array (m, n), in the unit of the quantity divided by that of
-        the error. If the load is unknown, quantities that depend on it are masked at the dead centres.
+        Derivatives of each quantity with respect to the errors, by the name of the quantity: masked array (m, n), in the unit
+        of the quantity divided by that of the error. If the load is unknown, quantities that depend on it are masked at the
+        dead centres.
     """
 
     turn: ForceTurn
@@ -103,7 +104,7 @@ class Sensitivities:
     derivatives: Mapping[str, MaskedArray]
 
     def derivative(self, quantity: str, error: str) -> MaskedArray:
-        """Return the derivative (n,) of a quantity by an error.
+        """Return the derivative of a quantity with respect to an error, shape (n,).
 
         Raises
         ------
@@ -255,7 +256,7 @@ _DISTRIBUTIONS = {"normal": (NORMAL_EXTENT, 3.0), "uniform": (sqrt(3.0), 1.8), "
 
 @dataclass(frozen=True, slots=True)
 class Tolerance:
-    """A random error of one dimension, independent of the others, with zero mean.
+    """A random error of one dimension, mass or setting, independent of all other errors, with zero mean.
 
     Parameters
     ----------
@@ -263,7 +264,7 @@ class Tolerance:
         One of `ERRORS`: a parameter of the mechanism by its FMI name, "shift.position" or "crank.angle".
     half_width : float or str, optional
         Half the width of the tolerance zone, in the SI unit of the quantity in error, or text with a unit, such as "0.1 mm".
-        For a normal distribution it is three standard deviations; the distribution also has values beyond.
+        For a normal distribution it is three standard deviations; a few errors then lie outside the zone.
     standard_deviation : float, optional
         Standard deviation, instead of the half width.
     distribution : str
@@ -332,8 +333,8 @@ class Estimate:
     deviation : masked array, shape (n,)
         Standard deviation to first order: the root of the sum of squares of derivative times standard deviation.
     worst : masked array, shape (n,)
-        Greatest deviation from the nominal value to first order: every error has its extent as magnitude, and the worse
-        sign.
+        Greatest deviation from the nominal value to first order: the magnitude of every error is its extent, and its sign is
+        the worse one.
     shares : masked array, shape (m, n)
         Share of each tolerance in the variance to first order; masked if the variance is only a rounding error.
     second_mean, second_deviation : masked array, shape (n,)
@@ -342,8 +343,8 @@ class Estimate:
     second_shares : masked array, shape (m, n)
         As ``shares``, to second order; the joint effect of two errors is divided equally between them.
 
-    If the slider's force is sought and the errors, all at their extents, reach a dead centre, all arrays but ``nominal``
-    are masked: the quantity has a pole at the dead centre, and so neither mean nor variance.
+    If the slider's force is sought, all arrays but ``nominal`` are masked at the angles at which errors within their extents
+    can lead to a dead centre: the quantity has a pole at the dead centre, and so neither mean nor variance.
     """
 
     nominal: MaskedArray
@@ -426,7 +427,7 @@ def check_tolerances(tolerances: Sequence[Tolerance]) -> tuple[str, ...]:
 def _curvatures(
     turn: ForceTurn, tolerances: Sequence[Tolerance], quantities: Sequence[str]
 ) -> tuple[dict[str, FloatArray], NDArray[np.bool_]]:
-    """Return second derivatives times standard deviations, and a mask (n,): whether all varied mechanisms can be assembled.
+    """Return scaled second derivatives, and a mask (n,): whether all varied mechanisms can be assembled.
 
     The second derivatives are given for each quantity, by name, shape (m, m, n): each times the standard deviations of its
     two errors. They are half the difference between the first derivatives one standard deviation above and below.

@@ -36,7 +36,7 @@ STUDIES: Mapping[str, str] = MappingProxyType({**YOUSSEF, **RAHMAN})
 
 
 def is_figure(number: str) -> bool:
-    """Return whether a study reproduces a figure of a thesis, rather than being one of our own."""
+    """Return whether the number is that of a figure of a thesis; our own studies have names instead."""
     return number.removeprefix("R")[0].isdigit()
 
 
@@ -64,6 +64,6 @@ def make(
 ) -> tuple[StudyResult, tuple[Path, ...]]:
     """Run a study and write its plot, its table and its animation, if any, into a folder; return the result and the paths.
 
-    ``changes`` are values of its mechanism's parameters by name, numbers in SI or texts with their units.
+    ``changes`` maps names of the mechanism's parameters to new values: numbers in SI units, or texts with a unit.
     """
     return load(number).make(out, changes)

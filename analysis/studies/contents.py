@@ -1,4 +1,4 @@
-"""Entries of the lists of the theses' figures."""
+"""Entries of the lists of figures of both theses, and the statements that each study judges."""
 
 from __future__ import annotations
 
@@ -12,10 +12,10 @@ SENTENCES = Path(__file__).with_name("sentences.json")
 
 
 class Entry(NamedTuple):
-    """Figure in the list of studies: its title, the module that computes it, and its place in the thesis.
+    """Figure or study in the list: its title, the module that computes it, and its place in the thesis.
 
-    ``place`` gives the section and the lines (L) of the scanned text; it is empty for a study of ours. ``module`` is empty for
-    a figure that shows a mechanism or an apparatus, where there is nothing to compute.
+    ``place`` gives the section and the lines (L) of the scanned text; it is empty for a study of our own. ``module`` is empty
+    for a figure that shows a mechanism or an apparatus, where there is nothing to compute.
     """
 
     title: str
@@ -24,6 +24,6 @@ class Entry(NamedTuple):
 
 
 def sentences() -> Mapping[str, list[str]]:
-    """Return for each study, by its number, the statements that it judges, shortened, with their places in the thesis."""
+    """Return, by the study's number, the statements that the study judges: each shortened, with its place in the thesis."""
     found: dict[str, list[str]] = json.loads(SENTENCES.read_text(encoding="utf-8"))
     return found

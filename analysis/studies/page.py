@@ -1,4 +1,4 @@
-"""Markdown page of a thesis: each figure with its plot and its statements, findings of each chapter, a count at the head."""
+"""Write the Markdown page of a thesis: figures with plots and statements, findings of the chapters, number of statements."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from ..figures import Figure, resize
 from . import ENTRIES, STUDIES, file_stem, load
 from .statements import FAILS, HOLDS, IN_PART, OUTCOMES, TEXT, UNJUDGED, Statement, shortened
 
-#: Folder of the plots beside the page, width of a plot (in and px), and greatest size of its file (bytes).
+#: Folder of the plots beside the page, width of a plot (inches and pixels), and greatest size of its file (bytes).
 PLOTS, WIDTH_IN, WIDTH_PX, MOST_BYTES = "theses", 6.4, 480, 30_000
 #: A plot at least this wide (in) has three panels side by side.
 THREE_PANELS = 11.0
@@ -24,10 +24,10 @@ _STATEMENT = re.compile(
 
 
 def figures(numbers: Iterable[str], folder: Path) -> str:
-    """Compute the figures of these numbers and return them in Markdown; the plots go into ``folder``.
+    """Compute the figures with these numbers and return their Markdown text; the plots go into ``folder``.
 
     A chapter's findings come before its first figure. A figure that only shows a mechanism or an apparatus has only its title
-    and place. An assignment shared by several figures is printed with the first.
+    and place. An assignment that several figures share is printed with the first of them.
     """
     numbers = tuple(numbers)
     modules = dict.fromkeys(f"{__package__}.{ENTRIES[n].module}" for n in numbers if n in STUDIES)
@@ -74,12 +74,12 @@ def block(statement: Statement) -> Iterator[str]:
 
 
 def _escaped(text: str) -> str:
-    """Escape the vertical bars of a text, which would end a cell of a Markdown table."""
+    """Escape the vertical bars in a text, which would end a cell of a Markdown table."""
     return text.replace("|", "\\|")
 
 
 def save_small(figure: Figure, path: Path) -> None:
-    """Resize a plot to the page's width and save it in the best quality that keeps the file within `MOST_BYTES`.
+    """Save a plot at the page's width, in the best quality that keeps the file within `MOST_BYTES`.
 
     A plot with three panels side by side keeps its greater width, because narrower panels could not be read.
     """
@@ -100,7 +100,10 @@ def quotes(page: str) -> list[tuple[str, str]]:
 
 
 def sentences(page: str) -> dict[str, list[str]]:
-    """Return for each study on a page, by number, its statements, shortened, with places, and the figures that judge others."""
+    """Return, for each study on a page, its statements, and the figures at which further statements on it are judged.
+
+    The keys are the studies' numbers. Each statement is shortened and has its place in the thesis.
+    """
     _, *parts = re.split(r"^`linkwork figures (\S+)`$", page, flags=re.MULTILINE)
     return {
         number: [f"judged at {see}" for see in re.findall(r"are judged at Figs? (.+)\.$", part, flags=re.MULTILINE)]
@@ -110,7 +113,7 @@ def sentences(page: str) -> dict[str, list[str]]:
 
 
 def count(page: str) -> str:
-    """Return a sentence with the number of statements on a page by their verdicts."""
+    """Return a sentence that counts the statements on a page by verdict."""
     found = _STATEMENT.findall(page)
     number = Counter(outcome.lower() for *_, outcome in found)
     listed = sum(kind == "program" for _, kind, *_ in found)

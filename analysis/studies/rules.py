@@ -1,4 +1,4 @@
-"""Rule by which all studies convert the theses' words of degree, such as "about" and "slightly", to numbers."""
+"""Rule by which all studies convert words of degree in the theses, such as "about" and "slightly", to numbers."""
 
 from __future__ import annotations
 
@@ -11,14 +11,14 @@ ABOUT_DEG = 10.0
 SLIGHTLY = 0.15
 #: "Small", "negligible", "insignificant": no more than this, relative to what it is compared with.
 SMALL = 0.05
-#: "The same", "constant", "linear", "straight", "steady": what a reader cannot tell from it on a graph, relative to its scale.
+#: "The same", "constant", "linear", "straight", "steady": a difference that cannot be seen on a graph, relative to its scale.
 ALIKE = 0.05
-#: Words that studies print for a fall that can be seen on a graph: one by more than "the same".
+#: Words that studies print for a visible fall: a fall by more than "the same".
 SEEN_FALL = f"below {1.0 - ALIKE:g}, a fall that is seen by the rule for *the same*"
 #: Accuracy to which a place on a graph can be read: relative to the scale, and for a crank angle (deg).
 READ, READ_DEG = 0.02, 3.0
 
-#: "Very close" to an angle (deg), and "abnormally" high: how many times what it is compared with.
+#: "Very close" to an angle: largest departure (deg). "Abnormally" high: least ratio to what it is compared with.
 VERY_CLOSE_DEG, ABNORMAL = 1.0, 10.0
 
 #: The rule as the pages print it.

@@ -1,4 +1,4 @@
-"""Statement of a thesis with its verdict: its place, what is measured, the tolerance, and its cases."""
+"""Statements of a thesis with their verdicts: place, what is measured, tolerance, and cases."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ HOLDS, IN_PART, FAILS, UNJUDGED = OUTCOMES = ("holds", "holds in part", "does no
 
 
 def shortened(quote: str) -> str:
-    """Cut a quote at the end of a word to fit a line of a terminal."""
+    """Cut a quote at the end of a word so that it fits a line of a terminal."""
     return quote if len(quote) <= 120 else f"{quote[:100].rsplit(' ', 1)[0]} ..."
 
 
@@ -28,24 +28,26 @@ class Source(NamedTuple):
 
     @property
     def words(self) -> str:
-        """The source in words that need no documentation, such as "the thesis, 3.2.1, line 1905"."""
+        """The source in words that need no explanation, such as "the thesis, 3.2.1, line 1905"."""
         place = re.sub(r"\bL(?=\d)", "line ", self.place)
         return f"{'the thesis' if self.kind == TEXT else 'the program of the thesis'}, {place}"
 
 
 def text(place: str) -> Source:
-    """Return a place in the thesis's text as a source."""
+    """Return the source of a statement that stands at a place in the thesis's text."""
     return Source(TEXT, place)
 
 
 def listing(place: str) -> Source:
-    """Return a place in the thesis's program, which is run, as a source."""
+    """Return the source of a statement that the thesis's program prints, given the place of its listing in the thesis."""
     return Source(LISTING, place)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Case:
-    """One of the cases of a statement; it holds if ``computed`` lies from ``lower`` to ``upper``.
+    """Case of a statement: a computed value with the range in which the statement holds.
+
+    The case holds if ``computed`` lies from ``lower`` to ``upper``.
 
     Attributes
     ----------
@@ -54,7 +56,7 @@ class Case:
     stated : str
         Number as the thesis prints it; empty if the thesis gives it in words. Never a tolerance of ours.
     computed : float or None
-        None where the case cannot be judged.
+        Computed value; None if the case cannot be judged.
     lower, upper : float
         Range that the statement allows, with its tolerance.
     why : str
@@ -71,22 +73,22 @@ class Case:
 
     @property
     def holds(self) -> bool:
-        """Whether the computed value is in the range."""
+        """Whether the computed value is in the allowed range."""
         return self.computed is not None and bool(self.lower <= self.computed <= self.upper)
 
     @property
     def outcome(self) -> str:
-        """`HOLDS`, `FAILS` or `UNJUDGED`."""
+        """Verdict on the case: `HOLDS`, `FAILS` or `UNJUDGED`."""
         return UNJUDGED if self.computed is None else HOLDS if self.holds else FAILS
 
     @property
     def expected(self) -> str:
-        """The stated number with its unit; empty where there is none."""
+        """The stated number with its unit; empty if the thesis states no number."""
         return f"{self.stated} {self.unit}".rstrip() if self.stated else ""
 
     @property
     def allowed(self) -> str:
-        """The range that is allowed, in words."""
+        """The allowed range in words."""
         low, high = (f"{bound:.6g}" for bound in (self.lower, self.upper))
         if self.computed is None or self.lower == self.upper:
             return low if self.computed is not None else ""
@@ -102,7 +104,7 @@ class Case:
 
     @property
     def found(self) -> str:
-        """The computed value with its unit, to four digits or one more than are stated; empty where there is none."""
+        """The computed value with its unit, to four digits or one more than the stated number has; empty if there is none."""
         digits = max(4, 1 + len(re.sub(r"e.*|\D", "", self.stated).lstrip("0")))
         return "" if self.computed is None else f"{self.computed:.{digits}g} {self.unit}".rstrip()
 
@@ -116,10 +118,10 @@ def near(
     *,
     why: str = "",
 ) -> Case:
-    """Return a case that holds if the computed value is the stated one within a tolerance.
+    """Return a case that holds if the computed value equals the stated value within a tolerance.
 
-    ``stated`` is a text if the thesis prints the number, and a number if the thesis gives it in words. The tolerance is by
-    default half a unit of its last digit.
+    ``stated`` is a text if the thesis prints the number, and a number if the thesis gives it in words. By default the
+    tolerance is half a unit of the last printed digit.
     """
     value = float(stated)
     if tolerance is None:
@@ -149,14 +151,14 @@ class Statement:
     Attributes
     ----------
     quote : str
-        The sentence to the letter: slips of the scan mended in square brackets, an ellipsis where it is cut.
+        The sentence exactly as printed: slips of the scan are mended in square brackets, an ellipsis marks omissions.
     source : Source
     measure, tolerance : str
-        What is measured; the tolerance and where it comes from. Empty where the statement cannot be judged.
+        What is measured; the tolerance and where it comes from. Empty if the statement cannot be judged.
     cases : tuple of Case
-        Empty where the statement cannot be judged.
+        Empty if the statement cannot be judged.
     why : str
-        Reason for the verdict; the statement needs one unless it holds, or its cases have their own.
+        Reason for the verdict. It is needed unless the statement holds or its cases have their own reasons.
     """
 
     quote: str
@@ -168,7 +170,7 @@ class Statement:
 
     @property
     def outcome(self) -> str:
-        """One of `OUTCOMES`: it holds in part if some of its cases do."""
+        """Verdict on the statement, one of `OUTCOMES`; it holds in part if some of its cases hold."""
         if all(case.computed is None for case in self.cases):
             return UNJUDGED
         holding = [case.holds for case in self.cases]
@@ -176,7 +178,7 @@ class Statement:
 
     @property
     def reason(self) -> str:
-        """The reason for the verdict: the numbers of a single case, how many of several hold, and why the others do not."""
+        """The reason for the verdict: the numbers of a single case, or how many cases hold and why the others do not."""
         parts = []
         if len(self.cases) == 1:
             parts += self.cases[0].numbers
@@ -188,7 +190,7 @@ class Statement:
 
     @property
     def reasons_differ(self) -> bool:
-        """Whether the cases fail for different reasons, so that each needs its own."""
+        """Whether the cases fail for different reasons, so that each case needs its own reason."""
         return len({case.why for case in self.cases if not case.holds}) > 1
 
     def __str__(self) -> str:

@@ -1,4 +1,4 @@
-"""Study of a figure or of statements of a thesis: its result (claim, computed columns, verdicts), and how it is run."""
+"""Study of a figure or of statements of a thesis: its result (claim, computed columns, verdicts), and how to run it."""
 
 from __future__ import annotations
 
@@ -21,21 +21,21 @@ from .variation import varied, words
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class StudyResult:
-    """Result of a study: what is claimed, the data of the plot, and the statements with their verdicts.
+    """Result of a study: the claim, the data of the plot, and the statements with their verdicts.
 
     Attributes
     ----------
     number : str
-        Number of the thesis's figure, or name of a picture.
+        Number of the thesis's figure, or name of a study of our own.
     claim : str
         Claim or content of the figure, as far as the thesis's text tells.
     assignment : str
         Our choices in the figure, because the caption is lost; empty if there are none.
     columns : mapping
-        Data of the plot by name with unit; all of one length, padded with NaN. Empty where there is no plot.
+        Data of the plot by name with unit; all have the same length, padded with NaN. Empty if there is no plot.
     statements : tuple of Statement
     see : str
-        Number of the figure whose statements are about this one too; empty if there are none.
+        Number of the figure whose statements are also about this figure; empty if there is none.
     """
 
     number: str
@@ -47,7 +47,7 @@ class StudyResult:
 
     @property
     def title(self) -> str:
-        """Title in the list of studies."""
+        """Title of the study in the list of studies."""
         return STUDIES[self.number]
 
     @property
@@ -59,9 +59,9 @@ class StudyResult:
 
 @dataclass(frozen=True, slots=True)
 class Study:
-    """Study of a figure of a thesis, or of statements without a figure: functions that compute, draw and may animate it.
+    """Study of a figure of a thesis, or of statements without a figure: the functions that compute, draw and animate it.
 
-    ``sweeps`` are the parameters whose values the study compares itself; the reader cannot set them.
+    ``sweeps`` are the parameters whose values the study itself compares; the reader cannot set them.
     """
 
     number: str
@@ -75,13 +75,13 @@ class Study:
     ) -> tuple[StudyResult, tuple[Path, ...]]:
         """Compute the study and write ``fig_<number>.png`` and ``.csv`` into a folder; return the result and the paths.
 
-        A study without a plot writes nothing. ``changes`` are values of its mechanism's parameters by name, numbers in SI or
-        texts with their units; the names of its files then end in ``_varied``.
+        A study without a plot writes nothing. ``changes`` maps names of the mechanism's parameters to new values: numbers in SI
+        units, or texts with a unit. With changes, the names of the files end in ``_varied``.
 
         Raises
         ------
         InputError
-            If the study compares values of a changed parameter itself, or its mechanism has no such parameter.
+            If the study itself compares values of a changed parameter, or its mechanism has no such parameter.
         """
         changes = changes or {}
         for name in changes:
@@ -114,12 +114,12 @@ class Study:
 
 
 def padded(columns: Mapping[str, ArrayLike]) -> dict[str, NDArray[np.float64]]:
-    """Pad columns with NaN to the length of the longest."""
+    """Return the columns padded with NaN to the length of the longest column."""
     arrays = {name: np.asarray(values, dtype=float) for name, values in columns.items()}
     length = max(len(values) for values in arrays.values())
     return {name: np.append(v, np.full(length - len(v), np.nan)) for name, v in arrays.items()}
 
 
 def result_curves(result: StudyResult, x: str, names: Mapping[str, str]) -> list[Curve]:
-    """Return columns of a result as curves over the column ``x``; ``names`` maps each column to its label."""
+    """Return columns of a result as curves over the column ``x``; ``names`` maps the name of each column to its label."""
     return [Curve(x=result.columns[x], y=result.columns[name], label=label) for name, label in names.items()]

@@ -1,7 +1,7 @@
-"""Changes that a reader makes to the parameters of a study's mechanism: ``linkwork figures R5 --set rod.length='45 in'``.
+"""Reader's changes to the parameters of a study's mechanism: ``linkwork figures R5 --set rod.length='45 in'``.
 
-A chapter passes the mechanisms that it builds to `vary`, and uses the `cache` of this module. A study names in `Study.sweeps`
-the parameters whose values it compares itself.
+Each chapter's module passes the mechanisms that it builds to `vary`, and uses the `cache` of this module. `Study.sweeps` names
+the parameters whose values the study itself compares.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ T = TypeVar("T")
 
 
 class _Variation(NamedTuple):
-    """Changed values by the parameter's name, and the names of all parameters of the mechanisms that a study has built."""
+    """Changed values by parameter name, and the names of all parameters of the mechanisms that a study has built."""
 
     changes: tuple[tuple[str, Any], ...]
     known: set[str]
@@ -38,7 +38,10 @@ def _current() -> _Variation:
 
 @contextmanager
 def varied(changes: Mapping[str, Any]) -> Iterator[set[str]]:
-    """Change parameters in the studies computed inside the context; yield a set that collects their parameters' names."""
+    """Apply changes of parameters to all studies computed inside the context.
+
+    Yields a set that collects the parameter names of the mechanisms that these studies build.
+    """
     variation = _Variation(tuple(changes.items()), set())
     token = _CURRENT.set(variation)
     try:
@@ -48,7 +51,7 @@ def varied(changes: Mapping[str, Any]) -> Iterator[set[str]]:
 
 
 def vary(parameters: T) -> T:
-    """Return the parameters of a study's mechanism with the reader's changes made."""
+    """Return the parameters of a study's mechanism with the reader's changes."""
     changes, known = _current()
     variables = find_mechanism(parameters).mechanism_variables
     known.update(variables)
@@ -61,9 +64,9 @@ def vary(parameters: T) -> T:
 
 
 def compared(name: str, values: tuple[float, ...], unit: str, per: float) -> tuple[float, ...]:
-    """Return the values of a parameter that a study compares, or only the reader's value if the reader has changed it.
+    """Return the values of a parameter that a study compares, or only the reader's value if the reader has set it.
 
-    ``unit`` is the parameter's SI unit; ``per`` of the units of the values are one ``unit``.
+    ``unit`` is the parameter's SI unit; ``per`` is the factor from this unit to the unit of the values.
     """
     return next(
         ((per * quantity(value, unit, name),) for changed, value in _current().changes if changed == name), values
@@ -71,12 +74,12 @@ def compared(name: str, values: tuple[float, ...], unit: str, per: float) -> tup
 
 
 def words() -> str:
-    """Return the reader's changes in words; empty if there are none."""
+    """Return the reader's changes in words; empty if there are no changes."""
     return ", ".join(f"{name} = {value}" for name, value in _current().changes)
 
 
 def cache(function: Callable[P, T]) -> Callable[P, T]:
-    """Cache the results of a function, by its arguments and the reader's changes."""
+    """Cache the results of a function by its arguments and the reader's changes."""
     kept: dict[Any, tuple[T, set[str]]] = {}
 
     @wraps(function)
@@ -94,7 +97,7 @@ def cache(function: Callable[P, T]) -> Callable[P, T]:
 
 
 def unvaried(compute: Callable[[], T]) -> Callable[[], T]:
-    """Wrap a study's function so that it ignores the reader's changes, for instance if it evaluates printed equations."""
+    """Wrap a study's function so that it ignores the reader's changes, for instance because it evaluates printed equations."""
 
     @wraps(compute)
     def computed() -> T:

@@ -102,7 +102,9 @@ def make_page(state: Mapping[str, Any]) -> str:
 
 
 def page_address(state: Mapping[str, Any], page: str) -> str:
-    """Return the address that opens the page with a state, as the page itself writes it; start values are left out.
+    """Return the address that opens the page with a state, in the form in which the page itself writes addresses.
+
+    Values that are equal to their start values are left out.
 
     Parameters
     ----------

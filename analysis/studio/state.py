@@ -96,7 +96,9 @@ def page_case(state: Mapping[str, Any]) -> Case:
 
 
 def given_values(mechanism: Mechanism, values: Any) -> dict[str, float]:
-    """Return all values that the page can set of a mechanism, by FMI name; those not in ``values`` have their start values.
+    """Return the values of all variables of a mechanism that the page can set, by FMI name.
+
+    Variables that are not in ``values`` have their start values.
 
     Raises
     ------

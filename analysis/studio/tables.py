@@ -71,7 +71,7 @@ def mechanism_tables(mechanism: Mechanism) -> dict[str, Any]:
 
 
 def published_values(mechanism: Mechanism, known: PublishedSet) -> dict[str, float]:
-    """Return the values of a published set, driven at its speed, by FMI name."""
+    """Return the values of a published set, with the speeds at which the set is driven, by FMI name."""
     return fmi_starts(mechanism, known.parameters, known.initial) | {
         channel.name: known.drive[channel.argument] for channel in mechanism.channels if channel.argument in known.drive
     }
@@ -135,7 +135,10 @@ def _entry_rows(mechanism: Mechanism, variable: Variable, reference: int) -> dic
 
 
 def _motor(mechanism: Mechanism, crank: int) -> list[dict[str, Any]]:
-    """Return the rows of the values of a motor on the crank; their references in the page's module are negative."""
+    """Return table rows for the values of a motor on the crank; empty if the crank has no torque input.
+
+    In the page's module these values have negative references.
+    """
     torque = find_crank(mechanism, mechanism.freedoms[crank].coordinate).torque if crank >= 0 else None
     if torque is None:
         return []

@@ -47,8 +47,8 @@ class PartTable:
     fmu : str
         An FMU of FMI 2.0 or 3.0, from any tool.
     values : mapping
-        Start values of parameters and inputs, by FMI name: texts with units, or numbers in SI. A list ``table`` gives
-        ``table_0``, ``table_1`` and so on.
+        Start values of parameters and inputs, by FMI name: texts with units, or numbers in SI. A list with the name ``table``
+        sets ``table_0``, ``table_1`` and so on.
     """
 
     case: str = entry(files.text, "")
@@ -233,7 +233,7 @@ def _number(value: Any, name: str) -> float:
 
 
 def _read_values(values: Mapping[str, Any], units: Mapping[str, str], where: str) -> dict[str, float]:
-    """Return values by FMI name, in the units of the variables; a list gives ``name_0``, ``name_1`` and so on."""
+    """Return values by FMI name, in the units of the variables; a list sets ``name_0``, ``name_1`` and so on."""
     values = dict(values)
     for key in [key for key, value in values.items() if isinstance(value, list)]:
         names = [name for name in units if re.fullmatch(re.escape(key) + r"_\d+", name)]

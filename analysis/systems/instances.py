@@ -23,23 +23,26 @@ Floats: TypeAlias = NDArray[np.float64]
 
 @lru_cache(maxsize=64)
 def _unpack(fmu: Path, changed: int, folder: str | None) -> tempfile.TemporaryDirectory[str]:
-    """Unpack an FMU once per process, into a folder that is removed when the process ends."""
+    """Unpack an FMU once per process into a folder that is removed when the process ends; return that folder.
+
+    ``changed`` is the time of the file's last change: a changed file is unpacked anew.
+    """
     place = tempfile.TemporaryDirectory(dir=folder, prefix="linkwork-", ignore_cleanup_errors=True)
     extract(str(fmu), place.name)
     return place
 
 
 class Instance:
-    """An instance of an FMI 2.0 part; call `start_initialisation`, `finish_initialisation`, then `step`.
+    """An FMI 2.0 instance of a part of a system; call `start_initialisation`, `finish_initialisation`, then `step`.
 
     Attributes
     ----------
     messages : list of str
-        Logged messages; FMPy passes the messages of all FMI 2.0 FMUs to one of them.
+        Logged messages.
     outputs : tuple of str
-        Its real outputs, in the order of `read`.
+        Names of the part's real outputs, in the order of `read`.
     goes_back : bool
-        Whether it can save and restore its state.
+        Whether the part can save and restore its state.
     """
 
     _running: type = FMU2Slave
@@ -76,7 +79,7 @@ class Instance:
         for name, value in self.part.values.items():
             port = self.part.ports[name]
             kind = {"Real": float, "Float64": float, "Boolean": bool}.get(port.type, int)
-            # FMI 2.0 sets enumerations as integers, FMI 3.0 as integers of 64 bits
+            # enumerations are set as integers in FMI 2.0, as 64-bit integers in FMI 3.0
             setter = port.type if port.type != "Enumeration" else self._enumerations
             getattr(self._fmu, f"set{setter}")([port.reference], [kind(value)])
 
@@ -87,7 +90,7 @@ class Instance:
         self._fmu.exitInitializationMode()
 
     def read(self) -> NDArray[np.float64]:
-        """Return all real outputs."""
+        """Return the values of all real outputs."""
         return np.array(self._fmu.getReal(self._references))
 
     def set_inputs(
@@ -101,9 +104,9 @@ class Instance:
         values : float array
             Values at the start of the step.
         slopes : float array or None
-            Slopes over the step; None if the inputs are held.
+            Derivatives of the inputs with respect to time over the step; None if the inputs are held.
         middle : float
-            Time from the start of the step (s). A part that accepts no slopes holds the values at this time for the whole step.
+            Time from the start of the step (s). A part that accepts no slopes holds the inputs at their values at this time.
         updated : bool
             Whether an FMI 3.0 part follows the slopes by intermediate updates.
         """
@@ -118,15 +121,15 @@ class Instance:
                 self._fmu.setRealInputDerivatives(references, [1] * len(references), self._slopes.tolist())
 
     def end_values(self, step: float) -> Floats:
-        """Return the values of the inputs at the end of a step."""
+        """Return the values that the inputs have at the end of a step."""
         return self._values + step * self._slopes
 
     def step(self, time: float, step: float) -> None:
-        """Take a step; raises FMPy's FMICallException if the part refuses it."""
+        """Take a step; raise FMPy's FMICallException if the part refuses it."""
         self._fmu.doStep(time, step)
 
     def save(self) -> Any:
-        """Save the present state and return it."""
+        """Return a copy of the present state."""
         return self._fmu.getFMUState()
 
     def restore(self, state: Any) -> None:
@@ -134,7 +137,7 @@ class Instance:
         self._fmu.setFMUState(state)
 
     def forget(self, state: Any) -> None:
-        """Free a state."""
+        """Free a saved state."""
         self._fmu.freeFMUState(c_void_p(getattr(state, "value", state)))
 
     def close(self) -> None:
@@ -143,7 +146,7 @@ class Instance:
 
 
 class Instance3(Instance):
-    """An instance of an FMI 3.0 part: inputs have no derivatives, but can be updated at each step of the part's integrator."""
+    """An FMI 3.0 instance of a part: inputs have no derivatives, but can be updated at each step of the part's integrator."""
 
     _running = FMU3Slave
     _enumerations = "Int64"
@@ -165,13 +168,13 @@ class Instance3(Instance):
         self._fmu.enterInitializationMode(startTime=0.0)
 
     def read(self) -> NDArray[np.float64]:
-        """Return all real outputs."""
+        """Return the values of all real outputs."""
         return np.array(self._fmu.getFloat64(self._references))
 
     def set_inputs(
         self, names: Sequence[str], values: Floats, slopes: Floats | None, *, middle: float, updated: bool
     ) -> None:
-        """Set inputs for a step as `Instance.set_inputs` does; without updates they are held at their values at ``middle``."""
+        """Set inputs for a step as `Instance.set_inputs` does; without updates, hold their values at ``middle``."""
         references = [self.part.ports[name].reference for name in names]
         self._values, self._slopes = values, np.zeros(len(values)) if slopes is None else slopes
         self._lines = bool(references) and slopes is not None and updated
@@ -181,7 +184,7 @@ class Instance3(Instance):
             self._fmu.setFloat64(references, self._last.tolist())
 
     def end_values(self, step: float) -> Floats:
-        """Return the values of the inputs at the end of a step: those of the last update, or those that the slopes give."""
+        """Return the values of the inputs at the end of a step, from the last update or extrapolated with the slopes."""
         return self._last if self._lines else self._values + step * self._slopes
 
     def step(self, time: float, step: float) -> None:
@@ -190,10 +193,10 @@ class Instance3(Instance):
         self._fmu.doStep(time, step)
 
     def forget(self, state: Any) -> None:
-        """Free a state."""
+        """Free a saved state."""
         self._fmu.freeFMUState(state)
 
 
 def make_instance(part: Part) -> Instance:
-    """Return an instance of a part, according to its FMI version."""
+    """Return an instance of a part of a system, for the FMI version of its FMU."""
     return (Instance3 if part.description.fmiVersion.startswith("3") else Instance)(part)

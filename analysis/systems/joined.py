@@ -185,7 +185,10 @@ class JoinedSystem:
         )
 
     def _sample_times(self, stop_time: float) -> NDArray[np.float64]:
-        """Return the instants (s) at which controllers sample, from 0, and the stop time; equal but for rounding is equal."""
+        """Return the instants (s) at which controllers sample, from 0, and the stop time.
+
+        Instants that differ only by rounding errors are given once.
+        """
         periods = [controller.sample_time for controller in self.controllers.values()]
         times = [period * np.arange(ceil(stop_time / period)) for period in periods]
         marks = np.unique(np.concatenate([[0.0], *times]))
@@ -194,7 +197,7 @@ class JoinedSystem:
         return np.append(marks[apart], stop_time)
 
     def _sample(self, t: float, x: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Sample the controllers that are due at t, using the controller outputs before t; return the outputs of all."""
+        """Sample the controllers that are due at t, using the controller outputs before t; return all controllers' outputs."""
         due = {name: c for name, c in self.controllers.items() if c.count * c.sample_time <= t + 1e-6 * c.sample_time}
         # at the start the values that controllers exchange settle after as many rounds as there are controllers
         for _ in due if t == 0.0 else ():

@@ -46,7 +46,7 @@ class SystemRuns:
     names : tuple of str
         Outputs, as ``part.output``.
     samples : (N, K, M) float array
-        Values by run, output and time; see `output`.
+        Values of the outputs, by run, output and time; see `output`.
     lengths : (N,) int array
         Number of samples of each run; 0 if it has not begun or could not begin.
     messages : mapping of int to str
@@ -103,7 +103,7 @@ def run_many(
     Parameters
     ----------
     wiring : Wiring
-        Its FMUs must lie in a folder that all workers can read.
+        The FMUs must lie in a folder that all workers can read.
     vary : mapping of str to array
         Values of parameters and inputs by ``part.variable``, one value for each run (SI).
     outputs : sequence of str
@@ -115,7 +115,7 @@ def run_many(
     folder : path, optional
         Folder in which the runs are kept; runs that are finished in this folder are not repeated.
     n_jobs : int, optional
-        Number of processes; the default, also within `joblib.parallel_config`, is that of `run_in_parallel`.
+        Number of processes; by default that of `run_in_parallel`, also within `joblib.parallel_config`.
     progress : bool
 
     Raises

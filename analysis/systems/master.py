@@ -48,7 +48,7 @@ class SystemRun:
     time : (N,) float array
         Communication points (s).
     values : mapping of str to (N,) float array
-        Every real output, as ``part.output``.
+        Values of every real output, by the name ``part.output``.
     powers : mapping of str to (N,) float array
         Power residual of each power bond, named by its effort: the power that the coupling adds at the end of the step, because
         each part knew the other only from the start of the step (W).
@@ -272,7 +272,7 @@ class _Stepper:
         return round(self.stop_time / self.first)
 
     def adapt(self, powers: Floats, flows: Floats) -> None:
-        """Adapt the step to the power residuals and transmitted powers of the last step, by PI control of the added share."""
+        """Adapt the step to the power residuals and transmitted powers of the last step, by PI control of the added work."""
         if self.share is None:
             return
         self.scale = max(_MEMORY * self.scale, float(np.sqrt(np.mean(flows**2))))
@@ -303,7 +303,7 @@ def run_system(
     coupling : str
         One of `COUPLINGS`.
     step, stop_time : float, optional
-        Communication step and end (s); by default the wiring's.
+        Communication step and end of the run (s); by default those of the wiring.
     share : float, optional
         Share of the work that the coupling may add, such as 1e-3, relative to the power that the bonds transmitted recently.
         The share controls the length of the steps; ``step`` is the length of the first step.
@@ -386,6 +386,9 @@ def run_system(
 
 
 def _refusal(together: _Instances, time: float, error: FMICallException) -> str:
-    """Return the message on a refused step, with the last text of any FMU, as FMPy passes all texts to one of the FMUs."""
+    """Return the message on a refused step, with the last message that any FMU logged.
+
+    FMPy passes the messages of all FMUs to one of them, so the message may be found at an FMU that did not log it.
+    """
     said = [text for instance in together.instances.values() for text in instance.messages]
     return f"{together.stepping} refused the step from t = {time:.9g} s: {said[-1] if said else error}"

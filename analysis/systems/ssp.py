@@ -1,7 +1,7 @@
 """Write and read systems as SSP archives (System Structure and Parameterization), with pyssp-standard.
 
 An archive follows SSP 1.0, which supports FMI 2.0; with an FMI 3.0 part it follows SSP 2.0. This module adds the geometry of
-the diagram, which the library does not write, and moves the units to their place in the schema. The library ignores
+the diagram, which the library does not write, and moves the units to where the schema requires them. The library ignores
 transformations of connections and signal dictionaries: a file that has one is refused.
 """
 

@@ -59,7 +59,7 @@ class Part:
     fmu : path
         An FMU for co-simulation, FMI 2.0 or 3.0.
     ports : mapping of str to Port
-        All its variables.
+        All variables of the FMU.
     values : mapping of str to float
         Start values by variable; all other variables have the start values of the FMU.
     feeds : mapping of str to tuple of str

@@ -24,7 +24,7 @@ _LEAST_CHANGE, _LEAST = "least change", "least "
 
 
 def _objective(value: Any, name: str) -> str:
-    """Check the text of an objective, "least change" or "least" and a parameter, and return it."""
+    """Check the text of an objective, "least change" or "least" followed by the name of a parameter, and return the text."""
     words = text(value, name)
     if words != _LEAST_CHANGE and not words.startswith(_LEAST):
         raise ParameterError(
@@ -35,7 +35,7 @@ def _objective(value: Any, name: str) -> str:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class TuneTable:
-    """The table ``[tune]``; see `Wish`.
+    """The table ``[tune]`` of a case file; see `Wish`.
 
     Attributes
     ----------
@@ -81,7 +81,7 @@ class TuningCase:
     folder: Path
 
     def tuned_tables(self, tuned: Tuned, folder: str | Path) -> dict[str, Any]:
-        """Return the tables of a case with the tuned values, for a file in ``folder``."""
+        """Return the tables of a case with the tuned values; file names in the tables become relative to ``folder``."""
         mechanism = find_mechanism(self.wish.parameters)
         inputs = {channel.name: name_in_files(mechanism, channel) for channel in mechanism.channels}
         values = zip(self.wish.names, tuned.values.tolist())
@@ -92,7 +92,7 @@ class TuningCase:
 
 
 def load_tuning_case(path: str | Path, overrides: Mapping[str, Any] | None = None) -> TuningCase:
-    """Read a case from a TOML or JSON file; see `docs/tuning.md`.
+    """Read a tuning case from a TOML or JSON file; see `docs/tuning.md`.
 
     Raises
     ------

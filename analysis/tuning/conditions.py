@@ -1,8 +1,8 @@
-"""Define the conditions on the changes of parameters: functions of a motion of the response that must not be negative.
+"""Define conditions on the changes of parameters: functions of a motion of the response that must not be negative.
 
 The level is the value of the speed, or of the other quantity whose range is tuned. A motion is given by y at crank angle 0 and
-its level. One further equation picks the motion from its branch: a plane across the branch, or the loss of stability. When the
-parameters change, the motion is found again from its last position, so that it stays on its branch.
+by the level. One further equation picks the motion from its branch: the equation of a plane across the branch, or of a loss of
+stability. When the parameters change, the motion is found again from its last position, so that it stays on its branch.
 """
 
 from __future__ import annotations
@@ -45,7 +45,7 @@ ITERATIONS, FOUND = 12, 1e-9
 STRIDE, REACH = 0.05, 0.3
 #: Halvings of a step, over all steps, after which a motion counts as lost.
 _HALVINGS = 3
-#: Samples of a turn.
+#: Number of samples of a common period.
 _SAMPLES = 256
 
 
@@ -54,7 +54,7 @@ class LostError(LinkworkError):
 
 
 class Expansion(NamedTuple):
-    """Derivatives of y(T) - y(0) and of the monodromy matrix with respect to y at crank angle 0, the level and the k changes.
+    """Derivatives of y(T) - y(0) and of the monodromy matrix with respect to y at crank angle 0, the level, and the k changes.
 
     Attributes
     ----------
@@ -67,7 +67,7 @@ class Expansion(NamedTuple):
     variations : Variations
         The variational equations from which the derivatives are computed.
     ways : ndarray, shape (panels, nodes, n, n + 1 + k)
-        Derivatives of the motion over the period.
+        Derivatives of y at the nodes of the period's panels.
     constants : ndarray, shape (c, n + 1 + k)
         Derivatives of the drive vector and the constants of the equations.
     """
@@ -81,9 +81,9 @@ class Expansion(NamedTuple):
 
 
 def family(wish: Wish, x: FloatArray, spot: Spot | None = None) -> Family:
-    """Return the family of periodic motions over the level for changes x in units of the tolerances.
+    """Return the family of periodic motions over the level, with changes x of the parameters in units of the tolerances.
 
-    With a spot, links go round as often per period as in the motion at the spot.
+    If ``spot`` is given, links make as many full turns per period as in the motion at the spot.
     """
     parameters, drive = wish.operation(x, wish.span[0])
     found = Family(parameters=parameters, drive=drive, vary=wish.over)
@@ -91,22 +91,22 @@ def family(wish: Wish, x: FloatArray, spot: Spot | None = None) -> Family:
 
 
 class Spot(NamedTuple):
-    """A motion on the response, given by the changes of parameters, y at crank angle 0 and the level."""
+    """A motion of the response, given by the changes of the parameters, y at crank angle 0 and the level."""
 
     x: FloatArray  # the changes in units of the tolerances, shape (k,)
     y: FloatArray  # y at crank angle 0, shape (n,)
     level: float
-    turns: int  # turns of the period
+    turns: int  # number of common periods in the period
     ratios: Mapping[str, Any]  # ratios of the drive
 
 
 def known_spot(wish: Wish, x: FloatArray, orbit: PeriodicOrbit) -> Spot:
-    """Return the `Spot` of a motion that was found with the changes x."""
+    """Return the `Spot` of a motion that was found with the changes x of the parameters."""
     return Spot(x, orbit.start, wish.level(orbit), orbit.turns, orbit.drive.ratios)
 
 
 def motion(wish: Wish, spot: Spot) -> PeriodicOrbit:
-    """Return the orbit that begins at a spot; the orbit's residual says how well the orbit closes."""
+    """Return the orbit that begins at a spot; the orbit's ``residual`` tells how nearly the orbit is closed."""
     orbit: PeriodicOrbit = OrbitEquations(family(wish, spot.x, spot), spot.turns, *wish.span)(spot.y, spot.level).data
     return orbit
 
@@ -117,7 +117,7 @@ def sample_turn(orbit: PeriodicOrbit) -> Turn:
 
 
 def expansion(wish: Wish, spot: Spot) -> Expansion:
-    """Compute the derivatives at a spot by the variational equations to second order; the motion need not close."""
+    """Compute the derivatives at a spot by the variational equations to second order; the motion need not be periodic."""
     along = motion_gradient(motion(wish, spot), (wish.over, *wish.names))
     v, n = along.variations, len(spot.y)
     unit = np.append(1.0, wish.tolerance)
@@ -133,9 +133,9 @@ def expansion(wish: Wish, spot: Spot) -> Expansion:
 
 
 def margin_matrix(monodromy: FloatArray, kind: Crossing, radius: float = 1.0) -> FloatArray:
-    """Return a matrix A such that det(I - A) is zero when multipliers cross the circle of ``radius`` (crossing ``kind``).
+    """Return a matrix A such that det(I - A) is zero when Floquet multipliers cross the circle of ``radius``.
 
-    The determinant is positive if all multipliers are inside the circle.
+    ``kind`` is the kind of crossing. The determinant is positive if all multipliers are inside the circle.
     """
     if kind is not Crossing.TORUS:
         return monodromy / radius if kind is Crossing.FOLD else -monodromy / radius
@@ -175,7 +175,10 @@ class Row(Protocol):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class CrossPlane:
-    """A plane across the branch, normal . (y, level) = offset; if only the normal's last entry is not 0, the level is fixed."""
+    """A plane across the branch, normal . (y, level) = offset.
+
+    The plane fixes the level if all entries of the normal but the last are 0.
+    """
 
     normal: FloatArray
     offset: float
@@ -197,7 +200,7 @@ class CrossPlane:
 
 @dataclass(frozen=True, slots=True)
 class StabilityLoss:
-    """The equation of a loss of stability: a multiplier is on the unit circle."""
+    """The equation of a loss of stability: a Floquet multiplier is on the unit circle."""
 
     kind: Crossing
 
@@ -213,7 +216,7 @@ class StabilityLoss:
 
 
 class PickedMotion:
-    """The motion that an equation picks from its branch for given changes, and its derivatives with respect to them."""
+    """The motion that an equation picks from its branch for given changes of the parameters, with its derivatives."""
 
     def __init__(self, wish: Wish, row: Row, spot: Spot) -> None:
         self.spot = spot
@@ -221,7 +224,7 @@ class PickedMotion:
 
     @cached_property
     def expansion(self) -> Expansion:
-        """Derivatives of y(T) - y(0) and of the monodromy matrix."""
+        """Derivatives of y(T) - y(0) and of the monodromy matrix at the motion."""
         return expansion(self._wish, self.spot)
 
     @cached_property
@@ -246,7 +249,10 @@ class PickedMotion:
         return found
 
     def output_slopes(self, number: int, angle: float) -> FloatArray:
-        """Return the derivatives, (k,), of the output with index ``number`` at a crank angle with respect to the changes."""
+        """Return the derivatives of an output at a crank angle with respect to the changes, shape (k,).
+
+        ``number`` is the index of the output.
+        """
         found = self.expansion
         v = found.variations
         angle = float(angle % (self.spot.turns * v.flow.period))
@@ -279,7 +285,7 @@ class TrackedMotion:
         self._scale = np.append(motion_scales(*wish.operation(spot.x, spot.level), spot.y), wish.size)
 
     def find(self, x: FloatArray) -> PickedMotion:
-        """Find the motion for changes x in units of the tolerances; raises LostError if the motion is not found again."""
+        """Find the motion for changes x in units of the tolerances; raise LostError if the motion is not found again."""
         last = self._last
         moved = np.abs(x - last.x) * self.wish.tolerance
         size = np.maximum(np.abs(self.wish.present), self.wish.tolerance)
@@ -342,14 +348,18 @@ def series(turn: Turn, samples: NDArray[np.float64]) -> Callable[[Any], Any]:
 
 
 def curve(turn: Turn, limit: Limit) -> Callable[[Any], Any]:
-    """Return the limited quantity as a function of the crank angle: an output, or the magnitude of the force in a joint."""
+    """Return the limited quantity, an output or the magnitude of the force in a joint, as a function of the crank angle."""
     # series of the components, which are smooth where the magnitude is not
     parts = [series(turn, turn.oscillation(part)) for part in limit.parts]
     return lambda angle: reduce(np.hypot, (part(angle) for part in parts))
 
 
 def value_at_angles(turn: Turn, limit: Limit, angles: Sequence[float]) -> float:
-    """Return the value that the limit bounds: the magnitude at one crank angle, or half the difference between two values."""
+    """Return the value that the limit bounds, from the values of the limited quantity at one or two crank angles.
+
+    At one angle the value is the magnitude of the quantity there; at two angles it is half the difference between the quantity
+    at the first angle and at the second.
+    """
     values = curve(turn, limit)(np.array(angles))
     return float(abs(values[0])) if len(angles) == 1 else 0.5 * float(values[0] - values[1])
 
@@ -357,8 +367,8 @@ def value_at_angles(turn: Turn, limit: Limit, angles: Sequence[float]) -> float:
 def limited_value(turn: Turn, limit: Limit) -> tuple[float, tuple[float, ...]]:
     """Return the value that the limit bounds, over a period, and the crank angles at which it occurs.
 
-    The value is the greatest magnitude, with one angle; or the amplitude, half the range, with the angles of maximum and
-    minimum.
+    The value is the greatest magnitude of the limited quantity, with one angle; or its amplitude, which is half the difference
+    between its maximum and its minimum, with the angles of both.
     """
     samples = reduce(np.hypot, (turn.oscillation(part) for part in limit.parts))
     places = [np.abs(samples).argmax()]
@@ -369,7 +379,10 @@ def limited_value(turn: Turn, limit: Limit) -> tuple[float, tuple[float, ...]]:
 
 
 def peak_angles(turn: Turn, limit: Limit, angles: Sequence[float]) -> tuple[float, ...]:
-    """Find the angle of the greatest magnitude near one given angle or, near two, the angles of a maximum and a minimum."""
+    """Refine the crank angles of extreme values of the limited quantity, starting from ``angles``.
+
+    If there is one angle, it becomes the angle of the greatest magnitude; two angles become those of a maximum and a minimum.
+    """
     value, step = curve(turn, limit), float(turn.angle[1] - turn.angle[0])
     signs = (1.0, -1.0) if len(angles) > 1 else (float(np.sign(value(angles[0])) or 1.0),)
     return tuple(_climb(value, angle, step, sign) for angle, sign in zip(angles, signs))
@@ -407,7 +420,7 @@ class Condition(Protocol):
         """Name of the requirement to which the condition belongs."""
 
     def value(self, x: FloatArray) -> float:
-        """Return the value of the function; raises LostError if the motion is not found."""
+        """Return the value of the function at changes x; raise LostError if the motion is not found."""
 
     def slopes(self, x: FloatArray) -> FloatArray:
         """Return the derivatives of the function with respect to the changes, shape (k,)."""
@@ -430,7 +443,7 @@ class MultipliersInside:
 
 
 class StabilityLossBeyond:
-    """Condition that a point of lost stability is above a level (side +1) or below it (-1)."""
+    """Condition that the point at which stability is lost lies above a level (side +1) or below this level (side -1)."""
 
     slack = 1e-9
 
@@ -446,7 +459,7 @@ class StabilityLossBeyond:
 
 
 class PeakBeyond:
-    """Condition that a resonance, a maximum of the amplitude, is above a level (side +1) or below it (-1)."""
+    """Condition that a resonance, a maximum of the amplitude, lies above a level (side +1) or below this level (side -1)."""
 
     slack = 1e-8
 
@@ -467,7 +480,7 @@ class PeakBeyond:
 
 
 def find_resonance(wish: Wish, x: FloatArray, near: Spot) -> tuple[Gradient, Spot]:
-    """Find a resonance near a motion; return its level with the gradient over the changes, and its spot.
+    """Find a resonance near a motion; return its level with the gradient with respect to the changes, and its spot.
 
     Raises LinkworkError if there is no resonance near the motion.
     """
@@ -477,7 +490,7 @@ def find_resonance(wish: Wish, x: FloatArray, near: Spot) -> tuple[Gradient, Spo
 
 
 class OutputBelow:
-    """Condition that an output is below its limit at its maximum over the range and the crank angle."""
+    """Condition that the maximum of an output, over the range and the crank angle, is below its limit."""
 
     slack = 1e-7
 
@@ -487,7 +500,7 @@ class OutputBelow:
         self._known: tuple[bytes, PickedMotion, Turn] | None = None
 
     def _motion_and_turn(self, x: FloatArray) -> tuple[PickedMotion, Turn]:
-        """Find the motion with the greatest output by parabolas through the output at three levels."""
+        """Return the motion at the level at which the output is greatest, found by parabolas, and its outputs over a period."""
         if self._known is not None and self._known[0] == x.tobytes():
             return self._known[1:]
         found, value = self._reading(x, self._last.level)
@@ -500,7 +513,7 @@ class OutputBelow:
         return found, turn
 
     def _uphill(self, x: FloatArray, found: PickedMotion, value: float, step: float) -> tuple[PickedMotion, float]:
-        """Climb by parabolas over the level until the output does not increase; return the motion there and its output."""
+        """Move the level to a maximum of the output, by parabolas over the level; return the motion there and its output."""
         for _ in range(_CLIMB):
             level = found.spot.level
             try:

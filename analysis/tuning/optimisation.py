@@ -50,10 +50,11 @@ class Answer:
     Attributes
     ----------
     x : ndarray, shape (k,)
-        The changes in units of their tolerances.
+        The changes of the parameters in units of their tolerances.
     objective : float
+        Value of the objective.
     violations : mapping
-        Greatest violation among the conditions of each requirement, by its name.
+        Greatest violation among the conditions of each requirement, by the name of the requirement.
     """
 
     x: FloatArray
@@ -67,12 +68,12 @@ class Answer:
 
     @property
     def total(self) -> float:
-        """Sum of the violations."""
+        """Sum of the violations of all requirements."""
         return sum(self.violations.values())
 
 
 def objective(wish: Wish, x: Any) -> Any:
-    """Return the objective for changes x, numbers or symbols: the sum of the squares, or the change of one parameter."""
+    """Return the objective for changes x, numbers or symbols: the sum of their squares, or the change of one parameter."""
     squares = symbolic.library().sumsqr(x)
     if not wish.least:
         return squares
@@ -81,7 +82,7 @@ def objective(wish: Wish, x: Any) -> Any:
 
 
 def find_least_change(wish: Wish, conditions: Sequence[Condition], x: FloatArray) -> Answer:
-    """Find the least change that satisfies the conditions; if there is none, the change with the least sum of violations.
+    """Find the least change that satisfies the conditions; if no change does, find the change with the least sum of violations.
 
     ``x`` is the change from which IPOPT starts.
     """
@@ -149,7 +150,10 @@ class _Values:
         self._lost = 0
 
     def __call__(self, x: FloatArray, slopes: bool = False) -> tuple[FloatArray, FloatArray]:
-        """Return values, shape (m,), and derivatives, (m, k); the derivatives are NaN unless ``slopes`` is true."""
+        """Return the values of the m conditions, shape (m,), and their derivatives, shape (m, k), at changes x.
+
+        The derivatives are NaN unless ``slopes`` is true.
+        """
         key = x.tobytes()
         if self._last is not None and self._last[0] == key and self._last[1] >= slopes:
             return self._last[2:]
@@ -166,18 +170,18 @@ class _Values:
         return values, rows
 
     def function(self, count: int) -> Callable[[Any], Any]:
-        """Return the values as a CasADi function of ``count`` changes."""
+        """Return the values of the conditions as a CasADi function of ``count`` changes."""
         function: Callable[[Any], Any] = symbolic.wrap_function(
             "conditions", count, len(self.conditions), self.__call__
         )
         return function
 
 
-#: Greatest number of rounds of the exchange, and of combinations of ways that are tried.
+#: Greatest number of rounds of the exchange, and of combinations of moves that are tried.
 _ROUNDS, _WAYS = 12, 8
 #: Value of a condition above which the condition counts as far from active.
 _FAR = 0.05
-#: Number of changes spread over their bounds that are tried if no way meets the wish, a power of two; halvings of the distance
+#: Number of changes spread over their bounds that are tried if no move meets the wish, a power of two; halvings of the distance
 #: from the present values to changes that meet the wish; ratio of positive bounds above which the values are spread evenly in
 #: the logarithm.
 _SPREAD, _BISECTIONS, _WIDE = 16, 6, 10.0
@@ -187,7 +191,7 @@ _BELOW, _ABOVE, _REMOVED = -1, 1, 0
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Way:
-    """Choice of how a region of lost stability, or a resonance, leaves the range."""
+    """Choice of how one region of lost stability, or one resonance, is moved out of the range."""
 
     kind: Crossing | None  # kind of the region; None for a resonance
     level: float  # middle of the region, or the resonance
@@ -196,7 +200,7 @@ class _Way:
 
 @dataclass(slots=True, eq=False)
 class _Search:
-    """State of a tuning: motions that are not on the response, and the best changes so far."""
+    """State of a tuning: motions on branches off the response, and the best changes so far."""
 
     wish: Wish
     rounds: int = 0
@@ -206,7 +210,7 @@ class _Search:
     best: tuple[tuple[bool, float, float], Survey, tuple[float, ...]] | None = None
 
     def survey_changes(self, x: FloatArray) -> Survey:
-        """Follow the response with the changes x and survey the range."""
+        """Follow the response with changes x of the parameters and survey the range."""
         own = []
         for spot in self.more:
             place = TrackedMotion(self.wish, CrossPlane.level_plane(self.wish, spot, spot.level), spot)
@@ -217,7 +221,7 @@ class _Search:
         return survey(self.wish, x, own)
 
     def search_others(self, found: Survey) -> tuple[bool, tuple[float, ...]]:
-        """Search for motions off the response: return whether there are new ones, and the levels with two stable motions."""
+        """Search for motions off the response; return whether there are new ones, and the levels with two stable motions."""
         new, several = other_motions(found)
         self.more += [known_spot(self.wish, found.x, orbit) for orbit in new]
         return bool(new), several
@@ -292,7 +296,7 @@ def tune(wish: Wish, *, progress: bool = False) -> Tuned:
 
 
 def _try_ways(search: _Search, first: Survey, progress: bool) -> None:
-    """Try the combinations of ways to clear the range, starting from the changes of a survey; keep the best result."""
+    """Try the combinations of moves that clear the range, starting from the changes of a survey; keep the best result."""
     ways = _ways(first)
     with show_progress(progress, len(ways), "trying changes") as show:
         for number, way in enumerate(ways):
@@ -305,7 +309,7 @@ def _try_ways(search: _Search, first: Survey, progress: bool) -> None:
 def _survey_near_solution(search: _Search, first: Survey) -> Survey | None:
     """Find changes within the bounds that meet the requirements, and return a survey at nearby changes that do not.
 
-    If the motions are lost on all ways from the first changes, a search that starts at the nearby changes may succeed. The
+    If every search from the first changes fails because motions are lost, a search from these nearby changes may succeed. The
     result is None if none of the sampled changes, spread over the bounds, meets the requirements.
     """
     wish = search.wish
@@ -328,7 +332,7 @@ def _survey_near_solution(search: _Search, first: Survey) -> Survey | None:
 
 
 def _spread_values(low: FloatArray, high: FloatArray) -> FloatArray:
-    """Return m sets of k values spread over their bounds, shape (m, k)."""
+    """Return m sets of values of the k parameters, spread over the bounds ``low`` and ``high``; shape (m, k)."""
     share = qmc.Sobol(len(low), rng=0).random(_SPREAD)
     wide = (low > 0.0) & (high > _WIDE * low)
     base, ratio = np.where(wide, low, 1.0), np.where(wide, high / np.where(wide, low, 1.0), 1.0)
@@ -336,7 +340,7 @@ def _spread_values(low: FloatArray, high: FloatArray) -> FloatArray:
 
 
 def _try_changes(search: _Search, x: FloatArray) -> tuple[bool, Survey | None]:
-    """Return whether the changes x meet all requirements, and the survey, None if the motions cannot be followed."""
+    """Return whether the changes x meet all requirements, and their survey; None if the motions cannot be followed."""
     several: tuple[float, ...] = ()
     try:
         found = search.survey_changes(x)
@@ -395,7 +399,7 @@ def _end(region: Region, side: int) -> SpecialPoint | None:
 
 
 def _ways(found: Survey) -> list[tuple[_Way, ...]]:
-    """Return the combinations of ways to clear the range of all regions and resonances, the shortest moves first."""
+    """Return the combinations of moves that clear the range of all regions and resonances; the shortest total move is first."""
     wish = found.wish
     low, high = wish.span
     choices: list[list[tuple[float, _Way]]] = []
@@ -433,10 +437,10 @@ def _side(ways: Sequence[_Way], kind: Crossing | None, level: float) -> int | No
 
 
 def _exchange(search: _Search, first: Survey, ways: list[_Way]) -> tuple[Survey, tuple[float, ...]] | None:
-    """Find the least change that clears the range in the given ways; return its survey and the levels with two stable motions.
+    """Find the least change that clears the range by given moves; return its survey and the levels with two stable motions.
 
     The requirements may not all be met after the last round. The result is None if a motion is lost, or if another combination
-    of ways has found a change as small.
+    of moves has led to an objective that is as small.
     """
     wish, found = search.wish, first
     conditions: list[Condition] = []
@@ -462,7 +466,7 @@ def _exchange(search: _Search, first: Survey, ways: list[_Way]) -> tuple[Survey,
 
 
 def _counts(condition: Condition, answer: Answer) -> bool:
-    """Return whether an answer violates a condition more than it violates the other conditions of the same requirement."""
+    """Return whether a condition's violation exceeds the greatest violation in the answer for the same requirement."""
     return _value(condition, answer) < -answer.violations.get(condition.group, 0.0) - condition.slack
 
 
@@ -475,7 +479,10 @@ def _value(condition: Condition, answer: Answer) -> float:
 
 
 def _conditions(found: Survey, ways: list[_Way]) -> Iterator[Condition]:
-    """Yield the conditions for regions, minima, resonances and outputs of a survey; add ways for new regions to ``ways``."""
+    """Yield the conditions that follow from the regions, minima, resonances and outputs of a survey.
+
+    A move for each new region is added to ``ways``.
+    """
     wish, x = found.wish, found.x
     low, high = wish.span
     gone: list[Region] = []

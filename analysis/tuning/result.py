@@ -27,11 +27,12 @@ class Reading:
     Attributes
     ----------
     text : str
-        Description with units of what was found.
+        Description, with units, of what was found.
     excess : float
         Amount by which the requirement is missed; zero if the requirement is met. Resonance or jump: distance from the nearer
-        end of the range; second stable motion: width of the range; missing stable motion: width of the parts without one; each
-        is divided by the middle of the range. Largest multiplier: excess over its bound. Limit: excess relative to the limit.
+        end of the range. Second stable motion: width of the range. Missing stable motion: width of the parts of the range
+        without a stable motion. Each of these is divided by the middle of the range. Largest multiplier: excess over its bound.
+        Limit: excess relative to the limit.
     missed : str
         Description of the excess; empty if the requirement is met.
     """
@@ -115,7 +116,7 @@ def _stability_reading(found: Survey) -> Reading:
 def _interval_reading(
     wish: Wish, intervals: Sequence[tuple[float, float]], words: str, span: tuple[float, float]
 ) -> Reading:
-    """Return the state of the requirement that ``span`` contains none of the intervals that were found."""
+    """Return the state of the requirement that ``span`` overlaps none of ``intervals``; ``words`` describe an interval."""
     if not intervals:
         return Reading(text="none")
     low, high = span
@@ -142,8 +143,8 @@ class Verification:
     orbits : int
         Number of motions of the response over the range.
     charted, largest, place : int, float, str
-        Number of points of a chart's row over the range, the largest multiplier at these points, and the level of this
-        multiplier.
+        Number of points of a stability chart's row over the range, the largest multiplier at these points, and the level of
+        this multiplier.
     sought : int
         Number of levels at which all motions were sought.
     several : str
@@ -179,12 +180,13 @@ class Tuned(NotebookResult):
     ----------
     wish : Wish
     x : ndarray, shape (k,)
-        The changes in units of their tolerances.
+        The changes of the parameters in units of their tolerances.
     requirements : tuple of Requirement
     before, after : Survey
+        Surveys of the range before and after the change.
     verification : Verification
     rounds : int
-        Number of solutions of the nonlinear program, over all ways.
+        Number of solutions of the nonlinear program, for all combinations of moves that were tried.
     """
 
     wish: Wish
@@ -208,7 +210,7 @@ class Tuned(NotebookResult):
 
     @property
     def values(self) -> FloatArray:
-        """Changed values, in the order of ``wish.names``; shape (k,)."""
+        """Values of the changed parameters, in the order of ``wish.names``; shape (k,)."""
         return self.wish.present + self.x * self.wish.tolerance
 
     @property

@@ -77,7 +77,7 @@ class Region:
     low, high : float
         Least and greatest level of the region, as far as the branch was followed.
     first, last : SpecialPoint or None
-        Special points at the ends of the region, if they were met.
+        Special points at the ends of the region; None at an end that was not reached.
     worst : Spot
         Motion with the least value of the test function.
     across : CrossPlane
@@ -123,13 +123,13 @@ class Survey:
     ----------
     wish : Wish
     x : ndarray, shape (k,)
-        The changes in units of their tolerances.
+        The changes of the parameters in units of their tolerances.
     response : Response
         Response over the range and beyond its ends.
     regions : tuple of Region
         Regions of lost stability that reach into the range.
     peaks : tuple of Spot
-        Resonances in the range or the margin beside it.
+        Resonances in the range or within the margin beside the range.
     least : tuple of TestMinimum
         Minima of the test functions that matter for the wish.
     greatest : tuple of OutputMaximum
@@ -157,13 +157,13 @@ class Survey:
 
 
 def survey(wish: Wish, x: FloatArray, more: Sequence[PeriodicOrbit] = ()) -> Survey:
-    """Follow the response with some changes and survey the range.
+    """Follow the response with changes x of the parameters and survey the range.
 
     Parameters
     ----------
     wish : Wish
     x : ndarray, shape (k,)
-        Changes in units of their tolerances.
+        Changes of the parameters in units of their tolerances.
     more : sequence of PeriodicOrbit
         Motions on other branches, which are also followed.
 
@@ -227,7 +227,7 @@ def _parts_without_stable_motion(wish: Wish, branches: Sequence[Branch]) -> Iter
 
 
 def _stable_stretches(branch: Branch) -> Iterator[tuple[float, float]]:
-    """Yield the least and greatest level of the stable part between each two neighbouring points of a branch."""
+    """Yield the least and the greatest level of each stable stretch between neighbouring points of a branch."""
     stable = [orbit.largest <= 1.0 + MARGINAL for orbit in branch.orbits]
     lost = {special.after: special.parameter for special in branch.special}
     for i in range(len(branch) - 1):
@@ -254,7 +254,7 @@ def _ends(wish: Wish, beside: float) -> tuple[float, float]:
 
 
 def reaches(wish: Wish, low: float, high: float) -> bool:
-    """Return whether an interval of levels overlaps the inside of the range."""
+    """Return whether the interval of levels from ``low`` to ``high`` overlaps the inside of the range."""
     return _overlap(wish, low, high, wish.span)
 
 
@@ -279,7 +279,7 @@ def _add_branch(wish: Wish, response: Response, orbit: PeriodicOrbit) -> Respons
 
 
 def _meets(wish: Wish, response: Response, orbit: PeriodicOrbit) -> bool:
-    """Return whether a motion is on one of the branches, whichever turn of the motion comes first."""
+    """Return whether a motion is on a branch of the response, at whichever turn of its period the motion is taken to begin."""
     level, width = wish.level(orbit), response.high - response.low
     starts = orbit.passages()
     own = [branch for branch in response.branches if branch.turns == orbit.turns]
@@ -303,7 +303,7 @@ def _kinds(branch: Branch) -> Iterator[Crossing]:
 def _parts(
     wish: Wish, branch: Branch, kind: Crossing, response: Response
 ) -> Iterator[tuple[SpecialPoint | None, Any, SpecialPoint | None]]:
-    """Yield the parts of a branch between sign changes of a test function.
+    """Yield the parts of a branch into which the sign changes of a test function divide it.
 
     Each part is (special point at the beginning or None, indices of the points, special point at the end or None).
     """
@@ -424,7 +424,7 @@ def _test_minima(wish: Wish, x: FloatArray, branch: Branch) -> Iterator[TestMini
 
 
 def _peaks(wish: Wish, x: FloatArray, response: Response) -> Iterator[Spot]:
-    """Yield the resonances in the range and within the margin beside it."""
+    """Yield the resonances in the range and within the margin beside the range."""
     for top in response.maxima():
         if _overlap(wish, top.parameter, top.parameter, wish.range_with_margin):
             yield known_spot(wish, x, top.orbit)
@@ -433,7 +433,7 @@ def _peaks(wish: Wish, x: FloatArray, response: Response) -> Iterator[Spot]:
 def _output_maxima(
     wish: Wish, x: FloatArray, limit: Limit, motions: Sequence[Sequence[tuple[float, PeriodicOrbit]]]
 ) -> Iterator[OutputMaximum]:
-    """Yield the local maxima of an output in the range, refined with respect to the level."""
+    """Yield the local maxima of an output over the levels of the range, refined between the levels of the given motions."""
     found = []
     for branch in motions:
         values = [limited_value(sample_turn(orbit), limit)[0] for _, orbit in branch]

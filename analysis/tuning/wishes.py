@@ -196,7 +196,7 @@ class Wish:
         self._check_bounds()
 
     def _check_bounds(self) -> None:
-        """Raise ParameterError if mechanism or drive do not allow the bounds of the parameters that may be changed."""
+        """Raise ParameterError if the mechanism or the drive does not allow the bounds of a parameter that may be changed."""
         assert self.drive is not None
         for change in self.change:
             for value in (change.low, change.high):
@@ -242,16 +242,16 @@ class Wish:
 
     @property
     def span(self) -> tuple[float, float]:
-        """The range, in SI."""
+        """The ends of the range, in SI."""
         low, high = self.between or (0.0, 0.0)
         return float(low), float(high)
 
     def level(self, orbit: PeriodicOrbit) -> float:
-        """Return the level of a motion: its value of the quantity ``over``."""
+        """Return the level of a motion: the value that the quantity ``over`` has in this motion."""
         return parameter_value(orbit.parameters, orbit.drive, self.over)
 
     def say(self, *levels: float, joint: str = ", ") -> str:
-        """Format levels as text with the unit; speeds in rpm."""
+        """Format levels as a text with their unit, speeds in rpm; ``joint`` stands between two levels."""
         unit = parameter_unit(self.mechanism, self.over)
         factor, unit = (RAD_S_PER_RPM, "rpm") if unit == "rad/s" else (1.0, unit)
         return f"{joint.join(f'{level / factor:.6g}' for level in levels)} {unit}"
@@ -273,7 +273,7 @@ class Wish:
 
     @property
     def range_with_margin(self) -> tuple[float, float]:
-        """The range, widened at both ends by the margin for resonances, in SI."""
+        """The ends of the range widened by the margin for resonances, in SI."""
         (low, high), margin = self.span, self.resonance_margin
         return low - margin * abs(low), high + margin * abs(high)
 
@@ -290,18 +290,18 @@ class Wish:
 
     @property
     def present(self) -> FloatArray:
-        """Present values, shape (k,)."""
+        """Present values of the parameters that may be changed, shape (k,)."""
         assert self.drive is not None
         return np.array([parameter_value(self.parameters, self.drive, name) for name in self.names])
 
     @property
     def low(self) -> FloatArray:
-        """Least values, shape (k,)."""
+        """Lower bounds of the parameters that may be changed, shape (k,)."""
         return np.array([change.low for change in self.change])
 
     @property
     def high(self) -> FloatArray:
-        """Greatest values, shape (k,)."""
+        """Upper bounds of the parameters that may be changed, shape (k,)."""
         return np.array([change.high for change in self.change])
 
     @property
@@ -391,7 +391,7 @@ def _change(operation: Operation, name: str, value: Any) -> Change:
 
 
 def _tolerance(value: Any, unit: str, now: float, name: str) -> float:
-    """Return a tolerance in SI; a percentage is of the present value ``now``."""
+    """Return a tolerance in SI; a percentage is taken of the present value ``now``."""
     if isinstance(value, str) and value.rstrip().endswith("%"):
         found = quantity(value, "1", name) * abs(now)
         if now == 0.0:

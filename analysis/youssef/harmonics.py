@@ -36,7 +36,7 @@ MOST_ITERATIONS, MOST_HALVINGS = 40, 12
 
 
 class HarmonicBalanceError(LinkworkError):
-    """The harmonic balance failed; the message states speed, order, residual and iterations."""
+    """The harmonic balance failed; the message states the speed, the order, the residual and the number of iterations."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -46,7 +46,7 @@ class HarmonicMotion:
     Attributes
     ----------
     series : FourierSeries
-        zeta = u/l4 of a linear equation.
+        Solution zeta = u/l4 of a linear equation.
     residual : float
         Greatest unbalanced force over the turn, relative to (m4 + m5) l4 omega^2.
     """
@@ -56,20 +56,20 @@ class HarmonicMotion:
 
     @property
     def order(self) -> int:
-        """Order of the highest harmonic."""
+        """Order of the highest harmonic of the series."""
         return self.series.order
 
     @property
     def amplitude(self) -> float:
-        """Half the distance between the least and the greatest position."""
+        """Half the distance between the least and the greatest slider position."""
         return float(_half_ranges(self.series.cos[None, :], self.series.sin[None, :])[0])
 
     def harmonic(self, n: int) -> float:
-        """Return the amplitude of the n-th harmonic, the mean with its sign for n = 0, and 0 beyond the order."""
+        """Return the amplitude of the n-th harmonic, 0 if n is above the order; for n = 0 return the mean with its sign."""
         return float(self.series.amplitudes[n]) if n <= self.order else 0.0
 
     def position(self, angle: ArrayLike) -> NDArray[np.float64]:
-        """Return the positions at crank angles (rad), as an array of the angles' shape."""
+        """Return the slider positions at crank angles (rad), as an array of the angles' shape."""
         return self.series(angle)
 
 
@@ -96,16 +96,16 @@ class SliderMotion(HarmonicMotion):
     torque: FourierSeries
 
     def velocity(self, angle: ArrayLike) -> NDArray[np.float64]:
-        """Return u' (m/s) at crank angles (rad)."""
+        """Return the slider velocity u' (m/s) at crank angles (rad)."""
         return self.speed * self.series.derivative()(angle)
 
     def acceleration(self, angle: ArrayLike) -> NDArray[np.float64]:
-        """Return u'' (m/s2) at crank angles (rad)."""
+        """Return the slider acceleration u'' (m/s2) at crank angles (rad)."""
         return self.speed**2 * self.series.derivative().derivative()(angle)
 
 
 def two_harmonics(equation: SliderEquation) -> HarmonicMotion:
-    """Solve the thesis's five linear equations (4.30)-(4.35) for a0, a1, b1, a2, b2."""
+    """Return the slider motion with two harmonics: solve the thesis's equations (4.30)-(4.35) for a0, a1, b1, a2, b2."""
     return harmonic_balance(equation, 2)
 
 
@@ -184,7 +184,10 @@ def _coefficients(z: NDArray[Any]) -> tuple[NDArray[np.float64], NDArray[np.floa
 
 
 def _half_ranges(cos: NDArray[np.float64], sin: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return half the range of each of m Fourier series, shape (m,), from cosine and sine coefficients, each (m, n + 1)."""
+    """Return half the range of values of each of m Fourier series, shape (m,).
+
+    The series are given by their cosine and sine coefficients, each of shape (m, n + 1).
+    """
     n = np.arange(cos.shape[-1])
     angle = np.linspace(0.0, 2.0 * pi, 32 * len(n), endpoint=False)
     phase = np.multiply.outer(n, angle)
@@ -220,18 +223,18 @@ def resonance(
     order: int = 2,
     load: Load = NO_LOAD,
 ) -> tuple[float, float]:
-    """Return the two crank speeds (rad/s) at which the undamped linear balance is singular, the lower first.
+    """Return the two crank speeds (rad/s) at which the undamped linear harmonic balance is singular, the lower first.
 
-    For every harmonic the determinant vanishes at two neighbouring speeds, because the periodic mass and stiffness split
-    one resonance into two. The thesis's resonance is the lower one with ``harmonic=1`` and ``order=2``.
+    For every harmonic the determinant of the balance vanishes at two neighbouring speeds, because the periodic mass and
+    stiffness split one resonance into two. The thesis's resonance is the lower one with ``harmonic=1`` and ``order=2``.
 
     Parameters
     ----------
     parameters : FiveBarParameters
-        Parameters, of which the damping is ignored.
+        Parameters of the five-bar; the damping is ignored.
     variant : Variant
     harmonic : int
-        Resonating harmonic: 1 at the natural frequency, 2 near half of it; at most ``order``.
+        Resonating harmonic: 1 near the natural frequency, 2 near half the natural frequency; at most ``order``.
     order : int
         Highest harmonic of the balance.
     load : Load
@@ -266,12 +269,12 @@ def resonance(
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Approximations:
-    """Amplitudes against crank speed, approximated by the linear equation about u = 0.
+    """Amplitudes of the slider against crank speed, approximated by the linear equation about u = 0.
 
     Attributes
     ----------
     parameters : FiveBarParameters
-        Without Coulomb friction, which has no linear form.
+        Parameters without Coulomb friction, which has no linear form.
     load : Load
         Constant forces.
     speed : ndarray, shape (m,)
@@ -286,11 +289,11 @@ class Approximations:
     amplitudes: Mapping[str, NDArray[np.float64]]
 
     def at(self, speed: ArrayLike) -> dict[str, NDArray[np.float64]]:
-        """Return the amplitudes (m) at crank speeds (rad/s) by name of approximation, as arrays of the speeds' shape."""
+        """Return, for each approximation by its name, the amplitudes (m) at crank speeds (rad/s), in the shape of ``speed``."""
         return _approximate(self.parameters, speed, self.load)
 
     def columns(self) -> dict[str, NDArray[np.float64]]:
-        """Return speed and amplitudes as the columns of a table, by name with unit."""
+        """Return the speed and the amplitudes as columns of a table, by name with unit."""
         return {"drive.speed [rad/s]": self.speed} | {f"{name} [m]": v for name, v in self.amplitudes.items()}
 
 
@@ -332,9 +335,10 @@ def _approximate(parameters: FiveBarParameters, speed: ArrayLike, load: Load) ->
 
 
 class _Basis(NamedTuple):
-    """Functions 1, cos k x, sin k x at samples x (``angle``, rad): values and first two derivatives, (samples, 2 order + 1).
+    """The functions 1, cos k x, sin k x at samples of x (``angle``, rad): values and first two derivatives.
 
-    ``projection``, shape (2 order + 1, samples), converts samples of a function to its coefficients.
+    The arrays of values and derivatives have the shape (samples, 2 order + 1). ``projection``, shape (2 order + 1, samples),
+    converts samples of a function to its coefficients.
     """
 
     angle: NDArray[np.float64]
@@ -435,7 +439,7 @@ def _linear_start(parameters: FiveBarParameters, speed: float, order: int, load:
 def _newton(
     parameters: FiveBarParameters, speed: float, order: int, start: FourierSeries, tolerance: float, load: Load
 ) -> SliderMotion:
-    """Solve the nonlinear balance with harmonics up to ``order`` by Newton's method from ``start`` (m)."""
+    """Solve the nonlinear balance with harmonics up to ``order`` by Newton's method from the slider position ``start`` (m)."""
     p = parameters.constants()
     basis = _basis(order)
     scale = p.l4 * (p.m45 * speed**2 + p.k)

@@ -46,9 +46,9 @@ class PeriodicEquation:
     Attributes
     ----------
     a, b, c : FourierSeries
-        ``a`` must keep one sign and not be zero.
+        The coefficients; ``a`` must keep one sign and not be zero.
     factor : FourierSeries
-        s, by which `stiffened` multiplies the stiffness lambda: 1, except in the thesis's equation, where it is periodic.
+        s, by which `stiffened` multiplies the stiffness lambda: 1, except in the thesis's equation, where s is periodic.
     """
 
     a: FourierSeries
@@ -58,7 +58,7 @@ class PeriodicEquation:
 
     @classmethod
     def mathieu(cls, p: float, q: float, damping: float = 0.0) -> PeriodicEquation:
-        """Return Mathieu's equation y'' + damping y' + (p - 2 q cos 2 t) y = 0 in x = 2 t, which has period 2 pi."""
+        """Return Mathieu's equation y'' + damping y' + (p - 2 q cos 2 t) y = 0 in x = 2 t, with coefficients of period 2 pi."""
         return cls(
             a=FourierSeries.constant(4.0),
             b=FourierSeries.constant(2.0 * damping),
@@ -67,7 +67,7 @@ class PeriodicEquation:
 
     @property
     def order(self) -> int:
-        """Highest harmonic of the coefficients."""
+        """Order of the highest harmonic of the coefficients."""
         return max(series.order for series in (self.a, self.b, self.c, self.factor))
 
     def stiffened(self, stiffness: float) -> PeriodicEquation:
@@ -76,7 +76,7 @@ class PeriodicEquation:
 
 
 class SingularEquationError(InputError):
-    """The coefficient of y'' passes zero, so that the equation is not of second order throughout."""
+    """The coefficient of y'' passes through zero, where the equation is not of second order."""
 
 
 # Floquet
@@ -90,7 +90,7 @@ def _waves(points: tuple[float, ...], order: int) -> tuple[NDArray[np.float64], 
 
 
 def _table(series: Sequence[FourierSeries], order: int) -> NDArray[np.float64]:
-    """Return the cosine and sine coefficients of n series, padded with zeros to one order, shape (2, n, order + 1)."""
+    """Return the cosine and sine coefficients of n series, padded with zeros to the same order; shape (2, n, order + 1)."""
     table = np.zeros((2, len(series), order + 1))
     for i, one in enumerate(series):
         table[0, i, : one.order + 1], table[1, i, : one.order + 1] = one.cos, one.sin
@@ -98,13 +98,13 @@ def _table(series: Sequence[FourierSeries], order: int) -> NDArray[np.float64]:
 
 
 def _slope(table: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Differentiate the series whose coefficients a table holds (see `_table`); return the table of the derivatives."""
+    """Return the table of coefficients (see `_table`) of the derivatives of the series in a table."""
     k = np.arange(table.shape[2])
     return np.array([k * table[1], -k * table[0]])
 
 
 def _sample_series(table: NDArray[np.float64], points: tuple[float, ...]) -> NDArray[np.float64]:
-    """Return the values of the n series of a table at the same points, shape (n, number of points)."""
+    """Return the values of the n series of a table (see `_table`) at given points, shape (n, number of points)."""
     cos, sin = _waves(points, table.shape[2] - 1)
     values: NDArray[np.float64] = table[0] @ cos + table[1] @ sin
     return values
@@ -140,7 +140,7 @@ def _steps(tables: Sequence[NDArray[np.float64]]) -> int:
 
 
 def monodromies(equations: Sequence[PeriodicEquation], *, steps: int | None = None) -> NDArray[np.float64]:
-    """Return the monodromy matrices of many equations, which map (y, y') at x = 0 to (y, y') at x = 2 pi.
+    """Return the monodromy matrices of n equations, which map (y, y') at x = 0 to (y, y') at x = 2 pi.
 
     The integration by Gauss-Legendre collocation of order 12 on (y, a y') keeps the determinant at 1 if the equation is
     self-adjoint (b = a').
@@ -160,7 +160,7 @@ def monodromies(equations: Sequence[PeriodicEquation], *, steps: int | None = No
     InputError
         If there is no equation, or the number of steps is not positive.
     SingularEquationError
-        If a coefficient of y'' passes zero.
+        If a coefficient of y'' passes through zero.
     """
     if not equations:
         raise InputError("at least one equation is needed")
@@ -222,14 +222,17 @@ def _toeplitz(series: FourierSeries, size: int) -> NDArray[np.complex128]:
 
 
 def _harmonics(multiplier: int, order: int) -> NDArray[np.float64]:
-    """Return the harmonic numbers k, symmetric about 0: integers for the multiplier +1 (period 2 pi), half-integers for -1."""
+    """Return the harmonic numbers k, symmetric about 0, up to ``order``.
+
+    They are whole numbers for the multiplier +1 (period 2 pi), half-integers for the multiplier -1 (period 4 pi).
+    """
     count, first = (2 * order + 1, -order) if multiplier == 1 else (2 * order, -order + 0.5)
     k: NDArray[np.float64] = first + np.arange(count, dtype=float)
     return k
 
 
 def _order(equation: PeriodicEquation, order: int | None, more: int = 0) -> int:
-    """Return the highest harmonic: ``order`` if it is given, otherwise the default for the equation plus ``more``."""
+    """Return the highest harmonic of Hill's determinant: ``order`` if given, otherwise the equation's default plus ``more``."""
     if order is None:
         return 2 * equation.order + MORE_HARMONICS + more
     if order < 1:
@@ -245,15 +248,16 @@ def operator(equation: PeriodicEquation, k: NDArray[np.float64]) -> NDArray[np.c
 
 
 def hill_determinant(equation: PeriodicEquation, multiplier: int, *, order: int | None = None) -> float:
-    """Return Hill's determinant in exponential form, which is zero if the equation has the given multiplier.
+    """Return Hill's determinant in exponential form, which is zero if the equation has the given Floquet multiplier.
 
-    Row k is divided by -a0 (k^2 + 1). Only signs, and ratios at the same order, are meaningful: for equations that differ by a
-    constant in c, the ratios tend to the ratios of det(Phi - multiplier I) as the order grows.
+    Row k is divided by -a0 (k^2 + 1). Only the sign of a determinant, and the ratio of two determinants of the same order, are
+    meaningful: for equations that differ by a constant in c, the ratios tend to the ratios of det(Phi - multiplier I) as the
+    order grows.
 
     Parameters
     ----------
     equation : PeriodicEquation
-        It may have damping.
+        Equation, which may have damping.
     multiplier : int
         +1 for motions of period 2 pi, -1 for motions of period 4 pi.
     order : int, optional
@@ -276,7 +280,7 @@ def hill_multipliers(equation: PeriodicEquation, *, order: int | None = None) ->
 
     y = exp(s x) sum over k of y_k exp(i k x) gives (s^2 A + s B + C) y_k = 0. If s is an eigenvalue of the infinite problem, so
     is s + i n for every whole n, with the same multiplier exp(2 pi s). Truncation spoils the eigenvectors that reach the
-    highest harmonics; the multipliers are taken from eigenvectors centred on low ones.
+    highest harmonics; the multipliers are therefore taken from eigenvectors centred on low harmonics.
 
     Parameters
     ----------
@@ -320,7 +324,7 @@ def boundary_stiffnesses(
     Parameters
     ----------
     equation : PeriodicEquation
-        With a > 0. Damping that removes a region turns its two boundaries into a complex pair.
+        Equation with a > 0. Damping that removes a region turns the region's two boundaries into a complex pair.
     multiplier : int
         +1 or -1.
     count : int
@@ -371,7 +375,7 @@ class Region:
 
     @property
     def width(self) -> float:
-        """Distance between the boundaries."""
+        """Difference of the stiffnesses of the two boundaries."""
         return self.high - self.low
 
 
@@ -381,8 +385,9 @@ def hill_regions(equation: PeriodicEquation, count: int, *, order: int | None = 
     Parameters
     ----------
     equation : PeriodicEquation
-        With a > 0.
+        Equation with a > 0.
     count : int
+        Number of the last region.
     order : int, optional
         Highest harmonic.
     """
@@ -403,7 +408,9 @@ def hill_regions(equation: PeriodicEquation, count: int, *, order: int | None = 
 
 
 def _perturb_boundaries(equation: PeriodicEquation, number: int, order: int) -> NDArray[np.complex128]:
-    """Return the boundaries of the region N: one for N = 0, else two, a complex pair if damping has removed the region.
+    """Return the boundaries of the region N: one for N = 0, else two.
+
+    The two boundaries are a complex pair if damping has removed the region.
 
     On the harmonics exp(i k x) the equation is (V - lambda S) y = 0. To first order only the harmonics k = +-N/2 count. To
     second order the other harmonics q subtract the sum of (V_jq - lambda S_jq) (V_qk - lambda S_qk) / (V_qq - lambda S_qq), in
@@ -434,7 +441,9 @@ def _perturb_boundaries(equation: PeriodicEquation, number: int, order: int) -> 
 
 
 def perturbed_boundary(equation: PeriodicEquation, *, order: int = 2) -> float:
-    """Return the stiffness of boundary 0 for small harmonics, eq (5.13) to second order; below it the motion diverges.
+    """Return the stiffness, for small harmonics, of the boundary below which the motion diverges, the boundary 0.
+
+    This is eq (5.13) to second order.
 
     Raises
     ------
@@ -452,8 +461,8 @@ def perturbed_region(equation: PeriodicEquation, number: int, *, order: int = 2)
         lambda = k0 N^2/4 - K0 -+ sqrt(|N^2/4 M_N + K_N|^2 - (N lambda_c/2)^2),
 
     where k0 and K0 are the means of M and K, and M_N and K_N their complex coefficients of exp(i N x). Without damping this is
-    eq (5.16) for N = 1; to second order it is eq (5.26) for N = 2. The thesis derives them by Lindstedt's method; the
-    degenerate perturbation of Hill's matrix used here gives the same series.
+    eq (5.16) for N = 1; to second order it is eq (5.26) for N = 2. The thesis derives these equations by Lindstedt's method;
+    the degenerate perturbation of Hill's matrix used here gives the same series.
 
     Parameters
     ----------
@@ -462,7 +471,7 @@ def perturbed_region(equation: PeriodicEquation, number: int, *, order: int = 2)
     number : int
         N, from 1; for N = 0 see `perturbed_boundary`.
     order : int
-        1 or 2.
+        Order of the perturbation, 1 or 2.
 
     Returns
     -------

@@ -94,7 +94,7 @@ NO_LOAD = Load()
 
 
 class Balance(NamedTuple):
-    """Unbalanced slider force and crank torque for given slider motions; arrays of the same shape as the motions.
+    """Unbalanced force on the slider, and crank torque, for given slider motions; arrays of the same shape as the motions.
 
     Attributes
     ----------
@@ -103,7 +103,7 @@ class Balance(NamedTuple):
     by_acceleration, by_velocity, by_position : ndarray
         Derivatives of the force with respect to u'' (the effective mass m22, kg), u' (N.s/m) and u (N/m).
     torque : ndarray
-        Crank torque that holds the speed (N.m).
+        Crank torque that keeps the crank speed constant (N.m).
     """
 
     force: NDArray[np.float64]
@@ -177,7 +177,7 @@ def balance(
 
 
 def _require_assembly(angle: NDArray[np.float64], position: NDArray[np.float64], p: Constants) -> None:
-    """Raise AssemblyError where |sin(th4 - th3)| is not above `LIMIT_SINE`."""
+    """Raise AssemblyError if |sin(th4 - th3)| is not above `LIMIT_SINE` at one of the angles and positions."""
     angle, position = angle.ravel(), position.ravel()
     dx = p.l1 + position * p.ca - p.l2 * np.cos(angle)
     dy = position * p.sa - p.l2 * np.sin(angle)
@@ -193,7 +193,7 @@ def _require_assembly(angle: NDArray[np.float64], position: NDArray[np.float64],
 
 
 def require_speed(speed: float) -> None:
-    """Raise `InputError` for a crank speed (rad/s) that is not finite and greater than zero."""
+    """Raise `InputError` if a crank speed (rad/s) is not finite or not greater than zero."""
     if not (isfinite(speed) and speed > 0.0):
         raise InputError(f"crank speed {speed!r} rad/s: it must be finite and greater than zero")
 
@@ -245,7 +245,10 @@ class SliderEquation:
         return PeriodicEquation(a=self.mass, b=b, c=self.stiffness, factor=self.spring_factor)
 
     def coefficients(self) -> tuple[FourierSeries, FourierSeries, FourierSeries]:
-        """Return a, b, c of a zeta'' + b zeta' + c zeta = F: M, M' + lambda_c and lambda_k^2 + K, with the factors."""
+        """Return the coefficients a, b, c of a zeta'' + b zeta' + c zeta = F.
+
+        They are M, M' + lambda_c and lambda_k^2 + K, with the factors of lambda_c and lambda_k^2.
+        """
         whole = self.homogeneous().stiffened(self.spring)
         return whole.a, whole.b, whole.c
 
@@ -266,7 +269,7 @@ def slider_equation(
     Parameters
     ----------
     parameters : FiveBarParameters
-        Without Coulomb friction, which has no linear form.
+        Parameters without Coulomb friction, which has no linear form.
     speed : float
         Crank speed omega (rad/s), greater than zero.
     variant : Variant
@@ -366,7 +369,7 @@ def _last_harmonic(series: FourierSeries) -> int:
 def _taylor_coefficients(
     p: Constants, speed: float, load: Load, order: int
 ) -> tuple[FourierSeries, FourierSeries, FourierSeries]:
-    """Return the series of `_exact_coefficients` as Taylor polynomials in the crank's length, harmonics up to ``order``."""
+    """Return the series of `_exact_coefficients` as Taylor polynomials in the crank's length; harmonics up to ``order``."""
     bare, loaded = _without_spring(p, load)
     # the expansion is about a crank of zero length
     bare = bare._replace(l2=0.0)

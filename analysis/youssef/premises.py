@@ -1,4 +1,4 @@
-"""Checks of the parameters that the analyses of the five-bar slider share."""
+"""Checks of the parameters that are common to the analyses of the five-bar slider."""
 
 from __future__ import annotations
 

@@ -36,20 +36,20 @@ DATUM = Datum(*map(radians, (149.0, 57.0, 120.0)))
 
 
 class Form(StrEnum):
-    """Form in which the thesis uses the coefficients.
+    """Form in which the thesis uses the coefficients of eq (4.21).
 
     Attributes
     ----------
     QUOTIENT
-        As in eq (4.21).
+        The coefficients as in eq (4.21).
     SERIES
-        As in eq (4.29): divided by I and expanded by (4.23) to (4.28), which keep second-order harmonics but not
-        second-order means.
+        The coefficients as in eq (4.29): divided by I and expanded by (4.23) to (4.28), which keep second-order harmonics but
+        not second-order means.
     RESONANCE
-        As in appendix 2, which divides the harmonics of S by its mean k0 once too often; the damper's mean is 1 as in
-        (4.34).
+        The coefficients as in appendix 2, which divides the harmonics of S by its mean k0 once too often; the damper's mean is
+        1 as in (4.34).
     STABILITY
-        As in appendix 4: as in appendix 2, but the damper's mean is k0.
+        The coefficients as in appendix 4, which differ from those of appendix 2 in the damper's mean: it is k0.
     """
 
     QUOTIENT = "(4.21)"
@@ -59,7 +59,7 @@ class Form(StrEnum):
 
 
 class Coefficients(NamedTuple):
-    """The inertia I, the factors of lambda_c and of lambda_k^2, the stiffness K and the force F."""
+    """The coefficients of eq (4.21): inertia I, factors of lambda_c and of lambda_k^2, stiffness K and force F."""
 
     inertia: FourierSeries
     damper: FourierSeries
@@ -69,7 +69,10 @@ class Coefficients(NamedTuple):
 
 
 class Ratios(NamedTuple):
-    """Dimensionless parameters of the coefficients: l2/l4, l3/l4, p45 = m4/(m4 + m5), I4 = rocker inertia/(m4 l4^2)."""
+    """Dimensionless parameters that determine the coefficients.
+
+    They are l2/l4, l3/l4, p45 = m4/(m4 + m5) and I4 = rocker inertia/(m4 l4^2).
+    """
 
     sigma2: float
     sigma3: float
@@ -78,7 +81,7 @@ class Ratios(NamedTuple):
 
 
 def ratios(parameters: FiveBarParameters) -> Ratios:
-    """Return the dimensionless parameters of a mechanism.
+    """Return the dimensionless parameters of a five-bar.
 
     Raises InputError if the coupler has mass, the rocker's centre of mass is off the slider, or gravity or a preload acts.
     """
@@ -156,15 +159,15 @@ def _force(ratios: Ratios, datum: Datum) -> FourierSeries:
     """Return the force with the harmonics -U and -V of the listings (L8449-8450), used in place of R1 and S1.
 
     In the scan the lines of R1 and S1 (L2786-2794) are incomplete: the legible terms contain r4 and mr3, which are zero here,
-    and none contains I4. At sigma3 = 1, U and V are the I4 term in the line of Q1 (L2781) times cos and sin of alpha3. The
-    force has no mean in the listings, nor to first order in the correct equation.
+    and none of these terms contains I4. At sigma3 = 1, U and V are the I4 term in the line of Q1 (L2781) times cos and sin of
+    alpha3. The mean of the force is zero in the listings, and to first order also in the correct equation.
     """
     size = ratios.p45 * ratios.inertia_ratio * ratios.sigma2 * cos(datum.coupler)
     return _series(0.0, -size * cos(datum.coupler), -size * sin(datum.coupler))
 
 
 def _divide_by_inertia(part: FourierSeries, inertia: FourierSeries) -> FourierSeries:
-    """Divide a coefficient by the inertia as (4.23) to (4.28) do: to second order, but the mean to first order only."""
+    """Divide a coefficient by the inertia as (4.23) to (4.28) do: harmonics to second order, the mean to first order only."""
     mean = part.mean / inertia.mean
     # first harmonics as cos - i sin: the product of two has half their product as its second harmonic
     first, by = ((one.cos[1] - 1j * one.sin[1]) / inertia.mean for one in (part, inertia))

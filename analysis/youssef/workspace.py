@@ -1,7 +1,7 @@
-"""Coupler curves at a held slider, and the area that the coupler point P can reach (Youssef, Fig 7.2).
+"""Coupler curves with the slider held, and the area that the coupler point P can reach (Youssef, Fig 7.2).
 
-P has two freedoms, the crank angle th2 and the slider position u. At a fixed u it traces a coupler curve, which is closed if
-the crank turns fully and else consists of open arcs. Over a range of u the curves fill the accessible area.
+P has two degrees of freedom, the crank angle th2 and the slider position u. At a fixed u it traces a coupler curve, which is
+closed if the crank turns fully and otherwise consists of open arcs. Over a range of u the curves fill the accessible area.
 
 The curves come from the plant's kinematics. The area comes from inverse kinematics: a point (x, y) is accessible if one of
 its at most four configurations exists,
@@ -46,7 +46,7 @@ MISSED = 0.01
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Arc:
-    """Arc of a coupler curve on which the linkage can be assembled: crank angles (rad), coordinates of P (m), shapes (n,)."""
+    """Arc of a coupler curve on which the linkage can be assembled: n crank angles (rad) and the coordinates of P (m)."""
 
     crank_angle: NDArray[np.float64]
     x: NDArray[np.float64]
@@ -62,8 +62,8 @@ class CouplerCurve:
     slider_position : float
         Slider position (m).
     arcs : tuple of Arc
-        One closed arc if the crank turns fully, its last point equal to its first; else one per range between limits of
-        assembly; none if the links cannot be joined at any crank angle.
+        One closed arc if the crank turns fully, its last point equal to its first. Otherwise one arc for each range of crank
+        angles between limits of assembly; no arc if the links cannot be joined at any crank angle.
     closed : bool
         Whether the crank turns fully.
     """
@@ -103,7 +103,7 @@ class AccessibleArea:
     converged: bool
 
     def contains(self, x: ArrayLike, y: ArrayLike) -> NDArray[np.bool_]:
-        """Return whether points with coordinates x and y (m), of shape (k,), lie inside the boundaries."""
+        """Return whether points lie inside the boundaries; x and y are their coordinates (m), each of shape (k,)."""
         x, y = np.atleast_1d(np.asarray(x, float)), np.atleast_1d(np.asarray(y, float))
         inside = np.zeros(x.shape, dtype=bool)
         for ring in (*self.outer, *self.holes):
@@ -123,8 +123,8 @@ def coupler_curve(parameters: FiveBarParameters, slider_position: Amount, n: int
     slider_position : float
         Slider position (m).
     n : int
-        Intervals of each arc. In an open arc the intervals become shorter towards the ends, where P varies as the square root
-        of the angle.
+        Number of intervals of each arc. In an open arc the intervals become shorter towards the ends, where P varies as the
+        square root of the angle.
 
     Raises
     ------
@@ -159,10 +159,10 @@ def coupler_curves(parameters: FiveBarParameters, slider_positions: Amount, n: i
 
 
 def assembly_ranges(u: float, p: Constants) -> list[tuple[float, float]]:
-    """Return the ranges of crank angles (rad), end > start, in which the links can be joined at slider position u.
+    """Return the ranges (begin, end) of crank angles (rad) in which the links can be joined at slider position u.
 
     With e = |AD|, BD^2 = e^2 + l2^2 - 2 l2 e cos(th2 - phi) must lie between (l3 - l4)^2 and (l3 + l4)^2. The limits are
-    symmetric about the direction phi of D.
+    symmetric about the direction phi of D. The end of a range is greater than its beginning.
     """
     dx, dy = p.l1 + u * p.ca, u * p.sa
     e = hypot(dx, dy)
@@ -209,7 +209,7 @@ def _coupler_point(th2: float, u: float, middle: float, p: Constants) -> tuple[f
 @takes_published()
 @in_si(slider_range="m", x="m", y="m")
 def accessible(parameters: FiveBarParameters, slider_range: Amount, x: Amount, y: Amount) -> NDArray[np.bool_]:
-    """Return whether P can reach given points with the slider in a range, in closed form.
+    """Return whether P can reach given points with the slider within a range, computed in closed form.
 
     Parameters
     ----------
@@ -221,7 +221,7 @@ def accessible(parameters: FiveBarParameters, slider_range: Amount, x: Amount, y
     Returns
     -------
     ndarray of bool
-        All False if P is the crank pin B, whose path is a circle.
+        Whether each point can be reached; all False if P is the crank pin B, whose path is a circle.
     """
     p = parameters.constants()
     low, high = slider_range
@@ -314,16 +314,16 @@ def accessible_area(
 
 
 def _sample_points(parameters: FiveBarParameters, low: float, high: float) -> NDArray[np.float64]:
-    """Return P at configurations spread over crank angle and slider position, shape (k, 2)."""
+    """Return the points P (m) at configurations spread over crank angle and slider position, shape (k, 2)."""
     curves = coupler_curves(parameters, np.linspace(low, high, 33).tolist(), n=120)
     arcs = [np.column_stack([arc.x, arc.y]) for curve in curves for arc in curve.arcs]
     return np.concatenate(arcs) if arcs else np.empty((0, 2))
 
 
 class _Grid(NamedTuple):
-    """Square grid over the plane: coordinates of its points (m), whether P can reach each, and the test for other points.
+    """Square grid over the plane: coordinates of the grid points (m), whether P can reach each grid point, and a test.
 
-    ``inside`` has the shape (len(ys), len(xs)); ``reaches(x, y)`` tests points of any coordinates.
+    ``inside`` has the shape (len(ys), len(xs)); the test ``reaches(x, y)`` tells whether P can reach any other points.
     """
 
     xs: NDArray[np.float64]
@@ -335,7 +335,7 @@ class _Grid(NamedTuple):
 def _trace(
     parameters: FiveBarParameters, slider_range: tuple[float, float], sample: NDArray[np.float64], cells: int
 ) -> tuple[list[NDArray[np.float64]], float]:
-    """Return the boundaries (m) from a grid with ``cells`` cells across, and the share of the sample outside the boundaries."""
+    """Return the boundaries (m) from a grid with ``cells`` cells across, and the share of the sample points outside of them."""
     least, most = sample.min(axis=0), sample.max(axis=0)
     size = float((most - least).max()) / cells
     margin = 0.02
@@ -355,7 +355,7 @@ def _trace(
 
 
 def _rings(grid: _Grid) -> list[NDArray[np.float64]]:
-    """Return the closed boundaries (m), the largest first; their vertices are located on the grid's edges by bisection."""
+    """Return the closed boundaries (m), the largest first; the vertices are located on the grid's edges by bisection."""
     xs, ys, inside, reaches = grid
     heights = inside.astype(float)
     # if two diagonal corners of a cell are inside, its centre decides whether they connect: the contour uses their mean
@@ -379,7 +379,7 @@ def _rings(grid: _Grid) -> list[NDArray[np.float64]]:
 
 
 def _crossings(grid: _Grid, between: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Locate the boundary between neighbouring points of the grid by bisection; return its points (m), shape (k, 2).
+    """Return points on the boundary (m), shape (k, 2), located by bisection between neighbouring points of the grid.
 
     Each row of ``between``, shape (k, 2), has two grid indices, one of them fractional: a place on an edge of the grid.
     """
@@ -397,6 +397,6 @@ def _crossings(grid: _Grid, between: NDArray[np.float64]) -> NDArray[np.float64]
 
 
 def _signed_area(ring: NDArray[np.float64]) -> float:
-    """Return the area that a closed boundary encloses (m2), negative if its points (n, 2) run clockwise."""
+    """Return the area enclosed by a closed boundary (m2); the area is negative if the points, shape (n, 2), run clockwise."""
     x, y = (ring - ring[0]).T
     return float(0.5 * np.sum(x * np.roll(y, -1) - np.roll(x, -1) * y))

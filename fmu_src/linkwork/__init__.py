@@ -1,8 +1,9 @@
 """Linkwork's plants: the mechanisms' equations and their integrator, in plain Python.
 
-Only the standard library is used here, because this package travels inside the FMUs. Where the package `analysis` is installed
-beside it, its public names are available here too: ``linkwork.simulate`` is ``analysis.simulate``, imported when it is first
-used. If both packages have a module of the same name, this package's is returned: ``linkwork.slider_crank`` is the plant.
+Only the standard library is used here, because this package travels inside the FMUs. If the package `analysis` is installed
+too, the public names of `analysis` are also available here: ``linkwork.simulate`` is ``analysis.simulate``, imported at its
+first use. If both packages have a module of the same name, the module of this package is returned:
+``linkwork.slider_crank`` is the plant.
 """
 
 from __future__ import annotations
@@ -18,7 +19,7 @@ def __getattr__(name: str) -> Any:
     Raises
     ------
     AttributeError
-        If there is no such name or, as inside an FMU, no such package.
+        If `analysis` has no such name or, as inside an FMU, is not available.
     ImportError
         If another module named ``analysis`` is imported instead of Linkwork's.
     """

@@ -1,4 +1,4 @@
-"""Errors of Linkwork: each says what was wrong, with which value, and what would be right."""
+"""Errors of Linkwork: each message says what is wrong, which value was given, and what is allowed."""
 
 from __future__ import annotations
 
@@ -51,7 +51,8 @@ class InputError(LinkworkError, ValueError):
 class UnknownNameError(ParameterError, InputError):
     """A name is not valid; ``known`` are the valid names, ``near`` the valid name that was probably meant, or None.
 
-    The message lists the valid names, or the nearest five if there are more than ten; ``words``, if given, replace the name.
+    The message lists the valid names, or the nearest five if there are more than ten; ``words``, if given, replace the
+    name in the message.
     """
 
     def __init__(self, name: str, known: tuple[str, ...], words: str = "") -> None:
@@ -68,7 +69,7 @@ class UnknownNameError(ParameterError, InputError):
 
 
 class MissingParameterError(ParameterError):
-    """A required parameter was not given; ``others`` are the other missing ones."""
+    """A required parameter was not given; ``others`` are the names of the other missing parameters."""
 
     def __init__(self, name: str, others: tuple[str, ...] = ()) -> None:
         super().__init__(name, None, "be given")
@@ -84,7 +85,7 @@ class AssemblyError(LinkworkError):
 
 
 class JammingError(AssemblyError):
-    """Friction would jam the links, or nearly so, at the given configuration."""
+    """Friction jams the links, or nearly jams them, at the given configuration."""
 
 
 class StepError(LinkworkError):

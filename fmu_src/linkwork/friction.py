@@ -1,4 +1,4 @@
-"""Friction, smoothed at rest: viscous and Coulomb friction of a guide, and friction proportional to contact forces."""
+"""Friction, smoothed near zero speed: viscous and Coulomb friction of a guide, and friction proportional to contact forces."""
 
 from __future__ import annotations
 
@@ -6,11 +6,11 @@ from math import fabs, sqrt, tanh
 
 #: Slider speed (m/s) at which the regularised Coulomb friction F tanh(u'/v0) has reached 76 % of its level.
 FRICTION_SPEED = 1e-3
-#: The same for a pin: relative angular velocity of its links (rad/s).
+#: Relative angular velocity of the links of a pin (rad/s) at which its friction has reached 76 % of its level.
 FRICTION_RATE = 0.1
 #: Force F0 that rounds off the magnitude of a contact force F near zero (N): it is taken as sqrt(F^2 + F0^2).
 FRICTION_FORCE = 1e-2
-#: Greatest norm of the response of the contact forces to friction at which a motion is followed: at 1 friction may jam it.
+#: Greatest norm of the response of the contact forces to friction at which a motion is followed: at 1 the links may jam.
 MOST_RESPONSE = 0.8
 #: Sweeps of Newton's method for the forces of contacts with friction, before the last.
 SWEEPS = 4
@@ -24,7 +24,7 @@ def lesser(a: float, b: float) -> float:
 
 
 def resistance(v: float, mu: float, fc: float) -> float:
-    """Return the force that opposes a motion at speed v (N): damper mu v plus Coulomb friction of level fc; odd in v."""
+    """Return the force that opposes a motion at speed v (N): damper force mu v plus Coulomb friction of level fc; odd in v."""
     return mu * v + fc * tanh(v / FRICTION_SPEED)
 
 
@@ -44,17 +44,19 @@ def contact_forces(smooth: tuple[Vector, ...], response: tuple[tuple[Vector, ...
 def jamming_margin(response: tuple[tuple[Vector, ...], ...]) -> float:
     """Return the margin to jamming by friction, 1 - |response|/MOST_RESPONSE; it is negative beyond the limit.
 
-    ``response`` is that of `contact_forces`. If its norm is below 1, the solution for the contact forces is unique.
+    ``response`` is the argument of `contact_forces`. If its norm |response| is below 1, the solution for the contact forces is
+    unique.
     """
-    # the 1e-24, lost in any other sum, gives the root a finite derivative at rest
+    # the 1e-24, negligible in any other case, gives the root a finite derivative at rest
     return 1.0 - sqrt(1e-24 + sum(x * x + y * y for forces in response for x, y in forces)) / MOST_RESPONSE
 
 
 def mark_converged(s: tuple[float, ...]) -> tuple[float, ...]:
-    """Return ``s``, the solution to within rounding, unchanged.
+    """Return ``s`` unchanged; ``s`` is the solution to within rounding.
 
     The call marks where differentiation may begin: one more step of Newton's method from ``s`` has the derivatives of the
-    solution, whatever the derivatives of ``s`` are, so that code that differentiates these equations can skip the steps before.
+    solution, whatever the derivatives of ``s`` are. Code that differentiates these equations can therefore skip the steps
+    before the call.
     """
     return s
 

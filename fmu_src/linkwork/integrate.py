@@ -29,7 +29,7 @@ UNDEFINED = (ArithmeticError, ValueError)
 
 
 class Result(NamedTuple):
-    """Result of an integration: final state, step size with which to continue, number of steps tried, of evaluations of f."""
+    """Result of an integration: final state, step size to continue with, numbers of tried steps and of evaluations of f."""
 
     x: Vector
     step: float
@@ -134,9 +134,9 @@ def integrate(
     accept: Callable[[Vector], None] | None = None,
     max_steps: int = 20_000,
 ) -> Result:
-    """Integrate x' = f(x) over ``duration``; the last step ends exactly at its end.
+    """Integrate x' = f(x) over an interval of length ``duration``; the last step ends exactly at the end of the interval.
 
-    The right-hand side is not evaluated at the final state: ``accept`` must check whether it is defined there.
+    The right-hand side is not evaluated at the final state: ``accept`` must check whether f is defined there.
 
     Parameters
     ----------
@@ -151,7 +151,7 @@ def integrate(
     scale : tuple of float
         Magnitude of each component below which its error counts as absolute.
     step : float
-        First step to try, such as `Result.step` of the previous interval; 0 to have one chosen.
+        First step size to try, such as `Result.step` of the previous interval; if 0, the integrator chooses.
     accept : callable, optional
         Called with each accepted state, which is finite; may raise to stop the integration.
     max_steps : int
@@ -195,7 +195,7 @@ def integrate(
             if accept is not None:
                 accept(x_new)
             factor = GREATEST_FACTOR if error == 0.0 else min(GREATEST_FACTOR, SAFETY * error ** (-1.0 / tableau.ORDER))
-            # a step cut short by the end of the interval does not shorten the one carried over
+            # a step cut short by the end of the interval does not shorten the first step of the next interval
             proposal = max(proposal, factor * h) if h < proposal else max(LEAST_FACTOR, factor) * h
             x = x_new
             if last:
@@ -212,6 +212,6 @@ def integrate(
 
 
 def _first_step(x: Vector, k1: Vector, scale: Vector, duration: float, tolerance: float) -> float:
-    """Return a first step: tolerance^(1/8) times the time in which the state would change by its own magnitude."""
+    """Return a first step size: tolerance^(1/8) times the time in which the state would change by its own magnitude."""
     ratio = max(abs(k) / (s + abs(y)) for k, s, y in zip(k1, scale, x))
     return duration if ratio == 0.0 else min(duration, tolerance ** (1.0 / tableau.ORDER) / ratio)

@@ -20,7 +20,7 @@ JAMMING = "friction so strong that it may jam the links"
 
 
 class UnjoinedMessages(NamedTuple):
-    """Messages for configurations in which the links cannot be joined, or hardly; the same in Python and in C.
+    """Messages for configurations at or near which the links cannot be joined; the same in Python and in C.
 
     Attributes
     ----------
@@ -29,9 +29,9 @@ class UnjoinedMessages(NamedTuple):
     apart : str
         Text after the configuration; it has a field such as ``{:.9g}`` for each number of ``reach``.
     near : str
-        Text after the configuration if it is near the limit of assembly; its field is the angle from that limit (deg).
+        Text after a configuration near the limit of assembly; its field is the angle from that limit (deg).
     reach : callable or None
-        ``reach(x, p)`` returns the numbers in ``apart``, by arithmetic like the equations'; None if there are none.
+        ``reach(x, p)`` returns the numbers in ``apart``, by arithmetic without branches; None if there are none.
     """
 
     fact: str
@@ -40,7 +40,10 @@ class UnjoinedMessages(NamedTuple):
     reach: Callable[..., tuple[float, ...]] | None = None
 
     def error(self, sine: float, x: Sequence[float], p: Any, where: str) -> AssemblyError:
-        """Return the error for state x, described by ``where``; ``sine`` is that of the angle from the limit, or negative."""
+        """Return the error for state x; ``where`` describes x in words.
+
+        ``sine`` is the sine of the angle from the limit of assembly; if the links cannot be joined, it is not positive.
+        """
         if sine > 0.0:
             return AssemblyError(f"{ASSEMBLY} at {where}: {self.near.format(degrees(asin(min(1.0, sine))))}")
         return AssemblyError(f"{self.fact} at {where}: {self.apart.format(*(self.reach(x, p) if self.reach else ()))}")

@@ -1,4 +1,4 @@
-"""The class `Mechanism` and the records that it consists of; the folder of each mechanism exports one object of it."""
+"""The class `Mechanism` and the records that it contains; the package of each mechanism exports one `Mechanism`."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ State = tuple[float, ...]
 
 
 class Mode(NamedTuple):
-    """The FMI parameter that chooses how a freedom is driven.
+    """The FMI parameter that chooses how a degree of freedom is driven.
 
     Attributes
     ----------
@@ -28,7 +28,7 @@ class Mode(NamedTuple):
     values : tuple of str
         Meaning of its values 0, 1, ... in words.
     arguments : tuple of str
-        For each value the argument of a run that chooses it: the argument of a channel, or the name of a flag.
+        For each value, the argument with which a run selects the value: the argument of a channel, or the name of a flag.
     default : int
         Value if none of these arguments is given.
     """
@@ -49,11 +49,11 @@ class Freedom(NamedTuple):
     initial : (str, str)
         Fields of the initial state with the coordinate and its rate.
     mode : Mode or None
-        Choice of how it is driven; None if there is no choice.
+        Choice of the drive; None if there is no choice.
     period : float
         Increase of the coordinate after which the mechanism is in the same configuration; 0 if there is none.
     swings : bool
-        Whether it turns but is no crank, because nothing drives it: a pendulum.
+        Whether the degree of freedom is a rotation that nothing drives, as of a pendulum, and therefore no crank.
     """
 
     coordinate: str
@@ -65,21 +65,22 @@ class Freedom(NamedTuple):
 
 
 class Channel(NamedTuple):
-    """An input.
+    """A channel: an input of a mechanism.
 
     Attributes
     ----------
     name : str
         Name of the FMI input.
     argument : str
-        Its name among the inputs of a run in Python and in case files; for a ``rate`` its name in messages.
+        Name among the inputs of a run in Python and in case files; for a ``rate`` the name in messages.
     kind : str
-        ``force``; ``command``, the commanded rate of a freedom, whose jumps are impulses; or ``rate``, the rate of change of
-        the command of the same freedom over a step.
+        ``force``; ``command``, the commanded rate of a coordinate, whose jumps are impulses; or ``rate``, the time derivative
+        of the command for the same coordinate during a step.
     freedom : int
-        Index of the freedom that it drives; -1 if it drives none directly.
+        Index of the degree of freedom that the input drives; -1 if the input drives none directly.
     displacement : str
-        For a force that drives no freedom directly: the output that is the displacement of its point along the force.
+        For a force that drives no degree of freedom directly: the output with the displacement of the force's point of
+        application, in the direction of the force.
     """
 
     name: str
@@ -106,12 +107,12 @@ class Equations(NamedTuple):
     outputs : callable
         ``outputs(x, i, start_energy, p)``: all real outputs, in the order of the interface.
     clearance : callable
-        ``clearance(x, i, p)``: the distance of the links from the limit of assembly, a sine like `limits.LIMIT_SINE`; with
-        friction switched on, the margin to jamming if that is smaller.
+        ``clearance(x, i, p)``: the distance of the links from the limit of assembly, as the sine of an angle, comparable with
+        `limits.LIMIT_SINE`; with friction switched on, the margin to jamming if this margin is smaller.
     jump : callable
         ``jump(x, i, u, p)``: the state after the commanded rates that are in force have jumped to their values in u.
     start : callable
-        ``start(x, i, p)``: the initial state x, with the components computed that other components determine.
+        ``start(x, i, p)``: the initial state x, with its dependent components computed from the others.
     energy : callable
         ``energy(x, p)``: mechanical energy (J).
     """
@@ -126,16 +127,16 @@ class Equations(NamedTuple):
 
 
 class Joint(NamedTuple):
-    """A point of the picture of a mechanism.
+    """A point in the drawing of a mechanism.
 
     Attributes
     ----------
     name : str
-        Its letter.
+        Letter of the point.
     text : str
         Description.
     moves : tuple of str
-        FMI parameters, one or two, that follow when the point is dragged; empty if it cannot be dragged.
+        FMI parameters, one or two, that change when the point is dragged; empty if the point cannot be dragged.
     """
 
     name: str
@@ -150,9 +151,9 @@ class Part(NamedTuple):
     ----------
     kind : str
         ``pivot`` (a bearing of the ground at a point), ``link`` (through two points or more), ``guide`` (a line through two
-        points), ``slider`` (a block at the first point, in the direction of the next two), ``spring``, ``damper`` (from a
-        slider to the ground, with the slider's points), ``axis`` (a centre line through two points) or ``gear`` (the pitch
-        circle about the first point through the second, and its radius to there, which turns).
+        points), ``slider`` (a block at the first point, in the direction of the next two), ``spring``, ``damper`` (both from
+        a slider to the ground, with the slider's points), ``axis`` (a centre line through two points) or ``gear`` (the pitch
+        circle about the first point through the second, and the radius to the second, which rotates).
     joints : tuple of str
     text : str
         Description.
@@ -176,12 +177,12 @@ class Link(NamedTuple):
     Attributes
     ----------
     name : str
-        First part of the names of its parameters.
+        First part of the names of the link's parameters.
     length, mass, inertia : str
         FMI parameters.
     centre : tuple of str
-        FMI parameters of its centre of mass from its first pin: the distance along the link and, if there is one, the
-        coordinate across the link or the angle from it.
+        FMI parameters of the centre of mass relative to the first pin: the distance along the link and, for some links, the
+        coordinate across the link or the angle from the link.
     about_pin : bool
         Whether the moment of inertia is about the first pin, not about the centre of mass.
     """
@@ -218,19 +219,19 @@ class Drawing(NamedTuple):
 
 
 class PublishedSet(NamedTuple):
-    """A mechanism as printed.
+    """A mechanism with published numbers.
 
     Attributes
     ----------
     parameters, initial : of the mechanism
         Parameters and state at the start.
     drive : mapping of str to float
-        Constant inputs with which it runs, by argument, such as ``{"speed": 44.0}``.
+        Constant inputs of the published run, by argument, such as ``{"speed": 44.0}``.
     source : str
-        Where it is printed.
+        Source in which the numbers are printed.
     at_rest : bool
-        Whether it starts at rest except for the rate that ``drive`` commands. A run with another drive then starts at rest,
-        unless a case file says otherwise.
+        Whether the mechanism starts at rest except for the rate that ``drive`` commands. A run with another drive then starts
+        at rest, unless a case file says otherwise.
     origins : mapping of str to str
         Origin of masses in words, by FMI parameter, such as "of a bar of 20 x 5 mm"; masses not listed are as printed.
     """
@@ -264,11 +265,11 @@ class Mechanism:
     notes : tuple of str
         Paragraphs of the FMU's documentation.
     parameters, initial : type
-        Dataclass of its parameters, with a method ``constants`` and an attribute ``RULES``, and that of its initial state.
+        Dataclass of the parameters, with a method ``constants`` and an attribute ``RULES``; dataclass of the initial state.
     published : mapping
-        `PublishedSet` by name, one at least.
+        `PublishedSet` by name, at least one.
     freedoms : tuple of Freedom
-        Degrees of freedom; any number of them may turn.
+        Degrees of freedom; any number of them may be rotations.
     channels : tuple of Channel
         In the order of the FMI inputs.
     variables : tuple of Variable
@@ -286,16 +287,17 @@ class Mechanism:
         ``error_scale(parameters, x)``: magnitudes of the state's components below which the integrator's error is absolute,
         by arithmetic without branches.
     unjoined : UnjoinedMessages or None
-        Messages of that error, which the FMU in C has too; None if the links can always be joined.
+        Messages of this AssemblyError, also used by the FMU in C; None if the links can always be joined.
     switch : str
-        Name of the only constant on which the equations may branch: whether it is zero or positive. They are traced once for
-        each case, so that terms that are switched off cost nothing. Empty if there is none.
+        Name of the only constant on which the equations may branch: they may differ between zero and positive values of this
+        constant. The equations are traced once for each of the two cases, so that terms that are switched off cost nothing.
+        Empty if the equations do not branch.
     links : tuple of Link
         Links whose masses can follow from a cross-section.
     drawing : Drawing or None
-        How it is drawn; None if there is no picture.
+        Drawing of the mechanism; None if there is none.
     cases : mapping
-        Standard cases by name, as tables of a case file, with which its FMUs are checked; may be empty.
+        Standard cases by name, as tables of a case file; the mechanism's FMUs are checked with these cases. May be empty.
     """
 
     name: str
@@ -322,7 +324,7 @@ class Mechanism:
     cases: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
 
     def __reduce__(self) -> Any:
-        # pickled by the name of its package: a copy would be another mechanism
+        # a mechanism is pickled by the name of its package, because a copy would count as another mechanism
         package = str(self.modules[-1].__package__)
         if getattr(import_module(package), "MECHANISM", None) is not self:
             raise LinkworkError(f"this {self.name} is not the MECHANISM of {package}: another process cannot import it")
@@ -357,7 +359,7 @@ class Mechanism:
         return self.switch_index >= 0 and p[self.switch_index] != 0.0
 
     def describe_limit(self, x: Sequence[float], i: Any, p: Any) -> str:
-        """Describe in words which limit a motion with a small clearance reaches: that of assembly, or jamming by friction."""
+        """Return in words the limit that a motion with a small clearance is near: limit of assembly, or jamming by friction."""
         if (
             self.is_switched_on(p)
             and abs(self.equations.clearance(x, i, p._replace(**{self.switch: 0.0}))) >= NEAR_LIMIT
@@ -366,7 +368,7 @@ class Mechanism:
         return ASSEMBLY
 
     def idle_inputs(self, p: Any) -> Any:
-        """Return the applied inputs i of the equations with all inputs zero and all modes at their defaults."""
+        """Return the record i of applied inputs for all inputs zero and all modes at their defaults."""
         modes = tuple(float(mode.default) for mode in self.modes)
         return self.equations.apply_inputs(modes, (0.0,) * len(self.channels), p)
 
@@ -376,7 +378,7 @@ class Mechanism:
         Raises
         ------
         AssemblyError
-            If they cannot be joined; `JammingError` if friction may jam them.
+            If the links cannot be joined; `JammingError` if friction may jam the links.
         """
         self.check_assembly(parameters, x)
         if self.is_switched_on(p) and not self.equations.clearance(x, i, p) >= LIMIT_SINE:
@@ -384,16 +386,16 @@ class Mechanism:
 
     @cached_property
     def cyclic_freedoms(self) -> tuple[int, ...]:
-        """Return the indices of the freedoms that turn as a crank does."""
+        """Return the indices of the degrees of freedom that are rotations of cranks; pendulums are left out."""
         return tuple(n for n, freedom in enumerate(self.freedoms) if freedom.period > 0.0 and not freedom.swings)
 
     @cached_property
     def torques(self) -> tuple[int, ...]:
-        """Return the indices of the channels that are torques on freedoms that turn."""
+        """Return the indices of the channels that are torques on cranks; see `cyclic_freedoms`."""
         return tuple(n for n, c in enumerate(self.channels) if c.kind == "force" and c.freedom in self.cyclic_freedoms)
 
     def channel_index(self, freedom: int, kind: str) -> int | None:
-        """Return the index of the channel of a kind that drives a freedom directly; None if there is none."""
+        """Return the index of the channel of a kind that drives a degree of freedom directly; None if there is none."""
         found = (n for n, c in enumerate(self.channels) if c.kind == kind and c.freedom == freedom)
         return next(found, None)
 
@@ -403,7 +405,7 @@ class Mechanism:
 
     @cached_property
     def joints(self) -> dict[str, tuple[str, ...]]:
-        """Return, by joint, the names of the outputs that are the components of the force in it."""
+        """Return, by joint, the names of the outputs that are the components of the joint force."""
         found: dict[str, tuple[str, ...]] = {}
         for v in self.variables:
             if v.role == "joint force":
@@ -418,7 +420,7 @@ class Mechanism:
 
     @cached_property
     def modes(self) -> tuple[Mode, ...]:
-        """Return the modes of all freedoms that have one."""
+        """Return the modes of all degrees of freedom that have a choice of the drive."""
         return tuple(freedom.mode for freedom in self.freedoms if freedom.mode is not None)
 
     @cached_property
@@ -448,7 +450,7 @@ class Mechanism:
         return {v.name.removeprefix(prefix): v for v in self.variables if v.name.startswith(prefix)}
 
     def commands(self, modes: Mapping[str, int]) -> tuple[int, ...]:
-        """Return the indices of the channels that command a rate in these ``modes``, values by name of the mode."""
+        """Return the indices of the channels that command a rate; ``modes`` has the value of each mode by name."""
         return tuple(
             number
             for number, channel in enumerate(self.channels)
@@ -460,7 +462,7 @@ class Mechanism:
         return mode is None or mode.arguments[modes[mode.name]] == channel.argument
 
     def describe_state(self, x: Sequence[float]) -> str:
-        """Describe a state in words, by the coordinates of the freedoms."""
+        """Describe a state in words, by the coordinates of the degrees of freedom."""
         units = {v.name: v.unit for v in self.variables}
         words = []
         for freedom, value in zip(self.freedoms, x):
@@ -470,7 +472,7 @@ class Mechanism:
         return " and ".join(words)
 
     def state(self, initial: Any) -> State:
-        """Return the state that ``initial`` describes, with both works zero."""
+        """Return the state that ``initial`` describes, with dissipated and supplied work zero."""
         coordinates = [float(getattr(initial, freedom.initial[0])) for freedom in self.freedoms]
         rates = [float(getattr(initial, freedom.initial[1])) for freedom in self.freedoms]
         return (*coordinates, *rates, 0.0, 0.0)
@@ -482,10 +484,10 @@ def _load(package: str) -> Mechanism:
 
 
 def crank_scale(length: float, mass: float, inertia: float, crank_speed: float) -> tuple[float, ...]:
-    """Return `Mechanism.error_scale` for a mechanism with a crank and a second freedom along a line.
+    """Return `Mechanism.error_scale` for a mechanism with a crank and a translation as its second freedom.
 
-    ``length`` (m) and ``inertia`` (kg.m2) are those of the crank, ``mass`` (kg) is that of the other links, and
-    ``crank_speed`` (rad/s) that at the start.
+    ``length`` (m) and ``inertia`` (kg.m2) belong to the crank, ``mass`` (kg) is the mass of the other links, and
+    ``crank_speed`` (rad/s) the crank speed at the start.
     """
     speed = max(1.0, abs(crank_speed))
     energy = 0.5 * (inertia + mass * length * length) * speed * speed

@@ -29,7 +29,7 @@ def field_name(name: str) -> str:
 
 
 class LowerBound(NamedTuple):
-    """A lower bound of one parameter that depends on others.
+    """A lower bound of one parameter; the bound depends on other parameters.
 
     Attributes
     ----------
@@ -52,7 +52,7 @@ class Rules(NamedTuple):
     Attributes
     ----------
     positive, free_sign : tuple of str
-        Fields that must be greater than zero, and those that may have either sign; the others may be zero or greater.
+        Fields that must be greater than zero, and fields that may have either sign; all other fields must be zero or greater.
     signs : mapping
         Fields that are +1 or -1, each with the meaning of the sign: the words after "it must be +1 or -1" in the error message.
     least : tuple of LowerBound
@@ -86,7 +86,7 @@ def check_parameters(parameters: Any) -> None:
                 number = int(number)
         except (OverflowError, ValueError):
             raise ParameterError(name, value, "be a finite number") from None
-        # plain Python numbers, whatever kind was given: the equations and JSON know no other
+        # plain Python numbers, whatever type was given: the equations and JSON accept no other type
         object.__setattr__(parameters, field.name, number)
         value = number
         if field.name in rules.signs:
@@ -122,7 +122,7 @@ def check_initial(initial: Any) -> None:
     Raises
     ------
     ParameterError
-        For the first that is not a finite number.
+        For the first field that is not a finite number.
     """
     for field in fields(initial):
         value = getattr(initial, field.name)

@@ -1,15 +1,17 @@
 """Kinematics and forces of planar linkages built of dyads: the functions that the equations of described linkages call.
 
-Every vector and every direction has columns: for each freedom its velocity coefficient, the derivative with respect to that
-coordinate; and last its bias acceleration, the acceleration if no coordinate accelerates. With coordinates q and rates v its
-velocity is the sum of column times v, and its acceleration the sum of column times q'' plus the bias.
+Every `Vector` and every `Turn` has one column for each degree of freedom. This column is the velocity coefficient: the
+derivative with respect to the coordinate of the degree of freedom. One more column, the last, is the bias acceleration: the
+acceleration if no coordinate accelerates. With coordinates q and rates v, the velocity is the sum of column times v; the
+acceleration is the sum of column times q'' plus the bias.
 
-A dyad is a pair of bodies, joined to each other and each to a body whose motion is known; its two unknowns follow in closed
-form (the groups of the second class of Assur and Artobolevskii). R is a pin, P a slide; the middle letter is the joint
-between the two bodies. The functions are arithmetic without branches.
+A dyad is a pair of bodies that are joined to each other; each of them is also joined to a body whose motion is known. The two
+unknowns of a dyad follow in closed form (dyads are the groups of the second class of Assur and Artobolevskii). The name of a
+dyad has a letter for each joint, R for a pin and P for a slide; the middle letter is the joint between the two bodies. The
+functions are arithmetic without branches.
 
-Throughout n is the number of freedoms, v are their rates, u x w is the scalar u_x w_y - u_y w_x, and J turns a vector by +90
-degrees.
+In all functions n is the number of degrees of freedom, v are the rates of their coordinates, u x w is the scalar
+u_x w_y - u_y w_x, and J rotates a vector by +90 degrees.
 """
 
 from __future__ import annotations
@@ -23,7 +25,7 @@ from .limits import LIMIT_SINE, UnjoinedMessages
 
 
 class Vector(NamedTuple):
-    """A position, or an arm from one point to another: components, their rates, and the columns (x, y), the bias last."""
+    """A position, or an arm from one point to another: components (m), rates (m/s) and columns (x, y); the last is the bias."""
 
     x: float
     y: float
@@ -33,7 +35,7 @@ class Vector(NamedTuple):
 
 
 class Turn(NamedTuple):
-    """A direction: cosine and sine of its angle, its angular velocity, and the columns of the angle, the bias last."""
+    """A direction: cosine and sine of its angle, angular velocity, and the columns of the angle; the last is the bias."""
 
     c: float
     s: float
@@ -98,7 +100,7 @@ def linear_arm(distance: float, share: tuple[float, ...], v: Rates) -> Vector:
 
 
 def _dot(columns: tuple[float, ...], v: Rates) -> float:
-    """Return the sum over the freedoms of column times rate; a bias at the end of ``columns`` is left out."""
+    """Return the sum over the degrees of freedom of column times rate; a bias at the end of ``columns`` is left out."""
     return sum(g * w for g, w in zip(columns, v))
 
 
@@ -122,7 +124,10 @@ def arm(t: Turn, x: float, y: float) -> Vector:
 
 
 def rotate_arm(t: Turn, a: Vector) -> Vector:
-    """Return an arm ``a`` that moves in a body of direction ``t``, in outer axes, with centripetal and Coriolis bias."""
+    """Return, in outer axes, an arm that moves in a body of direction ``t``; ``a`` is the arm in the body's axes.
+
+    The bias of the result includes the centripetal and the Coriolis acceleration.
+    """
     rx, ry = t.c * a.x - t.s * a.y, t.s * a.x + t.c * a.y
     ux, uy = t.c * a.vx - t.s * a.vy, t.s * a.vx + t.c * a.vy
     *share, bias = (
@@ -157,9 +162,9 @@ def composed_frame(f: Frame, inner: Frame) -> Frame:
 def gear_direction(carrier: Turn, line: Turn, start: Vector, block: Vector, offset: float, radius: float) -> Turn:
     """Return the direction of a gear that is pinned to a body of direction ``carrier`` and driven by a rack.
 
-    The angle of the gear relative to the carrier is (d - ``offset``)/``radius``, where d is the distance along ``line``, the
-    direction of the slide between rack and carrier, from ``start`` on the holder of that slide to the origin ``block`` of
-    its block.
+    A slide of direction ``line`` joins rack and carrier; ``block`` is the origin of the block of this slide. The distance d of
+    this origin along the line is measured from ``start``, a point of the body that has the line. The angle of the gear relative
+    to the carrier is (d - ``offset``)/``radius``.
     """
     arm = subtract_vectors(block, start)
     way = line.c * arm.x + line.s * arm.y
@@ -171,7 +176,7 @@ def gear_direction(carrier: Turn, line: Turn, start: Vector, block: Vector, offs
 
 
 def pose_at_pin(pin: Vector, t: Turn, own: Vector) -> Frame:
-    """Return the pose of a body of direction ``t`` that has its point ``own``, given in the body's axes, at ``pin``."""
+    """Return the pose of a body of direction ``t`` that is pinned at ``pin`` by its point ``own``, given in the body's axes."""
     return Frame(subtract_vectors(pin, rotate_arm(t, own)), t)
 
 
@@ -179,13 +184,13 @@ def pose_at_pin(pin: Vector, t: Turn, own: Vector) -> Frame:
 
 
 def _angle(x: float, y: float, a: Vector) -> tuple[float, float]:
-    """Return cosine and sine of the direction of a body whose arm ``a`` lies on (x, y), a vector of the same length."""
+    """Return cosine and sine of the direction of a body from one arm: ``a`` in the body's axes, (x, y) in outer axes."""
     square = a.x * a.x + a.y * a.y
     return (x * a.x + y * a.y) / square, (y * a.x - x * a.y) / square
 
 
 def _rotation_bias(w: float, c: float, s: float, a: Vector, x: float, y: float) -> tuple[float, float]:
-    """Return the bias of an arm in a body that turns at w, without the term of the body's angular bias.
+    """Return the bias of an arm in a body of angular velocity w, without the term of the body's angular bias.
 
     ``a`` is the arm in the body's axes, (x, y) the same arm in outer axes; c and s are the cosine and sine of the body's
     direction.
@@ -196,7 +201,7 @@ def _rotation_bias(w: float, c: float, s: float, a: Vector, x: float, y: float) 
 
 
 def _shares(c: float, s: float, a: Vector) -> tuple[tuple[float, float], ...]:
-    """Return the columns of an arm, without the bias, turned from its body's axes to outer axes."""
+    """Return the columns of the arm ``a`` in outer axes, without the bias; the body's direction has cosine c and sine s."""
     return tuple((c * g[0] - s * g[1], s * g[0] + c * g[1]) for g in a.columns[:-1])
 
 
@@ -229,9 +234,9 @@ def pin_pin_pin(p: Vector, q: Vector, a: Vector, b: Vector, branch: float, v: Ra
 
 
 def _block_arm(o: Vector, t: Turn, b: Vector) -> tuple[float, float, list[tuple[float, float]], tuple[float, float]]:
-    """Return the arm b of a block on a line of direction t, for a block at the line's origin o.
+    """Return the arm ``b`` of a block in outer axes; the block's origin is at ``o``, the origin of its line of direction t.
 
-    The result is x and y of the arm in outer axes, the columns of the arm's end, and the bias of the arm's end.
+    The result is x and y of the arm, the columns of the arm's end without the bias, and the bias of the arm's end.
     """
     r = rotate_arm(t, b)
     *share, bias = ((g[0] + h[0], g[1] + h[1]) for g, h in zip(o.columns, r.columns))
@@ -304,13 +309,16 @@ def slide_pin_slide(
 
 
 def _line_bias(t: Turn, z: float, vz: float) -> tuple[float, float]:
-    """Return the bias of an arm along a turning line, of length z with rate vz, without the bias of its length."""
+    """Return the bias of an arm of length z, with rate vz, along a rotating line, without the bias of the length."""
     beta, ww, w2 = z * t.columns[-1], z * t.w * t.w, 2.0 * t.w * vz
     return -t.s * (beta + w2) - t.c * ww, t.c * (beta + w2) - t.s * ww
 
 
 def _sliding_arm(z: float, rate: float, share: list[float], bias: float) -> Vector:
-    """Return an arm of length z along x; ``share`` are the columns of its length, ``bias`` the bias of its length."""
+    """Return an arm of length z along x, from the rate, the derivatives and the bias acceleration of z.
+
+    ``rate`` is dz/dt, ``share`` the derivatives of z with respect to the coordinates, ``bias`` the bias acceleration of z.
+    """
     return Vector(z, 0.0, rate, 0.0, (*((g, 0.0) for g in share), (bias, 0.0)))
 
 
@@ -319,7 +327,7 @@ def pin_slide_pin(p: Vector, q: Vector, a: Vector, b: Vector, branch: float, v: 
 
     ``a`` is the pin p from the line's origin, in the axes of the line; ``b`` is the pin q in the block's axes, which are
     parallel. ``branch`` is the sign of the component of q - p along the line. Returns the direction of the line, the position
-    of the block as an arm along it, and the sine of the angle between the line and the normal of q - p.
+    of the block as an arm along the line, and the sine of the angle between the line and the normal of q - p.
     """
     dx, dy = q.x - p.x, q.y - p.y
     lever = subtract_vectors(b, a)
@@ -351,9 +359,9 @@ def pin_slide_slide(
     """Solve the dyad RPP: body 2 slides on the line through o along t; body 1 is pinned at p, and a slide joins it to body 2.
 
     ``r`` is the direction of this slide. ``a`` is the pin p from the slide's end on body 1, in the axes of r; ``b`` is the
-    slide's end on body 2 from the origin of body 2, in the axes of t. Returns as arms the position of body 2 along its line,
-    and that of body 1 along the slide from the end on body 2; and the magnitude of the sine of the angle between line and
-    slide.
+    slide's end on body 2 from the origin of body 2, in the axes of t. Returns the position of body 2 as an arm along the line;
+    the position of body 1 as an arm along the slide, from the slide's end on body 2; and the magnitude of the sine of the angle
+    between line and slide.
     """
     x1, y1, share1, bias1 = _block_arm(o, t, b)
     pin = rotate_arm(r, a)
@@ -378,11 +386,11 @@ def pin_slide_slide(
     )
 
 
-# Dynamics in the freedoms
+# Equations of motion
 
 
 def mass_matrix(masses: tuple[Mass, ...], n: int) -> Matrix:
-    """Compute the mass matrix of the freedoms."""
+    """Compute the mass matrix of the equations of motion in the n degrees of freedom."""
     return tuple(
         tuple(
             sum(
@@ -396,14 +404,14 @@ def mass_matrix(masses: tuple[Mass, ...], n: int) -> Matrix:
 
 
 def generalised_forces(masses: tuple[Mass, ...], wrenches: tuple[Wrench, ...], n: int) -> tuple[float, ...]:
-    """Compute the generalised forces of the ``wrenches`` on the bodies, minus those of their bias accelerations."""
+    """Compute the generalised forces of the ``wrenches`` on the bodies, and of the inertia forces of the bias accelerations."""
     total = [0.0] * n
     for m, f in zip(masses, wrenches):
         origin, h = m.frame.origin, m.frame.turn.columns
         bx, by = m.mass * m.centre.columns[n][0], m.mass * m.centre.columns[n][1]
         x, y = f.x - bx, f.y - by
         moment = f.moment - m.inertia * h[n] - m.centre.x * by + m.centre.y * bx
-        # about the body's own origin
+        # moment about the body's own origin
         moment = moment - origin.x * y + origin.y * x
         for i in range(n):
             total[i] = total[i] + x * origin.columns[i][0] + y * origin.columns[i][1] + moment * h[i]
@@ -411,9 +419,10 @@ def generalised_forces(masses: tuple[Mass, ...], wrenches: tuple[Wrench, ...], n
 
 
 def accelerations(matrix: Matrix, forces: Rates, held: Rates, given: Rates) -> tuple[float, ...]:
-    """Solve the equations of motion for the accelerations of the freedoms.
+    """Solve the equations of motion for the accelerations of the degrees of freedom.
 
-    ``held`` is 1 for a freedom with a prescribed acceleration, which ``given`` contains, and 0 for a free one.
+    ``held`` has 1 for each degree of freedom whose acceleration is prescribed, 0 for all others; ``given`` has the prescribed
+    accelerations.
     """
     n = range(len(forces))
     free = [1.0 - h for h in held]
@@ -430,7 +439,7 @@ def multiply(matrix: Matrix, values: Rates) -> tuple[float, ...]:
 
 
 class Rubbing(NamedTuple):
-    """Friction in one joint if the joint force is 1 N: wrenches on all bodies, and power lost (W)."""
+    """Friction in one joint for a joint force of 1 N: wrenches on all bodies, and power lost (W)."""
 
     wrenches: tuple[Wrench, ...]
     lost: float
@@ -537,7 +546,7 @@ def pin_of_blocks(c: Vector, t: Turn, r: Turn, on1: Wrench, on2: Wrench) -> Wren
 def slide_between_pins(p: Vector, q: Vector, t: Turn, on1: Wrench, on2: Wrench) -> Wrench:
     """Return the force of body 2 on body 1 of a dyad RPR in the slide along t; body 1 is pinned at p, body 2 at q."""
     m1, m2 = wrench_moment(on1, p), wrench_moment(on2, q)
-    # across the slide: its moments about p and q differ by (q - p) . t times it
+    # the force normal to the slide: its moments about p and q differ by (q - p) . t times the force
     across = (m1 + m2) / ((q.x - p.x) * t.c + (q.y - p.y) * t.s)
     x, y = -across * t.s, across * t.c
     return Wrench(x, y, m1 + p.x * y - p.y * x)
@@ -643,12 +652,14 @@ UNJOINED = UnjoinedMessages(
 
 
 def check_clearance(places: Callable[..., Any], x: Sequence[float], p: Any, where: str) -> None:
-    """Check that the bodies can be joined in state x; ``places`` computes their poses, ``where`` describes x in words.
+    """Check that the bodies can be joined in state x; ``where`` describes x in words.
+
+    ``places(x, p)`` computes the poses of the bodies, and their ``clearance``.
 
     Raises
     ------
     AssemblyError
-        If they cannot be joined, or are nearer to the limit than `limits.LIMIT_SINE`.
+        If the bodies cannot be joined, or the clearance is less than `limits.LIMIT_SINE`.
     """
     try:
         clearance = places(tuple(x), p).clearance

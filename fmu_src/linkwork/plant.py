@@ -1,6 +1,6 @@
-"""A mechanism as a stateful object around its equations, as an FMU holds it.
+"""The class `Plant`: a mechanism with its state and its inputs, as an FMU simulates it.
 
-It handles inputs, steps, refused steps, jumps of commanded rates and saved states in the same way for every `Mechanism`.
+`Plant` handles inputs, steps, refused steps, jumps of commanded rates and saved states in the same way for every `Mechanism`.
 """
 
 from __future__ import annotations
@@ -40,22 +40,22 @@ def mode_requirement(mode: Mode) -> str:
 
 
 class Plant:
-    """A mechanism in motion: its state, its inputs, and `step`, which advances it in time.
+    """A mechanism during a simulation: its state, its inputs, and `step`, which advances the state in time.
 
     Parameters
     ----------
     mechanism : Mechanism
     parameters, initial
-        Parameters and initial state, of the mechanism's types. A rate commanded at the start replaces that in ``initial``.
+        Parameters and initial state, of the mechanism's types. A rate commanded at the start replaces the rate in ``initial``.
     tolerance : float
         Bound of the local error of a step.
     time : float
         Time at the start (s).
     inputs : dict, optional
-        Inputs in force at the start, by FMI name; those left out are zero.
+        Inputs in force at the start, by FMI name; inputs left out are zero.
     **modes : int
-        Value of each of the mechanism's modes, ``drive_mode`` for the parameter ``drive.mode``; those left out have their
-        default.
+        Value of each of the mechanism's modes, ``drive_mode`` for the parameter ``drive.mode``; modes left out have
+        their default.
 
     Raises
     ------
@@ -141,7 +141,7 @@ class Plant:
         Raises
         ------
         ParameterError
-            If one of them is not valid; nothing changes then.
+            If a parameter is not valid; nothing is changed then.
         """
         m = self.mechanism
         parameters = m.parameters(**{field_name(name): values[name] for name in m.mechanism_variables})
@@ -155,7 +155,7 @@ class Plant:
         return {channel.name for channel in self.mechanism.channels if channel.kind == "command"}
 
     def _initial_state(self, initial: Any) -> Vector:
-        """Return the state at the start, in which commanded rates replace those of ``initial``."""
+        """Return the state at the start, in which commanded rates replace the rates of ``initial``."""
         x = list(self.mechanism.state(initial))
         for number in self._commands:
             x[self._commanded_rate(number)] = float(self.inputs[self.mechanism.channels[number].name])
@@ -166,11 +166,11 @@ class Plant:
         return len(self.mechanism.freedoms) + self.mechanism.channels[number].freedom
 
     def _applied_inputs(self) -> Any:
-        """Return the inputs in force in the form that the equations take."""
+        """Return the inputs in force as the record i that the equations take."""
         return self.mechanism.equations.apply_inputs(self._modes, tuple(self.inputs.values()), self._p)
 
     def _complete_start(self, x: Vector) -> Vector:
-        """Return a state with the components computed that other components determine."""
+        """Return the state ``x`` with its dependent components computed from the others."""
         complete: Vector = self.mechanism.equations.start(x, self._applied_inputs(), self._p)
         return complete
 
@@ -178,13 +178,13 @@ class Plant:
         self.mechanism.check_state(self.parameters, self._complete_start(x), self._applied_inputs(), self._p)
 
     def _jump_rates(self, x: Vector, applied: Any, commanded: Collection[str]) -> Vector:
-        """Return the state after the rates have jumped to the values that the inputs in ``commanded`` command."""
+        """Return the state after the rates have jumped to the values of the inputs named in ``commanded``."""
         names = self.mechanism.input_names
         if not any(names[number] in commanded for number in self._commands):
             return x
         u = list(self.inputs.values())
         for number in self._commands:
-            # a commanded freedom without a new command keeps its rate
+            # a commanded coordinate without a new command keeps its rate
             if names[number] not in commanded:
                 u[number] = x[self._commanded_rate(number)]
         jumped: Vector = self.mechanism.equations.jump(x, applied, tuple(u), self._p)
@@ -208,7 +208,7 @@ class Plant:
     # Inputs and outputs
 
     def set_input(self, name: str, value: float) -> None:
-        """Set an input by its FMI name until it is set again; `step` and `outputs` check its value, this method does not."""
+        """Set an input by its FMI name, until the next call; `step` and `outputs` check the value, this method does not."""
         if name not in self.inputs:
             raise InputError(f"there is no input {name!r}: the inputs are {', '.join(self.inputs)}")
         self.inputs[name] = value
@@ -243,13 +243,13 @@ class Plant:
 
     @property
     def next_step(self) -> float:
-        """Step that the solver will try first in the next interval (s); 0 before the first one."""
+        """Return the step size (s) that the solver will try first in the next interval; 0 before the first interval."""
         return self._step_size
 
     def step(self, time: float, step: float) -> None:
         """Advance from ``time`` by ``step`` seconds under the inputs in force.
 
-        A step that fails leaves everything as it was.
+        A step that fails leaves the plant unchanged.
 
         Raises
         ------
@@ -268,7 +268,7 @@ class Plant:
             raise StepError(f"a step of {step:.9g} s at t = {time:.9g} s: it must be greater than zero")
         if time + step == time:
             raise StepError(f"a step of {step:.9g} s at t = {time:.9g} s: it is lost in the rounding of the time")
-        # as much as rounding in the master's sum of steps can cause, and no more: a repeated step of a microsecond is refused
+        # allows for rounding in the master's sum of steps; so small that a repeated step of a microsecond is still refused
         slack = min(1e-6 * step, 1e-9) + 8.0 * ulp(max(abs(time), abs(self.time)))
         if abs(time - self.time) > slack:
             way = "backwards" if time < self.time else "over a gap"
@@ -276,7 +276,7 @@ class Plant:
         self._check_inputs()
         i = self._applied_inputs()
         derivative, p = self.mechanism.equations.derivative, self._p
-        # the step starts from every commanded rate, even from one that was not set again, as the contract says
+        # at the start every commanded rate jumps to its input, even if the input was not set again, as the contract says
         x = self._jump_rates(self.state, i, self.inputs)
         last = x
 
@@ -305,7 +305,7 @@ class Plant:
         self._commanded = set()
 
     def _explain(self, error: LinkworkError, time: float, last: Vector) -> LinkworkError:
-        """Return the error of a step with the step's start time and, if it is the cause, the limit of assembly.
+        """Return the error of a step with the step's start time and, if the limit of assembly is the cause, this limit.
 
         ``last`` is the last accepted state of the step.
         """
@@ -339,7 +339,7 @@ class Plant:
 
     @classmethod
     def restore(cls, mechanism: Mechanism, saved: dict[str, Any]) -> Plant:
-        """Restore the plant from the data of `save`.
+        """Return the plant that `save` described by ``saved``.
 
         Raises
         ------

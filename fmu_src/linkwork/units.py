@@ -1,4 +1,4 @@
-"""Factors of the units that the published tables use."""
+"""Conversion factors of the units in the published tables."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Variables of an FMI interface: their record, their units, and constructors of common variables."""
+"""Variables of an FMI interface: the record `Variable`, units, and functions that make common variables."""
 
 from __future__ import annotations
 
@@ -80,17 +80,19 @@ class Variable(NamedTuple):
         A key of `UNITS`; empty for Integer and String.
     description : str
     symbol : str
-        Symbol in the thesis, in LaTeX; empty where it has none.
+        Symbol in the thesis, in LaTeX; empty if there is none.
     start : float, int or str
-        Start value; for an output a placeholder, whose true value is computed from the others where it is needed.
+        Start value. The start value of an output is only a placeholder: where the true value is needed, it is computed from
+        the start values of the parameters and inputs.
     kind : str
         ``Real``, ``Integer`` or ``String``.
     minimum, maximum : float or None
-        Bounds, if they have a meaning.
+        Bounds of the value; None if there is no bound.
     display : str
-        Unit in which people read it; empty if it is ``unit``.
+        Unit in which the value is shown; empty if it is ``unit``.
     depends : str
-        Inputs on which an output depends: ``state`` (none), ``speed`` (the commanded speeds) or ``all``.
+        Inputs on which an output depends directly: ``state`` (on no input, only on the state), ``speed`` (only on the
+        commanded speeds) or ``all``.
     level : str
         Quantities on which the start value of an output depends: ``position``, ``velocity``, ``all`` or ``none``.
     rate_of : str
@@ -127,16 +129,16 @@ class Variable(NamedTuple):
 
     @property
     def wraps(self) -> bool:
-        """Return whether the variable is the angle of a link, which may jump by a turn."""
+        """Return whether the variable is the angle of a link, which may jump by 2 pi."""
         return self.minimum is not None and self.minimum in (-pi, -2.0 * pi) and self.maximum == -self.minimum
 
 
 def parameter(
     start: Any, name: str, unit: str, description: str, symbol: str = "", role: str = "", of: str = ""
 ) -> Variable:
-    """Return the variable of a parameter; its start value is its field in ``start``, its lower bound follows from ``RULES``.
+    """Return the variable of a parameter; ``start`` is an object of the mechanism's parameters with the start values.
 
-    Angles are shown in degrees.
+    The lower bound follows from the ``RULES`` of this object. Angles are shown in degrees.
     """
     field = field_name(name)
     minimum = None if field in start.RULES.free_sign else 0.0
@@ -156,7 +158,7 @@ def parameter(
 
 
 def choice(name: str, description: str, start: int, least: int, greatest: int) -> Variable:
-    """Return a parameter that is a whole number from ``least`` to ``greatest``."""
+    """Return the variable of a parameter that is a whole number from ``least`` to ``greatest``."""
     return Variable(name, "parameter", "", description, "", start, "Integer", least, greatest)
 
 
@@ -206,7 +208,7 @@ POSITION, RATE = ("state", "position"), ("speed", "velocity")
 
 
 def tolerance_parameter() -> Variable:
-    """Return the parameter that bounds the error of a step, which every FMU has."""
+    """Return the variable ``solver.tolerance`` of every FMU, which bounds the local error of a step."""
     return Variable(
         "solver.tolerance",
         "parameter",

@@ -40,7 +40,7 @@ def outlive_exception(slave: Any) -> None:
 
 
 def end_in_order(slave: Any) -> None:
-    """Release the references in reserve when a run is terminated; an instance that is freed without this keeps them."""
+    """Release the references in reserve when a run is terminated; without this call they would never be released."""
     if _in_reserve(slave):
         for kept in (slave, type(slave), slave.log_queue):
             ctypes.pythonapi.Py_DecRef(ctypes.py_object(kept))
@@ -53,15 +53,16 @@ def _in_reserve(slave: Any) -> bool:
 
 def write_state(state: dict[str, Any]) -> bytes:
     """Return a saved state as JSON with a checksum."""
-    # repr of a float, as JSON writes it, comes back as the same float
+    # JSON writes a float as its repr, which is read back as the same float
     text = json.dumps(state).encode("utf-8")
     return text[:-1] + b', "check": "%08x"}' % zlib.crc32(text)
 
 
 def read_state(state: bytes) -> dict[str, Any]:
-    """Return the state that `write_state` wrote; if it is damaged, a dictionary whose ``damaged`` says how.
+    """Return the state that `write_state` wrote; if it is damaged, a dictionary with the reason under ``"damaged"``.
 
-    No exception may leave here, where there is no instance to keep: a damaged state is refused when it is set.
+    This function has no instance to keep usable after an exception, and therefore raises none: a damaged state is refused when
+    it is set.
     """
     text, _, check = state.rpartition(b', "check": "')
     if check != b'%08x"}' % zlib.crc32(text + b"}"):

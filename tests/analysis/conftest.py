@@ -1,4 +1,4 @@
-"""Fixtures of the analysis tests, and what reads the files that commands write."""
+"""Fixtures of the analysis tests, and a reader of the CSV files that commands write."""
 
 from __future__ import annotations
 
@@ -19,13 +19,13 @@ if TYPE_CHECKING:
 
 @pytest.fixture
 def fmu(fmus: dict[str, Path]) -> Path:
-    """FiveBarSlider.fmu."""
+    """Return the path of FiveBarSlider.fmu."""
     return fmus["FiveBarSlider"]
 
 
 @pytest.fixture(scope="module")
 def registered() -> Iterator[None]:
-    """The mechanisms of the tests are known."""
+    """Register the mechanisms of the tests for a module."""
     mechanisms = [module.MECHANISM for module in (pendulum, rotor_on_cart, torsion)]
     for mechanism in mechanisms:
         register(mechanism)
@@ -36,7 +36,7 @@ def registered() -> Iterator[None]:
 
 @pytest.fixture
 def own_linkages() -> Iterator[None]:
-    """The linkages that a test describes are forgotten after it."""
+    """Remove the linkages that a test has described after the test."""
     before = dict(MECHANISMS)
     yield
     MECHANISMS.clear()
@@ -45,7 +45,7 @@ def own_linkages() -> Iterator[None]:
 
 @pytest.fixture
 def phone(browser: Browser) -> Iterator[Any]:
-    """The page on a phone, paused, and a finger or two on it: `touch(kind, points)`."""
+    """Return the studio's page on a phone, paused, and `touch(kind, points)`, which touches it with one or two fingers."""
     context = browser.new_context(
         viewport={"width": 390, "height": 844}, has_touch=True, is_mobile=True, device_scale_factor=2
     )
@@ -60,7 +60,7 @@ def phone(browser: Browser) -> Iterator[Any]:
     def touch(kind: str, *points: tuple[float, float]) -> None:
         fingers = [{"x": x, "y": y, "id": n} for n, (x, y) in enumerate(points)]
         line.send("Input.dispatchTouchEvent", {"type": f"touch{kind}", "touchPoints": fingers})
-        # moves are taken at the next frame
+        # the page processes moves at its next frame
         made.evaluate("new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(() => done(0))))")
 
     yield made, touch
@@ -68,6 +68,6 @@ def phone(browser: Browser) -> Iterator[Any]:
 
 
 def csv(path: Path) -> dict[str, np.ndarray]:
-    """Columns of a CSV file of numbers by their headings."""
+    """Return the columns of a CSV file of numbers, by their headings."""
     head = path.read_text(encoding="utf-8").splitlines()[0].split(",")
     return dict(zip(head, np.loadtxt(path, delimiter=",", skiprows=1).T))

@@ -1,4 +1,4 @@
-"""Branches made of formulas, for tests of what is read from branches and drawn of them: no motion is computed."""
+"""Make branches from formulas, without computing motions, for tests of reading and drawing branches."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 from analysis.periodic import Branch, Crossing, Drive, Family, Response, SpecialPoint
 from linkwork.five_bar.published import TABLE_3_1
 
-#: Over a parameter without a unit.
+#: Family of motions with a parameter p without a unit.
 FAMILY = Family(
     parameters=TABLE_3_1, drive=Drive(speed=30.0), vary=lambda value: (TABLE_3_1, Drive(speed=30.0)), name="p"
 )
@@ -21,7 +21,7 @@ FAMILY = Family(
 def orbit(
     amplitude: float, largest: float, start: float | None = None, *, periods: int = 1, crank_turns: int = 1
 ) -> Any:
-    """What is read of an orbit."""
+    """Return a stand-in for an orbit, with the attributes that branches read."""
     return SimpleNamespace(
         amplitude=amplitude,
         largest=largest,
@@ -41,7 +41,10 @@ def branch(
     turns: int = 1,
     common: int = 1,
 ) -> Branch:
-    """A branch of amplitudes (m); special points by kind, parameter, amplitude and the point that they come after."""
+    """Return a branch of amplitudes (m).
+
+    Each of ``special`` has kind, parameter and amplitude of a special point, and the index of the point before it.
+    """
     x, a = np.asarray(parameter, dtype=float), np.asarray(amplitude, dtype=float)
     rho = np.broadcast_to(np.asarray(largest, dtype=float), x.shape)
     made = Branch(
@@ -65,7 +68,7 @@ def branch(
 
 
 def hysteresis(points: int = 400) -> Branch:
-    """The curve p = 100 + (a - 2)^3 - 3 (a - 2), with its folds at a = 1, p = 102 and a = 3, p = 98; amplitudes in metres."""
+    """Return the curve p = 100 + (a - 2)^3 - 3 (a - 2) over the amplitude a (m); folds at a = 1, p = 102 and a = 3, p = 98."""
     a = np.linspace(-0.3, 4.3, points)
     x = 100.0 + (a - 2.0) ** 3 - 3.0 * (a - 2.0)
     folds = [(Crossing.FOLD, x_, a_, int(np.searchsorted(a, a_)) - 1) for x_, a_ in ((102.0, 1.0), (98.0, 3.0))]
@@ -73,6 +76,6 @@ def hysteresis(points: int = 400) -> Branch:
 
 
 def response(*branches: Branch) -> Response:
-    """The response that has these branches."""
+    """Return a response that consists of these branches."""
     every = np.concatenate([b.parameter for b in branches])
     return Response(branches=branches, low=float(every.min()), high=float(every.max()), problems=())

@@ -1,7 +1,7 @@
-"""A master for FMI 2.0 co-simulation in the standard library alone: ctypes on the shared library of an FMU.
+"""A master for FMI 2.0 co-simulation that uses only the standard library: ctypes on the shared library of an FMU.
 
-It hides nothing: every call returns the FMI status, and what the FMU logs goes through printf as in a master in C. The
-tests use it in processes of their own, among them one of a Python with nothing installed.
+It hides nothing: every call returns the FMI status, and log messages of the FMU go through printf as in a master in C. The
+tests use it in processes of their own, one of them a Python with no package installed.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ OK, WARNING, DISCARD, ERROR, FATAL = range(5)
 
 CO_SIMULATION = 1
 
-#: Of the arguments after the format one is read, which is all that the FMUs give.
+#: The logger reads one argument after the format; the FMUs never pass more.
 _LOGGER = ctypes.CFUNCTYPE(None, c_void_p, c_char_p, c_int, c_char_p, c_char_p, c_void_p)
 _ALLOCATE = ctypes.CFUNCTYPE(c_void_p, c_size_t, c_size_t)
 _FREE = ctypes.CFUNCTYPE(None, c_void_p)
@@ -41,7 +41,7 @@ class _Callbacks(ctypes.Structure):
 
 
 class Variable:
-    """One variable of the model description."""
+    """A variable of the model description."""
 
     def __init__(self, node):
         self.name = node.get("name")
@@ -51,7 +51,7 @@ class Variable:
 
 
 class Fmu:
-    """An FMU unpacked into ``folder`` and its library loaded."""
+    """An FMU that is unpacked into ``folder``, with its library loaded."""
 
     def __init__(self, path, folder):
         self.folder = Path(folder).resolve()
@@ -65,13 +65,13 @@ class Fmu:
         self.library = ctypes.CDLL(str(self.folder / "binaries" / f"{system}64" / f"{self.identifier}.{suffix}"))
 
     def instantiate(self, name="slave", *, guid=None, logging=True, resources=None):
-        """A new instance."""
+        """Return a new instance."""
         resources = resources or (self.folder / "resources").as_uri()
         return Instance(self, name, guid or self.root.get("guid"), logging, resources)
 
 
 class Instance:
-    """One slave. The methods named after FMI functions return their status."""
+    """An instance of an FMU. The methods named after FMI functions return their status."""
 
     def __init__(self, fmu, name, guid, logging, resources):
         self.fmu = fmu
@@ -123,7 +123,7 @@ class Instance:
         return self._call("ExitInitializationMode")
 
     def start(self, values=None, **experiment):
-        """Set values and initialise; returns the instance, fails if a status is not good."""
+        """Set values and initialise; return the instance, raise an error if a status is not OK."""
         statuses = [self.set(name, value) for name, value in (values or {}).items()]
         statuses += [self.setup(**experiment), self.enter(), self.exit()]
         if any(statuses):
@@ -134,7 +134,7 @@ class Instance:
         return self._call("DoStep", c_double(time), c_double(size), c_int(1))
 
     def run(self, sizes, time=0.0):
-        """Take steps of the given sizes from ``time``; returns the end time, fails if one is refused."""
+        """Take steps of the given sizes from ``time``; return the end time, raise an error if a step is refused."""
         for size in sizes:
             if self.step(time, size) != OK:
                 raise RuntimeError(f"step of {size} s refused at t = {time} s: {self.log}")
@@ -163,7 +163,7 @@ class Instance:
         return self._call(f"Set{kind}", (c_uint * 1)(reference), c_size_t(1), (c_type * 1)(value))
 
     def read(self, names, *, kind=None, references=None):
-        """Status and values of variables of one type."""
+        """Return the status and the values of variables of one type."""
         kind = kind or self.fmu.variables[names[0]].kind
         if references is None:
             references = [self.fmu.variables[name].reference for name in names]
@@ -178,14 +178,14 @@ class Instance:
         return values[0]
 
     def outputs(self):
-        """All real outputs by name."""
+        """Return all real outputs by name."""
         status, values = self.read(self.fmu.outputs)
         if status != OK:
             raise RuntimeError(f"outputs cannot be read: {status}, {self.log}")
         return dict(zip(self.fmu.outputs, values))
 
     def trouble(self):
-        """solver.status and solver.message."""
+        """Return solver.status and solver.message."""
         return [self.get("solver.status"), self.get("solver.message")]
 
     # States

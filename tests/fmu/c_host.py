@@ -1,4 +1,4 @@
-"""The master in C, host.c, compiled and run: on this machine, or for another one under an emulator."""
+"""Compile and run the master in C, host.c: on this machine, or under an emulator for another one."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ SOURCE = Path(__file__).with_name("host.c")
 
 
 def compile_host(folder: Path, platform: str | None = None) -> Path:
-    """Compile the host into a folder, for a platform of `PLATFORMS`."""
+    """Compile the host into a folder, for a platform of `PLATFORMS`; return its path."""
     platform = platform or this_platform()
     name = "host.exe" if "windows" in platform else "host"
     headers = str(resources.files("fmpy") / "c-code")
@@ -37,8 +37,10 @@ def compile_host(folder: Path, platform: str | None = None) -> Path:
 
 
 def python_path() -> dict[str, str]:
-    """The environment in which a master in C finds this Python's library for the Python FMU; a test that needs it is skipped
-    where there is none."""
+    """Return the environment in which a master in C finds this Python's library for the Python FMU.
+
+    The test is skipped if there is no such library.
+    """
     name = sysconfig.get_config_var("INSTSONAME") or ""
     try:
         ctypes.CDLL(name or "libpython3.so")
@@ -48,7 +50,7 @@ def python_path() -> dict[str, str]:
 
 
 def emulator(platform: str) -> list[str]:
-    """The command that runs programs of a platform, or skip."""
+    """Return the command that runs programs of a platform, empty on this one; skip the test if there is no emulator."""
     if platform == this_platform():
         return []
     wine = next((p for p in (shutil.which("wine64"), "/usr/lib/wine/wine64") if p and Path(p).is_file()), None)
@@ -61,7 +63,7 @@ def emulator(platform: str) -> list[str]:
 
 
 def wine_settings(folder: Path) -> dict[str, str]:
-    """The environment of a Wine of its own, in a folder."""
+    """Return the environment for a Wine installation of its own in a folder."""
     return {"WINEPREFIX": str(folder / "wine"), "WINEDEBUG": "-all", "WINEDLLOVERRIDES": "mscoree,mshtml="}
 
 
@@ -76,12 +78,12 @@ class Unpacked(NamedTuple):
     states: int
 
     def reals(self, causality: str) -> list[Scalar]:
-        """The real inputs or outputs."""
+        """Return the real variables with a causality, such as "input"."""
         return [s for s in self.scalars.values() if s.kind == "Real" and s.attributes.get("causality") == causality]
 
 
 def unpack(fmu: Path, folder: Path, platform: str | None = None) -> Unpacked:
-    """Unpack an FMU into a folder."""
+    """Unpack an FMU into a folder, and read what a master needs."""
     with zipfile.ZipFile(fmu) as archive:
         archive.extractall(folder)
     root = ElementTree.parse(folder / "modelDescription.xml").getroot()
@@ -113,7 +115,7 @@ def run_host(
     emulator: Sequence[str] = (),
     environment: Mapping[str, str] | None = None,
 ) -> dict[str, Any]:
-    """Run an FMU in the host, and return what it prints, with the outputs by name; see host.c.
+    """Run an FMU in the host, and return the numbers that it prints, with the outputs by name; see host.c.
 
     Parameters
     ----------
@@ -124,7 +126,7 @@ def run_host(
     change : (name, value, number of a step), optional
         An input that is changed before that step.
     resources : str, optional
-        Address of the resources; by default that of the folder in the FMU.
+        URI of the resources; by default that of the folder in the FMU.
     emulator : sequence of str
         Command that runs the host.
     """

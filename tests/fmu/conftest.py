@@ -1,4 +1,4 @@
-"""The FMU under test, each of them in turn, and variants of it built from changed copies of the sources."""
+"""Fixtures for each FMU under test in turn, and for variants of it built from changed copies of the sources."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from .models import MODELS, Changes, Model
 
 
 def changed_sources(folder: Path, changes: Changes) -> Path:
-    """A copy of the source root in ``folder`` with the changes made, each of them found at least once."""
+    """Copy the source root into ``folder`` and make the changes; each text to replace must occur."""
     sources = folder / "fmu_src"
     shutil.copytree(SOURCES, sources, ignore=shutil.ignore_patterns("__pycache__"))
     for name, (old, new) in changes.items():
@@ -30,37 +30,37 @@ def changed_sources(folder: Path, changes: Changes) -> Path:
 
 @pytest.fixture(params=list(MODELS))
 def model(request: pytest.FixtureRequest) -> Model:
-    """The model under test: each of them in turn."""
+    """Return the model under test; the test runs once for each model."""
     return MODELS[request.param]
 
 
 @pytest.fixture
 def fmu(fmus: dict[str, Path], model: Model) -> Path:
-    """The FMU of the model under test."""
+    """Return the FMU of the model under test."""
     return fmus[model.name]
 
 
 @pytest.fixture(scope="session")
 def five_bar(fmus: dict[str, Path]) -> Path:
-    """FiveBarSlider.fmu, where a test is of its mechanics."""
+    """Return FiveBarSlider.fmu, for tests of its mechanics."""
     return fmus["FiveBarSlider"]
 
 
 @pytest.fixture(scope="session")
 def slider_crank(fmus: dict[str, Path]) -> Path:
-    """SliderCrank.fmu, where a test is of its mechanics."""
+    """Return SliderCrank.fmu, for tests of its mechanics."""
     return fmus["SliderCrank"]
 
 
 @pytest.fixture
 def description(fmu: Path) -> ElementTree.Element:
-    """Root of the model description of the FMU under test."""
+    """Return the root of the model description of the FMU under test."""
     return model_description(fmu)
 
 
 @pytest.fixture
 def build_variant(tmp_path: Path, model: Model) -> Callable[[Changes], Path]:
-    """Builds the FMU under test from changed sources, each time in a folder of its own."""
+    """Return a function that builds the FMU under test from changed sources, each time in a folder of its own."""
     count = 0
 
     def variant(changes: Changes) -> Path:
@@ -73,6 +73,6 @@ def build_variant(tmp_path: Path, model: Model) -> Callable[[Changes], Path]:
 
 
 def model_description(fmu: Path) -> ElementTree.Element:
-    """Root of the model description of an FMU."""
+    """Return the root of the model description of an FMU."""
     with ZipFile(fmu) as archive:
         return ElementTree.fromstring(archive.read("modelDescription.xml"))

@@ -1,4 +1,4 @@
-"""Model descriptions of either version of FMI as the tests read them."""
+"""Read model descriptions of FMI 2.0 and 3.0 in one form."""
 
 from __future__ import annotations
 
@@ -6,13 +6,13 @@ from typing import NamedTuple
 from xml.etree import ElementTree
 from xml.etree.ElementTree import Element
 
-#: Types and parts of the model structure of FMI 2.0 as FMI 3.0 calls them, and the other way about.
+#: Names in FMI 2.0 of types and of parts of the model structure, by their names in FMI 3.0.
 _TYPES = {"Float64": "Real", "Int32": "Integer"}
 _PARTS = {"Output": "Outputs", "ContinuousStateDerivative": "Derivatives", "InitialUnknown": "InitialUnknowns"}
 
 
 class Scalar(NamedTuple):
-    """A variable; ``kind`` is its type as FMI 2.0 calls it, ``attributes`` are all of it and its type."""
+    """A variable; ``kind`` is its type as named in FMI 2.0, ``attributes`` are those of the variable and of its type."""
 
     name: str
     reference: int
@@ -21,12 +21,12 @@ class Scalar(NamedTuple):
 
 
 def root_of(xml: bytes | Element) -> Element:
-    """The root of an XML document."""
+    """Return the root of an XML document."""
     return xml if isinstance(xml, Element) else ElementTree.fromstring(xml)
 
 
 def read_scalars(xml: bytes | Element) -> list[Scalar]:
-    """The variables, in their order."""
+    """Return the variables, in the order of the model description."""
     found = []
     for node in root_of(xml).find("ModelVariables"):
         if node.tag == "ScalarVariable":
@@ -42,9 +42,9 @@ def read_scalars(xml: bytes | Element) -> list[Scalar]:
 
 
 def read_unknowns(xml: bytes | Element, part: str) -> dict[str, set[str] | None]:
-    """Names of what each unknown of a part of the model structure depends on; None where it may be all.
+    """Return the names of the variables on which each unknown of a part of the model structure depends; None if on all.
 
-    ``part`` is the name of its elements in FMI 3.0.
+    ``part`` is the name of the part's elements in FMI 3.0.
     """
     root = root_of(xml)
     scalars = read_scalars(root)

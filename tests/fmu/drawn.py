@@ -1,4 +1,4 @@
-"""Random mechanisms of every kind, with a state, modes and inputs: what the tests of agreement and of derivatives run over."""
+"""Draw random mechanisms of every kind, with a state, modes and inputs, for the tests of agreement and of derivatives."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ MECHANISMS = {m.fmu: m for m in (FIVE_BAR, SLIDER_CRANK, ROTOR, PENDULUM)}
 
 
 class Drawn(NamedTuple):
-    """A mechanism at the start of a run: values of its modes and inputs by their FMI names."""
+    """A mechanism at the start of a run: parameters, initial state, and values of its modes and inputs by their FMI names."""
 
     mechanism: Mechanism
     parameters: Any
@@ -27,7 +27,7 @@ class Drawn(NamedTuple):
 
     @property
     def values(self) -> dict[str, float | int]:
-        """All that an FMU is given, by FMI name; integers are whole numbers."""
+        """Return all values that an FMU is given, by FMI name; those of integer variables are of type int."""
         own = {fmi_name(name): value for name, value in asdict(self.parameters).items()}
         initial = {f"initial.{name}": float(value) for name, value in asdict(self.initial).items()}
         real = {n: v if n == "assembly.branch" else float(v) for n, v in own.items()}
@@ -35,13 +35,13 @@ class Drawn(NamedTuple):
 
     @property
     def commanded(self) -> dict[str, str]:
-        """Inputs that command a rate under the modes, each with that rate."""
+        """Return the inputs that command a rate under the modes, each with the name of that rate."""
         channels = [self.mechanism.channels[n] for n in self.mechanism.commands(self.modes)]
         return {channel.name: self.mechanism.freedoms[channel.freedom].rate for channel in channels}
 
 
 def drawn(fmu: str, seed: int) -> Drawn:
-    """The case of a seed, the same everywhere; every way of driving comes in turn."""
+    """Draw the case of a seed, which is the same on every machine; successive seeds go through all modes."""
     if fmu in ("FiveBarSlider", "SliderCrank"):
         mechanism = MECHANISMS[fmu]
         case = (strategies if mechanism is FIVE_BAR else slider_cranks).seeded(seed)
@@ -52,7 +52,7 @@ def drawn(fmu: str, seed: int) -> Drawn:
             modes["axial.mode"] = seed // 2 % 3
         inputs = case.fmi_inputs()
         if mechanism is FIVE_BAR:
-            # in proportion to the crank's inertia: a light one at thousands of rad/s is a matter of rounding
+            # in proportion to the crank's inertia: a light crank would reach thousands of rad/s, and rounding errors grow
             inputs["drive.torque"] *= 100.0 * case.parameters.crank_inertia
         return Drawn(mechanism, case.parameters, case.initial, modes, inputs)
     mechanism = MECHANISMS[fmu]

@@ -1,8 +1,9 @@
-"""The masters of the tests. Each of these functions runs in a process of its own, and imports what it needs inside itself.
+"""Run FMUs in the masters of the tests.
 
-All run a case of 100 steps of 1 ms: values at the start of reals and integers, the input that changes after half of them, and
-to what. What they return has the outputs at the
-end and the time, if the master tells them, `solver.status` likewise, and in ``said`` whatever sentence reached the user.
+Each function runs in a process of its own and imports there what it needs. It runs a case for 100 steps of 1 ms. A case has the
+start values of reals and of integers, the name of an input that changes after 50 steps, and its new value. The result has the
+outputs at the end as ``end``, the time and `solver.status` if the master tells them, and the messages that reach the user as
+``said``.
 """
 
 from __future__ import annotations
@@ -11,7 +12,7 @@ from typing import Any
 
 
 def by_fmpy(fmu: str, case: list[Any], outputs: list[str], kind: str) -> Any:
-    """The case by FMPy's own simulate_fmu; model exchange by CVode."""
+    """Run the case by FMPy's own simulate_fmu; model exchange by CVode."""
     import numpy as np
     from fmpy import read_model_description, simulate_fmu
     from fmpy.fmi1 import FMICallException
@@ -21,7 +22,7 @@ def by_fmpy(fmu: str, case: list[Any], outputs: list[str], kind: str) -> Any:
     names = [v.name for v in read_model_description(fmu).modelVariables if v.causality == "input"]
     before = [reals.get(name, 0.0) for name in names]
     after = [later if name == changed else reals.get(name, 0.0) for name in names]
-    # the jump is where the communication point is: halves of rounded milliseconds would make a step of their own
+    # the jump is exactly at a communication point: at a rounded time it would cause a step of its own
     half = 50 * 1e-3
     signals = np.array(
         [(0.0, *before), (half, *before), (half, *after), (0.1, *after)],
@@ -40,7 +41,7 @@ def by_fmpy(fmu: str, case: list[Any], outputs: list[str], kind: str) -> Any:
             input=signals,
             output=[*outputs, "solver.status"],
             debug_logging=True,
-            # of FMI 2.0 and 3.0
+            # the message is the last argument in FMI 2.0 and 3.0
             logger=lambda *arguments: said.append(arguments[-1].decode()),
         )
     except FMICallException as error:
@@ -54,7 +55,10 @@ def by_fmpy(fmu: str, case: list[Any], outputs: list[str], kind: str) -> Any:
 
 
 def by_fmpy_with(fmu: str, case: list[Any], outputs: list[str], option: str) -> Any:
-    """Co-simulation by FMPy with an option of `simulate_fmu`, or of `instantiate_fmu` with a callback that ends steps early."""
+    """Run the case in co-simulation by FMPy with an option of `simulate_fmu`; the input changes linearly from the start on.
+
+    With the option "early_return_allowed" a callback ends steps early.
+    """
     import numpy as np
     from fmpy import extract, instantiate_fmu, read_model_description, simulate_fmu
     from fmpy.fmi3 import fmi3IntermediateUpdateCallback
@@ -96,7 +100,7 @@ def by_fmpy_with(fmu: str, case: list[Any], outputs: list[str], option: str) -> 
 
 
 def by_libcosimpy(fmu: str, case: list[Any], outputs: list[str], kind: str) -> Any:
-    """The case by libcosim's fixed-step algorithm."""
+    """Run the case by libcosim's fixed-step algorithm."""
     import zipfile
     from xml.etree import ElementTree
 
@@ -133,7 +137,7 @@ def by_libcosimpy(fmu: str, case: list[Any], outputs: list[str], kind: str) -> A
 
 
 def by_ecospy(fmu: str, case: list[Any], outputs: list[str], kind: str) -> Any:
-    """The case by ecos."""
+    """Run the case by ecos."""
     from ecospy import EcosSimulation, EcosSimulationStructure
 
     reals, integers, changed, later = case
@@ -157,12 +161,12 @@ def by_ecospy(fmu: str, case: list[Any], outputs: list[str], kind: str) -> Any:
 
 
 def by_cofmupy(fmu: str, case: list[Any], outputs: list[str], kind: str) -> Any:
-    """The case by CoFMUPy. It sets Reals alone, and all inputs: those that it is not given to zero."""
+    """Run the case by CoFMUPy, which sets only Reals, and all inputs: to zero if it is given no value."""
     import sys
 
     reals, integers, changed, later = case
 
-    sys.path.insert(0, f"{sys.prefix}/cofmupy")  # with the version of FMPy that it is for
+    sys.path.insert(0, f"{sys.prefix}/cofmupy")  # with the version of FMPy that CoFMUPy needs
     from cofmupy import Coordinator
     from fmpy.fmi1 import FMICallException
 
@@ -188,7 +192,7 @@ def by_cofmupy(fmu: str, case: list[Any], outputs: list[str], kind: str) -> Any:
 
 
 def by_pathsim(fmu: str, case: list[Any], outputs: list[str], kind: str) -> Any:
-    """The case by PathSim; model exchange by its Runge-Kutta method of order 5."""
+    """Run the case by PathSim; model exchange by its Runge-Kutta method of order 5."""
     from fmpy.fmi1 import FMICallException
     from pathsim import Connection, Simulation
     from pathsim.blocks import Source

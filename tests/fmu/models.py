@@ -1,4 +1,4 @@
-"""The FMUs under test, and the marks that run a test on each of them with cases of its own."""
+"""List the FMUs under test, and parametrise tests with cases for each of them."""
 
 from __future__ import annotations
 
@@ -7,17 +7,16 @@ from typing import Any, NamedTuple
 
 import pytest
 
-#: Paths below the source root, each with a text to replace in the file and what to put there.
+#: Changes of source files: by path below the source root, the text to replace and its replacement.
 Changes = dict[str, tuple[str, str]]
 
 
 class Model(NamedTuple):
-    """What a test has to know of an FMU to be the same for all of them.
+    """Data of an FMU under test, with which one test can run on every FMU.
 
-    ``plant`` names its package, ``force`` is an input that drives the first or the second freedom
-    where a torque drives the crank, ``too_much`` a value of it that ends in the limit of assembly within a tenth of a
-    second. ``free`` are values that leave both freedoms to forces, ``equation`` is a change of one constant in its
-    equations of motion, which shows in torque drive.
+    ``plant`` is the name of its package. ``force`` is an input that drives one of its freedoms while a torque drives the crank;
+    with the value ``too_much`` it reaches the limit of assembly within a tenth of a second. ``free`` are values that leave both
+    freedoms to forces. ``equation`` is a change of one constant in its equations of motion that has an effect in torque drive.
     """
 
     name: str
@@ -29,7 +28,7 @@ class Model(NamedTuple):
 
     @property
     def slave(self) -> str:
-        """Name of the slave's module."""
+        """Return the name of the slave's module."""
         return f"{self.plant}_slave"
 
 
@@ -42,7 +41,7 @@ MODELS = {
             "slider.force",
             1e5,
             {"drive.mode": 0},
-            # the coupler's coupling into the crank's inertia, 2 q3
+            # a term of the crank's inertia that couples crank and coupler, 2 q3
             {"linkwork/five_bar/dynamics.py": ("g3 * q3 - w3 * w3 * n3", "g3 * q3 - 1.01 * w3 * w3 * n3")},
         ),
         Model(
@@ -51,14 +50,14 @@ MODELS = {
             "axial.force",
             1e5,
             {"drive.mode": 0, "axial.mode": 0},
-            # the rod's coupling of the pins' velocities into the crank's inertia
+            # a term of the crank's inertia in which the rod couples the velocities of the pins
             {"linkwork/slider_crank/dynamics.py": ("k.kth * (2.0 * p.m23", "k.kth * (2.02 * p.m23")},
         ),
     )
 }
 
 
-#: Every way to drive each.
+#: All modes of each FMU, by name.
 MODES = {
     "FiveBarSlider": {"torque": {"drive.mode": 0}, "speed": {"drive.mode": 1}},
     "SliderCrank": {f"{d}-{a}": {"drive.mode": d, "axial.mode": a} for d in (0, 1) for a in (0, 1, 2)},
@@ -66,9 +65,9 @@ MODES = {
 
 
 def each(cases: Mapping[str, Mapping[str, Any]], *names: str) -> pytest.MarkDecorator:
-    """Parametrise a test over the cases of each model, by model and by the name of the case.
+    """Parametrise a test over the cases of each model; the name of a test has the model and the case.
 
-    The arguments ``names`` (by default ``case``) take the value of a case, one of them all of it.
+    The arguments ``names`` (by default ``case``) take the values of a case; a single argument takes the whole case.
     """
     names = names or ("case",)
     rows, labels = [], []

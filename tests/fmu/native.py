@@ -1,4 +1,4 @@
-"""The library of a native FMU, called function by function: every call returns its status, nothing is checked or hidden."""
+"""Call the library of a native FMU function by function: every call returns its status, nothing is checked or hidden."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ UPDATE = ctypes.CFUNCTYPE(
 
 
 class Callbacks(ctypes.Structure):
-    """``fmi2CallbackFunctions``; the sentence of a message is the argument of its format ``%s``."""
+    """The structure ``fmi2CallbackFunctions``; log messages come as the argument of the format ``%s``."""
 
     _fields_ = (
         ("logger", LOG_2),
@@ -34,7 +34,10 @@ class Callbacks(ctypes.Structure):
 
 
 class Memory:
-    """Memory of a host: how often it was asked for some, what it gave and did not get back; none after so many times."""
+    """Memory functions of a host; after ``most`` requests they return no memory.
+
+    ``asked`` is the number of requests, ``given`` the blocks that were not freed yet, by address.
+    """
 
     def __init__(self, most: int = 1000) -> None:
         self.asked, self.given = 0, dict[int, Any]()
@@ -62,7 +65,9 @@ class Library:
     fmi : int
         Major version of FMI.
     references : dict of str to int
+        Value references by the names of the variables.
     token : str
+        GUID or instantiation token.
     dll : ctypes.CDLL
     """
 
@@ -80,7 +85,7 @@ class Library:
         self.path = path
         self.dll = ctypes.CDLL(str(path))
         text = (folder / "sources" / f"fmi{self.fmi}Functions.h").read_text(encoding="utf-8")
-        #: all functions of the standard
+        #: names of all functions of the standard
         self.functions = sorted(set(re.findall(rf"\bfmi{self.fmi}[A-Z]\w+(?=TYPE\b)", text)))
         for name in self.functions:
             function = getattr(self.dll, name, None)
@@ -88,12 +93,12 @@ class Library:
                 function.restype = c_void_p
 
     def instance(self, interface: str = "cs", **options: Any) -> Instance:
-        """A new instance."""
+        """Return a new instance."""
         return Instance(self, interface, **options)
 
 
 class Instance:
-    """An instance; ``log`` are the pairs (status, sentence) that it has logged."""
+    """An instance; ``log`` has the pairs (status, message) that it has logged."""
 
     def __init__(
         self,
@@ -140,12 +145,15 @@ class Instance:
         self.log.append((status, text.decode("ascii")))
 
     def __call__(self, function: str, *arguments: Any) -> int:
-        """Status of a function without its prefix; Python's floats are doubles, its integers size_t or int as they come."""
+        """Call a function, named without its prefix, and return its status.
+
+        Python floats are passed as doubles; all other arguments as ctypes passes them.
+        """
         converted = [c_double(a) if isinstance(a, float) else a for a in arguments]
         return int(getattr(self.library.dll, f"fmi{self.library.fmi}{function}")(c_void_p(self.handle), *converted))
 
     def free(self) -> None:
-        """Free the instance, as it is when nothing refers to it any more."""
+        """Free the instance; this also happens when nothing refers to it any more."""
         getattr(self.library.dll, f"fmi{self.library.fmi}FreeInstance")(c_void_p(self.handle))
         self.handle = None
 
@@ -156,13 +164,13 @@ class Instance:
     # Values
 
     def get(self, *names: str) -> list[float]:
-        """Values of real variables."""
+        """Return the values of real variables."""
         values = (c_double * len(names))()
         assert self(self.real("Get"), *self.arrays(names, values)) == OK
         return list(values)
 
     def set(self, **values: float) -> int:
-        """Set variables, with ``__`` for the dot of a name; whole numbers are of integers."""
+        """Set variables and return the worst status; ``__`` in a name stands for a dot. An int sets an integer variable."""
         status = OK
         for key, value in values.items():
             name = key.replace("__", ".")
@@ -173,30 +181,30 @@ class Instance:
         return status
 
     def set_integer(self, name: str, value: int) -> int:
-        """Set an integer."""
+        """Set an integer variable and return the status."""
         if self.library.fmi == 2:
             return self("SetInteger", *self.arrays([name], (c_int * 1)(value)))
         return self("SetInt32", *self.arrays([name], (c_int32 * 1)(value)))
 
     def text(self, name: str = "solver.message") -> str:
-        """Value of a string."""
+        """Return the value of a string variable."""
         values = (c_char_p * 1)()
         assert self("GetString", *self.arrays([name], values)) == OK
         return (values[0] or b"").decode()
 
     def status(self) -> int:
-        """Value of ``solver.status``."""
+        """Return the value of ``solver.status``."""
         values = (c_int32 * 1)()
         name = "GetInteger" if self.library.fmi == 2 else "GetInt32"
         assert self(name, *self.arrays(["solver.status"], values)) == OK
         return values[0]
 
     def real(self, verb: str) -> str:
-        """Name of the function for real values."""
+        """Return the name of the function that gets or sets real values."""
         return f"{verb}Real" if self.library.fmi == 2 else f"{verb}Float64"
 
     def arrays(self, names: Sequence[str], values: Any) -> tuple[Any, ...]:
-        """Arguments of a get or a set."""
+        """Return the arguments of a function that gets or sets values."""
         references = (c_uint32 * len(names))(*(self.library.references[name] for name in names))
         count = c_size_t(len(names))
         return (
@@ -206,7 +214,7 @@ class Instance:
     # Life
 
     def enter(self, start: float = 0.0, tolerance: float | None = None) -> int:
-        """To initialisation mode."""
+        """Set up the experiment and enter initialisation mode; return the status."""
         given = tolerance is not None
         limits = (c_double(tolerance or 0.0), c_double(start))
         if self.library.fmi == 2:
@@ -215,14 +223,14 @@ class Instance:
         return self("EnterInitializationMode", ctypes.c_bool(given), *limits, ctypes.c_bool(False), c_double(0.0))
 
     def start(self, **values: float) -> Instance:
-        """Through the initialisation."""
+        """Set values and pass through initialisation mode; return the instance itself."""
         assert self.set(**values) == OK
         assert self.enter() == OK
         assert self("ExitInitializationMode") == OK
         return self
 
     def step(self, time: float, step: float) -> int:
-        """A communication step."""
+        """Take a communication step and return its status."""
         if self.library.fmi == 2:
             return self("DoStep", time, step, 1)
         flags = (ctypes.c_bool * 3)()
@@ -233,7 +241,7 @@ class Instance:
         return status
 
     def discrete(self) -> tuple[bool, bool]:
-        """New discrete states: whether the simulation is to end, whether the states changed."""
+        """Update the discrete states; return whether the simulation is to end, and whether states have changed."""
         if self.library.fmi == 2:
             info = (c_int * 8)()
             assert self("NewDiscreteStates", info) == OK
@@ -245,20 +253,20 @@ class Instance:
         return flags[1], flags[3]
 
     def saved(self) -> c_void_p:
-        """A saved state."""
+        """Return a saved FMU state."""
         state = c_void_p()
         assert self("GetFMUstate" if self.library.fmi == 2 else "GetFMUState", byref(state)) == OK
         return state
 
     def states(self, which: str = "ContinuousStates", count: int = 6) -> list[float]:
-        """Continuous states, or their derivatives or nominal values."""
+        """Return the continuous states, or their derivatives or nominal values."""
         values = (c_double * count)()
         assert self(f"Get{which}", values, c_size_t(count)) == OK
         return list(values)
 
 
 def phases(library: Library, interface: str) -> Iterator[tuple[str, Instance]]:
-    """An instance in each state that the interface has, those during a callback apart."""
+    """Yield an instance in each state of the FMI state machine of an interface, except states during a callback."""
     names = ["instantiated", "initialization", "step" if interface == "cs" else "event"]
     names += ["continuous"] if interface == "me" else []
     for name in (*names, "terminated"):

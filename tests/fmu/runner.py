@@ -1,4 +1,4 @@
-"""Runs a function in a fresh process: what one FMU leaves behind in an interpreter must not reach the next test."""
+"""Run a function in a new process, so that nothing that an FMU leaves behind in an interpreter reaches the next test."""
 
 from __future__ import annotations
 
@@ -34,10 +34,10 @@ def run_in_process(
     timeout: float = 60.0,
     options: tuple[str, ...] = ("-W", "error"),
 ) -> Any:
-    """Run the source of the function ``code`` with ``args`` in a fresh Python, and return what it returned.
+    """Run the source of the function ``code`` with ``args`` in a new Python process, and return its result.
 
-    The function imports what it needs inside itself; ``bare_master`` is importable. Arguments and result travel as JSON,
-    which carries floats without loss. A process that dies fails the test with what it printed.
+    The function imports inside itself what it needs; ``bare_master`` is importable. Arguments and result are sent as JSON,
+    which represents floats without loss. If the process dies, the test fails with the output of the process.
     """
     source = _FRAME.format(helpers=str(HERE), source=textwrap.dedent(inspect.getsource(code)), name=code.__name__)
     with tempfile.TemporaryDirectory(prefix="linkwork-test-") as folder:

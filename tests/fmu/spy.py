@@ -1,4 +1,4 @@
-"""Copies of FMUs and archives that write down what masters call; for Linux."""
+"""Make copies of FMUs and archives that log the calls of masters; for Linux."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ OPTIONS = (
 
 
 def watched(fmu: Path, target: Path) -> Path:
-    """Write a copy of a native FMU whose calls are written to the file that the variable LINKWORK_CALLS names."""
+    """Write a copy of a native FMU that logs all calls into the file named by the environment variable LINKWORK_CALLS."""
     with tempfile.TemporaryDirectory() as folder:
         library = unpack(fmu, Path(folder)).library
         real = library.rename(library.with_name(f"real-{library.name}"))
@@ -37,7 +37,7 @@ def watched(fmu: Path, target: Path) -> Path:
 
 
 def changed(archive: Path, target: Path, change: Callable[[Path], None]) -> Path:
-    """Write a copy of an archive, such as of SSP, with a change made to the folder that it is unpacked to."""
+    """Write a copy of an archive, such as of SSP; ``change`` is applied to the folder of its unpacked files."""
     with tempfile.TemporaryDirectory() as folder, zipfile.ZipFile(archive) as content:
         content.extractall(folder)
         change(Path(folder))
@@ -45,7 +45,7 @@ def changed(archive: Path, target: Path, change: Callable[[Path], None]) -> Path
 
 
 def packed(folder: Path, target: Path) -> Path:
-    """Write an archive of a folder's files."""
+    """Write the files of a folder into an archive."""
     with zipfile.ZipFile(target, "w") as content:
         for path in sorted(folder.rglob("*")):
             content.write(path, path.relative_to(folder))

@@ -1,4 +1,4 @@
-"""Reads an archive of SSP for masters that do not; importable by what `runner.run_in_process` runs, as `bare_master` is."""
+"""Read an archive of SSP for masters that cannot; functions in `runner.run_in_process` can import it, like `bare_master`."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 
 
 class Archive(NamedTuple):
-    """Of each part the path of its FMU, its start values and its value references by name; and the output of each input."""
+    """For each part: path of its FMU, start values, value references by name; and the connected output of each input."""
 
     fmus: dict[str, str]
     starts: dict[str, dict[str, float]]
@@ -17,7 +17,7 @@ class Archive(NamedTuple):
 
 
 def unpack(archive: str) -> Archive:
-    """Unpack an archive of SSP into a folder, unpacked, and read it by FMPy."""
+    """Unpack an archive of SSP into the folder "unpacked", and read it by FMPy."""
     from fmpy import read_model_description
     from fmpy.ssp.ssd import read_ssd, read_ssv
 

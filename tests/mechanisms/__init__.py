@@ -1,1 +1,1 @@
-"""Mechanisms of the tests: they have nothing to do with the two theses, and each is one folder and one line."""
+"""Mechanisms for the tests that are not from the two theses; each is one folder, registered by one line."""

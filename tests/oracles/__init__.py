@@ -1,1 +1,1 @@
-"""Independent formulations, against which the plants are checked."""
+"""Independent formulations of the mechanisms, against which the plants are checked."""

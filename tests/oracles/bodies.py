@@ -1,7 +1,7 @@
-"""Both mechanisms as particles: places and velocities of the links' masses, and what Newton and Euler say of them.
+"""Model both mechanisms as particles: positions and velocities of the masses, and forces by Newton's and Euler's laws.
 
-The five-bar takes the angles and rates of its links from the program, the slider-crank solves for its slider by itself.
-From the particles follow energies, momenta and tensors of inertia by summation. For the slider-crank the equations of
+The five-bar takes the angles and rates of its links from the program; the slider-crank computes its slider position itself.
+Energies, momenta and inertia tensors follow from the particles by summation. For the slider-crank the equations of
 motion of its three bodies in space, the pins' accelerations and the drives make one linear system for all
 accelerations, forces and moments at once: a formulation that shares no algebra with `linkwork.slider_crank.dynamics`.
 """
@@ -26,7 +26,7 @@ AXIS = np.array([0.0, 0.0, 1.0])
 
 
 class Body(NamedTuple):
-    """Particles of a rigid body: masses (n,), places and velocities in the ground frame (n, 3)."""
+    """Particles of a rigid body: masses (n,), positions and velocities in the ground frame (n, 3)."""
 
     masses: np.ndarray
     places: np.ndarray
@@ -41,7 +41,7 @@ class Body(NamedTuple):
         return self.masses @ self.places / self.mass
 
     def inertia(self) -> np.ndarray:
-        """Tensor of inertia about the centre of mass (3, 3)."""
+        """Return the inertia tensor about the centre of mass, shape (3, 3)."""
         r = self.places - self.centre
         return np.eye(3) * (self.masses @ (r * r).sum(axis=1)) - np.einsum("n,ni,nj->ij", self.masses, r, r)
 
@@ -52,7 +52,7 @@ class Body(NamedTuple):
         return self.masses @ self.velocities
 
     def moment_of_momentum(self) -> np.ndarray:
-        """About the origin of the ground frame."""
+        """Return the angular momentum about the origin of the ground frame."""
         return self.masses @ np.cross(self.places, self.velocities)
 
 
@@ -60,19 +60,19 @@ class Body(NamedTuple):
 
 
 def in_plane(z: complex) -> np.ndarray:
-    """A complex number as a vector in the plane."""
+    """Return a complex number as a vector in the plane, (x, y, 0)."""
     return np.array([z.real, z.imag, 0.0])
 
 
 def planar_link(mass: float, inertia: float, place: complex, velocity: complex, spin: float) -> Body:
-    """Two particles with the link's mass and moment of inertia about its centre of mass."""
+    """Return a link as two particles with its mass and its moment of inertia about the centre of mass."""
     arm = np.array([[1.0, 0.0, 0.0], [-1.0, 0.0, 0.0]]) * sqrt(inertia / mass)
     places, velocities = in_plane(place) + arm, in_plane(velocity) + spin * np.cross(AXIS, arm)
     return Body(np.array([0.5 * mass] * 2), places, velocities)
 
 
 def five_bar(x: five_bar_dynamics.State, par: FiveBarParameters) -> tuple[Body, ...]:
-    """Crank, coupler, rocker and slider; only the angles and rates are taken from the program."""
+    """Return crank, coupler, rocker and slider as particles; only the angles and rates are taken from the program."""
     th2, u, w2, v, _, _ = x
     p = par.constants()
     g = kinematics.position(th2, u, p)
@@ -103,7 +103,7 @@ def five_bar_gravity(par: FiveBarParameters) -> np.ndarray:
 
 
 def slider_resistance(x: five_bar_dynamics.State, par: FiveBarParameters) -> float:
-    """Spring, damper and friction: their force on the slider along the guide."""
+    """Return the force of spring, damper and friction on the slider along the guide."""
     spring = par.slider_stiffness * (x[1] - par.slider_spring_free_position)
     return -spring - par.slider_damping * x[3] - par.slider_coulomb_friction * tanh(x[3] / FRICTION_SPEED)
 
@@ -112,10 +112,10 @@ def slider_resistance(x: five_bar_dynamics.State, par: FiveBarParameters) -> flo
 
 
 def crank_particles(par: SliderCrankParameters) -> tuple[np.ndarray, np.ndarray]:
-    """Six particles in frame 2 with the crank's mass, centre of mass, inertia about the axis and products of inertia."""
+    """Return six particles in frame 2 with the crank's mass, centre of mass, axial inertia and products of inertia."""
     m = par.crank_mass
     cog = np.array([par.crank_cog_x, par.crank_cog_y, par.crank_cog_z])
-    # integrals of x x, x y ... about the centre of mass; that of z z is free, and large enough for real particles
+    # second moments x x, x y ... about the centre of mass; z z is arbitrary, but large enough for real positions of particles
     square = 0.5 * (par.crank_inertia - m * (cog[0] ** 2 + cog[1] ** 2))
     xz, yz = par.crank_product_xz - m * cog[0] * cog[2], par.crank_product_yz - m * cog[1] * cog[2]
     second = np.array([[square, 0.0, xz], [0.0, square, yz], [xz, yz, 2.0 * (xz * xz + yz * yz) / square + square]])
@@ -125,7 +125,10 @@ def crank_particles(par: SliderCrankParameters) -> tuple[np.ndarray, np.ndarray]
 
 
 def rod_particles(par: SliderCrankParameters, line: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Two particles on the rod's line and a ring of four about it, from the centre of mass: half of the inertia each."""
+    """Return the rod's particles relative to its centre of mass: two on its line and a ring of four about it.
+
+    Each of these two groups has half of the moment of inertia.
+    """
     m, inertia = par.rod_mass, par.rod_inertia
     u = line / np.linalg.norm(line)
     j = np.cross(u, np.eye(3)[np.argmin(np.abs(u))])
@@ -137,13 +140,13 @@ def rod_particles(par: SliderCrankParameters, line: np.ndarray) -> tuple[np.ndar
 
 
 def guide_frame(par: SliderCrankParameters) -> np.ndarray:
-    """Axes of frame 4 by rows."""
+    """Return the axes of frame 4 as rows."""
     c, s = cos(par.guide_twist), sin(par.guide_twist)
     return np.array([[1.0, 0.0, 0.0], [0.0, c, -s], [0.0, s, c]])
 
 
 class Pins(NamedTuple):
-    """Places and velocities of both pins, and the angular velocity of the rod without spin."""
+    """Positions and velocities of both pins, and the rod's angular velocity without its spin about its own line."""
 
     p2: np.ndarray
     p3: np.ndarray
@@ -153,7 +156,7 @@ class Pins(NamedTuple):
 
 
 def pins(x: dynamics.State, par: SliderCrankParameters) -> Pins:
-    """The pins from the lengths; the slider's position and the rate that keeps the rod's length are solved for here."""
+    """Return the pins; the slider's position and rate are solved from the condition that the rod's length is constant."""
     th, s1, w, v, _, _ = x
     p2 = np.array([par.crank_length * cos(th), par.crank_length * sin(th), s1])
     v2 = w * np.cross(AXIS, p2) + v * AXIS
@@ -168,7 +171,7 @@ def pins(x: dynamics.State, par: SliderCrankParameters) -> Pins:
 
 
 def slider_crank(x: dynamics.State, par: SliderCrankParameters) -> tuple[Body, Body, Body]:
-    """Crank, rod and slider."""
+    """Return crank, rod and slider as particles."""
     th, s1, w, v, _, _ = x
     at = pins(x, par)
     turned = np.array([[cos(th), -sin(th), 0.0], [sin(th), cos(th), 0.0], [0.0, 0.0, 1.0]])
@@ -189,26 +192,27 @@ def gravity(par: SliderCrankParameters) -> np.ndarray:
 
 
 def slider_push(s4: float, v4: float, load: float, par: SliderCrankParameters) -> float:
-    """Load, spring, damper and friction: their force on the slider along the guide."""
+    """Return the force of load, spring, damper and friction on the slider along the guide."""
     spring = par.slider_stiffness * (s4 - par.slider_spring_free_position)
     return load - spring - par.slider_damping * v4 - par.slider_coulomb_friction * tanh(v4 / FRICTION_SPEED)
 
 
 def shift_push(s1: float, v: float, par: SliderCrankParameters) -> float:
-    """Spring and damper on the shift."""
+    """Return the force of spring and damper on the shift."""
     return -par.shift_stiffness * (s1 - par.shift_spring_free_position) - par.shift_damping * v
 
 
 def slider_motion(at: Pins, par: SliderCrankParameters) -> tuple[float, float]:
-    """Slider position and velocity."""
+    """Return position and velocity of the slider along the guide."""
     way = -guide_frame(par)[2]
     return float(at.p3 @ way), float(at.v3 @ way)
 
 
 # ------------------------------------------------------------------ Newton and Euler, body by body
 
-#: Unknowns of the 29 equations: accelerations of the freedoms, of the rod's centre of mass and of the slider, the rod's
-#: angular acceleration; forces in the pins, on bearing and guide, and their moments; what drives, holds and grooves supply.
+#: Unknowns of the 29 equations with their numbers of components: accelerations of the freedoms, of the rod's centre of mass and
+#: of the slider, and the rod's angular acceleration; forces in the pins, forces and moments of bearing and guide; torque and
+#: axial force of the drives, and the force of the groove.
 UNKNOWNS = {
     "crank_acceleration": 1,
     "shift_acceleration": 1,
@@ -228,12 +232,12 @@ UNKNOWNS = {
 
 
 def skew(a: np.ndarray) -> np.ndarray:
-    """Matrix of a x."""
+    """Return the matrix of the cross product a x."""
     return np.array([[0.0, -a[2], a[1]], [a[2], 0.0, -a[0]], [-a[1], a[0], 0.0]])
 
 
 def solve_bodies(case: Case, drive: str) -> dict[str, np.ndarray]:
-    """All unknowns from the equations of motion of three bodies in space, the pins' accelerations, and the drives."""
+    """Solve the equations of motion of three bodies in space, the pins' accelerations and the drives; return the unknowns."""
     par, x, i = case.parameters, case.under(drive), case.inputs(drive)
     th, s1, w, v, _, _ = x
     at = pins(x, par)
@@ -248,7 +252,7 @@ def solve_bodies(case: Case, drive: str) -> dict[str, np.ndarray]:
     right: list[np.ndarray] = []
 
     def equation(value: Any, **terms: Any) -> None:
-        """The rows: the sum of each term's matrix times the unknown of its name is ``value``."""
+        """Add equations: the sum over ``terms`` of matrix times unknown of that name equals ``value``."""
         value = np.atleast_1d(np.asarray(value, dtype=float))
         row = np.zeros((len(value), ends[-1]))
         for name, matrix in terms.items():
@@ -287,7 +291,7 @@ def solve_bodies(case: Case, drive: str) -> dict[str, np.ndarray]:
     )
     cog = slider.centre - at.p3
     equation(np.cross(cog, slider.mass * g), slider_acceleration=slider.mass * np.cross(cog, way), guide_moment=-one)
-    # the rod's ends go with crank and slider
+    # the rod's ends have the accelerations of the pins on crank and slider
     equation(
         -w * w * at.p2 * np.array([1.0, 1.0, 0.0]) - np.cross(at.turn, np.cross(at.turn, arm2)),
         rod_acceleration=one,
@@ -301,7 +305,7 @@ def solve_bodies(case: Case, drive: str) -> dict[str, np.ndarray]:
         rod_turning=-skew(arm3),
         slider_acceleration=-way,
     )
-    # groove of eq 28: the shift's force in it turns the crank against its pitch
+    # groove of eq 28: its force on the shift also acts as a torque on the crank, in proportion to the groove's pitch
     amplitude, ratio = par.groove_amplitude, par.groove_ratio
     pitch = amplitude * ratio * cos(ratio * th)
     bend = -amplitude * ratio * ratio * sin(ratio * th)
@@ -321,7 +325,7 @@ def solve_bodies(case: Case, drive: str) -> dict[str, np.ndarray]:
         else:
             equation(i.force, force=1.0)
     matrix = np.concatenate(rows)
-    # rows and columns to a like size, for the sake of the condition
+    # scale rows and columns to a similar size, for a better condition number
     row_size = np.abs(matrix).max(axis=1)
     column_size = np.abs(matrix / row_size[:, None]).max(axis=0)
     solution = np.linalg.solve(matrix / row_size[:, None] / column_size, np.concatenate(right) / row_size) / column_size

@@ -1,12 +1,12 @@
-"""Special points of periodic motions by other continuation codes: AUTO-07p, through bifpy, and jaxcont.
+"""Find special points of periodic motions with other continuation codes: AUTO-07p, through bifpy, and jaxcont.
 
-Both follow autonomous equations by collocation. What turns with the crank is therefore an oscillator of its own, c + i s, that
-goes to the unit circle, and the independent variable is the crank angle. The equations are those of the oracles, and each
-branch begins at a motion that SciPy's integrator has settled to: nothing of ours has a part in it.
+Both follow autonomous equations by collocation. The excitation by the crank is therefore an oscillator of its own, c + i s,
+that converges to the unit circle; the independent variable is the crank angle. The equations are those of the oracles, and each
+branch begins at a motion to which SciPy's integrator has settled: no code of this project takes part.
 
     python -m tests.oracles.continued
 
-prints what `tests.published.CONTINUED` holds. The codes are the extra ``continuation``.
+prints what `tests.published.CONTINUED` contains. The codes are installed with the extra ``continuation``.
 """
 
 from __future__ import annotations
@@ -24,12 +24,18 @@ from linkwork.five_bar.published import SETS
 
 from . import multipliers
 
-#: Rates of x and v over the crank angle at (x, v, c, s) and a value of the parameter; functions such as sin from a library.
+#: Function of a library, which supplies functions such as sin, of (x, v, c, s) and of the parameter's value: the derivatives of
+#: x and v with respect to the crank angle.
 Rates = Callable[[Any, Sequence[Any], Any], Sequence[Any]]
 
 
 class Case(NamedTuple):
-    """A branch: rates, turns in a period, where it begins, the range, start and turns of the run to it, pieces of a turn."""
+    """A branch of periodic motions for continuation.
+
+    ``turns`` is the number of crank turns per period. The parameter begins at ``begin`` and is followed towards the farther end
+    of the range from ``low`` to ``high``. The first motion is settled from ``start`` over ``settle`` turns; ``mesh`` is the
+    number of elements per turn.
+    """
 
     rates: Rates
     turns: int
@@ -42,17 +48,17 @@ class Case(NamedTuple):
 
     @property
     def direction(self) -> int:
-        """Towards the farther end of the range."""
+        """Return the direction from the first parameter towards the farther end of the range, 1 or -1."""
         return 1 if self.high - self.begin > self.begin - self.low else -1
 
     def full(self, library: Any, u: Sequence[Any], value: Any) -> list[Any]:
-        """Rates of (x, v, c, s)."""
+        """Return the derivatives of (x, v, c, s) with respect to the crank angle."""
         c, s = u[2], u[3]
         rest = 1.0 - c * c - s * s
         return [*self.rates(library, u, value), c * rest - s, s * rest + c]
 
     def settled(self) -> Callable[[Any], np.ndarray]:
-        """The motion that is begun with, as a function of the crank angle from 0 to the end of its period."""
+        """Return the first motion of the branch, as a function of the crank angle from 0 to the end of its period."""
 
         def right(angle: float, y: np.ndarray) -> Sequence[float]:
             return self.rates(np, (*y, np.cos(angle), np.sin(angle)), self.begin)
@@ -67,13 +73,13 @@ class Case(NamedTuple):
 
 
 def duffing(library: Any, u: Sequence[Any], speed: Any) -> Sequence[Any]:
-    """x'' + 0.1 x' + x + 0.04 x^3 = cos w t."""
+    """Return the derivatives for Duffing's equation x'' + 0.1 x' + x + 0.04 x^3 = cos w t."""
     x, v, c, _ = u
     return v, (c - 0.1 * speed * v - x - 0.04 * x * x * x) / (speed * speed)
 
 
 def pendulum(library: Any, u: Sequence[Any], strength: Any) -> Sequence[Any]:
-    """Taylor's driven damped pendulum: w0 = 1.5 w, b = w0 / 4."""
+    """Return the derivatives for Taylor's driven damped pendulum: w0 = 1.5 w, b = w0 / 4."""
     x, v, c, _ = u
     return v, 2.25 * (strength * c - library.sin(x)) - 0.75 * v
 
@@ -82,7 +88,7 @@ RIG = SETS["rig-1-spring-b"].parameters
 
 
 def five_bar(library: Any, u: Sequence[Any], speed: Any) -> Sequence[Any]:
-    """Rig 1 with spring B in redundant coordinates with Lagrange multipliers, u by the crank's length."""
+    """Return the derivatives for rig 1 with spring B in redundant coordinates with multipliers; u is in crank lengths."""
     x, v, c, s = (float(value) for value in u)
     length = RIG.crank_length
     q = multipliers.assemble(RIG, np.arctan2(s, c), length * x)
@@ -104,7 +110,7 @@ CASES: dict[str, Case] = {
 
 
 def by_auto(case: Case) -> Iterator[tuple[str, float]]:
-    """Kind and parameter of every special point, by AUTO-07p."""
+    """Yield kind and parameter of every special point of a branch, by AUTO-07p."""
     import math
 
     from bifpy import auto
@@ -130,7 +136,10 @@ def by_auto(case: Case) -> Iterator[tuple[str, float]]:
 
 
 def by_jaxcont(case: Case) -> Iterator[tuple[str, float]]:
-    """The same by jaxcont; its period doublings are brought to an interval of 1e-6."""
+    """Yield kind and parameter of every special point of a branch, by jaxcont.
+
+    Its period doublings are bisected to an interval of 1e-6.
+    """
     import jax
 
     jax.config.update("jax_enable_x64", True)
@@ -155,7 +164,7 @@ def by_jaxcont(case: Case) -> Iterator[tuple[str, float]]:
         yield event.kind.replace("_", " "), float(event.p)
 
 
-#: Each code by the package that has it, and the branches that it is asked for.
+#: Codes by the name of their package, with the branches that each follows.
 CODES: dict[str, tuple[Callable[[Case], Iterator[tuple[str, float]]], tuple[str, ...]]] = {
     "bifpy": (by_auto, tuple(CASES)),
     "jaxcont": (by_jaxcont, ("duffing", "pendulum")),
@@ -163,7 +172,7 @@ CODES: dict[str, tuple[Callable[[Case], Iterator[tuple[str, float]]], tuple[str,
 
 
 def main() -> None:
-    """Print what every code gives."""
+    """Print the special points that every code finds."""
     for package, (follow, names) in CODES.items():
         print(f"{package} {version(package)}")  # noqa: T201
         for name in names:

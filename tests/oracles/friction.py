@@ -1,8 +1,9 @@
-"""Newton and Euler for each link of the five-bar slider with friction in pins and guide, solved by a general root finder.
+"""Newton's and Euler's equations for each link of the five-bar slider with friction in pins and guide, solved numerically.
 
-Unknown are the accelerations of all redundant coordinates, all pin forces, the guide's force and the crank torque: 14, with
-eleven equations of motion of the links, two of the loop's acceleration and one of the drive. Friction is written into these
-equations by its law, so that they are not linear. They share the geometry with `multipliers`; no virtual work is in them.
+The 14 unknowns are the accelerations of all redundant coordinates, all pin forces, the guide's force and the crank torque. The
+equations are eleven equations of motion of the links, two of the loop's acceleration and one of the drive. Friction enters them
+by its law, so that they are not linear; a general root finder solves them. They share the geometry with `multipliers`, but use
+no virtual work.
 """
 
 from __future__ import annotations
@@ -35,7 +36,7 @@ from .multipliers import (
 
 
 class Solution(NamedTuple):
-    """th2'', th3'', th4'' (rad/s2) and u'' (m/s2), forces by their FMI names (N), crank torque (N.m), friction's power (W)."""
+    """th2'', th3'', th4'' (rad/s2), u'' (m/s2), forces by FMI name (N), torque (N.m), and power lost by friction (W)."""
 
     accelerations: Vector
     forces: dict[str, float]
@@ -48,13 +49,13 @@ def magnitude(force: complex) -> float:
 
 
 def solve(par: FiveBarParameters, x: State, i: Inputs) -> Solution:
-    """All accelerations and forces at one instant."""
+    """Return all accelerations and forces at one instant."""
     q = assemble(par, x[0], x[1])
     qd = rates(par, q, x[2], x[3])
     links = _links(par)
     state = _state(q, qd, links)
     w2, w3, w4, v = qd
-    # of the first link of each pair relative to the second: what friction turns back
+    # angular velocity in each pin of the first link relative to the second; friction opposes it
     turning = {"A": w2, "B": w3 - w2, "C": w3 - w4, "D": w4}
     load = complex(i.load_x, i.load_y)
     points = {"A": 0j, "B": state.points[_B], "C": state.points[_C_COUPLER], "D": state.points[_G5]}
@@ -62,7 +63,7 @@ def solve(par: FiveBarParameters, x: State, i: Inputs) -> Solution:
     along -= par.slider_coulomb_friction * tanh(v / FRICTION_SPEED)
 
     def friction(pins: dict[str, complex], guide: float) -> tuple[dict[str, float], float]:
-        """Moments on the first link of each pair, and the force on the slider."""
+        """Return the friction moments on the first link of each pin, and the friction force on the slider."""
         moments = {
             name: -getattr(par, f"pin_{name}_friction_radius") * magnitude(pins[name]) * tanh(rate / FRICTION_RATE)
             for name, rate in turning.items()
@@ -74,8 +75,8 @@ def solve(par: FiveBarParameters, x: State, i: Inputs) -> Solution:
         pins = dict(zip("ABCD", unknown[4:12:2] + 1j * unknown[5:12:2]))
         moments, rub = friction(pins, guide)
         net = links.masses * (state.jacobian[:4] @ accelerations + state.centripetal[:4] - links.gravity)
-        # force with the pin it acts in, for crank, coupler and rocker; A of the ground, B of the crank on the coupler, C of
-        # the rocker on the coupler, D of the slider on the rocker
+        # signs of the pin forces on crank, coupler and rocker: A is the force of the ground on the crank, B of the crank on
+        # the coupler, C of the rocker on the coupler, D of the slider on the rocker
         on = ({"A": 1, "B": -1}, {"B": 1, "C": 1}, {"C": -1, "D": 1})
         couples = (torque + moments["A"] - moments["B"], moments["B"] + moments["C"], moments["D"] - moments["C"])
         found: list[float] = []
@@ -90,13 +91,13 @@ def solve(par: FiveBarParameters, x: State, i: Inputs) -> Solution:
         found.append(accelerations[0] - i.acceleration if i.speed_drive else torque - i.torque)
         return np.array(found)
 
-    # rows and columns to a like size
+    # scale rows and columns to a similar size
     jacobian = np.column_stack([residual(unit) - residual(np.zeros(14)) for unit in np.eye(14)])
     rows = np.abs(jacobian).max(axis=1)
     columns = np.abs(jacobian / rows[:, None]).max(axis=0)
 
     def further(unknown: Vector) -> Vector:
-        """From what was found, at the size of what is left."""
+        """Improve a solution by the root finder; the residual is scaled to a size near one."""
         size = 1.0 + np.abs(unknown * columns).max()
 
         def scaled(z: Vector) -> Vector:

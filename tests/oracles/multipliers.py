@@ -1,17 +1,16 @@
 """The five-bar slider in redundant coordinates with Lagrange multipliers (Youssef, chapter III, eqs 3.1-3.10).
 
-This is the check of the reduced form in `linkwork.five_bar.dynamics`: another formulation of the same mechanism, which
-shares no algebra with it. The coordinates are q = (th2, th3, th4, u), all angles absolute, so that the rocker's th4 is
-the thesis's theta4 + alpha. With phi the loop closure (2.1), J = d phi / d q and lam the multipliers,
+This checks the reduced form in `linkwork.five_bar.dynamics` by another formulation of the same mechanism that shares no
+algebra with the reduced form. The coordinates are q = (th2, th3, th4, u). All angles are absolute, so that the rocker's
+th4 is the thesis's theta4 + alpha. With the loop closure phi (2.1), J = d phi / d q and the multipliers lam,
 
     M q'' + h = Q + J^T lam
     J q''     = -J' q'
 
-is solved as one system of 6 equations; at prescribed speed a third constraint th2'' = given makes it 7, and its
+is solved as one system of 6 equations. At prescribed speed a third constraint, th2'' = given, makes 7 equations; its
 multiplier is the crank torque. The two loop multipliers are the force of the rocker on the coupler at C (2.3). The other
-pin forces come from Newton's and Euler's laws of the separate links, as one system of 11 equations in which the torque
-and the force along the guide are unknown too: what it finds for these, and for the force at C, must be what the
-multipliers say.
+pin forces come from Newton's and Euler's laws of the separate links, a system of 11 equations. Torque, force along the
+guide and force at C are unknowns of this system too; its solution for them must agree with the multipliers.
 
 Plane vectors are complex numbers, x + i y: a point of the mechanism is ``origin + sum_j arm_j e^(i q_j) + arm_u u``, its
 Jacobian and its centripetal acceleration follow by differentiation, term by term.
@@ -40,7 +39,7 @@ InputFunction = Callable[[float, Vector, Vector], tuple[float, float, float, flo
 #: Names of the forces in `MultiplierSolution.forces`, as in the FMI contract.
 FORCE_NAMES = (*(f"pin.{pin}.f{axis}" for pin in "ABCD" for axis in "xy"), "slider.guide_force")
 
-#: Refinements of the linear system after which no further digit is to be had.
+#: Number of iterative refinements of the linear system; more give no further digit.
 MOST_REFINEMENTS = 4
 
 # rows of the table of points: centres of mass first
@@ -63,12 +62,12 @@ class MultiplierSolution(NamedTuple):
     multipliers: Vector
     #: Crank torque (N.m): the given one, or the third multiplier.
     torque: float
-    #: Pin forces and guide force (N). A, B, D and the guide are from Newton's laws of the links, C is the multipliers.
+    #: Pin forces and guide force (N). A, B, D and the guide force are from Newton's laws of the links, C from the multipliers.
     forces: Mapping[str, float]
     #: Length by which the loop fails to close (m).
     closure: float
-    #: Largest difference between what Newton's laws and what the multipliers give for the force at C, the torque (as a
-    #: force at the crank pin) and the force on the slider, relative to the largest force of the mechanism.
+    #: Largest difference between Newton's laws and the multipliers in the force at C, the torque (as a force at the crank
+    #: pin) and the force on the slider, relative to the largest force of the mechanism.
     newton_mismatch: float
     #: Largest residual of the linear system after refinement, relative to the largest term of its row.
     residual: float
@@ -88,7 +87,7 @@ class RedundantRun(NamedTuple):
 
     @property
     def drift(self) -> float:
-        """Largest failure of loop closure over the run (m)."""
+        """Return the largest failure of loop closure over the run (m)."""
         return float(self.closure.max())
 
 
@@ -119,7 +118,7 @@ def _links(parameters: FiveBarParameters) -> _Links:
     arms[[_G4, _G5, _C_ROCKER], 3] = guide
     origin = np.zeros(8, dtype=complex)
     origin[[_G4, _G5, _C_ROCKER]] = l1
-    # the crank's inertia is given about its shaft: Steiner's part belongs to the motion of its centre of mass
+    # the crank's inertia is given about its shaft: subtract m r^2 to have it about the centre of mass
     crank_inertia = p.crank_inertia - p.crank_mass * p.crank_cog_distance**2
     return _Links(
         origin,
@@ -132,7 +131,7 @@ def _links(parameters: FiveBarParameters) -> _Links:
 
 
 class _State(NamedTuple):
-    """Points (8,), their Jacobian (8, 4), and their accelerations at q'' = 0 (8,)."""
+    """Positions of the points (8,), their Jacobian (8, 4), and their accelerations at q'' = 0 (8,)."""
 
     points: ComplexVector
     jacobian: ComplexVector
@@ -149,17 +148,17 @@ def _state(q: Vector, qd: Vector, links: _Links) -> _State:
 
 
 def _loop(x: ComplexVector) -> ComplexVector:
-    """What opens the loop: coupler's less rocker's, of the points at C, of their Jacobian rows or accelerations."""
+    """Return the difference of coupler and rocker at C, from positions, Jacobian or accelerations of all points."""
     return x[_C_COUPLER] - x[_C_ROCKER]
 
 
 def _real(x: ComplexVector) -> Vector:
-    """A complex row, or number, as its x and y rows: shape (...,) to (2, ...)."""
+    """Convert complex numbers to x and y rows: shape (...,) to (2, ...)."""
     return np.stack([x.real, x.imag])
 
 
 def assemble(parameters: FiveBarParameters, crank_angle: float, slider_position: float) -> Vector:
-    """Redundant coordinates that close the loop, from the law of cosines and Newton's iteration on (2.1)."""
+    """Return redundant coordinates that close the loop, by the law of cosines and Newton's iteration on (2.1)."""
     l3, l4 = parameters.coupler_length, parameters.rocker_length
     links = _links(parameters)
     state = _state(np.array([crank_angle, 0.0, 0.0, slider_position]), np.zeros(4), links)
@@ -176,7 +175,7 @@ def assemble(parameters: FiveBarParameters, crank_angle: float, slider_position:
 
 
 def rates(parameters: FiveBarParameters, q: ArrayLike, crank_speed: float, slider_velocity: float) -> Vector:
-    """Rates of the redundant coordinates that keep the loop closed, shape (4,): J q' = 0 for the two given ones."""
+    """Return the rates of the redundant coordinates, shape (4,), that keep the loop closed: J q' = 0 with two rates given."""
     loop = _real(_loop(_state(np.asarray(q, dtype=float), np.zeros(4), _links(parameters)).jacobian))
     w3, w4 = np.linalg.solve(loop[:, 1:3], -loop[:, [0, 3]] @ [crank_speed, slider_velocity])
     return np.array([crank_speed, w3, w4, slider_velocity])
@@ -188,7 +187,7 @@ def _mass_matrix(state: _State, links: _Links) -> Vector:
 
 
 def _slider_resistance(u: float, v: float, p: FiveBarParameters) -> float:
-    """Force (N) along the guide of spring, damper and friction."""
+    """Return the force of spring, damper and friction along the guide (N)."""
     return -(
         p.slider_stiffness * (u - p.slider_spring_free_position)
         + p.slider_damping * v
@@ -203,7 +202,7 @@ def _system(
     acting: tuple[float, float, float, float],
     crank_acceleration: float | None,
 ) -> tuple[Vector, Vector]:
-    """The 6 or 7 equations: symmetric matrix and right-hand side; unknowns are q'' and minus the multipliers."""
+    """Return matrix and right-hand side of the 6 or 7 equations; unknowns are q'' and minus the multipliers."""
     links = _links(parameters)
     state = _state(q, qd, links)
     torque, slider_force, *load = acting
@@ -221,10 +220,10 @@ def _system(
 
 
 def _refined_solve(matrix: Vector, rhs: Vector) -> tuple[Vector, float]:
-    """Solve a symmetric system with iterative refinement: the solution and its relative residual.
+    """Solve a symmetric system with iterative refinement; return the solution and its relative residual.
 
-    Rows and columns are first brought to like size (kg.m2, kg and m stand side by side in the matrix); the residuals are
-    formed in extended precision, as the thesis's subroutine does.
+    Rows and columns are first scaled to similar size, since kg.m2, kg and m occur together in the matrix. The residuals are
+    computed in extended precision, as in the thesis's subroutine.
     """
     scale: Vector = np.ones(len(rhs))
     for _ in range(3):
@@ -247,12 +246,12 @@ def _refined_solve(matrix: Vector, rhs: Vector) -> tuple[Vector, float]:
 
 
 def _cross(a: complex, b: complex) -> float:
-    """Moment of the force ``b`` at the arm ``a``."""
+    """Return the moment of the force ``b`` with the lever arm ``a``."""
     return (a.conjugate() * b).imag
 
 
 class _LinkForces(NamedTuple):
-    """Forces at A, B, C, D (N), of the guide (N), crank torque (N.m) and whole force on the slider along the guide (N)."""
+    """Forces at A, B, C, D (N), of the guide (N), crank torque (N.m) and total force on the slider along the guide (N)."""
 
     a: complex
     b: complex
@@ -264,13 +263,13 @@ class _LinkForces(NamedTuple):
 
 
 def _newton_euler(state: _State, accelerations: Vector, load: complex, links: _Links) -> _LinkForces:
-    """All forces at known accelerations, from Newton's and Euler's laws of crank, coupler, rocker and slider.
+    """Return all forces at known accelerations, from Newton's and Euler's laws of crank, coupler, rocker and slider.
 
-    Unknown are the pin forces A, B, C, D, the guide's force, the crank torque and the force along the guide: 11, with
-    three equations for each of crank, coupler and rocker about its own centre of mass, and two for the slider.
+    The 11 unknowns are the pin forces A, B, C, D, the guide's force, the crank torque and the force along the guide. There
+    are three equations for each of crank, coupler and rocker about its own centre of mass, and two for the slider.
     """
     acceleration = state.jacobian[:4] @ accelerations + state.centripetal[:4]
-    # what the unknown forces have to supply on each link, and in moment about its centre of mass
+    # right-hand sides: force and moment about the centre of mass that the unknown forces must supply on each link
     net = links.masses * (acceleration - links.gravity)
     spin = links.inertias * accelerations
     net[_G3] -= load
@@ -316,11 +315,11 @@ def solve_multipliers(
     load: tuple[float, float] = (0.0, 0.0),
     crank_acceleration: float | None = None,
 ) -> MultiplierSolution:
-    """Accelerations, multipliers and pin forces at one instant, from the redundant form (3.1-3.10).
+    """Return accelerations, multipliers and pin forces at one instant, from the redundant form (3.1-3.10).
 
     ``q`` and ``qd`` are th2, th3, th4 (rad, absolute), u (m) and their rates, see `assemble` and `rates`; the inputs are the
-    crank torque (N.m), the force on the slider (N) and that at the coupler point P (N, N). With a prescribed
-    ``crank_acceleration`` (rad/s2) its multiplier is the crank torque, and ``torque`` is of no effect.
+    crank torque (N.m), the force on the slider (N) and the force at the coupler point P (N, N). With a prescribed
+    ``crank_acceleration`` (rad/s2) its multiplier is the crank torque, and ``torque`` has no effect.
     """
     q, qd = np.asarray(q, dtype=float), np.asarray(qd, dtype=float)
     x, residual = _refined_solve(*_system(parameters, q, qd, (torque, slider_force, *load), crank_acceleration))
@@ -348,13 +347,13 @@ def solve_multipliers(
 
 
 def _closure(parameters: FiveBarParameters, q: Vector, qd: Vector) -> tuple[float, float]:
-    """Failure of (2.1) and of its first derivative (m, m/s)."""
+    """Return the closure error (2.1) and its time derivative (m, m/s)."""
     state = _state(q, qd, _links(parameters))
     return float(abs(_loop(state.points))), float(abs(_loop(state.jacobian) @ qd))
 
 
 def no_inputs(t: float, q: Vector, qd: Vector) -> tuple[float, float, float, float]:
-    """No torque, no control force, no load."""
+    """Return inputs of zero: no torque, no control force, no load."""
     return 0.0, 0.0, 0.0, 0.0
 
 
@@ -370,9 +369,9 @@ def simulate_redundant(
 ) -> RedundantRun:
     """Integrate all four redundant accelerations, as the thesis recommends to do first, with a method of SciPy.
 
-    Nothing holds the loop closed but the accelerations themselves: the failure of (2.1) that builds up is a measure of
-    the error of the equations and of the integration. With a prescribed ``speed`` its start takes the place of the initial
-    crank speed, and the torque of ``inputs`` has no effect.
+    Only the accelerations hold the loop closed: the closure error (2.1) that builds up measures the error of the equations
+    and of the integration. With a prescribed ``speed`` its start replaces the initial crank speed, and the torque of
+    ``inputs`` has no effect.
     """
     t = np.array(t_eval, dtype=float)
     q = assemble(parameters, initial.crank_angle, initial.slider_position)

@@ -1,13 +1,14 @@
-"""Special points of a driven oscillator by Fourier collocation, and its map over a period as a Taylor series.
+"""Find special points of a driven oscillator by Fourier collocation, and expand its map over a period as a Taylor series.
 
-Nothing here integrates over a period as the analyses do to find where a multiplier passes the unit circle: a motion of n turns
-is its values at equal steps of the crank angle th, its derivatives are those of the trigonometric polynomial through them, and
+The analyses find where a multiplier passes the unit circle by integration over a period. Nothing here integrates to find it: a
+motion of n turns is represented by its values at equal steps of the crank angle th, its derivatives are those of the
+trigonometric polynomial through these values, and
 
     J W^2 x'' + c W x' + g(x, th) = 0
 
-holds at every one of them. At a fold the linearised equation has a periodic solution v, at a period doubling one that is
-antiperiodic; motion, v and parameter are solved for together. The series of the map, for the normal forms, are those of the
-equation itself with x a polynomial in the deviations at the start.
+holds at every step. At a fold the linearised equation has a periodic solution v, at a period doubling an antiperiodic solution;
+motion, v and parameter are solved for together. The series of the map, for the normal forms, follow from the equation itself
+with x as a polynomial in the deviations at the start.
 """
 
 from __future__ import annotations
@@ -23,12 +24,12 @@ from scipy.integrate import solve_ivp
 from tests.mechanisms.torsion.equations import Constants
 
 Vector = NDArray[np.float64]
-#: Speed of the crank and constants at a value of the parameter.
+#: Function of the parameter's value that returns the crank speed and the constants of the equation.
 Law = Callable[[float], tuple[float, Constants]]
 
 
 class Found(NamedTuple):
-    """A special point: parameter, motion at equal steps of the angle, residual."""
+    """A special point: parameter, motion at equal steps of the crank angle, residual."""
 
     parameter: float
     motion: Vector
@@ -36,7 +37,10 @@ class Found(NamedTuple):
 
 
 def special_point(law: Law, motion: Vector, value: float, turns: int, *, antiperiodic: bool) -> Found:
-    """The fold, or with ``antiperiodic`` the period doubling, next to a motion given at equal steps of its period."""
+    """Return the fold, or with ``antiperiodic`` the period doubling, near a motion.
+
+    ``motion`` is given at equal steps of its period of ``turns`` turns; ``value`` is the parameter there.
+    """
     n = len(motion)
     angle = 2.0 * pi * turns * np.arange(n) / n
     first, second = (_derivative(n, turns, order, 0.0) for order in (1, 2))
@@ -78,35 +82,38 @@ def special_point(law: Law, motion: Vector, value: float, turns: int, *, antiper
 
 
 def _derivative(n: int, turns: int, order: int, shift: float) -> Vector:
-    """Derivative over the crank angle of what is given at n steps of a period; antiperiodic with a shift of a half."""
+    """Return the matrix of the derivative over the crank angle for values at n steps of a period.
+
+    ``shift`` is 0 for periodic functions and 0.5 for antiperiodic ones.
+    """
     wave = (np.fft.fftfreq(n, 1.0 / n) + shift) / turns
     twist = np.exp(2j * pi * shift * np.arange(n) / n)[:, None]
     spectrum = np.fft.fft(np.eye(n) * twist.conj(), axis=0)
     return (twist * np.fft.ifft((1j * wave[:, None]) ** order * spectrum, axis=0)).real
 
 
-#: Powers (i, j) of the two deviations of which the series are kept.
+#: Powers (i, j) of the two deviations in the terms of a series, up to order 3.
 POWERS = tuple((i, j) for i in range(4) for j in range(4 - i))
 
 
-#: Which products of two terms add to which term: shape (terms, terms, terms).
+#: 1 where the product of two terms (last two indices) belongs to a term (first index), else 0: shape (terms, terms, terms).
 _TIMES = np.array([[[(a + c, b + d) == e for c, d in POWERS] for a, b in POWERS] for e in POWERS], dtype=float)
 
 
 def _product(a: Vector, b: Vector) -> Vector:
-    """Product of two series."""
+    """Return the product of two series."""
     result: Vector = _TIMES @ b @ a
     return result
 
 
 def series(p: Constants, w: float, start: Vector, directions: Vector, turns: int) -> Vector:
-    """x and x' after a period as series in two deviations of the start; shape (2, number of `POWERS`).
+    """Return x and x' after a period as series in two deviations of the start; shape (2, number of `POWERS`).
 
     Parameters
     ----------
     start : ndarray, shape (2,)
     directions : ndarray, shape (2, 2)
-        The two deviations are of these columns.
+        The columns are the directions of the two deviations.
     """
     size = len(POWERS)
     initial = np.zeros((2, size))
@@ -132,10 +139,10 @@ def series(p: Constants, w: float, start: Vector, directions: Vector, turns: int
 
 
 def cubic_coefficient(p: Constants, w: float, start: Vector, turns: int, scale: Vector) -> float:
-    """Coefficient c of the normal form -s + c s^3 of the map on the centre manifold of a period doubling, s scaled.
+    """Return the coefficient c of the normal form s -> -s + c s^3 of the map at a period doubling, with s scaled by ``scale``.
 
-    The centre manifold is the graph s -> s q + h s^2 r over the eigenvectors q of -1 and r of the other multiplier; h and c
-    follow from that the map takes it to itself.
+    The map is reduced to its centre manifold, the graph s -> s q + h s^2 r over the eigenvectors q of -1 and r of the other
+    multiplier. The condition that the map takes the manifold to itself determines h and c.
     """
     linear = series(p, w, start, np.diag(scale), turns)[:, [POWERS.index(k) for k in ((1, 0), (0, 1))]] / scale[:, None]
     values, vectors = np.linalg.eig(linear)
@@ -154,7 +161,10 @@ def cubic_coefficient(p: Constants, w: float, start: Vector, turns: int, scale: 
 
 
 def curvature_at_fold(p: Constants, w: float, start: Vector, turns: int, scale: Vector) -> float:
-    """Half the second derivative of the map along the eigenvector of 1, seen along the other; its sign is the vector's."""
+    """Return half the second derivative of the map along the eigenvector of 1, projected onto it along the other eigenvector.
+
+    Its sign depends on the sign of the eigenvector.
+    """
     linear = series(p, w, start, np.diag(scale), turns)[:, [POWERS.index(k) for k in ((1, 0), (0, 1))]] / scale[:, None]
     values, vectors = np.linalg.eig(linear)
     basis = vectors.real[:, np.argsort(np.abs(values.real - 1.0))]

@@ -1,7 +1,7 @@
-"""Planar linkages in all coordinates of their bodies: closure from the description, Lagrange multipliers for the joints.
+"""Planar linkages in all coordinates of their bodies: loop closure from the description, Lagrange multipliers for the joints.
 
-Nothing of `linkwork.planar` or of the structure analysis is used: each body has a place (x, y, angle), each joint its
-equations, and accelerations and joint forces follow from one linear system.
+Neither `linkwork.planar` nor the structure analysis is used. Each body has a place (x, y, angle), each joint has its
+constraint equations; accelerations and joint forces follow from one linear system.
 """
 
 from __future__ import annotations
@@ -22,12 +22,12 @@ _UNITS = pint.UnitRegistry()
 
 
 def number(value: Any) -> float:
-    """A number in SI of an entry that may be a text with a unit."""
+    """Return an entry as a number in SI units; it may be a text with a unit."""
     return float(_UNITS.Quantity(value).to_base_units().magnitude) if isinstance(value, str) else float(value)
 
 
 def interpolated(rows: list[list[float]], x: Any) -> Any:
-    """The line through the rows about x, the first and the last one beyond them."""
+    """Return the piecewise linear interpolation of rows (x, y) at x; the first and last segments are extrapolated."""
     lines = [y0 + (y1 - y0) / (x1 - x0) * (x - x0) for (x0, y0), (x1, y1) in pairwise(rows)]
     found = lines[0]
     for (knot, _), line in zip(rows[1:], lines[1:]):
@@ -36,9 +36,10 @@ def interpolated(rows: list[list[float]], x: Any) -> Any:
 
 
 class Solution(NamedTuple):
-    """Accelerations of the freedoms, loads on them, kinetic energy; by joint (x, y) of a pin, (across, couple) of a slide.
+    """Accelerations of the freedoms, loads on them, joint forces and kinetic energy.
 
-    ``friction`` is the force along each slot that has some.
+    ``forces`` are (x, y) for a pin, (force across, couple) for a slide, by joint. ``friction`` is the force along each slot
+    that has friction.
     """
 
     accelerations: np.ndarray
@@ -49,7 +50,7 @@ class Solution(NamedTuple):
 
 
 class Multipliers:
-    """The equations of one description."""
+    """The equations of motion of one linkage description."""
 
     def __init__(self, description: Description) -> None:
         self.d = description
@@ -95,30 +96,30 @@ class Multipliers:
         self.joints = casadi.Function("joints", [self.q], [both, casadi.jacobian(both, self.q)])
 
     def pose(self, body: str) -> Any:
-        """Place of a body."""
+        """Return the place (x, y, angle) of a body."""
         if body == GROUND:
             return casadi.SX(3, 1)
         n = self.bodies.index(body)
         return self.q[3 * n : 3 * n + 3]
 
     def at(self, body: str, own: str) -> tuple[Any, Any]:
-        """A point of a body."""
+        """Return the position of a point of a body."""
         x, y = self.d.ground[own] if body == GROUND else self.d.bodies[body].all_points[own]
         px, py, angle = casadi.vertsplit(self.pose(body))
         return px + x * casadi.cos(angle) - y * casadi.sin(angle), py + x * casadi.sin(angle) + y * casadi.cos(angle)
 
     def line(self, s: Any) -> tuple[tuple[Any, Any], tuple[Any, Any]]:
-        """Normal and a point of the line of a slide or a slot."""
+        """Return the normal, and a point, of the line of a slide or slot."""
         angle = self.pose(s.on)[2] + s.direction
         return (-casadi.sin(angle), casadi.cos(angle)), self.at(s.on, s.through)
 
     def carrier(self, one: str, other: str) -> str:
-        """The body to which both gears are pinned."""
+        """Return the body to which both gears are pinned."""
         pinned = [{b for of in self.owners.values() if gear in of for b in of} for gear in (one, other)]
         return next(iter((pinned[0] & pinned[1]) - {one, other}))
 
     def meshed(self, r: Any) -> tuple[str, str, str]:
-        """The pin of a gear, the slide of its rack, and the body that both are on."""
+        """Return the pin of a gear, the slide of its rack, and the body that carries both."""
         for slide, s in self.d.slides.items():
             for carrier in {s.on, s.body} - {r.rack} if r.rack in (s.on, s.body) else ():
                 for pin, of in self.owners.items():
@@ -127,7 +128,7 @@ class Multipliers:
         raise AssertionError(r)
 
     def coordinate(self, joint: str) -> Any:
-        """Coordinate of a joint."""
+        """Return the coordinate of a joint."""
         if joint in self.d.slides or joint in self.d.slots:
             if joint in self.d.slides:
                 s: Any = self.d.slides[joint]
@@ -141,11 +142,11 @@ class Multipliers:
         return self.pose(second)[2] - self.pose(first)[2]
 
     def moving(self, own: str) -> str:
-        """The body on which a force at a point acts: the first that moves, where several are pinned there."""
+        """Return the body on which a force at a point acts: of all bodies pinned there, the first that moves."""
         return next((body for body in self.owners[own] if body != GROUND), GROUND)
 
     def stretch(self, s: Any) -> Any:
-        """What a spring measures."""
+        """Return the length or angle that a spring measures."""
         if s.at:
             return self.coordinate(s.at)
         if s.bodies:
@@ -154,7 +155,7 @@ class Multipliers:
         return casadi.sqrt((bx - ax) ** 2 + (by - ay) ** 2)
 
     def mass(self, name: str) -> tuple[float, tuple[float, float], float]:
-        """Mass, centre of mass in the body and moment of inertia of a body."""
+        """Return mass, centre of mass in the body's frame, and moment of inertia of a body."""
         body = self.d.bodies[name]
         if body.section is not None:
             mass, centre, inertia = body.section.properties(body.length)
@@ -162,17 +163,17 @@ class Multipliers:
         return body.mass or 0.0, body.cog if body.cog is not None else (0.5 * body.length, 0.0), body.inertia or 0.0
 
     def centre(self, name: str) -> tuple[Any, Any]:
-        """Centre of mass of a body."""
+        """Return the position of a body's centre of mass."""
         x, y = self.mass(name)[1]
         px, py, angle = casadi.vertsplit(self.pose(name))
         return px + x * casadi.cos(angle) - y * casadi.sin(angle), py + x * casadi.sin(angle) + y * casadi.cos(angle)
 
     def residual(self, q: np.ndarray) -> float:
-        """Largest closure error."""
+        """Return the largest closure error at places q."""
         return float(np.abs(np.asarray(casadi.Function("c", [self.q], [self.closure])(q))).max(initial=0.0))
 
     def share(self, forces: dict[str, np.ndarray], q: np.ndarray, gear: Any, couple: float) -> None:
-        """Replace the couple between two gears, all that closure knows, by a force at their pitch point."""
+        """Replace the couple between two gears, as closure gives it, by a force at their pitch point; change the pin forces."""
         carrier = self.carrier(*gear.bodies)
         pins = [next(own for own, of in self.owners.items() if {carrier, body} <= set(of)) for body in gear.bodies]
         places = [casadi.Function("p", [self.q], [casadi.vertcat(*self.at(carrier, own))])(q) for own in pins]
@@ -187,7 +188,7 @@ class Multipliers:
                 forces[own] = forces[own] + sign * force * (1.0 if self.owners[own][0] == body else -1.0)
 
     def pull(self, forces: dict[str, np.ndarray], q: np.ndarray, rack: Any, pull: float) -> None:
-        """Replace the force on the block and the couple on the gear, that closure knows, by a force at the pitch point."""
+        """Replace the force on the block and the couple on the gear, as closure gives them, by a force at the pitch point."""
         pin, name, carrier = self.meshed(rack)
         s = self.d.slides[name]
         angle = casadi.Function("a", [self.q], [self.pose(s.on)[2] + s.direction])
@@ -208,7 +209,7 @@ class Multipliers:
                 forces[own] = forces[own] + sign * side * pull * along
 
     def placed(self, coordinates: np.ndarray, guess: np.ndarray, sweeps: int = 20) -> np.ndarray:
-        """Places of the bodies at coordinates of the freedoms, by Newton's method."""
+        """Return the places of the bodies at given coordinates of the freedoms, by Newton's method from a guess."""
         q = guess
         for _ in range(sweeps):
             residual, jacobian = (np.asarray(a) for a in self.joints(q))
@@ -219,7 +220,11 @@ class Multipliers:
         return q
 
     def function(self, points: Mapping[str, tuple[float, float]], forces: Mapping[str, float]) -> Any:
-        """Derivatives of closure and freedoms, drift, mass matrix, forces and kinetic energy, as a function."""
+        """Return a function of places and velocities, for given forces on points and forces of springs.
+
+        It returns the Jacobian of closure and freedoms, their drift, the mass matrix, the generalised forces and the kinetic
+        energy.
+        """
         key = (*points.items(), *forces.items())
         if key not in self._functions:
             self._functions[key] = self._made(points, forces)
@@ -247,7 +252,7 @@ class Multipliers:
             x, v = measure - number(s.free), casadi.jtimes(measure, self.q, self.v)
             about = s.bodies or s.at in self.owners
             if about and s.at not in freed:
-                # an angle that nothing counts is known up to whole turns
+                # an angle that is no freedom's coordinate is known only up to whole turns
                 x = casadi.atan2(casadi.sin(x), casadi.cos(x))
             known = {own: value for own, (value, _) in s.constants.items()}
             functions = {"fabs": casadi.fabs, "tanh": casadi.tanh}
@@ -273,7 +278,7 @@ class Multipliers:
         return casadi.Function("f", [self.q, self.v], [jacobian, drift, inertia_of, force, kinetic])
 
     def rubbing(self, q: np.ndarray, v: np.ndarray) -> dict[str, tuple[float, np.ndarray]]:
-        """Friction of each joint for a force of 1 N in it: along its coordinate, and in all coordinates."""
+        """Return the friction of each joint per newton of joint force: along its coordinate, and in all coordinates."""
         found = {}
         for name, value in self.d.friction.items():
             measure, slow = self.coordinate(name), FRICTION_RATE if name in self.owners else FRICTION_SPEED
@@ -291,9 +296,10 @@ class Multipliers:
         points: Mapping[str, tuple[float, float]],
         forces: Mapping[str, float],
     ) -> Solution:
-        """Solve at places q for the rates of the freedoms, the loads along them or their commanded accelerations.
+        """Solve for accelerations and forces at places q, given the rates of the freedoms.
 
-        ``points`` are forces on points, ``forces`` torques on bodies and forces of driven springs by their names.
+        Freedoms have the given loads, or commanded accelerations by their index. ``points`` are forces on points, ``forces``
+        torques on bodies and forces of driven springs, by name.
         """
         f = self.function(points, forces)
         j = np.asarray(f(q, np.zeros(len(q)))[0])
@@ -312,7 +318,7 @@ class Multipliers:
         wanted = np.concatenate([-d[:size, 0], [commanded[n] - d[size + n, 0] for n in held]])
         rubbing = self.rubbing(q, v)
         rubbed, before = np.zeros(len(q)), np.full(len(q), np.inf)
-        # friction and the forces by which it grows, in turns
+        # iterate between the joint forces and the friction that depends on them
         for _ in range(200):
             solution = np.linalg.solve(
                 matrix, np.concatenate([right[:, 0] + along[free].T @ loads[free] + rubbed, wanted])
@@ -337,9 +343,10 @@ class Multipliers:
     def on_bodies(
         self, solution: Solution, pulls: Mapping[str, float], q: np.ndarray
     ) -> dict[tuple[str, str], np.ndarray]:
-        """Force of each pin on each of its bodies (x, y), of all the others together; those of slots and their friction too.
+        """Return the total force (x, y) of all other bodies on each body at each of its pins.
 
-        ``pulls`` are the forces of springs along slots, which act on their blocks.
+        Forces of slots and their friction are included. ``pulls`` are the forces of springs along slots, which act on their
+        blocks.
         """
         forces = solution.forces
         found: dict[tuple[str, str], np.ndarray] = {}
@@ -370,9 +377,9 @@ class Multipliers:
         loads: np.ndarray | None = None,
         forces: Mapping[str, float] | None = None,
     ) -> tuple[np.ndarray, np.ndarray]:
-        """Integrate from time[0] under constant loads; returns coordinates and rates of the freedoms at all times.
+        """Integrate from time[0] under constant loads; return coordinates and rates of the freedoms at all times.
 
-        ``commanded`` freedoms keep their rates; ``guess`` is near the places of the bodies at the start.
+        Freedoms with an index in ``commanded`` keep their rates. ``guess`` is near the places of the bodies at the start.
         """
         n, last = len(coordinates), [guess]
         points = {load.point: (0.0, 0.0) for load in self.d.loads}

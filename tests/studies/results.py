@@ -1,4 +1,4 @@
-"""What the tests of all studies share: their results, and what must be true of each."""
+"""Compute the results of the studies once for all their tests, and check what must be true of each study."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from analysis import studies
 from analysis.studies.statements import HOLDS, LISTING, OUTCOMES, TEXT, Statement
 from analysis.studies.study import StudyResult
 
-#: What holds in part, does not hold or cannot be judged, by study: the beginning of the quote and the verdict.
+#: Statements that do not simply hold, by study: the beginning of the quote, and the verdict.
 VERDICTS = tomllib.loads(Path(__file__).with_name("verdicts.toml").read_text(encoding="utf-8"))
 #: Studies whose results take more than a second or two.
 LONG = {
@@ -23,30 +23,30 @@ LONG = {
     *(f"8.{n}" for n in (*range(7, 12), *range(13, 22))),
     *("rig-1-resonance", "rig-1-friction", "rig-2-forces", "rahman-closure", "rahman-rates"),
 }
-#: Those of them that take half a minute and more.
+#: Studies of `LONG` that take half a minute and more.
 LONGEST = {"8.16", "8.19", "8.21", "rig-1-resonance", "rig-1-friction", "rahman-closure"}
 
 
 @cache
 def result(number: str) -> StudyResult:
-    """Return the result of a study, computed once in a process."""
+    """Return the result of a study; it is computed once in a process."""
     return studies.load(number).compute()
 
 
 def statement(number: str, beginning: str) -> Statement:
-    """Return the statement of a study whose quote begins so."""
+    """Return the statement of a study whose quote begins with ``beginning``."""
     (found,) = (s for s in result(number).statements if s.quote.startswith(beginning))
     return found
 
 
 def every(*beginnings: str) -> pytest.MarkDecorator:
-    """Parametrise a test over the studies whose numbers begin so; those that take long are slow tests."""
+    """Parametrise a test over the studies whose numbers begin with one of the texts; long studies are marked slow or long."""
     numbers = [n for n in studies.STUDIES if n.startswith(beginnings)]
     return pytest.mark.parametrize("number", [pytest.param(n, marks=marks_of(n)) for n in numbers])
 
 
 def marks_of(number: str) -> tuple[pytest.MarkDecorator, ...]:
-    """Return the marks of a test that needs the results of a study."""
+    """Return the marks of a test that needs the result of a study: slow, long or none."""
     return (pytest.mark.long,) if number in LONGEST else (pytest.mark.slow,) if number in LONG else ()
 
 
@@ -62,7 +62,7 @@ def check(number: str) -> None:
 
 
 def check_verdicts(number: str) -> None:
-    """Check that the statements that do not simply hold are those of the table, and that each says what and why."""
+    """Check that the statements that do not simply hold are those in `VERDICTS`, and that all statements are complete."""
     found = result(number).statements
     for s in found:
         assert s.source.kind in (TEXT, LISTING)
@@ -79,7 +79,7 @@ def check_verdicts(number: str) -> None:
 
 
 def check_plot_and_data(number: str) -> None:
-    """A heading, labels and curves in the plot; columns of one length with units."""
+    """Check that the plot has a heading, labels and curves, and that the data columns have one length and units."""
     study, found = studies.load(number), result(number)
     assert found.claim
     if study.draw is None:

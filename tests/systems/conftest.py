@@ -1,4 +1,4 @@
-"""Systems of the library, wired once."""
+"""Systems of the library for the tests, loaded and wired once."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ def wiring_of(name: str) -> Wiring:
 
 
 def started_in_its_modes(name: str, folder: Path) -> Wiring:
-    """A system without rates, with FMUs that have all its start values inside, for masters that do not set integers."""
+    """Return a system without rates for masters that set no integers: its FMUs contain all their start values."""
     wiring, parts = system_of(name).without_rates().wiring(), {}
     for part, member in system_of(name).members.items():
         assert member.mechanism is not None

@@ -1,7 +1,7 @@
-"""The hydraulic part of a published benchmark as an FMU: F. Gonzalez, cosim-benchmarks, hydraulic manipulator, section 1.2.
+"""Model the hydraulic part of a published benchmark: F. Gonzalez, cosim-benchmarks, hydraulic manipulator, section 1.2.
 
-A cylinder with two chambers between pump and tank, of which a valve opens each by its share. Over a sample the motion of the
-arm goes on at the speed that it had; the pressures follow by Runge and Kutta's method.
+A cylinder has two chambers between pump and tank. A valve opens the ports of both chambers. The speed of the arm is assumed
+constant over a sample; the pressures are integrated by Runge and Kutta's method.
 """
 
 from __future__ import annotations
@@ -14,20 +14,20 @@ from analysis.export.controllers import Controller, Row
 #: and tank (Pa), compressibility (1/Pa, 1/Pa2); the greatest area of a valve (m2).
 AREA, LENGTH, FRICTION, DISCHARGE, DENSITY, PUMP, TANK = 65e-4, 0.442, 1e5, 0.67, 850.0, 7.6e6, 0.1e6
 A, B, VALVE = 6.53e-10, -1.19e-18, 5e-4
-#: Of the start in equilibrium: length of the actuator (m), pressures (Pa), opening of the valve.
+#: Equilibrium at the start: length of the actuator (m), pressures of the chambers (Pa), opening of the valve (0 to 1).
 START, PRESSURES, OPENING = 0.5, (3170846.2, 4529153.8), 0.45434559
-#: Steps of the pressures in a sample.
+#: Number of integration steps of the pressures in a sample.
 STEPS = 4
 
 
 def opening(t: float) -> float:
-    """Manoeuvre M1: a step of -0.01 at 2 s and of +0.03 at 6 s, each over 1 or 2 ms."""
+    """Return the opening of the valve in manoeuvre M1: steps of -0.01 at 2 s and +0.03 at 6 s, over 1 and 2 ms."""
     down, up = min(max((t - 2.0) / 1e-3, 0.0), 1.0), min(max((t - 6.0) / 2e-3, 0.0), 1.0)
     return OPENING - 0.01 * down + 0.03 * up
 
 
 def rates(t: float, p: tuple[float, float], s: float, ds: float) -> tuple[float, float]:
-    """Rates of the pressures, eqs 9 and 10."""
+    """Return the time derivatives of both pressures (Pa/s), eqs 9 and 10; ``s`` is the actuator's length, ``ds`` its rate."""
     kappa = opening(t)
     inlet, outlet = VALVE * kappa, VALVE * (1.0 - kappa)
 
@@ -61,7 +61,7 @@ class Hydraulics(Controller):
         ds = sqrt(3.0) * sin(self.angle) / (4.0 * s) * self.speed
         h, p = self.sample_time / STEPS, (self.first, self.second)
         for n in range(STEPS if self.count > 0 else 0):
-            # the sample before lies behind: its motion is that up to now
+            # integrate over the last sample period, with the motion extrapolated backwards from now
             start, place = t - self.sample_time + n * h, s - ds * (self.sample_time - n * h)
 
             def slope(

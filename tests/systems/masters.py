@@ -1,7 +1,8 @@
-"""The masters of the tests of systems. Each function runs in a process of its own, and imports what it needs inside itself.
+"""Run archives of SSP in the masters of the tests.
 
-All take an archive of SSP, which some read themselves; a communication step and the number of steps; names of outputs; and
-options of their own. They return the outputs at the end.
+Each function runs in a process of its own and imports there what it needs. Its arguments are the archive, the communication
+step and the number of steps, the names of outputs, and options of the master. The function returns the outputs at the end.
+Masters that do not read archives are wired by hand.
 """
 
 from __future__ import annotations
@@ -10,7 +11,7 @@ from typing import Any
 
 
 def by_fmpy(archive: str, step: float, count: int, names: list[str], parameter_set: bool = True) -> Any:
-    """FMPy's runner of SSP: it takes start values as one set, and records what is connected."""
+    """Run the archive by FMPy's runner of SSP, which takes start values as one set and records only connected variables."""
     from fmpy.ssp.simulation import simulate_ssp
     from fmpy.ssp.ssd import Parameter, ParameterSet
     from ssp_archive import unpack
@@ -25,7 +26,7 @@ def by_fmpy(archive: str, step: float, count: int, names: list[str], parameter_s
 
 
 def by_libcosimpy(archive: str, step: float, count: int, names: list[str]) -> Any:
-    """libcosim's fixed-step algorithm on the unpacked archive."""
+    """Run the unpacked archive by libcosim's fixed-step algorithm."""
     from libcosimpy.CosimExecution import CosimExecution
     from libcosimpy.CosimObserver import CosimObserver
     from ssp_archive import unpack
@@ -45,10 +46,10 @@ def by_libcosimpy(archive: str, step: float, count: int, names: list[str]) -> An
 
 
 def by_ecco(archive: str, stop_time: float, tolerance: float, bond: list[str], names: list[str]) -> Any:
-    """libcosim's ECCO algorithm on the FMUs of an archive, with a power bond; it chooses its steps.
+    """Run the FMUs of an archive by libcosim's ECCO algorithm, with a power bond; it chooses its steps.
 
-    The bond has an effort and the input that it goes to, a flow and the input that it goes to. All values come at all
-    communication points.
+    ``bond`` names an effort and the input to which it goes, a flow and the input to which it goes. The result has all values
+    at all communication points.
     """
     from libcosimpy.CosimAlgorithm import CosimAlgorithm, EccoParams
     from libcosimpy.CosimEnums import CosimVariableType
@@ -86,7 +87,7 @@ def by_ecco(archive: str, stop_time: float, tolerance: float, bond: list[str], n
     assert algorithm.add_power_bond(effort[0], effort[1], flow_to[1], flow[0], flow[1], effort_to[1]) == 0
     observer = CosimObserver.create_time_series(buffer_size=100_000)
     execution.add_observer(observer)
-    # the algorithm reads the inputs of the bond as they are observed
+    # the algorithm reads the inputs of the bond only if they are observed
     for name in (*bond, *names):
         observer.start_time_series(*end(name), CosimVariableType.REAL)
     assert execution.simulate_until(round(stop_time * 1e9))
@@ -99,7 +100,7 @@ def by_ecco(archive: str, stop_time: float, tolerance: float, bond: list[str], n
 
 
 def by_ecospy(archive: str, step: float, count: int, names: list[str]) -> Any:
-    """ecos on the archive, with the start values of the sets of one name."""
+    """Run the archive by ecos, with the start values of the parameter sets named "default"."""
     from ecospy import EcosSimulation
 
     with EcosSimulation(ssp_path=archive, step_size=step) as simulation:
@@ -111,10 +112,13 @@ def by_ecospy(archive: str, step: float, count: int, names: list[str]) -> Any:
 
 
 def by_cofmupy(archive: str, step: float, count: int, names: list[str], iterative: bool = False) -> Any:
-    """CoFMUPy, wired by hand: it sets Reals alone, so that the FMUs must start in their modes; and all inputs."""
+    """Run the FMUs by CoFMUPy, wired by hand.
+
+    It sets only Reals, so that the FMUs must have the values of their modes as start values; and it sets all inputs.
+    """
     import sys
 
-    sys.path.insert(0, f"{sys.prefix}/cofmupy")  # with the version of FMPy that it is for
+    sys.path.insert(0, f"{sys.prefix}/cofmupy")  # with the version of FMPy that CoFMUPy needs
     from cofmupy import Coordinator
     from ssp_archive import unpack
 
@@ -134,9 +138,9 @@ def by_cofmupy(archive: str, step: float, count: int, names: list[str], iterativ
 
 
 def by_pathsim(archive: str, step: float, count: int, names: list[str]) -> Any:
-    """PathSim's blocks of FMUs, wired by hand.
+    """Run the FMUs by PathSim's blocks, wired by hand.
 
-    A block shows what it came to at its next step, and its neighbour sees it then.
+    A block shows the outputs of a step only at its next step, and only then its neighbour receives them.
     """
     from pathsim import Connection, Simulation
     from pathsim.blocks import Constant
@@ -166,7 +170,7 @@ def by_pathsim(archive: str, step: float, count: int, names: list[str]) -> Any:
 def by_linkwork(
     archive: str, step: float, count: int, names: list[str], coupling: str = "hold", share: float | None = None
 ) -> Any:
-    """Our own master."""
+    """Run the archive by our own master."""
     from analysis.systems import read_ssp, run_system
 
     run = run_system(read_ssp(archive), step=step, stop_time=count * step, coupling=coupling, share=share)

@@ -76,9 +76,10 @@ def forces(chosen: MechanismChoice, problem: Problem, frames: Sequence[int], out
 
 
 def _extremes(turn: ForceTurn, frames: Sequence[int], units: Units) -> Sequence[Sequence[str]]:
-    """Return rows of a table: least and greatest value of each quantity with their crank angles, in ``frames``.
+    """Return the rows of a table: least and greatest value of each quantity, with the crank angles at which they occur.
 
-    Forces and torques near singular angles are left out.
+    ``frames`` are the numbers of the frames in which joint forces are given. Forces and torques near singular angles are left
+    out.
     """
     quantities: list[tuple[str, str, Any]] = [
         ("slider position", "m", turn.slider_position),

@@ -76,8 +76,9 @@ class Units:
 class MechanismChoice:
     """The mechanism that the options of a command choose.
 
-    ``name`` is the first part of the names of files that are written. ``shift`` (m) is the constant shift S1 of the crank,
-    unless a ``groove``, "shaft" or "apart", moves the crank. ``speed`` is the crank speed (rad/s).
+    ``name`` is the first part of the names of files that are written. ``shift`` (m) is the constant shift S1 of the crank; it
+    has no effect if a groove moves the crank. ``groove`` is "shaft" for a groove in the crank shaft, "apart" for a drive apart
+    from the crank, None without a groove. ``speed`` is the crank speed (rad/s).
     """
 
     name: str
@@ -90,14 +91,14 @@ class MechanismChoice:
 
     @property
     def law(self) -> PeriodicShift:
-        """The shift as a function of the crank angle, for ranges of assembly and pictures."""
+        """Return the shift as a function of the crank angle, for ranges of assembly and pictures."""
         if self.groove is None:
             return sc.constant_shift(self.shift)
         return sc.groove_shift(self.parameters)
 
     @property
     def force_law(self) -> ShiftLaw:
-        """The shift as a function of the crank angle, for force problems."""
+        """Return the shift as a function of the crank angle, for force problems."""
         p = self.parameters
         if self.groove is None:
             return sc.ConstantShift(self.shift)

@@ -83,12 +83,12 @@ def follow_crossing(
     place : (float, float)
         The point of the plane at which the orbit is.
     x, y : (float, float)
-        The box.
+        Ranges of the two parameters, which form the box.
     first, greatest, widest : float
         First and greatest step in scaled arc length, in which each side of the box has length 1 and the crank's length counts
         as 1; and the greatest step along one side of the box.
     most_points : int
-        Points at most in each direction.
+        Greatest number of points in each direction.
 
     Raises
     ------
@@ -113,9 +113,10 @@ def follow_crossing(
 
 
 def _evaluate(at: Plane, turns: int, kind: Crossing, scale: NDArray[np.float64], settings: Settings) -> Evaluate:
-    """Return a function that evaluates G = (y(T) - y(0), test) and its derivatives at unknowns (y(0), x) and a parameter y.
+    """Return a function that evaluates G = (y(T) - y(0), test) and its derivatives at unknowns (y(0), p) and a parameter q.
 
-    x and y are the two parameters of the plane; y(0) and y(T) are the state y of the orbit at the beginning and the end.
+    p and q are the two parameters of the plane; y(0) and y(T) are the state y of the orbit at the beginning and at the end of
+    the period.
     """
     n = len(scale) - 1
     (low, high), (bottom, top) = settings.bounds[n], (settings.low, settings.high)
@@ -126,7 +127,7 @@ def _evaluate(at: Plane, turns: int, kind: Crossing, scale: NDArray[np.float64],
     def values(z: NDArray[np.float64]) -> tuple[NDArray[np.float64], PeriodicOrbit]:
         point = operating_point(*at(float(z[n]), float(z[n + 1])))
         orbit, shift = trial_orbit(point, z[:n], turns, path)
-        # the dimensionless test is multiplied by the scale of x, to which its row belongs
+        # the dimensionless test is multiplied by the scale of p, to which its row belongs
         return np.append(shift, scale[n] * crossing_test(orbit.monodromy, kind)), orbit
 
     steps = _DIFFERENCE * np.append(scale, settings.high - settings.low)
@@ -264,12 +265,12 @@ def orbit_monodromy(operation: Plane, *, start: ArrayLike | None = None, near: G
 
 
 def plane_test(matrix: Monodromy, crossing: Crossing | int) -> Test:
-    """Return a test function of a point (x, y) of a plane: the `crossing_test` of the monodromy matrix at this point."""
+    """Return a test function of a point (x, y) of a plane: the `crossing_test` of the monodromy matrix at the point."""
     return lambda x, y: float(crossing_test(matrix(x, y), crossing))
 
 
 def orbit_test(operation: Plane, multiplier: int, *, start: ArrayLike | None = None) -> Test:
-    """Return the test function of the mechanism's own periodic orbit over a plane: see `plane_test` and `orbit_monodromy`.
+    """Return the test function of the mechanism's periodic orbit over a plane: see `plane_test` and `orbit_monodromy`.
 
     ``multiplier`` is +1 or -1: the test function is zero where a Floquet multiplier of the orbit has this value.
     """
@@ -280,12 +281,15 @@ def orbit_test(operation: Plane, multiplier: int, *, start: ArrayLike | None = N
 
 
 class RemovalError(LinkworkError):
-    """The damping that removes a region does not lie in the given range."""
+    """The damping that removes a region of instability does not lie in the given range."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RemovingDamping:
-    """Damping at which a region vanishes; at the tip of the region the other parameter x, and the test function's value."""
+    """Damping at which a region of instability vanishes.
+
+    ``x`` is the other parameter where the region vanishes, and ``residual`` the test function's value at this point.
+    """
 
     damping: float
     x: float
@@ -300,7 +304,7 @@ def removing_damping(
     samples: int = 40,
     tolerance: float = 1e-8,
 ) -> RemovingDamping:
-    """Find the damping at which a region of instability vanishes, so that the least value of its test function is zero.
+    """Find the damping at which a region of instability vanishes: the least value of its test function over x is then zero.
 
     Parameters
     ----------
@@ -313,7 +317,7 @@ def removing_damping(
     samples : int
         Number of samples of x from which the search for the least value begins.
     tolerance : float
-        Tolerance of the damping, relative to its upper end.
+        Tolerance of the damping, relative to the upper end of its range.
 
     Raises
     ------

@@ -94,7 +94,7 @@ class Axis:
 
     @property
     def label(self) -> str:
-        """Name with unit."""
+        """Name of the parameter with its unit."""
         return f"{self.name} [{self.unit}]"
 
     def format_value(self, value: float) -> str:
@@ -156,7 +156,7 @@ class StabilityChart(NotebookResult):
     runs : tuple of Run
         Long runs at up to three points.
     most : int
-        Greatest number of stable motions found at one point, on the searched lines or in ``beside``.
+        Greatest number of stable motions found at one point of the searched lines or of the grid of ``beside``.
     beside : Coexistence or None
         All motions at every point of the grid; None if they were not asked for.
     problems : tuple of str
@@ -235,13 +235,13 @@ def stability_chart(
     Parameters
     ----------
     parameters : parameters of a mechanism
-        Or a published set or its name.
+        Parameters, a published set, or the name of a published set.
     drive : Drive, optional
         Crank speed or torque, and constant forces, except those that are axes of the chart. For a published set the drive may
         be omitted: the set is then driven at its own speed.
     names : (str, str), optional
-        FMI names of the parameters along x and y; by default the crank speed and the damping of the first freedom other than
-        the crank, for a five-bar ``drive.speed`` and ``slider.damping``.
+        FMI names of the parameters along x and y; by default the crank speed and the damping of the first degree of freedom
+        other than the crank, for a five-bar ``drive.speed`` and ``slider.damping``.
     ranges : ((float, float), (float, float)), optional
         Ranges of the two parameters, in SI or as text such as "420 rpm"; see `default_range`.
     points : int
@@ -384,7 +384,7 @@ class _Survey:
             )
 
     def trace(self, motion: str, matrix: Monodromy, kind: Crossing) -> None:
-        """Find and trace the boundaries of one kind for a motion, given by name and monodromy matrix, by a test function."""
+        """Find and trace, by a test function, the boundaries of one kind for a motion given by name and monodromy matrix."""
         result = chart(plane_test(matrix, kind), self.box, lines=LINES, samples=SAMPLES)
         self.traced += [
             TracedBoundary(points=b.points, motion=motion, kind=kind, ends=b.ends) for b in result.boundaries
@@ -534,9 +534,9 @@ class _Survey:
 
 
 def unmet_lines(beside: Coexistence, lines: Sequence[float], boundaries: Sequence[NDArray[np.float64]]) -> list[float]:
-    """Return lines y = const, one through each region that no searched line crosses and no known boundary touches.
+    """Return values of y of further lines to search: one through each region that no searched line or known boundary meets.
 
-    A region is a connected set of grid points with the same number of stable motions. The result is the values of y.
+    A region is a connected set of grid points with the same number of stable motions.
 
     Parameters
     ----------
@@ -564,7 +564,7 @@ def unmet_lines(beside: Coexistence, lines: Sequence[float], boundaries: Sequenc
 def _belongs(found: Grid, orbit: PeriodicOrbit, place: Sequence[float]) -> bool:
     """Return whether an orbit belongs to the motion of a grid.
 
-    The start of the orbit must be near the start of an orbit of the grid, at one of the grid points around ``place``.
+    This is so if the orbit's start is near the start of an orbit at one of the grid points around ``place``.
     """
     scale = orbit.scale
     distance = np.linalg.norm((found.nearby_starts(*place) - orbit.start) / scale, axis=1)
@@ -573,7 +573,7 @@ def _belongs(found: Grid, orbit: PeriodicOrbit, place: Sequence[float]) -> bool:
 
 @takes_published()
 def default_range(parameters: Parameters, drive: Drive, name: str) -> tuple[float, float]:
-    """Return the default range of an axis of a chart, in SI.
+    """Return the default range of the parameter ``name`` on an axis of a chart, in SI.
 
     The range of a crank speed lies around the natural frequency, the range of another parameter around its present value.
 
@@ -597,7 +597,9 @@ def default_range(parameters: Parameters, drive: Drive, name: str) -> tuple[floa
 
 
 def damping_name(mechanism: Mechanism) -> str:
-    """Return the FMI name of the damping of the first freedom other than the crank; if it has none, of another damping.
+    """Return the FMI name of the damping that is an axis of a chart by default.
+
+    It is the damping of the first degree of freedom other than the crank; if there is none, another damping.
 
     Raises
     ------

@@ -89,12 +89,12 @@ class Coexistence:
 
     @property
     def least(self) -> np.ma.MaskedArray[Any, np.dtype[np.float64]]:
-        """Amplitude of the smallest stable motion at each point, shape (ny, nx)."""
+        """Least amplitude of the stable motions at each point, shape (ny, nx)."""
         return self._extreme(np.ma.min)
 
     @property
     def greatest(self) -> np.ma.MaskedArray[Any, np.dtype[np.float64]]:
-        """Amplitude of the largest stable motion at each point, shape (ny, nx)."""
+        """Greatest amplitude of the stable motions at each point, shape (ny, nx)."""
         return self._extreme(np.ma.max)
 
     def _extreme(self, of: Callable[..., Any]) -> np.ma.MaskedArray[Any, np.dtype[np.float64]]:
@@ -125,12 +125,12 @@ def coexistence(
     progress: bool = False,
     what: str = "motions",
 ) -> Coexistence:
-    """Find all periodic motions of one turn at every point of a grid.
+    """Find all periodic motions of one turn at every point of a grid over two parameters.
 
     Newton's method starts from the motions of the neighbouring point in the row, then from `STARTS` guesses, with the known
     motions divided out. A motion that exists only in a short part of a row may be missed; `find_orbits` searches a single
-    point closely. In these motions an undriven link swings, or goes round as often as the drive says; `find_orbits` finds
-    motions of both kinds. The rows are distributed over workers and kept as in `grid`.
+    point closely. An undriven link that has a ratio in the drive goes round in all these motions; any other undriven link only
+    swings. `find_orbits` finds motions of both kinds. The rows are distributed over workers and kept as in `grid`.
 
     Parameters
     ----------
@@ -234,7 +234,7 @@ class Basins(NotebookResult):
         return self.found.stable
 
     def share(self, end: int) -> float:
-        """Return the share of the initial states for which ``ends`` is ``end``: an index into ``motions``, -1 or -2."""
+        """Return the share of the initial states that end as ``end``: an index into ``motions``, or -1 or -2 as in ``ends``."""
         return float(np.mean(self.ends == end))
 
     def to_csv(self, path: str | Path) -> Path:
@@ -253,7 +253,7 @@ class Basins(NotebookResult):
 
     @property
     def labels(self) -> tuple[str, str]:
-        """Names of the two axes with units."""
+        """Names of the two axes, the first free coordinate and its rate, with units."""
         (name, unit), (rate, rate_unit) = self._components()
         return f"{name} [{unit}]", f"{rate} [{rate_unit}]"
 
@@ -355,7 +355,7 @@ def describe_turns(flow: Flow, turns: int) -> str:
 
 
 def _ends(point: OperatingPoint, known: FloatArray, across: FloatArray, rate: float) -> FloatArray:
-    """Return for each start of a row an index into ``known``, the motion on which it settles, or LOST or UNSETTLED.
+    """Return for each start of a row an index into ``known``: the motion on which the mechanism settles; or LOST or UNSETTLED.
 
     A start has an initial coordinate from ``across``, shape (points,), and the initial rate ``rate``.
     """

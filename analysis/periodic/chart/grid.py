@@ -184,7 +184,7 @@ def grid(
     Parameters
     ----------
     operation : callable
-        See `plane`.
+        Function that returns mechanism and drive at a point of the plane: see `plane`.
     x, y : array_like, shapes (nx,) and (ny,)
         Values of the two parameters: in SI, or as texts with units if the plane is a `NamedPlane`.
     start : array_like, shape (n,), optional
@@ -194,7 +194,8 @@ def grid(
     folder : path, optional
         Folder of the cache; `grid_folder` by default.
     n_jobs : int, optional
-        Number of processes, -1 for one per core; inside `joblib.parallel_config` of a cluster, all of its cores.
+        Number of processes; -1 for one per core. Inside `joblib.parallel_config` of a cluster the default is all cores of the
+        cluster.
     progress : bool
         Show a progress bar.
     what : str
@@ -264,7 +265,7 @@ def _axis(name: str, values: ArrayLike) -> FloatArray:
 
 
 def row_code(*functions: Any) -> tuple[str, ...]:
-    """Return texts that identify the code: the fingerprints of ``functions``, and all Python sources of this package."""
+    """Return texts that identify the code: the fingerprints of ``functions``, and all source texts of this package."""
     sources = (path.read_text(encoding="utf-8") for path in sorted(Path(__file__).parents[1].rglob("*.py")))
     return *map(fingerprint, functions), *sources
 
@@ -327,7 +328,7 @@ class RowComputation:
         names: Sequence[str],
         shape: tuple[int, ...],
     ) -> tuple[FloatArray, int]:
-        """Return the result of ``work`` for each item (row): from the cache, or computed by a worker and then cached.
+        """Return the result of ``work`` for each item, a row of a grid: from the cache, or computed by a worker and cached.
 
         Parameters
         ----------

@@ -1,8 +1,9 @@
 """Compiled kernels for rows of a chart: one or all periodic motions of each mechanism, and basins of attraction.
 
 Along a row the orbits change smoothly: a polynomial through the previous orbits predicts the next orbit at every node, and
-collocation corrects the prediction. If this fails (friction, a torque, the limit of assembly, a fold in between), shooting
-finds the orbit from its neighbour on the left, from its neighbour on the right, or from other guesses.
+collocation corrects the prediction. Collocation may fail because of friction, a torque, the limit of assembly or a fold. The
+orbit is then found by shooting: from the orbit of the neighbour on the left, of the neighbour on the right, or from other
+guesses.
 """
 
 from __future__ import annotations
@@ -99,7 +100,7 @@ MOTIONS = types.NamedTuple((CUBE, CUBE, CUBE, int64[::1]), Motions)
 
 @part
 def point_section(section, points, row, tolerance):
-    """Return the `Section` of the mechanism with the index ``row``: ``section`` with the data of this mechanism."""
+    """Return ``section`` with the data of the mechanism with the index ``row`` from ``points``."""
     return replace_numbers(section, points.drives[row], points.constants[row], points.scales[row], tolerance)
 
 
@@ -107,9 +108,9 @@ def point_section(section, points, row, tolerance):
 def divide(section, search, level, start, path, desk, room):
     """Find an orbit by collocation with the least number of elements in `COUNTS` that suffices.
 
-    ``level`` is the first index into `COUNTS` to try. Return the level that suffices, or -1, and the relative size of the
-    highest Legendre coefficients. ``start`` is a guess of y at crank angle 0. ``path`` = (y, w) receives y at the beginning of
-    each element, and the slopes w.
+    ``level`` is the first index into `COUNTS` to try. Return the index of the number that suffices, or -1, and the relative
+    size of the highest Legendre coefficients. ``start`` is a guess of y at crank angle 0. ``path`` = (y, w) receives y at the
+    beginning of each element, and the slopes w.
     """
     y, w = path
     while level < len(COUNTS):
@@ -132,7 +133,7 @@ def divide(section, search, level, start, path, desk, room):
 
 @inner
 def predict(known, size, path):
-    """Predict the next orbit, row 0 of ``path``, by extrapolation from the previous orbits.
+    """Predict the next orbit of a row, row 0 of ``path``, by extrapolation from the previous orbits.
 
     The ``known`` previous orbits are rows 1, 2, ... of ``path``, the latest first; each has ``size`` entries.
     """
@@ -144,7 +145,7 @@ def predict(known, size, path):
 
 @inner
 def shift(size, path):
-    """Move each orbit, ``size`` entries of a row of ``path``, one row down, so that row 0 can take the next orbit."""
+    """Move each orbit in ``path`` one row down, so that row 0 can take the next orbit; an orbit has ``size`` entries."""
     for old in range(PASSED, 0, -1):
         copy(path[old - 1, :size], path[old, :size])
 
@@ -153,8 +154,8 @@ def shift(size, path):
 def solve_from_left(section, points, search, guess, found, tables):
     """Find the orbits of a row of a chart from left to right: by collocation if it converges, otherwise by shooting.
 
-    ``guess`` is a guess of y for the first orbit. ``tables`` is the work space made by `make_desk`; the caller must keep its
-    arrays alive during the call.
+    ``guess`` is a guess of y for the first orbit. ``tables`` is the work space made by `make_desk`; the caller must keep the
+    arrays of the work space alive during the call.
     """
     starts, monodromies, status = found
     n = guess.shape[0]
@@ -238,7 +239,7 @@ def solve_from_left(section, points, search, guess, found, tables):
 
 @part
 def solve_from_right(section, points, search, found):
-    """Find missing orbits of a row by Newton's method, each from the start of its neighbour on the right."""
+    """Find missing orbits of a row by Newton's method, each from the start of the orbit of the neighbour on the right."""
     starts, monodromies, status = found
     n = starts.shape[1]
     z, carry, report = np.empty(n * (1 + n)), np.array([0.1, 0.0]), np.zeros(3)
@@ -254,7 +255,7 @@ def solve_from_right(section, points, search, found):
 
 @part
 def solve_from_guesses(section, points, search, guesses, found):
-    """Find orbits of a row that are still missing, from the neighbour on the left, then from all guesses except the first."""
+    """Find orbits of a row that are still missing, from the orbit on the left, then from all guesses except the first."""
     starts, monodromies, status = found
     n = starts.shape[1]
     z, carry, report = np.empty(n * (1 + n)), np.array([0.1, 0.0]), np.zeros(3)
@@ -306,7 +307,7 @@ def solve_row(section, points, search, guesses, found):
 
 @inner
 def _is_known(start, known, section, away):
-    """Return whether a start equals a known start, apart from whole turns of angles; ``away`` is work space."""
+    """Return whether a start equals one of the known starts, apart from whole turns of angles; ``away`` is work space."""
     found = False
     for k in range(known.shape[0]):
         subtract_modulo_turns(start, known[k], section.ways, away)
@@ -315,7 +316,7 @@ def _is_known(start, known, section, away):
 
 
 class Seekers(NamedTuple):
-    """Searches for periodic motions that run at the same time, one in each lane of the processor."""
+    """Searches for periodic motions that run at the same time, one in each lane of the vector instructions."""
 
     place: NDArray[np.int64]  # index of the guess from which the search began, -1 if the lane is free
     begun: NDArray[np.int64]  # number of motions that were known when the search began

@@ -31,7 +31,7 @@ class PointRow:
     first : OperatingPoint
         The first point.
     constants, vectors, scales : ndarray, shapes (m, constants), (m, drive) and (m, n)
-        Constants of the equations, drive vectors (`Drive.vector`), and magnitudes of y.
+        Constants of the equations, drive vectors (`Drive.vector`), and magnitudes of y, of each point.
     smooth : bool
         Whether collocation can be used at all points.
     """
@@ -44,7 +44,7 @@ class PointRow:
 
     @property
     def flow(self) -> Flow:
-        """The mechanism with these drives, as a flow."""
+        """The flow of the mechanism that all the points share."""
         return self.first.flow
 
     @property
@@ -61,12 +61,12 @@ class PointRow:
         )
 
     def search(self, turns: int = 1) -> Search:
-        """Return the settings of the search for the orbits."""
+        """Return the settings of the search for orbits whose period has ``turns`` common periods."""
         return Search(self.flow.period * turns, turns, MOST_ITERATIONS, SEARCH_TOLERANCE, self.smooth)
 
 
 def point_row(points: Sequence[OperatingPoint], start: FloatArray) -> PointRow:
-    """Collect operating points in a row; the magnitudes of y are computed at ``start``.
+    """Collect operating points in a row; the magnitudes of y are computed from the guess ``start``.
 
     Raises InputError if the points do not all have the same kind of drive.
     """

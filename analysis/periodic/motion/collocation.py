@@ -6,8 +6,8 @@ nodes, and the state y (coordinates, then rates) at the beginning. Newton's meth
 each element are eliminated first; small matrices, whose product is the monodromy matrix, then join the elements. With NODES
 nodes the values at the ends of the elements are of order 2 NODES (E. Hairer, S. P. Norsett, G. Wanner, Solving Ordinary
 Differential Equations I, section II.7). A neighbouring motion gives a good guess at every node; two or three corrections then
-suffice. Each correction evaluates the right-hand side a sixth as often as an integrator of order 8 does. The decay of the
-Legendre coefficients over each element is a measure of the error.
+suffice. Collocation evaluates the right-hand side a sixth as often as an integrator of order 8. The decay of the Legendre
+coefficients over each element is a measure of the error.
 
 Vector instructions linearise LANES elements at once. In an array "in lanes", element e has lane ``e % LANES`` of row
 ``e // LANES``. Unused lanes of the last row repeat the last element.
@@ -51,8 +51,8 @@ _CORRECTIONS, _FAR = 8, 1.0
 class Desk(NamedTuple):
     """Work space for the collocation of one period.
 
-    It contains arrays in lanes for all elements, arrays in lanes for one row of elements, and matrices that join the elements.
-    f = n / 2 is the number of coordinates.
+    The work space has arrays in lanes for all elements, arrays in lanes for one row of elements, and matrices that join the
+    elements. f = n / 2 is the number of coordinates.
     """
 
     angles: NDArray[np.float64]  # beginnings of the elements (rad), shape (rows, LANES)
@@ -76,13 +76,16 @@ class Desk(NamedTuple):
 
 @inner
 def row_count(elements):
-    """Return the number of rows of lanes that hold ``elements`` elements."""
+    """Return the number of rows that hold ``elements`` elements, LANES in each row."""
     return (elements + LANES - 1) // LANES
 
 
 @part
 def make_desk(n, most, directional):
-    """Return the work space for y of n components and ``most`` elements; ``directional``: with derivatives by lambda."""
+    """Return the work space for y of n components and up to ``most`` elements.
+
+    ``directional`` tells whether the work space has room for derivatives with respect to lambda.
+    """
     f, columns = n // 2, n + 1 if directional else n
     unknowns, rows = NODES * f, row_count(most)
     return Desk(
@@ -107,7 +110,10 @@ def make_desk(n, most, directional):
 
 @inner
 def lay_elements(angles, desk):
-    """Write the beginnings and lengths of the elements into ``desk``; ``angles`` are the beginnings and the end of the last."""
+    """Write the beginnings and lengths of the elements into ``desk``.
+
+    ``angles`` are the crank angles at which the elements begin, and the end of the last element.
+    """
     m = angles.shape[0] - 1
     for place in range(row_count(m) * LANES):
         e = min(place, m - 1)
@@ -125,7 +131,10 @@ def _identity(matrix):
 
 @inner
 def _equation(section, desk):
-    """Return the address of the function for rates and derivatives; by lambda, too, if ``desk`` has room for them."""
+    """Return the address of the function that gives the rates and their derivatives.
+
+    The derivatives with respect to lambda are included if ``desk`` has room for them.
+    """
     n = desk.shift.shape[0]
     directional = desk.out.shape[1] > n * (1 + n) * LANES
     return section.equations[IN_LANES + (DIRECTIONAL if directional else VARIATIONAL)]
@@ -133,7 +142,11 @@ def _equation(section, desk):
 
 @inner
 def _pace(section, y, desk):
-    """Return the time per radian of crank rotation: the derivative of a coordinate's slope with respect to its rate."""
+    """Return dt/dtheta, the time per radian of crank rotation.
+
+    As dq/dtheta = qd dt/dtheta for a coordinate q with the rate qd, dt/dtheta is the derivative of dq/dtheta with respect to
+    qd, which the flow's derivatives contain.
+    """
     n = desk.shift.shape[0]
     for i in range(n):
         store(desk.z, i, load(y[0], i))
@@ -145,7 +158,7 @@ def _pace(section, y, desk):
 
 @inner
 def _evaluate_node(s, row, unit, y, w, desk):
-    """Compute y and the crank angle at node s of a row of elements from the slopes, and write them into ``desk.z``.
+    """Compute y and the crank angle at node s of each element in a row from the slopes, and write them into ``desk.z``.
 
     ``unit`` is the time per radian of crank rotation.
     """
@@ -277,10 +290,10 @@ def linearise(section, y, w, desk):
 
 @inner
 def _carry(e, y, following, desk):
-    """Replace ``desk.shift``, the change of y at the beginning of element e, by the change at the next element's beginning.
+    """Replace ``desk.shift``, the change of y at the beginning of element e, by the change at the beginning of the next one.
 
     ``following`` is the index of the next element; if it is -1, ``desk.shift`` becomes y at the end of element e. The change at
-    the beginning of element e is written into ``desk.shifts``, in the lane of the element and the later lanes of its row.
+    the beginning of element e is written into ``desk.shifts``, in the lane of the element and the later lanes of the row.
     """
     shift, column = desk.shift, desk.column
     row, lane, n = e // LANES, e % LANES, shift.shape[0]
@@ -350,7 +363,7 @@ def _move(section, y, w, desk):
 def _correct_period(section, m, y, w, desk):
     """Correct y and w of a closed period of m elements by one Newton step; return the greatest correction.
 
-    The greatest correction is relative to the scale of y, and NaN if the linear system has no solution. The monodromy matrix
+    The greatest correction is relative to the scale of y; it is NaN if the linear system has no solution. The monodromy matrix
     before the correction is written into ``desk``.
     """
     n = desk.shift.shape[0]
@@ -376,10 +389,10 @@ def _correct_period(section, m, y, w, desk):
 
 @inner
 def _tails(section, row, w, desk):
-    """Compute the size of the two highest Legendre coefficients of the slopes and their derivatives: a measure of the error.
+    """Compute the size of the two highest Legendre coefficients of the slopes and of their derivatives.
 
-    The size is relative to the greatest value plus the scale. The size for each element of the row is written into
-    ``desk.single``.
+    The size is a measure of the error, relative to the greatest value plus the scale. The size for each element of the row is
+    written into ``desk.single``.
     """
     scale = section.scale
     n = scale.shape[0]
@@ -420,7 +433,7 @@ def _least_gap(section, y, w, desk):
 
 @part
 def close(section, m, y, w, desk):
-    """Find y and w of a periodic motion on m elements, in lanes, by Newton's method.
+    """Find y and w of a periodic motion on m elements by Newton's method; the arrays y and w are in lanes.
 
     Return a `Status` and the relative size of the highest Legendre coefficients. NO_STEP means that this size is too large:
     more elements are needed.
@@ -471,7 +484,7 @@ def integrate_elements(section, angles, first, start, y, w, room):
 
 @inner
 def repeat_last(m, many):
-    """Copy the values of the last of m elements into the unused lanes of its row; ``many`` is an array in lanes."""
+    """Copy the values of the last of m elements into the unused lanes of the last row; ``many`` is an array in lanes."""
     row, lane = (m - 1) // LANES, (m - 1) % LANES
     for i in range(many.shape[1] // LANES):
         for other in range(lane + 1, LANES):
@@ -479,7 +492,7 @@ def repeat_last(m, many):
 
 
 class Neighbour(NamedTuple):
-    """A neighbouring motion, from which the collocation starts; arrays in lanes."""
+    """A neighbouring motion, from which the collocation starts, as arrays in lanes."""
 
     y: NDArray[np.float64]  # y at the beginnings of the elements, shape (rows, n LANES)
     w: NDArray[np.float64]  # slopes at the nodes, (rows, NODES f LANES)
@@ -502,7 +515,10 @@ class PieceSolution(NamedTuple):
 
 @inner
 def _predict(firsts, starts, change, unit, neighbour, desk):
-    """Extrapolate a neighbouring motion, in place, to other starts of the pieces and another lambda, to first order."""
+    """Extrapolate a neighbouring motion, in place, to other states at the beginnings of the pieces and another lambda.
+
+    The extrapolation is of first order; ``change`` is the change of lambda.
+    """
     y, w, moves = neighbour
     n = desk.shift.shape[0]
     f = n // 2
@@ -548,7 +564,7 @@ def _correct_pieces(section, firsts, starts, y, w, desk, rows):
 
 @inner
 def _write_derivatives(firsts, rows, desk):
-    """Write the derivatives of y at the end of each piece, by y at its beginning and by lambda, into ``rows``."""
+    """Write into ``rows`` the derivatives of y at the end of each piece with respect to y at its beginning and to lambda."""
     n = desk.shift.shape[0]
     whole = desk.system
     for piece in range(rows.shape[0]):

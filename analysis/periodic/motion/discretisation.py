@@ -9,8 +9,9 @@ equations for Newton's method and for continuation from them.
 - **Shooting** integrates each piece with steps of order 8. With one piece it is single shooting, with several multiple
   shooting. It works for every drive.
 - **Collocation** corrects the polynomials of a neighbouring motion, element by element. It evaluates the right-hand sides a
-  sixth as often. It works if the crank's speed is prescribed and the rates are smooth (`collocation_serves`), as long as the
-  links stay clear of the limit of assembly and not too many elements are needed; otherwise shooting is used for a while.
+  sixth as often as shooting. It works if the crank's speed is prescribed and the rates are smooth (`collocation_serves`), as
+  long as the links stay clear of the limit of assembly and not too many elements are needed; otherwise shooting is used for
+  a while.
 
 The period is one piece as long as a deviation grows less than `GROWTH` times over the period. If a deviation grows more, the
 period is divided so that deviations grow about `AIM` times over each piece (`choose_pieces`).
@@ -84,13 +85,13 @@ class OrbitAssemblyError(OrbitError, AssemblyError):
 def orbit_error(
     status: int, flow: Flow, start: FloatArray, residual: float = np.inf, iterations: int = 0
 ) -> OrbitError:
-    """Return the exception for a `Status` of the kernels that is a failure."""
+    """Return the exception for a `Status` of the kernels that means failure."""
     kind = OrbitAssemblyError if status == Status.LIMIT else OrbitError
     return kind(kernels.REASONS[Status(status)], flow, start, float(residual), iterations)
 
 
 class Ends(NamedTuple):
-    """y at the ends of the k pieces of a period, with derivatives."""
+    """y at the ends of the k pieces of a period, with the derivatives of these states."""
 
     y: FloatArray  # y at the end of each piece, shape (k, n)
     matrices: FloatArray  # its derivatives by y at the beginning, (k, n, n)
@@ -99,7 +100,7 @@ class Ends(NamedTuple):
 
 
 class Period(NamedTuple):
-    """One period followed from a start: y(T) - y(0), shape (n,), dy(T)/dy(0), (n, n), and dy(T)/dlambda, (n,)."""
+    """Result of following one period from a start: y(T) - y(0), shape (n,), dy(T)/dy(0), (n, n), and dy(T)/dlambda, (n,)."""
 
     shift: FloatArray
     monodromy: FloatArray
@@ -108,7 +109,7 @@ class Period(NamedTuple):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class OperatingPoint:
-    """A mechanism and its drive as arrays for the kernels, computed once for all results of a motion.
+    """A mechanism and its drive as arrays for the kernels, computed once and shared by all results of a motion.
 
     Attributes
     ----------
@@ -153,9 +154,9 @@ class OperatingPoint:
         *functions : int
             Indices of the flow's functions that are needed, in addition to GAP.
         direction : Direction, optional
-            Derivatives of the drive vector and the constants by a parameter lambda; zero if not given.
+            Derivatives of the drive vector and the constants with respect to a parameter lambda; zero if not given.
         along : float
-            Typical magnitude of lambda, for the errors of derivatives by lambda.
+            Typical magnitude of lambda, which scales the errors of derivatives with respect to lambda.
         switched : bool
             Whether to use the equations with their optional terms, such as friction, even if this mechanism has none.
         """
@@ -208,8 +209,8 @@ class OperatingPoint:
 def operating_point(parameters: Parameters, drive: Drive) -> OperatingPoint:
     """Return a mechanism and its drive as an `OperatingPoint`.
 
-    Raises InputError if the drive does not suit the mechanism, or if a gear ratio or a force law differs from the mechanism's
-    first published set and the period changes with it.
+    Raises InputError if the drive does not suit the mechanism. The error is also raised if a gear ratio or a force law differs
+    from that of the mechanism's first published set, and the motion therefore does not repeat after the common period.
     """
     require_drive(drive)
     mechanism = find_mechanism(parameters)
@@ -282,7 +283,7 @@ def follow_period(
 
 
 def collocation_serves(drives: Iterable[Drive], mechanisms: Iterable[Parameters]) -> bool:
-    """Return whether collocation can be used: it needs drives with prescribed speeds, and mechanisms with smooth rates.
+    """Return whether collocation can be used: all speeds must be prescribed, and all rates must be smooth functions.
 
     Collocation assumes that the slope of a coordinate over the crank angle is its rate divided by the crank speed. This does
     not hold for a second crank that turns freely, or for a link that goes round.
@@ -349,7 +350,7 @@ def choose_pieces(point: OperatingPoint, places: FloatArray, turns: int) -> tupl
 
 
 class Discretisation:
-    """Method that computes the ends of the pieces of a period, for one motion of a family after another.
+    """Method that computes y at the ends of the pieces of a period, for one motion of a family after another.
 
     Collocation takes the previous motion as first approximation; shooting is used where collocation fails or is not tried.
 
@@ -390,7 +391,7 @@ class Discretisation:
         return point.shoot(self.angles, starts, direction, along)
 
     def _collocate(self, section: Section, flow: Flow, starts: FloatArray, value: float) -> Ends | None:
-        """Compute the ends by collocation on as many elements as are needed; return None if shooting must be used instead."""
+        """Compute y at the ends by collocation on as many elements as are needed; return None if shooting must be used."""
         k, n = starts.shape
         self._calls += 1
         if self._calls % _RENEWED == 1:
@@ -428,7 +429,7 @@ class Discretisation:
         return None
 
     def _divide(self, mesh: FloatArray, n: int) -> None:
-        """Divide the pieces into new elements that begin at the angles ``mesh``, and forget the last motion."""
+        """Divide the pieces into new elements that begin at the crank angles ``mesh``, and forget the previous motion."""
         self._value = None
         self._mesh = mesh
         self._firsts = np.searchsorted(mesh, self.angles).astype(np.int64)

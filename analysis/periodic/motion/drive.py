@@ -40,7 +40,7 @@ Torque = float | InductionMotor | Sequence[float | InductionMotor]
 
 
 class VaryingInputError(InputError):
-    """An input varies in time, so that no periodic motion can be sought; ``channel`` is the name of the input."""
+    """An input varies in time, so that there is no periodic motion to be sought; ``channel`` is the name of the input."""
 
     def __init__(self, channel: str, value: object) -> None:
         self.channel = channel
@@ -50,7 +50,10 @@ class VaryingInputError(InputError):
 
 
 class NothingFreeError(InputError):
-    """All freedoms are commanded, so that none can oscillate; ``force`` is an input that would free one of them, or empty."""
+    """All degrees of freedom are commanded, so that none can oscillate.
+
+    ``force`` is an input that would free one of them; it is empty if there is none.
+    """
 
     def __init__(self, mechanism: str, force: str) -> None:
         self.force = force
@@ -79,11 +82,12 @@ class Drive:
         Constant forces by the FMI names of their inputs, such as ``slider.force`` or ``load.fx`` (N), and torques on other
         cranks (N.m).
     held : mapping of str to float
-        Coordinates of held freedoms by their FMI names, such as ``shift.position``, and angles of other commanded cranks at
-        the crank angle 0; 0 if they are left out.
+        Coordinates of held degrees of freedom by their FMI names, such as ``shift.position``, and angles of other commanded
+        cranks at the crank angle 0; 0 if they are left out.
     modes : mapping of str to int
-        Modes of freedoms other than the crank, by name, such as ``axial.mode``. A freedom whose mode is left out is free if its
-        force is among ``forces`` (0 included), commanded if it is a crank with a ratio, and otherwise in its default mode.
+        Modes of degrees of freedom other than the crank, by name, such as ``axial.mode``. A degree of freedom whose mode is
+        left out is free if its force is among ``forces`` (0 included), commanded if it is a crank with a ratio, and otherwise
+        in its default mode.
     crank : str
         FMI name of the crank to which ``speed``, ``torque`` and ``motor`` refer: name of its coordinate, commanded speed or
         torque. It follows from ``speeds``, and may be left out if there is one crank.
@@ -162,16 +166,20 @@ class Drive:
         return find_crank(mechanism, self.crank)
 
     def ratios_by_freedom(self, mechanism: Mechanism) -> dict[int, Fraction]:
-        """Return the turns of each other crank and link that goes round per turn of the crank, by index of the freedom."""
+        """Return the turns of each other crank, and of each link that goes round, per turn of the crank.
+
+        The keys are the indices of their degrees of freedom.
+        """
         return {find_turning_freedom(mechanism, name): ratio for name, ratio in self.ratios.items()}
 
     def arguments(self, mechanism: Mechanism) -> Mapping[str, str]:
-        """Return how each freedom with a mode is driven: by the name of the mode, one of `Mode.arguments`.
+        """Return how each degree of freedom that has a mode is driven: one of `Mode.arguments`, by the name of the mode.
 
         Raises
         ------
         InputError
-            If ``modes`` names a mode that no freedom other than the crank has, or gives it a value that does not exist.
+            If ``modes`` names a mode that no degree of freedom other than the crank has, or gives it a value that does not
+            exist.
         """
         return _arguments(
             mechanism,
@@ -188,7 +196,7 @@ class Drive:
         Raises
         ------
         InputError
-            If the mechanism cannot have this drive, or no freedom is free.
+            If the mechanism cannot have this drive, or no degree of freedom is free.
         """
         crank, ratios = self.reference(mechanism), self.ratios_by_freedom(mechanism)
         if (crank.command if self.speed_drive else crank.torque) is None:
@@ -221,13 +229,13 @@ class Drive:
         return made
 
     def with_rounds(self, mechanism: Mechanism, rounds: Mapping[str, int], turns: int) -> tuple[Drive, int]:
-        """Return the drive for motions in which undriven links make ``rounds`` whole turns in ``turns`` common periods.
+        """Return the drive for motions in which undriven links make given numbers of whole turns in ``turns`` common periods.
 
         Parameters
         ----------
         mechanism : Mechanism
         rounds : mapping of str to int
-            Number of whole turns of each link, by the FMI name of its coordinate.
+            Number of whole turns of each link, by the FMI name of the link's coordinate.
         turns : int
             Number of common periods of this drive.
 
@@ -248,7 +256,7 @@ class Drive:
         Raises
         ------
         UnknownNameError
-            If a name in ``forces`` is not that of a force input, or a name in ``motors`` not that of a torque.
+            If a name in ``forces`` is not the name of a force input, or a name in ``motors`` is not the name of a torque.
         InputError
             If a force does not act, or if ``held`` names a coordinate that is not held.
         """
@@ -288,7 +296,7 @@ class Drive:
         return np.array([*u, *motors, *held, *(float(ratios.get(n, 0)) for n in made.others)])
 
     def inputs(self, mechanism: Mechanism) -> Inputs:
-        """Return the `Inputs` with which a run of the mechanism has this drive."""
+        """Return the `Inputs` that give a run of the mechanism this drive."""
         made, crank, ratios = self.flow(mechanism), self.reference(mechanism), self.ratios_by_freedom(mechanism)
         names = [c.argument for c in mechanism.channels]
         acting: dict[str, Any] = {c.argument: self.forces[c.name] for c in mechanism.channels if c.name in self.forces}
@@ -306,7 +314,7 @@ class Drive:
 
 
 def _whole_turns(freedom: Freedom) -> int:
-    """Return the number of turns of a link after which a mechanism is in the same configuration."""
+    """Return the number of turns of a link after which the mechanism is in the same configuration again."""
     return round(freedom.period / (2.0 * pi))
 
 
@@ -333,7 +341,7 @@ def _arguments(
     turning: tuple[int, ...],
     modes: tuple[tuple[str, int], ...],
 ) -> Mapping[str, str]:
-    """Compute `Drive.arguments`, cached because continuation needs it at every point of a branch."""
+    """Compute `Drive.arguments`; the result is cached because continuation needs it at every point of a branch."""
     found, own = {}, dict(modes)
     others = {f.mode.name: f.mode for n, f in enumerate(mechanism.freedoms) if f.mode and n != crank}
     for name, value in modes:
@@ -363,7 +371,7 @@ def force_inputs(mechanism: Mechanism) -> dict[str, Channel]:
 
 
 def require_acting(drive: Drive, mechanism: Mechanism, channel: Channel) -> None:
-    """Raise InputError if a channel has no effect because its freedom is driven in another way."""
+    """Raise InputError if a channel has no effect because the drive prescribes its degree of freedom differently."""
     mode = mechanism.freedoms[channel.freedom].mode if channel.freedom >= 0 else None
     chosen = "" if mode is None else drive.arguments(mechanism)[mode.name]
     if mode is not None and chosen != channel.argument:
@@ -375,7 +383,10 @@ def _value(mode: Mode, argument: str) -> str:
 
 
 def published_drive(known: PublishedSet, drive: Drive | None) -> Drive:
-    """Return ``drive``; if it is None, return the drive of a published set, with held freedoms at their initial values."""
+    """Return ``drive``; if it is None, return the drive of a published set.
+
+    In the drive of the set, held degrees of freedom are at the set's initial values.
+    """
     return drive or steady_drive(known.parameters, complete_inputs(known, None), known.initial)
 
 
@@ -396,7 +407,7 @@ def steady_drive(
     parameters : parameters of a mechanism
     inputs : Inputs, optional
     initial : state at the start, optional
-        Positions of held freedoms, which are all freedoms that are neither free nor the crank.
+        State that gives the positions of held degrees of freedom: all those that are neither free nor the crank.
     speed, torque : optional
         Crank speed (rad/s) and torque on the crank (N.m), instead of the drive of the crank in ``inputs``; other commanded
         cranks keep their ratios to the crank.
@@ -406,7 +417,7 @@ def steady_drive(
     VaryingInputError
         If an input varies.
     InputError
-        If nothing drives the crank, or if a freedom that is no crank is commanded at a speed other than zero.
+        If nothing drives the crank, or if a degree of freedom that is no crank is commanded at a speed other than zero.
     """
     mechanism = find_mechanism(parameters)
     inputs, initial = check_run(mechanism, inputs, initial)
@@ -462,7 +473,8 @@ def _choose_crank(
     """Return the crank whose angle is the independent variable under the inputs of a run, and the ratios of the other cranks.
 
     This crank is the first crank that is commanded at a positive speed, or else the first crank. The ratios, by index of the
-    freedom, are those of the commanded speeds; a free crank has the ratio of the initial speeds, rounded to a whole number.
+    degree of freedom, are those of the commanded speeds; a free crank has the ratio of the initial speeds, rounded to a whole
+    number.
     """
     if len(mechanism.cyclic_freedoms) < 2:
         return find_crank(mechanism), {}
@@ -531,7 +543,7 @@ def is_smooth(parameters: Parameters) -> bool:
 def assembly_ranges(
     parameters: Parameters, drive: Drive, guess: NDArray[np.float64]
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return the lower and the upper bounds of the free coordinates at crank angle 0 within which the links can be joined.
+    """Return the lower and the upper bounds, at crank angle 0, of the free coordinates for which the links can be joined.
 
     Each coordinate is moved away from its default value in growing steps, while all other components of y stay as in
     ``guess``; a bound may lie one step too far. Both arrays have the shape (free,).
@@ -557,7 +569,7 @@ def assembly_ranges(
 
 
 def mean_rates(drive: Drive, flow: Flow, guess: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the mean rate of each free coordinate, shape (free,): 0 unless the coordinate goes round."""
+    """Return the mean rate of each free coordinate, shape (free,): 0 unless it is the angle of a link that goes round."""
     turning, pace = drive.ratios_by_freedom(flow.mechanism), drive.speed or guess[-1]
     return np.array([pace * turning.get(n, 0) for n in flow.free], dtype=float)
 
@@ -565,11 +577,11 @@ def mean_rates(drive: Drive, flow: Flow, guess: NDArray[np.float64]) -> NDArray[
 def spread_starts(
     parameters: Parameters, drive: Drive, guess: NDArray[np.float64], count: int, number: int = 0
 ) -> NDArray[np.float64]:
-    """Return starts of many amplitudes and phases for the search, by a scrambled Sobol sequence; shape (count or 2 count, n).
+    """Return starts with many amplitudes and phases, by a scrambled Sobol sequence; shape (count or 2 count, n).
 
     In the plane of a coordinate and its rate the starts fill the largest ellipse about the default initial value for which the
-    links can be joined. If a coordinate can move much further to one side, ``count`` further starts fill the ellipse about the
-    middle of the range of this coordinate.
+    links can be joined. If a coordinate can move much further in one direction than in the other, ``count`` further starts fill
+    the ellipse about the middle of the range of this coordinate.
 
     Parameters
     ----------

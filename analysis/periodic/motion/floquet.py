@@ -28,7 +28,7 @@ class VerdictError(LinkworkError, TypeError):
 
 
 class Stability(Enum):
-    """Stability by linear theory: a small deviation dies out, grows, or the theory does not decide."""
+    """Stability by linear theory: a small deviation decays, grows, or the theory does not decide."""
 
     STABLE = "stable"
     UNSTABLE = "unstable"
@@ -142,7 +142,10 @@ def verdict(multipliers: ArrayLike, tolerance: float = TOLERANCE) -> StabilityVe
 
 
 def crossing(multiplier: complex, angle: float = REAL_ANGLE) -> Crossing:
-    """Return the kind of crossing of a multiplier, which counts as real within ``angle`` (rad) of the real axis."""
+    """Return the kind of bifurcation at which a multiplier crosses the unit circle.
+
+    The multiplier counts as real if it lies within ``angle`` (rad) of the real axis.
+    """
     if abs(np.angle(multiplier)) <= angle:
         return Crossing.FOLD
     if abs(np.angle(-multiplier)) <= angle:
@@ -159,7 +162,7 @@ def liouville(trace: ArrayLike, period: float = 2.0 * pi) -> float:
         Trace of the Jacobian matrix at equal steps over one period, the end left out. It is integrated by the trapezoidal
         rule, whose error comes only from harmonics of order n and more.
     period : float
-        In the unit of the independent variable: rad, or s.
+        Period in the unit of the independent variable, rad or s.
 
     Raises
     ------
@@ -202,6 +205,6 @@ def crossing_test(monodromy: NDArray[np.float64], crossing: Crossing | int) -> N
 
 
 def require_sign(multiplier: int) -> None:
-    """Raise `InputError` for a multiplier that is neither +1 nor -1."""
+    """Raise `InputError` if a multiplier is neither +1 nor -1."""
     if multiplier not in (1, -1):
         raise InputError(f"multiplier is {multiplier}: the boundaries sought are those of +1 or -1")

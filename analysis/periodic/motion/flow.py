@@ -25,7 +25,7 @@ IN_LANES = len(_NAMES)
 
 
 class Crank(NamedTuple):
-    """A crank of a mechanism: a freedom that turns without end."""
+    """A crank of a mechanism: a degree of freedom that turns without end."""
 
     freedom: int  # index of the freedom
     command: int | None  # index of the channel of the commanded speed, if there is one
@@ -43,7 +43,10 @@ def find_cranks(mechanism: Mechanism) -> tuple[Crank, ...]:
 
 @cache
 def find_turning_freedom(mechanism: Mechanism, name: str) -> int:
-    """Return the index of a crank, or of a link that swings and may go round, by one of its FMI names."""
+    """Return the index of the degree of freedom of a crank, or of a link that swings and may go round.
+
+    ``name`` is one of the FMI names of the crank or link.
+    """
     swinging = {freedom.coordinate: n for n, freedom in enumerate(mechanism.freedoms) if freedom.swings}
     return swinging[name] if name in swinging else find_crank(mechanism, name).freedom
 
@@ -90,9 +93,10 @@ def _names(mechanism: Mechanism, crank: Crank) -> list[str]:
 class Flow:
     """A mechanism with one kind of drive as a flow: differential equations for the state y over the crank angle.
 
-    Other cranks and undriven links have a ratio to this crank. Commanded cranks turn exactly at their ratio; cranks under a
-    torque and undriven links turn at their ratio on average. For these y contains the angle minus the ratio times the crank
-    angle: this difference is periodic. The ratio of a link that only swings is 0.
+    Other cranks and undriven links have a ratio to the crank whose angle is the independent variable. Commanded cranks turn
+    exactly at their ratio; cranks under a torque and undriven links turn at their ratio on average. For cranks under a torque
+    and undriven links, y contains the angle minus the ratio times the crank angle: this difference is periodic. The ratio of
+    a link that only swings is 0.
 
     Parameters
     ----------
@@ -100,7 +104,7 @@ class Flow:
     modes : tuple of int
         Values of the mechanism's modes.
     crank : int
-        Index of the cyclic freedom whose angle is the independent variable.
+        Index of the cyclic degree of freedom whose angle is the independent variable.
     base : int
         Number of periods of the crank after which all cranks, and all links that go round, have made whole turns.
     commons : int
@@ -109,17 +113,17 @@ class Flow:
     Attributes
     ----------
     others : tuple of int
-        Indices of the other freedoms that turn, or swing and may go round.
+        Indices of the other degrees of freedom that turn, or swing and may go round.
     free : tuple of int
-        Indices of the freedoms other than the crank whose coordinates and rates are in y. A freedom that is commanded without
-        a ratio is held in place.
+        Indices of the degrees of freedom other than the crank whose coordinates and rates are in y. A degree of freedom that is
+        commanded without a ratio is held in place.
     torque : bool
         Whether a torque drives the crank: the crank's rate is then in y.
     motors : int
         Index of the first motor parameter in the drive vector, after the channels; each of `Mechanism.torques` has three.
     held : int
-        Index in the drive vector of the coordinates at crank angle 0, one for each freedom; they are used for freedoms that
-        are held or have a ratio. The ratios of ``others`` follow.
+        Index in the drive vector of the coordinates at crank angle 0, one for each degree of freedom; they are used for degrees
+        of freedom that are held or have a ratio. The ratios of ``others`` follow.
     components : tuple of (str, str)
         FMI name and unit of each component of y.
     labels : tuple of str
@@ -131,7 +135,7 @@ class Flow:
     rest : ndarray, shape (n,)
         y with the coordinates at which the mechanism starts by default, and rates of zero.
     ways : ndarray, shape (n,)
-        Period of each component: for an angle the whole turn after which the mechanism is the same, otherwise 0.
+        Period of each component of y: for an angle the rotation after which the mechanism is the same, otherwise 0.
     swinging : dict of str to int
         Indices in y of the coordinates of undriven links that may go round, by FMI name.
     """
@@ -183,7 +187,10 @@ class Flow:
 
     @property
     def period(self) -> float:
-        """Return the crank angle (rad) of the common period of all freedoms that go round: one turn if only the crank does."""
+        """Return the crank angle (rad) of the common period of the crank and of everything else that goes round.
+
+        It is one turn if only the crank goes round.
+        """
         return self.mechanism.freedoms[self.crank].period * self.base
 
     @property
@@ -192,7 +199,7 @@ class Flow:
         return max(1, round(self.period / (2.0 * pi)))
 
     def addresses(self, *which: int, switched: bool = False) -> NDArray[np.int64]:
-        """Return the addresses of all functions of the flow, by index; 0 for a function that is not compiled.
+        """Return the addresses of all functions of the flow, ordered by index; 0 for a function that is not compiled.
 
         The functions with the indices ``which`` are compiled if needed. ``switched`` tells whether the equations have their
         optional terms, such as friction.
@@ -210,14 +217,14 @@ class Flow:
         return addresses
 
     def fingerprint(self, *which: int, switched: bool = False) -> str:
-        """Return the hashes of the machine code of the functions with the indices ``which``."""
+        """Return, as one text, the hashes of the machine code of the functions with the indices ``which``."""
         self.addresses(*which, switched=switched)
         return " ".join(self._code[switched, n].fingerprint for n in which)
 
     def state(self, y: NDArray[np.float64], drive: NDArray[np.float64]) -> tuple[Any, ...]:
-        """Return the state of a run at crank angle 0, from y and the drive vector.
+        """Return the state of a run at crank angle 0 from y and the drive vector.
 
-        If ``drive`` holds m drive vectors, shape (drive, m), the entries of the state are arrays, too.
+        If ``drive`` holds m drive vectors, shape (drive, m), the entries of the state are arrays of length m.
         """
         rates = len(self.mechanism.freedoms)
         numbers = drive.tolist() if drive.ndim == 1 else list(drive)
@@ -244,12 +251,15 @@ class Flow:
         return whole
 
     def paces(self, drive: NDArray[np.float64]) -> dict[str, float]:
-        """Return the ratio to the crank of each coordinate in y that goes round, by FMI name, from the drive vector."""
+        """Return the turns per turn of the crank of each coordinate in y that goes round, by FMI name.
+
+        These ratios are taken from the drive vector.
+        """
         freedoms = self.mechanism.freedoms
         return {freedoms[n].coordinate: float(r) for n, r in self._ratios(drive).items() if n in self.free and r}
 
     def unknowns(self, states: NDArray[np.float64], drive: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return y, shape (..., n), from states of a run, (..., states), and the drive vector."""
+        """Return y, shape (..., n), from states of a run, shape (..., states), and the drive vector."""
         y = states[..., self.places]
         for place, ratio in self._ratios(drive).items():
             if place in self.places:
@@ -257,7 +267,7 @@ class Flow:
         return y
 
     def _ratios(self, drive: Any) -> dict[int, Any]:
-        """Return the ratio to the crank of each freedom in `others`, by index of the freedom."""
+        """Return the turns of each degree of freedom in `others` per turn of the crank, by index of the degree of freedom."""
         return {n: drive[self.held + len(self.mechanism.freedoms) + i] for i, n in enumerate(self.others)}
 
     @cache  # noqa: B019 - flows themselves are never discarded
@@ -265,9 +275,9 @@ class Flow:
         """Return the function of the flow with the index ``which`` as a ``casadi.Function``.
 
         The arguments are the crank angle; z, which is y and the columns of its derivatives; the modes; the drive vector and its
-        derivative by lambda; the constants and their derivative by lambda. ``plain`` gives dy/dangle, ``variational`` also the
-        rates of the columns dy/dy0, ``directional`` also the rates of dy/dlambda. ``gap`` gives the clearance to the limit of
-        assembly, ``state`` the state of a run and the channels.
+        derivative with respect to lambda; the constants and their derivative with respect to lambda. ``plain`` gives dy/dangle;
+        ``variational`` gives also the rates of the columns dy/dy0, ``directional`` also those of dy/dlambda. ``gap`` gives the
+        clearance to the limit of assembly, ``state`` the state of a run and the channels.
         """
         casadi = symbolic.library()
         n, m = self.size, self.mechanism
@@ -310,10 +320,10 @@ class Flow:
         return casadi.Function(_NAMES[which], arguments, [casadi.densify(r) for r in results], {"cse": True})
 
     def function_in_lanes(self, which: int, switched: bool = False) -> Any:
-        """Return a function of the flow in the form for several crank angles at once; its arguments: unused, (y, angle), ...
+        """Return a function of the flow in the form that is evaluated at several crank angles at once.
 
-        The columns dy/dy0 are set to the identity and dy/dlambda to zero, so that the columns of the result are the derivatives
-        of the rates by y and by lambda.
+        The first argument is unused, the second is (y, angle). The columns dy/dy0 are set to the identity and dy/dlambda to
+        zero, so that the columns of the result are the derivatives of the rates with respect to y and to lambda.
         """
         casadi = symbolic.library()
         function = self.function(which, switched)
@@ -345,7 +355,7 @@ class Flow:
         return casadi.Function("trace", [angle, y, modes, drive, p], [casadi.trace(casadi.jacobian(f, y))])
 
     def _state(self, angle: Any, y: Any, drive: Any) -> tuple[tuple[Any, ...], Any]:
-        """Return the state of a run and the channels as symbolic expressions of crank angle, y and drive vector."""
+        """Return the state of a run and the channels as symbolic expressions of the crank angle, y and the drive vector."""
         casadi = symbolic.library()
         m, freedoms = self.mechanism, len(self.mechanism.freedoms)
         held = drive[self.held : self.held + freedoms]
@@ -375,5 +385,5 @@ def label(variable: Variable) -> str:
 
 @cache
 def flow(mechanism: Mechanism, modes: tuple[int, ...], crank: int, base: int = 1, commons: int = 1) -> Flow:
-    """Return the `Flow` with these parameters; it is built at the first call and then kept."""
+    """Return the `Flow` with these parameters; the flow is built at the first call and then cached."""
     return Flow(mechanism, modes, crank, base, commons)

@@ -1,10 +1,10 @@
 """Integrate a period with its variational equations, and find periodic motions by Newton's method: kernels of shooting.
 
 The independent variable is the crank angle, so that the period is known beforehand, whatever drives the crank. The state y has
-the coordinates of the other free freedoms, their rates, and under a torque the crank's rate. The map over a period is the
-Poincare map of the section at crank angle 0. The columns of dy/dy0, and if wanted dy/dlambda for a parameter lambda, are
-integrated with y. The right-hand sides and their exact derivatives are traced from the equations (`flow`). The integrator is
-that of `simulate`.
+the coordinates of the free degrees of freedom other than the crank, their rates, and under a torque the crank's rate. The map
+over a period is the Poincare map of the section at crank angle 0. The columns of dy/dy0, and if wanted dy/dlambda for a
+parameter lambda, are integrated with y. The right-hand sides and their exact derivatives are traced from the equations
+(`flow`). The integrator is that of `simulate`.
 """
 
 from __future__ import annotations
@@ -62,7 +62,7 @@ _LEAST_FRACTION, _LEAST_SEARCHED = 1.0 / 4096.0, 1.0 / 64.0
 
 
 class Section(NamedTuple):
-    """Input of the kernels: functions and numbers of a flow, with derivatives with respect to a parameter lambda."""
+    """Input of the kernels: functions and numbers of a flow, with their derivatives with respect to a parameter lambda."""
 
     equations: NDArray[np.int64]  # addresses of the flow's functions
     modes: NDArray[np.float64]
@@ -80,7 +80,7 @@ SECTION = types.NamedTuple((int64[::1], VECTOR, VECTOR, VECTOR, VECTOR, VECTOR, 
 
 @part
 def replace_numbers(section, drive, p, scale, tolerance):
-    """Return the section with another drive vector, constants p, scale and tolerance, and 1 for the magnitude of lambda."""
+    """Return the section with new drive vector, constants p, scale and tolerance, and with 1 for the magnitude of lambda."""
     return Section(section.equations, section.modes, drive, p, scale, section.ways, 1.0, tolerance, section.torque)
 
 
@@ -181,7 +181,7 @@ def advance(section, begin, end, z, room, carry):
 
 @inner
 def start_piece(n, start, z):
-    """Write the initial values of a piece into z: y = ``start``, the identity for dy/dy0, zeros for dy/dlambda."""
+    """Write the initial values of a piece of the period into z: y = ``start``, dy/dy0 the identity, dy/dlambda zero."""
     for i in range(z.shape[0]):
         z[i] = 0.0
     for i in range(n):
@@ -284,7 +284,7 @@ _ITERATION, _FRACTION, _SIZE, _RESIDUAL = range(4)
 
 
 class Hunt(NamedTuple):
-    """State of a search by Newton's method, between two integrations over the period."""
+    """State of a search by Newton's method between two integrations over the period."""
 
     start: NDArray[np.float64]  # last accepted start
     trial: NDArray[np.float64]  # start of the next integration
@@ -316,8 +316,8 @@ def begin_hunt(start, hunt):
 def continue_newton(section, most, status, z, hunt):
     """Continue Newton's method after an integration from ``hunt.trial`` to z; return GOING or a `Status`.
 
-    Only a part of a correction is taken if the next correction, computed with the same matrix, would not be smaller
-    (Deuflhard's natural monotonicity test), or if the integration from the corrected start fails. ``most`` is the greatest
+    A correction is taken only in part in two cases: if the next correction, computed with the same matrix, would not be smaller
+    (Deuflhard's natural monotonicity test), and if the integration from the corrected start fails. ``most`` is the greatest
     number of iterations.
     """
     scale, close = section.scale, 100.0 * section.tolerance
@@ -404,7 +404,10 @@ def continue_deflated_newton(section, most, reach, status, known, z, hunt):
 
 @part
 def newton(section, end, most, start, z, room, carry, report):
-    """Solve y(end) = y(0) by Newton's method; parameters and result: see `solve`, ``room`` and ``carry``: see `advance`."""
+    """Solve y(end) = y(0) by Newton's method.
+
+    Parameters and result are those of `solve`; ``room`` and ``carry`` are those of `advance`.
+    """
     n = section.scale.shape[0]
     hunt = make_hunt(n)
     begin_hunt(start, hunt)
@@ -470,7 +473,7 @@ def deflated_newton(section, end, most, reach, start, known, z, room, carry):
     purpose="the search for coexisting motions",
 )
 def search(section, end, most, reach, start, known, z):
-    """Find a periodic orbit that is not among the known ones, by Newton's method with the known orbits divided out.
+    """Find a periodic orbit that is not among the known orbits, by Newton's method with the known orbits divided out.
 
     The residual is multiplied by 1 + 1/d^2 for each known orbit at the distance d, so that the known orbits are no longer zeros
     (deflation: Brown and Gearhart 1971; Farrell, Birkisson and Funke 2015). The Newton correction of this product is a multiple
@@ -522,8 +525,9 @@ def sample(section, stations, starts, angles, rows):
     Parameters
     ----------
     stations, starts : ndarray, shapes (k,) and (k, n)
-        Increasing crank angles at which the pieces begin, the first 0, and y there.
+        Increasing crank angles at which the pieces begin, the first 0, and the values of y at these angles.
     angles : ndarray, shape (m,)
+        Crank angles of the samples.
     rows : ndarray, shape (m, states + inputs)
         Written: state of a run and channels at each angle.
     """

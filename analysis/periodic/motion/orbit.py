@@ -128,7 +128,7 @@ class Turn:
         than a rounding error, as for a pendulum that hangs still.
 
         The Fourier series of ``swing`` is evaluated on a grid eight times as fine, and parabolas are laid through the greatest
-        and the least values. The result is accurate to a millionth of itself if there are enough samples for the series.
+        and the least values. The relative error of the amplitude is about 1e-6 if there are enough samples for the series.
         """
         u = self.oscillation(self.swing)
         n = 8 * len(u)
@@ -171,7 +171,7 @@ class Turn:
 def _time(speed: FloatArray, way: float) -> tuple[FloatArray, float]:
     """Integrate 1 / speed over the crank angle by its Fourier series; return the time at equal steps, and the period.
 
-    ``way`` is the crank angle of a period (rad).
+    ``speed`` are samples of the crank speed; ``way`` is the crank angle of a period (rad).
     """
     n = len(speed)
     c = np.fft.rfft(1.0 / speed) / n
@@ -197,8 +197,8 @@ class PeriodicOrbit(NotebookResult):
     turns : int
         Number of common periods, `Flow.period`, in one period of the motion; `crank_turns` is the number of turns of the crank.
     start : ndarray, shape (n,)
-        State y at crank angle 0: first the coordinates, then the rates, of the free freedoms other than the crank; last, if a
-        torque drives the crank, the crank speed (rad/s). For a five-bar: u (m), u' (m/s).
+        State y at crank angle 0: first the coordinates, then the rates, of the free degrees of freedom other than the crank;
+        last, if a torque drives the crank, the crank speed (rad/s). For a five-bar: u (m), u' (m/s).
     monodromy : ndarray, shape (n, n)
         Derivatives of y after one period with respect to y at crank angle 0.
     residual : float
@@ -253,7 +253,7 @@ class PeriodicOrbit(NotebookResult):
 
     @property
     def flow(self) -> Flow:
-        """The mechanism as a flow, with names and units of y."""
+        """The mechanism with its drive as a flow, which has the names and units of y."""
         return self.point.flow
 
     @property
@@ -283,7 +283,7 @@ class PeriodicOrbit(NotebookResult):
 
     @property
     def swing(self) -> tuple[str, str]:
-        """Short name and unit of the coordinate whose amplitude is returned: ``("u", "m")`` for a five-bar."""
+        """Short name and unit of the coordinate to which `amplitude` refers: ``("u", "m")`` for a five-bar."""
         return self.flow.labels[0], self.flow.components[0][1]
 
     @property
@@ -362,8 +362,8 @@ class PeriodicOrbit(NotebookResult):
     def determinant_by_liouville(self, samples: int = 512) -> float:
         """Return the determinant of the monodromy matrix from the trace of the Jacobian of dy/dangle along the orbit.
 
-        The result does not depend on the variational equations, and therefore is a check of them. With Coulomb friction the
-        trace has sharp peaks where the slider reverses: some ten thousand samples are then needed.
+        The result does not depend on the variational equations, and is therefore a check of the monodromy matrix. With Coulomb
+        friction the trace has sharp peaks where the slider reverses: some ten thousand samples are then needed.
         """
         flow, turn, p = self.flow, self.turn(samples), self.point.constants
         y = flow.unknowns(turn.states, self.point.vector).T
@@ -374,7 +374,7 @@ class PeriodicOrbit(NotebookResult):
     def passages(self) -> FloatArray:
         """Return y at the beginning of each common period of the cranks and gears; shape (periods, n).
 
-        The motion could start from each of these states.
+        Each of these states can be taken as the start of the same motion.
         """
         passed, flow, paces = [self.start], self.flow, self.flow.paces(self.point.vector)
         angles = np.array([0.0, flow.period / flow.commons])
@@ -386,7 +386,7 @@ class PeriodicOrbit(NotebookResult):
 
 
 def make_orbit(point: OperatingPoint, **rest: Any) -> PeriodicOrbit:
-    """Build an orbit that keeps its operating point; ``rest`` are the other fields of `PeriodicOrbit`."""
+    """Build a `PeriodicOrbit` that stores its operating point; ``rest`` are the other fields."""
     orbit = PeriodicOrbit(parameters=point.parameters, drive=point.drive, **rest)
     orbit._kept["point"] = point
     return orbit
@@ -456,7 +456,7 @@ def settle_motion(
     """Integrate from ``start`` until a turn changes y by less than ``change``, or for ``turns`` turns at most.
 
     A turn is here a common period, `Flow.period`. Whole turns of links do not count as a change. Return the status and the last
-    y, with whole turns removed.
+    y, without whole turns.
     """
     settled, flow = start.copy(), point.flow
     section = point.section(start, PLAIN, tolerance=tolerance)
@@ -465,9 +465,10 @@ def settle_motion(
 
 
 def _solve_with_rounds(point: OperatingPoint, turns: int, start: FloatArray) -> PeriodicOrbit:
-    """Find by Newton's method a motion in which undriven links go round as often as in the period after ``start``.
+    """Find by Newton's method a motion in which undriven links make as many full turns as in the period after ``start``.
 
-    If there is no such motion, find a motion in which the links go round at the ratios of the drive.
+    If no such motion is found, find a motion in which undriven links make only the full turns that the drive prescribes
+    (``drive.ratios``).
     """
     rounds = _count_rounds(point, start, turns)
     if rounds:
@@ -478,12 +479,12 @@ def _solve_with_rounds(point: OperatingPoint, turns: int, start: FloatArray) -> 
 
 
 def _count_rounds(point: OperatingPoint, start: FloatArray, turns: int) -> dict[str, int]:
-    """Return how often undriven links without a ratio in the drive go round in the period after a start.
+    """Return the numbers of full turns that undriven links without a ratio in the drive make in the period after a start.
 
     Returns
     -------
     dict of str to int
-        Number of whole turns by FMI name of the coordinate; links that only swing are left out.
+        Number of full turns by FMI name of the coordinate; links that only swing are left out.
     """
     flow = point.flow
     swinging = {name: i for name, i in flow.swinging.items() if name not in point.drive.ratios}
@@ -496,7 +497,7 @@ def _count_rounds(point: OperatingPoint, start: FloatArray, turns: int) -> dict[
 def approach_orbit(
     point: OperatingPoint, turns: int, place: FloatArray, known: FloatArray | None = None
 ) -> FloatArray | None:
-    """Search for a periodic motion from a guess that may be far away; return the start of the motion, None if none is found.
+    """Search for a periodic motion from a guess that may be far away; return the start of the motion, or None if none is found.
 
     The start is accurate only to `SEARCH_TOLERANCE`.
 
@@ -521,7 +522,7 @@ def approach_orbit(
 
 
 def approach_uniform_rotation(point: OperatingPoint, turns: int, place: FloatArray) -> FloatArray | None:
-    """Search for a motion near a uniform rotation, however unstable, by multiple shooting.
+    """Search by multiple shooting for a periodic motion near a uniform rotation; the motion may be very unstable.
 
     Parameters
     ----------
@@ -556,8 +557,8 @@ def first_guess(flow: Flow, drive: Drive, start: ArrayLike | None, speed: float 
     """Return the first guess of y for Newton's method: ``start``, or else the mechanism's default coordinates with zero rates.
 
     In the default guess only cranks and links with a ratio turn. The drive's crank has the prescribed speed; under a torque the
-    crank has ``speed`` (rad/s), or else a speed within the motor's range. Other cranks and links have their ratio times this
-    speed.
+    crank has ``speed`` (rad/s), or else a speed within the motor's range. The speed of another crank or link is its ratio times
+    this speed.
 
     Raises InputError if ``start`` does not have the components of the state, if under a torque neither ``start``, ``speed``
     nor a motor is given, or if the crank's speed is then not above zero.
@@ -590,8 +591,8 @@ def rest_guess(
 ) -> list[float]:
     """Return a guess of y for a periodic motion: rest at the coordinates of ``initial``.
 
-    Under a torque the crank has ``speed`` (rad/s), or else the speed in ``initial`` if this is above zero, or else a speed
-    within the motor's range.
+    Under a torque the crank has ``speed`` (rad/s). If ``speed`` is not given, the crank has the speed in ``initial`` if this is
+    above zero, or else a speed within the motor's range.
 
     Raises InputError if there is none of these speeds; ``other`` ends the message: it tells where else a speed can be given.
     """
@@ -612,8 +613,8 @@ def rest_guess(
 def require_turns(turns: int, point: OperatingPoint | None = None, start: FloatArray | None = None) -> None:
     """Raise InputError if a period cannot have this number of turns.
 
-    A mechanism with a freedom driven by a groove, for example, may need several turns to return to its configuration. This is
-    checked if an operating point and a start are given.
+    A mechanism with a degree of freedom driven by a groove, for example, may need several turns to return to its configuration.
+    This is checked if an operating point and a start are given.
     """
     if turns < 1 or turns != int(turns):
         raise InputError(f"turns is {turns}: a period has a whole number of them, at least one")
@@ -649,7 +650,7 @@ def _check_assembly(point: OperatingPoint, start: FloatArray) -> None:
 
 
 def solve_orbit(point: OperatingPoint, turns: int, guess: FloatArray) -> PeriodicOrbit:
-    """Find a periodic motion by Newton's method from a guess; raises OrbitError if the method fails."""
+    """Find a periodic motion by Newton's method from a guess; raise OrbitError if the method fails."""
     n, start = point.flow.size, guess.copy()
     z, report = np.empty(n * (1 + n)), np.zeros(3)
     section = point.section(guess, VARIATIONAL)
@@ -691,7 +692,10 @@ def trial_orbit(
 
 
 def _close(ends: Ends, starts: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return the gaps of a period, y at each end minus y at the next beginning, (k, n), and their Jacobian, (k n, k n)."""
+    """Return the gaps between the pieces of a period, shape (k, n), and their Jacobian, (k n, k n).
+
+    A gap is y at the end of a piece minus y at the beginning of the next piece.
+    """
     (k, n), pieces = starts.shape, np.arange(len(starts))
     following = (pieces + 1) % k
     jacobian: FloatArray = np.zeros((k, n, k, n))
@@ -729,14 +733,14 @@ class OrbitEquations:
         self._direction = family.direction(high, low, high) if mechanism is other else None
 
     def scale(self, start: FloatArray) -> FloatArray:
-        """Return the scale of each unknown, its typical magnitude: the larger of those at the two ends of the range."""
+        """Return the scale of each unknown, its typical magnitude: the larger of the scales at the two ends of the range."""
         scale = np.max([operating_point(*bound).scale(start) for bound in self._bounds], axis=0)
         # arc length is measured by the mean square over the pieces
         pieces = len(self.angles) - 1
         return np.asarray(np.tile(scale * np.sqrt(pieces), pieces))
 
     def __call__(self, unknowns: FloatArray, value: float) -> Evaluation:
-        """Evaluate the residual with its exact derivatives; raises OrbitError if the integration over a piece fails."""
+        """Evaluate the residual with its exact derivatives; raise OrbitError if the integration over a piece fails."""
         point = operating_point(*self.family.operation(value))
         starts = unknowns.reshape(self._shape).copy()
         direction = self._direction or self.family.direction(value, self.low, self.high)

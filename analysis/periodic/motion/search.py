@@ -97,7 +97,7 @@ class Sweep:
     def amplitude(self) -> np.ma.MaskedArray[tuple[int], np.dtype[np.float64]]:
         """Half the range of the first free coordinate at each speed, shape (m,); masked where there is no steady motion.
 
-        Its unit is m for a slider, rad for an angle.
+        The unit is m for a slider, rad for an angle.
         """
         values = [np.nan if orbit is None else orbit.amplitude for orbit in self.orbits]
         return np.ma.masked_invalid(np.array(values))
@@ -185,7 +185,7 @@ def sweep(
 
 
 def _with_speed(drive: Drive, speed: float) -> Drive:
-    """Return the drive with this prescribed speed; if it has a motor instead, with this synchronous speed of the motor."""
+    """Return the drive with another prescribed speed; if the drive has a motor, with another synchronous speed of the motor."""
     if drive.speed is None and drive.motor is not None:
         return replace(drive, motor=replace(drive.motor, synchronous_speed=speed))
     return replace(drive, speed=speed, torque=0.0, motor=None)
@@ -274,12 +274,12 @@ class Orbits(NotebookResult):
     orbits : tuple of PeriodicOrbit
         The motions in the order of their amplitudes, the smallest first.
     agreed : bool
-        Whether the two methods found the same motions and ``index`` is ``index_of_all``; if not, there may be more.
+        Whether the two methods found the same motions and ``index`` is ``index_of_all``; if not, there may be more motions.
     index : int
         Sum of the signs of det(I - monodromy matrix) over these motions and the motions whose period is a fraction of theirs;
-        each motion counts once per turn. Motions come and go in pairs of opposite signs: a sum other than ``index_of_all``
-        means that a motion was missed, or lost at the limit of assembly. If several numbers of turns were searched, ``index``
-        is the first sum that differs from ``index_of_all``.
+        each motion counts once per turn. Motions appear and vanish in pairs of opposite signs: a sum other than
+        ``index_of_all`` means that a motion was missed, or lost at the limit of assembly. If several numbers of turns were
+        searched, ``index`` is the first sum that differs from ``index_of_all``.
     index_of_all : int
         Value of ``index`` if no motion is missing: 1; or 0 if a link may go round, because motions then come in pairs, like a
         hanging and an inverted pendulum.
@@ -301,13 +301,13 @@ class Orbits(NotebookResult):
 
     @property
     def stable(self) -> tuple[PeriodicOrbit, ...]:
-        """The motions in which a machine can stay: all motions that are not unstable."""
+        """The motions that a machine can maintain: all motions that are not unstable."""
         return tuple(orbit for orbit in self.orbits if orbit.verdict().stability is not Stability.UNSTABLE)
 
 
 @takes_published()
 def unsought_hint(parameters: Parameters, drive: Drive) -> str:
-    """Return the end of an error message, which tells what motions with links that go round were not sought.
+    """Return the end of an error message, which tells which motions with links that go round were not sought.
 
     The result is empty if no link can go round.
     """
@@ -331,12 +331,13 @@ def find_orbit(
     start: ArrayLike | None = None,
     settle: bool = True,
 ) -> PeriodicOrbit:
-    """Find a periodic motion of the full nonlinear mechanism; of several, the motion that a machine reaches in run-up.
+    """Find a periodic motion of the full nonlinear mechanism; if there are several, the motion reached in a slow run-up.
 
     Parameters
     ----------
     parameters : parameters of a mechanism
-        Or a published set or its name; the set also gives the crank speed, unless another drive is given.
+        Parameters, a published set, or the name of a published set; a set also gives the crank speed, unless another drive is
+        given.
     inputs : Inputs, optional
         Constant inputs; a motor may drive the crank.
     speed : float or str, optional
@@ -344,15 +345,15 @@ def find_orbit(
     torque : float, InductionMotor, or both in a sequence, optional
         Torque on the crank (N.m), instead of a speed. The mean speed is then part of the solution.
     initial : state at the start, optional
-        Positions of the freedoms that are held: see `Drive`.
+        Positions of the degrees of freedom that are held: see `Drive`.
     turns : int
         Turns of the crank in one period, or common periods of gears or several cranks; if there is no such motion, a motion of
         fewer turns is returned.
     start : array_like, shape (n,), optional
-        Guess of y at crank angle 0: coordinates and rates of the free freedoms other than the crank, of a five-bar u (m) and
-        u' (m/s), and under a torque the crank speed (rad/s), which is needed unless it follows from a motor's synchronous
-        speed. If ``start`` is given, the result at prescribed speed is the motion to which Newton's method leads from this
-        guess. Under a torque, the result is the stable motion on which the mechanism settles from this guess.
+        Guess of y at crank angle 0: coordinates and rates of the free degrees of freedom other than the crank, of a five-bar u
+        (m) and u' (m/s), and under a torque the crank speed (rad/s), which is needed unless it follows from a motor's
+        synchronous speed. If ``start`` is given, the result at prescribed speed is the motion to which Newton's method leads
+        from this guess. Under a torque, the result is the stable motion on which the mechanism settles from this guess.
     settle : bool
         Whether other motions are sought, and other starts are tried if Newton's method fails from the guess; if False, the
         result is the motion to which Newton's method leads.
@@ -456,7 +457,7 @@ def search_orbits(
     start: ArrayLike | None = None,
     known: Iterable[PeriodicOrbit] = (),
 ) -> Orbits:
-    """Find all periodic motions under a `Drive`, including the motions ``known`` from before: see `find_orbits`.
+    """Find all periodic motions under a `Drive`: see `find_orbits`. The motions ``known`` are included in the result.
 
     Motions in which an undriven link goes round are sought, too: one link at a time, at most once per turn of the crank. If the
     drive has a ratio for the link, only motions with this ratio are sought.
@@ -487,7 +488,7 @@ def search_orbits(
 def _search_rounds(
     point: OperatingPoint, turns: int, start: ArrayLike | None, known: Iterable[PeriodicOrbit] = ()
 ) -> Orbits:
-    """Find the periodic motions in which undriven links go round at the ratios of the drive, or swing if they have none."""
+    """Find the periodic motions in which undriven links with a ratio in the drive go round, and other links only swing."""
     guess = first_guess(point.flow, point.drive, start)
     require_turns(turns, point, guess)
     many, deflated = (_FoundMotions(point, turns, guess) for _ in range(2))
@@ -525,7 +526,7 @@ def _search_rounds(
 
 
 def join_orbits(parts: Sequence[Orbits]) -> Orbits:
-    """Join the results of several searches into one."""
+    """Join the results of several searches at one operating point into one result."""
     whole = parts[0].index_of_all
     return Orbits(
         orbits=tuple(sorted((o for part in parts for o in part.orbits), key=lambda orbit: orbit.amplitude)),
@@ -536,7 +537,7 @@ def join_orbits(parts: Sequence[Orbits]) -> Orbits:
 
 
 class _FoundMotions:
-    """The motions that one method of the search has found at an operating point."""
+    """The motions found at an operating point by one of the two methods of the search."""
 
     def __init__(self, point: OperatingPoint, turns: int, guess: FloatArray) -> None:
         self.point, self.turns, self.guess, self.scale = point, turns, guess, point.scale(guess)
@@ -547,11 +548,11 @@ class _FoundMotions:
         self.index = 0
 
     def places(self, count: int, number: int) -> list[FloatArray]:
-        """Return the starts of a set, by its index ``number``: see `spread_starts`."""
+        """Return the starts in the set with the index ``number``: see `spread_starts`."""
         return list(spread_starts(self.point.parameters, self.point.drive, self.guess, count, number))
 
     def knows(self, start: FloatArray, near: float = SAME) -> bool:
-        """Return whether a start is a start of a known motion, to a distance of ``near`` relative to the scale of y."""
+        """Return whether a start belongs to a known motion, within a distance of ``near`` relative to the scale of y."""
         away = np.abs(self.point.flow.remove_turns(self.known - start)) / self.scale
         return bool((away.max(axis=1) < near).any()) if len(away) else False
 
@@ -566,7 +567,7 @@ class _FoundMotions:
             return False
 
     def add(self, orbit: PeriodicOrbit) -> bool:
-        """Add a motion; return whether it is new."""
+        """Add a motion to the motions found; return whether it is new."""
         if self.knows(orbit.start):
             return False
         passed = orbit.passages()
@@ -580,13 +581,13 @@ class _FoundMotions:
         return True
 
     def has_same_motions(self, other: _FoundMotions) -> bool:
-        """Return whether this method and another one have found the same motions."""
+        """Return whether this method and another method have found the same motions."""
         if len(self.orbits) != len(other.orbits):
             return False
         return all(other.knows(orbit.start) for orbit in self.orbits)
 
     def intermediate_starts(self) -> list[FloatArray]:
-        """Return starts between each two motions, where a third motion often lies, and around each motion."""
+        """Return starts between each two known motions, where a third motion often lies, and around each known motion."""
         places = [
             a + share * (b - a) for n, a in enumerate(self.known) for b in self.known[:n] for share in (0.25, 0.5, 0.75)
         ]
@@ -599,9 +600,9 @@ def _reached_motion(
 ) -> PeriodicOrbit:
     """Return the motion that a machine reaches: the stable motion nearest to the motion on which the machine settles.
 
-    ``first`` is the motion that Newton's method found from the first guess, or None. It is returned if no motion is stable, or
-    if a link may go round and no stable motion is near. If no motion is stable and ``first`` is None, the result is the motion
-    of the smallest amplitude.
+    ``first`` is the motion that Newton's method found from the first guess, or None. If no motion is stable, or if a link may
+    go round and no stable motion is near, ``first`` is returned. If no motion is stable and ``first`` is None, the result is
+    the motion of the smallest amplitude.
     """
     stable = found.stable
     if not stable:

@@ -1,8 +1,8 @@
 """Integrate several motions of one mechanism at once, each in its own lane: functions of compiled kernels.
 
 Each lane has its own start, tolerance, step size and end; mechanism and drive are the same. A kernel starts a motion in each
-lane, steps all lanes until one motion ends, and then starts another motion in this lane. The integrator is that of
-`kernels.advance`.
+lane, steps all lanes until one motion ends, and then starts another motion in the lane of this motion. The integrator is that
+of `kernels.advance`.
 """
 
 from __future__ import annotations

@@ -30,7 +30,7 @@ Plane = Callable[[float, float], Operation]
 
 @cache
 def _crank_inputs(mechanism: Mechanism) -> dict[str, tuple[str, int]]:
-    """Return the kind (speed or torque) and the freedom of each crank speed and crank torque, by FMI name."""
+    """Return the kind (speed or torque) and the degree of freedom's index of each crank speed and crank torque, by FMI name."""
     found = {}
     for crank in find_cranks(mechanism):
         for what, n in (("torque", crank.torque), ("speed", crank.command)):
@@ -41,7 +41,7 @@ def _crank_inputs(mechanism: Mechanism) -> dict[str, tuple[str, int]]:
 
 @cache
 def motor_parameters(mechanism: Mechanism) -> dict[str, tuple[str, str]]:
-    """Return the field of `InductionMotor` and the unit of each motor parameter by FMI name, in the order of `Drive.vector`."""
+    """Return the field of `InductionMotor` and the unit for each motor parameter, by FMI name, ordered as in `Drive.vector`."""
     units = {"breakdown_torque": "N.m", "breakdown_slip": "1", "synchronous_speed": "rad/s"}
     torques = [mechanism.channels[n].name for n in mechanism.torques]
     return {f"{name}.{field}": (field, unit) for name in torques for field, unit in units.items()}
@@ -53,7 +53,7 @@ def driving_names(mechanism: Mechanism) -> tuple[str, ...]:
 
 
 def speed_names(mechanism: Mechanism) -> tuple[str, ...]:
-    """Return the FMI names of the speeds of cranks that can be prescribed."""
+    """Return the FMI names of the crank speeds that can be prescribed."""
     return tuple(name for name, (what, _) in _crank_inputs(mechanism).items() if what == "speed")
 
 
@@ -70,7 +70,7 @@ def speed_name(mechanism: Mechanism, drive: Drive | None = None) -> str | None:
 
 
 def default_variable(mechanism: Mechanism, drive: Drive | None = None) -> str:
-    """Return the FMI name of the parameter that varies if none is named: the prescribed speed of the crank.
+    """Return the FMI name of the parameter that varies if no name is given: the prescribed speed of the crank.
 
     Raises
     ------
@@ -85,7 +85,7 @@ def default_variable(mechanism: Mechanism, drive: Drive | None = None) -> str:
 
 @takes_published()
 def require_variable(parameters: Parameters, drive: Drive, name: str) -> None:
-    """Check that a parameter of this name can vary in this drive.
+    """Check that the parameter ``name`` can vary in this drive.
 
     Raises
     ------
@@ -149,7 +149,7 @@ def parameter_unit(mechanism: Mechanism, name: str) -> str:
 
 @takes_published()
 def parameter_value(parameters: Parameters, drive: Drive, name: str) -> float:
-    """Return the value of a parameter; NaN for a speed under a torque drive, or for a missing motor."""
+    """Return the value of a parameter; NaN for a speed under a torque, or for a motor parameter if there is no motor."""
     mechanism = find_mechanism(parameters)
     what, freedom = _crank_inputs(mechanism).get(name, ("", -1))
     if what == "speed":
@@ -164,20 +164,23 @@ def parameter_value(parameters: Parameters, drive: Drive, name: str) -> float:
 
 
 def format_value(name: str, value: float, unit: str) -> str:
-    """Format a value with its name and unit, speeds also in rpm."""
+    """Format a value with its name and unit; speeds are also given in rpm."""
     rpm = f" ({value / RAD_S_PER_RPM:.6g} rpm)" if unit == "rad/s" else ""
     return f"{name} = {value:.6g} {unit}".rstrip() + rpm
 
 
 @lru_cache(maxsize=64)
 def _replace_parameters(parameters: Parameters, *values: tuple[str, float]) -> Parameters:
-    """Return parameters with new values; cached, because all points in a row of a chart over the speed have the same values."""
+    """Return parameters with new values, given as (FMI name, value).
+
+    The result is cached, because all points in a row of a chart over the speed have the same values.
+    """
     return replace(parameters, **dict(values))
 
 
 @takes_published()
 def with_values(parameters: Parameters, drive: Drive, values: Mapping[str, float]) -> Operation:
-    """Return the mechanism and drive with new values of parameters, given by FMI name."""
+    """Return the mechanism and the drive with new values of parameters, which are given by FMI name."""
     mechanism = find_mechanism(parameters)
     of_cranks, of_motor, forces = _crank_inputs(mechanism), motor_parameters(mechanism), force_inputs(mechanism)
     own = drive.reference(mechanism).freedom
@@ -303,13 +306,13 @@ class Family:
         object.__setattr__(self, "unit", self.unit or parameter_unit(find_mechanism(self.parameters), vary))
 
     def operation(self, value: float) -> Operation:
-        """Return the mechanism and drive at a value of the parameter."""
+        """Return the mechanism and the drive at a value of the family's parameter."""
         if callable(self.vary):
             return self.vary(value)
         return with_values(self.parameters, self.drive, {self.vary: value})
 
     def with_ratios(self, ratios: Mapping[str, Any]) -> Family:
-        """Return the family with other ratios: turns of the other cranks and links per turn of the crank, see `Drive`."""
+        """Return the family with new ratios: turns of the other cranks and of links per turn of the crank, see `Drive`."""
         if ratios == self.drive.ratios:
             return self
         drive = replace(self.drive, ratios=ratios)
@@ -318,11 +321,14 @@ class Family:
         )
 
     def format_value(self, value: float) -> str:
-        """Format a value of the parameter with its name and unit, speeds also in rpm."""
+        """Format a value of the family's parameter with its name and unit; speeds are also given in rpm."""
         return format_value(self.name, value, self.unit)
 
     def direction(self, value: float, low: float, high: float) -> Direction:
-        """Differentiate drive vector and constants by the parameter at ``value``, by finite differences within its range."""
+        """Return the derivatives of drive vector and constants with respect to the family's parameter at ``value``.
+
+        They are computed by finite differences within the range from ``low`` to ``high``.
+        """
         step = _DIFFERENCE * max(abs(value), 1e-3 * (high - low))
         a, b = max(value - step, low), min(value + step, high)
         mechanism = find_mechanism(self.parameters)
@@ -333,7 +339,7 @@ class Family:
 
 
 def _with_ratios(vary: Callable[[float], Operation], ratios: Mapping[str, Any], value: float) -> Operation:
-    """Return the mechanism and drive that ``vary`` gives for a value, with other ratios in the drive."""
+    """Return the mechanism and the drive that ``vary`` gives for a value, with new ratios in the drive."""
     parameters, drive = vary(value)
     return parameters, replace(drive, ratios=ratios)
 
@@ -343,10 +349,10 @@ FloatArray = NDArray[np.float64]
 
 @takes_published()
 def gradient_names(parameters: Parameters, drive: Drive) -> tuple[str, ...]:
-    """Return the FMI names of the parameters of drive and mechanism with respect to which motions are differentiated.
+    """Return the FMI names of the drive's and mechanism's parameters with respect to which motions are differentiated.
 
-    A parameter at zero that would switch on further equations, such as friction by contact forces, is left out of these names;
-    where names can be chosen, it can be included.
+    A parameter is left out if it is zero and would switch on further equations, such as friction by contact forces. Functions
+    that accept names also differentiate with respect to a parameter that is left out here.
     """
     mechanism, acting = find_mechanism(parameters), []
     for name in variable_names(mechanism):
@@ -369,7 +375,7 @@ class ConstantDerivatives(NamedTuple):
 
 
 def differentiate_constants(parameters: Parameters, names: Sequence[str], along: str = "") -> ConstantDerivatives:
-    """Compute the derivatives of the constants of the equations by parameters; zero for parameters of the drive.
+    """Compute the derivatives of the constants of the equations with respect to parameters; zero for parameters of the drive.
 
     ``names`` are FMI names; ``along`` is the FMI name of the further parameter for the second derivatives.
     """
@@ -389,7 +395,7 @@ def differentiate_constants(parameters: Parameters, names: Sequence[str], along:
 
 
 def parameter_places(flow: Flow, drive: Drive, name: str) -> dict[int, float] | None:
-    """Return, for each entry of `Drive.vector` that is a multiple of a parameter, the factor, by index of the entry.
+    """Return the entries of `Drive.vector` that are multiples of a parameter: the factor of each, by the index of the entry.
 
     For a parameter of the mechanism the result is None.
     """
@@ -404,7 +410,7 @@ def parameter_places(flow: Flow, drive: Drive, name: str) -> dict[int, float] | 
 
 
 def stack_derivatives(drive: Drive, flow: Flow, names: Sequence[str], p: FloatArray) -> FloatArray:
-    """Return the derivatives of the drive vector by the m parameters ``names``, and below them ``p``.
+    """Return the derivatives of the drive vector with respect to the m parameters ``names``, and below them ``p``.
 
     ``p`` are the derivatives of the constants. The shape is (size of the drive vector + constants, m).
     """
@@ -417,10 +423,10 @@ def stack_derivatives(drive: Drive, flow: Flow, names: Sequence[str], p: FloatAr
 
 @cache
 def _constants(mechanism: Mechanism) -> Any:
-    """Return a ``casadi.Function`` that differentiates the constants of the equations by the parameters.
+    """Return a ``casadi.Function`` that differentiates the constants of the equations with respect to the parameters.
 
-    Its arguments are the parameters and a direction in their space. Its values are the Jacobian of the constants by the
-    parameters, and the derivative of this Jacobian along the direction.
+    The arguments are the parameters and a direction in their space. The values are the Jacobian of the constants with respect
+    to the parameters, and the derivative of this Jacobian along the direction.
     """
     casadi = symbolic.library()
     traced = parameter_symbols(mechanism)

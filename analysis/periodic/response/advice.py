@@ -108,11 +108,11 @@ class Arc:
 
     @property
     def span(self) -> Interval:
-        """The least and the greatest value of the parameter."""
+        """The least and the greatest value of the parameter on the arc."""
         return float(self.parameter[0]), float(self.parameter[-1])
 
     def is_same_curve(self, other: Arc) -> bool:
-        """Return whether two arcs are the same curve where they overlap, because a branch was followed from both ends."""
+        """Return whether two arcs are the same curve where they overlap, as when a branch was followed from both ends."""
         low, high = _overlap(self, other)
         if self.turns != other.turns or low >= high:
             return False
@@ -198,7 +198,7 @@ def fold_jumps(branches: Sequence[Branch]) -> tuple[FoldJump, ...]:
 
 
 def ranges_to_avoid(branches: Sequence[Branch], low: float, high: float) -> tuple[Avoided, ...]:
-    """Return the ranges of the parameter in which a machine resonates, may jump, doubles its period or has no stable motion.
+    """Return the ranges of the parameter that a machine should avoid: resonance, jump, doubled period, or no stable motion.
 
     ``low`` and ``high`` bound the range of the parameter over which the branches were followed.
     """
@@ -218,12 +218,12 @@ def ranges_to_avoid(branches: Sequence[Branch], low: float, high: float) -> tupl
 
 
 def _overlap(a: Arc, b: Arc) -> Interval:
-    """Return the range in which two arcs overlap; its end lies below its beginning if they do not."""
+    """Return the range of the parameter in which two arcs overlap; if they do not overlap, its end lies below its beginning."""
     return max(a.span[0], b.span[0]), min(a.span[1], b.span[1])
 
 
 def _resonances(arc: Arc) -> list[Interval]:
-    """Return the half-power bands of the peaks of an arc.
+    """Return the half-power bands of the peaks of an arc, as ranges of the parameter.
 
     An end of the arc also counts as a peak if the amplitude is greatest there and the branch continues on another arc.
     """
@@ -238,9 +238,10 @@ def _resonances(arc: Arc) -> list[Interval]:
 
 
 def _band_end(arc: Arc, top: int, way: int) -> float:
-    """Return the parameter at the half-power point on one side of a peak; infinite if the arc rises above the peak first.
+    """Return the parameter at the half-power point on one side of a peak, or at the end of the arc.
 
-    ``top`` is the index of the peak; ``way`` is -1 for the side of lower parameters, +1 for the side of higher parameters.
+    The result is infinite if the amplitude exceeds the peak before it falls to half power. ``top`` is the index of the peak;
+    ``way`` is -1 for the side of lower parameters, +1 for the side of higher parameters.
     """
     a, x = arc.amplitude, arc.parameter
     level, i = HALF_POWER * a[top], top
@@ -258,7 +259,7 @@ def _band_end(arc: Arc, top: int, way: int) -> float:
 
 
 def _union(intervals: Iterable[Interval], least: float) -> list[Interval]:
-    """Return intervals, sorted; those that overlap or are closer than ``least`` are joined."""
+    """Return the union of intervals, sorted; intervals that overlap or are closer than ``least`` are joined."""
     joined: list[Interval] = []
     for low, high in sorted((low, high) for low, high in intervals if low < high):
         if joined and low <= joined[-1][1] + least:
@@ -285,12 +286,12 @@ _SAMPLED = 1e-6
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Extremum:
-    """A local maximum or minimum of the amplitude over the parameter.
+    """A local maximum or minimum of the amplitude over the parameter of a family.
 
     Attributes
     ----------
     parameter : float
-        Value of the parameter that varies, such as the speed (rad/s).
+        Value of the parameter at the extremum, such as the speed (rad/s).
     amplitude : float
         Amplitude (m for a slider).
     stability : Stability
@@ -380,7 +381,7 @@ def special_gradient(
     InputError
         If the parameter of the family is not an FMI name but a function.
     LinkworkError
-        If the parameter at the point has no derivative, for example where two folds meet.
+        If the value of the family's parameter at the point has no derivative, for example where two folds meet.
     """
     if not isinstance(family.vary, str):
         raise InputError(f"{family.name} is a function: gradients are along a parameter with an FMI name")

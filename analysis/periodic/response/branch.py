@@ -105,7 +105,7 @@ class Branch(NotebookResult):
         return np.array([orbit.largest for orbit in self.orbits])
 
     def stability(self, tolerance: float = TOLERANCE) -> tuple[Stability, ...]:
-        """Return the stability of each orbit."""
+        """Return the stability of each orbit on the branch."""
         return tuple(orbit.verdict(tolerance).stability for orbit in self.orbits)
 
     def columns(self) -> Mapping[str, NDArray[np.float64]]:
@@ -140,9 +140,9 @@ FORCE = "greatest force in "
 
 
 def _turn_columns(orbit: PeriodicOrbit, first: Turn) -> dict[str, Callable[[Turn], float]]:
-    """Return functions that compute a column's value from the outputs over one period, by the name of the column.
+    """Return, by the name of each column, a function that computes the column's value from the outputs over one period.
 
-    ``first`` is the outputs of ``orbit``; they tell which outputs the mechanism has.
+    ``first`` are the outputs of ``orbit`` over a period; they tell which outputs the mechanism has.
     """
     mechanism = find_mechanism(orbit.parameters)
     rate = next(v for v in mechanism.variables if v.name == mechanism.freedoms[orbit.flow.crank].rate)
@@ -319,13 +319,13 @@ def _follower(
 def _growth(orbit: PeriodicOrbit) -> float:
     """Return the greatest growth factor of a small deviation over the period.
 
-    If the period is divided for multiple shooting, it is the greatest growth factor over any one piece.
+    If the period is divided for multiple shooting, the result is the greatest growth factor over any one piece.
     """
     return orbit.largest if orbit.stations is None else orbit.stations.growth
 
 
 def _divide_period(family: Family, last: Point, settings: Settings) -> tuple[Follower, Point]:
-    """Return a follower that uses multiple shooting, and its first point, which is the last point of the branch so far.
+    """Return a follower that uses multiple shooting, and its first point: the last point of the branch so far.
 
     The pieces into which the period is divided are chosen from the orbit at this point.
     """
@@ -415,7 +415,8 @@ def _branch(
 def _meets_half(before: Point, after: Point) -> bool:
     """Return whether a branch meets, between two of its points, a branch of motions with half the period.
 
-    From there on the followed branch passes through the same motions again, with the two halves of the period exchanged.
+    Beyond the meeting point the followed branch passes through the same motions again, with the two halves of the period
+    exchanged.
     """
     turns = after.data.turns
     if turns % 2 or not before.tangent[-1] * after.tangent[-1] < 0.0:
@@ -464,7 +465,7 @@ def _special_points(
 
 
 def describe(branches: Sequence[Branch]) -> str:
-    """Describe branches of a family in one line: range, number of orbits, stability, and place of the greatest amplitude."""
+    """Describe branches of a family in one line: range, number of orbits, stability, and where the amplitude is greatest."""
     family, (name, unit) = branches[0].family, branches[0].orbits[0].flow.components[0]
     span = format_range(np.concatenate([branch.parameter for branch in branches]), family.unit)
     words = dict.fromkeys(word.value for branch in branches for word in branch.stability())
@@ -484,7 +485,7 @@ _ON = 2e-3
 
 
 def distance(points: NDArray[np.float64], place: NDArray[np.float64]) -> float:
-    """Return the distance of a place, shape (n,), from the polygonal line through points, shape (m, n)."""
+    """Return the distance of a point ``place``, shape (n,), from the polygonal line through ``points``, shape (m, n)."""
     s = points - place
     pieces = np.diff(s, axis=0)
     squares = np.maximum((pieces**2).sum(axis=1), 1e-300)
@@ -496,7 +497,8 @@ def distance(points: NDArray[np.float64], place: NDArray[np.float64]) -> float:
 def passes(branch: Branch, value: float, motion: NDArray[np.float64], width: float) -> bool:
     """Return whether a branch passes through a motion, apart from whole turns of links.
 
-    ``motion`` is the start of the motion and ``value`` its parameter; ``width`` is the scale of the parameter.
+    ``motion`` is the start of the motion and ``value`` the value of the family's parameter; ``width`` is the scale of this
+    parameter.
     """
     ends = [branch.orbits[i] for i in (branch.parameter.argmin(), branch.parameter.argmax())]
     scale = np.append(np.max([o.scale for o in ends], axis=0), width)

@@ -2,7 +2,7 @@
 
 `frequency_response` follows the periodic motions of the full nonlinear mechanism over a range of speeds, past folds, from both
 ends of the range. At period doublings it switches to the motions of twice the period, repeatedly if wanted. `with_isolas` adds
-the motions to which no branch leads: closed curves over the parameter, and branches that reach neither end of the range.
+the motions to which none of these branches leads: closed curves over the parameter, and branches that reach neither end.
 `natural_frequency` gives the classical estimate of the resonance from the mean effective mass.
 """
 
@@ -69,15 +69,18 @@ def first_freedom(mechanism: Mechanism) -> int:
 
 
 def stiffness_name(mechanism: Mechanism) -> str:
-    """Return the FMI name of the stiffness of the first freedom's spring, such as ``slider.stiffness``; "" without a spring.
+    """Return the FMI name of the stiffness of the spring of the first degree of freedom that is not a crank.
 
-    The first freedom is the first degree of freedom that is not a crank.
+    The name is, for example, ``slider.stiffness``; it is empty without a spring.
     """
     return next(iter(mechanism.names("stiffness", mechanism.freedoms[first_freedom(mechanism)].coordinate)), "")
 
 
 def _mean_mass_and_stiffness(parameters: Parameters) -> tuple[float, float]:
-    """Return effective mass (kg) and stiffness (N/m) of the first freedom at its zero position, averaged over a crank turn."""
+    """Return mean effective mass (kg) and mean stiffness (N/m) of the first degree of freedom that is not a crank.
+
+    Both are averaged over a crank turn, with the degree of freedom held at its zero position.
+    """
     mechanism = find_mechanism(parameters)
     cranks, freedom = find_cranks(mechanism), first_freedom(mechanism)
     if not cranks:
@@ -100,23 +103,23 @@ def _mean_mass_and_stiffness(parameters: Parameters) -> tuple[float, float]:
 
 @takes_published()
 def mean_effective_mass(parameters: Parameters) -> float:
-    """Return the effective mass (kg) of the first freedom other than the crank, averaged over a crank turn.
+    """Return the effective mass (kg) of the first degree of freedom that is not a crank, averaged over a crank turn.
 
     For a five-bar it is the mean of m22.
 
     Raises
     ------
     AssemblyError
-        If the links cannot be joined over the whole turn with this freedom at its zero position.
+        If the links cannot be joined over the whole turn with this degree of freedom at its zero position.
     """
     return _mean_mass_and_stiffness(parameters)[0]
 
 
 @takes_published()
 def natural_frequency(parameters: Parameters) -> float:
-    """Compute the natural frequency (rad/s) of the first freedom other than the crank, from its mean effective mass.
+    """Compute the natural frequency (rad/s) of the first degree of freedom that is not a crank, from its mean effective mass.
 
-    The stiffness is the parameter of the freedom's spring, such as ``slider.stiffness``. If there is no such parameter, it is
+    The stiffness is the parameter of its spring, such as ``slider.stiffness``. If there is no such parameter, it is
     the second derivative of the potential energy, averaged over a crank turn.
 
     Raises
@@ -124,7 +127,7 @@ def natural_frequency(parameters: Parameters) -> float:
     ParameterError
         If there is no spring.
     AssemblyError
-        If the crank cannot make a turn with this freedom held at its zero position.
+        If the crank cannot make a turn with this degree of freedom held at its zero position.
 
     Examples
     --------
@@ -190,7 +193,7 @@ class Response(NotebookResult):
 
     @property
     def sought_values(self) -> str:
-        """Text: the number of values of the parameter at which all motions were sought; more values may find more motions."""
+        """Text that tells at how many values of the parameter all motions were sought; more values may find more motions."""
         return f"{format_count(self.sought, 'value')} of {self.family.name}"
 
     @property
@@ -212,11 +215,11 @@ class Response(NotebookResult):
         return fold_jumps(self.branches)
 
     def maxima(self) -> tuple[Extremum, ...]:
-        """Return the local maxima of the amplitude, sorted by parameter; multiples of the period are left out."""
+        """Return the local maxima of the amplitude, sorted by parameter; motions with a multiplied period are left out."""
         return self._extrema(1)
 
     def minima(self) -> tuple[Extremum, ...]:
-        """Return the local minima of the amplitude, sorted by parameter; multiples of the period are left out."""
+        """Return the local minima of the amplitude, sorted by parameter; motions with a multiplied period are left out."""
         return self._extrema(-1)
 
     def _extrema(self, sign: int) -> tuple[Extremum, ...]:
@@ -269,7 +272,7 @@ def frequency_response(
     Parameters
     ----------
     parameters : parameters of a mechanism
-        Or a published set or its name.
+        Parameters, a published set, or the name of a published set.
     low, high : float or str
         Range of the parameter: speed in rad/s, torque in N.m, other parameters in their FMI unit; or text such as "420 rpm".
     drive : Drive, optional
@@ -353,7 +356,7 @@ class _Search:
     def follow_from_both_ends(self, start: ArrayLike | None, most_points: int, show: Callable[[float], None]) -> None:
         """Follow the branch from the low end of the range, and the branch from the high end if it is a different branch.
 
-        ``show`` is called with the length of the range that is done.
+        ``show`` is called with the length of the part of the range that is done.
         """
         done = 0.0
 
@@ -395,7 +398,7 @@ class _Search:
     def follow_doublings(self, times: int) -> None:
         """Follow the branches of twice the period, four times the period and so on: the period is doubled ``times`` times.
 
-        A branch with a period doubling at both ends is followed from one end only.
+        A branch that begins and ends at a period doubling is followed from one of these points only.
         """
         ends: list[tuple[int, float, NDArray[np.float64]]] = []
 
@@ -464,7 +467,7 @@ class _Search:
                 self.problems.append(describe_end(branch))
 
     def _knows(self, orbit: PeriodicOrbit, value: float) -> bool:
-        """Return whether a known branch passes through a motion; a motion of several turns may begin with any of its turns."""
+        """Return whether a known branch passes through a motion, at whichever turn the motion is taken to begin."""
         own = [branch for branch in self.branches if branch.turns == orbit.turns]
         starts = orbit.passages()
         return any(passes(branch, value, start, self.high - self.low) for branch in own for start in starts)

@@ -93,7 +93,7 @@ class NormalForm:
 
 
 class Forms(NamedTuple):
-    """Second and third derivatives of a map at its fixed point zero as multilinear forms B and C, by finite differences.
+    """Second and third derivatives of a map at the fixed point zero as multilinear forms B and C, by finite differences.
 
     Attributes
     ----------
@@ -143,7 +143,7 @@ def _forms(orbit: PeriodicOrbit) -> Forms:
 
 
 def _complex_form(form: Callable[..., FloatArray], count: int) -> Form:
-    """Extend a real multilinear form of ``count`` vectors to complex vectors."""
+    """Extend a real multilinear form of ``count`` vectors to complex vectors, by linearity."""
 
     def of(*vectors: NDArray[np.complex128]) -> NDArray[np.complex128]:
         total = np.zeros(len(vectors[0]), dtype=complex)
@@ -157,7 +157,10 @@ def _complex_form(form: Callable[..., FloatArray], count: int) -> Form:
 
 
 def _eigenvectors(matrix: FloatArray, value: complex) -> tuple[NDArray[np.complex128], NDArray[np.complex128], complex]:
-    """Return right and left eigenvector, with the product 1, of the eigenvalue nearest to ``value``, and this eigenvalue."""
+    """Return the right and left eigenvectors of the eigenvalue nearest to ``value``, and this eigenvalue.
+
+    The eigenvectors are scaled so that their product is 1.
+    """
     values, right = np.linalg.eig(matrix.astype(complex))
     n = int(np.abs(values - value).argmin())
     adjoint, left = np.linalg.eig(matrix.T.astype(complex))
@@ -192,7 +195,10 @@ def normal_form(family: Family, special: SpecialPoint) -> NormalForm:
 
 
 def _extrapolate_coefficient(at: Callable[[float], float]) -> tuple[float, float]:
-    """Extrapolate a coefficient, a function of the step size, to zero; return the least uncertain value and its uncertainty."""
+    """Extrapolate a coefficient to step size zero; return the least uncertain value and its uncertainty.
+
+    ``at`` computes the coefficient for a step size of the finite differences.
+    """
     found: list[tuple[float, float]] = []
     values: list[float] = []
     change = 0.0
@@ -252,7 +258,10 @@ def form_coefficient(of: Forms, kind: Crossing, multiplier: complex, h: float) -
 
 
 def _slope(family: Family, of: Forms, special: SpecialPoint) -> float:
-    """Return the derivative of the map over a period by the parameter, at a fold: its component along the left eigenvector."""
+    """Return the derivative of the map over a period with respect to the parameter, at a fold.
+
+    The derivative is projected on the left eigenvector.
+    """
     _, p, _ = _eigenvectors(of.matrix, 1.0)
     point, start = operating_point(*family.operation(special.parameter)), special.orbit.start
     reach = 1e-3 * max(abs(special.parameter), 1e-9)
@@ -339,7 +348,7 @@ def confirm_form(family: Family, special: SpecialPoint, form: NormalForm) -> For
 
 
 class Outcome(Enum):
-    """The behaviour of a deviation in a long run."""
+    """The behaviour of a deviation from an orbit in a long run."""
 
     DECAYS = "decays"
     BOUNDED = "stays bounded"
@@ -375,8 +384,8 @@ class Confirmation:
     def agrees(self) -> bool:
         """Whether the run confirms the verdict; the deviation of a marginal motion must neither decay nor grow.
 
-        If the margin is so small that the deviation neither decays nor grows notably within the run, the measured growth must
-        agree with the multiplier.
+        If the margin is so small that the deviation hardly decays or grows within the run, the measured growth must agree with
+        the multiplier.
         """
         expected = {
             Stability.STABLE: Outcome.DECAYS,
@@ -465,7 +474,10 @@ def confirm(
 
 
 def _passages(point: OperatingPoint, start: FloatArray, turns: int) -> tuple[FloatArray, str]:
-    """Run the mechanism from a start; return y at the beginning of each turn, (turns + 1, n), and why the run ended early."""
+    """Run the mechanism from a start; return y at the beginning of each turn, shape (turns + 1, n), and a message.
+
+    The message tells why the run ended early; it is empty if the run is complete.
+    """
     if point.drive.speed is not None:
         mechanism, flow = point.mechanism, point.flow
         x, count = flow.state(start, point.vector), len(mechanism.freedoms)
@@ -496,7 +508,7 @@ def _passages(point: OperatingPoint, start: FloatArray, turns: int) -> tuple[Flo
 def _leading_vectors(
     orbit: PeriodicOrbit, scale: NDArray[np.float64]
 ) -> tuple[NDArray[np.float64], NDArray[np.complex128]]:
-    """Return the direction of greatest growth, of unit length, and a vector that measures the growth, both scaled.
+    """Return the direction of greatest growth, of unit length, and a vector that measures the growth, in units of the scale.
 
     The vector is the left eigenvector of the largest multiplier. The product of the deviation with this vector grows by the
     same factor in each turn, whereas for a complex pair the distance itself oscillates.

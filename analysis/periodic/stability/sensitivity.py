@@ -46,10 +46,11 @@ class Gradient:
     Attributes
     ----------
     value : float
+        Value of the quantity.
     names : tuple of str
-        FMI names of the parameters.
+        FMI names of the m parameters.
     by : ndarray, shape (m,)
-        The derivatives, in SI units.
+        Derivatives of the quantity with respect to the parameters, in SI units.
     at : ndarray, shape (m,)
         Values of the parameters.
 
@@ -70,7 +71,7 @@ class Gradient:
 
     @property
     def elasticities(self) -> dict[str, float]:
-        """Change of the quantity in percent per percent of each parameter; 0 for a parameter that is 0.
+        """Change of the quantity in percent for a change of each parameter by one percent; 0 for a parameter that is 0.
 
         Raises
         ------
@@ -89,7 +90,7 @@ class Gradient:
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class PointGradient:
-    """The derivatives of a special point of a branch: a resonance, a fold, a period doubling or a torus point.
+    """The derivatives, with respect to parameters, of a special point: a resonance, fold, period doubling or torus point.
 
     Attributes
     ----------
@@ -100,7 +101,7 @@ class PointGradient:
     amplitude : Gradient
         Gradient of the amplitude of the motion at the point.
     orbit : PeriodicOrbit
-        The motion.
+        The motion at the point.
     """
 
     along: str
@@ -143,7 +144,10 @@ class MotionGradient:
 
     @property
     def forcing(self) -> FloatArray:
-        """Derivatives of dy/dangle by the parameters at fixed y, at the nodes of `variations`; shape (k, s, n, m)."""
+        """Derivatives of dy/dangle with respect to the parameters at fixed y, at the nodes of `variations`.
+
+        The shape is (k, s, n, m).
+        """
         return self.variations.forcing
 
     @cached_property
@@ -178,7 +182,7 @@ class MotionGradient:
 
     @cached_property
     def _swing(self) -> tuple[tuple[float, float, Place], ...]:
-        """The greatest and the least value of the first component of y, each as (sign +1 or -1, value, place)."""
+        """The greatest and the least value of the first component of y, each as (sign, which is +1 or -1; value; place)."""
         found = []
         for sign in (1.0, -1.0):
             value, place = self.variations.greatest_value(sign * self.variations.y[..., 0])
@@ -219,15 +223,15 @@ class MotionGradient:
     # Outputs
 
     def greatest(self, name: str) -> Gradient:
-        """Return the gradient of the greatest value of an output over the period, by its FMI name."""
+        """Return the gradient of the greatest value over the period of the output with this FMI name."""
         return self._extreme(self._numbers(name, False), 1.0)
 
     def least(self, name: str) -> Gradient:
-        """Return the gradient of the least value of an output over the period, by its FMI name."""
+        """Return the gradient of the least value over the period of the output with this FMI name."""
         return self._extreme(self._numbers(name, False), -1.0)
 
     def peak(self, name: str) -> Gradient:
-        """Return the gradient of the greatest modulus of an output or a joint force.
+        """Return the gradient of the greatest modulus, over the period, of an output or a joint force.
 
         ``name`` is the FMI name of the output, such as ``drive.applied_torque``, or the name of the joint force, such as
         ``pin.A``.
@@ -346,7 +350,10 @@ def motion_gradient(orbit: PeriodicOrbit, names: Sequence[str] | None = None) ->
 
 
 def extremum_orbit(orbit: PeriodicOrbit, along: str) -> PeriodicOrbit:
-    """Return the motion at an extremum of the amplitude over a parameter, from a motion near it; see `extremum_gradient`."""
+    """Return the motion at an extremum of the amplitude over a parameter, starting from a motion near the extremum.
+
+    See `extremum_gradient`.
+    """
     return _locate_motion(orbit, along, _extremum_step, "extremum of the amplitude")
 
 
@@ -383,7 +390,7 @@ def extremum_gradient(orbit: PeriodicOrbit, along: str, names: Sequence[str] | N
 def crossing_gradient(
     orbit: PeriodicOrbit, kind: Crossing, along: str, names: Sequence[str] | None = None
 ) -> PointGradient:
-    """Compute how a fold, a period doubling or a torus point moves along one parameter as others change.
+    """Compute how a fold, a period doubling or a torus point moves along one parameter when other parameters change.
 
     Parameters
     ----------
@@ -453,7 +460,7 @@ _Step = Callable[[MotionGradient], tuple[FloatArray, float]]
 
 
 def _locate_motion(orbit: PeriodicOrbit, along: str, newton_step: _Step, what: str) -> PeriodicOrbit:
-    """Find the special point near a motion by Newton's method and return the motion there.
+    """Find the special point near a motion by Newton's method, and return the motion at this point.
 
     Raises LinkworkError if Newton's method does not converge to a point near the motion; ``what`` names the point in the
     message.
@@ -516,7 +523,10 @@ def _fold_step(motion: MotionGradient) -> tuple[FloatArray, float]:
 
 
 def _test(motion: MotionGradient, kind: Crossing) -> FloatArray:
-    """Return the derivatives, shape (m,), of a function that is zero where the multiplier is on the unit circle."""
+    """Return the derivatives of a function of the m parameters that is zero where the multiplier is on the unit circle.
+
+    The shape is (m,).
+    """
     if kind is Crossing.FOLD:
         left, _ = _null_vectors(motion.variations)
         return left @ motion.variations.final_deviation(motion.forcing)
@@ -542,7 +552,7 @@ def _singular_matrix(matrix: FloatArray, by: FloatArray, kind: Crossing) -> tupl
 
 
 def _null_vectors(v: Variations) -> tuple[FloatArray, FloatArray]:
-    """Return left and right eigenvectors of the monodromy matrix for the multiplier +1."""
+    """Return the left and right eigenvectors of the monodromy matrix for the multiplier +1."""
     left, _, right = np.linalg.svd(v.monodromy * v.scale / v.scale[:, None] - np.eye(len(v.scale)))
     return left[:, -1] / v.scale, right[-1] * v.scale
 

@@ -68,16 +68,16 @@ class Variations:
         derivatives with respect to their parameters are wanted.
     along : ndarray, shape (c, m)
         Derivatives of the drive vector and, below them, of the constants with respect to m parameters; the panels are chosen
-        such that they resolve the forcing by these parameters, too.
+        such that they also resolve the effect of these parameters on the rates.
 
     Attributes
     ----------
     h : ndarray, shape (k,)
-        Lengths of the panels (rad).
+        Lengths of the k panels (rad).
     angles : ndarray, shape (k, s)
-        Crank angles of the nodes.
+        Crank angles of the s nodes of each panel.
     y, rates : ndarray, shape (k, s, n)
-        The motion and its derivative by the crank angle.
+        The motion and its derivative with respect to the crank angle.
     by_y : ndarray, shape (k, s, n, n)
         Derivatives of the rates with respect to y.
     by_constant : ndarray, shape (k, s, n, c)
@@ -85,6 +85,7 @@ class Variations:
     forcing : ndarray, shape (k, s, n, m)
         Derivatives of the rates with respect to the parameters, at fixed y.
     monodromy : ndarray, shape (n, n)
+        Monodromy matrix.
     """
 
     def __init__(self, orbit: PeriodicOrbit, switched: bool, along: FloatArray) -> None:
@@ -99,7 +100,7 @@ class Variations:
             )
 
     def _divide(self, along: FloatArray) -> None:
-        """Choose panels that resolve the motion, its derivatives and the forcing."""
+        """Divide the period into panels that resolve the motion, the derivatives of the rates and the forcing."""
         flow = self.flow
         edges = np.linspace(0.0, flow.period * self.orbit.turns, _PANELS * self.orbit.periods + 1)
         if self.orbit.stations is not None:
@@ -141,7 +142,8 @@ class Variations:
     ) -> FloatArray:
         """Evaluate the function ``name`` of `_code` at the nodes; shape (k, s, size).
 
-        ``direction`` is a direction of y, ``along`` a direction of drive vector and constants; zero if not given.
+        ``direction`` is a direction in the space of y, ``along`` a direction in the space of drive vector and constants, for a
+        directional derivative; both are zero if not given.
         """
         direction = np.zeros_like(self.y) if direction is None else direction
         along = np.zeros(self.constants) if along is None else along
@@ -167,7 +169,10 @@ class Variations:
         return self.flow.drive_size + len(self._p)
 
     def _first_derivatives(self) -> tuple[FloatArray, FloatArray]:
-        """Return the rates at the nodes, (k, s, n), and their derivatives by y and by the constants, (k, s, n, n + c)."""
+        """Return the rates at the nodes, shape (k, s, n), and their derivatives, shape (k, s, n, n + c).
+
+        The derivatives are with respect to y and, after it, the drive vector and the constants.
+        """
         n, width = self.flow.size, self.flow.size + self.constants
         found = self._call("first", n * (1 + width))
         return found[..., :n], found[..., n:].reshape(*self.angles.shape, width, n).swapaxes(-1, -2)
@@ -180,9 +185,9 @@ class Variations:
         Parameters
         ----------
         direction : ndarray, shape (k, s, n)
-            Direction of y at the nodes.
+            Components of the direction in the space of y, at the nodes.
         along : ndarray, shape (c,), optional
-            Direction of the drive vector and the constants; zero without it.
+            Components of the direction in the space of the drive vector and the constants; zero if not given.
         """
         n, width = self.flow.size, self.flow.size + self.constants
         found = self._call("second", n * width, direction, along)
@@ -259,12 +264,15 @@ class Variations:
     # Results
 
     def integral(self, values: FloatArray) -> FloatArray:
-        """Integrate values at the nodes, shape (k, s, ...), over the period."""
+        """Integrate over the period a quantity with given values at the nodes, shape (k, s, ...)."""
         found: FloatArray = np.einsum("k,s,ks...->...", self.h, _GAUSS.weights, values)
         return found
 
     def slope(self, panel: int, values: FloatArray, position: float) -> float:
-        """Return the crank angle derivative, at a position on a panel, of a quantity with ``values``, (s,), at its nodes."""
+        """Return the derivative of a quantity with respect to the crank angle, at a position on a panel.
+
+        ``values``, shape (s,), are the values of the quantity at the nodes of the panel.
+        """
         series = legendre.legder(_GAUSS.coefficients @ values)
         return float(legendre.legval(position, series) * 2.0 / self.h[panel])
 
@@ -297,7 +305,10 @@ class Variations:
         return self._call("outputs", len(self.flow.mechanism.output_names))
 
     def output_derivatives(self, panel: int, number: int) -> tuple[FloatArray, FloatArray]:
-        """Return the derivatives of output ``number`` at the nodes of a panel: by y, (s, n), and by constants, (s, c)."""
+        """Return the derivatives of output ``number`` at the nodes of a panel.
+
+        The derivatives are with respect to y, shape (s, n), and to the drive vector and the constants, shape (s, c).
+        """
         n = self.flow.size
         function = _output_derivatives(self.flow, self.switched, number)
         found = [
@@ -339,7 +350,11 @@ def _solve_cyclic(steps: FloatArray, gains: FloatArray) -> FloatArray:
 
 
 class _Symbols(NamedTuple):
-    """Symbols of a flow's variables and of their directions (``d...``), and expressions of its rates and outputs."""
+    """CasADi symbols of a flow's arguments, and the flow's rates and outputs as expressions of these arguments.
+
+    ``dy``, ``d_drive`` and ``d_p`` are symbols of the direction of a directional derivative, in the space of y, of the drive
+    vector and of the constants.
+    """
 
     y: Any
     dy: Any
@@ -379,9 +394,9 @@ def _symbols(flow: Flow, switched: bool) -> _Symbols:
 def _code(flow: Flow, switched: bool, name: str) -> MachineCode:
     """Return the machine code of one of three functions, by name.
 
-    "first" gives the rates and their derivatives, "second" the derivatives of these derivatives along a direction, "outputs"
-    the outputs. The arguments are (y, direction of y, crank angle), the modes, and the drive vector and the constants, each
-    followed by its direction.
+    "first" gives the rates and their first derivatives, "second" the derivatives of the first derivatives along a direction,
+    "outputs" the outputs. The arguments are (y, direction of y, crank angle), the modes, the drive vector with its direction,
+    and the constants with their direction.
     """
     casadi = symbolic.library()
     with MAKING:

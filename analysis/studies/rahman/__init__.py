@@ -1,7 +1,7 @@
 """List of the figures of Rahman's thesis.
 
-`table` assigns quantities to figures and `figures` computes them; `printed` has the thesis's equations to the letter, and
-`closure`, `rates`, `forces` and `conclusions` judge them.
+`table` assigns quantities to figures and `figures` computes them. `printed` has the equations exactly as the thesis prints
+them, and `closure`, `rates`, `forces` and `conclusions` judge these equations.
 """
 
 from __future__ import annotations

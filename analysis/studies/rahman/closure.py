@@ -1,4 +1,4 @@
-"""Verdicts on the loop closure and its iteration, sections 2.2 to 2.6, 3.2 and 3.3."""
+"""Verdicts on the loop closure and its iteration: sections 2.2 to 2.6, 3.2 and 3.3."""
 
 from __future__ import annotations
 
@@ -66,19 +66,19 @@ UNSETTLED = (
     ),
     *(Case(f"alpha4 = {twist:g} deg", 20.0, 0.0, twist) for twist in (231.0, 312.0)),
 )
-#: A larger step (rad, in) that counts as small, since the thesis gives none.
+#: A larger limit (rad, in) on a small step, for comparison: the thesis gives no limit.
 LOOSE = 1e-3
 #: Differential operator of a rotation about k, eqs 2a and 3a.
 _ABOUT = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 0.0]])
 
 
 def _eta_operator(th: float) -> FloatArray:
-    """Return the differential operator of the rotation eta at an angle theta, eqs 2b and 3b."""
+    """Return the differential operator of the rotation eta when theta is ``th``, eqs 2b and 3b."""
     return np.array([[0.0, 0.0, np.cos(th)], [0.0, 0.0, np.sin(th)], [-np.cos(th), -np.sin(th), 0.0]])
 
 
 def _matrices_error() -> float:
-    """Return the greatest difference of the matrices as eqs 1 to 4 print them from the products of rotations."""
+    """Return the greatest difference between the matrices as printed in eqs 1 to 4 and the products of rotations."""
     th2, eta2, th3, eta3, s4 = (float(value) for value in GENERAL)
     a1, a4, twist = CRANK, 20.0, 4.0
     (s1, s2, se, s3, sh, sa), (c1, c2, ce, c3, ch, ca) = (
@@ -104,7 +104,7 @@ def _matrices_error() -> float:
 
 
 def _rotation_that_meets_22() -> FloatArray:
-    """Return a rotation other than none for which the right sides of eq 22 vanish."""
+    """Return a rotation, not the identity, for which the right sides of eq 22 vanish."""
 
     def sides(vector: FloatArray) -> list[float]:
         b = Rotation.from_rotvec(vector).as_matrix()
@@ -115,7 +115,7 @@ def _rotation_that_meets_22() -> FloatArray:
 
 
 def _operator_error() -> float:
-    """Return the greatest error of the operators of eqs 2a to 4a: operator times matrix minus the matrix's derivative."""
+    """Return the greatest error of the operators of eqs 2a to 4a: operator times matrix minus the derivative of the matrix."""
     th, eta = float(GENERAL.th2), float(GENERAL.eta2)
 
     def ball(beyond: Dual, change: FloatArray) -> Dual:
@@ -135,7 +135,8 @@ def _operator_error() -> float:
 def _nine_equations(case: Case, angle: float, q: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Return the coefficients (9, 10) and the right sides (3, 3, 2) of the nine dual equations 19a, by eqs 12 to 18.
 
-    Each of the five unknowns has a column of real and one of dual parts; so have the right sides on their last axis.
+    Each of the five unknowns has two columns of coefficients, the real and the dual parts. The last axis of the right sides
+    has the real and the dual parts too. ``q`` are the unknowns at the crank angle ``angle`` (rad).
     """
     p, (th2, eta2, th3, eta3, s4) = parameters(case.offset_in, case.twist_deg), q.tolist()
     m1 = about_k(Dual(angle, case.shift_in * INCH)) @ about_i(Dual(0.0, p.crank_length))
@@ -159,11 +160,12 @@ def _nine_equations(case: Case, angle: float, q: FloatArray) -> tuple[FloatArray
 
 
 def _independent() -> tuple[int, float, float]:
-    """Return how many of eqs 19a are independent, and the order and the size by which the others contradict them.
+    """Return the number of independent equations in 19a, and how much the dependent equations contradict them: order and size.
 
-    The number is the rank of the left sides in a general position. Opposite left sides add up to zero, so that opposite right
-    sides should too. The order is the power with which the sums of right sides fall as a closed planar loop is opened by less
-    (rad, in). The size is the greatest of their real parts where the iteration ends in the first case out of the plane.
+    The number is the rank of the left sides in a general position. Left sides on opposite sides of the diagonal add up to
+    zero, so their right sides should too. The order is the power of the opening (rad, in) with which these sums of right sides
+    decrease as a closed planar loop is opened less and less. The size is the greatest real part of the sums where the iteration
+    ends in the first case out of the plane.
     """
 
     def odds(case: Case, angle: float, q: FloatArray) -> FloatArray:
@@ -180,7 +182,7 @@ def _independent() -> tuple[int, float, float]:
 
 
 def _joint_freedoms() -> tuple[int, ...]:
-    """Return the numbers of freedoms that eqs 1 to 4 give joints 1 to 4: the ranks of the derivatives of their matrices."""
+    """Return the degrees of freedom of each joint 1 to 4 by eqs 1 to 4: the rank of the derivatives of the joint's matrix."""
 
     def ball(th: float, eta: float) -> Dual:
         return cast(Dual, about_k(th) @ about_j(eta))
@@ -199,9 +201,9 @@ def _joint_freedoms() -> tuple[int, ...]:
 
 
 def _settled(a4: float, shifts: FloatArray, off: float) -> NDArray[np.bool_]:
-    """Return whether the printed iteration settles at every angle for n shifts (in) less ``off``, as given, and plus ``off``.
+    """Return whether the printed iteration converges at every crank angle, at n shifts (in) and beside them; shape (n, 3).
 
-    The shape is (n, 3).
+    The columns are for the shift minus ``off``, the shift itself, and the shift plus ``off``.
     """
     each = shifts[:, None] + off * np.array([-1.0, 0.0, 1.0])
     return turn(parameters(a4), each.ravel()).settled.reshape(each.shape)
@@ -209,12 +211,12 @@ def _settled(a4: float, shifts: FloatArray, off: float) -> NDArray[np.bool_]:
 
 @cache
 def _twisted(twist_deg: float) -> Turn:
-    """Run the iteration over a turn at a4 = 20 in, S1 = 0."""
+    """Run the iteration over a turn at a4 = 20 in and S1 = 0 with a twist alpha4 (deg)."""
     return turn(parameters(20.0, twist_deg), 0.0)
 
 
 def _limits() -> tuple[Statement, ...]:
-    """Judge the stated limits of the iteration, and what the thesis infers from them for the mechanism."""
+    """Judge the stated limits of the iteration, and the conclusions on the mechanism that the thesis draws from them."""
     place = text("section 3.2, L1121")
     reached = {}
     for a4, first, last, stated in (
@@ -323,11 +325,11 @@ def _limits() -> tuple[Statement, ...]:
 
 
 def _detection_errors() -> tuple[float, float]:
-    """Return the shares of shifts at which the iteration fails although the crank turns fully, or accepts an open loop.
+    """Return the fractions of shifts at which the iteration fails, and at which it accepts an open loop.
 
-    The shifts go by 2 in from 0 to the greatest at which the crank turns fully, at a4 = 0, 10, 20, 30 in. The iteration runs
-    at every 30 deg from the planar estimate. It fails if it does not settle at one of these angles; it accepts an open loop if
-    it settles at all of them and the loop is open at one.
+    The crank turns fully at all of these shifts. They go in steps of 2 in from 0 to the greatest such shift, at a4 = 0, 10, 20
+    and 30 in. The iteration runs at every 30 deg from the planar estimate. It fails if it does not converge at one of these
+    angles. It accepts an open loop if it converges at all of them and the loop is open at one.
     """
     missed: list[bool] = []
     wrong: list[bool] = []
@@ -344,10 +346,10 @@ def _detection_errors() -> tuple[float, float]:
 
 
 def endings(cases: tuple[Case, ...], offs: tuple[float, ...] = (0.0,), small: float = STEP) -> list[Settled]:
-    """Run the iteration for each case at every 30 deg, from planar estimates with ``offs`` (deg) added to theta2 and theta3.
+    """Run the iteration for each case at every 30 deg, from planar estimates with errors in theta2 and theta3.
 
-    Each of the ``offs`` of theta2 goes with each of those of theta3, but for two zeros if there are others. A step below
-    ``small`` (rad, in) ends it.
+    The errors are all pairs of the ``offs`` (deg); the pair of zeros is left out if there are others. The iteration ends when
+    a correction is below ``small`` (rad, in).
     """
     grid = np.radians(GRID_DEG[::6])
     pairs = [pair for pair in product(offs, offs) if any(pair) or len(offs) == 1]
@@ -362,9 +364,9 @@ def endings(cases: tuple[Case, ...], offs: tuple[float, ...] = (0.0,), small: fl
 
 
 def _poor_starts(cases: tuple[Case, ...]) -> tuple[float, float]:
-    """Return the shares of crank angles at which the iteration settles from poor estimates, and ends on the closed loop.
+    """Return the fractions of runs from poor estimates that converge, and that end on the closed loop.
 
-    The estimates of theta2 and theta3 are each off by 60 and 120 deg either way and by 180 deg (see `endings`).
+    The estimates of theta2 and theta3 are each wrong by -120, -60, 60, 120 and 180 deg (see `endings`).
     """
     ended = endings(cases, (-120.0, -60.0, 60.0, 120.0, 180.0))
     closed = [(found.rotation_residual < NOTHING) & (found.position_error < NOTHING) for found in ended]
@@ -372,14 +374,14 @@ def _poor_starts(cases: tuple[Case, ...]) -> tuple[float, float]:
 
 
 def _steps_from_near(case: Case, small: float) -> FloatArray:
-    """Return the numbers of corrections at the angles where the iteration starts within 20 deg of where it ends."""
+    """Return the numbers of corrections at the crank angles where the iteration starts within 20 deg of its result."""
     found = turn(parameters(case.offset_in, case.twist_deg), case.shift_in, small=small)
     changes = np.degrees(np.abs(np.diff(found.unknowns[:, 0, :4], axis=0))).max(-1)
     return np.asarray(found.steps[1:, 0][changes <= 20.0])
 
 
 def _estimate_error(case: Case) -> float:
-    """Return the greatest difference (deg) of the planar estimate at theta1 = 0 from the angles of the closed loop.
+    """Return the greatest difference (deg) between the planar estimate at theta1 = 0 and the angles of the closed loop.
 
     In the closed loop each ball joint has a third rotation, about i, after theta and eta.
     """
@@ -394,7 +396,7 @@ def _estimate_error(case: Case) -> float:
 
 
 def _opening_of_estimates() -> float:
-    """Return the greatest rotation (rad) or length (m) by which the loop is open at the estimates of section 2.6.2."""
+    """Return the greatest rotation (rad) or distance (m) by which the loop is open at the estimates of section 2.6.2."""
     zero, worst = np.zeros(1), 0.0
     for a4 in (0.0, 10.0, 20.0, 30.0):
         s4 = np.sqrt(ROD**2 - (CRANK + a4) ** 2)
@@ -405,14 +407,14 @@ def _opening_of_estimates() -> float:
 
 
 def _system(case: Case, unknowns: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return the matrix A and the right side V of eq 23 at each angle of the grid, for the unknowns (n, 5) there."""
+    """Return the matrix A and the right side V of eq 23 at each angle of the grid, given the n unknown vectors (n, 5)."""
     angle, shift = np.radians(GRID_DEG), np.full(GRID_DEG.size, case.shift_in * INCH)
     unknowns = unknowns * [1.0, 1.0, 1.0, 1.0, INCH]
     return equations(*chain(parameters(case.offset_in, case.twist_deg), angle, shift, unknowns), INCH, "printed")
 
 
 def _condition(case: Case) -> float:
-    """Return A's least singular value relative to its greatest, least over the corrections of a turn.
+    """Return the least value, over the corrections of a turn, of the least singular value of A divided by the greatest.
 
     The corrections are those of `turn`, up to the first angle at which they do not become small.
     """
@@ -439,7 +441,7 @@ def _condition(case: Case) -> float:
 def _first_correction(case: Case) -> tuple[float, float]:
     """Return the greatest entries of A Delta - V and of Delta - A^-1 V, for Delta = (A'A)^-1 A'V.
 
-    A^-1 is the name that L457 gives to (A'A)^-1 A'. The entries are those of the first correction from the previous angle.
+    A^-1 is the name of (A'A)^-1 A' in L457. Delta is the first correction at an angle, from the solution at the previous angle.
     """
     matrix, right = _system(case, np.roll(followed(case).unknowns[:, 0], 1, axis=0))
     transposed = np.swapaxes(matrix, -1, -2)
@@ -452,7 +454,7 @@ def _first_correction(case: Case) -> tuple[float, float]:
 
 
 def _right_angle_condition() -> float:
-    """Return A's least singular value relative to its greatest with the rod at right angles to the guide, a4 = a2 - a1."""
+    """Return the least singular value of A divided by the greatest, with the rod at right angles to the guide, a4 = a2 - a1."""
     p, zero = parameters(ROD - CRANK), np.zeros(1)
     matrix, _ = equations(*chain(p, zero, zero, planar(p, zero)), INCH, "printed")
     singular = np.linalg.svd(matrix[0], compute_uv=False)
@@ -460,7 +462,7 @@ def _right_angle_condition() -> float:
 
 
 def closure() -> StudyResult:
-    """Compute the closure error at which the iteration ends over a turn, and judge the loop closure."""
+    """Compute the closure error at the end of the iteration over a turn, and judge the statements on the loop closure."""
     columns = {ANGLE: GRID_DEG}
     (first, *_), sparse = OPEN, GRID_DEG[::2]
     p, unknowns = parameters(first.offset_in), followed(first).unknowns[4, 0] * [1.0, 1.0, 1.0, 1.0, INCH]

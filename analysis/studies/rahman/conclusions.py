@@ -30,7 +30,10 @@ def conclusions() -> StudyResult:
     printed, mended = (planar_forces(erratum_5=both, erratum_6=both) for both in (False, True))
 
     def error(found: dict[str, FloatArray], of: dict[str, FloatArray]) -> float:
-        """Return the greatest error of ``found``, each component relative to its greatest size in ``of``, unless that is 0."""
+        """Return the greatest error of ``found`` over the components in ``of``, each relative to its greatest magnitude there.
+
+        Components that vanish in ``of`` are left out.
+        """
         sizes = {s: np.abs(x)[clear(PLANE)].max() for s, x in of.items()}
         return max(
             float(np.abs(found[s] - right[s])[clear(PLANE)].max() / size) for s, size in sizes.items() if size > NOTHING

@@ -1,12 +1,12 @@
 """Rahman's figures 5 to 38: displacement and joint forces of the generalised slider-crank.
 
-The mechanism of section 3.1 turns at 50 rpm under a crank torque of 100 lb.in, with three values of the offset a4, the
-shift S1 or the twist alpha4, each beside the ideal slider-crank (a4 = 0, S1 = 0, alpha4 = 270 deg). The unknown is the
-force on the slider, and with it every joint force and moment. It is infinite at the dead centres, where it has no lever
-on the crank: the curves leave the plot there, and dotted lines of their colour mark the places. The greatest value of a
-curve is therefore taken at whole degrees `CLEAR_DEG` or more from a dead centre.
+The mechanism of section 3.1 turns at 50 rpm under a crank torque of 100 lb.in. Each figure has three values of the offset a4,
+the shift S1 or the twist alpha4, beside the ideal slider-crank (a4 = 0, S1 = 0, alpha4 = 270 deg). The unknown is the force on
+the slider, and with it every joint force and moment. At the dead centres this force has no lever arm about the crank axis, so
+that it is infinite: the curves leave the plot there, and dotted lines of their colour mark the angles. Greatest values are
+therefore taken at whole degrees that are `CLEAR_DEG` or more from a dead centre.
 
-Statements of sections 3.2 and 3.3 on several figures are judged with the first of them.
+Statements of sections 3.2 and 3.3 on several figures are judged with the first of these figures.
 """
 
 from __future__ import annotations
@@ -88,7 +88,7 @@ ANGLE = "crank angle theta1 [deg]"
 #: Largest force or moment (lb, lb.in) that counts as zero.
 NOTHING = 1e-6
 ROUNDING = f"{NOTHING:g}, the rounding"
-#: How far from a dead centre greatest values are taken.
+#: How far from a dead centre greatest values are taken, in words.
 FROM_DEAD = f"{CLEAR_DEG:g} deg or more from a dead centre"
 #: Torque on the crank (lb.in) and its length (in).
 TORQUE, CRANK = 100.0, 12.0
@@ -103,13 +103,16 @@ _UNITS = {"lb": POUND_FORCE, "lb.in": POUND_INCH}
 
 
 def mechanism(case: Case) -> SliderCrankParameters:
-    """Return the parameters of a case's mechanism, with the reader's changes."""
+    """Return the parameters of the mechanism of a case, with the reader's changes."""
     return vary(parameters(case.offset_in, case.twist_deg))
 
 
 @cache
 def turn(case: Case, load_lb: float | None = None) -> ForceTurn:
-    """Compute a turn of the crank with a load on the slider (lb, away from the crank), or without one with the given torque."""
+    """Compute the forces over a turn of the crank: under a load on the slider (lb), or under the given torque.
+
+    A positive load points away from the crank.
+    """
     return force_turn(
         mechanism(case),
         crank_speed=CRANK_SPEED,
@@ -126,7 +129,7 @@ def dead_centres_deg(case: Case) -> FloatArray:
 
 
 def force_component(found: ForceTurn, component: Component) -> FloatArray:
-    """Return a component over a turn in the printed unit, NaN at a dead centre."""
+    """Return a component of the forces over a turn in the printed unit, NaN at a dead centre."""
     if component.source in ("axial_force", "slider_force"):
         si = getattr(found, component.source)
     else:
@@ -135,12 +138,12 @@ def force_component(found: ForceTurn, component: Component) -> FloatArray:
 
 
 def values(case: Case, component: Component) -> FloatArray:
-    """Return a component over the turn with the torque given, in the printed unit, NaN at a dead centre."""
+    """Return a component of the forces over the turn under the given torque, in the printed unit, NaN at a dead centre."""
     return force_component(turn(case), component)
 
 
 def position(case: Case) -> FloatArray:
-    """Return the slider position (in)."""
+    """Return the slider position over the turn (in)."""
     return turn(case).slider_position / INCH
 
 
@@ -157,12 +160,12 @@ def greatest(case: Case, quantity: FloatArray) -> float:
 
 
 def spikes_deg(case: Case, component: Component) -> FloatArray:
-    """Find the crank angles (deg) of the poles of a component, as zeros of its reciprocal."""
+    """Find the crank angles (deg) of a component's poles, as zeros of its reciprocal."""
     value = values(case, component)
     # a dead centre at one of the angles has no value
     angle, value = ANGLES_DEG[np.isfinite(value)], value[np.isfinite(value)]
     (changes,) = np.nonzero(value[:-1] * value[1:] < 0.0)
-    # a zero of the component changes its sign too, but between small values
+    # the component changes sign at a zero too, but the values beside a zero are small
     size = np.minimum(np.abs(value[changes]), np.abs(value[changes + 1]))
     found = []
     for at in changes[size > SPIKE * greatest(case, values(case, component))].tolist():
@@ -173,12 +176,12 @@ def spikes_deg(case: Case, component: Component) -> FloatArray:
 
 
 def nothing(label: str, size: ArrayLike, unit: str = "", *, why: str = "") -> Judged:
-    """Judge that a quantity vanishes, usually the difference of an equation from its correct value."""
+    """Judge whether a quantity vanishes, usually the difference of an equation from its correct value."""
     return at_most(label, NOTHING, float(np.max(np.abs(size))), unit, why=why)
 
 
 def _motion() -> tuple[Statement, ...]:
-    """Judge shape and stroke of the slider's motion, and its power."""
+    """Judge the shape and the stroke of the slider's motion, and its power."""
     shapes = []
     for case in (IDEAL, *ALL):
         first = 2.0 * np.fft.rfft(position(case)[:-1])[1] / (ANGLES_DEG.size - 1)
@@ -228,20 +231,20 @@ def _motion() -> tuple[Statement, ...]:
 
 
 def full_name(case: Case) -> str:
-    """Return a name that distinguishes a case from those of all families."""
+    """Return a name of a case that is unique among the cases of all families."""
     return f"{case.name}, S1 = {case.shift_in:g} in" if case.name.startswith("a4") else case.name
 
 
 def _stroke(case: Case) -> float:
-    """Return the stroke (in) of a mechanism of section 3.1 at its shift."""
+    """Return the stroke (in) of the mechanism of a case."""
     (whole,) = ranges(mechanism(case), constant_shift(case.shift_in * INCH))
     return whole.stroke / INCH
 
 
 def offsets_peaks(component: Component, load_lb: float | None = None) -> list[float]:
-    """Return a component's greatest magnitude for each offset, the ideal case first.
+    """Return the greatest magnitude of a component for each offset, the ideal case first.
 
-    With a load given it is that over the whole turn, with the torque given clear of the dead centres.
+    With a load (lb) it is taken over the whole turn; with the given torque, clear of the dead centres.
     """
     found = {case: force_component(turn(case, load_lb), component) for case in (IDEAL, *OFFSETS)}
     if load_lb is None:
@@ -250,7 +253,7 @@ def offsets_peaks(component: Component, load_lb: float | None = None) -> list[fl
 
 
 def _forces() -> tuple[Statement, ...]:
-    """Judge the growth of the forces with the offset, and their spikes."""
+    """Judge how the forces grow with the offset, and their spikes at the dead centres."""
     components = [COMPONENTS[symbol] for symbol in QUANTITIES[1:]]
     gains = [
         at_least(c.symbol, 0.0, min(after - before for before, after in pairwise(offsets_peaks(c))), c.unit)
@@ -312,13 +315,13 @@ def _forces() -> tuple[Statement, ...]:
 
 
 def moment_by_forces(case: Case, symbol: str) -> FloatArray:
-    """Return 1T1i or 1T1j (lb.in) from the forces on the crank, as in section 3.2."""
+    """Return 1T1i or 1T1j (lb.in), selected by ``symbol``, computed from the forces on the crank, as in section 3.2."""
     across = -values(case, COMPONENTS["1F1j"]) if symbol == "1T1i" else values(case, COMPONENTS["1F1i"])
     return across * case.shift_in
 
 
 def _bearing_moments() -> tuple[Statement, ...]:
-    """Judge 1T1i and 1T1j against the forces, and whether the shift causes them."""
+    """Judge 1T1i and 1T1j by the forces on the crank, and whether the shift causes these moments."""
     cases = (IDEAL, *ALL)
     moments = {symbol: {case: values(case, COMPONENTS[symbol]) for case in cases} for symbol in ("1T1i", "1T1j")}
     shifted = [case for case in ALL if case.shift_in]
@@ -463,14 +466,14 @@ def _constant() -> tuple[Statement, ...]:
 
 
 def _equations() -> FloatArray:
-    """Return the coefficients of eqs 62a to 64f without 63b in the general position: a row each, seventeen unknowns."""
+    """Return the coefficients of eqs 62a to 64f, except 63b, in a general position: one row each, with seventeen unknowns."""
     th2, eta2, th3, eta3, _ = (float(value) for value in GENERAL)
     crank = about_k(Dual(0.9, 3.5)) @ about_i(Dual(0.0, CRANK_AT_SPEED.a1))
     rod = about_k(th2) @ about_j(eta2) @ about_i(Dual(0.0, CRANK_AT_SPEED.a2))
     slider = about_k(th3) @ about_j(eta3) @ about_i(0.5 * np.pi)
     rows = np.zeros((3, 6, 4, 6))
     for n, matrix in enumerate((crank, rod, slider)):
-        # force and moment before the link, then those beyond it
+        # force and moment in the joint before the link, then those in the joint after it
         turned = matrix.T
         rows[n, :3, n, :3] = rows[n, 3:, n, 3:] = turned.real
         rows[n, 3:, n, :3] = turned.dual
@@ -481,7 +484,10 @@ def _equations() -> FloatArray:
 
 
 def sinusoidal_axial_force(ratio: float) -> float:
-    """Return the greatest difference (lb) of 1F1k from m1 S1'' at a4 = 10 in with the shift 3.5 in sin(alpha theta1)."""
+    """Return the greatest difference (lb) between 1F1k and m1 S1'' at a4 = 10 in.
+
+    The shift is 3.5 in times sin(alpha theta1), where alpha is ``ratio``.
+    """
     p, shift = mechanism(OFFSETS[0]), GrooveShift(3.5 * INCH, ratio)
     found = force_turn(p, crank_speed=CRANK_SPEED, shift=shift, angles=np.radians(ANGLES_DEG), torque=CRANK_TORQUE)
     beyond = found.axial_force - p.crank_mass * found.shift_acceleration
@@ -501,7 +507,7 @@ def _dead_centre_name(case: Case) -> str:
 
 
 def compute(number: str) -> StudyResult:
-    """Compute the curves of all cases of a figure, their dead centres, and the verdicts."""
+    """Compute the curves and dead centres of all cases of a figure, and judge its statements."""
     family, symbols, *_ = FIGURES[number]
     components = [COMPONENTS[symbol] for symbol in symbols]
     cases = (IDEAL, *FAMILIES[family].cases)
@@ -531,14 +537,17 @@ def compute(number: str) -> StudyResult:
 
 
 def _judging_figures(number: str, symbols: tuple[str, ...]) -> str:
-    """Return the figures that judge the statements on this figure, if it has none of its own or shows a torque."""
+    """Return the numbers of the figures whose statements are also about this figure.
+
+    ``symbols`` are the components that this figure shows.
+    """
     if not symbols:
         return "R5"
     return "R8" if "T" not in symbols[0] else "R8 and below" if number in _JUDGED else "R8 and R14"
 
 
 def printed(text: str) -> str:
-    """Format a case or a list of dimensions for a plot."""
+    """Format the text of a case or of a list of dimensions for a plot."""
     text = re.sub(r"\b([aS])(\d)", r"$\1_\2$", text.replace("alpha4", r"$\alpha_4$"))
     return re.sub(r" deg\b", "°", text)
 
@@ -549,7 +558,7 @@ def printed_symbol(symbol: str) -> str:
 
 
 def _interrupted_curve(result: StudyResult, case: Case, name: str) -> tuple[FloatArray, FloatArray]:
-    """Return angles and values of a curve with a NaN at each of its dead centres, where the drawn line is interrupted."""
+    """Return the angles and values of a curve, with a NaN at each of its dead centres to interrupt the drawn line."""
     centres = result.columns[_dead_centre_name(case)]
     centres = centres[np.isfinite(centres)]
     where = np.searchsorted(ANGLES_DEG, centres)
@@ -557,7 +566,7 @@ def _interrupted_curve(result: StudyResult, case: Case, name: str) -> tuple[Floa
 
 
 def _y_range(curves: Iterable[FloatArray]) -> tuple[float, float]:
-    """Return a range of y with all values of the curves and a margin, of 1 lb or 1 lb.in if they are constant."""
+    """Return a range of y that contains the curves and a margin; the margin is 1 lb or 1 lb.in if they are constant."""
     joined = np.concatenate(list(curves))
     low, high = float(joined.min()), float(joined.max())
     room = max(0.08 * (high - low), 1.0 if high - low < NOTHING else 0.0)
@@ -565,7 +574,7 @@ def _y_range(curves: Iterable[FloatArray]) -> tuple[float, float]:
 
 
 def draw(result: StudyResult) -> Figure:
-    """Draw one panel a component, the ideal case dashed over the others, dead centres dotted."""
+    """Draw one panel for each component, the ideal case dashed over the others, dead centres dotted."""
     family, symbols, *_ = FIGURES[result.number]
     looks = [
         (case, printed(case.name), colour, line)

@@ -1,4 +1,4 @@
-"""Verdicts on the force equations: momenta and joint forces, in the plane and out of it, sections 2.8 and 3.1."""
+"""Verdicts on the force equations, in the plane and out of it: momenta and joint forces, sections 2.8 and 3.1."""
 
 from __future__ import annotations
 
@@ -88,9 +88,9 @@ PLANAR = ("1F1i", "1F1j", "2F2i", "2F2j", "3F3i", "3F3j", "4F4i", "4F4k")
 
 
 def planar_forces(case: Case = PLANE, *, erratum_5: bool, erratum_6: bool, share: float = 1.0) -> dict[str, FloatArray]:
-    """Return the forces (lb) of a planar mechanism by the printed equations, with errata mended or not.
+    """Return the joint forces (lb) of a planar mechanism by the printed equations; each switch mends one erratum.
 
-    ``share`` multiplies the masses: 0 leaves the inertia out.
+    ``share`` multiplies the masses; 0 leaves the inertia out.
     """
     p, angle = parameters(case.offset_in), np.radians(ANGLES_DEG)
     q = joints(planar(p, angle) / [1.0, 1.0, 1.0, 1.0, INCH])
@@ -106,7 +106,7 @@ def planar_forces(case: Case = PLANE, *, erratum_5: bool, erratum_6: bool, share
 
 
 def _binors() -> tuple[Binor, Binor, Binor]:
-    """Return the inertia binors of eqs 46 to 48 of the bodies of section 3.1, in lb.s2 and inches."""
+    """Return the inertia binors of eqs 46 to 48 for the bodies of section 3.1, in lb.s2 and inches."""
     b = bodies(parameters())
     squares = ((0.0, b.crank_square), (ROD_X_SQUARE, b.rod_square), (SLIDER_SQUARE, SLIDER_SQUARE))
     first, second, third = (
@@ -117,7 +117,7 @@ def _binors() -> tuple[Binor, Binor, Binor]:
 
 
 def _balances() -> tuple[float, ...]:
-    """Return the greatest residuals of eqs 62 to 64 with the right forces in the plane, erratum 6 mended (lb, lb.in)."""
+    """Return the greatest residuals (lb, lb.in) of eqs 62 to 64 with the correct forces in the plane, erratum 6 mended."""
     p, angle, b = parameters(PLANE.offset_in), np.radians(ANGLES_DEG), bodies(parameters(), erratum_6=True)
     q = joints(planar(p, angle) / [1.0, 1.0, 1.0, 1.0, INCH])
     r = joint_rates(CRANK_AT_SPEED, q)
@@ -141,13 +141,13 @@ def _balances() -> tuple[float, ...]:
 
 
 def _clear_joints(case: Case) -> Joints:
-    """Return the joint values where the printed iteration ends, at the angles where theta2 is not near 0 or half a turn."""
+    """Return the joint values at the end of the printed iteration, at the angles where sin theta2 is not near 0."""
     q = joints(followed(case).unknowns[:, 0])
     return Joints(*(x[np.abs(np.sin(q.th2)) > CLEAR_SINE] for x in q))
 
 
 def velocity_paths() -> list[Judged]:
-    """Judge the forward path against the mixed path by the rod's momentum, eqs 50 and 52, in the plane and out of it."""
+    """Judge the forward path by the rod's momentum: eq 50 compared with eq 52 of the mixed path, in the plane and out of it."""
     b, rod = bodies(parameters()), _binors()[1]
     found = []
     for case in (PLANE, *ROW_F):
@@ -160,7 +160,10 @@ def velocity_paths() -> list[Judged]:
 
 
 def replacements() -> list[Judged]:
-    """Judge eqs 57 and 58 against 55 and 56, with rates and accelerations as printed, in the plane and out of it."""
+    """Judge eqs 57 and 58 by comparison with eqs 55 and 56, in the plane and out of it.
+
+    All four have the printed rates and accelerations.
+    """
     b, found = bodies(parameters()), []
     for case in (PLANE, *ROW_F):
         apart = []
@@ -174,7 +177,7 @@ def replacements() -> list[Judged]:
 
 
 def _roundoffs() -> list[Judged]:
-    """Judge the greatest roundoffs in single precision of the momenta in the plane, eqs 50a and 51a against 52a and 53a."""
+    """Judge the greatest roundoff errors of momenta in single precision in the plane: by eqs 50a, 51a and by eqs 52a, 53a."""
     p, b = parameters(PLANE.offset_in), bodies(parameters())
     single = Joints(*(planar(p, np.radians(ANGLES_DEG)) / [1.0, 1.0, 1.0, 1.0, INCH]).T.astype(np.float32))
     found = []
@@ -197,7 +200,7 @@ def _roundoffs() -> list[Judged]:
 
 
 def _momenta() -> tuple[Statement, ...]:
-    """Judge eqs 49a to 61 in the general position against the binors of eqs 46 to 48."""
+    """Judge eqs 49a to 61 in a general position by comparison with the momenta by the binors of eqs 46 to 48."""
     b, still = bodies(parameters()), CRANK_AT_SPEED
     r, unmoved = joint_rates(MOVING, GENERAL), joint_rates(still, GENERAL)
     of_crank, of_rod, of_slider = _binors()
@@ -331,7 +334,10 @@ def _momenta() -> tuple[Statement, ...]:
 
 
 def _unsolved() -> FloatArray:
-    """Return the residuals (3, 2, 3) of eqs 62 to 64 with the forces of eqs 69a to 69q: link, real or dual part, axis."""
+    """Return the residuals (3, 2, 3) of eqs 62 to 64 with the forces by eqs 69a to 69q.
+
+    The axes are the link, the real or dual part, and the coordinate axis.
+    """
     crank, b = CRANK_AT_SPEED, bodies(parameters())
     r = joint_rates(crank, GENERAL)
     a = joint_accelerations(crank, GENERAL, r)
@@ -346,7 +352,7 @@ def _unsolved() -> FloatArray:
 
 
 def _expanded() -> dict[str, FloatArray]:
-    """Return the differences of the joint forces in eqs 62a to 64f from those in eqs 62 to 64, by the equations' names."""
+    """Return the differences of eqs 62a to 64f, as printed, from eqs 62 to 64 for given forces, by the equations' names."""
     th1, shift, (th2, eta2, th3, eta3, _) = AT, SHIFT, (float(value) for value in GENERAL)
     (s, s2, se, s3, sh), (c, c2, ce, c3, ch) = (f([th1, th2, eta2, th3, eta3]) for f in (np.sin, np.cos))
     i, j, k = force = np.array([30.0, -50.0, 70.0])
@@ -378,7 +384,10 @@ def _expanded() -> dict[str, FloatArray]:
 
 
 def _slips(right: dict[str, FloatArray]) -> tuple[Statement, ...]:
-    """Judge eqs 62c, 63b, 69h and 69k, the manipulations of section 3.2, and the data of section 3.1."""
+    """Judge eqs 62c, 63b, 69h and 69k, the algebra of section 3.2, and the data of section 3.1.
+
+    ``right`` are the correct forces.
+    """
     angle, at = np.radians(ANGLES_DEG), clear(PLANE)
     crank, b = CRANK_AT_SPEED, bodies(parameters())
     r = joint_rates(crank, GENERAL)
@@ -506,7 +515,7 @@ def _slips(right: dict[str, FloatArray]) -> tuple[Statement, ...]:
 
 
 def forces() -> StudyResult:
-    """Compute the joint forces in the plane by the equations as printed and mended, and judge the force equations."""
+    """Compute the joint forces in the plane by the equations as printed and as mended, and judge the force equations."""
     columns = {ANGLE: ANGLES_DEG, "4F4k right [lb]": values(PLANE, COMPONENTS["4F4k"])}
     errata = {
         "as printed": (False, False),

@@ -1,7 +1,7 @@
-"""Cases, iteration over a turn and plot that the studies of Rahman's method share.
+"""Cases, iteration over a turn, and plot that the studies of Rahman's method share.
 
-`printed` has the equations to the letter. The studies compare them with other formulations: dual matrices, difference
-quotients, the model by Newton and Euler. The errata are numbered as in docs/rahman.md.
+`printed` has the equations exactly as printed. The studies compare them with other formulations: dual matrices, difference
+quotients, and the model by Newton's and Euler's equations. The errata are numbered as in docs/rahman.md.
 """
 
 from __future__ import annotations
@@ -50,12 +50,12 @@ H, ROUGH = 1e-6, 1e-7
 
 @cache
 def followed(case: Case, rows: Rows = "printed", from_before: bool = True) -> Turn:
-    """Run the iteration over a turn for a case; see `turn`."""
+    """Run the iteration over a turn for the mechanism of a case; see `turn`."""
     return turn(parameters(case.offset_in, case.twist_deg), case.shift_in, rows, from_before=from_before)
 
 
 def joints(unknowns: FloatArray) -> Joints:
-    """Return the unknowns (..., 5) of the loop by name."""
+    """Return the unknowns (..., 5) of the loop as `Joints`, each by its name."""
     return Joints(*np.moveaxis(unknowns, -1, 0))
 
 
@@ -64,7 +64,7 @@ AT, SHIFT = 0.9, 3.5
 
 
 def links() -> tuple[Dual, Dual, Dual]:
-    """Return the matrices of eqs 1 to 3 in the general position, as products of rotations, lengths in inches."""
+    """Return the matrices of eqs 1 to 3 in a general position, as products of rotations, with lengths in inches."""
     th2, eta2, th3, eta3, _ = (float(value) for value in GENERAL)
     return (
         about_k(Dual(AT, SHIFT)) @ about_i(Dual(0.0, CRANK_AT_SPEED.a1)),
@@ -74,7 +74,7 @@ def links() -> tuple[Dual, Dual, Dual]:
 
 
 def difference(a: Dual, b: Dual) -> float:
-    """Return the greatest difference of two dual vectors or matrices."""
+    """Return the greatest difference between the entries of two dual vectors or matrices."""
     return float(max(np.abs(a.real - b.real).max(), np.abs(a.dual - b.dual).max()))
 
 
@@ -85,7 +85,7 @@ _DASHED = ("loop mended", "both mended", "Davidon")
 
 
 def draw(result: StudyResult) -> Figure:
-    """Draw one panel for each unit of the columns, mended equations dashed."""
+    """Draw one panel for each unit of the columns; results of the mended equations are dashed."""
     panels: list[Panel] = []
     for unit, label in _SHOWN.items():
         shown = {name: column for name, column in result.columns.items() if name.endswith(unit) and name != ANGLE}

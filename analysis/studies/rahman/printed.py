@@ -1,8 +1,8 @@
 """Rahman's equations as printed, in pounds, inches and seconds: the iteration of section 2.6.1, and eqs 37 to 43, 46 to 69.
 
-They are kept to the letter with their errors, to be compared with correct values; where a second rate has one dot in our scan,
-two are read: each term of a second rate has one second rate or two first ones. A switch ``erratum_N`` mends the erratum of
-that number in docs/rahman.md. The suffix ``_t`` of an angle's name is its rate, ``_tt`` its second rate.
+The equations are kept exactly, with their errors, to be compared with correct values. Where a second rate has one dot in our
+scan, it is read as two dots, since each term of a second rate has one second rate or two first rates. A switch ``erratum_N``
+mends the erratum N of docs/rahman.md. The suffix ``_t`` of an angle's name denotes its rate, ``_tt`` its second rate.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ FloatArray = NDArray[np.float64]
 
 #: Step of the crank angle (deg) in the continuation, and most corrections at an angle: our choice.
 STEP_DEG, MAX_STEPS = 5.0, 200
-#: Largest change of an angle (rad) or of S4 (in) in a step that counts as small: our choice too.
+#: Largest change of an angle (rad) or of S4 (in) in a small step: our choice too.
 STEP = 1e-6
 #: Squared radii of gyration (in2): K2x2 of the rod, used in eqs 50a and 55 only, and those of the slider, in 51a and 56 only.
 ROD_X_SQUARE, SLIDER_SQUARE = 0.5, 3.0**2 / 6.0
@@ -35,9 +35,10 @@ GRID_DEG = np.arange(0.0, 360.0, STEP_DEG)
 class Turn(NamedTuple):
     """Result of the iteration at the m angles of `GRID_DEG` for n shifts.
 
-    ``unknowns`` (m, n, 5) are theta2, eta2, theta3, eta3 (rad) and S4 (in). ``rotation_deg`` and ``error_in`` (m, n) are the
-    rotation by which the loop is open and the error of S4; ``steps`` (m, n) the numbers of corrections; ``settled`` (n,)
-    whether the last correction was small at every angle. A shift has NaN from the first angle at which it does not settle.
+    ``unknowns`` (m, n, 5) are theta2, eta2, theta3, eta3 (rad) and S4 (in). ``rotation_deg`` (m, n) is the rotation by which
+    the loop is open, ``error_in`` (m, n) the error of S4. ``steps`` (m, n) are the numbers of corrections. ``settled`` (n,)
+    tells whether the last correction was small at every angle. A shift has NaN from the first angle at which the iteration
+    does not converge.
     """
 
     unknowns: FloatArray
@@ -55,10 +56,10 @@ def turn(
     from_before: bool = True,
     small: float = STEP,
 ) -> Turn:
-    """Run the iteration over a turn for given shifts (in), from the planar estimate at theta1 = 0.
+    """Run the iteration over a turn for given shifts (in), starting at theta1 = 0 from the planar estimate.
 
-    At later angles it starts from the solution at the previous angle (``from_before``), otherwise from the planar estimate. A
-    step below ``small`` (rad, in) ends it.
+    At each later angle it starts from the solution at the previous angle, or again from the planar estimate if ``from_before``
+    is False. It ends when a correction is below ``small`` (rad, in).
     """
     shifts = np.atleast_1d(np.asarray(shift_in, dtype=float))
     shape = (GRID_DEG.size, shifts.size)
@@ -83,12 +84,13 @@ def turn(
 
 
 def dependable(p: SliderCrankParameters, shift_in: float) -> tuple[FloatArray, FloatArray, bool]:
-    """Close the loop at every other angle by Newton-Raphson and Davidon-Fletcher-Powell steps, joined in our way.
+    """Close the loop at every second angle of `GRID_DEG` by Newton-Raphson and Davidon-Fletcher-Powell steps combined our way.
 
-    The thesis prints the Newton-Raphson steps only (eqs 7 to 26). Reference 12 was not at hand. A step by eq 23a is taken if it
-    halves the sum of squares of eq 25, lengths in inches; otherwise a Davidon-Fletcher-Powell step reduces that sum. The start
-    is the planar estimate, then the solution at the previous angle. Returns the rotation by which the loop is open (deg) and
-    the error of S4 (in) at each angle, and whether the last step was small at every angle.
+    The thesis prints the Newton-Raphson steps only (eqs 7 to 26); its reference 12, on the combination, was not at hand. A
+    step by eq 23a is taken if it halves the sum of squares of eq 25, with lengths in inches; otherwise a
+    Davidon-Fletcher-Powell step reduces that sum. The start is the planar estimate, then the solution at the previous angle.
+    Returns the rotation by which the loop is open (deg) and the error of S4 (in) at each angle, and whether the last step was
+    small at every angle.
     """
     unit, angles = np.array([1.0, 1.0, 1.0, 1.0, INCH]), np.radians(GRID_DEG[::2])
     away = 1e-6 * np.concatenate([np.zeros((1, 5)), np.eye(5), -np.eye(5)])
@@ -133,7 +135,7 @@ def dependable(p: SliderCrankParameters, shift_in: float) -> tuple[FloatArray, F
 
 
 class Crank(NamedTuple):
-    """Lengths a1 and a2 (in), theta1' (rad/s) and S1' (in/s), theta1'' (rad/s2) and S1'' (in/s2)."""
+    """Crank and shift: lengths a1 and a2 (in), theta1' (rad/s), S1' (in/s), theta1'' (rad/s2) and S1'' (in/s2)."""
 
     a1: float
     a2: float
@@ -144,7 +146,7 @@ class Crank(NamedTuple):
 
 
 class Joints(NamedTuple):
-    """Values of theta2, eta2, theta3, eta3 (rad) and S4 (in), or their rates."""
+    """Values of theta2, eta2, theta3, eta3 (rad) and S4 (in), or their first or second rates."""
 
     th2: FloatArray
     eta2: FloatArray
@@ -159,9 +161,9 @@ GENERAL = Joints(*(np.array(value) for value in (2.1, 0.35, -1.3, 0.2, 40.0)))
 
 
 def later(c: Crank, q: Joints, r: Joints, a: Joints) -> tuple[Crank, Joints, Joints]:
-    """Return crank, joints and their rates after an imaginary time of 1e-20j s.
+    """Return the crank, the joint values and their rates an imaginary time of 1e-20j s later.
 
-    The imaginary part of a function of them, divided by 1e-20, is its time derivative without rounding error.
+    The imaginary part of any function of the results, divided by 1e-20, is its time derivative without rounding error.
     """
     speeds = (c.speed + 1e-20j * c.acceleration, c.shift_rate + 1e-20j * c.shift_acceleration)
     moved = [Joints(*(x + 1e-20j * y for x, y in zip(*pair))) for pair in ((q, r), (r, a))]
@@ -169,7 +171,7 @@ def later(c: Crank, q: Joints, r: Joints, a: Joints) -> tuple[Crank, Joints, Joi
 
 
 def joint_rates(c: Crank, q: Joints, *, erratum_4: bool = False) -> Joints:
-    """Return the joint rates by eqs 39 to 43; ``erratum_4`` mends 39."""
+    """Return the joint rates by eqs 39 to 43; ``erratum_4`` mends eq 39."""
     (s2, se, s3), (c2, ce, c3) = (f([q.th2, q.eta2, q.th3]) for f in (np.sin, np.cos))
     w, v = c.speed, c.shift_rate
     factor = ce**2 if erratum_4 else 1.0
@@ -185,10 +187,7 @@ def joint_rates(c: Crank, q: Joints, *, erratum_4: bool = False) -> Joints:
 
 
 def joint_accelerations(c: Crank, q: Joints, r: Joints) -> Joints:
-    """Return the second rates by eqs 38a to 42a.
-
-    ``bracket`` is the bracket that eqs 40 to 42 share, ``bracket_t`` its rate.
-    """
+    """Return the second rates of the joints by eqs 38a to 42a."""
     (s2, se, s3), (c2, ce, c3) = (f([q.th2, q.eta2, q.th3]) for f in (np.sin, np.cos))
     w, v, a1, a2 = c.speed, c.shift_rate, c.a1, c.a2
     wt, vt = c.acceleration, c.shift_acceleration
@@ -233,7 +232,7 @@ def joint_accelerations(c: Crank, q: Joints, r: Joints) -> Joints:
 
 
 def loop_rates(c: Crank, q: Joints, r: Joints) -> FloatArray:
-    """Return the residuals of rows 37a to 37f (6, ...): a, c, e in rad/s, and b, d, f in in/s."""
+    """Return the residuals of eqs 37a to 37f, shape (6, ...): a, c and e in rad/s, b, d and f in in/s."""
     (s2, se, s3), (c2, ce, c3) = (f([q.th2, q.eta2, q.th3]) for f in (np.sin, np.cos))
     w, v = c.speed, c.shift_rate
     return np.array(
@@ -249,7 +248,7 @@ def loop_rates(c: Crank, q: Joints, r: Joints) -> FloatArray:
 
 
 def separated_rates(c: Crank, q: Joints) -> FloatArray:
-    """Return eq 38, shape (6, 6): the coefficients of theta2', theta3', eta2', eta3', S4', and the right side."""
+    """Return eq 38, shape (6, 6): five columns of coefficients of theta2', theta3', eta2', eta3', S4', and the right side."""
     (s2, se, s3), (c2, ce, c3) = (f([q.th2, q.eta2, q.th3]) for f in (np.sin, np.cos))
     w, v = c.speed, c.shift_rate
     return np.array(
@@ -266,9 +265,9 @@ def separated_rates(c: Crank, q: Joints) -> FloatArray:
 
 
 def mended_row(p: SliderCrankParameters, angle: FloatArray, shift: FloatArray, q: Joints, speed: float) -> FloatArray:
-    """Return the residual of row 37f (in/s) with erratum 2 mended, when rows 37a to 37e are solved for the joint rates.
+    """Return the residual of eq 37f (in/s) with erratum 2 mended, with joint rates that satisfy eqs 37a to 37e.
 
-    With the erratum mended, the rate of eta acts about the axis j that theta has turned.
+    With the erratum mended, the rate of eta acts about the axis j after its rotation by theta.
     """
     _, screws = chain(p, angle, shift, np.stack([*q[:4], q.s4 * INCH], -1))
     zero = np.zeros_like(angle)
@@ -285,7 +284,10 @@ def mended_row(p: SliderCrankParameters, angle: FloatArray, shift: FloatArray, q
 
 
 class Bodies(NamedTuple):
-    """Masses (lb.s2/in), distances g1 and g2 of the centres of mass from the distal joints (in), K1z2 and K2z2 (in2)."""
+    """Masses (lb.s2/in), distances g1 and g2 of the centres of mass from the distal joints (in), K1z2 and K2z2 (in2).
+
+    K1z2 and K2z2 are squared radii of gyration.
+    """
 
     masses: tuple[float, ...]
     g1: float
@@ -295,7 +297,7 @@ class Bodies(NamedTuple):
 
 
 def bodies(p: SliderCrankParameters, *, erratum_6: bool = False) -> Bodies:
-    """Return the bodies of section 3.1, g3 = 0; ``erratum_6`` mends the signs of g1 and g2."""
+    """Return the bodies of section 3.1 with g3 = 0; ``erratum_6`` mends the signs of g1 and g2."""
     side = -1.0 if erratum_6 else 1.0
     a1, a2 = p.crank_length / INCH, p.rod_length / INCH
     masses = [mass * INCH / POUND_FORCE for mass in (p.crank_mass, p.rod_mass, p.slider_mass)]
@@ -303,14 +305,14 @@ def bodies(p: SliderCrankParameters, *, erratum_6: bool = False) -> Bodies:
 
 
 def _dual(real: list[ArrayLike], dual: list[ArrayLike]) -> Dual:
-    """Build a dual vector (..., 3) of components that are numbers or arrays."""
+    """Build a dual vector (..., 3) from real and dual components, each a number or an array."""
     # arrays of single precision stay in single precision beside plain numbers
     joined = np.stack(np.broadcast_arrays(*real, *dual), -1, dtype=np.result_type(*real, *dual))
     return Dual(joined[..., :3], joined[..., 3:])
 
 
 def velocities(c: Crank, q: Joints, r: Joints) -> tuple[Dual, Dual, Dual]:
-    """Return the dual velocities of crank, rod and slider by eqs 33, 36 and 32a, the mixed path."""
+    """Return the dual velocities of crank, rod and slider by eqs 33, 36 and 32a; this is the mixed path."""
     s3, c3 = np.sin(q.th3), np.cos(q.th3)
     return (
         _dual([0.0, 0.0, c.speed], [0.0, c.a1 * c.speed, c.shift_rate]),
@@ -320,7 +322,7 @@ def velocities(c: Crank, q: Joints, r: Joints) -> tuple[Dual, Dual, Dual]:
 
 
 def forward_rod_velocity(c: Crank, q: Joints, r: Joints) -> Dual:
-    """Return the rod's dual velocity by eq 35, the forward path."""
+    """Return the dual velocity of the rod by eq 35; this is the forward path."""
     (s2, se), (c2, ce), turning = np.sin([q.th2, q.eta2]), np.cos([q.th2, q.eta2]), c.speed + r.th2
     return _dual(
         [r.eta2 * s2 * ce - turning * se, r.eta2 * c2, turning * ce + r.eta2 * s2 * se],
@@ -333,7 +335,7 @@ def forward_rod_velocity(c: Crank, q: Joints, r: Joints) -> Dual:
 
 
 def _forward_rod_rate(c: Crank, q: Joints, r: Joints, a: Joints) -> Dual:
-    """Return the rate of eq 35, whose terms eqs 55 and 56 share."""
+    """Return the rate of eq 35; eqs 55 and 56 share its terms."""
     (s2, se), (c2, ce), turning = np.sin([q.th2, q.eta2]), np.cos([q.th2, q.eta2]), c.speed + r.th2
     w, v, wt, vt = c.speed, c.shift_rate, c.acceleration, c.shift_acceleration
     about_j2 = a.eta2 * c2 - r.eta2 * r.th2 * s2
@@ -375,7 +377,10 @@ def forward_slider_velocity(c: Crank, q: Joints, r: Joints) -> Dual:
 
 
 def _slider_momentum(v: Dual, mass: float, g3: float) -> Dual:
-    """Return the slider's dual momentum from the velocity ``v`` of eq 45, or its rate from that of ``v``; eqs 51a and 56."""
+    """Return the slider's dual momentum by eq 51a, if ``v`` is the velocity of eq 45.
+
+    If ``v`` is the rate of that velocity, the result is the rate of the momentum by eq 56.
+    """
     (x, y, z), (xd, yd, zd) = np.moveaxis(v.real, -1, 0), np.moveaxis(v.dual, -1, 0)
     square = SLIDER_SQUARE
     found = _dual([xd, yd + g3 * z, zd - g3 * y], [square * x, square * y - g3 * zd, square * z + g3 * yd])
@@ -383,7 +388,7 @@ def _slider_momentum(v: Dual, mass: float, g3: float) -> Dual:
 
 
 def forward_slider_momentum(c: Crank, b: Bodies, q: Joints, r: Joints, g3: float, *, slip: bool = False) -> Dual:
-    """Return the slider's dual momentum by eq 51a; ``slip`` keeps its cos theta3 for cos eta3 (erratum 9)."""
+    """Return the slider's dual momentum by eq 51a; ``slip`` keeps the printed cos theta3 instead of cos eta3 (erratum 9)."""
     mass, across = b.masses[2], forward_rod_velocity(c, q, r).dual[..., 2]
     wrong = mass * (np.cos(q.th3) - np.cos(q.eta3)) * across if slip else 0.0
     found = _slider_momentum(forward_slider_velocity(c, q, r), mass, g3) + _dual([0.0, wrong, 0.0], [0.0, 0.0, 0.0])
@@ -391,7 +396,7 @@ def forward_slider_momentum(c: Crank, b: Bodies, q: Joints, r: Joints, g3: float
 
 
 def forward_momentum_rates(c: Crank, b: Bodies, q: Joints, r: Joints, a: Joints, g3: float) -> tuple[Dual, Dual]:
-    """Return the rates of the dual momenta of rod and slider by eqs 55 and 56, terms collected; eq 56 has cos eta3."""
+    """Return the rates of the dual momenta of rod and slider by eqs 55 and 56, with terms collected and cos eta3 in eq 56."""
     (_, m2, m3), square, rod = b.masses, b.rod_square, _forward_rod_rate(c, q, r, a)
     (x, y, z), (xd, yd, zd) = rod.real, rod.dual
     of_rod = _dual(
@@ -438,7 +443,7 @@ def forward_rod_momentum(c: Crank, b: Bodies, q: Joints, r: Joints) -> Dual:
 
 
 def momenta(c: Crank, b: Bodies, q: Joints, r: Joints, *, slip: bool = False) -> tuple[Dual, Dual, Dual]:
-    """Return the dual momenta by eqs 49a, 52a and 53a; ``slip`` keeps the g3 for g2 of 52a (erratum 9), g3 being 0."""
+    """Return the dual momenta by eqs 49a, 52a and 53a with g3 = 0; ``slip`` keeps the printed g3 for g2 in 52a (erratum 9)."""
     (_, m2, m3), c3 = b.masses, np.cos(q.th3)
     return (
         crank_momentum(c, b),
@@ -451,7 +456,7 @@ def momenta(c: Crank, b: Bodies, q: Joints, r: Joints, *, slip: bool = False) ->
 
 
 def momentum_rates(b: Bodies, q: Joints, r: Joints, a: Joints) -> tuple[Dual, Dual, Dual]:
-    """Return the rates of the dual momenta by eqs 54, 57 and 58, speed and shift being constant."""
+    """Return the rates of the dual momenta by eqs 54, 57 and 58, for constant speed and shift."""
     (_, m2, m3), s3, c3 = b.masses, np.sin(q.th3), np.cos(q.th3)
     turned = a.s4 * c3 - r.s4 * s3 * r.th3
     return (
@@ -474,7 +479,7 @@ def inertia_force(velocity: Dual, momentum: Dual, rate: Dual) -> Dual:
 
 
 def inertia_forces(c: Crank, b: Bodies, q: Joints, r: Joints, a: Joints) -> list[Dual]:
-    """Return f1, f2 and f3 by eqs 49a, 52a, 53a, 54 and 57 to 61, at constant speed and shift."""
+    """Return the inertia forces f1, f2 and f3 by eqs 49a, 52a, 53a, 54 and 57 to 61, at constant speed and shift."""
     return [inertia_force(*of) for of in zip(velocities(c, q, r), momenta(c, b, q, r), momentum_rates(b, q, r, a))]
 
 
@@ -483,8 +488,8 @@ def joint_forces(
 ) -> dict[str, FloatArray]:
     """Return all joint forces (lb) and moments (lb.in) by eqs 49a, 52a, 53a, 54, 57 to 61 and 69a to 69q.
 
-    The shift is constant. The equations are as printed, but for the slip of 52a (g3 for g2), which is mended.
-    ``erratum_5`` mends the signs of f1 and f3 in eqs 62 and 64. 1F1k is 0, as in the thesis.
+    The shift is constant. The equations are as printed, except that the slip in 52a (g3 for g2) is mended. ``erratum_5`` mends
+    the signs of f1 and f3 in eqs 62 and 64. 1F1k is 0, as in the thesis.
     """
     (s2, se, s3, sh), (c2, ce, c3, ch) = (f([q.th2, q.eta2, q.th3, q.eta3]) for f in (np.sin, np.cos))
     f1, f2, f3 = inertia_forces(c, b, q, r, a)
@@ -509,12 +514,12 @@ def joint_forces(
 
 
 def on_crank(angle: FloatArray, f: dict[str, FloatArray]) -> tuple[FloatArray, FloatArray]:
-    """Return 1F1i and 1F1j by eqs 69i and 69j."""
+    """Return 1F1i and 1F1j (lb) by eqs 69i and 69j; ``f`` has the forces that these equations need."""
     s, c = np.sin(angle), np.cos(angle)
     return f["along crank"] * c - f["across crank"] * s, f["along crank"] * s + f["across crank"] * c
 
 
 def on_bearing(angle: FloatArray, shift_in: float, f: dict[str, FloatArray]) -> tuple[FloatArray, FloatArray]:
-    """Return 1T1i and 1T1j (lb.in) by eqs 69q and 69p, with the 1F1k = 0 of a constant shift."""
+    """Return 1T1i and 1T1j (lb.in) by eqs 69q and 69p; 1F1k is 0, since the shift is constant."""
     (i, j), s, c = on_crank(angle, f), np.sin(angle), np.cos(angle)
     return -j * shift_in - f["f1xd"] * c + f["f1yd"] * s, i * shift_in - f["f1xd"] * s - f["f1yd"] * c

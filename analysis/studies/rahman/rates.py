@@ -1,4 +1,4 @@
-"""Verdicts on the velocities and accelerations of the joints, sections 2.7 and 2.8."""
+"""Verdicts on the velocities and accelerations of the joints: sections 2.7 and 2.8."""
 
 from __future__ import annotations
 
@@ -63,7 +63,10 @@ from .table import FAMILIES, IDEAL, Case
 
 
 def row_f(case: Case) -> tuple[FloatArray, FloatArray]:
-    """Return the residuals of row 37f (in/s), as printed (NaN where eq 41 is unbounded) and with erratum 2 mended."""
+    """Return the residuals of eq 37f (in/s): as printed, NaN where eq 41 is unbounded, and with erratum 2 mended.
+
+    Each residual has a value at every angle of the turn.
+    """
     p, q = parameters(case.offset_in, case.twist_deg), joints(followed(case).unknowns[:, 0])
     lacking = loop_rates(CRANK_AT_SPEED, q, joint_rates(CRANK_AT_SPEED, q))[5]
     shift = np.full(GRID_DEG.size, case.shift_in * INCH)
@@ -72,7 +75,7 @@ def row_f(case: Case) -> tuple[FloatArray, FloatArray]:
 
 
 def _angular_velocity() -> float:
-    """Return the difference (rad/s) of eqs 30 and 31 from the angular velocity of Z(theta) Y(eta), by a difference quotient."""
+    """Return the error (rad/s) of eqs 30 and 31 as the angular velocity of Z(theta) Y(eta), by a difference quotient."""
     th, eta, th_rate, eta_rate = 0.8, 0.3, 1.7, -2.1
     before, now, after = (about_k(th + h * th_rate).real @ about_j(eta + h * eta_rate).real for h in (-H, 0.0, H))
     omega = axial(Dual((after - before) / (2.0 * H) @ now.T)).real
@@ -80,7 +83,10 @@ def _angular_velocity() -> float:
 
 
 def _velocities() -> dict[str, float]:
-    """Return the differences of eqs 33, 35, 36 and 45 from the matrices of eqs 1 to 3 times the velocities of eqs 29 to 32."""
+    """Return the errors of eqs 33, 35, 36 and 45, by equation, compared with velocities transformed by matrices.
+
+    The matrices are those of eqs 1 to 3, the velocities those of eqs 29 to 32.
+    """
     r, (crank, rod, slider) = joint_rates(MOVING, GENERAL), links()
     of_crank, of_rod, _ = velocities(MOVING, GENERAL, r)
     forward = forward_rod_velocity(MOVING, GENERAL, r)
@@ -98,7 +104,7 @@ def _velocities() -> dict[str, float]:
 def _sinusoidal(ratio: float) -> tuple[float, float]:
     """Return the errors of eq 28a (in/s) and of eq 28b (in/s2) at alpha = ``ratio``.
 
-    28a should be the rate of 28, and 28b the rate of 28a with its amplitude mended.
+    Eq 28a should be the rate of eq 28, and eq 28b the rate of eq 28a with its amplitude mended.
     """
     amplitude, angle, speed, acceleration, h = 2.0, 0.9, CRANK_SPEED, 3.0, 1e-20
     # derivatives along the motion by a complex step, which has no rounding error
@@ -113,13 +119,13 @@ def _sinusoidal(ratio: float) -> tuple[float, float]:
 
 
 def _rows(crank: Crank, q: Joints) -> tuple[FloatArray, FloatArray]:
-    """Return the coefficients of the joint rates in eqs 37a to 37f, shape (6, 5), and the constant parts, shape (6,)."""
+    """Return the coefficients of the joint rates in eqs 37a to 37f, shape (6, 5), and the constant terms, shape (6,)."""
     right = loop_rates(crank, q, Joints(*np.zeros(5)))
     return np.stack([loop_rates(crank, q, Joints(*unit)) - right for unit in np.eye(5)], -1), right
 
 
 def _printed_rates() -> tuple[Statement, ...]:
-    """Judge eqs 28a to 31 and 37 to 43, 38a to 42a in the general position, with the shift in motion."""
+    """Judge eqs 28a to 31, 37 to 43 and 38a to 42a in a general position, with the shift in motion."""
     crank = MOVING
     matrix, right = _rows(crank, GENERAL)
     flat = joints(planar(parameters(PLANE.offset_in), np.array([1.0])) / [1.0, 1.0, 1.0, 1.0, INCH])
@@ -234,7 +240,7 @@ def _printed_rates() -> tuple[Statement, ...]:
     )
 
 
-#: How far from a zero of sin theta2 accelerations are taken (deg).
+#: Distance (deg) from a zero of sin theta2 at which accelerations are taken.
 BESIDE_DEG = 1e-3
 #: Labels of the accelerations with the printed equations that give them, by the joint's name.
 EQUATIONS = {
@@ -247,7 +253,10 @@ EQUATIONS = {
 
 
 def _near_dead_centres(case: Case, q: Joints, angles_deg: FloatArray) -> dict[str, float]:
-    """Return the greatest second rates, eqs 38a to 42a, within 10 deg of a dead centre relative to elsewhere, by joint name."""
+    """Return the greatest second rate of each joint within 10 deg of a dead centre, relative to the greatest elsewhere.
+
+    The second rates are those of eqs 38a to 42a.
+    """
     found = joint_accelerations(CRANK_AT_SPEED, q, joint_rates(CRANK_AT_SPEED, q))
     close_by = np.min([np.abs(angles_deg - at) for at in dead_centres_deg(case)], axis=0) < ABOUT_DEG
     sizes = {name: np.abs(second) for name, second in found._asdict().items()}
@@ -257,7 +266,7 @@ def _near_dead_centres(case: Case, q: Joints, angles_deg: FloatArray) -> dict[st
 
 
 def _ended(case: Case, angles_deg: FloatArray, start: FloatArray) -> FloatArray:
-    """Return the unknowns (n, 5) at which the printed iteration ends at crank angles, from a start for each."""
+    """Return the unknowns (n, 5) at the end of the printed iteration at n crank angles, given a start for each angle."""
     p, unit = parameters(case.offset_in, case.twist_deg), [1.0, 1.0, 1.0, 1.0, INCH]
     shift = case.shift_in * INCH
     ended = settle(p, np.radians(angles_deg), shift, rows="printed", start=start * unit, max_steps=MAX_STEPS)
@@ -265,13 +274,16 @@ def _ended(case: Case, angles_deg: FloatArray, start: FloatArray) -> FloatArray:
 
 
 def _ended_on_turn(case: Case) -> FloatArray:
-    """Return the unknowns at which the printed iteration ends at half degrees, from the loops at every fifth degree."""
+    """Return the unknowns at the end of the printed iteration at every half degree of a turn.
+
+    The iteration starts from the solution at the last multiple of five degrees.
+    """
     starts = np.repeat(followed(case).unknowns[:, 0], round(2.0 * STEP_DEG), axis=0)
     return _ended(case, ANGLES_DEG[:-1], starts)
 
 
 def _zeros(case: Case, angles_deg: FloatArray, unknowns: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return the angles (deg) of the zeros of sin theta2 where the printed iteration ends, and the unknowns there."""
+    """Return the angles (deg) at which sin theta2 is zero in the printed iteration's results, and the unknowns there."""
     sine, step = np.sin(unknowns[:, 0]), np.diff(angles_deg).max()
     small = np.abs(sine) < CLEAR_SINE
     (at,) = np.nonzero((sine[:-1] * sine[1:] < 0.0) & small[:-1] & small[1:])
@@ -291,7 +303,10 @@ def _beside_zeros(case: Case, angles_deg: FloatArray, unknowns: FloatArray) -> t
 
 
 def _roundoff(q: Joints) -> float:
-    """Return the greatest roundoff of eqs 38a to 42a, relative to the greatest acceleration by the same equation."""
+    """Return the greatest roundoff error of eqs 38a to 42a, relative to the greatest acceleration by the same equation.
+
+    ``q`` are the joint values.
+    """
     digit = np.spacing(2.0 * np.pi)
     short, long = (
         joint_accelerations(CRANK_AT_SPEED, at, joint_rates(CRANK_AT_SPEED, at))
@@ -301,7 +316,7 @@ def _roundoff(q: Joints) -> float:
 
 
 def _dead_centres() -> tuple[Statement, ...]:
-    """Judge the cause that section 3.2 gives for the spikes, in the plane and where the printed iteration ends."""
+    """Judge the cause that section 3.2 gives for the spikes, in the plane and out of it."""
     cases = [Case(f"a4 = {a4:g} in, S1 = 0", a4, 0.0, 270.0) for a4 in (10.0, 20.0, 30.0)]
     twisted = [case for case in FAMILIES["twist"].cases if case.twist_deg != IDEAL.twist_deg]
     worst, least, rough, near_zero, high, whole = 0.0, np.inf, 0.0, [], [], []
@@ -395,7 +410,7 @@ def _dead_centres() -> tuple[Statement, ...]:
 
 
 def rates() -> StudyResult:
-    """Compute the rates as printed, and the residual of the unsolved row."""
+    """Compute the joint rates as printed, and the residual of the equation 37f that is not solved."""
     columns = {ANGLE: GRID_DEG}
     for case in ROW_F:
         lacking, mended = row_f(case)

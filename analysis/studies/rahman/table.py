@@ -1,12 +1,12 @@
 """Assignment of Rahman's figures 5 to 38: twelve quantities in two or three families of cases.
 
 Section 3.2 assigns figures to the families: variable offset, variable axial shift, variable twist; the two torques have no
-figure of variable twist. The surviving captions, each above its number, name displacement, force or torque and the
-constant dimensions. The component of each figure is our inference: in the order of section 3.2, the families leave one
-place for each component that it does not find constant.
+figure of variable twist. The surviving captions, each above its number, name the displacement, force or torque and the
+constant dimensions. The component of each figure is our inference: in the order of section 3.2, the families leave exactly one
+place for each component that this section does not find constant.
 
-The symbols are the thesis's: nFni is the force in joint n along i of frame n, nTni the moment. 1F1 and 1T1 act from the
-ground on the crank, and 2F2 from the rod on the crank, since 2F2j = -T/a1. Then 3F3 acts from the rod on the slider by
+The symbols are the thesis's: nFni is the force in joint n along the axis i of frame n, nTni the moment. 1F1 and 1T1 act from
+the ground on the crank, and 2F2 from the rod on the crank, since 2F2j = -T/a1. Then 3F3 acts from the rod on the slider by
 eq 63, and 4F4 from the ground on the slider by eq 64.
 """
 
@@ -39,7 +39,7 @@ class Case(NamedTuple):
 
 
 class Family(NamedTuple):
-    """Cases that differ in one dimension, with the texts of titles and legends."""
+    """Cases that differ in one dimension, with the texts of their titles and legends."""
 
     title: str
     legend: str
@@ -49,8 +49,9 @@ class Family(NamedTuple):
 class Component(NamedTuple):
     """Component of a force or moment: symbol, meaning, printed unit, and source.
 
-    ``source`` is a vector of `analysis.slider_crank.ForceTurn`, of which this is the component along ``axis`` of ``frame``, or
-    one of the two axial forces, "axial_force" and "slider_force". ``sign`` converts the sense of the source to the thesis's.
+    ``source`` is the name of a vector of `analysis.slider_crank.ForceTurn`, of which this is the component along ``axis`` of
+    ``frame``. Or it is one of the two axial forces, "axial_force" and "slider_force". ``sign`` converts the source's sense to
+    that of the thesis.
     """
 
     symbol: str
@@ -80,7 +81,7 @@ def _components() -> Iterator[Component]:
         for axis in "ijk":
             yield Component(symbol + axis, what, unit, source, sign)
     yield Component("1F1k", "ground on crank", "lb", "axial_force")
-    # along the guide the unknown slider force acts; as a load it is positive against k4
+    # the unknown slider force acts along the guide; as a load it is positive in the direction opposite to k4
     yield Component("4F4k", "slider force sought", "lb", "slider_force", -1.0)
 
 
@@ -88,7 +89,7 @@ COMPONENTS: Mapping[str, Component] = MappingProxyType({component.symbol: compon
 
 
 class Figure(NamedTuple):
-    """Figure: the family of its cases, its components (none for the slider displacement), its title, its place."""
+    """Figure of the thesis: family of cases, components (none for the slider displacement), title, and place."""
 
     family: str
     symbols: tuple[str, ...]

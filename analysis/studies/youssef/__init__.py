@@ -7,8 +7,8 @@ from types import MappingProxyType
 
 from ..contents import Entry
 
-#: Figures in the order of the thesis, and our own studies: number or name, module (empty where there is nothing to compute),
-#: place in the thesis, title.
+#: Figures in the order of the thesis, and our own studies. Each row has the number or name, the module (empty if there is
+#: nothing to compute), the place in the thesis, and the title.
 _ROWS = (
     ("3.1", "formulation", "II, 3.1, L554-1804", "The linkage with its loads: equations and integration"),
     (

@@ -1,4 +1,4 @@
-"""The figures of chapter III: the five-bar slider of Table 3.1 driven at 420 rpm, and those of `free_crank`."""
+"""Figures of chapter III: the five-bar slider of Table 3.1 driven at 420 rpm, and the figures of `free_crank`."""
 
 from __future__ import annotations
 
@@ -65,18 +65,18 @@ predictor-corrector method is stable: Milne's classical one is weakly unstable."
 DAMPINGS = (1e4, 5e4, 1e5, 5e5, 1e6)
 #: Time of a turn (s).
 PERIOD = 60.0 / SPEED
-#: Transmission at which the coupler and the rocker count as collinear: |sin(th4 - th3)|.
+#: Sine |sin(th4 - th3)| of the transmission angle below which coupler and rocker count as collinear: our choice.
 COLLINEAR_SINE = 0.3
-#: A transmission nearer to a line, by which the choice of the other is tried.
+#: A smaller sine, to test how much the results depend on `COLLINEAR_SINE`.
 NEARER_SINE = 0.05
 #: Turns of a run without a spring.
 DRIFT_TURNS = 80
 SAMPLES_PER_DRIFT_TURN = 120
 #: Dampers (dyn.s/cm) with which the drift is nearly linear.
 NEAR_LINEAR = (5e5, 1e6)
-#: Turns of the transient, as the thesis has it, and last of the turns over which the drift is compared with a line.
+#: Turns of the transient according to the thesis, and the last turn of those over which the drift is compared with a line.
 TRANSIENT_TURNS, DRAWN_TURNS = 2, 10
-#: Fewest turns that show the motion after the transient: two more.
+#: Least number of turns that shows the motion after the transient: two turns more than the transient.
 FEWEST_TURNS = TRANSIENT_TURNS + 2
 
 TURNS, ANGLE = "turns of the crank [1]", "crank angle [deg]"
@@ -96,9 +96,9 @@ def _k(stiffness: float) -> str:
 
 @dataclass(frozen=True, slots=True)
 class Drift:
-    """Motion of the slider without a spring: turns of the crank, slider position (cm), turn at which the links are collinear.
+    """Motion of the slider without a spring: crank rotation (turns), slider position (cm), and when the links become collinear.
 
-    ``collinear_turn`` is NaN if they never are.
+    ``collinear_turn`` is the crank rotation at that moment (turns), NaN if the coupler and the rocker never become collinear.
     """
 
     turns: NDArray[np.float64]
@@ -106,7 +106,7 @@ class Drift:
     collinear_turn: float
 
     def turn(self, number: int) -> NDArray[np.float64]:
-        """Return the slider position over turn ``number`` (cm), counted from 1, both ends included."""
+        """Return the slider position (cm) over the turn ``number``, counted from 1, both ends included."""
         n = SAMPLES_PER_DRIFT_TURN
         return self.slider_cm[(number - 1) * n : number * n + 1]
 
@@ -116,18 +116,21 @@ class Drift:
         return np.where(self.turns > self.collinear_turn, np.nan, self.slider_cm)
 
     def _last(self, turns: int = DRAWN_TURNS) -> int:
-        """Return the last whole turn before the links are collinear, at most ``turns``."""
+        """Return the number of the last whole turn before the links are collinear, at most ``turns``."""
         return int(np.fmin(turns, self.collinear_turn))
 
     def _ends(self, last: int) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
-        """Numbers of the turns after the transient, or of all if there are none, and the slider position at their ends (cm)."""
+        """Return the numbers of the turns after the transient, and the slider position (cm) at the end of each.
+
+        If no turn follows the transient, all turns are used, from number 0.
+        """
         last = self._last(last)
         turns = np.arange(TRANSIENT_TURNS if last > TRANSIENT_TURNS else 0, last + 1)
         return turns, self.slider_cm[turns * SAMPLES_PER_DRIFT_TURN]
 
     @property
     def line(self) -> tuple[float, float]:
-        """Least-squares line of the drift after the transient: drift per turn, and position at crank angle 0 (cm)."""
+        """Least-squares line through the drift after the transient: slope (cm per turn) and position at crank angle 0 (cm)."""
         rate, start = np.polyfit(*self._ends(DRAWN_TURNS), 1)
         return float(rate), float(start)
 
@@ -138,16 +141,19 @@ class Drift:
 
     @property
     def bend(self) -> float:
-        """Greatest distance of the slider at the ends of turns from the least-squares line, relative to the drift over them."""
+        """Greatest distance of the slider from the least-squares line at the ends of turns, relative to its range there."""
         return self.bend_until_turn(DRAWN_TURNS)
 
     def bend_until_turn(self, last: int) -> float:
-        """Return `bend` over the turns up to the ``last``."""
+        """Return `bend` for the turns up to number ``last``."""
         turns, ends = self._ends(last)
         return float(np.abs(ends - np.polyval(np.polyfit(turns, ends, 1), turns)).max() / np.ptp(ends))
 
     def unsteadiness(self, number: int) -> float:
-        """Return the range of the change from a turn to the next, both without drift, relative to the range of the next."""
+        """Return the greatest change of the motion from turn ``number`` to the next, relative to the range of the next turn.
+
+        The mean drift of each turn is subtracted first; the change is the range of the difference of the two turns.
+        """
         share = np.linspace(0.0, 1.0, SAMPLES_PER_DRIFT_TURN + 1)
         one, other = (u - share * (u[-1] - u[0]) for u in map(self.turn, (number, number + 1)))
         return float(np.ptp(other - one) / np.ptp(other))
@@ -159,14 +165,20 @@ class Drift:
 
     @property
     def transient(self) -> float:
-        """Number of turns until the motion is steady; if it never is, until the links are collinear, or else `DRAWN_TURNS`."""
+        """Number of turns until the motion is steady.
+
+        If the motion never becomes steady, the turn at which the links become collinear, or else `DRAWN_TURNS`.
+        """
         end = float(np.nan_to_num(self.collinear_turn, nan=DRAWN_TURNS))
         return next((n for n in range(1, int(end)) if self.unsteadiness(n) <= ALIKE), end)
 
 
 @cache
 def drift(damping: float, gravity: float = 9.81, sine: float = COLLINEAR_SINE) -> Drift:
-    """Run Table 3.1 at 420 rpm without a spring for `DRIFT_TURNS` turns, or up to the limit of assembly."""
+    """Run Table 3.1 at 420 rpm without a spring for `DRIFT_TURNS` turns, or until the links cannot be joined.
+
+    The links count as collinear where the sine of the transmission angle falls below ``sine``.
+    """
     angle = asin(sine)
     run = simulate(
         table_3_1(0.0, damping, gravity),
@@ -183,7 +195,7 @@ def drift(damping: float, gravity: float = 9.81, sine: float = COLLINEAR_SINE) -
 
 
 def drift_result() -> StudyResult:
-    """Compute the drift with the five dampers, its departure from a line, and when the links become collinear."""
+    """Compute the drift with each of the five dampers, its distance from a straight line, and when links become collinear."""
     runs = {mu: drift(mu) for mu in DAMPINGS}
     accelerates = "the drift accelerates, and the swing about it grows"
     none = at_least(
@@ -297,7 +309,10 @@ def weightless_result() -> StudyResult:
 
 
 def draw_drift(result: StudyResult) -> Figure:
-    """Draw the drift over the first turns and over many, with a cross at collinear links or dashed curves without gravity."""
+    """Draw the drift over the first turns and over many turns.
+
+    A cross marks where the links become collinear; dashed curves are without gravity.
+    """
     turns = result.columns[TURNS]
     curves, others = [], []
     for colour, mu in zip(COLOURS, DAMPINGS):
@@ -339,7 +354,7 @@ def _steady(stiffness: float) -> SteadyTurn:
 
 
 def springs() -> tuple[float, ...]:
-    """Return the stiffnesses that Fig 3.4 compares, or only the reader's if there is one (dyn/cm)."""
+    """Return the spring stiffnesses (dyn/cm) that Fig 3.4 compares, or only the reader's stiffness if the reader has set it."""
     return compared("slider.stiffness", STIFFNESSES, "N/m", DYN_PER_CM_PER_NEWTON_PER_METRE)
 
 
@@ -363,7 +378,7 @@ def steady_result() -> StudyResult:
 
 
 def _steady_statements() -> list[Statement]:
-    """Judge the transient, and the mean and the least position of the slider."""
+    """Judge the statements on the transient, and on the mean and the least slider position."""
     turns = {k: _steady(k) for k in STIFFNESSES}
     places = {k: least(turn.angle_deg, turn.slider_cm)[0] for k, turn in turns.items()}
     means = {k: turn.slider_cm[:-1].mean() for k, turn in turns.items()}
@@ -437,7 +452,7 @@ def _steady_statements() -> list[Statement]:
 
 
 def _shape_statements() -> list[Statement]:
-    """Judge the slopes between the least and the greatest position, and the width of the curves."""
+    """Judge the statements on the slopes between the least and the greatest position, and on the width of the curves."""
     turns = [_steady(k) for k in STIFFNESSES]
     ends = np.array([[find(t.angle_deg, t.slider_cm)[0] for find in (least, greatest)] for t in turns])
     widths, ranges = np.diff(ends, axis=1)[:, 0] % 360.0, np.array([np.ptp(t.slider_cm) for t in turns])
@@ -509,7 +524,7 @@ def _shape_statements() -> list[Statement]:
 
 
 def draw_steady(result: StudyResult) -> Figure:
-    """Draw the motion from the start over three turns, and the steady turns with a cross at each least position."""
+    """Draw the motion over three turns from the start, and one steady turn per spring with a cross at its least position."""
     columns = result.columns
     from_start = {f"u from the start; {_k(k)} [cm]": scientific(k) for k in springs()}
     names = [f"slider position u; {_k(k)} [cm]" for k in springs()]
@@ -542,7 +557,7 @@ def draw_steady(result: StudyResult) -> Figure:
 
 @dataclass(frozen=True, slots=True)
 class Parts:
-    """Torque at constant speed over a steady turn (N.m), and its parts due to the slider's acceleration and to gravity."""
+    """Crank torque over a steady turn at constant speed (N.m), and its parts due to slider acceleration and to gravity."""
 
     whole: NDArray[np.float64]
     acceleration: NDArray[np.float64]
@@ -550,7 +565,7 @@ class Parts:
 
 
 def slider_motion(stiffness: float) -> list[NDArray[np.float64]]:
-    """Return u, u' and u'' over the steady turn (SI), the derivatives by its harmonics."""
+    """Return u, u' and u'' over the steady turn (SI); the derivatives are computed from the Fourier series of u."""
     u = _steady(stiffness).slider_cm[:-1] / CM_PER_METRE
     waves = np.fft.rfft(u)
     order = 1j * SPEED * RAD_S_PER_RPM * np.arange(len(waves))
@@ -558,20 +573,20 @@ def slider_motion(stiffness: float) -> list[NDArray[np.float64]]:
 
 
 def slider_forces(stiffness: float) -> list[NDArray[np.float64]]:
-    """Return spring force, damper force and mean effective mass times acceleration over the steady turn (N)."""
+    """Return spring force, damper force, and mean effective mass times acceleration of the slider over the steady turn (N)."""
     p = table_3_1(stiffness)
     factors = (p.slider_stiffness, p.slider_damping, mean_effective_mass(p))
     return [factor * x for factor, x in zip(factors, slider_motion(stiffness))]
 
 
 def spring_share(stiffness: float) -> float:
-    """Return the range of the spring force divided by the greater range of the other two; see `slider_forces`."""
+    """Return the range of the spring force divided by the greater of the ranges of the other two forces in `slider_forces`."""
     spring, *others = (np.ptp(force) for force in slider_forces(stiffness))
     return float(spring / max(others))
 
 
 def parts(stiffness: float) -> Parts:
-    """Return the torque over the steady turn, and its parts."""
+    """Return the crank torque over the steady turn, and its parts."""
     parameters, speed = table_3_1(stiffness), SPEED * RAD_S_PER_RPM
     angle, (u, v, a) = np.radians(_steady(stiffness).angle_deg[:-1]), slider_motion(stiffness)
     whole, unaccelerated, weightless = (
@@ -582,9 +597,10 @@ def parts(stiffness: float) -> Parts:
 
 
 def by_position(soft: float, stiff: float) -> NDArray[np.float64]:
-    """Return the part of the difference of the steady torque between two springs that is due to the slider's position (N.m).
+    """Return the part (N.m) of the difference in steady torque between two springs that is due to the slider's position alone.
 
-    It is the mean of two changes of the position alone: at the rates of the softer spring, and at those of the stiffer one.
+    It is the mean of two differences in which only the position changes: one with u' and u'' of the softer spring, the other
+    with those of the stiffer spring.
     """
     angle, p = np.radians(_steady(soft).angle_deg[:-1]), table_3_1(soft).constants()
     motions = [slider_motion(soft), slider_motion(stiff)]
@@ -593,14 +609,17 @@ def by_position(soft: float, stiff: float) -> NDArray[np.float64]:
 
 
 def damper_torque(stiffness: float) -> NDArray[np.float64]:
-    """Return the crank torque over a steady turn that supplies the damper's power (N.m)."""
+    """Return the crank torque (N.m) over a steady turn that supplies the power lost in the damper."""
     return table_3_1(stiffness).slider_damping * slider_motion(stiffness)[1] ** 2 / (SPEED * RAD_S_PER_RPM)
 
 
 def apart_on_the_graph(
     x: NDArray[np.float64], one: NDArray[np.float64], other: NDArray[np.float64]
 ) -> NDArray[np.float64]:
-    """Return the distance of each point of ``one`` curve from the nearest point of the ``other``; both have period 1 in x."""
+    """Return the distance of each point of the curve ``one`` from the nearest point of the curve ``other``.
+
+    Both curves have the abscissas ``x`` and the period 1.
+    """
     points = x + 1j * one
     line = np.concatenate([(x[:-1] + shift) + 1j * other[:-1] for shift in (-1.0, 0.0, 1.0)])
     starts, steps = line[:-1], np.diff(line)
@@ -608,13 +627,16 @@ def apart_on_the_graph(
 
 
 def _least_distance(offsets: NDArray[np.complex128], steps: NDArray[np.complex128]) -> float:
-    """Return the distance of a point from the nearest of some segments, by its offsets from their starts and their steps."""
+    """Return the distance of a point from the nearest of several line segments.
+
+    ``offsets`` lead from the start of each segment to the point, ``steps`` from the start of each segment to its end.
+    """
     shares = np.clip((offsets * steps.conj()).real / np.abs(steps) ** 2, 0.0, 1.0)
     return float(np.abs(offsets - shares * steps).min())
 
 
 def torque_result() -> StudyResult:
-    """Compute the torque over the steady turn with each spring, and the crank angles at which it depends on the spring."""
+    """Compute the torque over the steady turn with each spring, and the crank angles at which the spring affects the torque."""
     turns = {k: _steady(k) for k in STIFFNESSES}
     angle, torque = turns[1e6].angle_deg, np.array([turn.torque for turn in turns.values()])
     peak = np.abs(torque[1]).max()
@@ -770,7 +792,7 @@ def torque_result() -> StudyResult:
 
 
 def draw_torque(result: StudyResult) -> Figure:
-    """Draw the three torques over a turn."""
+    """Draw the torque over a turn with each of the three springs."""
     panel = Panel(
         x_label="crank angle [deg]",
         y_label="crank torque [N m]",

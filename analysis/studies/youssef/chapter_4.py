@@ -1,8 +1,8 @@
-"""The figures of chapter IV: the slider's amplitude over the speed by the linearised equation, and its resonances.
+"""Figures of chapter IV: the amplitude of the slider over the speed by the linearised equation, and its resonances.
 
-The thesis balances two harmonics, eqs (4.30) to (4.35), of its equation (4.21). We do the same with the right coefficients
-and, for comparison, with the thesis's own, as printed and as listed, in the form of its appendix 2. Amplitudes are those of
-zeta = u/l4; the spring with m4 + m5 alone has omega_k = 31.623 rad/s.
+The thesis balances two harmonics, eqs (4.30) to (4.35), of its equation (4.21). We do the same with the correct coefficients
+and, for comparison, with the thesis's own, as printed and as listed in its program, all in the form of appendix 2. Amplitudes
+are those of zeta = u/l4. The spring with the mass m4 + m5 alone has the natural frequency omega_k = 31.623 rad/s.
 """
 
 from __future__ import annotations
@@ -58,9 +58,9 @@ everywhere; in truth it is so above 22 rad/s alone, and near half the natural fr
 of the free motion falls with the damper, by 5 mrad/s, but the peaks of the curves, which the figures show, rise."""
 
 OMEGA_K = sqrt(SQUARE_OF_OMEGA_K)
-#: Inertia ratios I4 whose resonances by appendix 2 are known.
+#: Inertia ratios I4 for which appendix 2 gives the resonance.
 INERTIA_RATIOS = (0.5, 1.0, 1.5)
-#: Variants that are compared, by their names in legends.
+#: Variants of the equation that are compared, with their names in legends.
 VARIANTS = {Variant.EXACT: "corrected", Variant.PRINTED: "(4.21) as printed", Variant.FORTRAN: "listing of appendix 2"}
 #: The speeds of appendix 2 (rad/s), closer at the resonances.
 SPEEDS = np.unique(
@@ -74,9 +74,10 @@ DAMPERS = tuple(0.2 * n for n in range(1, 7))
 COMPARED_AT = 0.45
 #: Order of the balance by which harmonics above the second are judged, and its speeds (rad/s).
 MANY, EVEN = 10, np.arange(9.0, 40.01, 0.02).round(2)
-#: Amplitude above which a speed is in the region of resonance, and distance (rad/s) from which it is outside: our choice.
+#: Amplitude above which a speed lies in the region of resonance, and distance (rad/s) from the peak beyond which it lies
+#: outside this region: our choice.
 LARGE, OUTSIDE = 0.1, 3.0
-#: Amplitudes below which a damper is taken to have eliminated the resonance.
+#: Amplitudes of the peak below which the resonance counts as eliminated by the damper.
 LEVELS = (0.05, 0.2, 0.5)
 #: Peaks of the first harmonic, relative to its amplitude `OUTSIDE` above them, to which a damper is to limit them.
 TIMES = (1.5, 2.0, 5.0)
@@ -88,14 +89,17 @@ DAMPED_RATIOS = (1.0, 0.5)
 
 @cache
 def equation(inertia_ratio: float, variant: Variant) -> SliderEquation:
-    """Return the linear equation at 1 rad/s: without gravity only its spring and its damper depend on the speed."""
+    """Return the slider's linear equation at 1 rad/s.
+
+    Without gravity only its spring and damper terms depend on the speed; `linear` sets them for other speeds.
+    """
     return slider_equation(chapter_4(inertia_ratio), 1.0, variant=variant, form=Form.RESONANCE)
 
 
 def linear(
     speed: float, inertia_ratio: float, omega_c: float = 0.0, variant: Variant = Variant.EXACT
 ) -> HarmonicMotion:
-    """Return the motion zeta at a speed (rad/s), with the thesis's two harmonics."""
+    """Return the periodic motion zeta at a crank speed (rad/s) by two harmonics, as in the thesis."""
     once = equation(inertia_ratio, variant)
     return two_harmonics(replace(once, spring=SQUARE_OF_OMEGA_K / speed**2, damping=omega_c / speed))
 
@@ -103,12 +107,12 @@ def linear(
 def harmonic(
     n: int, speeds: NDArray[np.float64], inertia_ratio: float, omega_c: float = 0.0, variant: Variant = Variant.EXACT
 ) -> NDArray[np.float64]:
-    """Return the amplitude of the n-th harmonic at each speed (rad/s)."""
+    """Return the amplitude of the n-th harmonic of zeta at each speed (rad/s)."""
     return np.array([linear(speed, inertia_ratio, omega_c, variant).harmonic(n) for speed in speeds.tolist()])
 
 
 def ten_harmonics(inertia_ratio: float) -> NDArray[np.float64]:
-    """Return the amplitudes of the harmonics 0 to `MANY` at the speeds `EVEN` with omega_c `COMPARED_AT`, a row a speed."""
+    """Return the amplitudes of harmonics 0 to `MANY`, one row for each speed of `EVEN`, at omega_c `COMPARED_AT`."""
     once = equation(inertia_ratio, Variant.EXACT)
     motions = (
         harmonic_balance(replace(once, spring=SQUARE_OF_OMEGA_K / speed**2, damping=COMPARED_AT / speed), MANY)
@@ -118,7 +122,7 @@ def ten_harmonics(inertia_ratio: float) -> NDArray[np.float64]:
 
 
 def peak(n: int, inertia_ratio: float, omega_c: float, variant: Variant = Variant.EXACT) -> tuple[float, float]:
-    """Return the speed (rad/s) near its resonance at which the n-th harmonic is greatest, and its amplitude there."""
+    """Return the peak of the n-th harmonic near its resonance: the speed (rad/s) and the amplitude."""
     middle = 0.5 * sum(resonance(chapter_4(inertia_ratio), variant=variant, harmonic=n))
     found = minimize_scalar(
         lambda speed: -linear(speed, inertia_ratio, omega_c, variant).harmonic(n),
@@ -133,13 +137,16 @@ def peak(n: int, inertia_ratio: float, omega_c: float, variant: Variant = Varian
 
 
 def deviation(inertia_ratio: float, variant: Variant = Variant.EXACT) -> float:
-    """Return the distance of the resonance, the lower root of the determinant, below omega_k (rad/s)."""
+    """Return how far the resonance lies below omega_k (rad/s); the resonance is the lower root of the determinant."""
     return OMEGA_K - resonance(chapter_4(inertia_ratio), variant=variant)[0]
 
 
 @cache
 def undamped_columns(n: int) -> dict[str, NDArray[np.float64]]:
-    """Return the n-th harmonic over the speed, for three I4 by the exact equation and for I4 = 1 by each variant."""
+    """Return the amplitude of the n-th harmonic over the speed without a damper, as columns by name.
+
+    The correct equation has three inertia ratios I4; the other variants have I4 = 1 only.
+    """
     columns = {"speed [rad/s]": SPEEDS}
     for ratio in INERTIA_RATIOS:
         for variant, name in VARIANTS.items():
@@ -149,7 +156,7 @@ def undamped_columns(n: int) -> dict[str, NDArray[np.float64]]:
 
 
 def growth(n: int) -> list[Case]:
-    """Judge whether amplitudes and the width of the resonance grow with I4."""
+    """Judge whether the amplitude of the n-th harmonic and the width of its resonance grow with I4."""
     columns, word = undamped_columns(n), ("first", "second")[n - 1]
     curves = [columns[f"I4 = {ratio:g}; corrected [1]"] for ratio in INERTIA_RATIOS]
     ratios = [np.min((larger / smaller)[APART]) for smaller, larger in pairwise(curves)]
@@ -167,7 +174,7 @@ def growth(n: int) -> list[Case]:
 
 
 def listed_cases() -> tuple[Case, ...]:
-    """Compare the listing with the right equation: roots of the determinant, greatest first and second harmonics."""
+    """Compare the equation of appendix 2 with the correct one: roots of the determinant, peaks of both harmonics."""
     cases = []
     for ratio in INERTIA_RATIOS:
         found = (resonance(chapter_4(ratio), variant=variant) for variant in (Variant.FORTRAN, Variant.EXACT))
@@ -260,7 +267,7 @@ def compute_first() -> StudyResult:
 
 
 def compute_second() -> StudyResult:
-    """Compute Fig 4.4: the second harmonic, and its size beside the first."""
+    """Compute Fig 4.4: the second harmonic, and its size relative to the first."""
     columns = undamped_columns(2)
     shares = np.max([columns[f"I4 = {r:g}; corrected [1]"] / harmonic(1, SPEEDS, r) for r in INERTIA_RATIOS], axis=0)
     last = SPEEDS[shares > SMALL].max()
@@ -326,7 +333,7 @@ def compute_second() -> StudyResult:
 
 
 def draw_undamped(result: StudyResult, n: int) -> Figure:
-    """Draw the three inertia ratios, and the variants close to the resonance."""
+    """Draw the n-th harmonic over the speed for three inertia ratios, and the variants close to the resonance."""
     c, word = result.columns, ("first", "second")[n - 1]
     three = {f"I4 = {ratio:g}": c[f"I4 = {ratio:g}; corrected [1]"] for ratio in INERTIA_RATIOS}
     variants = {name: c[f"I4 = 1; {name} [1]"] for name in VARIANTS.values()}
@@ -356,7 +363,7 @@ RATIOS = np.arange(0.0, 2.01, 0.25)
 
 
 def compute_deviation() -> StudyResult:
-    """Compute Fig 4.5: the distance of the resonance below omega_k."""
+    """Compute Fig 4.5: how far the resonance lies below omega_k."""
     columns = {"inertia ratio I4 [1]": RATIOS}
     for variant, name in VARIANTS.items():
         columns[f"omega_k less resonance; {name} [rad/s]"] = np.array(
@@ -399,7 +406,7 @@ def compute_deviation() -> StudyResult:
 
 
 def draw_deviation(result: StudyResult) -> Figure:
-    """Draw the deviation by each variant."""
+    """Draw the deviation of the resonance from omega_k over I4 by each variant of the equation."""
     names = (name for name in result.columns if name.startswith("omega_k"))
     curves = [
         Curve(x=RATIOS, y=result.columns[column], label=name, line=line)
@@ -423,7 +430,7 @@ STRONGEST = DAMPERS[-1]
 
 
 def free_frequency(inertia_ratio: float, omega_c: float) -> float:
-    """Return the frequency of the free motion (rad/s), from the Floquet multipliers at 20 rad/s."""
+    """Return the frequency of the free motion (rad/s), from the Floquet multipliers at a crank speed of 20 rad/s."""
     speed = 20.0
     found = slider_equation(chapter_4(inertia_ratio, omega_c), speed)
     multiplier = hill_multipliers(found.homogeneous().stiffened(found.spring))[0]
@@ -433,7 +440,7 @@ def free_frequency(inertia_ratio: float, omega_c: float) -> float:
 
 
 def eliminating(inertia_ratio: float, amplitude: float) -> float:
-    """Find the omega_c (1/s) that limits the peak of the first harmonic to an amplitude."""
+    """Find the damper omega_c (1/s) with which the peak of the first harmonic has a given amplitude."""
     return float(brentq(lambda d: peak(1, inertia_ratio, d)[1] - amplitude, 0.1, 10.0, xtol=1e-6))
 
 
@@ -448,7 +455,10 @@ def flattening(inertia_ratio: float, times: float) -> float:
 
 
 def one_mass(inertia_ratio: float, omega_c: float) -> NDArray[np.float64]:
-    """Return the first harmonic at the speeds `CLOSE` of a single mass on a spring, with the means of M and K alone."""
+    """Return the amplitude of a single mass on a spring at the speeds `CLOSE`, under the first harmonic of the force.
+
+    The mass and the spring follow from the mean values of M and K.
+    """
     found = equation(inertia_ratio, Variant.EXACT)
     stiffness = SQUARE_OF_OMEGA_K / CLOSE**2 + found.stiffness.mean - found.mass.mean
     amplitude: NDArray[np.float64] = found.force.amplitudes[1] / np.abs(stiffness + 1j * omega_c / CLOSE)
@@ -456,14 +466,14 @@ def one_mass(inertia_ratio: float, omega_c: float) -> NDArray[np.float64]:
 
 
 def from_one_mass(inertia_ratio: float, omega_c: float) -> float:
-    """Return the greatest distance of the first harmonic from that of a single mass, relative to its peak."""
+    """Return the greatest difference between the first harmonic and the amplitude of `one_mass`, relative to the peak."""
     near_peak = harmonic(1, CLOSE, inertia_ratio, omega_c)
     return float(np.abs(near_peak - one_mass(inertia_ratio, omega_c)).max() / peak(1, inertia_ratio, omega_c)[1])
 
 
 @cache
 def damped(inertia_ratio: float) -> dict[str, float]:
-    """Return the measures, by name, by which `_curves` and `_dampers` judge the dampers at an I4."""
+    """Return the effects of the dampers at an inertia ratio, by name; `_curves` and `_dampers` judge these effects."""
     weak, strong = (harmonic(1, SPEEDS, inertia_ratio, d) for d in (DAMPERS[0], STRONGEST))
     (at, height), (at_strong, _) = (peak(1, inertia_ratio, d) for d in (DAMPERS[0], STRONGEST))
     outside = np.abs(SPEEDS - at) > OUTSIDE
@@ -480,7 +490,7 @@ def damped(inertia_ratio: float) -> dict[str, float]:
 
 
 def compute_damped(number: str, inertia_ratio: float) -> StudyResult:
-    """Compute Fig 4.6 or 4.7: the first harmonic with the dampers of the listing."""
+    """Compute Fig 4.6 or 4.7: the first harmonic with the dampers of the program in appendix 2."""
     columns = {"speed [rad/s]": CLOSE}
     for omega_c in (0.0, *DAMPERS):
         columns[f"omega_c = {omega_c:g} 1/s; corrected [1]"] = harmonic(1, CLOSE, inertia_ratio, omega_c)
@@ -575,7 +585,7 @@ def _dampers() -> tuple[Statement, ...]:
 
 
 def draw_damped(result: StudyResult) -> Figure:
-    """Draw all dampers by the exact equation, and the strongest by each variant and the plant."""
+    """Draw the first harmonic: with each damper by the correct equation, with the strongest also by variants and plant."""
     c = result.columns
     dampers = [Curve(x=CLOSE, y=c[f"omega_c = {d:g} 1/s; corrected [1]"], label=f"{d:g}") for d in DAMPERS]
     strongest = [

@@ -1,10 +1,10 @@
-"""The figures of chapter V: the first region of instability, without damping and with it.
+"""Figures of chapter V: the first region of instability, without damping and with it.
 
-The slider's motion doubles its period near lambda_k^2 = k/((m4 + m5) omega^2) = k0/4, where the crank runs at about twice the
-natural frequency. The thesis takes the stability about zeta = 0, which is no solution, by its equation (4.21), which lacks
-M' zeta'. We take the stability of the true periodic orbit and compare it with the corrected linear equation, by Hill's
-determinant, and with the thesis's own coefficients, as printed, by (5.16), and as appendix 3 evaluates them. The axis A of a
-region is omega/omega_k in its middle.
+The slider's motion doubles its period near lambda_k^2 = k/((m4 + m5) omega^2) = k0/4, where the crank turns at about twice the
+natural frequency. The thesis analyses the stability about zeta = 0, which is no solution of its equation (4.21); this equation
+lacks the term M' zeta'. We analyse the stability of the true periodic orbit. We compare it with the corrected linear equation,
+by Hill's determinant, and with the thesis's own coefficients: as printed, by (5.16), and as appendix 3 evaluates them. The axis
+A of a region is omega/omega_k in its middle.
 """
 
 from __future__ import annotations
@@ -71,7 +71,7 @@ damper only slows it."""
 STATED = 0.45
 #: Inertia ratios of appendix 3 whose regions are compared.
 COMPARED = (0.5, 1.0, 1.5)
-#: Names of ways in the tables.
+#: Names of the methods in the tables.
 NAMES = {"linear equation": "linear equation", "true orbit": "true motion"}
 
 # Figures 5.1 to 5.3
@@ -79,9 +79,11 @@ NAMES = {"linear equation": "linear equation", "true orbit": "true motion"}
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Sweep:
-    """First region over a parameter: symbol and values, mechanism at a value, and the function that judges the statements.
+    """Figure of the first region of instability over a parameter of the mechanism.
 
-    ``further`` has other mechanisms, of which the true orbit alone is computed, by their names.
+    ``symbol`` is the parameter's symbol, ``values`` are its values. ``mechanism`` builds the mechanism at a value, and
+    ``judge`` judges the statements. ``further`` maps names to other mechanisms, for which only the region of the true orbit
+    is computed.
     """
 
     number: str
@@ -97,7 +99,7 @@ class Sweep:
 
 @cache
 def regions(name: str) -> dict[str, list[Region]]:
-    """Return the regions of a sweep by method, and the regions of the true orbit of its further mechanisms."""
+    """Return the regions along a sweep, a list for each method and for each of the further mechanisms, by name."""
     sweep = SWEEPS[name]
     found = {way: [of(sweep.mechanism(x)) for x in sweep.values] for way, of in WAYS.items()}
     for way, mechanism in (sweep.further or {}).items():
@@ -106,17 +108,17 @@ def regions(name: str) -> dict[str, list[Region]]:
 
 
 def widths(found: Iterable[Region]) -> NDArray[np.float64]:
-    """Return the widths of regions in lambda_k^2."""
+    """Return the widths of the regions in lambda_k^2."""
     return np.array([region.width for region in found])
 
 
 def axes(found: Iterable[Region]) -> NDArray[np.float64]:
-    """Return the axis A of each region."""
+    """Return the axes A of the regions."""
     return np.array([axis(region) for region in found])
 
 
 def compute_sweep(number: str) -> StudyResult:
-    """Compute the regions over a parameter."""
+    """Compute the first region of instability over the parameter of a sweep, by all methods."""
     sweep, found = SWEEPS[number], regions(number)
     columns = {f"{sweep.symbol} [1]": np.array(sweep.values)}
     for way, these in found.items():
@@ -132,7 +134,7 @@ def compute_sweep(number: str) -> StudyResult:
 
 
 def draw_sweep(result: StudyResult) -> Figure:
-    """Draw the regions and their widths."""
+    """Draw the regions over the parameter of a sweep, and their widths."""
     c, sweep = result.columns, SWEEPS[result.number]
     values = c[f"{sweep.symbol} [1]"]
     edges, sizes = [], []
@@ -161,7 +163,7 @@ def draw_sweep(result: StudyResult) -> Figure:
 
 
 def judge_inertia(found: Mapping[str, Sequence[Region]]) -> tuple[Statement, ...]:
-    """Judge Fig 5.1 and the formulas behind it."""
+    """Judge the statements on Fig 5.1 and on the formulas behind it."""
     true, ratios = found["true orbit"], np.array(SWEEPS["5.1"].values)
     middles = np.array([0.5 * (region.low + region.high) for region in true]) - 0.25
     bent = np.abs(middles - middles[-1] / ratios[-1] * ratios).max() / middles[-1]
@@ -239,7 +241,10 @@ def judge_inertia(found: Mapping[str, Sequence[Region]]) -> tuple[Statement, ...
 
 
 def to_the_letter(given: SliderEquation) -> tuple[tuple[float, float], ...]:
-    """Return pairs of boundaries: the zeroth, by (5.13), twice, and those of regions 1 and 2 by (5.16) and (5.26); h0 = 0."""
+    """Return the boundaries (low, high) in lambda_k^2 of regions 0 to 2 by (5.13), (5.16) and (5.26), with h0 = 0.
+
+    Region 0 is the zeroth boundary, given twice.
+    """
     s, k = given.spring_factor, given.stiffness.to_order(2)
 
     def amplitudes(n: int, at: float) -> tuple[float, float]:
@@ -255,7 +260,7 @@ def to_the_letter(given: SliderEquation) -> tuple[tuple[float, float], ...]:
 
 
 def zeroth_boundary() -> tuple[Case, ...]:
-    """Count the boundaries near lambda_k^2 = 0, and take the multipliers on both sides of the zeroth."""
+    """Judge the number of boundaries near lambda_k^2 = 0, and the multipliers on both sides of the zeroth boundary."""
     counts: list[int] = []
     sides: dict[float, list[float]] = {1.5: [], 0.5: []}
     for ratio in COMPARED:
@@ -272,7 +277,7 @@ def zeroth_boundary() -> tuple[Case, ...]:
 
 
 def formulas() -> tuple[Case, ...]:
-    """Compare the formulas of the perturbation with Hill's determinant, greatest error of the I4 `COMPARED`."""
+    """Judge the perturbation formulas by Hill's determinant: their greatest errors for the inertia ratios `COMPARED`."""
     errors: dict[str, list[float]] = {}
     for ratio in COMPARED:
         given = slider_equation(chapter_4(ratio), 1.0, variant=Variant.PRINTED, form=Form.SERIES)
@@ -287,13 +292,16 @@ def formulas() -> tuple[Case, ...]:
 
 
 def widest_by_inertia() -> dict[float, float]:
-    """Return the greatest width in Fig 5.1 by limit of I4: 1.5, as in Fig 5.4, and 2, since the text gives no range."""
+    """Return the greatest width (in lambda_k^2) of the regions of Fig 5.1, for two upper limits of I4.
+
+    The limits are the keys: 1.5, as in Fig 5.4, and 2. The text does not say which range it means.
+    """
     found = widths(regions("5.1")["true orbit"])
     return {most: float(found[np.array(SWEEPS["5.1"].values) <= most].max()) for most in (1.5, 2.0)}
 
 
 def judge_crank(found: Mapping[str, Sequence[Region]]) -> tuple[Statement, ...]:
-    """Judge Fig 5.2."""
+    """Judge the statements on Fig 5.2."""
     true = found["true orbit"]
     ends = [[axis(of(with_crank(s, 0.5))) for s in (0.01, 0.1)] for of in (right, appendix_3)]
     over = {most: widths(true).max() / x for most, x in widest_by_inertia().items()}
@@ -342,14 +350,14 @@ def judge_crank(found: Mapping[str, Sequence[Region]]) -> tuple[Statement, ...]:
 
 
 def held(sigma3: float, inertia_ratio: float = 2.0) -> FiveBarParameters:
-    """Return the mechanism with another coupler and the thesis's angles; ground link and guide direction follow from them."""
+    """Return the mechanism with sigma3 = l3/l4 and the thesis's link angles; its ground link and guide direction follow."""
     mechanism = closed(sigma3, inertia_ratio)
     ground = rect(mechanism.coupler_length, pi / 3.0) - rect(mechanism.rocker_length, 2.0 * pi / 3.0)
     return replace(mechanism, ground_length=abs(ground), slider_guide_angle=-phase(ground))
 
 
 def closed(sigma3: float, inertia_ratio: float = 2.0) -> FiveBarParameters:
-    """Return the mechanism with another coupler, sigma3 = l3/l4, and the same ground link."""
+    """Return the mechanism with another coupler length, sigma3 = l3/l4, and an unchanged ground link."""
     mechanism = chapter_4(inertia_ratio)
     return replace(mechanism, coupler_length=sigma3 * mechanism.rocker_length)
 
@@ -359,7 +367,7 @@ SAME_GROUND = "true orbit on the same ground link"
 
 
 def judge_coupler(found: Mapping[str, Sequence[Region]]) -> tuple[Statement, ...]:
-    """Judge Fig 5.3, with constant angles as in the thesis, and with a constant ground link."""
+    """Judge the statements on Fig 5.3, with constant angles as in the thesis, and with a constant ground link."""
     widest = float(widths(found["true orbit"]).max())
     over_crank = widest / float(widths(regions("5.2")["true orbit"]).max())
     over_inertia = " and ".join(f"{widest / x:.2f} up to I4 = {most:g}" for most, x in widest_by_inertia().items())
@@ -491,7 +499,7 @@ SWEEPS = {
 BOX = Box(x=(0.25, 0.29), y=(0.25, 2.0))
 DAMPERS = (0.0, 0.05, 0.1, 0.15)
 RANGE = (0.0, 1.2)
-#: Crank angles at which coefficients are divided, and harmonics of the quotients that are kept where all count.
+#: Crank angles at which the coefficients are divided, and number of harmonics that represents the quotients fully.
 ANGLES = np.linspace(0.0, 2.0 * pi, 256, endpoint=False)
 ALL_HARMONICS = 64
 #: Harmonics of the coefficients in (4.29) and in the listing of appendix 4.
@@ -507,7 +515,7 @@ MOTIONS: Mapping[str, Callable[[Plane, int], Test]] = {
 
 
 def with_damping(omega_c: float) -> Plane:
-    """Return a function that gives mechanism and drive at a lambda_k^2 and an I4, with a damper omega_c (1/s)."""
+    """Return a function of lambda_k^2 and I4 that returns the mechanism and its drive, with a damper omega_c (1/s)."""
 
     def operation(lambda_k2: float, inertia_ratio: float) -> Operation:
         return chapter_4(inertia_ratio, omega_c), Drive(speed=crank_speed(lambda_k2))
@@ -517,13 +525,13 @@ def with_damping(omega_c: float) -> Plane:
 
 @cache
 def damped_region(omega_c: float) -> Chart:
-    """Return the chart of the first region's boundaries in lambda_k^2 and I4, with a damper omega_c (1/s)."""
+    """Return the chart of the first region over lambda_k^2 and I4, with a damper omega_c (1/s)."""
     return chart(orbit_test(with_damping(omega_c), -1), BOX, lines=(0, 4), samples=100)
 
 
 @cache
 def removing(motion: str, inertia_ratio: float) -> RemovingDamping:
-    """Find the damper omega_c (1/s) that removes the first region of one of the `MOTIONS` at an I4."""
+    """Find the damper omega_c (1/s) that removes the first region at an inertia ratio, by one of the `MOTIONS`."""
 
     def test(lambda_k2: float, omega_c: float) -> float:
         return MOTIONS[motion](with_damping(omega_c), -1)(lambda_k2, inertia_ratio)
@@ -532,20 +540,23 @@ def removing(motion: str, inertia_ratio: float) -> RemovingDamping:
 
 
 def region_width(found: Chart, value: float) -> float:
-    """Return the width of a chart's region in lambda_k^2 at an I4, zero if there is no region."""
+    """Return the width in lambda_k^2 of the region in a chart at I4 = ``value``, zero if there is no region."""
     roots = found.scan_line(value, samples=100).roots
     return float(np.ptp(roots)) if len(roots) else 0.0
 
 
 def divided(found: PeriodicEquation, harmonics: int) -> PeriodicEquation:
-    """Return an equation divided by its mass, the form (5.27), with coefficients cut after the given number of harmonics."""
+    """Return an equation divided by its mass, as in (5.27), with the given number of harmonics kept in the quotients."""
     mass = found.a(ANGLES)
     b, c, factor = (FourierSeries.from_samples(x(ANGLES) / mass, harmonics) for x in (found.b, found.c, found.factor))
     return PeriodicEquation(a=FourierSeries.constant(1.0), b=b, c=c, factor=factor)
 
 
 def without_factor(inertia_ratio: float, lambda_c: float) -> PeriodicEquation:
-    """Return the equation (5.29) of chi, zeta without its factor exp(-1/2 int psi1), from the right linear equation."""
+    """Return the equation (5.29) of chi, derived from the correct linear equation.
+
+    Here zeta is chi times the factor exp(-1/2 int psi1).
+    """
     found = replace(slider_equation(chapter_4(inertia_ratio), crank_speed(0.25)), damping=lambda_c)
     whole = divided(found.homogeneous(), ALL_HARMONICS)
     psi1, psi2 = whole.b, whole.c
@@ -554,7 +565,10 @@ def without_factor(inertia_ratio: float, lambda_c: float) -> PeriodicEquation:
 
 
 def shifts() -> tuple[Case, ...]:
-    """Judge shift and width of the regions 1 to 4 of (5.30) with the stated damper, each at the I4 where it fits least."""
+    """Judge how a damper shifts regions 1 to 4 of (5.30) and changes their widths.
+
+    The damper is the one that the thesis states; each result is that of the I4 with the worst agreement.
+    """
     found: dict[str, list[float]] = {}
     for ratio in COMPARED:
         for n, free in hill_regions(without_factor(ratio, 0.0), 4).items():
@@ -577,13 +591,16 @@ def shifts() -> tuple[Case, ...]:
 
 
 def narrowing(charts: Mapping[float, Chart], inertia_ratio: float) -> float:
-    """Return the greatest growth of the region's width from one damper to the next, as far as there is a region."""
+    """Return the greatest change of the region's width from one damper to the next, negative if each change narrows the region.
+
+    Changes from a damper without a region do not count.
+    """
     at = np.array([region_width(found, inertia_ratio) for found in charts.values()])
     return float(np.diff(at)[at[:-1] > 0.0].max())
 
 
 def outside(omega_c: float) -> float:
-    """Return the greatest real part s1 of Lambda (5.32) outside the first region, with a damper, of the I4 `COMPARED`."""
+    """Return the greatest real part s1 of Lambda (5.32) outside the first region, for the I4 `COMPARED` and a damper (1/s)."""
     exponents = []
     for ratio in COMPARED:
         mechanism, region = chapter_4(ratio, omega_c), hill(chapter_4(ratio))
@@ -595,17 +612,18 @@ def outside(omega_c: float) -> float:
 
 
 def nine_terms(found: PeriodicEquation) -> dict[int, Region]:
-    """Return regions 1 to 4 by nine terms of the determinant; of a complex pair of boundaries the real parts are taken."""
-    # the first of the multiplier 1 is the zeroth boundary
+    """Return regions 1 to 4 by nine terms of the determinant; complex boundaries are replaced by their real parts."""
+    # the first boundary with the multiplier 1 is the zeroth
     even, odd = (boundary_stiffnesses(found, m, count=c, order=2).real for m, c in ((1, 5), (-1, 4)))
     ends = np.append(odd, even[1:]).reshape(4, 2).tolist()
     return {n: Region(number=n, low=low, high=high) for n, (low, high) in zip((1, 3, 2, 4), ends)}
 
 
 def cut_errors(*, harmonics: int, terms: Callable[[PeriodicEquation], Mapping[int, Region]]) -> dict[int, float]:
-    """Return the greater error of each region's boundaries, relative to its width, by the divided equation at I4 = 1.
+    """Return the boundary errors of regions 1 to 4 by the divided equation at I4 = 1, relative to the regions' widths.
 
-    ``harmonics`` are kept in the divided equation; ``terms`` computes its regions.
+    ``harmonics`` are kept in the divided equation; ``terms`` computes its regions. Each error is the greater of the region's
+    two boundaries.
     """
     found = equation(chapter_4(1.0))
     cut = terms(divided(found, harmonics))
@@ -616,7 +634,7 @@ def cut_errors(*, harmonics: int, terms: Callable[[PeriodicEquation], Mapping[in
 
 
 def damped_statements(charts: Mapping[float, Chart]) -> tuple[Statement, ...]:
-    """Judge the statements on the regions, given their charts by damper omega_c (1/s)."""
+    """Judge the statements on the regions with damping, given their charts by omega_c (1/s)."""
     tips = [float(found.boundaries[0].points[:, 1].min()) for d, found in charts.items() if d > 0.0]
     worst = {motion: max(removing(motion, x).damping for x in RATIOS.tolist() if x <= 1.5) for motion in MOTIONS}
     mechanisms = [chapter_4(x) for x in COMPARED]
@@ -779,7 +797,7 @@ def damped_statements(charts: Mapping[float, Chart]) -> tuple[Statement, ...]:
 
 
 def compute_damped() -> StudyResult:
-    """Compute the boundaries of the first region of instability at each damper, and the damper that removes it for each I4."""
+    """Compute the boundaries of the first region with each damper, and the damper that removes the region at each I4."""
     charts = {omega_c: damped_region(omega_c) for omega_c in DAMPERS}
     columns = {"I4 [1]": RATIOS}
     for motion in MOTIONS:
@@ -799,7 +817,7 @@ def compute_damped() -> StudyResult:
 
 
 def draw_damped(result: StudyResult) -> Figure:
-    """Draw the regions at each damper, and the removing damper over I4."""
+    """Draw the first region with each damper, and the damper that removes it over I4."""
     c = result.columns
     boundaries = []
     for colour, omega_c in zip(COLOURS, DAMPERS):

@@ -1,7 +1,7 @@
-"""The figures of chapter VI: four-bars for an ellipse and for a rocker function, as printed and ours.
+"""Figures of chapter VI: four-bars for ellipses, rocker functions and paths, as printed and ours.
 
-The thesis prints a linkage and its error for each problem. Most of these linkages do not have the printed error, three come
-near it only once a misprint is mended, and within our limits there are far better linkages: the thesis's downhill simplex did
+The thesis prints a linkage and its error for each problem. Most of these linkages do not have the printed error, and three come
+near it only if a misprint is mended. Within our limits there are far better linkages: the thesis's downhill simplex did
 not find the optimum. The error of the ellipses goes to zero as the links grow, so our links are no longer than the longest
 printed link. Lengths and errors are in the units of print, cm and degrees. Fig 6.11 is in
 `analysis.studies.youssef.packaging`.
@@ -73,21 +73,24 @@ no solution: the longer the links, the smaller the error. With exact derivatives
 
 FloatArray = NDArray[np.float64]
 
-#: Least transmission angle of our linkages (deg).
+#: Lower bound on the transmission angle of our linkages (deg).
 TRANSMISSION = 40.0
-#: Longer semi-axis of ellipse (a) (cm), and what becomes of its curve if a digit is misprinted.
+#: Longer semi-axis of ellipse (a) (cm), and words for a curve that a misprinted digit puts beside the ellipse.
 LONGER_CM, BESIDE = 10.0, "the curve lies beside the ellipse"
 #: A small search is enough: nearly every start of these problems ends at the same optimum.
 SEARCH = Search(starts=4, candidates=1 << 14)
-#: Colours of target, printed and our linkage.
+#: Colours of the target, the printed linkage and our linkage.
 TARGET, PRINTED, FOUND = "0.25", COLOURS[1], COLOURS[0]
 COLOURED = (PRINTED, FOUND, COLOURS[2])
-#: Least transmission angles of the trade-off (deg).
+#: Bounds on the transmission angle (deg) for which the least error is computed.
 ANGLES = (0.0, 20.0, 30.0, 35.0, 40.0, 45.0, 50.0, 55.0, 60.0)
 
 
 class Row(NamedTuple):
-    """Figure of chapter VI: problem, claim, statements (or the figure ``see`` that has them), reading of illegible places."""
+    """Figure of chapter VI: its problem, claim, statements, and how we read illegible places.
+
+    ``see`` is the number of the figure that has the statements, if they are not given here.
+    """
 
     problem: str
     claim: str
@@ -109,20 +112,20 @@ def printed_error(name: str) -> float:
 
 
 def share_of_stated(name: str) -> float:
-    """Return the error of the printed linkage divided by the stated error, in the reading that brings it nearest to 1."""
+    """Return the printed linkage's error divided by the stated error, for the reading that brings this ratio nearest to 1."""
     p = PROBLEMS[name]
     assert p.error is not None
     return min((error / p.error for error in by_readings(name, p.linkage).values()), key=lambda share: abs(share - 1.0))
 
 
 def our_error(name: str) -> float:
-    """Return the error of our linkage (unit of print)."""
+    """Return the error of our best linkage for a problem (unit of print)."""
     return PROBLEMS[name].convert(best(name).error)
 
 
 # Statements
 
-#: Tolerance of a printed error.
+#: Tolerance of a printed error, in words.
 HALF = "half a unit of the last digit"
 #: What is judged of a printed linkage, and what the errors of both rocker functions are taken to be.
 ROUNDED = "the nearest to the stated one that rounding each printed number of the linkage up or down gives"
@@ -138,7 +141,10 @@ NUMBERS = tuple(n for n in range(18, 361) if 720 % n == 0)
 
 
 def by_readings(name: str, linkage: Linkage) -> dict[str, float]:
-    """Return the error of a linkage (unit of print) by reading of the text; only the rocker functions have several readings."""
+    """Return the error of a linkage (unit of print) for each reading of the text.
+
+    Only the rocker functions have more than one reading.
+    """
     if not isinstance(PROBLEMS[name].task, RockerFunction):
         return {"": PROBLEMS[name].linkage_error(linkage)}
     found: dict[str, float] = {}
@@ -162,14 +168,14 @@ def by_readings(name: str, linkage: Linkage) -> dict[str, float]:
 
 
 def half_units(linkage: Linkage) -> FloatArray:
-    """Return half a unit of the last digit of each number of a linkage (m, rad), 0 for a number that is not printed."""
+    """Return half a unit of the last printed digit of each dimension of a linkage (m, rad), 0 if it is not printed."""
     si = np.array([1.0 / CM_PER_METRE] * 7 + [radians(1.0)] * 3)
     digits = (Decimal(repr(round(float(x), 6))) for x in linkage.vector / si)
     return si * [0.5 * 10.0 ** int(x.as_tuple().exponent) if x else 0.0 for x in digits]
 
 
 def rounded(name: str) -> dict[str, tuple[float, float]]:
-    """Return, for each reading of the text, the range of a printed linkage's error within its rounding."""
+    """Return the least and the greatest error of a printed linkage within its rounding, for each reading of the text."""
     p = PROBLEMS[name]
     off = half_units(p.linkage)
     if isinstance(p.task, UntimedPath):
@@ -182,7 +188,7 @@ def rounded(name: str) -> dict[str, tuple[float, float]]:
 
 
 def as_stated(label: str, stated: str, name: str, why: str = "no rounding gives it") -> Case:
-    """Judge whether a stated error is in the range that `rounded` gives, in the reading that comes nearest to it."""
+    """Judge whether a stated error lies in one of the ranges of `rounded`; the range that comes nearest to the error counts."""
     ranges, wanted = rounded(name), float(stated)
     near_by = {reading: float(np.clip(wanted, *span)) for reading, span in ranges.items()}
     reading = min(near_by, key=lambda r: abs(near_by[r] - wanted))
@@ -197,7 +203,7 @@ def as_stated(label: str, stated: str, name: str, why: str = "no rounding gives 
 
 
 def best_known(*names: str) -> str:
-    """Return words on the least errors that we find within our limits, for the reason of a verdict."""
+    """Return words on the least errors that we find within our limits, as part of the reason for a verdict."""
     found = " and ".join(f"{our_error(name):.2f}" for name in names)
     return f"the least that we find within our limits, see the head, is {found} {PROBLEMS[names[0]].unit}"
 
@@ -245,7 +251,7 @@ def _bounded() -> tuple[Statement, ...]:
     by_closures = [p.linkage_error(replace(p.printed, branch=branch)) for branch in (1, -1)]
 
     def outside(linkage: Linkage) -> int:
-        """Return how many of l1 to l4 are out of the printed bounds."""
+        """Return how many of l1 to l4 are outside the printed bounds."""
         return sum(not p.bounds[name][0] <= linkage.values()[name] <= p.bounds[name][1] for name in LINKS)
 
     return (
@@ -307,7 +313,10 @@ def _rocker() -> tuple[Statement, ...]:
 
 
 def straight_error() -> float:
-    """Return the rms distance (mm) of our best linkage from 13 points of a line of 100 mm, passed within 60 degrees."""
+    """Return the rms distance (mm) of our best linkage's curve from 13 points on a straight line of 100 mm.
+
+    The points are passed within 60 degrees of crank rotation.
+    """
     points = ellipse(10.0, N)
     points[:13] = np.column_stack([np.linspace(0.30, 0.20, 13), np.full(13, 0.10)])
     weights = np.where(np.arange(N) < 13, 1.0, 0.0)
@@ -397,7 +406,10 @@ def _paths() -> tuple[Statement, ...]:
 
 
 def over_least() -> dict[str, float]:
-    """Return the error of each figure's printed linkage, mended, divided by the least that we find with no longer link."""
+    """Return the ratio of the printed linkage's error to ours for each figure.
+
+    The printed linkage has its misprint mended; ours has no link longer than the longest printed link.
+    """
     return {f"Fig {n}": printed_error(row.problem) / our_error(row.problem) for n, row in TABLE.items()}
 
 
@@ -444,13 +456,13 @@ TABLE = {
 
 
 def pairing_area(desired: FloatArray, actual: FloatArray, *, window: float) -> float:
-    """Return the thesis's quality function of path generation (section 6.4.1, listing at L9797), an area.
+    """Return the thesis's quality function of path generation, an area (section 6.4.1, listing at L9797).
 
-    The first desired point is paired with the nearest actual point, each following one with the nearest of a number of actual
-    points from its predecessor's partner on: ``window`` times the number of actual points per desired point. If there are as
-    many actual points as desired ones, they are paired in order, because the program leaves no point without a partner
-    (L9894-9898). Each two successive pairs span two triangles, whose areas are added up; of the two senses of rotation the one
-    with the lesser area is taken.
+    The first desired point is paired with the nearest actual point. Each following desired point is paired with the nearest of
+    the actual points that follow the previous partner; their number is ``window`` times the actual points per desired point.
+    If there are as many actual points as desired ones, they are paired in order, because the program leaves no point without a
+    partner (L9894-9898). Two successive pairs span two triangles, whose areas are added up. The lesser result of the two
+    senses of rotation is returned.
     """
     span = int(window * len(actual) / len(desired))
     areas = []
@@ -467,7 +479,7 @@ def pairing_area(desired: FloatArray, actual: FloatArray, *, window: float) -> f
 
 
 def path_columns(name: str) -> dict[str, FloatArray]:
-    """Return target, coupler curves, linkages with their ground links, and distances from the target (cm)."""
+    """Return target, coupler curves, linkages with ground links, and distances from the target (cm), as columns by name."""
     p = PROBLEMS[name]
     stations = normal_form(p.task).places
     shapes = {"target": CM_PER_METRE * np.column_stack([stations.real, stations.imag])}
@@ -486,12 +498,12 @@ def path_columns(name: str) -> dict[str, FloatArray]:
 
 
 def shape_curve(result: StudyResult, shape: str, **look: str | float | None) -> Curve:
-    """Return a shape of `path_columns` as a curve."""
+    """Return a target, coupler curve or linkage from `path_columns` as a curve to be drawn."""
     return Curve(x=result.columns[f"{shape} x [cm]"], y=result.columns[f"{shape} y [cm]"], **look)  # type: ignore[arg-type]
 
 
 def curves_panel(result: StudyResult, *more: Curve, marks: bool) -> Panel:
-    """Build the panel of target and coupler curves; the target is drawn as marks or as a wide line."""
+    """Build the panel with the target and the coupler curves; ``marks`` draws the target as marks instead of a wide line."""
     x, y = (result.columns[f"target {axis} [cm]"] for axis in "xy")
     x, y = (np.append(v[np.isfinite(v)], v[0]) for v in (x, y))
     look = {"colour": TARGET, "line": "", "marker": "."} if marks else {"colour": "0.8", "width": 5.0}
@@ -511,7 +523,7 @@ def curves_panel(result: StudyResult, *more: Curve, marks: bool) -> Panel:
 
 
 def linkages_panel(result: StudyResult) -> Panel:
-    """Build the panel of both linkages to scale, in the colours of `curves_panel`."""
+    """Build the panel with the printed linkage and ours, to scale, in the colours of `curves_panel`."""
     parts: dict[str, dict[str, str | float]] = {
         "links": {"marker": ".", "width": 1.6},
         "ground": {"line": ":", "width": 1.2},
@@ -527,7 +539,10 @@ def linkages_panel(result: StudyResult) -> Panel:
 
 
 def draw_path(result: StudyResult, *, timed: bool) -> Figure:
-    """Draw target and both curves, their distances over the crank's rotation or along the target, and the linkages."""
+    """Draw the target with both coupler curves, their distances from the target, and the linkages.
+
+    The distances are drawn over the crank rotation if the path is timed, otherwise along the target.
+    """
     place = result.columns["place on the target [deg]"]
     distances = Panel(
         x_label="crank rotation [deg]" if timed else "place on the ellipse, its parameter [deg]",
@@ -549,7 +564,10 @@ def draw_path(result: StudyResult, *, timed: bool) -> Figure:
 
 
 def window_sums(linkage: Linkage) -> tuple[float, float]:
-    """Return the sums of the squared errors inside and outside the weighted window, at 72 crank angles (deg2)."""
+    """Return the sums (deg2) of the squared errors of the rocker function inside and outside the weighted window.
+
+    They are taken at 72 crank angles.
+    """
     task = rocker_function(N, weighted=True)
     within, squares = np.asarray(task.weights) > 1.0, DEG2_PER_RAD2 * evaluate(task, linkage).errors ** 2
     return float(squares[within].sum()), float(squares[~within].sum())
@@ -557,14 +575,18 @@ def window_sums(linkage: Linkage) -> tuple[float, float]:
 
 @cache
 def mounted() -> Solution:
-    """Return our linkage for the weighted rocker function with the output mounted on the rocker at a free angle."""
+    """Return our linkage for the weighted rocker function if the output may be mounted on the rocker at any angle."""
     p = PROBLEMS["rocker-weighted"]
     task = rocker_function(N, weighted=True, mounting=True)
     return synthesize(task, p.bounds, p.constraints, search=SEARCH).best
 
 
 def rocker_columns(name: str) -> dict[str, FloatArray]:
-    """Return target, rocker angles and errors over a turn (deg), and the least error for each bound on transmission angle."""
+    """Return the data of a rocker function's figure.
+
+    They are the target, the rocker angles and their errors over a turn (deg), and the least error for each bound on the
+    transmission angle.
+    """
     p = PROBLEMS[name]
     assert isinstance(p.task, RockerFunction)
     linkages, tasks = {"printed": p.linkage, "ours": best(name).linkage}, {"fixed": p.task}
@@ -640,7 +662,7 @@ def draw_rocker(result: StudyResult) -> Figure:
 
 
 def compute(number: str) -> StudyResult:
-    """Compute curves and errors of a figure's printed linkage and of ours, and judge the statements."""
+    """Compute the curves and the errors of a figure's printed linkage and of ours, and judge the statements."""
     row = TABLE[number]
     rocker = row.problem.startswith("rocker")
     return StudyResult(

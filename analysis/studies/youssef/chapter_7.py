@@ -1,9 +1,10 @@
 """Series 1 of chapter VII: a moving slider keeps the coupler point near a desired curve at every crank angle.
 
-The mechanism of Fig 7.2 to 7.10 has links of 0.5 and 1 without a unit: lengths are in units of l3. The desired curve is
-lost with its figure. Ours, Fig 7.4, shows the methods at work, but no statement is judged by it. The variational motion (a)
-is nearest at every crank angle, but has two vertical tangents, which no slider follows at speed. The eleven terms of the
-direct search (b) have none, at the cost of an eighth more squared error. Series 2 is in `analysis.studies.youssef.series_2`.
+The mechanism of Fig 7.2 to 7.10 has links of 0.5 and 1 without a unit: lengths are in units of l3. The desired curve is lost
+with its figure. Our own curve, in Fig 7.4, shows how the methods work, but no statement is judged by it. The variational motion
+(a) is nearest to the curve at every crank angle, but it has two vertical tangents, which no slider can follow at speed. The
+direct search with eleven terms (b) has no vertical tangent; its squared error is an eighth greater. Series 2 is in
+`analysis.studies.youssef.series_2`.
 """
 
 from __future__ import annotations
@@ -64,23 +65,23 @@ TARGET = "0.25"
 TURN = np.linspace(0.0, 2.0 * pi, 721)
 #: l2 = r = 0.5, l3 = l4 = 1, all angles zero; U = u + 1.
 LINKAGE = Linkage(ground_length=1.0, crank_length=0.5, coupler_length=1.0, rocker_length=1.0, point_distance=0.5)
-#: Values of U of the family; the thesis's are lost.
+#: Values of U for the family of coupler curves; the values of the thesis are lost.
 FAMILY = (0.6, 0.8, 1.0, 1.2, 1.4)
 #: Crank angles of the isochronous curves (deg).
 ISOCHRONES = range(0, 360, 30)
 #: Random guesses of the downhill simplex, and the standard deviation of their coefficients (l3).
 GUESSES, SPREAD = 6, 0.1
-#: Crank angles of the desired points, and which of them lie on p1 p2.
+#: Crank angles of the desired points, and a mask of the points on p1 p2.
 ROTATION = turn(72)
 P1, P2 = radians(150.0), radians(210.0)
 WITHIN = (ROTATION > P1 - 1e-9) & (ROTATION < P2 + 1e-9)
-#: Weight within p1 p2, of 1 elsewhere, and harmonics of eleven terms.
+#: Weight on p1 p2, relative to 1 elsewhere; number of harmonics in a series of eleven terms.
 WEIGHT, HARMONICS = 5.0, 5
-#: Error where the links cannot be joined.
+#: Squared error that stands for links that cannot be joined.
 NO_LINKAGE = 1e3
 SERIES_1 = "Desired curve: ours, see Fig 7.4."
 LOST = "the desired curve is lost with its figure"
-#: Limits of U within which the family of coupler curves is drawn; the thesis's are lost.
+#: Limits of U within which the family of coupler curves is drawn; the limits of the thesis are lost.
 LIMITS = ((0.9, 1.1), (0.8, 1.2), (FAMILY[0], FAMILY[-1]), (0.501, 1.499), (-1.499, 1.499))
 #: Slider positions u of the isochronous arcs that are judged (l3).
 ALONG = np.linspace(0.501, 1.499, 101) - 1.0
@@ -93,13 +94,13 @@ PRECISION, BETWEEN = 5, (-0.4, -0.2, 0.2, 0.4)
 
 
 def point(rotation: FloatArray, u: ArrayLike) -> ComplexArray:
-    """Return P (l3, complex) at crank rotations (rad) with the slider at u = U - 1."""
+    """Return the coupler point P (l3, complex) at crank rotations (rad) with the slider at u = U - 1."""
     u = np.asarray(u, dtype=float) + np.zeros_like(rotation)
     return np.asarray(LINKAGE.path(rotation, (u, np.zeros_like(u))) @ np.array([1.0, 1j]))
 
 
 def desired(rotation: FloatArray = ROTATION) -> ComplexArray:
-    """Return the desired points: P at U = 0.8 + 0.4 |sin th2| with the crank advanced by 0.05 sin th2 rad."""
+    """Return the desired points: P at U = 0.8 + 0.4 |sin th2|, with 0.05 sin th2 rad added to the crank rotation."""
     return point(rotation + 0.05 * np.sin(rotation), 0.4 * np.abs(np.sin(rotation)) - 0.2)
 
 
@@ -110,7 +111,7 @@ def task(weights: ArrayLike | None = None) -> TimedPath:
 
 @cache
 def variational(n: int = 72) -> VariationalMotion:
-    """Return the slider motion of least error at n crank rotations."""
+    """Return the variational motion: the slider positions of least error at n crank rotations."""
     wanted = desired(turn(n))
     return variational_motion(LINKAGE, turn(n), np.column_stack([wanted.real, wanted.imag]))
 
@@ -119,28 +120,31 @@ def variational(n: int = 72) -> VariationalMotion:
 def direct(
     harmonics: int = HARMONICS, inside: float = 1.0, outside: float = 1.0, acceleration: float = inf
 ) -> Solution:
-    """Return the best Fourier series of the slider, with weights inside and outside p1 p2 and a bound on |d2U/dth2^2|."""
+    """Return the best Fourier series of the slider motion by the direct search.
+
+    ``inside`` and ``outside`` weight the errors on p1 p2 and elsewhere; ``acceleration`` bounds |d2U/dth2^2|.
+    """
     unknown = SliderUnknown(harmonics=harmonics, guide_angle=(0.0, 0.0), acceleration=acceleration)
     weights = np.where(WITHIN, inside, outside)
     return slider_motion(task(weights), LINKAGE, unknown, search=Search(starts=4)).best
 
 
 def slider(linkage: Linkage) -> SliderMotion:
-    """Return the motion of a linkage's rocker pivot."""
+    """Return the motion of a linkage's moving rocker pivot."""
     assert isinstance(linkage.pivot, SliderMotion)
     return linkage.pivot
 
 
 def squared_errors(found: Solution) -> tuple[float, float]:
-    """Return the sums of the squared errors inside and outside p1 p2."""
+    """Return the sums of the squared errors on p1 p2 and elsewhere."""
     squares = found.evaluation.errors**2
     return float(squares[WITHIN].sum()), float(squares[~WITHIN].sum())
 
 
 def ends_of_simplex(starts: int = GUESSES, seed: int = 7) -> list[tuple[float, float]]:
-    """Return pairs of squared errors of eleven terms: where the downhill simplex ends, and after a descent from there.
+    """Return pairs of squared errors with eleven terms: at the end of a downhill simplex, and after a further descent.
 
-    The simplex starts from random guesses. Ends at which the links cannot be joined are left out.
+    Each simplex starts from a random guess. Ends at which the links cannot be joined are left out.
     """
     random = np.random.default_rng(seed)
 
@@ -155,16 +159,17 @@ def ends_of_simplex(starts: int = GUESSES, seed: int = 7) -> list[tuple[float, f
     guesses = SPREAD * random.normal(size=(starts, 2 * HARMONICS + 1))
     options = {"maxfev": 40000, "xatol": 1e-6, "fatol": 1e-9}
     ends = [minimize(error, c, method="Nelder-Mead", options=options) for c in guesses]
-    # none is cut off by the limit
+    # no search was stopped by the limit on evaluations
     assert all(end.success for end in ends)
     return [(float(end.fun), 2.0 * float(least_squares(missed, end.x).cost)) for end in ends if end.fun < NO_LINKAGE]
 
 
 def with_all_terms(curves: int = 20, seed: int = 11) -> float:
-    """Return the greatest relative excess of the squared error of a series over that of the variational motion.
+    """Return the greatest value of e_F / e_V - 1 over random desired curves.
 
-    The series goes through the variational motion, with as many terms as there are points; the curves are random points near
-    random places of P.
+    e_F and e_V are the sums of squared errors of a Fourier series and of the variational motion. The series has as many terms
+    as there are points and interpolates the variational motion. The desired curves are points scattered about random positions
+    of P.
     """
     # off the axis, where the slider can come below the crank pin and the links then have no direction
     random, steps, found = np.random.default_rng(seed), turn(73), []
@@ -179,7 +184,7 @@ def with_all_terms(curves: int = 20, seed: int = 11) -> float:
 
 
 def in_line(rotation: FloatArray, target: ComplexArray) -> tuple[FloatArray, FloatArray]:
-    """Return a and b of U = a +- sqrt(b), eq (7.14), with which the coupler points at the target."""
+    """Return a and b of U = a +- sqrt(b), eq (7.14): the slider positions at which the coupler points at the target."""
     l2, l3, l4 = LINKAGE.crank_length, LINKAGE.coupler_length, LINKAGE.rocker_length
     th3 = np.angle(target - l2 * np.exp(1j * rotation))
     centre = l2 * np.cos(rotation) + l3 * np.cos(th3)
@@ -187,7 +192,7 @@ def in_line(rotation: FloatArray, target: ComplexArray) -> tuple[FloatArray, Flo
 
 
 def vertical_tangents() -> list[float]:
-    """Return the crank angles (deg) at which the root in (7.14) vanishes, so that U has a vertical tangent."""
+    """Return the crank angles (deg) at which the square root in (7.14) is zero, so that U has a vertical tangent."""
 
     def square(angle: float) -> float:
         at = np.array([angle])
@@ -199,9 +204,10 @@ def vertical_tangents() -> list[float]:
 
 
 def by_equations(rotation: FloatArray, target: ComplexArray, side: int = 1) -> tuple[FloatArray, NDArray[np.bool_]]:
-    """Solve eq (7.14) for U, with both signs of its root, or (7.15) if (7.14) has no root.
+    """Solve eq (7.14) for U with both signs of its square root, or (7.15) where (7.14) has no real root.
 
-    In (7.15) the rocker is upright, or hangs if ``side`` is -1. Returns U, shape (n, 2), and a mask of the points that use it.
+    In (7.15) the rocker is at th4 = 90 deg, or at -90 deg if ``side`` is -1. Returns U, shape (n, 2), and a mask of the points
+    where (7.15) is used.
     """
     l2, l3, l4 = LINKAGE.crank_length, LINKAGE.coupler_length, LINKAGE.rocker_length
     first, square = in_line(rotation, target)
@@ -214,18 +220,18 @@ def by_equations(rotation: FloatArray, target: ComplexArray, side: int = 1) -> t
 
 
 def plane(curves: list[Curve], **more: object) -> Panel:
-    """Build a panel with curves in the plane of series 1."""
+    """Build a panel that draws curves in the plane of series 1."""
     options = {"legend_at": "outside"} | more
     return Panel(x_label="x / l3", y_label="y / l3", curves=curves, equal=True, **options)  # type: ignore[arg-type]
 
 
 def xy(name: str, z: ComplexArray) -> dict[str, FloatArray]:
-    """Return points of series 1 as two columns."""
+    """Return points of series 1 as two columns, whose names begin with ``name``."""
     return {f"{name} x [l3]": z.real, f"{name} y [l3]": z.imag}
 
 
 def path_curve(result: StudyResult, name: str, label: str = "", **look: object) -> Curve:
-    """Return two columns of `xy` as a curve."""
+    """Return the curve of the points whose two columns `xy` has made under this name."""
     c = result.columns
     return Curve(x=c[f"{name} x [l3]"], y=c[f"{name} y [l3]"], label=label, **look)  # type: ignore[arg-type]
 
@@ -312,7 +318,8 @@ def reach(low: float, high: float) -> AccessibleArea:
 def enclosed(low: float, high: float) -> float:
     """Return the area that the coupler curves for U between two limits enclose together.
 
-    It is the union of the areas within 21 of the curves and of the area that P reaches, which covers the space between them.
+    It is the union of the areas within 21 of these curves and of the area that P reaches, which covers the space between the 21
+    curves.
     """
     import shapely
 
@@ -329,10 +336,11 @@ def enclosed(low: float, high: float) -> float:
 
 
 def between_precision_points() -> tuple[float, float, str]:
-    """Return the departure of P from its path at U = 1 (l3), if the slider moves by the amplitudes `BETWEEN`.
+    """Return how far (in l3) P departs from its path for U = 1 if the slider moves between the precision points.
 
-    The first value is the greatest at the precision points. The second is the least, of the parts between them, of the greatest
-    of all amplitudes. The text names the part and the amplitude with the least departure.
+    The amplitudes of the slider are `BETWEEN`. The first result is the greatest departure at a precision point. For the
+    second, the greatest departure over all amplitudes is taken in each interval between two precision points; the result is
+    the least of these. The text names the interval and the amplitude with the least departure.
     """
     change = np.sin(0.5 * PRECISION * TURN) ** 2
     away = np.array([np.abs(point(TURN, a * change) - point(TURN, 0.0)) for a in BETWEEN])
@@ -362,7 +370,7 @@ def draw_family(result: StudyResult) -> Figure:
 
 
 def curve_wanted() -> StudyResult:
-    """Compute Fig 7.4: the desired curve, and whether P can reach it."""
+    """Compute Fig 7.4: the desired curve, and whether P can reach its points."""
     z = desired()
     reached = accessible(LINKAGE.to_five_bar(), (FAMILY[0] - 1.0 - 1e-9, FAMILY[-1] - 1.0 + 1e-9), z.real, z.imag)
     columns = {"crank rotation [deg]": np.degrees(ROTATION), **xy("desired", z)}
@@ -388,7 +396,7 @@ def curve_wanted() -> StudyResult:
 
 
 def draw_wanted(result: StudyResult) -> Figure:
-    """Draw the desired points between the outer curves of the family."""
+    """Draw the desired points between the outermost coupler curves of the family."""
     z = desired()
     marks = {"p1": int(np.argmax(WITHIN)), "p2": int(np.nonzero(WITHIN)[0][-1])}
     curves = [
@@ -404,7 +412,7 @@ def draw_wanted(result: StudyResult) -> Figure:
 def nearest(rotation: float, target: complex) -> tuple[float, float]:
     """Return the least distance of P from a target at a crank rotation, over the slider `POSITIONS` and both assemblies.
 
-    The second value is the distance that P moves from there to the next position.
+    The second result is the distance that P moves from this nearest point to the adjacent slider position.
     """
     crank, found = np.full(POSITIONS.size, rotation), []
     for branch in (1, -1):
@@ -416,7 +424,7 @@ def nearest(rotation: float, target: complex) -> tuple[float, float]:
 
 
 def two_positions() -> StudyResult:
-    """Compute Fig 7.5, both positions of the rocker at a crank angle, and judge (7.14) and (7.15) with random points."""
+    """Compute Fig 7.5: both positions of the rocker at a crank angle. Judge (7.14) and (7.15) with random points."""
     found, (u, _) = variational(), by_equations(ROTATION, desired())
     k = 60
     pin = LINKAGE.crank_length * np.exp(1j * ROTATION[k])
@@ -509,7 +517,7 @@ def two_positions() -> StudyResult:
 
 
 def draw_positions(result: StudyResult) -> Figure:
-    """Draw crank and coupler, both rockers, the desired point, and the slider's line."""
+    """Draw the crank, the coupler, both rockers, the desired point, and the line of the slider."""
     reach = [result.columns[f"{name} x [l3]"][1] for name in ("U1", "U2")]
     curves = [
         Curve(x=[min(0.0, *reach) - 0.1, max(reach) + 0.1], y=[0.0, 0.0], colour="0.6", line=":"),
@@ -528,7 +536,7 @@ MOTIONS = {"variational": "(a) variational", "direct": "(b) eleven terms", "weig
 
 @cache
 def columns_of_motions() -> dict[str, FloatArray]:
-    """Return U, error and path of each motion, and the desired points."""
+    """Return U, the error and the path of each slider motion, and the desired points, as columns."""
     fine = variational(720)
     u = {"variational": np.append(fine.u, fine.u[0])}
     errors = {"variational": variational().error}
@@ -648,7 +656,7 @@ def _weighted() -> tuple[Statement, ...]:
 
 
 def draw_motions(result: StudyResult, names: tuple[str, ...], what: str) -> Figure:
-    """Draw U or the error over the crank's rotation, or the paths."""
+    """Draw U or the error of the motions over the crank rotation, or draw their paths."""
     c = result.columns
     look = {name: {"label": MOTIONS[name], "colour": colour} for name, colour in zip(MOTIONS, COLOURS)}
     if what == "paths":
@@ -671,7 +679,10 @@ def draw_motions(result: StudyResult, names: tuple[str, ...], what: str) -> Figu
 
 
 class Motions(NamedTuple):
-    """Figure of the motions: its claim, motions, quantity shown and statements, or the figure ``see`` that judges them."""
+    """Figure of slider motions: its claim, the motions, the drawn quantity, and the statements.
+
+    ``see`` is the number of the figure that judges the statements, if they are not given here.
+    """
 
     claim: str
     names: tuple[str, ...]
@@ -713,7 +724,7 @@ TABLE = {
 
 
 def compute(number: str) -> StudyResult:
-    """Compute the motions of a figure."""
+    """Compute the slider motions of a figure."""
     row = TABLE[number]
     return StudyResult(
         number=number,

@@ -88,16 +88,16 @@ one of them does both.
 
 # --- 8.4: crank speed from the widths of the photocell's pulses
 
-#: Holes of the disc, and moments of inertia of the crank with its flywheels that are tried out (kg.m2); none is printed.
+#: Number of holes in the disc, and moments of inertia (kg.m2) that we assume for the crank with its flywheels: none is printed.
 HOLES, INERTIAS = 60, (5e-3, 2e-2)
 #: Crank speed (rpm).
 PULSED = 420.0
 
 
 def speed_of_crank(inertia: float) -> NDArray[np.float64]:
-    """Return the crank speed (rad/s) over a turn with a constant torque and a moment of inertia (kg.m2) of the crank.
+    """Return the crank speed (rad/s) over a turn under a constant drive torque, for a crank inertia (kg.m2).
 
-    The torque of the links is that of the steady motion at `PULSED` rpm.
+    The torque that the links need is that of the steady motion at `PULSED` rpm.
     """
     torque = turn("A", PULSED)["drive.applied_torque"]
     energy = np.cumsum(torque.mean() - torque) * 2.0 * pi / len(torque)
@@ -106,7 +106,7 @@ def speed_of_crank(inertia: float) -> NDArray[np.float64]:
 
 
 def speed_by_pulses(speed: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the mean speeds between the holes (rad/s), from the times at which they pass the photocell."""
+    """Return the mean speeds between successive holes (rad/s), from the times at which the holes pass the photocell."""
     angle = np.linspace(0.0, 2.0 * pi, len(speed))
     time = np.append(0.0, np.cumsum(0.5 * (1.0 / speed[1:] + 1.0 / speed[:-1]) * np.diff(angle)))
     width = np.diff(np.interp(np.linspace(0.0, 2.0 * pi, HOLES + 1), angle, time))
@@ -114,7 +114,7 @@ def speed_by_pulses(speed: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def compute_pulses() -> StudyResult:
-    """Compute the speed of the crank over a turn, and the speed by the widths of the pulses."""
+    """Compute the crank speed over a turn, and the speed that the widths of the pulses give."""
     speeds = {inertia: speed_of_crank(inertia) for inertia in INERTIAS}
     pulses = {inertia: speed_by_pulses(speed) for inertia, speed in speeds.items()}
     crank_angle = np.linspace(0.0, 360.0, len(speeds[INERTIAS[0]]))
@@ -159,7 +159,7 @@ def compute_pulses() -> StudyResult:
 
 
 def draw_pulses(result: StudyResult) -> Figure:
-    """Draw the speed over the crank angle, and the speeds by the pulses as marks."""
+    """Draw the speed over the crank angle, with the speeds from the pulses as marks."""
     curves = []
     for inertia, colour in zip(INERTIAS, COLOURS):
         names = {"crank angle [deg]": "crank speed", "place of a pulse [deg]": "crank speed by the pulses"}
@@ -181,12 +181,15 @@ def draw_pulses(result: StudyResult) -> Figure:
 
 #: Damping coefficients that the thesis found (N.s/m), by rig, and a spring of each to show them with.
 FOUND = {1: (9.0, "A"), 2: (5.5, "C")}
-#: Velocity after the impulse (m/s), length of the record (s), and dry friction (N) that are tried out.
+#: Velocity after the impulse (m/s), length of the record (s), and dry friction (N): our choices.
 KICK, LENGTH, DRY = 1.0, 1.0, 0.5
 
 
 def impulse_response(spring: str, time: NDArray[np.float64], friction: float = 0.0) -> NDArray[np.float64]:
-    """Return the position (m) of the disconnected slider after an impulse; dry friction (N) shifts the centre of each swing."""
+    """Return the position (m) over time (s) of the disconnected slider after an impulse.
+
+    Dry friction (N) shifts the centre of each half swing.
+    """
     p = rig(spring)
     decay = 0.5 * p.slider_damping / p.slider_mass
     frequency = sqrt(p.slider_stiffness / p.slider_mass - decay**2)
@@ -208,7 +211,7 @@ def impulse_response(spring: str, time: NDArray[np.float64], friction: float = 0
 
 
 def compute_decay() -> StudyResult:
-    """Compute records like those of the thesis, and the damping that their logarithmic decrement gives."""
+    """Compute records of the impulse response like those of the thesis, and the damping from their logarithmic decrement."""
     time = np.linspace(0.0, LENGTH, 4001)
     columns, added = {"time [s]": time}, []
     for number, (stated, spring) in FOUND.items():
@@ -243,7 +246,7 @@ def compute_decay() -> StudyResult:
 
 
 def draw_decay(result: StudyResult) -> Figure:
-    """Draw the records, one panel a rig."""
+    """Draw the records of the impulse response, one panel for each rig."""
     panels = []
     for number, (_, spring) in FOUND.items():
         names = [name for name in result.columns if f"spring {spring}" in name]
@@ -262,9 +265,10 @@ def draw_decay(result: StudyResult) -> Figure:
 
 @dataclass(frozen=True, slots=True)
 class Turns:
-    """Figure of the slider position over the crank angle: spring, speeds (rpm), and its statements, or where they are judged.
+    """Figure of the slider position over the crank angle: spring, speeds (rpm) and statements.
 
-    ``rough`` adds each curve with friction in the guide, by the coefficient `SLIGHT`.
+    ``see`` is the number of the figure that judges the statements, if they are not given here. ``rough`` adds the curve with
+    friction in the guide; its coefficient is `SLIGHT`.
     """
 
     number: str
@@ -277,7 +281,7 @@ class Turns:
     see: str = ""
 
     def compute(self) -> StudyResult:
-        """Compute the steady turns at the speeds of a figure."""
+        """Compute a steady turn at each speed of the figure."""
         turns = {f"{speed:g} rpm": turn(self.spring, speed) for speed in self.speeds}
         if self.rough:
             (speed,) = self.speeds
@@ -294,7 +298,7 @@ class Turns:
         )
 
     def draw(self, result: StudyResult) -> Figure:
-        """Draw the turns over the crank angle, relative to their amplitudes if these differ much."""
+        """Draw the slider position over the crank angle, divided by its amplitude if the amplitudes differ much."""
         angle, *positions = result.columns.items()
         sizes = [0.5 * float(np.ptp(u)) for _, u in positions]
         relative = max(sizes) > 5.0 * min(sizes)
@@ -316,7 +320,7 @@ class Turns:
 
     @property
     def study(self) -> Study:
-        """The figure as a study."""
+        """The study of the figure."""
         return Study(self.number, self.compute, self.draw)
 
 
@@ -331,7 +335,7 @@ NEAREST = "of a speed the nearest to the stated one that rounding the printed st
 
 
 def _periodic() -> tuple[Statement, ...]:
-    """Judge Fig 8.7: one cycle of the slider takes one cycle of the crank, at this speed and at all others."""
+    """Judge Fig 8.7: one cycle of the slider takes one turn of the crank, at the speed of the figure and at all others."""
     stable = "below 1: the motion of one crank cycle exists, and every motion near it tends to it"
     largest = [
         at_most(f"spring {s}, to {rig_1.STOPPED[s]} rpm", 1.0, largest_multiplier(s, SLOWEST, float(rig_1.STOPPED[s])))
@@ -369,7 +373,7 @@ def _periodic() -> tuple[Statement, ...]:
 
 
 def _compared_a() -> tuple[Statement, ...]:
-    """Return the statements of Fig 8.8 to 8.10, which compare theory with lost measurements."""
+    """Judge the statements on Fig 8.8 to 8.10, which compare theory with lost measurements."""
     why = f"{LOST}; for what friction does to the theory see {FRICTION}"
     return (
         Statement(
@@ -388,7 +392,7 @@ def _compared_a() -> tuple[Statement, ...]:
 
 
 def _compared_b() -> tuple[Statement, ...]:
-    """Return the statements of Fig 8.11 to 8.13."""
+    """Judge the statements on Fig 8.11 to 8.13."""
     return (
         Statement(
             "As may be seen the theoretical and experimental results are almost in total agreement in phase.",
@@ -485,7 +489,7 @@ def _rounded(what: str, speeds: NDArray[np.float64]) -> str:
 
 
 def _least_rise(spring: str, speeds: Sequence[float]) -> float:
-    """Return the least growth of the amplitude from one speed to the next (cm)."""
+    """Return the least growth of the amplitude (cm) from one speed to the next."""
     return float(np.diff([amplitude(turn(spring, speed)) for speed in speeds]).min())
 
 
@@ -650,7 +654,10 @@ TYPICAL, RUN = (400.0, 585.0, 1000.0), (300.0, 1000.0)
 
 
 def _unbalance_ratio(spring: str, speeds: NDArray[np.float64], unbalance: float) -> float:
-    """Return the greatest ratio, at speeds (rpm), of the amplitude to that of a mass on a spring under an unbalance (cm.kg)."""
+    """Return the greatest ratio, over the speeds (rpm), of the amplitude to that of a single mass under an unbalance (cm.kg).
+
+    The single mass is on the same spring and damper.
+    """
     rates, amplitudes = RAD_S_PER_RPM * speeds, np.array([amplitude(turn(spring, w)) for w in speeds.tolist()])
     return float((amplitudes * dynamic_stiffness(rig(spring), rates) / (unbalance * rates**2)).max())
 

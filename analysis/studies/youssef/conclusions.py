@@ -1,6 +1,6 @@
-"""Verdicts on the conclusions of the thesis: each sentence of sections 8.0 and 9.1 that claims something.
+"""Verdicts on the conclusions of the thesis: on each sentence of sections 8.0 and 9.1 that makes a claim.
 
-Most of these sentences sum up statements that are judged in their chapters; here each is measured again as a whole.
+Most of these sentences sum up statements that are judged in the chapters; here each sentence is judged again as a whole.
 """
 
 from __future__ import annotations
@@ -73,7 +73,7 @@ SIGN = "none, the sign decides"
 
 @cache
 def short_crank(inertia_ratio: float, damper: float, most: int) -> tuple[HarmonicMotion, ...]:
-    """Return the motions u/l4 of chapter IV's mechanism at the `SPEEDS`, with the harmonics up to ``most``."""
+    """Return the motion u/l4 of chapter IV's mechanism at each of the `SPEEDS`, with the harmonics up to ``most``."""
     found = slider_equation(chapter_4(inertia_ratio), 1.0)
     return tuple(
         harmonic_balance(replace(found, spring=SQUARE_OF_OMEGA_K / w**2, damping=damper / w), most)
@@ -82,7 +82,7 @@ def short_crank(inertia_ratio: float, damper: float, most: int) -> tuple[Harmoni
 
 
 def harmonic(order: int, inertia_ratio: float, damper: float, most: int = 2) -> NDArray[np.float64]:
-    """Return the amplitude of a harmonic of u/l4 at the `SPEEDS`; see `short_crank`."""
+    """Return the amplitude of one harmonic of u/l4 at each of the `SPEEDS`; see `short_crank`."""
     return np.array([motion.harmonic(order) for motion in short_crank(inertia_ratio, damper, most)])
 
 
@@ -90,8 +90,9 @@ def harmonic(order: int, inertia_ratio: float, damper: float, most: int = 2) -> 
 def unlike_oscillator(inertia_ratio: float) -> tuple[float, float]:
     """Compare the motion with that of a damped oscillator under a force that grows with the square of the speed.
 
-    The oscillator has the means of M and K. Return the relative spread of F0/omega^2, F0 the force on it that gives the first
-    harmonic, and the greatest amplitude over that under the mean of F0/omega^2; each the greater of two dampers.
+    The oscillator has the mean values of M and K, and F0 is the amplitude of the force that gives it the first harmonic of the
+    motion. The first result is the range of F0/omega^2 over the speeds, relative to its mean. The second is the greatest ratio
+    of the amplitude to the oscillator's amplitude under the mean of F0/omega^2. Each is the greater result of two dampers.
     """
     found, compared = slider_equation(chapter_4(inertia_ratio), 1.0), []
     for damper in (WEAK, STRONG):
@@ -111,14 +112,17 @@ def amplitude_ratio(why: str = "") -> Case:
 
 
 def speeds_above(level: float, curve: NDArray[np.float64]) -> float:
-    """Return the range of the `SPEEDS` (rad/s) between the first and the last at which a curve passes a level."""
+    """Return the width (rad/s) of the speed range between the first and the last speed at which a curve crosses a level.
+
+    ``curve`` has a value for each of the `SPEEDS`.
+    """
     (at,) = np.nonzero((curve[:-1] > level) != (curve[1:] > level))
     passed = SPEEDS[at] + (level - curve[at]) / (curve[at + 1] - curve[at]) * np.diff(SPEEDS)[at]
     return float(np.ptp(passed))
 
 
 def width(parameters: FiveBarParameters, number: int = 1) -> float:
-    """Return the width of a region of instability in lambda_k^2."""
+    """Return the width in lambda_k^2 of the region of instability with the given number, by Hill's determinant."""
     return hill(parameters, number).width
 
 
@@ -132,14 +136,17 @@ def spacings(run: Trajectory) -> NDArray[np.float64]:
 
 
 def decay(torque: float, stiffness: float, damping: float) -> float:
-    """Return the greatest range of u in the second half of the turns after a launch, divided by that in the first half."""
+    """Return the greatest range of u in the later half of the turns after a launch, relative to that in the earlier half."""
     swing = Turns.of(launch(torque, stiffness, FREE, 6000, damping), start=1.0).slider_range
     half = swing.size // 2
     return float(swing[half:].max() / swing[:half].max())
 
 
 def collinear_turn(damping: float) -> float:
-    """Return the turn at which the links of Table 3.1 are collinear at 420 rpm without a spring, as in Fig 3.2, or NaN."""
+    """Return the turn at which the links become collinear without a spring, as in Fig 3.2, or NaN.
+
+    The mechanism is Table 3.1 at 420 rpm with a damper (dyn.s/cm).
+    """
     angle, period = asin(COLLINEAR_SINE), 60.0 / SPEED
     run = simulate(
         table_3_1(0.0, damping),
@@ -155,14 +162,17 @@ def collinear_turn(damping: float) -> float:
 
 
 def removed(mechanisms: Iterable[FiveBarParameters]) -> float:
-    """Return the damping that removes the first four regions, over the critical one of m4 + m5, the most of some mechanisms."""
+    """Return the damping ratio that removes the first four regions of instability of all given mechanisms.
+
+    It is relative to the critical damping of the mass m4 + m5 on the spring.
+    """
     return max(removing_estimate(p, number) for p in mechanisms for number in range(1, 5)) / (2.0 * OMEGA_K)
 
 
 def of_ellipse(semi_axis: float, harmonics: int) -> float:
-    """Return the least area between an ellipse (cm) and the curve of path (b)'s links, over the ellipse's.
+    """Return the least area between an ellipse and the coupler curve of path (b)'s links, relative to the ellipse's area.
 
-    Of no harmonics the pivot is fixed.
+    ``semi_axis`` is in cm. The rocker pivot moves with the given number of harmonics; with 0 it is fixed.
     """
     p = PROBLEMS["path-b"]
     formula = f"0.20 + {semi_axis / CM_PER_METRE:g}*cos(t)"
@@ -177,14 +187,20 @@ def of_ellipse(semi_axis: float, harmonics: int) -> float:
 
 
 def second_region(inertia_ratio: float) -> tuple[float, float]:
-    """Return the width of the region at the natural frequency over that of the first, in lambda_k^2 and in speed."""
+    """Return the width of the second region of instability divided by that of the first: in lambda_k^2, and in speed.
+
+    The second region lies at the natural frequency.
+    """
     second, first = (hill(chapter_4(inertia_ratio), number) for number in (2, 1))
     of_speed, of_first = (region.low**-0.5 - region.high**-0.5 for region in (second, first))
     return second.width / first.width, of_speed / of_first
 
 
 def twice_natural() -> float:
-    """Return the ratio of the speed in the middle of the first region to the natural frequency, farthest from 2 of `RATIOS`."""
+    """Return the speed in the middle of the first region divided by the natural frequency.
+
+    The result is that of the inertia ratio in `RATIOS` for which it is farthest from 2.
+    """
     found = [axis(hill(chapter_4(i))) * OMEGA_K / natural_frequency(chapter_4(i)) for i in RATIOS]
     return max(found, key=lambda x: abs(x - 2.0))
 
@@ -655,7 +671,7 @@ def experiment() -> tuple[Statement, ...]:
 
 
 def compute() -> StudyResult:
-    """Judge the sentences of sections 8.0 and 9.1."""
+    """Judge the sentences of sections 8.0 and 9.1 that make a claim."""
     return StudyResult(
         number=NUMBER,
         claim="What the introduction to the experiments says of the theory (8.0), and what the thesis concludes (9.1).",

@@ -1,11 +1,12 @@
-"""The methods of sections 7.1 and 7.4 for driving the slider, applied to a mechanism with masses.
+"""Methods of sections 7.1 and 7.4 for driving the slider, applied to a mechanism with masses.
 
-The thesis classifies the methods and computes none: off-line (a spring, a drive without feedback), partial-on-line
-(feedback to a stored motion), and adaptive (trial cycles that correct the drive). Here each moves the slider by the two
-harmonics of Fig 7.11, at 120 rpm; the printed links of the weighted rocker function are steel bars of 20 by 5 mm, with a
-damper and some friction in the guide. The plant differs from the controller's model: twice the friction, coupler and slider a
-tenth heavier, a load on the rocker pin. A trial cycle corrects the stored motion by the Fourier series of the last cycle's
-deviation. A cam on the crank shaft drives the slider by a roller that moves along a line through the shaft.
+The thesis classifies the methods and computes none: off-line (a spring, or a drive without feedback), partial-on-line
+(feedback to a stored motion), and adaptive (trial cycles that correct the drive). Here each method moves the slider by the two
+harmonics of Fig 7.11, at 120 rpm. The links are those printed for the weighted rocker function, as steel bars of 20 by 5 mm,
+with a damper and some friction in the guide. The plant, the mechanism as built, differs from the controller's model: friction
+is twice as large, coupler and slider are a tenth heavier, and a load acts on the rocker pin. Each trial cycle corrects the
+stored motion by the Fourier series of the last cycle's deviation. A cam on the crank shaft drives the slider by a roller that
+moves along a line through the shaft.
 """
 
 from __future__ import annotations
@@ -44,18 +45,18 @@ DAMPING, FRICTION = 5.0, 2.0
 PERIOD, BANDWIDTH, TURNS = 1e-3, 120.0, 3.0
 #: Load at the pin of coupler and rocker, unknown to the controller (N).
 LOAD = (-5.0, -3.0)
-#: Load to which a search on the machine must adjust itself (N), three times as much.
+#: Load (N) to which a search on the machine must adapt: three times `LOAD`.
 CHANGED = (-15.0, -9.0)
 #: Trial cycles, and harmonics of the deviation that they correct.
 TRIALS, HARMONICS = 6, (8, 16)
-#: First step of the search on the machine (m), and number of its runs.
+#: First step (m) of a search on the machine, and number of runs in it.
 STEP, SEARCHED = 8e-3, 25
 #: Largest pressure angle of a cam (rad), the usual limit of a follower that slides, and radius of its roller (cm).
 PRESSURE, ROLLER = radians(30.0), 1.0
 
 
 class Machine(NamedTuple):
-    """Mechanism as modelled and as built, motion of its slider over the crank angle (m), and design of the feedback."""
+    """Mechanism as modelled and as built, desired slider motion over the crank angle (m), and design of the feedback."""
 
     model: FiveBarParameters
     plant: FiveBarParameters
@@ -65,7 +66,7 @@ class Machine(NamedTuple):
 
 @cache
 def machine() -> Machine:
-    """Return the machine: the printed links in steel, and the two harmonics of Fig 7.11 as the slider's motion."""
+    """Return the machine: the printed links in steel, with the two harmonics of Fig 7.11 as the desired slider motion."""
     linkage = rocker_motion(2).linkage
     motion = motion_of_plant(linkage)
     model = replace(
@@ -85,7 +86,10 @@ def machine() -> Machine:
 def run(
     stored: FourierSeries, *, feedback: bool = True, load: tuple[float, float] = LOAD, speed: float = SPEED
 ) -> TrackingResult:
-    """Run the plant along a stored motion, by feedback, or else by the force that the model needs."""
+    """Run the plant along a stored motion: with feedback, or without feedback under the force that the model predicts.
+
+    ``load`` acts on the rocker pin (N); ``speed`` is the crank speed (rad/s).
+    """
     m = machine()
     design = m.design if feedback else None
     controller = TrackingController(m.model, stored, PERIOD, design=design, feedforward=not feedback)
@@ -94,9 +98,9 @@ def run(
 
 @cache
 def trials(harmonics: int) -> tuple[NDArray[np.float64], ...]:
-    """Run the trial cycles; return the slider's deviation from the desired motion over the last turn of each (m).
+    """Run the trial cycles; return the deviation of the slider from the desired motion over the last turn of each run (m).
 
-    After each cycle ``harmonics`` of the deviation are subtracted from the stored motion.
+    After each cycle, the Fourier series of the deviation with this number of harmonics is subtracted from the stored motion.
     """
     turn = round(2.0 * pi / (SPEED * PERIOD))
     stored, deviations = machine().motion, []
@@ -110,13 +114,13 @@ def trials(harmonics: int) -> tuple[NDArray[np.float64], ...]:
 
 
 def move_slider(series: FourierSeries) -> Linkage:
-    """Return the printed links of the rocker function with another motion of the slider along the best guide."""
+    """Return the printed links of the rocker function with the slider moved by ``series`` along the best guide."""
     linkage = rocker_motion(2).linkage
     return replace(linkage, pivot=replace(slider(linkage), series=series))
 
 
 def error_on_machine(stored: FourierSeries, load: tuple[float, float] = LOAD, speed: float = SPEED) -> float:
-    """Return the weighted error of the rocker function (deg2) over the last turn of a run along a stored motion."""
+    """Return the weighted error of the rocker function (deg2) over the last turn of a run along a stored motion; see `run`."""
     turns = round(2.0 * pi / (speed * PERIOD))
     position = run(stored, load=load, speed=speed).loop.position[-turns - 1 : -1]
     found = FourierSeries.from_samples(position, max(HARMONICS))(turn(72) + rocker_motion(2).linkage.crank_phase)
@@ -124,10 +128,11 @@ def error_on_machine(stored: FourierSeries, load: tuple[float, float] = LOAD, sp
 
 
 def searched() -> tuple[float, float, float]:
-    """Search on the machine by a downhill simplex over the coefficients of two harmonics, and again with another load.
+    """Minimise the weighted error of the rocker function in runs of the plant, by a downhill simplex; repeat with another load.
 
-    Returns the weighted errors of the rocker function (deg2): with the slider at rest, at the end of the first search, and at
-    the end of the second, which begins with the result of the first.
+    The unknowns are the mean and two harmonics of the slider motion. Returns three errors (deg2): with the slider at rest, at
+    the end of the first search, and at the end of the second search, which begins with the result of the first and has the load
+    `CHANGED`.
     """
 
     def error(c: NDArray[np.float64], load: tuple[float, float]) -> float:
@@ -145,10 +150,10 @@ def searched() -> tuple[float, float, float]:
 
 
 class Cam(NamedTuple):
-    """Plate cam.
+    """Plate cam with its base radius, radii of curvature and pitch curve.
 
-    Its base radius and the least radii of curvature where its pitch curve is convex and where it is hollow (cm), the angle
-    over which it is hollow (deg), and the pitch curve (cm).
+    The radii (cm) are the base radius and the least radii of curvature where the pitch curve is convex and where it is concave.
+    Then follow the angle over which it is concave (deg) and the pitch curve (cm).
     """
 
     base: float
@@ -159,7 +164,7 @@ class Cam(NamedTuple):
 
 
 def cam(series: FourierSeries) -> Cam:
-    """Return the smallest cam that moves a roller by a series (m) of its rotation with a pressure angle within `PRESSURE`."""
+    """Return the smallest cam with a pressure angle within `PRESSURE`; ``series`` is the motion of its roller (m)."""
     angle = np.linspace(0.0, 2.0 * pi, 3601)
     slope = series.derivative()
     lift, rate, change = (CM_PER_METRE * of(angle) for of in (series, slope, slope.derivative()))
@@ -179,12 +184,12 @@ def cam(series: FourierSeries) -> Cam:
 
 
 def rms(values: NDArray[np.float64]) -> float:
-    """Return the root mean square."""
+    """Return the root mean square of an array."""
     return float(np.sqrt(np.mean(values**2)))
 
 
 def compute() -> StudyResult:
-    """Compute the force with and without a spring, the motion with and without feedback, the trial cycles, and cams."""
+    """Compute the drive force with and without a spring, the motion with and without feedback, the trial cycles, and cams."""
     m = machine()
     drives = {"without a spring": inverse_dynamics(m.model, m.motion, SPEED)}
     drives["with the best spring"] = inverse_dynamics(best_spring(m.model, m.motion, SPEED).parameters, m.motion, SPEED)
@@ -386,7 +391,7 @@ def compute() -> StudyResult:
 
 
 def draw(result: StudyResult) -> Figure:
-    """Draw force, errors of the runs, and the trial cycles."""
+    """Draw the drive force, the errors of the runs, and the errors of the trial cycles."""
     c = result.columns
     runs = (("feed-forward", "no feedback", COLOURS[1]), ("feedback", "feedback", COLOURS[0]))
     panels = [

@@ -1,6 +1,6 @@
-"""Chapter II and section 3.1: the equations with Lagrange's multipliers, eqs (3.1) to (3.10), and how they are integrated.
+"""Chapter II and section 3.1: the equations with Lagrange's multipliers, eqs (3.1) to (3.10), and their integration.
 
-The equations are the thesis's, to the letter; their results are compared with those of the plant, which has no multipliers.
+The equations are exactly those of the thesis; their results are compared with those of the plant, which has no multipliers.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from ..statements import Case, Statement, at_least, at_most, near, text
 from ..study import Study, StudyResult, result_curves
 from .runs import SPEED, table_3_1
 
-#: The mechanism, its speed (rad/s), the time that is integrated (s), and the steps (s); appendix 1 begins with 1e-3 s.
+#: The mechanism, its speed (rad/s), the duration of the motion (s), and the steps (s); appendix 1 begins with 1e-3 s.
 TABLE = table_3_1(1e6)
 OMEGA, STOP = SPEED * RAD_S_PER_RPM, 0.5
 STEPS = (4e-3, 2e-3, 1e-3, 5e-4)
@@ -37,14 +37,14 @@ TORQUE, ROUNDING = 10.0, 1e-9
 KINK = "the step in which the torque of the launch ends leaves an error along the motion, with the loop closed"
 #: Step (s) with which appendix 1 begins: there the estimate of Hamming's method is judged.
 STEP = 1e-3
-#: Errors by which that estimate is tried (m): of the start, and the unit to which the back values are rounded.
+#: Errors (m) with which this estimate is tested: of the start, and the unit to which the back values are rounded.
 START_ERROR, UNIT = 1e-5, 1e-6
 
 
 def solved(q: ArrayLike, qd: ArrayLike, torque: float | None = None) -> NDArray[np.float64]:
-    """Solve A W = B, eqs (3.1), (3.8), (3.10), at q = (th2, th3, th4, u) and q' = ``qd`` (SI); return W.
+    """Solve A W = B, eqs (3.1), (3.8), (3.10), for W at q = (th2, th3, th4, u) and q' = ``qd`` (SI).
 
-    W = (lambda3, lambda2, lambda1, u'', th4'', th3''); if a torque acts on the crank, th2'' takes the place of lambda3 (3.2.2).
+    W = (lambda3, lambda2, lambda1, u'', th4'', th3''). If a torque acts on the crank, th2'' takes the place of lambda3 (3.2.2).
     """
     q, qd, p = np.asarray(q), np.asarray(qd), TABLE
     m3, m4, r3, r4, g = p.coupler_mass, p.rocker_mass, p.coupler_cog_distance, p.rocker_cog_distance, p.gravity
@@ -79,7 +79,7 @@ def solved(q: ArrayLike, qd: ArrayLike, torque: float | None = None) -> NDArray[
 
 
 def closed(crank: float, u: float, speed: float, velocity: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return q and q' of the closed loop, eqs (2.1) and (2.4), from crank angle, u and their rates (SI)."""
+    """Return q and q' of the closed loop, eqs (2.1) and (2.4), at a crank angle, u and their rates (SI)."""
     p = TABLE.constants()
     g = kinematics.position(crank, u, p)
     k = kinematics.coefficients(g, p)
@@ -88,22 +88,22 @@ def closed(crank: float, u: float, speed: float, velocity: float) -> tuple[NDArr
 
 
 def all_derivatives(t: float, y: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return y' of y = (th3, th4, u, th3', th4', u') at constant crank speed: the first approach of 3.1."""
+    """Return y' of y = (th3, th4, u, th3', th4', u') at constant crank speed: the first approach of section 3.1."""
     w = solved((OMEGA * t, *y[:3]), (OMEGA, *y[3:]))
     return np.array([*y[3:], w[5], w[4], w[3]])
 
 
 def slider_alone(t: float, y: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return y' of y = (u, u') with the loop closed by its kinematics: the second approach."""
+    """Return y' of y = (u, u'), with th3 and th4 from the closure of the loop: the second approach of section 3.1."""
     return np.array([y[1], solved(*closed(OMEGA * t, y[0], OMEGA, y[1]))[3]])
 
 
 class Integrated(NamedTuple):
-    """Runs by the two approaches of 3.1 with a constant step of Hamming's method.
+    """Results of the two approaches of section 3.1 by Hamming's method with a constant step.
 
-    ``gap`` is the failure of closure (cm) at ``times`` (s) by the first approach, ``errors`` are the greatest errors of u (cm)
-    by the first and by the second, ``unseen`` is the greatest failure of closure (cm) and ``slider`` has times (s) and u (cm)
-    by the second.
+    ``gap`` is the closure error (cm) at ``times`` (s) by the first approach. ``errors`` are the greatest errors of u (cm) by
+    the first and by the second approach. By the second approach, ``unseen`` is the greatest closure error (cm) and ``slider``
+    has the times (s) and u (cm).
     """
 
     times: NDArray[np.float64]
@@ -115,7 +115,7 @@ class Integrated(NamedTuple):
 
 @cache
 def integrated(step: float) -> Integrated:
-    """Integrate the motion by the two approaches of 3.1 with a constant step (s)."""
+    """Integrate the motion from rest by the two approaches of section 3.1, by Hamming's method with a constant step (s)."""
     options = {"method": Hamming, "first_step": step, "max_step": step, "rtol": 1e3, "atol": 1e9}
     q, qd = closed(0.0, 0.0, OMEGA, 0.0)
     first, second = (
@@ -182,7 +182,7 @@ def shown_by_closure() -> tuple[Case, ...]:
 
 @cache
 def exact(start: float = 0.0) -> Callable[[NDArray[np.float64]], NDArray[np.float64]]:
-    """Return a function that gives (u, u') in SI at times (s), accurate to rounding, from rest at u = ``start`` (m)."""
+    """Return a function of times (s) that gives (u, u') in SI, accurate to rounding, from rest at u = ``start`` (m)."""
     options = {"method": "DOP853", "rtol": 1e-12, "atol": 1e-14, "dense_output": True}
     solution: Callable[[NDArray[np.float64]], NDArray[np.float64]]
     solution = solve_ivp(slider_alone, (0.0, STOP), [start, 0.0], **options).sol
@@ -190,16 +190,16 @@ def exact(start: float = 0.0) -> Callable[[NDArray[np.float64]], NDArray[np.floa
 
 
 def change_on_halving(step: float) -> float:
-    """Return the greatest change of u (cm) by the second approach when the step is halved."""
+    """Return the greatest change of u (cm), by the second approach, if the step is halved."""
     (times, u), (finer, other) = (integrated(h).slider for h in (step, 0.5 * step))
     return float(np.abs(u - np.interp(times, finer, other)).max())
 
 
 def estimated(start: float = 0.0, unit: float = 0.0) -> tuple[NDArray[np.float64], ...]:
-    """Return the estimates 9/121 (p - c) of the errors of u by single steps of Hamming's method, the errors, and roundings (m).
+    """Return estimated errors of u, true errors of u, and roundings of u (all in m), for single steps of Hamming's method.
 
-    The steps are `STEP` long and begin with exact values of the motion from rest at ``start`` (m), but for the roundings of u
-    and u' to multiples of ``unit``, if it is not zero.
+    The estimate is 9/121 (p - c). Each step has the length `STEP` and begins with the exact motion from rest at ``start`` (m).
+    If ``unit`` is not zero, u and u' at the beginning are rounded to multiples of it; the roundings are these changes of u.
     """
     h, t = STEP, np.linspace(0.0, STOP, round(STOP / STEP) + 1)
     exactly = exact(start)(t).T
@@ -218,13 +218,13 @@ def estimated(start: float = 0.0, unit: float = 0.0) -> tuple[NDArray[np.float64
 
 
 class RungeKutta(NamedTuple):
-    """A run of the classical method of fourth order: states at each step, and evaluations of the function."""
+    """Run of the classical method of fourth order: the state after each step, and the number of function evaluations."""
 
     states: NDArray[Any]
     evaluations: int
 
 
-#: Stages of the classical method: place in the step, and weight in sixths; and the same with a slip, the last in its middle.
+#: Stages of the classical method: place in the step, and weight in sixths. `SLIP` has a slip: its last stage is at mid-step.
 CLASSICAL = ((0.0, 1.0), (0.5, 2.0), (0.5, 2.0), (1.0, 1.0))
 SLIP = (*CLASSICAL[:3], (0.5, 1.0))
 
@@ -236,7 +236,10 @@ def runge_kutta(
     n: int,
     stages: tuple[tuple[float, float], ...] = CLASSICAL,
 ) -> RungeKutta:
-    """Integrate y' = f(t, y) from t = 0 by n steps h of the classical Runge-Kutta method."""
+    """Integrate y' = f(t, y) from t = 0 by n steps of length h of the classical Runge-Kutta method.
+
+    ``stages`` gives for each stage its place in the step and its weight in sixths.
+    """
     states, evaluations = [np.asarray(y)], 0
     for i in range(n):
         y0 = states[-1]
@@ -252,7 +255,10 @@ def runge_kutta(
 def by_runge_kutta(
     step: float, first: bool = False, stages: tuple[tuple[float, float], ...] = CLASSICAL
 ) -> NDArray[np.float64]:
-    """Integrate the motion by Runge-Kutta's method, by the first approach or the second; return the states at each step."""
+    """Integrate the motion by Runge-Kutta's method; return the state after each step.
+
+    The equations are those of the second approach of section 3.1, or of the first if ``first``.
+    """
     q, qd = closed(0.0, 0.0, OMEGA, 0.0)
     f, start = (all_derivatives, [*q[1:], *qd[1:]]) if first else (slider_alone, [0.0, 0.0])
     n = round(STOP / step)
@@ -260,28 +266,34 @@ def by_runge_kutta(
 
 
 def integration_error(u: NDArray[np.float64]) -> float:
-    """Return the greatest error (cm) of u (m) at evenly spaced times from 0 to `STOP`."""
+    """Return the greatest error (cm) of u (m), given at evenly spaced times from 0 to `STOP`."""
     return CM_PER_METRE * float(np.abs(u - exact()(np.linspace(0.0, STOP, len(u)))[0]).max())
 
 
 def of_runge_kutta(step: float) -> float:
-    """Return the greatest error of u by the second approach relative to its estimate by halving the step.
+    """Return the greatest error of u by Runge-Kutta's method relative to its estimate by halving the step.
 
-    The estimate is the greatest change of u divided by 1 - 1/16.
+    The estimate is the greatest change of u divided by 1 - 1/16; the second approach is used.
     """
     u, halved = by_runge_kutta(step)[:, 0], by_runge_kutta(0.5 * step)[::2, 0]
     return integration_error(u) / (CM_PER_METRE * float(np.abs(u - halved).max()) / (1.0 - 2.0**-4))
 
 
 def with_slip(step: float) -> float:
-    """Return the greatest failure of closure relative to the greatest error of u, by the first approach with a slip."""
+    """Return the greatest closure error divided by the greatest error of u, by Runge-Kutta's method with the stages `SLIP`.
+
+    The first approach is used.
+    """
     states = by_runge_kutta(step, True, SLIP)
     crank = OMEGA * np.linspace(0.0, STOP, len(states))
     return float(opening(np.array([crank, *states[:, :3].T])).max()) / integration_error(states[:, 2])
 
 
 def stable_steps(rate: complex, steps: int = 400) -> tuple[float, float]:
-    """Return the greatest steps with which y' = ``rate`` y does not grow by Runge-Kutta's and by Hamming's method."""
+    """Return the greatest stable steps for y' = ``rate`` y by Runge-Kutta's and by Hamming's method.
+
+    A step is stable if the solution does not grow at the end of ``steps`` steps.
+    """
 
     def classical(h: float) -> NDArray[np.complex128]:
         return runge_kutta(lambda t, y: rate * y, np.ones(1, complex), h, steps).states[:, 0]
@@ -304,7 +316,10 @@ def stable_steps(rate: complex, steps: int = 400) -> tuple[float, float]:
 
 
 def order_of_series(highest: int) -> float:
-    """Return the order of a Taylor step on y' = -y with the derivatives of y' up to the ``highest``, from h = 0.1 to 0.05."""
+    """Return the order of the Taylor series method on y' = -y, from the errors with h = 0.1 and 0.05.
+
+    The series has the derivatives of y' up to the order ``highest``.
+    """
     errors = []
     for n in (10, 20):
         growth = sum((-1.0 / n) ** k / factorial(k) for k in range(highest + 2))
@@ -313,14 +328,14 @@ def order_of_series(highest: int) -> float:
 
 
 def opening(q: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the failure of closure (cm), eq (2.1), for each column of q, shape (4, n)."""
+    """Return the closure error (cm), eq (2.1), for each column of q, shape (4, n)."""
     lengths = np.array([TABLE.crank_length, TABLE.coupler_length, -TABLE.rocker_length])
     gap: NDArray[np.float64] = CM_PER_METRE * np.abs(lengths @ np.exp(1j * q[:3]) - TABLE.ground_length - q[3])
     return gap
 
 
 def evaluations_a_step() -> float:
-    """Count the evaluations of the accelerations that a further step of Hamming's method takes."""
+    """Count the evaluations of the accelerations in one step of Hamming's method; those of the starting steps do not count."""
     counts = []
     for stop in (0.4, 0.5):
         found = solve_ivp(
@@ -332,16 +347,16 @@ def evaluations_a_step() -> float:
 
 
 def parasite(past: ArrayLike, rates: ArrayLike, h: float) -> float:
-    """Return the greatest modulus of the spurious roots of a corrector on y' = -y at a step h: all but that near exp(-h).
+    """Return the greatest modulus of a corrector's spurious roots on y' = -y with a step h.
 
-    ``past`` and ``rates`` are the corrector's coefficients of the values and of their rates.
+    The spurious roots are all but the one near exp(-h). ``past`` and ``rates`` are the corrector's coefficients of y and of y'.
     """
     roots = np.roots(np.asarray(past) + h * np.asarray(rates))
     return float(np.abs(np.delete(roots, np.abs(roots - np.exp(-h)).argmin())).max())
 
 
 def multipliers() -> tuple[Case, ...]:
-    """Compare multipliers and accelerations with the plant's, at constant speed and under a torque."""
+    """Compare multipliers and accelerations with those of the plant, at constant speed and under a torque."""
     worst: dict[str, float] = {}
     for drive, inputs in (
         ("constant speed", Inputs(speed=OMEGA)),
@@ -368,7 +383,7 @@ def multipliers() -> tuple[Case, ...]:
 
 
 def compute() -> StudyResult:
-    """Judge chapter II and section 3.1, and compute the closure of the loop over time."""
+    """Judge chapter II and section 3.1, and compute the closure error of the loop over time."""
     found = {f"step {1e3 * step:g} ms": integrated(step) for step in STEPS}
     columns = {"time [s]": found[next(iter(found))].times}
     for label, run in found.items():
@@ -592,7 +607,7 @@ def compute() -> StudyResult:
 
 
 def draw(result: StudyResult) -> Figure:
-    """Draw the failure of closure over the time."""
+    """Draw the closure error over time."""
     time, *names = result.columns
     curves = result_curves(result, time, {name: name.partition("; ")[2].partition(" [")[0] for name in names})
     panel = Panel(

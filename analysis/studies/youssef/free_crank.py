@@ -1,4 +1,4 @@
-"""Figures 3.6 to 3.14: the crank accelerated by a torque, and the crank in free motion."""
+"""Figures 3.6 to 3.14: the crank accelerated from rest by a torque, and the crank in free motion."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ TORQUES = (1e7, 1e8, 2e8)
 TORQUE_RANGE = np.geomspace(TORQUES[0], TORQUES[-1], 14)
 #: Springs of the free motion (dyn/cm).
 SOFT, STIFF = 5e5, 2e6
-#: Speeds (rpm) from whose steady motion a crank is released for comparison, by spring (dyn/cm): above those after the launches.
+#: Speeds (rpm), by spring (dyn/cm), at which a steadily running crank is released for comparison: above those of the launches.
 RELEASED = {5e5: 600.0, 1e6: 840.0, 2e6: 840.0}
 #: Crank speed near which the thesis sees higher harmonics (rad/s).
 HARMONIC_SPEED = 27.0
@@ -67,7 +67,10 @@ UNSAID = (
 def launch(
     torque: float, stiffness: float = 1e6, stop_time: float = 1.0, samples: int = 2000, damping: float = 3e4
 ) -> Trajectory:
-    """Run Table 3.1 from rest under T = T0 (1 - th2) up to 1 rad, then without torque; an event marks the release."""
+    """Run Table 3.1 from rest under the torque T = T0 (1 - th2) up to th2 = 1 rad, then without torque.
+
+    ``torque`` is T0. Torque, stiffness and damping are in CGS units; an event marks the end of the torque.
+    """
     return simulate(
         table_3_1(stiffness, damping),
         Inputs(torque=TorsionBar(torque=torque / DYN_CM_PER_NEWTON_METRE)),
@@ -78,18 +81,18 @@ def launch(
 
 
 def release_time(torque: float, stiffness: float = 1e6, stop_time: float = 1.0) -> float:
-    """Return the time from rest to th2 = 1 rad (s); infinite if the crank falls back before."""
+    """Return the time from rest to th2 = 1 rad (s); infinite if the crank falls back before it gets there."""
     events = launch(torque, stiffness, stop_time).events
     return events[0].time if events else np.inf
 
 
 def accelerated(torque: float, stiffness: float = 1e6) -> Trajectory:
-    """Return a launch up to the end of its torque."""
+    """Run a launch up to th2 = 1 rad, where its torque ends."""
     return launch(torque, stiffness, release_time(torque, stiffness), 1000)
 
 
 def least_torque() -> float:
-    """Find the least T0 (dyn.cm) that turns the crank by 1 rad, to half a per cent."""
+    """Find the least T0 (dyn.cm) that turns the crank from rest by 1 rad, to half a per cent."""
     low, high = 1e5, 1e7
     while high / low > 1.01:
         middle = float(np.sqrt(low * high))
@@ -99,9 +102,9 @@ def least_torque() -> float:
 
 @cache
 def coast(stiffness: float, damping: float = 3e4, rpm: float = SPEED) -> Trajectory:
-    """Run Table 3.1 without torque, released at crank angle 0 from its steady motion at a speed.
+    """Run Table 3.1 without torque, released at crank angle 0 from its steady motion at a speed (rpm).
 
-    The steady motion has the thesis's damper, the free motion has ``damping``.
+    The steady motion has the thesis's damper, the free motion has ``damping`` (dyn.s/cm).
     """
     period, speed = 60.0 / rpm, rpm * RAD_S_PER_RPM
     steady = simulate(table_3_1(stiffness), Inputs(speed=speed), stop_time=20.0 * period, step=period)
@@ -112,16 +115,16 @@ def coast(stiffness: float, damping: float = 3e4, rpm: float = SPEED) -> Traject
 
 @dataclass(frozen=True, slots=True)
 class Turns:
-    """Statistics of each whole turn of a free crank, from samples at evenly spaced crank angles.
+    """Statistics of the whole turns of a free crank, from samples at evenly spaced crank angles.
 
     Attributes
     ----------
     ends : ndarray
-        Time at which the turn ends (s).
+        Time at which each turn ends (s).
     speed, speed_range : ndarray
         Mean crank speed, 2 pi divided by the time of the turn, and range of the crank speed (rad/s).
     slider, slider_range, velocity_range : ndarray
-        Mean and range of the slider position (cm), range of its velocity (cm/s).
+        Mean and range of the slider position (cm), and range of the slider velocity (cm/s).
     first, second : ndarray
         Amplitudes of the first and the second harmonic of the slider position over the crank angle (cm).
     energy_share : ndarray
@@ -140,7 +143,7 @@ class Turns:
 
     @classmethod
     def of(cls, run: Trajectory, start: float = 0.0) -> Turns:
-        """Divide a run into turns, the first from the crank angle ``start`` (rad), and return their statistics."""
+        """Divide a run into turns and return their statistics; the first turn begins at the crank angle ``start`` (rad)."""
         angle = run["crank.angle"]
         times = np.interp(np.arange(start, angle[-1], 2.0 * pi), angle, run.time)
         names = ("slider.position", "slider.velocity", "crank.speed", "energy.kinetic")
@@ -160,16 +163,17 @@ class Turns:
 
     @property
     def shown(self) -> int:
-        """Number of turns until the mean crank speed falls below `HARMONIC_SPEED`."""
+        """Number of turns up to the first whose mean crank speed is below `HARMONIC_SPEED`, this turn included."""
         return 1 + int(np.argmax(self.speed < HARMONIC_SPEED))
 
 
 class Settling(NamedTuple):
-    """How a launch comes to the steady decay of a free crank.
+    """Transition of u after a launch to the steady decay of a free crank.
 
-    Turns and time (s) from the end of the torque until u stays within `ALIKE` of it; greatest distance of u from it in the
-    first and in the last whole turn, relative to its range; greatest ratio of the mean of u to that of the turn before, after
-    that.
+    ``turns`` and ``time`` (s) pass from the end of the torque until u stays within `ALIKE` of the steady decay. ``first`` and
+    ``last`` are the greatest distances of u from the steady decay in the first and in the last whole turn, relative to the
+    range of the steady decay in this turn. ``decay`` is the greatest ratio, after ``turns``, of the mean of u in a turn to the
+    mean in the turn before.
     """
 
     turns: float
@@ -181,14 +185,17 @@ class Settling(NamedTuple):
 
 @cache
 def settling(torque: float, stiffness: float) -> Settling:
-    """Compare u after a launch with that of a free crank at the same crank angle and mean speed of the turn."""
+    """Compare u after a launch with u of a free crank in steady decay.
+
+    The two motions are compared at equal crank angles, in turns of equal mean speed.
+    """
     launched, steady = launch(torque, stiffness), coast(stiffness, rpm=RELEASED[stiffness])
     (after, turns), (known, waves) = (
         (Turns.of(run, 1.0), turn_by_turn(run, "slider.position", 1.0)) for run in (launched, steady)
     )
     found = []
     for speed, turn in zip(after.speed, turns):
-        # the speed of the steady decay falls
+        # the speed falls in the steady decay, and np.interp needs rising abscissas
         wave = np.array([np.interp(-speed, -known.speed, column) for column in waves.T])
         found.append(np.abs(turn - wave) / np.ptp(wave))
     distances = np.array(found)
@@ -201,19 +208,19 @@ def settling(torque: float, stiffness: float) -> Settling:
 
 
 def turn_by_turn(run: Trajectory, output: str, start: float) -> NDArray[np.float64]:
-    """Return an output over each whole turn from the crank angle ``start`` (rad), shape (turns, SAMPLES)."""
+    """Sample an output over each whole turn from the crank angle ``start`` (rad), shape (turns, SAMPLES)."""
     return over_turns(run["crank.angle"], run[output], start)
 
 
 def over_turns(angle: NDArray[np.float64], values: NDArray[np.float64], start: float = 0.0) -> NDArray[np.float64]:
-    """Return values at crank angles (rad) over each whole turn from the angle ``start``, shape (turns, SAMPLES)."""
+    """Sample values, given at crank angles (rad), over each whole turn from the angle ``start``, shape (turns, SAMPLES)."""
     marks = np.arange(start, angle[-1], 2.0 * pi)
     grid = marks[:-1, None] + np.linspace(0.0, 2.0 * pi, SAMPLES, endpoint=False)
     return np.interp(grid, angle, values)
 
 
 def half_natural_frequencies(stiffness: float) -> NDArray[np.float64]:
-    """Return half the slider's natural frequency (rad/s) with the effective mass at each crank angle, at u = 0."""
+    """Return half the slider's natural frequency (rad/s) with the effective mass at each crank angle of a turn, at u = 0."""
     parameters = table_3_1(stiffness)
     p = parameters.constants()
     places = (kinematics.position(angle, 0.0, p) for angle in np.linspace(0.0, 2.0 * pi, 721).tolist())
@@ -235,7 +242,7 @@ def _spring_runs() -> dict[str, Trajectory]:
 def _launch_result(
     number: str, claim: str, runs: Mapping[str, Trajectory], quantity: Quantity, *statements: Statement
 ) -> StudyResult:
-    """Build the result of launches: a quantity over time, and the times at which the torques end."""
+    """Build the result of several launches: a quantity over time, and the times at which their torques end."""
     name, output, factor, unit = quantity
     columns = {TIME: next(iter(runs.values())).time}
     columns |= {f"{name}; {label} [{unit}]": factor * run[output] for label, run in runs.items()}
@@ -244,7 +251,7 @@ def _launch_result(
 
 
 def draw_launches(values: Sequence[float], legend: str, result: StudyResult) -> Figure:
-    """Draw a quantity over time, with a circle at 1 rad, where the torque ends."""
+    """Draw a quantity of several launches over time, with a circle at th2 = 1 rad, where the torque ends."""
     time, *columns = result.columns.values()
     name = list(result.columns)[1]
     curves, circles = [], []
@@ -271,7 +278,7 @@ RISE = (
 
 
 def _rise_cases(runs: Mapping[str, Trajectory]) -> tuple[Case, ...]:
-    """Judge whether the crank speed rises along a line, and whether it peaks before the torque ends."""
+    """Judge whether the crank speed rises linearly, and whether it peaks before the torque ends."""
     bows = [
         at_most(f"distance from a line; {label}", ALIKE, from_line(*_rise_to_peak(run))) for label, run in runs.items()
     ]
@@ -288,13 +295,13 @@ class Peak(NamedTuple):
 
 
 def run_peak(run: Trajectory) -> Peak:
-    """Return the greatest crank speed, between the samples."""
+    """Return the greatest crank speed of a run, interpolated between the samples."""
     time, speed = greatest(run.time, run["crank.speed"])
     return Peak(time, float(np.interp(time, run.time, run["crank.angle"])), speed)
 
 
 def _rise_to_peak(run: Trajectory) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return time and crank speed up to the peak of the speed, relative to their values there."""
+    """Return time and crank speed up to the peak of the speed, each divided by its value at the peak."""
     peak = run_peak(run)
     before = run.time < peak.time
     return np.append(run.time[before] / peak.time, 1.0), np.append(run["crank.speed"][before] / peak.speed, 1.0)
@@ -338,7 +345,10 @@ def _by_mean(pairs: Mapping[str, tuple[Trajectory, Trajectory]], start: float) -
 
 
 def _damper_cases(pairs: Mapping[str, tuple[Trajectory, Trajectory]], start: float) -> tuple[Case, ...]:
-    """Judge whether a free crank loses mean speed only if it has a damper; each pair is a run without it and one with it."""
+    """Judge whether a free crank loses mean speed only if it has a damper.
+
+    Each pair has a run without the damper and a run with it.
+    """
     cases = []
     for label, runs in pairs.items():
         free, damped = (half.max() for half in _second_halves(runs, start))
@@ -348,7 +358,7 @@ def _damper_cases(pairs: Mapping[str, tuple[Trajectory, Trajectory]], start: flo
 
 
 def _launches(torque: float, stiffness: float) -> tuple[Trajectory, Trajectory]:
-    """Return two launches of 3 s, without the damper and with it."""
+    """Run a launch of 3 s without the damper and with it."""
     free, damped = (launch(torque, stiffness, 3.0, 6000, damping) for damping in (0.0, 3e4))
     return free, damped
 
@@ -370,7 +380,7 @@ DECAY = "mean of u relative to the turn before, greatest"
 
 
 def _settled() -> tuple[Case, ...]:
-    """Judge whether the launch with the greatest torque takes the longest to come to a decay, and whether it decays."""
+    """Judge whether the launch with the greatest torque takes longest to reach the steady decay, and whether u then decays."""
     try:
         *sooner, last = (settling(torque, 1e6) for torque in TORQUES)
     except AssemblyError:
@@ -386,7 +396,7 @@ def _settled() -> tuple[Case, ...]:
 
 
 def _swing_growth(runs: Mapping[str, Trajectory]) -> str:
-    """Return words on how much the range of the crank speed grows from a turn to the next."""
+    """Return words on the greatest growth of the range of the crank speed from one turn to the next."""
     most = max(greatest_ratio(Turns.of(run, 1.0).speed_range) for run in runs.values())
     return f"the range of the speed itself grows at first, by up to {100 * (most - 1):.0f} %" if most > 1.0 else ""
 
@@ -434,7 +444,7 @@ def launch_speeds() -> StudyResult:
 
 
 def torque_over_time() -> StudyResult:
-    """Compute the time to 1 rad for each torque, the torque's exponent in the time, and the least sufficient torque."""
+    """Compute the time to 1 rad for each torque, the exponent of the torque as a power of the time, and the least torque."""
     time = np.array([release_time(float(torque)) for torque in TORQUE_RANGE])
     slope = float(np.mean(np.diff(np.log(TORQUES)) / np.diff(np.log([release_time(torque) for torque in TORQUES]))))
     low, scale = least_torque(), TORQUES[-1]
@@ -469,7 +479,10 @@ def torque_over_time() -> StudyResult:
 
 
 def draw_torque_over_time(result: StudyResult) -> Figure:
-    """Draw the torque over time, on linear and logarithmic axes, with lines of exponent -1 and -2 through T0 = 1e8."""
+    """Draw the torque over the time to 1 rad, on linear and on logarithmic axes.
+
+    Lines with the exponents -1 and -2 pass through the point of T0 = 1e8 dyn.cm.
+    """
     torque, time = result.columns["T0 [dyn.cm]"], result.columns["time to 1 rad [s]"]
     hinge, three = float(np.interp(1e8, torque, time)), np.interp(TORQUES, torque, time)
     curves = [
@@ -652,7 +665,7 @@ BOTH = {f"k = {plain(k)} dyn/cm": k for k in (SOFT, STIFF)}
 def _coast_result(
     number: str, claim: str, run: Trajectory, columns: Mapping[str, NDArray[np.float64]], *statements: Statement
 ) -> StudyResult:
-    """Build the result of a free motion from its columns, cut where the figure ends."""
+    """Build the result of a free motion from its columns, up to the last turn that the figure shows."""
     turns = Turns.of(run)
     last = int(np.searchsorted(run.time, turns.ends[turns.shown - 1]))
     return StudyResult(
@@ -750,7 +763,7 @@ def _phase_plane(number: str, stiffness: float, *statements: Statement) -> Study
 
 
 def order_of_chords(run: Trajectory) -> float:
-    """Return the order, in the sampling step, of the distance between the phase-plane curve and its chords."""
+    """Return the order, in the sampling step, with which the distance between phase-plane curve and chords decreases."""
     turns = Turns.of(run)
     shown = run.time < turns.ends[turns.shown - 1]
     u, v = (run[f"slider.{name}"][shown] for name in ("position", "velocity"))
@@ -840,14 +853,14 @@ def soft_phase_plane() -> StudyResult:
 
 
 def linear_ratio(stiffness: float) -> float:
-    """Return the ratio of the second to the first harmonic of u at a constant 27 rad/s by the linear equation."""
+    """Return the ratio of the second to the first harmonic of u by the linear equation, at a constant 27 rad/s."""
     linear = harmonic_balance(slider_equation(table_3_1(stiffness), HARMONIC_SPEED), 8)
     return linear.harmonic(2) / linear.harmonic(1)
 
 
 @cache
 def linear_motion(stiffness: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Integrate the slider's equation, linear about u = u' = 0, with the free crank's motion; return th2 (rad) and u (m)."""
+    """Integrate the slider's equation, linearised about u = u' = 0, along the free crank's motion; return th2 (rad), u (m)."""
     run, p, turns = coast(stiffness), table_3_1(stiffness).constants(), Turns.of(coast(stiffness))
     # half a turn beyond those that are drawn
     n = int(np.searchsorted(run["crank.angle"], 2.0 * pi * (turns.shown + 0.5)))
@@ -884,20 +897,20 @@ def linear_motion(stiffness: float) -> tuple[NDArray[np.float64], NDArray[np.flo
 
 
 def higher_harmonics(turns: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the root of the sum of squares of the harmonics from the second on, over the first, in each row of samples."""
+    """Return the root sum square of the second and all higher harmonics, relative to the first, for each row of samples."""
     sizes = np.abs(np.fft.rfft(turns, axis=1))
     ratios: NDArray[np.float64] = np.linalg.norm(sizes[:, 2:], axis=1) / sizes[:, 1]
     return ratios
 
 
 def drawn_harmonics(stiffness: float) -> NDArray[np.float64]:
-    """Return `higher_harmonics` of u in each turn that is drawn."""
+    """Return the `higher_harmonics` of u in each turn that the figure shows."""
     run = coast(stiffness)
     return higher_harmonics(turn_by_turn(run, "slider.position", 0.0))[: Turns.of(run).shown]
 
 
 def beyond_linear(stiffness: float) -> float:
-    """Return the greatest ratio of `drawn_harmonics` to those of the linear motion."""
+    """Return the greatest ratio of `drawn_harmonics` to the higher harmonics of the linear motion in the same turn."""
     found = drawn_harmonics(stiffness)
     return float((found / higher_harmonics(over_turns(*linear_motion(stiffness)))[: len(found)]).max())
 
@@ -980,7 +993,7 @@ def stiff_phase_plane() -> StudyResult:
 
 
 def draw_phase_plane(result: StudyResult) -> Figure:
-    """Draw the velocity over the position, with the start S and the finish F."""
+    """Draw the slider velocity over the position, with the start S and the finish F."""
     u, v = result.columns.values()
     start = Curve(x=u[:1], y=v[:1], colour="black", line="", marker="s", label="S, start")
     finish = Curve(x=u[-1:], y=v[-1:], colour="black", line="", marker="o", label="F, finish")

@@ -1,4 +1,4 @@
-"""Sections 4.1 to 4.4: verdicts on the linearised equations (4.1) to (4.35), one by one."""
+"""Sections 4.1 to 4.4: verdict on each of the linearised equations (4.1) to (4.35)."""
 
 from __future__ import annotations
 
@@ -24,24 +24,24 @@ from ..statements import Case, Statement, at_least, at_most, near, text
 from ..study import Study, StudyResult, result_curves
 from .runs import SPEED, table_3_1
 
-#: Greatest rounding error, crank lengths sigma2 from which an order is computed, and tolerance of a limit at the shorter one.
+#: Greatest rounding error, crank lengths sigma2 from which an order is computed, tolerance of a limit at the shorter length.
 ROUNDING, SHORT, LIMIT = 1e-9, (0.002, 0.001), 0.01
 TURN = np.linspace(0.0, 2.0 * pi, 361)
-#: sigma3 of the linearised kinematics, the least of Fig 5.3: at sigma3 = 1 its place in (4.8) would not show.
+#: sigma3 of the linearised kinematics, the least in Fig 5.3: with sigma3 = 1 an error in its place in (4.8) would not show.
 COUPLER = 0.8
 #: Speeds (rad/s) and inertia ratios at which the recurrence is solved.
 BALANCED_AT = tuple((speed, ratio) for speed in (10.0, 25.0, 40.0) for ratio in (0.5, 1.0, 1.5))
 
 
 def with_crank(sigma2: float, inertia_ratio: float = 1.0, sigma3: float = 1.0) -> FiveBarParameters:
-    """Return the mechanism of chapters IV and V with another crank and coupler, sigma2 = l2/l4 and sigma3 = l3/l4."""
+    """Return the mechanism of chapters IV and V with other crank and coupler lengths, sigma2 = l2/l4 and sigma3 = l3/l4."""
     mechanism = chapter_4(inertia_ratio)
     rocker = mechanism.rocker_length
     return replace(mechanism, crank_length=sigma2 * rocker, coupler_length=sigma3 * rocker)
 
 
 def angles(parameters: FiveBarParameters, zeta: float = 0.0) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return the angles of coupler and rocker (rad) over a turn with the slider held at zeta."""
+    """Return the angles of coupler and rocker (rad) over a turn with the slider held at u/l4 = ``zeta``."""
     p = parameters.constants()
     places = [kinematics.position(angle, zeta * p.l4, p) for angle in TURN.tolist()]
     coupler, rocker = np.array([kinematics.link_angles(g, p) for g in places]).T
@@ -50,7 +50,10 @@ def angles(parameters: FiveBarParameters, zeta: float = 0.0) -> tuple[NDArray[np
 
 @cache
 def datum(sigma2: float, rocker: float | None = None, sigma3: float = 1.0) -> Datum:
-    """Return the datum: the rocker's angle by (4.1) unless it is given, crank's and coupler's by the closure (4.6)."""
+    """Return the datum angles about which the equations are linearised.
+
+    The rocker's angle follows from (4.1) unless it is given, the angles of crank and coupler from the closure (4.6).
+    """
     swing = angles(with_crank(sigma2, sigma3=sigma3))[1]
     middle = 0.5 * (swing.max() + swing.min()) if rocker is None else rocker
 
@@ -63,7 +66,7 @@ def datum(sigma2: float, rocker: float | None = None, sigma3: float = 1.0) -> Da
 
 
 def deviations(sigma2: float) -> tuple[float, float]:
-    """Return the greatest errors of xi3 and xi4 (rad) by (4.8) over a turn, with the slider at zeta = sigma2/2."""
+    """Return the greatest errors of xi3 and xi4 (rad) by (4.8) over a turn, with the slider held at zeta = sigma2/2."""
     zeta = 0.5 * sigma2
     true = angles(with_crank(sigma2, sigma3=COUPLER), zeta)
     start = datum(sigma2, sigma3=COUPLER)
@@ -73,14 +76,14 @@ def deviations(sigma2: float) -> tuple[float, float]:
 
 
 def _by_print(sigma2: float, zeta: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return xi3 and xi4 (rad) by (4.8) over a turn."""
+    """Return xi3 and xi4 (rad) by (4.8) as printed, over a turn."""
     alpha, a3, a4 = datum(sigma2, sigma3=COUPLER)
     by_rocker, by_coupler = (cos(a) * zeta - sigma2 * np.cos(TURN - a) + sigma2 * cos(alpha - a) for a in (a4, a3))
     return by_rocker / (COUPLER * sin(a4 - a3)), by_coupler / sin(a4 - a3)
 
 
 def eliminations(sigma2: float) -> dict[str, float]:
-    """Return the greatest residuals of (4.5) and (4.7) over a turn with xi3 and xi4 by (4.8), relative to sigma2."""
+    """Return the greatest residuals of (4.5) and (4.7) over a turn, relative to sigma2, for xi3 and xi4 by (4.8)."""
     zeta = 0.5 * sigma2
     (alpha, a3, a4), (xi3, xi4) = datum(sigma2, sigma3=COUPLER), _by_print(sigma2, zeta)
     x, y = sin(a4) * xi4 - COUPLER * sin(a3) * xi3 - zeta, COUPLER * cos(a3) * xi3 - cos(a4) * xi4
@@ -93,9 +96,9 @@ def eliminations(sigma2: float) -> dict[str, float]:
 
 
 def residuals() -> dict[str, float]:
-    """Return the residual of each equation (4.10) to (4.20) in a motion of the plant, relative to its greatest term.
+    """Return the greatest residual of each equation (4.10) to (4.20) in a motion of the plant, relative to the largest term.
 
-    The plant is Table 3.1 without gravity, whose coupler has mass and whose rocker is not balanced.
+    The plant is Table 3.1 without gravity; its coupler has mass and its rocker is not balanced.
     """
     par, w = table_3_1(1e6, gravity=0.0), SPEED * RAD_S_PER_RPM
     p, worst = par.constants(), dict[str, float]()
@@ -127,7 +130,10 @@ def residuals() -> dict[str, float]:
 
 
 def coefficients(sigma2: float, inertia_ratio: float = 1.0) -> dict[str, float]:
-    """Return the coefficients of (4.21) as printed, about its own datum, relative to the right ones of first order."""
+    """Return the coefficients of (4.21) as printed, each divided by the correct coefficient of first order.
+
+    The printed coefficients are evaluated at the datum of (4.1).
+    """
     mechanism = with_crank(sigma2, inertia_ratio)
     right = slider_equation(mechanism, 1.0, variant=Variant.FIRST_ORDER)
     parts = printed(ratios(mechanism), datum(sigma2))
@@ -147,7 +153,7 @@ def coefficients(sigma2: float, inertia_ratio: float = 1.0) -> dict[str, float]:
 
 
 def constant_parts() -> dict[str, float]:
-    """Return |h0|/k0 and |g0|/k0 by the right equation, for mechanisms of chapter V and rig 2."""
+    """Return |h0|/k0 and |g0|/k0 of the correct equation, for mechanisms of chapter V and for rig 2."""
     found = {}
     for words, mechanism in (
         ("I4 = 2", chapter_4(2.0)),
@@ -162,13 +168,13 @@ def constant_parts() -> dict[str, float]:
 
 
 def scanned_mean(inertia_ratio: float) -> float:
-    """Return Q1/A1 by the term of Q1 in the scan that is left if the coupler has no mass: p45 sigma2 I4 cos(alpha3)."""
+    """Return Q1/A1 with the only term of Q1 in the scan that remains without coupler mass: p45 sigma2 I4 cos(alpha3)."""
     r = ratios(chapter_4(inertia_ratio))
     return r.p45 * r.sigma2 * r.inertia_ratio * cos(DATUM.coupler) / printed(r).spring.mean
 
 
 def _first_order_quotient(part: FourierSeries, by: FourierSeries) -> tuple[float, float, float]:
-    """Return the mean and the first cosine and sine of the quotient of two series, to first order."""
+    """Return the mean and the first cosine and sine coefficients of the quotient of two series, to first order."""
     mean = part.mean / by.mean
     return mean, *((x[1] - mean * y[1]) / by.mean for x, y in ((part.cos, by.cos), (part.sin, by.sin)))
 
@@ -176,7 +182,7 @@ def _first_order_quotient(part: FourierSeries, by: FourierSeries) -> tuple[float
 def expansion(sigma2: float) -> dict[str, NDArray[np.float64]]:
     """Return the errors of the expansions (4.23) to (4.28) of S/I, K/I and F/I, with the coefficients of (4.21), by name.
 
-    Each is given by the magnitudes of its complex Fourier coefficients: mean, first and second harmonic; shape (3,).
+    Each error is given by the magnitudes of its complex Fourier coefficients: mean, first and second harmonic; shape (3,).
     """
     parts = printed(ratios(with_crank(sigma2)))
     kept, angle = convert(parts, Form.SERIES), np.linspace(0.0, 2.0 * pi, 64, endpoint=False)
@@ -189,7 +195,10 @@ def expansion(sigma2: float) -> dict[str, NDArray[np.float64]]:
 
 
 def recurrence(equation: SliderEquation, mean: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return A and B of (4.33) by (4.34) and (4.35), with ``mean`` in place of lambda_c; without a damper this is (4.32)."""
+    """Return the matrix A and the right side B of (4.33) by (4.34) and (4.35), with ``mean`` in place of lambda_c.
+
+    Without a damper this is (4.32).
+    """
     s, d, k, f = (
         equation.spring_factor,
         equation.damping_factor,
@@ -214,9 +223,9 @@ def recurrence(equation: SliderEquation, mean: float) -> tuple[NDArray[np.float6
 
 
 def balanced(omega_c: float, as_printed: bool = True) -> float:
-    """Return the greatest relative error of the solution of (4.34) against the balance of (4.29), at `BALANCED_AT`.
+    """Return the greatest relative error of the solution of (4.34), compared with the balance of (4.29), at `BALANCED_AT`.
 
-    If it is not taken as printed, (4.34) has lambda_c k0 in place of lambda_c.
+    If ``as_printed`` is False, (4.34) has lambda_c k0 in place of lambda_c.
     """
     errors = []
     for speed, ratio in BALANCED_AT:
@@ -389,7 +398,10 @@ def compute() -> StudyResult:
 
 
 def _first_order_series(parts: Coefficients) -> tuple[FourierSeries, ...]:
-    """Return M, K and F from the thesis's coefficients, divided by the spring's factor to first order."""
+    """Return the series of M, K and F: the thesis's coefficients of inertia, stiffness and force divided by that of the spring.
+
+    The quotients are taken to first order and have one harmonic.
+    """
     return tuple(
         FourierSeries(np.array([mean, c]), np.array([0.0, s]))
         for mean, c, s in (

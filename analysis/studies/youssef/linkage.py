@@ -1,7 +1,7 @@
-"""Picture and animation of the linkage.
+"""Picture and animation of the linkage of Table 3.1.
 
-Table 3.1 runs at 420 rpm from the thesis's start, th2 = u = u' = 0, with a coupler point P of ours. Within a few turns
-the slider reaches its steady motion, and P its steady path.
+It runs at 420 rpm from the thesis's start, th2 = u = u' = 0, with a coupler point P that we chose. Within a few turns the
+slider reaches its steady motion, and P its steady path.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ def run() -> Trajectory:
 
 
 def compute() -> StudyResult:
-    """Compute the positions of slider and coupler point."""
+    """Compute the positions of slider and coupler point over the run."""
     t = run()
     return StudyResult(
         number=NUMBER,
@@ -61,7 +61,7 @@ def draw(result: StudyResult) -> Figure:
 
 
 def animate(result: StudyResult, path: Path) -> Path:
-    """Animate the whole run."""
+    """Animate the whole run and write the animation to ``path``."""
     return animate_linkage(MECHANISM, run(), path, frames=72, title=result.heading)
 
 

@@ -1,9 +1,9 @@
 """Fig 6.11: the packaging machine.
 
-The coupler point pushes packages along a straight line within 120 degrees of crank rotation and returns past nineteen
-points. The printed linkage travels 175.5 cm on a part that is flat to 5.5 cm, and comes within 10.5 degrees of a dead
-position. Ours is flat to 2.5 cm over 144 cm, has less than half the area, and keeps 40 degrees. The text does not tell
-the flatness that the thesis requires.
+The coupler point pushes packages along a straight line within 120 degrees of crank rotation and returns past nineteen points.
+The printed linkage travels 175.5 cm along a part that is flat to 5.5 cm, and comes within 10.5 degrees of a dead position. Our
+linkage is flat to 2.5 cm over 144 cm, its quality function (an area) is less than half as large, and it stays 40 degrees away
+from dead positions. The text does not say how flat the part must be.
 """
 
 from __future__ import annotations
@@ -46,7 +46,10 @@ TRAVEL_CM = 154.0
 
 
 def nineteen_points() -> FloatArray:
-    """Return the ten points of the listing and the midpoints of all sides but the one of 4 cm, shape (19, 2) in m."""
+    """Return the nineteen desired points, shape (19, 2) in m.
+
+    They are the ten points of the listing and the midpoints of all sides of their polygon except the side of 4 cm.
+    """
     corners = packaging_path().points
     ahead = np.roll(corners, -1, axis=0)
     middles = np.where(np.hypot(*(ahead - corners).T)[:, None] > 0.05, 0.5 * (corners + ahead), np.nan)
@@ -55,7 +58,7 @@ def nineteen_points() -> FloatArray:
 
 
 def region(distance: float) -> dict[str, FloatArray]:
-    """Return the bounds of the region within a distance of the desired path (m), as columns in cm."""
+    """Return the bounds of the region that lies within a distance (m) of the desired path, as columns in cm."""
     import shapely
 
     polygon = shapely.Polygon(packaging_path().points)
@@ -68,9 +71,9 @@ def region(distance: float) -> dict[str, FloatArray]:
 
 
 def straightest(curve: FloatArray) -> tuple[Straightness, int]:
-    """Return the straightest part of a curve of N points (m) relative to its length, and its number of points.
+    """Return the part of a curve of N points (m) with the least flatness error per length, and the number of points in it.
 
-    The parts compared lie within 120 degrees of rotation and are at least as long as AB, along the line.
+    The parts compared lie within 120 degrees of crank rotation and are at least as long as the travel AB, along the line.
     """
     greatest = round(N * PACKAGING_ROTATION / (2.0 * pi)) + 1
     parts = ((part, count) for count in range(2, greatest + 1) for part in straight_parts(curve, count, direction=0.0))
@@ -79,7 +82,7 @@ def straightest(curve: FloatArray) -> tuple[Straightness, int]:
 
 
 def compute() -> StudyResult:
-    """Compute the region and the linkages, the quality function of the nineteen points, and the straight part."""
+    """Compute the region, both linkages, the quality function of the nineteen points, and the straight part."""
     p, ours, desired = PROBLEMS["packaging"], best("packaging"), nineteen_points()
     curves = {"printed": p.linkage.path(turn(N)), "ours": ours.linkage.path(turn(N))}
     # with the window of 2 that the program has for its ten points the pairing lags behind on the long sides
@@ -154,7 +157,7 @@ def compute() -> StudyResult:
 
 
 def draw(result: StudyResult) -> Figure:
-    """Draw region, points and curves (a), the straight parts with y enlarged, and the linkages (b)."""
+    """Draw the region, the points and the curves (a), the straight parts with y enlarged, and the linkages (b)."""
     bounds = [shape_curve(result, f"{name} bound", colour="0.55", line="--", width=0.8) for name in ("outer", "inner")]
     points = shape_curve(result, "nineteen points", label="nineteen points", colour=TARGET, line="", marker="o")
     line = Curve(

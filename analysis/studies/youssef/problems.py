@@ -1,9 +1,9 @@
-"""The problems of the thesis's chapter VI (linkages in appendix 5), converted from cm and degrees to SI.
+"""Problems of chapter VI of the thesis, with the linkages of appendix 5, converted from cm and degrees to SI.
 
-`PROBLEMS` maps a name to a `PublishedProblem`. The thesis bounds only the lengths of one problem. Its other problems are
-ill-posed: the error tends to zero as the links grow. Each is therefore stated here with no link longer than the longest
-of the printed linkage, and with a least transmission angle of 40 degrees, or, for rocker functions, whose target fixes
-this angle, with a fully turning crank.
+`PROBLEMS` maps a name to a `PublishedProblem`. The thesis bounds the lengths of only one problem. Its other problems are
+ill-posed: the error tends to zero as the links grow. Here each of these is therefore stated with two constraints of ours. No
+link is longer than the longest of the printed linkage. The transmission angle is at least 40 degrees, or, for rocker functions,
+whose target fixes this angle, the crank turns fully.
 
 >>> problem = PROBLEMS["ellipse-a"]
 >>> round(problem.linkage_error(problem.linkage), 2)
@@ -41,7 +41,7 @@ from ...units import CM_PER_METRE
 
 CM2_PER_M2 = CM_PER_METRE**2
 DEG2_PER_RAD2 = degrees(1.0) ** 2
-#: Weight of the weighted rocker function from 60 to 260 degrees; the thesis divides its error by it.
+#: Weight of the weighted rocker function from 60 to 260 degrees; the thesis divides the error by this weight.
 WEIGHT = 1000.0
 #: Numbers of crank angles for timed paths and the rocker function, and for the weighted one. N is printed for the paths only.
 N, WEIGHTED_N = 72, 24
@@ -51,19 +51,19 @@ AREA_N = 360
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class PublishedProblem:
-    """Problem of synthesis with the printed linkage.
+    """Synthesis problem of the thesis with its printed linkage.
 
     Attributes
     ----------
     task : Task
     bounds : mapping
-        As `synthesize` takes them.
+        Bounds on the dimensions, as `synthesize` takes them.
     constraints : tuple
-        As `synthesize` takes them; ours, except for the bounds.
+        Constraints, as `synthesize` takes them; they are ours, except for the bounds.
     printed : Linkage
-        With the printed digits.
+        Linkage with the printed digits.
     mended : Linkage, optional
-        With its misprints mended, if it has any.
+        Linkage with its misprints mended, if it has any.
     error : float or None
         Printed error, in ``unit``.
     goal : float
@@ -73,6 +73,7 @@ class PublishedProblem:
     per_si : float
         Number of this unit in one m2 or rad2.
     source : str
+        Place in the thesis.
     """
 
     task: Task
@@ -88,15 +89,15 @@ class PublishedProblem:
 
     @property
     def linkage(self) -> Linkage:
-        """The printed linkage with its misprints mended."""
+        """The printed linkage with its misprints mended, if it has any."""
         return self.mended or self.printed
 
     def convert(self, error: float) -> float:
-        """Convert an error from SI to the unit of print."""
+        """Convert an error from SI to ``unit``."""
         return self.per_si * error
 
     def linkage_error(self, linkage: Linkage) -> float:
-        """Return the error of a linkage in the unit of print, infinite if its links cannot be joined."""
+        """Return the error of a linkage in ``unit``, infinite if its links cannot be joined."""
         if isinstance(self.task, UntimedPath):
             curve = linkage.path(turn(AREA_N))
             return self.convert(area_difference(curve, self.task.path)) if np.isfinite(curve).all() else np.inf
@@ -104,7 +105,10 @@ class PublishedProblem:
 
 
 def ellipse(semi_axis_cm: float, n: int) -> NDArray[np.float64]:
-    """Return the target ellipse about (20, 15) cm, with a given semi-axis along x and 5 cm along y, shape (n, 2) in m."""
+    """Return n points of the target ellipse about (20, 15) cm, shape (n, 2) in m.
+
+    The semi-axis along x is given in cm, the semi-axis along y is 5 cm.
+    """
     phi = turn(n)
     return np.column_stack([20.0 + semi_axis_cm * np.cos(phi), 15.0 + 5.0 * np.sin(phi)]) / CM_PER_METRE
 
@@ -112,8 +116,9 @@ def ellipse(semi_axis_cm: float, n: int) -> NDArray[np.float64]:
 def rocker_function(n: int, *, weighted: bool = False, mounting: bool = False) -> RockerFunction:
     """Return the function th4* = 70 + 100 |sin(th/2)| degrees at n crank angles, optionally weighted by `WEIGHT`.
 
-    The window is 60 to 260 degrees with both ends. The thesis prints 60 < omega t < 260, but the error comes nearest to its
-    35.0 with 60 included, at N = 24 and within the window alone.
+    With ``mounting`` the output may be mounted on the rocker at any angle. The weighted window is 60 to 260 degrees, with both
+    ends. The thesis prints 60 < omega t < 260, but the error comes nearest to its 35.0 with 60 included, at N = 24 and within
+    the window alone.
     """
     phi = turn(n)
     # in whole numbers, so that the ends of the window are exact
@@ -140,23 +145,23 @@ PACKAGING_POINTS_CM = (
     (128.0, 34.5),
 )
 PACKAGING_OFFSET_CM = (51.0, 350.0)
-#: Least travel on the straight part, and its greatest flatness.
+#: Least travel on the straight part, and the greatest deviation from straightness there.
 PACKAGING_TRAVEL, PACKAGING_FLATNESS = 144.0 / CM_PER_METRE, 2.5 / CM_PER_METRE
 #: Crank rotation of the straight part.
 PACKAGING_ROTATION = radians(120.0)
 
 
 def packaging_path() -> TargetPath:
-    """Return the closed polygon of the ten points."""
+    """Return the closed polygon of the ten points of the packaging machine."""
     return TargetPath(points=(np.array(PACKAGING_POINTS_CM) + PACKAGING_OFFSET_CM) / CM_PER_METRE, closed=True)
 
 
 def _packaging() -> UntimedPath:
-    # the points (160, 0) and (50, 0) give way to the ends of the straight part, half a centimetre more than the travel asked
-    # and clear of the corners: the polygon is the same
+    # the ends of the straight part replace the points (160, 0) and (50, 0); they are half a centimetre farther apart than the
+    # required travel, and clear of the corners, so that the polygon is the same
     points = np.array([*PACKAGING_POINTS_CM[:2], (159.5, 0.0), (15.0, 0.0), *PACKAGING_POINTS_CM[4:]])
     path = TargetPath(points=(points + PACKAGING_OFFSET_CM) / CM_PER_METRE, closed=True)
-    # flatness is kept at the stations: a reserve for what is between them
+    # the flatness is constrained at the stations only: keep a reserve for the curve between them
     straight = Straight(start=2, end=3, rotation=PACKAGING_ROTATION, flatness=0.9 * PACKAGING_FLATNESS)
     return UntimedPath(path=path, straight=straight)
 
@@ -168,7 +173,7 @@ def _linkage(
     angles_deg: tuple[float, float, float],
     branch: int = 1,
 ) -> Linkage:
-    """Build a linkage from X0, Y0; l1 ... l4; r; a1, th20, a2."""
+    """Build a linkage from the printed numbers: X0, Y0; l1 to l4; r; a1, th20, a2 (cm, deg)."""
     l1, l2, l3, l4 = links_cm
     a1, th20, a2 = angles_deg
     return Linkage(
@@ -193,12 +198,12 @@ _ROCKER = _linkage((0.0, 0.0), (5.083, 2.615, 4.148, 3.75), 0.0, (0.0, 41.88, 0.
 _WEIGHTED = _linkage((0.0, 0.0), (15.65, 6.91, 11.77, 11.56), 0.0, (0.0, 42.74, 0.0))
 _PATH_A = _linkage((154.85, -62.54), (80.216, 5.03, 139.25, 129.46), 77.75, (-93.22, 100.41, 113.83))
 _PATH_B = _linkage((-49.13, 144.98), (142.576, 8.18, 152.743, 183.443), 147.38, (-3.062, -31.19, -136.04))
-# no th20 is printed: an untimed path needs none. The only one with C to the right of B -> D
+# no th20 is printed, since an untimed path needs none. This is the only linkage with C to the right of B -> D
 _PACKAGING = _linkage((94.53, -48.55), (137.54, 36.05, 134.05, 40.06), 435.15, (116.73, 0.0, 345.01), branch=-1)
 
 
 def _capped(linkage: Linkage) -> tuple[Constraint, ...]:
-    """Return the usual constraints, with no link longer than the longest of this linkage."""
+    """Return the usual constraints, and the bound that no link is longer than the longest of ``linkage``."""
     return (LargestLink(length=linkage.largest_link), *USUAL)
 
 
@@ -226,7 +231,7 @@ PROBLEMS: Mapping[str, PublishedProblem] = MappingProxyType(
             bounds=MappingProxyType(
                 {
                     **dict.fromkeys(("ground_length", "coupler_length", "rocker_length"), (0.1, 0.3)),
-                    # l2 <= 10 cm; a link of no length is none
+                    # l2 <= 10 cm; the least length excludes a crank of length zero
                     "crank_length": (1e-3, 0.1),
                     "point_distance": (0.0, 0.3),
                 }

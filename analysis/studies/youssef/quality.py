@@ -1,9 +1,10 @@
-"""Methods of sections 6.2 and 6.3 without a figure: the combined quality function and the constraint of assembly.
+"""Methods of sections 6.2 and 6.3 that have no figure: the combined quality function and the constraint of assembly.
 
-The quality functions of a path in time and of the area between the curves may be added. For ellipse (a) the sum is
-minimised with no link longer than the longest of either printed linkage, by the thesis's downhill simplex. It starts from our
-optimum for the area and from our two for the path in time, one for each limit of the links. A linkage found for the path alone
-gets its best crank phase: the thesis keeps th20 there although the area does not depend on it (L4700).
+The quality functions of a timed path and of the area between the curves may be added. For ellipse (a) the thesis's downhill
+simplex minimises the sum; no link may be longer than the longest link of the two printed linkages. It is started three times:
+from our optimum for the area, and from our optima for the timed path, under this limit and under the longest link of the
+printed linkage for the timed path. A linkage found for the area alone gets its best crank phase; the thesis optimises th20 in
+this case too, although the area does not depend on it (L4700).
 """
 
 from __future__ import annotations
@@ -29,7 +30,7 @@ from .problems import AREA_N, CM2_PER_M2, PROBLEMS
 NUMBER = "quality"
 TIMED, PATH = PROBLEMS["ellipse-a"], PROBLEMS["path-a"]
 LONGEST = max(TIMED.linkage.largest_link, PATH.linkage.largest_link)
-#: Evaluations of a simplex, number of restarts, and its size relative to the dimensions.
+#: Evaluations of a simplex, number of its runs, and its size relative to the dimensions.
 EVALUATIONS, ROUNDS, SIZE = 1500, 3, 0.01
 #: Error of a linkage outside the limits (cm2); least length (m) and most steps of a descent.
 REFUSED, SHORTEST, STEPS = 1e6, 1e-6, 60
@@ -40,14 +41,14 @@ SAMPLES = 10_000
 
 
 class Quality(NamedTuple):
-    """Quality functions of a linkage: sum of squared distances in time, and area between the curves (cm2)."""
+    """Quality functions of a linkage: sum of squared distances of the timed path, and area between the curves (cm2)."""
 
     timed: float
     area: float
 
     @property
     def combined(self) -> float:
-        """Their sum."""
+        """Sum of both quality functions (cm2)."""
         return self.timed + self.area
 
 
@@ -59,7 +60,7 @@ def both(linkage: Linkage) -> Quality:
 
 
 def in_time(linkage: Linkage) -> Linkage:
-    """Return the linkage with the crank phase of least error for the timed ellipse."""
+    """Return the linkage with the crank phase that makes its error for the timed ellipse least."""
 
     def error(phase: float) -> float:
         return evaluate(TIMED.task, replace(linkage, crank_phase=phase)).error
@@ -71,7 +72,7 @@ def in_time(linkage: Linkage) -> Linkage:
 
 
 def least_combined(start: Linkage) -> Linkage:
-    """Minimise the combined error by the downhill simplex from a linkage; return the linkage found."""
+    """Minimise the combined quality function by the downhill simplex from a linkage; return the linkage found."""
     unit = np.maximum(np.abs(start.vector), 0.05)
 
     def linkage(x: FloatArray) -> Linkage:
@@ -93,7 +94,7 @@ def least_combined(start: Linkage) -> Linkage:
 
 
 def below(name: str) -> float:
-    """Return the error to which a descent from a printed linkage leads (unit of print)."""
+    """Return the error (unit of print) at the end of a descent that starts from the printed linkage of a problem."""
     p, longest = PROBLEMS[name], PROBLEMS[name].linkage.largest_link
     unit = np.append(np.full(7, longest), np.ones(3))
     bounds = {**dict.fromkeys((*LINKS, "point_distance"), (SHORTEST, longest)), **p.bounds}
@@ -110,7 +111,11 @@ def below(name: str) -> float:
 
 @cache
 def linkages() -> dict[str, Linkage]:
-    """Return the linkages compared, by name: printed for the timed ellipse and for the path, ours for each and for the sum."""
+    """Return the linkages compared, by name.
+
+    They are the printed linkages for the timed ellipse and for the path, and our linkages for the timed ellipse, for the path
+    and for the sum of both quality functions.
+    """
     limits = (*USUAL, LargestLink(length=LONGEST))
     timed = synthesize(TIMED.task, TIMED.bounds, limits, search=SEARCH).best.linkage
     ours = {"ours; timed": timed, "ours; path": in_time(best("path-a").linkage)}
@@ -120,32 +125,32 @@ def linkages() -> dict[str, Linkage]:
 
 
 def arguments(seed: int = 64) -> FloatArray:
-    """Return the argument of the square root (6.12) of random four-bars at 72 crank angles, shape (SAMPLES, 72)."""
+    """Return the argument of the square root in (6.12) for random four-bars at 72 crank angles, shape (SAMPLES, 72)."""
     l1, l2, l3, l4 = np.random.default_rng(seed).uniform(0.1, 1.0, (4, SAMPLES, 1))
     span = l1**2 + l2**2 - 2.0 * l1 * l2 * np.cos(turn(72))
     return np.asarray(4.0 * l4**2 * span - (l3**2 - l4**2 - span) ** 2)
 
 
 def least_away_from_ends() -> int:
-    """Count the random four-bars whose argument is least at another angle than 0 or 180 deg."""
+    """Count the random four-bars whose argument (6.12) is least at a crank angle other than 0 or 180 deg."""
     found = arguments()
     return int((found.min(axis=1) < found[:, [0, 36]].min(axis=1) - 1e-12).sum())
 
 
 def wrong_by_extremes() -> int:
-    """Count the random four-bars of which the two extremes say otherwise than all crank angles whether they close."""
+    """Count the random four-bars for which a test at 0 and 180 deg is wrong on whether they close at all crank angles."""
     closes = arguments() >= 0.0
     return int((closes[:, [0, 36]].all(axis=1) != closes.all(axis=1)).sum())
 
 
 def late_violations() -> float:
-    """Return the share of the random four-bars that close at the first crank angle, but not at every later one."""
+    """Return the fraction of random four-bars that close at the first crank angle, but not at every later one."""
     found = arguments()
     return float(np.mean((found[:, 0] >= 0.0) & (found < 0.0).any(axis=1)))
 
 
 def compute() -> StudyResult:
-    """Compute both quality functions of the linkages."""
+    """Compute both quality functions of the linkages, and judge the statements."""
     q = {name: both(linkage) for name, linkage in linkages().items()}
     found, timed, path = q["ours; combined"], q["ours; timed"], q["ours; path"]
     columns = {
@@ -240,7 +245,7 @@ def compute() -> StudyResult:
 
 
 def draw(result: StudyResult) -> Figure:
-    """Draw the area against the timed error of each linkage."""
+    """Draw the area over the error of the timed path, one mark for each linkage."""
     looks = {"printed": COLOURS[1], "ours": COLOURS[0]}
     curves, labels = [], []
     for name, marker in zip(linkages(), "osos^"):

@@ -1,6 +1,7 @@
 """First region of instability of the mechanisms of chapters IV and V, by four methods.
 
-The methods are the true orbit, the corrected linear equation, and the thesis's coefficients as printed and as listed.
+The methods are the true orbit, the corrected linear equation, and the thesis's coefficients as printed and as listed in its
+program.
 """
 
 from __future__ import annotations
@@ -33,7 +34,7 @@ def crank_speed(lambda_k2: float) -> float:
 
 
 def axis(region: Region) -> float:
-    """Return the axis of a region: A = omega/omega_k in its middle."""
+    """Return the axis A of a region: omega/omega_k in its middle."""
     return 1.0 / sqrt(0.5 * (region.low + region.high))
 
 
@@ -41,19 +42,19 @@ def axis(region: Region) -> float:
 def equation(
     parameters: FiveBarParameters, variant: Variant = Variant.EXACT, form: Form = Form.STABILITY
 ) -> PeriodicEquation:
-    """Return the slider's undamped linear equation, which without gravity is the same at any speed."""
+    """Return the slider's undamped linear equation; without gravity it is the same at any crank speed."""
     undamped = replace(parameters, slider_damping=0.0)
     return slider_equation(undamped, crank_speed(0.25), variant=variant, form=form).homogeneous()
 
 
 def hill(parameters: FiveBarParameters, number: int = 1, variant: Variant = Variant.EXACT) -> Region:
-    """Return the region N = ``number`` by Hill's determinant, eq (5.35)."""
+    """Return the region of instability N = ``number`` by Hill's determinant, eq (5.35)."""
     return hill_regions(equation(parameters, variant), number)[number]
 
 
 @cache
 def right(parameters: FiveBarParameters) -> Region:
-    """Return the first region of the true periodic orbit, searched near the region of the linear equation."""
+    """Return the first region of the true periodic orbit; the search starts near the region of the linear equation."""
     test = orbit_test(lambda lambda_k2, _: (parameters, Drive(speed=crank_speed(lambda_k2))), -1)
     linear = hill(parameters)
     found = scan(lambda x: test(x, 0.0), linear.low - 0.5 * linear.width, linear.high + 0.5 * linear.width, samples=8)
@@ -62,14 +63,14 @@ def right(parameters: FiveBarParameters) -> Region:
 
 
 def first_order(parameters: FiveBarParameters, variant: Variant) -> Region:
-    """Return the first region by eq (5.16), with the coefficients of a variant."""
+    """Return the first region by eq (5.16), with the coefficients of a variant of the equation."""
     region = perturbed_region(equation(parameters, variant, Form.SERIES), 1, order=1)
     assert region is not None, "there is no damping"
     return region
 
 
 def appendix_3(parameters: FiveBarParameters) -> Region:
-    """Return the first region by eq (5.16) as listed: without 1/k0 in the half width, and with a sine for a cosine."""
+    """Return the first region by eq (5.16) as listed in appendix 3: no 1/k0 in the half width, and a sine for a cosine."""
     region = first_order(parameters, Variant.APPENDIX_3)
     middle = 0.5 * (region.low + region.high)
     half = 0.5 * region.width * equation(parameters, Variant.APPENDIX_3, Form.SERIES).factor.mean

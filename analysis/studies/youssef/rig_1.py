@@ -1,4 +1,4 @@
-"""Rig 1: the motions about resonance, where it could not be run, and what friction explains of the amplitudes."""
+"""Rig 1: the motions about resonance, where the rig could not be run, and the effect of friction on the amplitudes."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ from .rigs import (
 
 #: Step of the sweeps (rpm).
 STEP = 10.0
-#: Speeds (rpm) up to which each spring was run, since the guide was too short for more, as printed.
+#: Highest speed (rpm) at which each spring was run, as printed; the guide was too short for greater amplitudes.
 STOPPED = {"A": "500", "B": "800"}
 #: Special points; branches with spring B: up to 900 rpm, beyond it from the low and the high end, and one of twice the period.
 SPECIAL = "fold and period doublings"
@@ -46,7 +46,7 @@ NAMES = ("below resonance", "lower branch", "upper branch", "period of two turns
 
 @cache
 def swept(spring: str, rising: bool) -> Sweep:
-    """Sweep the speed up or down in steps, with spring A over all speeds, with spring B about resonance."""
+    """Sweep the speed up or down in steps: with spring A over all speeds, with spring B about resonance."""
     low, step = (SLOWEST, 25.0) if spring == "A" else (SPLIT, STEP)
     speeds = np.arange(low, FASTEST[spring] + 1.0, step) * RAD_S_PER_RPM
     return sweep(rig(spring), speeds if rising else speeds[::-1])
@@ -65,7 +65,7 @@ def upper_orbit(speed: float) -> PeriodicOrbit:
 
 
 def compute_rig_1() -> StudyResult:
-    """Compute branches of periodic motions, and sweeps with rising and falling speed."""
+    """Compute the branches of periodic motions, and sweeps with rising and falling speed."""
     columns = branch_columns(motions("A").branches[0], "spring A")
     for name, branch in zip(NAMES, motions("B").branches + resonant_b().branches):
         columns |= branch_columns(branch, f"spring B; {name}")
@@ -122,13 +122,19 @@ def compute_rig_1() -> StudyResult:
 
 
 def _turns_to_stop(spring: str) -> dict[float, Turn]:
-    """Return turns of the motion by speed (rpm), every 5 rpm from the figures' lowest to that at which the rig was stopped."""
+    """Return turns of the steady motion by speed (rpm), in steps of 5 rpm.
+
+    They begin at the lowest speed of the figures and end at the speed at which the rig was stopped.
+    """
     speeds = np.arange({"A": 240.0, "B": 500.0}[spring], float(STOPPED[spring]) + 1.0, 5.0).tolist()
     return {w: turn(spring, w) for w in speeds}
 
 
 def _displacements(spring: str) -> tuple[float, float, float]:
-    """Return the greatest displacement (cm) at the speed at which the rig was stopped, that below it, and its speed (rpm)."""
+    """Return the greatest displacement (cm) at the speed where the rig was stopped, and the greatest at all lower speeds (cm).
+
+    The third result is the speed (rpm) of the greatest displacement at lower speeds.
+    """
     found = {w: float(np.abs(slider(of)).max()) for w, of in _turns_to_stop(spring).items()}
     _, there = found.popitem()
     at = max(found, key=found.__getitem__)
@@ -136,7 +142,7 @@ def _displacements(spring: str) -> tuple[float, float, float]:
 
 
 def draw_rig_1(result: StudyResult) -> Figure:
-    """Draw the amplitude over the speed: spring A, spring B up to resonance, and the motions about resonance."""
+    """Draw the amplitude over the speed: spring A, spring B up to resonance, and spring B about resonance."""
     below = [c for n in NAMES[:2] for c in curves_over_speed(result, f"spring B; {n}", COLOURS[0])]
     about = [c for n, colour in zip(NAMES[1:], COLOURS) for c in curves_over_speed(result, f"spring B; {n}", colour, n)]
     for name, label, line, marker, colour in (
@@ -178,13 +184,13 @@ PIN_RADIUS = 3e-4
 
 
 def lowered(spring: str, **changes: float) -> NDArray[np.float64]:
-    """Return the relative decrease of the amplitude by changes of the rig's parameters, at the speeds `COMPARED`."""
+    """Return the relative decrease of the amplitude at the speeds `COMPARED` if parameters of the rig are changed."""
     speeds = COMPARED[spring]
     return np.array([1.0 - amplitude(turn(spring, w, **changes)) / amplitude(turn(spring, w)) for w in speeds])
 
 
 def lag(spring: str, speed: float, coefficient: float) -> float:
-    """Return the delay (deg of crank angle) at which the motion without friction agrees best with that with friction."""
+    """Return the delay (deg of crank angle) of the motion with friction behind the motion without it, by correlation."""
     rough, smooth = (slider(turn(spring, speed, slider_friction_coefficient=c))[:-1] for c in (coefficient, 0.0))
     together = np.fft.irfft(np.fft.rfft(rough - rough.mean()) * np.conj(np.fft.rfft(smooth - smooth.mean())))
     shift = 360.0 / len(rough) * int(np.argmax(together))
@@ -192,7 +198,7 @@ def lag(spring: str, speed: float, coefficient: float) -> float:
 
 
 def over_damper(spring: str, speed: float, coefficient: float) -> NDArray[np.float64]:
-    """Return friction in the guide divided by the damper's force: work in a turn, mean force, greatest force."""
+    """Return the ratios of the guide friction to the damper's force: of work in a turn, mean force and greatest force."""
     of = turn(spring, speed, slider_friction_coefficient=coefficient)
     v = np.abs(of["slider.velocity"])
     forces = coefficient * np.abs(of["slider.guide_force"]), rig(spring).slider_damping * v
@@ -201,10 +207,10 @@ def over_damper(spring: str, speed: float, coefficient: float) -> NDArray[np.flo
 
 
 def _constant_friction(force: float, speed: float) -> tuple[float, float]:
-    """Compare constant friction (N) with friction by the coefficient `SLIGHT`, spring A, at a speed (rpm).
+    """Compare constant friction (N) with friction by the coefficient `SLIGHT`, for spring A at a speed (rpm).
 
-    Returns the greatest difference of u between them, relative to the amplitude without friction, and the relative excess
-    of the work of constant friction in a turn over that of the other.
+    The first result is the greatest difference of u between the two, relative to the amplitude without friction. The second is
+    the relative excess of the work that constant friction does in a turn over the work of the other friction.
     """
     even, varying = (
         turn("A", speed, **{name: value})
@@ -241,7 +247,7 @@ def compute_friction() -> StudyResult:
     )
     constant = {w: SLIGHT * float(force[w].mean()) for w in COMPARED["A"]}
     within = min(_constant_friction(constant[w], w)[0] for w in COMPARED["A"])
-    # constant friction that does the same work in a turn
+    # the constant friction that does the same work in a turn
     mean = constant[SHOWN["A"]]
     working = brentq(lambda c: _constant_friction(c, SHOWN["A"])[1], 0.5 * mean, 2.0 * mean, xtol=1e-4)
     shift, shift_slight = (max(abs(lag("A", w, c)) for w in COMPARED["A"]) for c in (SLIGHT, still_slight))
@@ -343,7 +349,7 @@ def compute_friction() -> StudyResult:
 
 
 def draw_friction(result: StudyResult) -> Figure:
-    """Draw the amplitude over the speed and a turn, one curve a coefficient."""
+    """Draw the amplitude over the speed, and u over a turn, one curve for each coefficient of friction."""
     panels = []
     for s, speed in SHOWN.items():
         verticals = {words: place for words, place in marks(s, 2, 3, 4).items() if place > GRID[s][0]}

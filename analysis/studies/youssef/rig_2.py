@@ -1,4 +1,4 @@
-"""Resonance curves of rig 2, figures 8.19 to 8.21, and the loads on its drive and pins."""
+"""Resonance curves of rig 2, Fig 8.19 to 8.21, and the loads on its drive and pins."""
 
 from __future__ import annotations
 
@@ -57,7 +57,7 @@ WIDTH = "width of the resonance: of the speeds at which the amplitude over the s
 
 @cache
 def linear_motion(spring: str, speed: float, variant: Variant = Variant.SECOND_ORDER) -> HarmonicMotion:
-    """Return u/l4 at a speed (rpm) by two harmonics of the corrected linear equation of chapter IV."""
+    """Return the motion u/l4 at a speed (rpm) by two harmonics of the corrected linear equation of chapter IV."""
     return two_harmonics(slider_equation(rig(spring), speed * RAD_S_PER_RPM, variant=variant))
 
 
@@ -67,7 +67,7 @@ def length(spring: str) -> float:
 
 
 def compute_resonance(number: str, spring: str) -> StudyResult:
-    """Compute the amplitude over the speed by the full equations and by two harmonics of the linear one."""
+    """Compute the amplitude over the speed by the full equations and by two harmonics of the linear equation."""
     (branch,), l4 = motions(spring).branches, length(spring)
     place, _ = near_fraction(spring, 1)
     speeds = np.unique(np.append(CURVE, place)).tolist()
@@ -88,7 +88,10 @@ def compute_resonance(number: str, spring: str) -> StudyResult:
 
 @cache
 def width(spring: str, linear: Variant | None = None, /, **changes: float) -> float:
-    """Return the width of the resonance (rpm), see `WIDTH`: by the full equations, or by a variant of the linear one."""
+    """Return the width of the resonance (rpm), defined in `WIDTH`.
+
+    It follows from the full equations, with changes of the rig, or from the variant ``linear`` of the linear equation.
+    """
     speeds = natural_speed(spring) + np.arange(-40.0, 40.1, 5.0)
     if linear:
         sizes = np.array([linear_motion(spring, speed, linear).amplitude for speed in speeds.tolist()])
@@ -208,12 +211,12 @@ def _resonance() -> tuple[Statement, ...]:
 
 
 def amplitudes_beyond(spring: str, **changes: float) -> list[float]:
-    """Return the amplitudes at the speeds `BEYOND` with changes of the rig, relative to those without them."""
+    """Return the amplitudes at the speeds `BEYOND` with changes of the rig, each relative to the amplitude without changes."""
     return [amplitude(turn(spring, w, **changes)) / amplitude(turn(spring, w)) for w in BEYOND[spring]]
 
 
 def _factors() -> tuple[Case, ...]:
-    """Judge how friction and other dampers change the amplitude beyond resonance and its width."""
+    """Judge how friction and other dampers change the amplitude beyond resonance and the width of the resonance."""
     cases = []
     for s in "CD":
         factors: dict[str, dict[str, float]] = {
@@ -258,7 +261,10 @@ ORDERS = (1, 2, 3)
 
 
 def _greatest(way: str, spring: str, n: int) -> float:
-    """Return the greatest harmonic of an order over l4 near its resonance, by the "linear" or the "full" equations."""
+    """Return the greatest amplitude of the n-th harmonic near its resonance, relative to l4.
+
+    ``way`` names the equations that are solved: "linear" or "full".
+    """
 
     def less(speed: float) -> float:
         speed = float(speed)
@@ -272,7 +278,7 @@ def _greatest(way: str, spring: str, n: int) -> float:
 
 
 def compute_harmonics() -> StudyResult:
-    """Compute three harmonics relative to l4 over the speed, and the second by the linear equation too."""
+    """Compute the first three harmonics relative to l4 over the speed, and the second by the linear equation too."""
     columns: dict[str, NDArray[np.float64]] = {}
     ratios, cases, left, part_of_all, together = [], [], [], [], []
     points = CURVE[::3]
@@ -337,7 +343,7 @@ def compute_harmonics() -> StudyResult:
 
 
 def draw_harmonics(result: StudyResult) -> Figure:
-    """Draw the harmonics, one panel a spring, the second in front."""
+    """Draw the harmonics, one panel for each spring, the second harmonic in front."""
     panels = []
     for spring in "CD":
         name = f"spring {spring}"
@@ -384,7 +390,7 @@ TORQUES = ("greatest crank torque", "mean crank torque")
 
 
 def compute_forces() -> StudyResult:
-    """Compute crank torque and pin forces along the motions."""
+    """Compute the crank torque and the pin forces over the speed."""
     columns: dict[str, NDArray[np.float64]] = {}
     for spring in "CD":
         name, branch = f"spring {spring}", motions(spring).branches[0]
@@ -403,7 +409,7 @@ def compute_forces() -> StudyResult:
 
 
 def draw_forces(result: StudyResult) -> Figure:
-    """Draw the torque above and the pin forces below, one column a spring, the square of the speed dotted."""
+    """Draw the torque above and the pin forces below, one column for each spring; the square of the speed is dotted."""
     torques, forces = [], []
     for spring in "CD":
         name = f"spring {spring}"
@@ -428,7 +434,7 @@ def draw_forces(result: StudyResult) -> Figure:
 
 
 def _panel(spring: str, y_label: str, lines: list[Curve], top: float, legend: str = "") -> Panel:
-    """Return the panel of a spring over the speed; that of spring D, on the right, has the legend for both."""
+    """Build the panel of a spring over the speed; the panel of spring D, on the right, has the legend for both."""
     first = spring == "C"
     return Panel(
         x_label="crank speed [rpm]",

@@ -36,7 +36,7 @@ from ..variation import cache, vary
 LOST = "the measured curve is lost with the figure"
 #: Study of friction in the guide of rig 1, as its heading names it.
 FRICTION = "*What friction explains of the amplitudes; rig 1, springs A and B*"
-#: Relative rise of the amplitude that no one notices on a graph.
+#: Relative rise of the amplitude up to which no one notices it on a graph.
 NOTICED = ALIKE
 SEEN_IN_RECORDS = (
     f"{NOTICED:g} of the amplitude there, the rule for *the same*, as the records of neighbouring speeds are compared"
@@ -70,7 +70,7 @@ FINE, COARSE = 5e-3, 2e-2
 
 @cache
 def rig(spring: str, **changes: float) -> FiveBarParameters:
-    """Return the parameters of the rig with a spring, with the reader's changes and then with ``changes`` made."""
+    """Return the parameters of the rig with a spring; ``changes`` are made after the reader's changes."""
     parameters: FiveBarParameters = replace(
         vary(SETS[f"rig-{RIG[spring]}-spring-{spring.lower()}"].parameters), **changes
     )
@@ -104,12 +104,12 @@ def motions(spring: str) -> Response:
 
 
 def resonant_b() -> Response:
-    """Return the periodic motions with spring B about resonance: the lower branch, then the upper one."""
+    """Return the periodic motions with spring B about resonance: first the lower branch, then the upper branch."""
     return response("B", SPLIT, FASTEST["B"], COARSE)
 
 
 def orbit(parameters: FiveBarParameters, speed: float, start: NDArray[np.float64] | None = None) -> PeriodicOrbit:
-    """Find the periodic motion at a speed (rpm), near a start if one is given."""
+    """Find the periodic motion at a speed (rpm), near the state ``start`` if it is given."""
     return find_orbit(parameters, speed=speed * RAD_S_PER_RPM, start=start)
 
 
@@ -128,17 +128,20 @@ def slider(of: Turn) -> NDArray[np.float64]:
 
 
 def complex_stiffness(p: FiveBarParameters, rates: NDArray[np.float64]) -> NDArray[np.complex128]:
-    """Return force divided by displacement (N/m) of the mean effective mass on spring and damper at angular speeds (rad/s)."""
+    """Return the complex dynamic stiffness (N/m) of the mean effective mass on spring and damper at angular speeds (rad/s).
+
+    It is the force divided by the displacement.
+    """
     return np.asarray(p.slider_stiffness - mean_effective_mass(p) * rates**2 + 1j * p.slider_damping * rates)
 
 
 def dynamic_stiffness(p: FiveBarParameters, rates: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the size of the complex stiffness (N/m): force divided by amplitude."""
+    """Return the magnitude of `complex_stiffness` (N/m): force amplitude divided by displacement amplitude."""
     return np.abs(complex_stiffness(p, rates))
 
 
 def amplitude(of: Turn) -> float:
-    """Return half the range of the slider position (cm)."""
+    """Return the amplitude (cm): half the range of the slider position."""
     return 0.5 * float(np.ptp(slider(of)))
 
 
@@ -148,18 +151,18 @@ def turns_of_sign(x: NDArray[np.float64]) -> int:
 
 
 def peaks(of: Turn) -> int:
-    """Count the maxima and minima of the slider position over a turn together, as the thesis does."""
+    """Count the maxima and minima of the slider position over a turn, both together, as the thesis does."""
     return turns_of_sign(np.diff(slider(of)))
 
 
 def harmonic(of: Turn, order: int) -> float:
-    """Return the amplitude of a harmonic of the crank's turn in the slider position (cm)."""
+    """Return the amplitude (cm) of a harmonic of the slider position; order 1 has one cycle per turn of the crank."""
     return CM_PER_METRE * float(of.harmonic("slider.position", order))
 
 
 @cache
 def speed_of_fewer_peaks(spring: str, low: float, high: float) -> float:
-    """Find the speed (rpm, to 0.1) above which the slider has two peaks a turn instead of four."""
+    """Find the speed (rpm, to 0.1), between two limits, above which the slider has two extrema per turn instead of four."""
     while high - low > 0.1:
         middle = 0.5 * (low + high)
         low, high = (middle, high) if peaks(turn(spring, middle)) > 2 else (low, middle)
@@ -172,13 +175,13 @@ def rpm(branch: Branch) -> NDArray[np.float64]:
 
 
 def between(extrema: Sequence[Extremum], low: float, high: float) -> tuple[float, float]:
-    """Return speed (rpm) and amplitude (cm) of the one extremum between two speeds (rpm)."""
+    """Return speed (rpm) and amplitude (cm) of the only extremum between two speeds (rpm)."""
     (found,) = (e for e in extrema if low < e.parameter / RAD_S_PER_RPM < high)
     return found.parameter / RAD_S_PER_RPM, CM_PER_METRE * found.amplitude
 
 
 def near_fraction(spring: str, order: int) -> tuple[float, float]:
-    """Return speed (rpm) and amplitude (cm) of the maximum near 1/order of the natural frequency."""
+    """Return speed (rpm) and amplitude (cm) of the amplitude's maximum near 1/order of the natural frequency."""
     place = natural_speed(spring) / order
     return between(motions(spring).maxima(), 0.9 * place, 1.1 * place)
 
@@ -198,7 +201,10 @@ def near_half_rounded(spring: str) -> NDArray[np.float64]:
 
 
 def peak_rise(spring: str, order: int) -> float:
-    """Return the relative rise of the maximum near 1/order of the natural frequency over the next minimum; 0 without one."""
+    """Return the relative excess of the amplitude's maximum near 1/order of the natural frequency over the next minimum.
+
+    The result is 0 without such a maximum.
+    """
     tops = [
         e
         for e in motions(spring).maxima()
@@ -209,7 +215,7 @@ def peak_rise(spring: str, order: int) -> float:
 
 
 def overtones(of: Turn) -> float:
-    """Return the greatest of the harmonics 3 to 6 divided by the greater of the first two."""
+    """Return the greatest of the harmonics 3 to 6 divided by the greater of the harmonics 1 and 2."""
     first, second, *higher = (harmonic(of, n) for n in range(1, 7))
     return max(higher) / max(first, second)
 
@@ -221,7 +227,10 @@ def over_speed(spring: str, coefficient: float) -> NDArray[np.float64]:
 
 
 def follow(spring: str, speeds: Sequence[float], **changes: float) -> NDArray[np.float64]:
-    """Return the amplitude (cm) at speeds (rpm), each motion found from the one before, with changes of the rig."""
+    """Return the amplitude (cm) at each speed (rpm) with changes of the rig.
+
+    Each motion is found from the motion at the previous speed.
+    """
     parameters, start, found = rig(spring, **changes), orbit(rig(spring), speeds[0]).start, []
     for speed in speeds:
         motion = orbit(parameters, speed, start)
@@ -231,7 +240,7 @@ def follow(spring: str, speeds: Sequence[float], **changes: float) -> NDArray[np
 
 
 def rise(spring: str, coefficient: float, order: int) -> float:
-    """Return the rise of `peak_rise` with a coefficient of friction in the guide; 0 without a maximum."""
+    """Return the relative excess as `peak_rise` does, with a coefficient of friction in the guide; 0 without such a maximum."""
     size, speeds = over_speed(spring, coefficient), GRID[spring]
     tops = np.flatnonzero((size[1:-1] > size[:-2]) & (size[1:-1] > size[2:])) + 1
     lows = np.flatnonzero((size[1:-1] < size[:-2]) & (size[1:-1] < size[2:])) + 1
@@ -241,7 +250,10 @@ def rise(spring: str, coefficient: float, order: int) -> float:
 
 
 def branch_columns(branch: Branch, name: str) -> dict[str, NDArray[np.float64]]:
-    """Return the amplitude along a branch as columns for its stable and unstable parts; see `curves_over_speed`."""
+    """Return the amplitude along a branch as columns, with stable and unstable parts in separate columns.
+
+    `curves_over_speed` turns these columns into curves.
+    """
     amplitude = CM_PER_METRE * branch.amplitude
     stable = np.array([verdict is Stability.STABLE for verdict in branch.stability()])
     # a dashed part begins and ends on the solid one
@@ -262,13 +274,13 @@ def curves_over_speed(result: StudyResult, name: str, colour: str, label: str = 
 
 
 def marks(spring: str, *orders: int) -> Mapping[str, float]:
-    """Return the natural frequency with a spring, or fractions of it (rpm), by label, as marks of a panel."""
+    """Return marks for a panel, by label: the natural frequency of the rig with this spring, divided by each order (rpm)."""
     words = {1: "natural", 2: "half of it", 3: "a third", 4: "a quarter"}
     return {f"{words[n]}, {natural_speed(spring) / n:.0f} rpm": natural_speed(spring) / n for n in orders}
 
 
 def largest_multiplier(spring: str, low: float, high: float) -> float:
-    """Return the largest Floquet multiplier over a range of speeds (rpm), its ends included."""
+    """Return the greatest modulus of the Floquet multipliers over a range of speeds (rpm), both ends included."""
     (branch,) = motions(spring).branches
     within = (rpm(branch) >= low) & (rpm(branch) <= high)
     ends = (orbit(rig(spring), speed).largest for speed in (low, high))

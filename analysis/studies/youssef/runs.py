@@ -1,6 +1,6 @@
-"""Simulation runs that the figures share, cached.
+"""Simulation runs that several figures use, cached.
 
-Parameters are in the thesis's units (dyn/cm, dyn.s/cm, dyn.cm, rpm), as its text names them; results are in cm, degrees,
+Parameters are in the thesis's units (dyn/cm, dyn.s/cm, dyn.cm, rpm), as its text gives them; results are in cm, degrees,
 turns, rad/s and N.m.
 """
 
@@ -33,7 +33,10 @@ SETTLING_TIME = 8.0
 
 
 def table_3_1(stiffness: float, damping: float = 3e4, gravity: float = 9.81) -> FiveBarParameters:
-    """Return Table 3.1 with a spring (dyn/cm), a damper (dyn.s/cm), gravity (m/s2) and the reader's changes."""
+    """Return the parameters of Table 3.1 with this spring (dyn/cm), damper (dyn.s/cm) and gravity (m/s2).
+
+    The reader's changes are applied last.
+    """
     return vary(
         replace(
             TABLE_3_1,
@@ -45,12 +48,12 @@ def table_3_1(stiffness: float, damping: float = 3e4, gravity: float = 9.81) -> 
 
 
 def plain(value: float) -> str:
-    """Format a value as in the thesis's tables and in CSV headers: 5e5."""
+    """Format a value as in the thesis's tables and in CSV headers, such as 5e5."""
     return re.sub(r"\.?0*e\+0?", "e", f"{value:.3e}")
 
 
 def scientific(value: float) -> str:
-    """Format a value for print: 5 times a power of ten, a leading 1 omitted."""
+    """Format a value for a plot: a factor times a power of ten; a factor of 1 is omitted."""
     digits, exponent = plain(value).split("e")
     power = "10" + exponent.translate(str.maketrans("0123456789", "⁰¹²³⁴⁵⁶⁷⁸⁹"))
     return power if digits == "1" else f"{digits}\N{MULTIPLICATION SIGN}{power}"
@@ -58,9 +61,10 @@ def scientific(value: float) -> str:
 
 @dataclass(frozen=True, slots=True)
 class SteadyTurn:
-    """One turn of the steady motion, sampled at evenly spaced crank angles, the last at 360 deg.
+    """One turn of the steady motion, sampled at evenly spaced crank angles; the last is 360 deg.
 
-    ``torque`` is the crank torque (N.m); ``change`` is the largest difference of the slider position from the turn before (cm).
+    ``torque`` is the crank torque (N.m); ``change`` is the greatest difference of the slider position from the turn before
+    (cm).
     """
 
     angle_deg: NDArray[np.float64]
@@ -75,18 +79,18 @@ class SteadyTurn:
 
     @property
     def peaks(self) -> int:
-        """Number of maxima and minima of the slider position over the turn, together."""
+        """Number of maxima and minima of the slider position over the turn, both together."""
         rise = np.diff(self.slider_cm)
         return int(np.sum(np.sign(rise) != np.sign(np.roll(rise, 1))))
 
     def harmonic(self, order: int) -> float:
-        """Return the amplitude of a harmonic of the crank's turn in the slider position (cm)."""
+        """Return the amplitude (cm) of a harmonic of the slider position; order 1 has one cycle per turn of the crank."""
         return 2.0 * float(np.abs(np.fft.rfft(self.slider_cm[:-1])[order])) / (len(self.slider_cm) - 1)
 
 
 @cache
 def steady_turn(parameters: FiveBarParameters, speed_rpm: float, start: tuple[float, float] = (0.0, 0.0)) -> SteadyTurn:
-    """Simulate until the motion is steady and return a turn of it; ``start`` is (u, u') (m, m/s) at crank angle 0."""
+    """Simulate until the motion is steady and return a turn; ``start`` is (u, u') at crank angle 0 (m, m/s)."""
     period, samples = 60.0 / speed_rpm, 1440
     inputs = Inputs(speed=speed_rpm * RAD_S_PER_RPM)
     turns = ceil(SETTLING_TIME / period)
@@ -117,7 +121,10 @@ def steady_turn(parameters: FiveBarParameters, speed_rpm: float, start: tuple[fl
 
 
 def least(x: NDArray[np.float64], y: NDArray[np.float64]) -> tuple[float, float]:
-    """Return the place and the value of the minimum of evenly spaced samples, by a parabola through the lowest three."""
+    """Return abscissa and value of the minimum of evenly spaced samples, by a parabola.
+
+    The parabola passes through the lowest sample and the samples beside it.
+    """
     i = int(np.clip(np.argmin(y), 1, len(y) - 2))
     a, b, c = y[i - 1 : i + 2]
     shift = 0.5 * (a - c) / (a - 2.0 * b + c)
@@ -125,7 +132,7 @@ def least(x: NDArray[np.float64], y: NDArray[np.float64]) -> tuple[float, float]
 
 
 def greatest(x: NDArray[np.float64], y: NDArray[np.float64]) -> tuple[float, float]:
-    """Return the place and the value of the maximum of evenly spaced samples; see `least`."""
+    """Return abscissa and value of the maximum of evenly spaced samples, by a parabola; see `least`."""
     place, value = least(x, -y)
     return place, -value
 
@@ -136,5 +143,5 @@ def greatest_ratio(values: NDArray[np.float64]) -> float:
 
 
 def from_line(x: NDArray[np.float64], y: NDArray[np.float64]) -> float:
-    """Return the greatest distance in y of an arc from (0, 0) to (1, 1) from the nearest parallel to its chord."""
+    """Return the greatest distance in y between a curve from (0, 0) to (1, 1) and the best line parallel to its chord."""
     return 0.5 * float(np.ptp(y - x))

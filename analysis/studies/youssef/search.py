@@ -1,9 +1,9 @@
-"""The search of section 6.3 as the program of appendix 5 has it, for ellipse (a) with bounds on the lengths; Fig 6.2 and 6.3.
+"""Search of section 6.3 as in the program of appendix 5, for ellipse (a) with bounds on the lengths; Fig 6.2 and 6.3.
 
 The downhill simplex reflects its worst vertex, doubles the move if the new vertex is the best, contracts if it is poor, and
-shrinks by half towards its best vertex if that does not help (L9480 to L9610). Starting sets of parameters follow (6.11); a set
-outside its bounds is put onto them, and one whose links do not close moves back by quarters (L9697). The bounds of the lengths
-are printed, those of place and angles are ours.
+shrinks by half towards its best vertex if that does not help (L9480 to L9610). Starting sets of parameters follow (6.11). A set
+outside its bounds is put onto them, and a set whose links do not close moves back by quarters (L9697). The bounds of the
+lengths are printed; the bounds of place and angles are ours.
 """
 
 from __future__ import annotations
@@ -54,7 +54,10 @@ Error = Callable[[FloatArray], float]
 
 
 class Found(NamedTuple):
-    """End of a search: parameters, error (cm2), evaluations that it took, and which known minima it began with."""
+    """Result of a search: parameters, error (cm2) and number of evaluations.
+
+    ``included`` are the indices of the earlier searches whose results are among the starting sets; empty if there are none.
+    """
 
     parameters: FloatArray
     error: float
@@ -63,7 +66,7 @@ class Found(NamedTuple):
 
 
 def residuals(v: FloatArray, n: int = N, semi_axis: float = 10.0) -> tuple[FloatArray, FloatArray]:
-    """Return the distances of P from the points of an ellipse at n crank angles (cm), along x and y, by each closure.
+    """Return the distances along x and y (cm) of P from n points of an ellipse, by each of the two closures.
 
     ``v`` are the parameters in the order of `LOW`; ``semi_axis`` (cm) is 10 for ellipse (a), 15 for (b).
     """
@@ -78,7 +81,7 @@ def residuals(v: FloatArray, n: int = N, semi_axis: float = 10.0) -> tuple[Float
 
 
 def error(v: FloatArray, n: int = N, semi_axis: float = 10.0) -> float:
-    """Return the sum of the squared distances by the better closure (cm2), see `residuals`."""
+    """Return the sum of the squared distances (cm2) by the better of the two closures; see `residuals`."""
     return min(float(away @ away) for away in residuals(v, n, semi_axis))
 
 
@@ -89,7 +92,7 @@ def closes(v: FloatArray) -> bool:
 
 
 def admitted(v: FloatArray, towards: FloatArray) -> FloatArray:
-    """Return a set put onto its bounds and moved by quarters ``towards`` another set until its links close."""
+    """Put a set of parameters onto its bounds, and move it by quarters ``towards`` another set until its links close."""
     v = np.clip(v, LOW, HIGH)
     while not closes(v):
         v = np.clip(0.75 * v + 0.25 * towards, LOW, HIGH)
@@ -102,7 +105,7 @@ def drawn(random: np.random.Generator) -> FloatArray:
 
 
 def starting_sets(random: np.random.Generator, first: list[FloatArray]) -> FloatArray:
-    """Return starting sets, one more than there are parameters: the sets ``first``, then random ones by (6.11)."""
+    """Return starting sets, one more than there are parameters: the sets ``first``, then random sets by (6.11)."""
     sets = list(first)
     while not sets:
         sets = [v for v in [drawn(random)] if closes(v)]
@@ -112,9 +115,10 @@ def starting_sets(random: np.random.Generator, first: list[FloatArray]) -> Float
 
 
 def downhill(of: Error, sets: FloatArray, free: list[int] | None = None) -> Found:
-    """Minimise an error by the simplex with given vertices until (6.15) holds, for each parameter as in the program (L9669).
+    """Minimise an error by the downhill simplex from given vertices until (6.15) holds.
 
-    ``free`` are the indices of the parameters that it moves, by default all.
+    For (6.15) each parameter is tested by itself, as in the program (L9669). ``free`` are the indices of the parameters that
+    the search may change, by default all.
     """
     moves = np.arange(LOW.size) if free is None else np.array(free)
     v = sets[: moves.size + 1].copy()
@@ -156,7 +160,7 @@ def downhill(of: Error, sets: FloatArray, free: list[int] | None = None) -> Foun
 
 @cache
 def searches() -> dict[str, tuple[Found, ...]]:
-    """Run all searches; return their ends by kind."""
+    """Run all searches; return their results by the kind of search."""
     random = np.random.default_rng(62)
     plain = [downhill(error, starting_sets(random, [])) for _ in range(SEARCHES)]
     fresh, fewer_points, fewer = [], [], []
@@ -177,7 +181,10 @@ def searches() -> dict[str, tuple[Found, ...]]:
 
 @cache
 def ranked() -> tuple[tuple[Found, ...], ...]:
-    """Run the searches compared by rank: from random sets, with fewer points first, with five or nine parameters first."""
+    """Run the searches that are compared by rank, and return the results of each kind.
+
+    The kinds are: from random sets; with fewer points first; with five parameters first; with nine parameters first.
+    """
     random = np.random.default_rng(62)
     plain = tuple(downhill(error, starting_sets(random, [])) for _ in range(RANKED))
     points, five = zip(*((_points_first(random), _parameters_first(random)) for _ in range(RANKED)))
@@ -185,7 +192,7 @@ def ranked() -> tuple[tuple[Found, ...], ...]:
 
 
 def rocker_error(v: FloatArray) -> float:
-    """Return the sum of the squared errors of the rocker function of Fig 6.7 at N crank angles by the better closure (deg2)."""
+    """Return the error (deg2) of the rocker function of Fig 6.7: the sum of squares at N crank angles by the better closure."""
     l1, l2, l3, l4 = v[2:6]
     phi = turn(N)
     pin = l2 * np.exp(1j * (phi + v[8]))
@@ -201,43 +208,49 @@ def rocker_error(v: FloatArray) -> float:
 
 
 def work(of: Error, free: list[int] | None = None) -> FloatArray:
-    """Return the numbers of evaluations of searches for another output from the same random sets."""
+    """Return the numbers of evaluations that the minimisation of another error takes from the same random sets.
+
+    ``free`` are the indices of the parameters that may change, by default all.
+    """
     random = np.random.default_rng(62)
     return np.array([downhill(of, starting_sets(random, []), free).evaluations for _ in range(SEARCHES)], dtype=float)
 
 
 def _points_first(random: np.random.Generator) -> Found:
-    """Search with fewer points first, then with all."""
+    """Search with fewer points of the ellipse first, then with all points."""
     first = downhill(lambda v: error(v, FEWER_POINTS), starting_sets(random, []))
     return _second_search(first, FEWER_POINTS / N, random)
 
 
 def _parameters_first(random: np.random.Generator, free: list[int] = FEWER) -> Found:
-    """Search with fewer parameters first, then with all."""
+    """Search with only the parameters ``free`` first, then with all parameters."""
     return _second_search(downhill(error, starting_sets(random, []), free), 1.0, random)
 
 
 def _second_search(first: Found, share: float, random: np.random.Generator) -> Found:
-    """Search from the end of a first search, whose evaluations are added, each counted as a ``share`` of one."""
+    """Search again from the end of a first search, and add the evaluations of the first search.
+
+    Each evaluation of the first search counts as ``share`` evaluations.
+    """
     then = downhill(error, starting_sets(random, [first.parameters]))
     return then._replace(evaluations=then.evaluations + round(share * first.evaluations))
 
 
 def descended(v: FloatArray, side: int, n: int = N) -> tuple[FloatArray, float]:
-    """Return the parameters and the error (cm2) to which a least-squares descent leads, by closure ``side``, at n points."""
+    """Return the parameters and the error (cm2) at the end of a least-squares descent, by closure ``side``, with n points."""
     inside = np.clip(v, FREE_LOW + 1e-9, FREE_HIGH - 1e-9)
     end = least_squares(lambda v: residuals(v, n)[side], inside, bounds=(FREE_LOW, FREE_HIGH), xtol=1e-12, ftol=1e-12)
     return end.x, 2.0 * float(end.cost)
 
 
 def bottom(found: Found) -> float:
-    """Return the error of the minimum next to the end of a search (cm2), nan where the descent leaves the links that close."""
+    """Return the error (cm2) of the minimum near the end of a search; NaN if the descent ends where the links do not close."""
     v, error = descended(found.parameters, int(np.argmin([away @ away for away in residuals(found.parameters)])))
     return error if closes(v) else np.nan
 
 
 def minima(n: int) -> FloatArray:
-    """Return the errors of the minima, more than `APART` apart, to which descents from random sets lead at n points."""
+    """Return the errors of the minima to which descents from random sets lead with n points, if more than `APART` apart."""
     random = np.random.default_rng(612)
     ends = [descended(v, side, n) for v in (drawn(random) for _ in range(DESCENTS)) for side in (0, 1)]
     errors = np.sort([error * N / n for v, error in ends if closes(v)])
@@ -245,7 +258,7 @@ def minima(n: int) -> FloatArray:
 
 
 def compute() -> StudyResult:
-    """Compute the ends of all searches, and judge the statements on the search."""
+    """Compute the results of all searches, and judge the statements on the search."""
     found, least = searches(), our_error(PROBLEM)
     errors = {name: np.sort([end.error for end in ends]) for name, ends in found.items()}
     plain, *techniques = errors
@@ -266,7 +279,7 @@ def compute() -> StudyResult:
     )
 
     def by_chance(with_it: FloatArray, name: str = "") -> tuple[Case, ...]:
-        """Judge whether a technique's errors are lower, and its evaluations fewer, than those from random sets."""
+        """Judge if a technique lowers the errors and the evaluations, compared with searches from random sets."""
         errors_by, work_by = (
             float(mannwhitneyu(of, than, alternative="less").pvalue) for of, than in zip(with_it, from_random)
         )
@@ -456,7 +469,7 @@ def compute() -> StudyResult:
 
 
 def draw(result: StudyResult) -> Figure:
-    """Draw the errors at the ends of the searches in order."""
+    """Draw the errors at the ends of the searches, in ascending order."""
     c = result.columns
     share = c["share of the searches [%]"]
     names = [name for name in c if name.startswith("error; ")]
@@ -484,7 +497,7 @@ PHASE, FIRST = 0.6, 24
 
 
 def compute_closures() -> StudyResult:
-    """Compute the curves and errors by both closures, and the area by triangles."""
+    """Compute the coupler curves and errors by both closures, and the area between curves by triangles."""
     columns: dict[str, FloatArray] = {}
     ratios, phases, triangles = [], [], []
     for name in (*PATHS, "packaging"):
@@ -567,7 +580,7 @@ def compute_closures() -> StudyResult:
 
 
 def draw_closures(result: StudyResult) -> Figure:
-    """Draw the target and the curves of both closures."""
+    """Draw the target and the coupler curves of both closures."""
     looks = {"target": TARGET, "printed closure": PRINTED, "other closure": COLOURS[2]}
     c = result.columns
     curves = [Curve(x=c[f"{n} x [cm]"], y=c[f"{n} y [cm]"], label=n, colour=colour) for n, colour in looks.items()]

@@ -1,10 +1,10 @@
-"""Series 2 of chapter VII: two harmonics of the crank's rotation move the rocker pivot of two printed four-bars.
+"""Series 2 of chapter VII: two harmonics of the crank rotation move the rocker pivot of two printed four-bars.
 
 The printed series of path (b) gives the stated 4.3 cm2, within the rounding of its numbers, if l4 is mended as in chapter VI
-and A0 is read as 0.31 cm for 3.1 cm. That of the rocker function gives its 4.8 deg2 in no reading tried.
-The direct search with exact derivatives finds better motions for both, and shows the gain of more harmonics. No motion
-traces all of path (b) with these links: the distance of P from the crank shaft is at most l2 + r, and part of the ellipse lies
-beyond. Lengths and errors are in the units of print, cm and degrees.
+and A0, printed as 3.1 cm, is read as 0.31 cm. The printed series of the rocker function does not give its 4.8 deg2 in any
+reading that we tried. The direct search with exact derivatives finds better motions for both, and shows the gain from more
+harmonics. No motion traces all of path (b) with these links: the distance of P from the crank shaft is at most l2 + r, and
+part of the ellipse lies beyond. Lengths and errors are in the units of print, cm and degrees.
 """
 
 from __future__ import annotations
@@ -47,12 +47,12 @@ FloatArray = NDArray[np.float64]
 
 ROCKER, PATH = "rocker-weighted", "path-b"
 TARGET, FIXED = "0.25", "0.55"
-#: Starts of the search for the rocker function; starts and greatest stroke (m) of those for the path, by number of harmonics.
+#: Starts of the search for the rocker function; for the path, starts and greatest stroke (m) by number of harmonics.
 ROCKER_STARTS = 24
 PATH_SEARCHES = {2: (8, 0.25), 3: (8, 0.25), 5: (24, 0.18)}
 #: Printed series: A0, A1, A2 and B1, B2 (cm), guide angle (deg).
 SERIES = {ROCKER: ((1.46, -0.425, -0.855), (-0.256, 0.569), -41.0), PATH: ((3.1, 0.772, 0.568), (-0.34, -0.136), -0.9)}
-#: Errors that the thesis states with them (deg2, cm2).
+#: Errors that the thesis states for the printed series (deg2, cm2).
 STATED = {ROCKER: 4.8, PATH: 4.3}
 #: Half a unit of the last digit of A0, which is read as a tenth of what is printed (cm), and of the guide's angle (deg).
 HALF_UNITS = {ROCKER: (0.0005, 0.5), PATH: (0.005, 0.05)}
@@ -62,7 +62,7 @@ TURN = np.linspace(0.0, 2.0 * pi, 721)
 
 @cache
 def rocker_motion(harmonics: int) -> Solution:
-    """Return the best Fourier series of the slider for the weighted rocker function, with the printed links."""
+    """Return the best slider motion with a number of harmonics for the weighted rocker function, with the printed links."""
     p = PROBLEMS[ROCKER]
     return slider_motion(
         p.task, p.linkage, SliderUnknown(harmonics=harmonics), search=Search(starts=ROCKER_STARTS)
@@ -71,7 +71,7 @@ def rocker_motion(harmonics: int) -> Solution:
 
 @cache
 def path_motion(harmonics: int) -> Solution:
-    """Return the best Fourier series of the slider for path (b), with the printed links.
+    """Return the best slider motion with a number of harmonics for path (b), with the printed links.
 
     Bounds on the guide's angle, 0 to 90 deg from the ground link, and on the stroke lead the search to the better optima.
     """
@@ -94,15 +94,15 @@ def printed(
     Parameters
     ----------
     name : str
-        Problem.
+        Name of the problem.
     mean : float
         Factor of A0.
     sines, sign : float
-        Factors of the sines, and of the whole series: senses of the rotation and of the slider.
+        Factors of the sines and of the whole series: they set the senses of the crank rotation and of the slider.
     turned : float
-        Angle added to the crank's rotation in the series (rad): th20 if the argument of the series is th2.
+        Angle added to the crank rotation in the series (rad): th20 if the argument of the series is th2.
     along : float
-        Sense of the guide's angle from the ground link.
+        Sense in which the guide's angle is measured from the ground link, 1 or -1.
     """
     (a0, *a), b, guide = SERIES[name]
     k = np.arange(len(a) + 1)
@@ -114,9 +114,9 @@ def printed(
 
 
 def readings(name: str) -> list[Linkage]:
-    """Return the linkage with the printed series in all its readings that can be joined over the turn, the best first.
+    """Return the linkage with the printed series in each reading in which its links can be joined over the turn, best first.
 
-    The readings differ in A0 (whole, a tenth, none), in signs, and in the argument (omega t or th2).
+    The readings differ in A0 (as printed, a tenth of it, or zero), in signs, and in the argument (omega t or th2).
     """
     k = PROBLEMS[name].linkage
     signs = (1.0, -1.0)
@@ -128,7 +128,7 @@ def readings(name: str) -> list[Linkage]:
 
 
 def in_window(linkage: Linkage) -> float:
-    """Return the error of the rocker angle within the weighted portion (deg, rms)."""
+    """Return the rms error of the rocker angle (deg) within the weighted window."""
     p = PROBLEMS[ROCKER]
     assert isinstance(p.task, RockerFunction)
     heavy = np.asarray(p.task.weights) == WEIGHT
@@ -136,19 +136,22 @@ def in_window(linkage: Linkage) -> float:
 
 
 def angle_error(linkage: Linkage) -> FloatArray:
-    """Return the rocker angle less the desired one (deg), within half a turn."""
+    """Return the rocker angle minus the desired angle (deg) at the rotations `TURN`, between -180 and 180."""
     off = np.degrees(linkage.rocker_angle(TURN)) - wanted_angle()
     return np.asarray((off + 180.0) % 360.0 - 180.0)
 
 
 def wanted_angle() -> FloatArray:
-    """Return the desired rocker function (deg)."""
+    """Return the desired rocker angle (deg) at the rotations `TURN`."""
     return np.asarray(70.0 + 100.0 * np.abs(np.sin(0.5 * TURN)))
 
 
 @cache
 def reduced() -> Mapping[str, float]:
-    """Return the error with two harmonics of the slider divided by that with a fixed pivot, by problem of chapter VI."""
+    """Return the error with two harmonics of the slider divided by that with a fixed pivot, for each problem of chapter VI.
+
+    The linkages are the printed ones.
+    """
     tasks = {
         name: UntimedPath(path=packaging_path()) if name == "packaging" else p.task for name, p in PROBLEMS.items()
     }
@@ -157,7 +160,7 @@ def reduced() -> Mapping[str, float]:
 
 @cache
 def reduced_further() -> Mapping[str, float]:
-    """Return the ratios of `reduced` with our best links, for the problems of the figures of chapter VI."""
+    """Return the ratios of `reduced` with our best linkages, for the problems that have a figure in chapter VI."""
     return {row.problem: _error_ratio(PROBLEMS[row.problem].task, best(row.problem).linkage) for row in TABLE.values()}
 
 
@@ -167,7 +170,10 @@ def _error_ratio(task: Task, linkage: Linkage) -> float:
 
 
 def by_both_methods() -> tuple[float, float]:
-    """Return the least errors (deg2) that a descent and the simplex find over two harmonics and the guide's angle."""
+    """Return the least errors (deg2) of the rocker function by a descent and by the simplex.
+
+    Both vary two harmonics of the slider and the guide's angle.
+    """
     p = PROBLEMS[ROCKER]
     assert isinstance(p.task, RockerFunction)
     task, root = p.task, np.sqrt(np.asarray(p.task.weights))
@@ -184,7 +190,7 @@ def by_both_methods() -> tuple[float, float]:
 
 
 def moved_rocker() -> StudyResult:
-    """Compute Fig 7.11: the best motion with each number of harmonics, and the printed one."""
+    """Compute Fig 7.11: the best slider motion with each number of harmonics, and the printed motion."""
     p = PROBLEMS[ROCKER]
     assert isinstance(p.task, RockerFunction)
     found = {n: rocker_motion(n) for n in (1, 2, 3)}
@@ -318,7 +324,7 @@ def moved_rocker() -> StudyResult:
 
 
 def draw_rocker(result: StudyResult) -> Figure:
-    """Draw rocker angles, their errors, and the slider position."""
+    """Draw the rocker angles, their errors, and the slider position."""
     c = result.columns
     task = PROBLEMS[ROCKER].task
     assert isinstance(task, RockerFunction)
@@ -353,7 +359,10 @@ def draw_rocker(result: StudyResult) -> Figure:
 
 
 def out_of_reach(quarter: int = 20000) -> float:
-    """Return the area of the ellipse beyond l2 + r from the crank shaft (cm2), with ``quarter`` sides for a quarter circle."""
+    """Return the area (cm2) of the ellipse's part that lies beyond l2 + r from the crank shaft.
+
+    The circle of this radius is approximated by a polygon with ``quarter`` sides in each quadrant.
+    """
     from shapely import Point, Polygon
 
     p = PROBLEMS[PATH]
@@ -364,18 +373,21 @@ def out_of_reach(quarter: int = 20000) -> float:
 
 
 def mended() -> Linkage:
-    """Return the printed series of path (b) with A0 = 0.31 cm."""
+    """Return the linkage of path (b) with the printed series and A0 = 0.31 cm."""
     return printed(PATH, mean=0.1)
 
 
 def shares_of_stated() -> dict[str, float]:
-    """Return the error with each printed series, in its best reading or mended, divided by the stated error."""
+    """Return the error with each printed series divided by the stated error, in the best reading or with A0 mended."""
     linkages = {ROCKER: readings(ROCKER)[0], PATH: mended()}
     return {name: linkage_error(name, linkage) / STATED[name] for name, linkage in linkages.items()}
 
 
 def over_rounding(name: str, found: Linkage) -> tuple[float, float]:
-    """Return the least and the greatest error with a printed series if each printed number is rounded up or down."""
+    """Return the least and the greatest error with a printed series if each printed number is rounded up or down.
+
+    ``found`` is the linkage with this series.
+    """
     motion, (mean, guide) = slider(found), HALF_UNITS[name]
     off = np.concatenate(
         [half_units(found), np.array([mean, *[0.0005] * 4]) / CM_PER_METRE, [radians(guide)]], dtype=float
@@ -394,7 +406,7 @@ def over_rounding(name: str, found: Linkage) -> tuple[float, float]:
 
 
 def moved_path() -> StudyResult:
-    """Compute Fig 7.12: path (b) with the printed series, its correction, and the best series of 2, 3 and 5 harmonics."""
+    """Compute Fig 7.12: path (b) with the printed series, with A0 mended, and with the best series of 2, 3 and 5 harmonics."""
     p = PROBLEMS[PATH]
     assert isinstance(p.task, UntimedPath)
     found = {n: path_motion(n) for n in PATH_SEARCHES}
@@ -468,7 +480,7 @@ def moved_path() -> StudyResult:
 
 
 def draw_path(result: StudyResult) -> Figure:
-    """Draw curves, distances, and the slider position."""
+    """Draw the coupler curves, their distances from the path, and the slider position."""
     c = result.columns
     labels = {"fixed": "pivot fixed", "printed": "printed series, mended"} | {
         f"{n}": f"{n} harmonics" for n in PATH_SEARCHES

@@ -84,7 +84,7 @@ class SearchTable:
     jobs: int = entry(_cores, 1)
 
     def search(self, **changes: Any) -> Search:
-        """Return the `Search` that the table describes, with some values replaced."""
+        """Return the `Search` that the table describes, with the fields in ``changes`` replaced."""
         own = {name: value for name, value in asdict(self).items() if name not in ("kinds", "gears")}
         return Search(**({"n_jobs": own.pop("jobs")} | own | changes))
 
@@ -97,7 +97,7 @@ def _transmission(value: Any, name: str) -> float | None:
 
 
 def _error(value: Any, name: str) -> Any:
-    """Check the bound of the greatest error while pin forces are minimised: a length, or for a rocker function an angle."""
+    """Check the greatest error that is allowed when pin forces are minimised: a length, or for a rocker function an angle."""
     try:
         quantity(value, "m", name)
     except ParameterError:

@@ -168,7 +168,7 @@ def _refuse_entries(table: Any, names: tuple[str, ...], source: str) -> None:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _ObjectiveAndRange:
-    """Entries shared by several tasks: the objective; for a target given by a formula, number and range of its parameter."""
+    """Entries shared by several tasks: the objective and, for a formula, the number and the range of the parameter's values."""
 
     objective: Objective = entry(Choice(get_args(Objective)), "error")
     n: int | None = entry(Whole(3), None)
@@ -272,7 +272,7 @@ class PrecisionPointsTable(_Curve):
     length: float | None = entry(Quantity("m"), None)
 
     def _body(self, folder: Path) -> dict[str, Any]:
-        """Return the arguments that `PrecisionPoints` and `Motion` share; the body's directions rotate with the points."""
+        """Return the arguments that `PrecisionPoints` and `Motion` share; the entry ``turn`` rotates both points and body."""
         points, _ = self._target_points(folder)
         rotation = _rotation(self.rotation, len(points))
         angle = None

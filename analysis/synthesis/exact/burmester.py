@@ -98,7 +98,7 @@ class Guidance(Exact):
         Least imaginary part of the complex dyads, as a fraction of the poses' size. If this number is close to zero, a small
         change of the poses makes a pair of dyads real. Infinite if all dyads are real.
     solutions : tuple of Solution
-        Each pair of dyads, with either dyad as the crank; sound linkages first, then by transmission angle.
+        The four-bars of all pairs of dyads, with either dyad as the crank; sound linkages first, then by transmission angle.
     """
 
     task: Poses
@@ -132,8 +132,8 @@ class GuidanceMap(NotebookResult):
     sound : ndarray of bool, shape (n, n)
         Whether the linkage with the row's dyad as crank and the column's dyad as rocker is free of defects.
     transmission : ndarray, shape (n, n)
-        Least deviation of that linkage's transmission angle from 0 and pi between the first pose and the last (rad); 0 if the
-        linkage has a defect.
+        Least deviation of the same linkage's transmission angle from 0 and pi between the first pose and the last (rad); 0 if
+        the linkage has a defect.
     solutions : tuple of Solution
         The linkages with the largest ``transmission`` that differ clearly from one another.
     """
@@ -260,7 +260,7 @@ _FORMS = _forms()
 
 
 def _null_space(rows: FloatArray, size: int) -> FloatArray:
-    """Return a basis of the null space of the matrix ``rows``, in ``size`` columns.
+    """Return a basis of the null space of the matrix ``rows`` as columns; ``size`` is their number.
 
     Raises InputError if the rows are linearly dependent, so that the null space has more dimensions.
     """

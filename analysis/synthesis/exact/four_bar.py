@@ -7,9 +7,9 @@ linkages, Trans. ASME 77, 1955), with th2 = phi + th20 and th4 = psi - the outpu
 
 Three points determine R1, R2, R3 if crank phase and mounting angle are known. With a fourth point one of the two may be
 unknown: the determinant of the four equations is a trigonometric polynomial of second degree in that angle. With a fifth point
-both may be unknown: relative to the crank the rocker is a body in five poses, and C has a constant distance from B, which is
-the problem of `burmester`. One of its four dyads is always the ground link, C at D and B at A, so that there are at most three
-linkages.
+both may be unknown: relative to the crank the rocker is a body in five poses, and C has a constant distance from B. Module
+`burmester` solves this problem. One of the four dyads is always the ground link, with C at D and B at A, so that there are at
+most three linkages.
 """
 
 from __future__ import annotations
@@ -275,8 +275,8 @@ def cognates(linkage: Linkage, rotation: ArrayLike = 0.0) -> tuple[Linkage, Link
 def alternatives(solution: Solution) -> tuple[Solution, ...]:
     """Return the cognates of a solution as solutions of its task: the same coupler curve with other pivots.
 
-    If the task gives crank rotations, only the cognate whose crank turns as that of the original is returned; for a closed path
-    only the cognates whose cranks can turn fully.
+    If the task gives crank rotations, only the cognate whose crank turns as that of the original is returned. For a closed path
+    only cognates whose cranks can turn fully are returned.
 
     Returns
     -------

@@ -385,8 +385,8 @@ class Linkage:
     def transmission_excess(l3: Any, l4: Any, nearest: Any, farthest: Any, cosine: Any) -> tuple[Any, ...]:
         """Return the values g of constraints g <= 0 that bound ``|cos mu|`` by ``cosine``; mu is the transmission angle at C.
 
-        The arguments are numbers, arrays or symbols; ``nearest`` and ``farthest`` are the least and greatest `square`, the
-        squared `reach`.
+        ``nearest`` and ``farthest`` are the squares of the least and the greatest `reach`. The arguments are numbers, arrays
+        or symbols.
         """
         joint, product = l3 * l3 + l4 * l4, 2.0 * l3 * l4 * cosine
         return joint - nearest - product, farthest - joint - product
@@ -400,7 +400,7 @@ class Linkage:
     def slack(l1: Any, l2: Any, cosine: Any) -> Any:
         """Return a bound on the change of `square` when the crank turns from a position in which `square` is extreme.
 
-        ``cosine`` is the cosine of that rotation. For a four-bar the bound is exact.
+        ``cosine`` is the cosine of this rotation of the crank. For a four-bar the bound is exact.
         """
         return 2.0 * l1 * l2 * (1.0 - cosine)
 

@@ -91,7 +91,7 @@ class MachineSpec:
         return 0.4 * self.width if self.pin is None else self.pin
 
     def describe(self, *, forces: bool = True) -> str:
-        """Return one line on the bars and, with ``forces``, on speed, gravity and load."""
+        """Return a line that describes the bars and, with ``forces``, speed, gravity and load."""
         bars = f"bars {1e3 * self.width:g} x {1e3 * self.thickness:g} mm of {self.density:g} kg/m³, pins {1e3 * self.hole:g} mm"
         if not forces:
             return bars
@@ -107,7 +107,7 @@ class MachineSpec:
         return f"masses, centres of mass and moments of inertia: {bars}{weighed}; [make] of the task changes them"
 
     def link_masses(self, made: Mapping[str, Any]) -> dict[str, Any]:
-        """Return masses and moments of inertia of the links: the values in ``made``, or the given masses.
+        """Return masses and moments of inertia of the links: those in ``made``, unless this specification gives a link's mass.
 
         The moment of inertia of a link with a given mass changes in proportion to its mass.
         """
@@ -158,7 +158,7 @@ class MachineSpec:
         )
 
     def sliding_five_bar(self, linkage: Linkage) -> FiveBarParameters:
-        """Return the parameters of the five-bar plant for a linkage, whose slider at D is free to move.
+        """Return the parameters of the five-bar plant for a linkage; the plant's slider at D is free to move.
 
         A slider-crank becomes a four-bar with a very long rocker, of `FAR` coupler lengths. The mass of its slider is at C, at
         the end of this rocker.
@@ -190,7 +190,7 @@ class MachineSpec:
         return self.slider_crank(linkage) if isinstance(linkage, SliderCrank) else self.five_bar(linkage)
 
     def five_bar(self, linkage: Linkage) -> FiveBarParameters:
-        """Return the parameters of the five-bar plant for a linkage, whose slider at D is held by spring and damper."""
+        """Return the parameters of the five-bar plant for a linkage; the plant's slider at D is held by spring and damper."""
         free = self.sliding_five_bar(linkage)
         mass = free.slider_mass + free.rocker_mass + free.coupler_mass
         frequency = max(STIFF, STIFF_TURNS * abs(self.speed))

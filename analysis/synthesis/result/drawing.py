@@ -83,7 +83,7 @@ class LinkageScene:
 
     @property
     def rotation(self) -> FloatArray:
-        """Return the crank rotations of the task's stations, or those of `turn` if the task takes a whole turn."""
+        """Return the crank rotations of the task's stations or, if the task takes a whole turn, the rotations of `turn`."""
         return self.turn if self.task_rotations is self.turn else self.solution.rotation
 
     @cached_property
@@ -164,7 +164,7 @@ class LinkageScene:
 
     @property
     def motion(self) -> tuple[str, FloatArray] | None:
-        """Return heading and values of the second crank's or slider's position at each `turn` rotation; None without either."""
+        """Return a heading, and the position of second crank or slider at each `turn` rotation; None if there is neither."""
         if isinstance(self.linkage, FiveBar):
             return "second crank [rad]", self.linkage.pivot.angle(self.turn)
         slider = self.linkage.slider(self.turn)

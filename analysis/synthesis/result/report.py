@@ -587,7 +587,7 @@ def _station_rows(solution: Solution) -> list[list[str]]:
 
 
 def solution_columns(solutions: Sequence[Solution]) -> dict[str, list[float]]:
-    """Return the columns of `Synthesis.columns` for given solutions: a row for each; a missing link has the length 0."""
+    """Return the columns of `Synthesis.columns`, with one row for each given solution; a missing link has the length 0."""
     columns: dict[str, list[float]] = {}
 
     def put(name: str, value: float) -> None:

@@ -234,12 +234,12 @@ def judge(linkage: Linkage, rotation: FloatArray, *, closed: bool) -> Verdicts:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class StraightPart:
-    """Straight part of a path, as the linkage traces it; from closely spaced points.
+    """Straight part of a path, as the linkage traces it; computed from closely spaced points.
 
     Attributes
     ----------
     travel, flatness : float
-        Extent of the traced points along the wanted line, from first to last, and across this line (m).
+        Extent of the traced points (m): along the wanted line from the first point to the last, and across this line.
     begin, end : float
         Crank rotations at the ends of the straight part (rad).
     """
@@ -485,9 +485,10 @@ def angle_at_c(linkage: Linkage, rotation: FloatArray) -> FloatArray:
 
 
 def path_rate(linkage: Linkage, at: FloatArray, both: NDArray[np.complex128]) -> NDArray[np.complex128]:
-    """Return the derivative of the coupler point with respect to the crank rotation ``at``, with the pivot's motion (m/rad).
+    """Return the derivative of the coupler point with respect to the crank rotation, at the rotations ``at`` (m/rad).
 
-    ``both`` are the derivatives of `Linkage.path_jacobian`, as complex numbers x + iy; the result is complex, too.
+    The motion of the pivot is included. ``both`` are the derivatives of `Linkage.path_jacobian`, as complex numbers x + iy; the
+    result is complex, too.
     """
     step = 1e-6
     ahead, behind = linkage.displacement(at + step), linkage.displacement(at - step)

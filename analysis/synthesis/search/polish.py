@@ -2,7 +2,7 @@
 
 Both solvers use exact Jacobians. If the objective is not a sum of squares, the squared errors are minimised first. Then
 `refine` minimises the area or the greatest distance between an untimed path and its target. For other tasks IPOPT minimises the
-greatest error at the stations: an unknown that bounds all errors.
+greatest error at the stations, as an unknown that bounds all errors.
 """
 
 from __future__ import annotations
@@ -116,7 +116,10 @@ class Polished:
     def from_answers(
         cls, found: Sequence[Answer], kept: Sequence[Answer], interrupted: bool, begun: Sequence[Answer] = ()
     ) -> Polished:
-        """Build the record from all answers ``found``, feasible answers ``kept`` in order, and feasible starts ``begun``."""
+        """Build the record from the results of searches.
+
+        ``found`` are all answers, ``kept`` the feasible answers, best first, and ``begun`` the starts that are feasible.
+        """
         others = tuple(a for a in found if not a.feasible)
         return cls(kept=tuple(kept), others=others, done=len(found), interrupted=interrupted, begun=tuple(begun))
 
@@ -206,9 +209,9 @@ def _refine_in_laps(
 ) -> tuple[list[Answer], bool]:
     """Refine many answers by few iterations each, then the best by more; return the answers, and whether Ctrl-C was pressed.
 
-    The refinement has several laps. ``laps`` has, for each lap, the number of answers that take part, the best ones, and their
-    limit of iterations. The guesses ``given`` always take part in the first lap. ``spread`` calls a method of `Polisher` for
-    many items.
+    The refinement has several laps, and in each lap the best answers take part. ``laps`` has, for each lap, the number of these
+    answers and the limit of iterations for each. The guesses ``given`` always take part in the first lap. ``spread`` calls a
+    method of `Polisher` for many items.
     """
     for lap, (count, iterations) in enumerate(laps):
         # guesses take part in the first lap however poor they are; answers that do not take part are dropped

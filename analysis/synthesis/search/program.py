@@ -99,7 +99,7 @@ class Program(Statement):
 
     @cached_property
     def trace(self) -> Any:
-        """Return a CasADi function of the unknowns, the parameters and a fraction of the crank rotation of a path.
+        """Return a CasADi function of the unknowns, the parameters and a fraction (0 to 1) of the crank rotation of a path.
 
         The function computes the coupler point, shape (2, 1), and its derivatives with respect to the k unknowns, shape (2, k).
         """
@@ -347,10 +347,10 @@ class Program(Statement):
 
 
 def _grashof_rows(type_: str | None, links: FloatArray) -> FloatArray:
-    """Return rows r with r . (l1, l2, l3, l4) <= 0 for a four-bar of this type, shape (6, 4); unused rows are zero.
+    """Return coefficients r of the conditions r . (l1, l2, l3, l4) <= 0 for a four-bar of this type, shape (6, 4).
 
-    The lengths of all triple-rockers do not form a convex set. For this type the rows therefore also require that the shortest
-    and the longest of ``links`` remain the shortest and the longest.
+    Unused rows are zero. The lengths of all triple-rockers do not form a convex set. For this type the conditions therefore
+    also require that the shortest and the longest of ``links`` remain the shortest and the longest.
     """
     rows = np.zeros((6, 4))
     if type_ is None:

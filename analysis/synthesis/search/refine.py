@@ -29,7 +29,7 @@ FloatArray = NDArray[np.float64]
 Made = TypeVar("Made")
 #: Iterations of SLSQP, and the change of the measure, relative to its first value, at which it ends.
 ITERATIONS, CHANGE = 100, 1e-7
-#: Number added to the mean square displacement by which a direction is scaled, relative to the greatest one, as a limit.
+#: A direction is scaled by its mean square displacement; this fraction of the greatest one is added, to limit the scaling.
 STIFF = 1e-6
 #: Least number of pieces of the target at which distances are computed.
 PIECES = 360
@@ -213,7 +213,11 @@ class Refinement:
         return replace(ended, start=start, converged=bool(found.success), iterations=int(found.nit))
 
     def _distance_choices(self) -> Sequence[Callable[[FloatArray], Sequence[Any]]]:
-        """Return, for each round, a function that chooses which distances of a curve are bounded: a few, then the large."""
+        """Return, for each round of `refine`, a function that chooses the distances of a curve that are bounded.
+
+        The first round bounds a few distances, the later rounds the large distances. If the greatest distance is not minimised,
+        there is one round, without bounded distances.
+        """
         if self.normal.quality != "worst":
             return (lambda _: (),)
 
@@ -230,7 +234,7 @@ class Refinement:
         return choose_few, choose_large, choose_large
 
     def _scaled_directions(self, curve: FloatArray, slopes: FloatArray) -> FloatArray:
-        """Return scaled directions in the space of the k unknowns, shape (k, number of free unknowns).
+        """Return scaled directions in the space of the k unknowns, shape (k, number of unknowns that are not fixed).
 
         A step of 1 along a direction moves the curve perpendicular to itself by 1, in the root mean square.
         """
@@ -308,7 +312,7 @@ class _Descent:
         self._chosen = some
         self._bounds_distances = refinement.normal.quality == "worst"
         self._bound_unknown = self._bounds_distances and refinement.limit is None
-        # SLSQP asks for each twice at the same unknowns: for the measure and for the constraints
+        # SLSQP evaluates the curve twice at the same unknowns: for the measure and for the constraints
         self.curve = _cache_last(lambda z: refinement.trace(z, parameters))
         self._evaluate = _cache_last(lambda z: refinement.program.evaluate(z, parameters))
         self._differentiate = _cache_last(lambda z: refinement.program.gradient_and_jacobian(z, parameters))

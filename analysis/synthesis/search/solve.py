@@ -49,7 +49,7 @@ from .start import (
     random_pivot,
 )
 
-#: Stations of an untimed path with a moving pivot: more than with a fixed one, because harmonics cause waves in the curve.
+#: Number of stations of an untimed path with a moving pivot: more than with a fixed one, as harmonics cause waves in the curve.
 STATIONS = 144
 #: Untimed points that a four-bar can pass exactly, and the factor by which starts are increased until it passes them.
 MOST_EXACT, AGAIN = 9, 4

@@ -43,10 +43,10 @@ class Search:
     candidates : int
         Number of linkages in the scan.
     n_jobs : int, optional
-        Number of processes, -1 for one per core; by default one, or inside `joblib.parallel_config` for a cluster all cores of
-        the cluster.
+        Number of processes, -1 for one per core. The default is one process; inside `joblib.parallel_config` for a cluster the
+        default is all cores of the cluster.
     progress : bool
-        Show a progress bar.
+        Whether to show a progress bar.
     """
 
     starts: int = 24
@@ -80,7 +80,7 @@ QUICK_SEARCH = Search(starts=12)
 def run_on_cores(
     work: Callable[[Item], Made], items: Sequence[Item], search: Search, what: str
 ) -> tuple[list[Made], bool]:
-    """Apply ``work`` to all items on several cores; return the results in order, and whether Ctrl-C interrupted it.
+    """Apply ``work`` to all items on several cores; return the results in order, and whether Ctrl-C interrupted the work.
 
     ``what`` is the text beside the progress bar.
     """

@@ -349,7 +349,8 @@ class Statement:
     ) -> None:
         """Add the constraint that a value lies between two bounds.
 
-        ``factor`` converts a violation to ``unit``; by default it converts from the target's size to mm, or from rad to deg.
+        ``factor`` converts a violation to ``unit``. By default a length is in multiples of the target's size (unit mm), an
+        angle in rad (unit deg), and any other value already in ``unit``.
         """
         usual = {"mm": 1e3 * self.normal.unit, "deg": degrees(1.0)}
         label = Label(name, usual.get(unit, 1.0) if factor is None else factor, unit, self.limits.linkage)

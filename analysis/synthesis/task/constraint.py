@@ -201,7 +201,7 @@ class RotationRequirement(Require):
 
 
 class RotationRange(NamedTuple):
-    """What a constraint needs to know about a search: the crank rotations at which it must hold, and the kind of linkage.
+    """Properties of a search on which a constraint depends: the crank rotations at which it must hold, and the linkages.
 
     Attributes
     ----------

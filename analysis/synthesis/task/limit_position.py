@@ -34,7 +34,7 @@ InLine = Literal["stretched", "folded"]
 
 
 class _FourBarConditions:
-    """Conditions for the limit positions of a four-bar, for numbers and symbols; `POSITIONS` has the class of each kind."""
+    """Conditions for the limit positions of a four-bar, for numbers and symbols; see `POSITIONS`."""
 
     @staticmethod
     def dead_cosine(l1: float, reach: float, l4: float) -> float:
@@ -77,7 +77,7 @@ class _FourBarConditions:
 
     @staticmethod
     def speed(g: Any, c2: Any, s2: Any, l2: Any, l3: Any, l4: Any) -> Any:
-        """Return the speed of the driven link divided by that of the crank; g is the closed loop's position."""
+        """Return the speed of the driven link divided by the speed of the crank; ``g`` is the position of the closed loop."""
         return symbolic_equations(FIVE_BAR).coefficients(g, SimpleNamespace(l2=l2, l3=l3, l4=l4, ca=1.0, sa=0.0)).k42
 
 

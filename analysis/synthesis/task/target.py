@@ -456,7 +456,8 @@ def hausdorff(curve: ArrayLike, target: TargetPath, *, closed: bool = True) -> f
     """Compute the Hausdorff distance of a traced curve from its target (m).
 
     For an open target and a closed curve only the target's points count, as in `area_difference`. Distances are computed at the
-    vertices and at `PIECES` points at equal arc lengths: the result is below the true distance by at most half their spacing.
+    vertices and at `PIECES` points at equal arc lengths. The result is below the true distance by at most half the spacing of
+    these points.
 
     Parameters
     ----------

@@ -24,7 +24,8 @@ def check_assembly(parameters: FiveBarParameters, crank_angle: float, slider_pos
     Raises
     ------
     AssemblyError
-        With the configuration, the distance from crank pin to slider pin, and the range in which it should be.
+        If the links cannot be joined; the message has the configuration and the distance from crank pin to slider pin,
+        with the range that coupler and rocker allow.
     """
     p = parameters.constants()
     square = kinematics.assembly_square(crank_angle, slider_position, p)
@@ -40,6 +41,6 @@ def configuration(crank_angle: float, slider_position: float) -> str:
 
 
 def error_scale(parameters: FiveBarParameters, x: Sequence[float]) -> tuple[float, ...]:
-    """Return the magnitude of each state component below which its error is absolute; x is the initial state."""
+    """Return for each state component the magnitude below which its error counts as absolute; x is the initial state."""
     mass = parameters.coupler_mass + parameters.rocker_mass + parameters.slider_mass
     return crank_scale(parameters.crank_length, mass, parameters.crank_inertia, x[2])

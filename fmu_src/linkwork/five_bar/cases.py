@@ -1,4 +1,4 @@
-"""Standard cases of the five-bar slider as tables of case files: every way to drive and load the mechanism of Table 3.1."""
+"""Standard cases of the five-bar slider as tables of case files: the mechanism of Table 3.1 with every drive and load."""
 
 from __future__ import annotations
 

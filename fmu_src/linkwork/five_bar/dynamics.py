@@ -1,6 +1,6 @@
-"""Dynamics of the five-bar slider in its two freedoms (Youssef, chapters II and III, reduced form).
+"""Dynamics of the five-bar slider in its two degrees of freedom (Youssef, chapters II and III, reduced form).
 
-With q = (th2, u), w2 = th2' and v = u' the equations of motion are
+With the coordinates (th2, u), w2 = th2' and v = u', the equations of motion are
 
     m11 w2' + m12 v' + b1 = T + Q1        (crank)
     m12 w2' + m22 v' + b2 = F2 + Q2       (slider)
@@ -51,7 +51,7 @@ class Inputs(NamedTuple):
 
 
 class Inertia(NamedTuple):
-    """Inertia matrix of the two freedoms: kg.m2, kg.m, kg."""
+    """Inertia matrix of the two degrees of freedom: m11 in kg.m2, m12 in kg.m, m22 in kg."""
 
     m11: float
     m12: float
@@ -135,7 +135,10 @@ class Outputs(NamedTuple):
 
 
 def inertia(g: Position, k: Coefficients, p: Constants) -> Inertia:
-    """Compute the inertia matrix; I_A includes the crank's m lG2^2, coupler and rocker inertias are about B and D."""
+    """Compute the inertia matrix.
+
+    The crank's moment of inertia about A includes m2 lG2^2; the moments of inertia of coupler and rocker are about B and D.
+    """
     # m3 l2 e2.r3 with r3 = G3 - B, and m4 e_alpha.(J r4) with r4 = G4 - D; J turns by +90 degrees
     q3 = p.l2 * (p.mx3 * (g.c2 * g.c3 + g.s2 * g.s3) + p.my3 * (g.s2 * g.c3 - g.c2 * g.s3))
     q4 = p.sa * (p.mx4 * g.c4 - p.my4 * g.s4) - p.ca * (p.mx4 * g.s4 + p.my4 * g.c4)
@@ -165,7 +168,7 @@ def velocity_terms(
 
 
 def friction(v: float, p: Constants) -> float:
-    """Compute the force of damper and guide friction against the slider's motion (N); odd in v."""
+    """Compute the force of damper and guide friction (N) against the slider's motion at speed v; odd in v."""
     return resistance(v, p.mu, p.fc)
 
 
@@ -173,7 +176,7 @@ def applied_forces(
     g: Position, k: Coefficients, u: float, v: float, load_x: float, load_y: float, p: Constants
 ) -> tuple[float, float]:
     """Compute the generalised forces Q1 (N.m) and Q2 (N) of gravity, load, spring, damper and friction."""
-    # moments about B of what acts on the coupler, about D of what acts on the rocker
+    # moments about B of the forces on the coupler, about D of the forces on the rocker
     t3 = (
         p.gy * (p.mx3 * g.c3 - p.my3 * g.s3)
         - p.gx * (p.mx3 * g.s3 + p.my3 * g.c3)
@@ -229,7 +232,7 @@ def motion(g: Position, k: Coefficients, x: State, i: Inputs, p: Constants) -> M
 
 
 class Rubbing(NamedTuple):
-    """Friction in one contact if its force is 1 N, and the changes of all joint forces that this friction causes."""
+    """Friction in one contact for a contact force of 1 N, and the changes of all joint forces that this friction causes."""
 
     friction: Friction
     response: Reactions
@@ -287,14 +290,14 @@ def derivative(x: State, i: Inputs, p: Constants) -> State:
 
 
 def reactions(g: Position, x: State, m: Motion, i: Inputs, p: Constants) -> Reactions:
-    """Compute the forces in the pins and the guide by Newton and Euler from the outermost link inwards.
+    """Compute the forces in the pins and the guide by the Newton-Euler equations, from the outermost link inwards.
 
     The force at C is the pair of loop multipliers of the thesis (2.3).
     """
     w2 = x[2]
     e2 = m.crank_acceleration
     a = m.slider_acceleration
-    # acceleration minus gravity of B and of D, and mass times the same for the centres of mass of coupler and rocker
+    # acceleration minus gravity: of B and D; multiplied by the mass, of the centres of mass of coupler and rocker
     bx = -p.l2 * (g.s2 * e2 + g.c2 * w2 * w2) - p.gx
     by = p.l2 * (g.c2 * e2 - g.s2 * w2 * w2) - p.gy
     rx3 = p.mx3 * g.c3 - p.my3 * g.s3
@@ -344,7 +347,7 @@ def kinetic_energy(m: Inertia, w2: float, v: float) -> float:
 
 
 def potential_energy(g: Position, u: float, p: Constants) -> float:
-    """Compute the potential energy of spring and gravity (J); that of gravity is zero with every centre of mass at A."""
+    """Compute the potential energy of spring and gravity (J); gravity contributes zero if every centre of mass is at A."""
     x = (
         p.mx2 * g.c2
         - p.my2 * g.s2
@@ -378,8 +381,8 @@ def mechanical_energy(x: State, p: Constants) -> float:
 def jump_speed(x: State, speed: float, p: Constants) -> State:
     """Return the state after a jump of the commanded crank speed to ``speed``.
 
-    The jump is an impulse on the crank. No impulse acts along the slider's freedom, so that its generalised momentum
-    m12 w2 + m22 v is conserved; the work of the crank's impulse is the change of kinetic energy.
+    The jump is an impulse on the crank. No other impulse is applied, so that the generalised momentum of the slider position,
+    m12 w2 + m22 v, is conserved; the work of the crank's impulse is the change of kinetic energy.
     """
     g = position(x[0], x[1], p)
     m = inertia(g, coefficients(g, p), p)
@@ -389,7 +392,7 @@ def jump_speed(x: State, speed: float, p: Constants) -> State:
 
 
 def jump(x: State, i: Inputs, u: tuple[float, ...], p: Constants) -> State:
-    """Return the state after the commanded speed, if it is in force, has jumped to its value in the channels ``u``."""
+    """Return the state after a jump of the commanded speed to its value in the channels ``u``; no jump at a torque drive."""
     return jump_speed(x, (1.0 - i.speed_drive) * x[2] + i.speed_drive * u[1], p)
 
 
@@ -401,12 +404,12 @@ def apply_inputs(modes: tuple[float, ...], u: tuple[float, ...], p: Constants) -
 
 
 def complete_start(x: State, i: Inputs, p: Constants) -> State:
-    """Return the initial state unchanged, because all its components are independent."""
+    """Return the initial state unchanged, because its components do not depend on each other."""
     return x
 
 
 def clearance(x: State, i: Inputs, p: Constants) -> float:
-    """Compute the sine of the transmission angle, or the margin to jamming by friction if that is smaller."""
+    """Compute the sine of the transmission angle; with friction, the margin to jamming if this margin is smaller."""
     g = position(x[0], x[1], p)
     sine = p.branch * g.s43
     if not p.rough:
@@ -419,7 +422,7 @@ def clearance(x: State, i: Inputs, p: Constants) -> float:
 def outputs(x: State, i: Inputs, start_energy: float, p: Constants) -> Outputs:
     """Compute all real outputs of the FMI contract at state ``x`` under the inputs ``i``.
 
-    ``start_energy`` is the mechanical energy at the start of the run (J), from which the energy balance counts.
+    ``start_energy`` is the mechanical energy at the start of the run (J), the reference of the energy balance.
     """
     th2, u, w2, v, dissipated, supplied = x
     g = position(th2, u, p)

@@ -1,6 +1,6 @@
 """Kinematics of the five-bar slider in closed form (Youssef, chapter II).
 
-The freedoms are the crank angle ``th2`` and the slider position ``u``. Every angle is absolute, counter-clockwise from
+The coordinates are the crank angle ``th2`` and the slider position ``u``. Every angle is absolute, counter-clockwise from
 the ground link; ``c4, s4`` belong to the direction from the slider pin D to the coupler-rocker pin C, so that the rocker
 angle here is the thesis's theta4 + alpha.
 
@@ -42,7 +42,7 @@ class Coefficients(NamedTuple):
 def assembly_square(th2: float, u: float, p: Constants) -> float:
     """Compute the square of the distance of C from the line BD, times BD squared (m4).
 
-    It is (l3 l4 sin(th4 - th3))^2, positive where the links can be joined and negative where they cannot.
+    The result is (l3 l4 sin(th4 - th3))^2: positive where the links can be joined, negative where they cannot.
     """
     dx = p.l1 + u * p.ca - p.l2 * cos(th2)
     dy = u * p.sa - p.l2 * sin(th2)
@@ -60,8 +60,8 @@ def joint_distance(x: Sequence[float], p: Constants) -> tuple[float, float, floa
 def position(th2: float, u: float, p: Constants) -> Position:
     """Solve loop closure (2.1) as the intersection of two circles about B and D.
 
-    ``p.branch`` is the sign of sin(th4 - th3) and stays the same in a motion. The "+ root" of the thesis's KINE does not: it
-    changes the assembly once B passes D.
+    ``p.branch`` is the sign of sin(th4 - th3) and stays the same in a motion. The "+ root" of the listing KINE (appendix 1)
+    changes the assembly when B passes D.
 
     Raises
     ------
@@ -119,8 +119,8 @@ def centripetal(g: Position, w2: float, w3: float, w4: float, p: Constants) -> t
 def link_angles(g: Position, p: Constants) -> tuple[float, float]:
     """Return the absolute angles of the coupler B -> C and the rocker D -> C (the thesis's theta4 + alpha), in (-2 pi, 2 pi).
 
-    They are sums of the direction of the line B -> D and angles of the triangle B, D, C, which are at most pi in magnitude.
-    Both change continuously unless the line B -> D comes to point opposite to the ground link, where B passes behind D.
+    Each angle is the direction of the line B -> D plus a sum of angles of the triangle B, D, C, each at most pi in magnitude.
+    Both angles change continuously unless the line B -> D comes to point opposite to the ground link, where B passes behind D.
     """
     dx = p.l3 * g.c3 - p.l4 * g.c4
     dy = p.l3 * g.s3 - p.l4 * g.s4
@@ -150,7 +150,7 @@ def coupler_point_velocity(g: Position, w2: float, w3: float, p: Constants) -> t
 
 
 def assembly_margin(th2: float, u: float, p: Constants) -> tuple[float, float]:
-    """Compute the margins of BD to the limits of assembly (m), l3 + l4 - BD and BD - |l3 - l4|, both positive inside."""
+    """Compute the margins of BD to the limits of assembly (m): l3 + l4 - BD and BD - |l3 - l4|, positive within the limits."""
     dx = p.l1 + u * p.ca - p.l2 * cos(th2)
     dy = u * p.sa - p.l2 * sin(th2)
     distance = sqrt(dx * dx + dy * dy)

@@ -14,8 +14,8 @@ class Constants(NamedTuple):
 
     ``mx3, my3`` are m3 times the components of the centre of mass along and across the coupler, and so on; ``i2b`` is
     I_A + m3 l2^2, ``i3b`` the coupler's moment of inertia about B, ``i4d`` the rocker's about D; ``gx, gy`` gravity;
-    ``ca, sa`` the guide's direction; ``rough`` is the sum of ``mug`` and ``ra`` to ``rd``, zero without friction by contact
-    forces.
+    ``ca, sa`` the guide's direction. ``rough`` is mug + ra + rb + rc + rd, used only as a switch: it is zero if no friction
+    depends on the joint forces.
     """
 
     l1: float
@@ -97,8 +97,8 @@ class FiveBarParameters(CheckedParameters):
 
     Lengths in m, masses in kg, moments of inertia in kg.m2, angles in rad, stiffness in N/m, damping in N.s/m. The
     moment of inertia of the crank is about its shaft A and includes m lG2^2; those of coupler and rocker are about their
-    own centres of mass. Centres of mass are measured from A, from the crank pin B and from the slider pin D, and turned by
-    the ``*_cog_angle`` from the link's own direction (A to B, B to C, D to C).
+    own centres of mass. The centres of mass of crank, coupler and rocker are measured from A, from the crank pin B and from
+    the slider pin D, at the ``*_cog_angle`` from the link's own direction (A to B, B to C, D to C).
 
     Raises
     ------

@@ -1,6 +1,6 @@
 """Published parameter sets (Youssef, Tables 3.1, 8.1, 8.2 and appendix 1), converted from cgs to SI.
 
-`SETS` maps a name to a `PublishedSet`: the mechanism, the speed at which it runs, and where it is printed.
+`SETS` maps a name to a `PublishedSet`: the mechanism, its running speed, and the source.
 """
 
 from __future__ import annotations

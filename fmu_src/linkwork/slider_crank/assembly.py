@@ -32,7 +32,8 @@ def check_assembly(parameters: SliderCrankParameters, crank_angle: float, shift:
     Raises
     ------
     AssemblyError
-        With the configuration, and by how much the rod is too short or how near it is to perpendicular to the guide.
+        If the rod does not reach the guide; the message has the configuration, and by how much the rod is too short or how
+        near the rod is to perpendicular to the guide.
     """
     p = parameters.constants()
     square = kinematics.assembly_square(crank_angle, shift, p)
@@ -43,6 +44,6 @@ def check_assembly(parameters: SliderCrankParameters, crank_angle: float, shift:
 
 
 def error_scale(parameters: SliderCrankParameters, x: Sequence[float]) -> tuple[float, ...]:
-    """Return the magnitude of each state component below which its error is absolute; x is the initial state."""
+    """Return for each state component the magnitude below which its error counts as absolute; x is the initial state."""
     mass = parameters.crank_mass + parameters.rod_mass + parameters.slider_mass
     return crank_scale(parameters.crank_length, mass, parameters.crank_inertia, x[2])

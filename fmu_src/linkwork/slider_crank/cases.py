@@ -1,4 +1,4 @@
-"""Standard cases of the slider-crank as tables of case files: every way to drive and load it, for a4 = 10 in, S1 = 3.5 in."""
+"""Standard cases of the slider-crank as tables of case files: every drive and load, for a4 = 10 in and S1 = 3.5 in."""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
-"""Dynamics of the generalised slider-crank in its two freedoms, by vector mechanics.
+"""Dynamics of the generalised slider-crank in its two degrees of freedom, by vector mechanics.
 
-With q = (theta1, S1), w = theta1' and v = S1' the equations of motion are
+With the coordinates (theta1, S1), w = theta1' and v = S1', the equations of motion are
 
     m11 w' + m12 v' + b1 = T + Q1        (crank)
     m12 w' + m22 v' + b2 = F + Q2        (axial shift)
@@ -9,9 +9,9 @@ where b are the velocity terms and Q gathers gravity, the slider's load, springs
 speed or the shift is prescribed, its acceleration is given, and its equation yields the required torque T or axial force
 F. The state of a run is the six-tuple (theta1, S1, w, v, dissipated work, supplied work).
 
-A rigid rod without spin has the same motion and the same forces at its ends as the masses m22, m23, m33 of
-`parameters.Constants`, which multiply the accelerations of its ends: each of its points moves as a fixed weighted mean of the
-ends, and the transverse moment of inertia I adds I/a2^2 to m22 and m33 and -I/a2^2 to m23.
+A rigid rod without spin is replaced by the masses m22, m23, m33 of `parameters.Constants`, which multiply the accelerations of
+its ends. Motion and end forces stay the same, because each point of the rod moves as a fixed weighted mean of the two ends. The
+transverse moment of inertia I adds I/a2^2 to m22 and m33, and -I/a2^2 to m23.
 
 The functions are arithmetic on floats without branches, like those of `kinematics`.
 """
@@ -66,7 +66,7 @@ class Inputs(NamedTuple):
 
 
 class Inertia(NamedTuple):
-    """Inertia matrix of the two freedoms: kg.m2, kg.m, kg."""
+    """Inertia matrix of the two degrees of freedom: m11 in kg.m2, m12 in kg.m, m22 in kg."""
 
     m11: float
     m12: float
@@ -76,8 +76,8 @@ class Inertia(NamedTuple):
 class Motion(NamedTuple):
     """Accelerations, slider velocity, torque, axial forces and powers that follow from the state and the inputs.
 
-    ``torque`` is the torque of the drive on the shaft, ``force`` the axial force that drives or holds the shift, of which a
-    groove exerts ``groove_force``.
+    ``torque`` is the torque of the drive on the shaft, ``force`` the axial force that drives or holds the shift;
+    ``groove_force`` is the part of ``force`` that a groove exerts.
     """
 
     crank_acceleration: float
@@ -97,8 +97,8 @@ class Reactions(NamedTuple):
     ``bearing`` is the force of the bearing on the crank, without axial component; ``axial`` is the whole axial force on the
     crank, of drive, groove, spring and damper; ``bearing_moment`` is about the origin O of the ground frame and includes the
     torques of drive and groove; ``crank_pin`` is the force of the crank on the rod, ``slider_pin`` that of the slider on the
-    rod; ``guide`` is the force of the guide on the slider, without friction, spring and load, and ``guide_moment`` its moment
-    about the slider pin.
+    rod; ``guide`` is the force of the guide on the slider, without friction, spring and load; ``guide_moment`` is the moment
+    of the guide about the slider pin.
     """
 
     bearing: Vector
@@ -170,7 +170,10 @@ def impose_groove(x: State, in_groove: float, p: Constants) -> State:
 
 
 def inertia(q: Position, k: Coefficients, p: Constants) -> Inertia:
-    """Compute the inertia matrix, with the rod as masses at its ends; m23 couples the velocities of its two pins."""
+    """Compute the inertia matrix.
+
+    The rod is replaced by masses at its ends, of which m23 couples the velocities of the two pins.
+    """
     # direction of the guide times the velocities of the crank pin for w = 1 and for v = 1
     along = -p.a1 * q.c * p.sa
     m4 = p.m33 + p.m3
@@ -224,8 +227,8 @@ def motion(q: Position, k: Coefficients, x: State, i: Inputs, p: Constants) -> M
     r2 = q2 - b2 + i.force
     law = groove(th, p)
     pitch = i.groove * law.pitch
-    # two linear equations, whose rows the drives choose: the crank's (with the groove's force on it eliminated) or the
-    # prescribed crank acceleration; the shift's, the prescribed axial acceleration, or the groove's
+    # two linear equations; the drives choose each row. Row 1: equation of the crank (with the groove's force eliminated) or
+    # prescribed crank acceleration. Row 2: equation of the shift, prescribed axial acceleration, or shift by the groove
     turning = 1.0 - i.speed_drive
     shifting = (1.0 - i.shift_drive) * (1.0 - i.groove)
     a11 = turning * (m.m11 + pitch * m.m12) + i.speed_drive
@@ -237,7 +240,7 @@ def motion(q: Position, k: Coefficients, x: State, i: Inputs, p: Constants) -> M
     determinant = a11 * a22 - a12 * a21
     e = (c1 * a22 - a12 * c2) / determinant
     a = (a11 * c2 - a21 * c1) / determinant
-    # the force that holds the shift in addition to the given one; below, the same for the torque
+    # the force that holds the shift, in addition to the given force; below likewise the torque
     hold = (1.0 - shifting) * (m.m12 * e + m.m22 * a - r2)
     groove_force = i.groove * hold
     torque = i.torque + i.speed_drive * (m.m11 * e + m.m12 * a - r1 + pitch * hold)
@@ -251,7 +254,7 @@ def motion(q: Position, k: Coefficients, x: State, i: Inputs, p: Constants) -> M
         force,
         groove_force,
         resistance(v4, p.mu, p.fc) * v4 + p.mux * v * v,
-        # the groove adds no power: its force along the shaft gives what its torque takes
+        # the groove adds no power: the power of its axial force and the power of its torque cancel
         torque * w + (force - groove_force) * v + i.load * v4,
     )
 
@@ -266,7 +269,7 @@ def derivative(x: State, i: Inputs, p: Constants) -> State:
 
 
 def reactions(q: Position, x: State, m: Motion, i: Inputs, p: Constants) -> Reactions:
-    """Compute the forces and moments in all joints by Newton and Euler from the slider inwards."""
+    """Compute the forces and moments in all joints by the Newton-Euler equations, from the slider inwards."""
     w = x[2]
     e = m.crank_acceleration
     g = Vector(p.gx, p.gy, p.gz)
@@ -279,14 +282,14 @@ def reactions(q: Position, x: State, m: Motion, i: Inputs, p: Constants) -> Reac
     q3 = subtract(add(scale(p.m23, a2), scale(p.m33, a3)), scale(front, g))
     free = subtract(a3, g)
     pushed = slider_resistance(q.s4, m.slider_velocity, i.load, p)
-    # the slider's motion along the guide gives that pull: m3 (a3 - g) = push - (q3 + pull r), r the rod's vector
+    # the slider's motion along the guide gives this pull: m3 (a3 - g) = push - (q3 + pull r), r the rod's vector
     r = rod(q, p)
     pull = (pushed - p.m3 * dot(free, along) - dot(q3, along)) / q.h
     f3 = add(q3, scale(pull, r))
     f2 = subtract(q2, scale(pull, r))
     guiding = subtract(add(scale(p.m3, free), f3), scale(pushed, along))
     guide_moment = cross(from_guide_frame(Vector(p.mx4, p.my4, p.mz4), p), free)
-    # the crank about the origin of frame 2, which accelerates along the axis alone
+    # moments on the crank about the origin of frame 2, which accelerates only along the axis
     rx = p.mx1 * q.c - p.my1 * q.s
     ry = p.mx1 * q.s + p.my1 * q.c
     px = p.pxz * q.c - p.pyz * q.s
@@ -313,7 +316,7 @@ def kinetic_energy(m: Inertia, w: float, v: float) -> float:
 
 
 def potential_energy(q: Position, s1: float, p: Constants) -> float:
-    """Compute the potential energy of springs and gravity (J); that of gravity is zero with every centre of mass at O."""
+    """Compute the potential energy of springs and gravity (J); gravity contributes zero if every centre of mass is at O."""
     front = p.m2 * p.share
     rear = p.m2 - front
     slider = from_guide_frame(Vector(p.mx4, p.my4, p.mz4), p)
@@ -333,10 +336,10 @@ def mechanical_energy(x: State, p: Constants) -> float:
 
 
 def jump(x: State, i: Inputs, u: tuple[float, ...], p: Constants) -> State:
-    """Return the state after the commanded speeds that are in force have jumped to their values in the channels ``u``.
+    """Return the state after a jump of the commanded speeds, if there are any, to their values in the channels ``u``.
 
-    A jump is an impulse on the driven freedom. No impulse acts along the other freedom, so that its generalised momentum is
-    conserved, unless a groove couples it to the crank. The work of the impulses is the change of kinetic energy.
+    A jump is an impulse on the driven coordinate. No impulse acts on the other coordinate, so that its generalised momentum is
+    conserved, unless a groove couples the shift to the crank. The work of the impulses is the change of kinetic energy.
     """
     speed, shift_velocity = u[1], u[4]
     x = impose_groove(x, i.groove, p)
@@ -390,7 +393,7 @@ def clearance(x: State, i: Inputs, p: Constants) -> float:
 def outputs(x: State, i: Inputs, start_energy: float, p: Constants) -> Outputs:
     """Compute all real outputs of the FMI interface at state ``x`` under the inputs ``i``.
 
-    ``start_energy`` is the mechanical energy at the start of the run (J), from which the energy balance counts.
+    ``start_energy`` is the mechanical energy at the start of the run (J), the reference of the energy balance.
     """
     x = impose_groove(x, i.groove, p)
     th, s1, w, v, dissipated, supplied = x

@@ -1,6 +1,6 @@
 """Kinematics of the generalised slider-crank in closed form (Rahman, chapter II, solved without iteration).
 
-The freedoms are the crank angle ``th`` and the axial shift ``s1``. With the crank pin P2 = (a1 c, a1 s, S1) and the slider
+The coordinates are the crank angle ``th`` and the axial shift ``s1``. With the crank pin P2 = (a1 c, a1 s, S1) and the slider
 pin P3 = (-a4, 0, 0) - S4 k4, k4 = (0, sin alpha4, cos alpha4), the rod's length a2 = |P3 - P2| gives S4: the position of the
 foot of P2 on the guide plus the distance h of P3 from that foot.
 
@@ -51,7 +51,7 @@ class Coefficients(NamedTuple):
 def assembly_square(th: float, s1: float, p: Constants) -> float:
     """Compute the squared rod length minus the squared distance of the crank pin from the guide (m2).
 
-    It is h^2, positive where the rod reaches the guide and negative where it does not.
+    The result is h^2: positive where the rod reaches the guide, negative where it does not.
     """
     f = p.a1 * cos(th) + p.a4
     g = p.a1 * sin(th) * p.ca - s1 * p.sa
@@ -65,7 +65,9 @@ def joint_distance(x: Sequence[float], p: Constants) -> tuple[float, float, floa
 
 
 def position(th: float, s1: float, p: Constants) -> Position:
-    """Solve loop closure; ``p.branch`` says on which side of the crank pin's foot on the guide the slider is.
+    """Compute the configuration from loop closure.
+
+    ``p.branch`` says on which side of the crank pin's foot on the guide the slider is.
 
     Raises
     ------
@@ -96,7 +98,7 @@ def slider_pin(q: Position, p: Constants) -> Vector:
 
 
 def rod(q: Position, p: Constants) -> Vector:
-    """Compute the vector of the rod, from crank pin to slider pin (m): -f i4 - g j4 - h k4."""
+    """Compute the vector from crank pin to slider pin (m): -f i4 - g j4 - h k4 with the unit vectors of frame 4."""
     return Vector(-q.f, -q.g * p.ca - q.h * p.sa, q.g * p.sa - q.h * p.ca)
 
 
@@ -120,8 +122,8 @@ def crank_pin_acceleration(q: Position, w: float, e: float, a: float, p: Constan
 
 def centripetal(q: Position, k: Coefficients, w: float, v: float, p: Constants) -> float:
     """Compute the slider acceleration for theta1'' = S1'' = 0 (m/s2): loop closure differentiated twice."""
-    # r.r'' + r'.r' = 0 with the rod's vector r and its rate r' = -S4' k4 - v2; component by component for speed, since every
-    # step of a run calls this many times
+    # r.r'' + r'.r' = 0 with the rod's vector r and its rate r' = -S4' k4 - v2; written out by components for speed, since
+    # every step of a run calls this function many times
     slide = k.kth * w + k.ks * v
     rate_x = p.a1 * q.s * w
     rate_y = -slide * p.sa - p.a1 * q.c * w
@@ -151,7 +153,7 @@ def transmission_angle(q: Position, p: Constants) -> float:
 
 
 def assembly_margin(q: Position, p: Constants) -> float:
-    """Compute the rod length minus the crank pin's distance from the guide (m), positive where it can be assembled."""
+    """Compute the rod length minus the crank pin's distance from the guide (m), positive where the links can be joined."""
     return p.a2 - sqrt(q.f * q.f + q.g * q.g)
 
 
@@ -164,14 +166,14 @@ def closure_residual(th: float, s1: float, s4: float, p: Constants) -> float:
 
 
 def to_crank_frame(a: Vector, q: Position) -> Vector:
-    """Return the components in frame 2, which turns with the crank, of a vector in the ground frame."""
+    """Return the components in frame 2, which moves with the crank, of a vector in the ground frame."""
     return Vector(q.c * a.x + q.s * a.y, q.c * a.y - q.s * a.x, a.z)
 
 
 def to_rod_frame(a: Vector, q: Position, p: Constants) -> Vector:
     """Return the components in frame 3, fixed to the rod's line, of a vector in the ground frame.
 
-    i is along the rod from crank pin to slider pin, j perpendicular to it and to the crank axis.
+    i is along the rod from crank pin to slider pin, j perpendicular to the rod and to the crank axis.
 
     Raises
     ------

@@ -1,8 +1,9 @@
 """Parameters of the generalised slider-crank: validated, in SI, named as in its FMI interface.
 
-Frames, right-handed, with the thesis's axes: 1 is the ground's, its origin O on the crank axis, k along that axis; 2 turns
-and shifts with the crank, its origin on the axis in the plane of the crank pin, i towards the pin; 4 is the guide's, its i
-the common normal of both axes (and i of frame 1) and its k turned from that of frame 1 by ``guide_twist``.
+The frames are right-handed and have the thesis's axes. Frame 1 is fixed to the ground: origin O on the crank axis, k along the
+crank axis. Frame 2 rotates and shifts with the crank: origin on the crank axis in the plane of the crank pin, i towards the
+pin. Frame 4 is fixed to the guide: i along the common normal of crank axis and guide (also i of frame 1), k at the angle
+``guide_twist`` from k of frame 1.
 """
 
 from __future__ import annotations
@@ -21,7 +22,8 @@ class Constants(NamedTuple):
     energy is half of m22 v2.v2 + 2 m23 v2.v3 + m33 v3.v3, with v2, v3 the velocities of crank pin and slider pin;
     ``share`` is the distance of its centre of mass from the crank pin divided by its length.
     ``iz`` is the crank's moment of inertia about its axis, ``pxz, pyz`` its products of inertia, ``mx1, my1, mz1`` its mass
-    times the coordinates of its centre of mass in frame 2; ``mx4, my4, mz4`` the slider's from the slider pin in frame 4.
+    times the coordinates of its centre of mass in frame 2; ``mx4, my4, mz4`` are the slider's mass times the coordinates of
+    its centre of mass from the slider pin, in frame 4.
     """
 
     a1: float
@@ -106,9 +108,9 @@ class SliderCrankParameters(CheckedParameters):
     N.s/m, gravity in m/s2 along the axes of the ground frame.
 
     The crank's centre of mass is given in frame 2 and its inertia about the axes of that frame: ``crank_inertia`` about the
-    axis of rotation, Steiner's share included, and the products of inertia, the integrals of x z and y z over its mass. The
-    rod's mass must be symmetric about the line of its joints. Only then its spin about that line, which two ball joints leave
-    free, has no effect; the spin is taken as zero, and the rod's moment of inertia about the line is not needed.
+    axis of rotation, including the parallel-axis term, and the products of inertia, the integrals of x z and y z over its
+    mass. The rod's mass must be symmetric about the line through its joints. Only then the spin about this line, which two
+    ball joints leave free, has no effect; it is taken as zero, and the rod's moment of inertia about the line is not needed.
     ``rod_inertia`` is about a transverse axis through the centre of mass, ``rod_cog_distance`` is measured from the crank pin.
     The slider's centre of mass is given in frame 4 from the slider pin.
 

@@ -1,6 +1,6 @@
 """Data of Rahman's section 3.1 in SI, from the printed inches, pounds and seconds.
 
-A round crank and a round rod with their centres of mass at mid-length, and a cubic slider; the printed "specific gravity" of
+Crank and rod are round bars with their centres of mass at mid-length; the slider is a cube. The printed "specific gravity" of
 0.28 is a weight density in lb/in3. No gravity acts: the thesis uses g only to convert weights to masses.
 """
 

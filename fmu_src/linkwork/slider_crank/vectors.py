@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 
 class Vector(NamedTuple):
-    """A vector by its components in a frame, by default that of the ground."""
+    """Components of a vector in a frame: the ground frame unless another is stated."""
 
     x: float
     y: float

@@ -1,4 +1,4 @@
-"""A driven pendulum: a mechanism of one freedom."""
+"""A driven pendulum: a mechanism with one degree of freedom."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from .equations import Constants
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Parameters(CheckedParameters):
-    """SI units."""
+    """Parameters in SI units."""
 
     RULES: ClassVar[Rules] = Rules(positive=("pendulum_inertia",))
 
@@ -25,13 +25,13 @@ class Parameters(CheckedParameters):
     pendulum_damping: float = 0.0
 
     def constants(self) -> Constants:
-        """What the equations use."""
+        """Return the constants of the equations."""
         return Constants(self.pendulum_inertia, self.pendulum_damping, self.pendulum_weight)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Initial(CheckedState):
-    """State at the start: rad, rad/s."""
+    """State at the start (rad, rad/s)."""
 
     pendulum_angle: float = 0.0
     pendulum_speed: float = 0.0

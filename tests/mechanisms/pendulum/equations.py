@@ -9,7 +9,7 @@ State = tuple[float, float, float, float]
 
 
 class Constants(NamedTuple):
-    """J, c, m g l."""
+    """Constants of the equation: J, c, m g l."""
 
     inertia: float
     damping: float
@@ -17,50 +17,50 @@ class Constants(NamedTuple):
 
 
 def apply_inputs(modes: tuple[float, ...], u: tuple[float, ...], p: Constants) -> float:
-    """The torque."""
+    """Return the torque on the pendulum (N.m)."""
     return u[0]
 
 
 def acceleration(x: State, torque: float, p: Constants) -> float:
-    """Angular acceleration."""
+    """Return the angular acceleration."""
     return (torque - p.weight * cos(x[0]) - p.damping * x[1]) / p.inertia
 
 
 def derivative(x: State, torque: float, p: Constants) -> State:
-    """Time derivative of the state."""
+    """Return the time derivative of the state."""
     return (x[1], acceleration(x, torque, p), p.damping * x[1] * x[1], torque * x[1])
 
 
 def energy(x: State, p: Constants) -> float:
-    """Mechanical energy (J)."""
+    """Return the mechanical energy (J)."""
     return 0.5 * p.inertia * x[1] * x[1] + p.weight * sin(x[0])
 
 
 def outputs(x: State, torque: float, start_energy: float, p: Constants) -> tuple[float, ...]:
-    """All real outputs, in the order of the interface."""
+    """Return all real outputs, in the order of the interface."""
     return (x[0], x[1], acceleration(x, torque, p), energy(x, p) - start_energy + x[2] - x[3])
 
 
 def places(x: State, torque: float, p: Constants) -> tuple[float, ...]:
-    """Pivot and end of a rod of 1 m."""
+    """Return x, y and z of the pivot and of the end of a rod of 1 m."""
     return (0.0, 0.0, 0.0, cos(x[0]), sin(x[0]), 0.0)
 
 
 def clearance(x: State, torque: float, p: Constants) -> float:
-    """There is no limit of assembly."""
+    """Return 1: the mechanism can always be assembled."""
     return 1.0
 
 
 def jump(x: State, torque: float, u: tuple[float, ...], p: Constants) -> State:
-    """There is no commanded rate."""
+    """Return the state unchanged, because no rate is commanded."""
     return x
 
 
 def start(x: State, torque: float, p: Constants) -> State:
-    """A state at the start as it is."""
+    """Return the initial state unchanged."""
     return x
 
 
 def error_scale(parameters, x):  # type: ignore[no-untyped-def]
-    """Magnitudes below which errors are absolute."""
+    """Return the magnitudes of the states below which errors are absolute."""
     return (1.0, 10.0, 1.0, 1.0)

@@ -16,7 +16,7 @@ from .equations import Constants
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Parameters(CheckedParameters):
-    """SI units."""
+    """Parameters in SI units."""
 
     RULES: ClassVar[Rules] = Rules(positive=("rotor_mass", "rotor_radius", "cart_mass"))
 
@@ -29,7 +29,7 @@ class Parameters(CheckedParameters):
     gravity: float = 9.81
 
     def constants(self) -> Constants:
-        """What the equations use."""
+        """Return the constants of the equations."""
         m, r = self.rotor_mass, self.rotor_radius
         return Constants(
             self.rotor_inertia + m * r * r,
@@ -43,7 +43,7 @@ class Parameters(CheckedParameters):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Initial(CheckedState):
-    """State at the start: rad, rad/s, m, m/s."""
+    """State at the start (rad, rad/s, m, m/s)."""
 
     rotor_angle: float = 0.0
     rotor_speed: float = 0.0

@@ -14,7 +14,7 @@ State = tuple[float, float, float, float, float, float]
 
 
 class Constants(NamedTuple):
-    """J + m l2, m l, M + m, spring, damper, m g l."""
+    """Constants of the equations: J + m l2, m l, M + m, k, c, m g l."""
 
     inertia: float
     unbalance: float
@@ -25,7 +25,7 @@ class Constants(NamedTuple):
 
 
 class Applied(NamedTuple):
-    """Whether the speed is prescribed; torque, angular acceleration, force."""
+    """Inputs of the equations: whether the speed is prescribed, torque, angular acceleration, force."""
 
     speed_drive: float
     torque: float
@@ -34,14 +34,14 @@ class Applied(NamedTuple):
 
 
 def apply_inputs(modes: tuple[float, ...], u: tuple[float, ...], p: Constants) -> Applied:
-    """What acts on the plant, from drive.mode and the channels."""
+    """Return what acts on the mechanism, from drive.mode and the channels."""
     (drive,) = modes
     torque, _, acceleration, force = u
     return Applied(drive, (1.0 - drive) * torque, drive * acceleration, force)
 
 
 def motion(x: State, i: Applied, p: Constants) -> tuple[float, float, float]:
-    """Angular acceleration, acceleration of the cart, torque."""
+    """Return the angular acceleration, the acceleration of the cart and the torque."""
     th, s, w, v, _, _ = x
     m12 = -p.unbalance * sin(th)
     r1 = i.torque - p.weight * cos(th)
@@ -53,34 +53,34 @@ def motion(x: State, i: Applied, p: Constants) -> tuple[float, float, float]:
 
 
 def derivative(x: State, i: Applied, p: Constants) -> State:
-    """Time derivative of the state."""
+    """Return the time derivative of the state."""
     e, a, torque = motion(x, i, p)
     return (x[2], x[3], e, a, p.c * x[3] * x[3], torque * x[2] + i.force * x[3])
 
 
 def kinetic_energy(th: float, w: float, v: float, p: Constants) -> float:
-    """Kinetic energy (J)."""
+    """Return the kinetic energy (J)."""
     return 0.5 * (p.inertia * w * w + p.mass * v * v) - p.unbalance * sin(th) * w * v
 
 
 def energy(x: State, p: Constants) -> float:
-    """Mechanical energy (J)."""
+    """Return the mechanical energy (J)."""
     return kinetic_energy(x[0], x[2], x[3], p) + 0.5 * p.k * x[1] * x[1] + p.weight * sin(x[0])
 
 
 def outputs(x: State, i: Applied, start_energy: float, p: Constants) -> tuple[float, ...]:
-    """All real outputs, in the order of the interface."""
+    """Return all real outputs, in the order of the interface."""
     e, a, torque = motion(x, i, p)
     return (x[0], x[2], e, x[1], x[3], a, torque, energy(x, p) - start_energy + x[4] - x[5])
 
 
 def clearance(x: State, i: Applied, p: Constants) -> float:
-    """There is no limit of assembly."""
+    """Return 1: the mechanism can always be assembled."""
     return 1.0
 
 
 def jump(x: State, i: Applied, u: tuple[float, ...], p: Constants) -> State:
-    """A jump of the commanded speed conserves the cart's momentum."""
+    """Return the state after a jump of the commanded speed, which conserves the cart's momentum."""
     th, s, w, v, dissipated, supplied = x
     w_new = (1.0 - i.speed_drive) * w + i.speed_drive * u[1]
     v_new = v + p.unbalance * sin(th) * (w_new - w) / p.mass
@@ -89,10 +89,10 @@ def jump(x: State, i: Applied, u: tuple[float, ...], p: Constants) -> State:
 
 
 def start(x: State, i: Applied, p: Constants) -> State:
-    """A state at the start as it is."""
+    """Return the initial state unchanged."""
     return x
 
 
 def error_scale(parameters, x):  # type: ignore[no-untyped-def]
-    """Magnitudes below which errors are absolute."""
+    """Return the magnitudes of the states below which errors are absolute."""
     return (1.0, 0.05, 10.0, 1.0, 1.0, 1.0)

@@ -1,4 +1,4 @@
-"""A rotor on a torsion spring, excited by a crank: the oscillators of the textbooks as one mechanism."""
+"""A rotor on a torsion spring, excited by a crank: textbook oscillators as one mechanism."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from .equations import Constants
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Parameters(CheckedParameters):
-    """SI units."""
+    """Parameters in SI units."""
 
     RULES: ClassVar[Rules] = Rules(
         positive=("rotor_inertia",),
@@ -32,7 +32,7 @@ class Parameters(CheckedParameters):
     rotor_excitation: float = 0.0
 
     def constants(self) -> Constants:
-        """What the equations use; traced parameters are no dataclass."""
+        """Return the constants of the equations. `astuple` would not do: traced parameters are no dataclass."""
         return Constants(
             self.rotor_inertia,
             self.rotor_damping,
@@ -46,7 +46,7 @@ class Parameters(CheckedParameters):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Initial(CheckedState):
-    """State at the start: rad, rad/s."""
+    """State at the start (rad, rad/s)."""
 
     crank_angle: float = 0.0
     crank_speed: float = 0.0

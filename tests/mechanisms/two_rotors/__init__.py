@@ -16,7 +16,7 @@ from .equations import Constants
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Parameters(CheckedParameters):
-    """SI units."""
+    """Parameters in SI units."""
 
     RULES: ClassVar[Rules] = Rules(positive=("left_mass", "left_radius", "right_mass", "right_radius", "cart_mass"))
 
@@ -29,7 +29,10 @@ class Parameters(CheckedParameters):
     cart_damping: float
 
     def constants(self) -> Constants:
-        """Return what the equations use; each rotor has its unbalance once more about its axis, as a disc of ten times."""
+        """Return the constants of the equations.
+
+        The moment of inertia of each rotor is 11 m r^2: m r^2 of the unbalanced mass, and ten times as much of a disc.
+        """
         m1, r1, m2, r2 = self.left_mass, self.left_radius, self.right_mass, self.right_radius
         return Constants(
             11.0 * m1 * r1 * r1,
@@ -44,7 +47,7 @@ class Parameters(CheckedParameters):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Initial(CheckedState):
-    """State at the start: rad, rad/s, m, m/s."""
+    """State at the start (rad, rad/s, m, m/s)."""
 
     left_angle: float = 0.0
     left_speed: float = 0.0

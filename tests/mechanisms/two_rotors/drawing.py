@@ -1,4 +1,4 @@
-"""Where the joints of two rotors on a cart are."""
+"""Positions of the joints of two rotors on a cart."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 """Two unbalanced rotors on one sprung and damped cart, in a horizontal plane: angles th1, th2 from the cart's direction, cart
-position s, unbalances U = m r, moments of inertia I about the axes, whole mass M.
+position s, unbalances U = m r, moments of inertia I about the axes, total mass M.
 
     I_i th_i'' - U_i sin(th_i) s'' = T_i
     M s'' - sum U_i (sin(th_i) th_i'' + cos(th_i) th_i'2) = F - k s - c s'
@@ -14,7 +14,7 @@ State = tuple[float, ...]
 
 
 class Constants(NamedTuple):
-    """Moments of inertia, unbalances, whole mass, spring, damper."""
+    """Constants of the equations: moments of inertia, unbalances, total mass, spring stiffness, damping."""
 
     inertia1: float
     inertia2: float
@@ -26,7 +26,7 @@ class Constants(NamedTuple):
 
 
 class Applied(NamedTuple):
-    """Of each rotor: whether its speed is prescribed, torque, angular acceleration; force on the cart."""
+    """Inputs: whether each rotor's speed is prescribed, its torque and angular acceleration; force on the cart."""
 
     speed1: float
     speed2: float
@@ -38,14 +38,14 @@ class Applied(NamedTuple):
 
 
 def apply_inputs(modes: tuple[float, ...], u: tuple[float, ...], p: Constants) -> Applied:
-    """Return what acts on the plant, from the modes and the channels."""
+    """Return what acts on the mechanism, from the modes and the channels."""
     m1, m2 = modes
     t1, _, a1, t2, _, a2, force = u
     return Applied(m1, m2, (1.0 - m1) * t1, (1.0 - m2) * t2, m1 * a1, m2 * a2, force)
 
 
 def motion(x: State, i: Applied, p: Constants) -> tuple[float, float, float, float, float]:
-    """Return both angular accelerations, the acceleration of the cart, both torques."""
+    """Return both angular accelerations, the acceleration of the cart and both torques."""
     th1, th2, s, w1, w2, v = x[:6]
     b1, b2 = p.unbalance1 * sin(th1), p.unbalance2 * sin(th2)
     free1, free2 = 1.0 - i.speed1, 1.0 - i.speed2
@@ -84,7 +84,7 @@ def outputs(x: State, i: Applied, start_energy: float, p: Constants) -> tuple[fl
 
 
 def clearance(x: State, i: Applied, p: Constants) -> float:
-    """Return 1: there is no limit of assembly."""
+    """Return 1: the mechanism can always be assembled."""
     return 1.0
 
 
@@ -102,10 +102,10 @@ def jump(x: State, i: Applied, u: tuple[float, ...], p: Constants) -> State:
 
 
 def start(x: State, i: Applied, p: Constants) -> State:
-    """Return a state at the start as it is."""
+    """Return the initial state unchanged."""
     return x
 
 
 def error_scale(parameters, x):  # type: ignore[no-untyped-def]
-    """Return magnitudes below which errors are absolute."""
+    """Return the magnitudes of the states below which errors are absolute."""
     return (1.0, 1.0, 0.01, 10.0, 10.0, 1.0, 1.0, 1.0)
