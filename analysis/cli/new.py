@@ -144,7 +144,7 @@ def _parameter_rows(mechanism: Mechanism, *, sections: bool) -> dict[str, str]:
 
 
 def _mass_comments(mechanism: Mechanism) -> str:
-    """Return comments for a new case on the cross sections of the links, and on the source of the other numbers."""
+    """Return comments for a new case file: how to give the links' cross sections, and the source of the other numbers."""
     from ..linkages import SECTIONS
     from ..sections import DENSITIES
 

@@ -87,7 +87,10 @@ def studio(what: str | None, out: str | None, browser: bool, port: int, settings
 
 
 def _open(address: str) -> None:
-    """Open a browser at an address if there is a screen; otherwise print a note: terminal browsers cannot show the page."""
+    """Open a browser at an address; print a note if there is no screen or no browser opens.
+
+    A browser in a terminal is not opened because it cannot show the page.
+    """
     screen = sys.platform in ("win32", "darwin") or any(os.environ.get(name) for name in _SCREENS)
     if not (screen and webbrowser.open(address)):
         print_error("note: there is no browser here: open the address in one, or write the page as a file with --out")

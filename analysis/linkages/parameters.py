@@ -119,15 +119,15 @@ class Interface:
         return self.points[body].get(point, ("0.0", "0.0"))
 
     def frame(self, body: str, of: str = "") -> str:
-        """Return the expression of the pose of a body; ``of`` is the prefix of the record that has the pose, such as "b."."""
+        """Return the source text for the pose of a body; ``of`` is the name of the variable of poses, with its dot: "b."."""
         return f"{of}{body}_frame" if body != GROUND else f"ground({len(self.drives)})"
 
     def turn(self, body: str, of: str = "") -> str:
-        """Return the expression of the direction of a body; ``of`` is the prefix of the record, see `frame`."""
+        """Return the source text for the direction of a body; for ``of`` see `frame`."""
         return f"{of}{body}_frame.turn" if body != GROUND else f"fixed_direction(1.0, 0.0, {len(self.drives)})"
 
     def travel(self, slide: Slider) -> str:
-        """Return the expression of position and velocity of a block along its line, from the record of poses b."""
+        """Return the source text for position and velocity of a block along its line; in it the variable of poses is b."""
         (holder, block), (x, y) = slide.bodies, self.coordinates(slide.bodies[0], slide.through)
         return f"block_position({self.frame(holder, 'b.')}, {x}, {y}, b.{slide.name}_line, b.{block}_frame)"
 

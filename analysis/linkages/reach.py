@@ -1,4 +1,4 @@
-"""Find the range through which one freedom can move, and the dead centres of the bodies that it drives."""
+"""Find the range in which one coordinate can move, and the dead centres of the bodies that it drives."""
 
 from __future__ import annotations
 
@@ -22,6 +22,7 @@ class Reach(NamedTuple):
     Attributes
     ----------
     freedom : int
+        Index of the degree of freedom.
     unit : str
         Unit of the freedom's coordinate, rad or m.
     low, high : float
@@ -44,12 +45,13 @@ class Reach(NamedTuple):
 
 
 def reach(mechanism: Mechanism, freedom: int = 0, *, most: float | None = None, samples: int = 360) -> Reach:
-    """Find the range in which a freedom can move.
+    """Find the range in which the coordinate of a degree of freedom can move.
 
     Parameters
     ----------
     mechanism : Mechanism
     freedom : int
+        Index of the degree of freedom.
     most : float, optional
         Greatest distance from the start that is searched: by default half the period of the coordinate. If the coordinate is
         not periodic, the default is four turns for an angle and 1 m for a displacement.

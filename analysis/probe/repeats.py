@@ -117,7 +117,7 @@ def check_serializing(context: Context, case: int) -> None:
 
 
 def check_deserializing(context: Context, case: int) -> None:
-    """Check that a run from a state that another process serialized gives the same values as in the other process."""
+    """Restore a state that `check_serializing` wrote in another process; check that the run from it has the values recorded."""
     path = context.work / f"serialized-{context.model.interface}-{case}.json"
     if not path.exists():
         context.say("not made: no bytes were written")

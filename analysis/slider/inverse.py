@@ -205,7 +205,9 @@ class SliderDrive:
 def slider_force(
     th2: float, u: float, w2: float, v: float, acceleration: float, load: tuple[float, float], p: Constants
 ) -> float:
-    """Return the slider force F2 (N) for a slider acceleration u'' (m/s2) at constant crank speed.
+    """Return the slider force F2 (N) for a slider acceleration u'' (m/s2) at constant crank speed w2.
+
+    ``v`` is the slider's velocity (m/s); ``load`` has the components of the force at P (N).
 
     Raises ValueError or ZeroDivisionError if the links cannot be joined at this position; InputError if the friction of
     the parameters depends on contact forces.

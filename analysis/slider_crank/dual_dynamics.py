@@ -452,8 +452,8 @@ def compare(turn: ForceTurn) -> Comparison:
     Raises
     ------
     InputError
-        If the slider's force is sought and a groove in the shaft makes the shift, which the dual method does not cover, or if
-        the slider's force is determined at none of the angles.
+        If the slider's force is sought for a crank that a groove in its shaft shifts (the dual method does not cover this
+        case), or if the slider's force is determined at none of the angles.
     """
     sought = turn.sought == SLIDER_FORCE
     if sought and has_shaft_groove(turn.law):

@@ -140,8 +140,8 @@ class Place(NamedTuple):
 class DeadCentre(NamedTuple):
     """A configuration in which the slider reverses: crank angle (rad), shift and slider position (m).
 
-    ``outer`` is true at a maximum of S4 on branch +1 and at a minimum of S4 on branch -1: the slider is then at the outer end
-    of its travel.
+    ``outer`` is true at a maximum of the slider position on branch +1 and at a minimum on branch -1: the slider is then at the
+    outer end of its travel.
     """
 
     crank_angle: float

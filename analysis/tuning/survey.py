@@ -1,6 +1,7 @@
 """Survey a range of speeds: follow the response over the range; find resonances, lost stability and greatest outputs.
 
-The level is the value of the speed, or of the other quantity whose range is tuned.
+The level is the value of the quantity over whose range the response is followed: the crank speed, or another drive quantity
+(see `Wish`).
 """
 
 from __future__ import annotations

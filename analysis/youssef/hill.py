@@ -98,7 +98,7 @@ def _table(series: Sequence[FourierSeries], order: int) -> NDArray[np.float64]:
 
 
 def _slope(table: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the table of coefficients (see `_table`) of the derivatives of the series in a table."""
+    """Differentiate the series of a table (see `_table`); return the table of the derivatives."""
     k = np.arange(table.shape[2])
     return np.array([k * table[1], -k * table[0]])
 

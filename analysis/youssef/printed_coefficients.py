@@ -156,7 +156,9 @@ def _series(mean: float, cosine: float, sine: float) -> FourierSeries:
 
 
 def _force(ratios: Ratios, datum: Datum) -> FourierSeries:
-    """Return the force with the harmonics -U and -V of the listings (L8449-8450), used in place of R1 and S1.
+    """Return the force with the first harmonic of the listings (L8449-8450), used in place of R1 and S1.
+
+    Its cosine coefficient is -U, its sine coefficient -V.
 
     In the scan the lines of R1 and S1 (L2786-2794) are incomplete: the legible terms contain r4 and mr3, which are zero here,
     and none of these terms contains I4. At sigma3 = 1, U and V are the I4 term in the line of Q1 (L2781) times cos and sin of

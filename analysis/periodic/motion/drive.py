@@ -92,8 +92,8 @@ class Drive:
         FMI name of the crank to which ``speed``, ``torque`` and ``motor`` refer: name of its coordinate, commanded speed or
         torque. It follows from ``speeds``, and may be left out if there is one crank.
     ratios : mapping of str to Fraction
-        Turns of each other crank per turn of the crank, by FMI name; they follow from ``speeds``. A crank that is not free and
-        has no ratio is held. An undriven link that goes round has a ratio, too, by the name of its coordinate, such as
+        Turns of the other cranks per turn of the crank, by FMI name; they follow from ``speeds``. A crank that is not free and
+        has no ratio is held. An undriven link that makes full turns has a ratio, too, by the name of its coordinate, such as
         ``{"swing.angle": 1}``; a link without a ratio only swings.
     motors : mapping of str to InductionMotor
         Motors on other cranks by the FMI names of the torques.
@@ -166,7 +166,7 @@ class Drive:
         return find_crank(mechanism, self.crank)
 
     def ratios_by_freedom(self, mechanism: Mechanism) -> dict[int, Fraction]:
-        """Return the turns of each other crank, and of each link that goes round, per turn of the crank.
+        """Return the turns, per turn of the crank, of the other cranks and of the links that make full turns.
 
         The keys are the indices of their degrees of freedom.
         """
@@ -569,7 +569,7 @@ def assembly_ranges(
 
 
 def mean_rates(drive: Drive, flow: Flow, guess: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the mean rate of each free coordinate, shape (free,): 0 unless it is the angle of a link that goes round."""
+    """Return the mean rate of each free coordinate, shape (free,): 0 unless it is the angle of a link that makes full turns."""
     turning, pace = drive.ratios_by_freedom(flow.mechanism), drive.speed or guess[-1]
     return np.array([pace * turning.get(n, 0) for n in flow.free], dtype=float)
 

@@ -64,7 +64,7 @@ def make_tracks(n, columns):
 
 @inner
 def set_scale(scale, v):
-    """Compute the magnitudes of z from the magnitudes ``scale`` of y, and write them into ``v.sizes``."""
+    """Compute the magnitudes of z (see `Tracks`) from the magnitudes ``scale`` of y, and write them into ``v.sizes``."""
     n = scale.shape[0]
     for i in range(n):
         store(v.sizes, i, scale[i])

@@ -147,7 +147,11 @@ def _clear_joints(case: Case) -> Joints:
 
 
 def velocity_paths() -> list[Judged]:
-    """Judge the forward path by the rod's momentum: eq 50 compared with eq 52 of the mixed path, in the plane and out of it."""
+    """Compare the rod's momentum by eqs 50 and 52, in the plane and out of it.
+
+    Eq 50 takes the rod's velocity from the joints on the crank's side (the thesis's forward path), eq 52 from those on the
+    slider's side (its mixed path).
+    """
     b, rod = bodies(parameters()), _binors()[1]
     found = []
     for case in (PLANE, *ROW_F):

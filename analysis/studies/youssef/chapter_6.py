@@ -175,7 +175,10 @@ def half_units(linkage: Linkage) -> FloatArray:
 
 
 def rounded(name: str) -> dict[str, tuple[float, float]]:
-    """Return the least and the greatest error of a printed linkage within its rounding, for each reading of the text."""
+    """Return the least and the greatest error that a printed linkage can have, for each reading (see `by_readings`).
+
+    Each printed dimension may be off by up to half a unit of its last digit.
+    """
     p = PROBLEMS[name]
     off = half_units(p.linkage)
     if isinstance(p.task, UntimedPath):
@@ -479,7 +482,11 @@ def pairing_area(desired: FloatArray, actual: FloatArray, *, window: float) -> f
 
 
 def path_columns(name: str) -> dict[str, FloatArray]:
-    """Return target, coupler curves, linkages with ground links, and distances from the target (cm), as columns by name."""
+    """Return columns by name (cm): the target, and curves of the printed linkage and of ours.
+
+    For each linkage these are the coupler curve, the links, the ground link and the distances from the target; the place on
+    the target is in degrees.
+    """
     p = PROBLEMS[name]
     stations = normal_form(p.task).places
     shapes = {"target": CM_PER_METRE * np.column_stack([stations.real, stations.imag])}

@@ -122,9 +122,9 @@ def compute_rig_1() -> StudyResult:
 
 
 def _turns_to_stop(spring: str) -> dict[float, Turn]:
-    """Return turns of the steady motion by speed (rpm), in steps of 5 rpm.
+    """Return one turn of the steady motion at each of several crank speeds (rpm), by speed; ``spring`` is "A" or "B".
 
-    They begin at the lowest speed of the figures and end at the speed at which the rig was stopped.
+    The speeds go from the lowest speed of the figures to the speed at which the rig was stopped, in steps of 5 rpm.
     """
     speeds = np.arange({"A": 240.0, "B": 500.0}[spring], float(STOPPED[spring]) + 1.0, 5.0).tolist()
     return {w: turn(spring, w) for w in speeds}

@@ -372,7 +372,10 @@ class Linkage:
 
     @staticmethod
     def closure() -> Callable[..., Any]:
-        """Return the function that closes the loop, also for CasADi symbols: here `close_loop` of the five-bar model."""
+        """Return the function that closes the loop, also for CasADi symbols.
+
+        For a four-bar it is `close_loop` of the five-bar model; `SliderCrank` has its own.
+        """
         joined: Callable[..., Any] = symbolic_equations(FIVE_BAR).close_loop
         return joined
 

@@ -131,8 +131,8 @@ class MachineSpec:
     def slider_crank(self, linkage: Linkage) -> SliderCrankParameters:
         """Return the parameters of the slider-crank's plant, with the guide at right angles to the crank shaft.
 
-        The plant's rod has its mass on the line of its joints. The arm to a coupler point off this line is projected onto the
-        line.
+        The plant's rod has its centre of mass on the line of its joints. If the coupler point is off this line, the coupler's
+        centre of mass is projected onto the line.
         """
         made = self.sliding_five_bar(linkage)
         a1 = linkage.ground_angle

@@ -274,7 +274,7 @@ def _link_dimensions(
     placed: list[Dimension] = []
 
     def count_overlaps(one: Dimension) -> tuple[int, int]:
-        """Return the overlaps with links and dimensions (a dimension counts three times), and with other lines."""
+        """Count a dimension's overlaps with links and placed dimensions (these count three times), and with other lines."""
         room, strokes = _number_box(one), _dimension_lines(one)
         count = sum(room.intersects(link) for link in links)
         count += 3 * sum(room.intersects(shape(other)) for other in placed for shape in (_number_box, _dimension_lines))

@@ -487,8 +487,8 @@ def angle_at_c(linkage: Linkage, rotation: FloatArray) -> FloatArray:
 def path_rate(linkage: Linkage, at: FloatArray, both: NDArray[np.complex128]) -> NDArray[np.complex128]:
     """Return the derivative of the coupler point with respect to the crank rotation, at the rotations ``at`` (m/rad).
 
-    The motion of the pivot is included. ``both`` are the derivatives of `Linkage.path_jacobian`, as complex numbers x + iy; the
-    result is complex, too.
+    The motion of the pivot is included. ``both`` has the derivatives of the coupler point that `Linkage.path_jacobian` returns,
+    as complex numbers x + iy; the result is complex, too.
     """
     step = 1e-6
     ahead, behind = linkage.displacement(at + step), linkage.displacement(at - step)

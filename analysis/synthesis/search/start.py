@@ -115,7 +115,7 @@ class Start:
     rotation : ndarray, shape (n,), or None
         Crank rotations of the stations if they are unknown.
     quality : float
-        Value of the objective (units squared; units for a greatest error).
+        Value of the objective, in the square of the length `Normal.unit`; for a greatest error, in `Normal.unit`.
     given : bool
         Whether the start is a guess, not a candidate of the scan.
     linkage : type
@@ -171,7 +171,7 @@ def random_pivot(unknown: PivotUnknown, ground: float, unit: float, random: np.r
     Parameters
     ----------
     ground : float
-        Ground link (units).
+        Ground link, as a multiple of ``unit``.
     unit : float
         Size of the target (m).
     """

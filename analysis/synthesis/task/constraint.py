@@ -232,14 +232,20 @@ class RotationRange(NamedTuple):
         return float(rotation.min()), float(rotation.max())
 
     def timed(self, what: str) -> FloatArray:
-        """Return the task's crank rotations; raise InputError, which names ``what`` needs them, if the task has none."""
+        """Return the task's crank rotations; raise InputError if it has none.
+
+        The error message begins with ``what``, the thing that needs the rotations.
+        """
         if self.rotation is None:
             raise InputError(f"{what} needs crank rotations, and the task gives none")
         return self.rotation
 
 
 class MinimisedFunction(NamedTuple):
-    """An objective: the greatest value of ``along`` is minimised, while the greatest error is at most ``error`` (units)."""
+    """An objective: the greatest value of ``along`` is minimised, while the greatest error is at most ``error``.
+
+    The length unit of ``error`` is `Normal.unit`.
+    """
 
     along: RotationRequirement
     error: float
