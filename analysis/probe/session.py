@@ -22,6 +22,11 @@ OK, WARNING, DISCARD, ERROR, FATAL, PENDING = range(6)
 STATUS = ("OK", "Warning", "Discard", "Error", "Fatal", "Pending")
 
 
+def status_name(status: int) -> str:
+    """Return the name of a status, or the number if it is none of the standard's."""
+    return STATUS[status] if 0 <= status < len(STATUS) else str(status)
+
+
 class ProbeError(LinkworkError):
     """A check could not be made, because the FMU refused a call that the check needs."""
 
@@ -130,7 +135,7 @@ class Session:
         if status is None:
             return OK
         self.journal.fatal |= status == FATAL
-        self.journal.write(f" -> {STATUS[status] if 0 <= status < len(STATUS) else status}")
+        self.journal.write(f" -> {status_name(status)}")
         return int(status)
 
     def need(self, name: str, *arguments: Any) -> None:
@@ -139,7 +144,7 @@ class Session:
         if status > WARNING:
             said = f": {self.messages[-1]}" if self.messages else ""
             self.journal.write(f"\n# the check ends here{said}")
-            raise ProbeError(f"{self.prefix}{name} returned {STATUS[status]}{said}")
+            raise ProbeError(f"{self.prefix}{name} returned {status_name(status)}{said}")
 
     def free(self) -> None:
         """Free the instance, if there is one."""

@@ -13,7 +13,7 @@ from fmpy import fmi2
 from .findings import QUESTIONABLE, WRONG, Note
 from .machines import MACHINES
 from .model import TYPES, Model, Variable
-from .session import DISCARD, ERROR, STATUS, WARNING, Session
+from .session import DISCARD, ERROR, WARNING, Session, status_name
 
 #: Weight with which a function is chosen, if it is not 1.
 _WEIGHTS = {
@@ -162,7 +162,7 @@ class Walk:
             return
         full = self.session.prefix + name
         if status not in (DISCARD, ERROR):
-            text = f"{full} returned {STATUS[status] if status < len(STATUS) else status} for a legal call"
+            text = f"{full} returned {status_name(status)} for a legal call"
             self.note(WRONG, f"{name}: strange status", text)
         elif status == ERROR:
             may = name in _MAY_REFUSE or name.startswith("Set") or state in _BEFORE

@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from pathlib import Path
@@ -189,19 +190,20 @@ class _Storage:
             mark.write_text(json.dumps({"key": key, "outputs": task.names, "varied": task.varied}), encoding="utf-8")
         said = folder / "messages.jsonl"
         for line in said.read_text(encoding="utf-8").splitlines() if said.is_file() else ():
-            number, message = json.loads(line)
-            self.messages[number] = message
+            with suppress(ValueError):  # a line that was cut off: its run is repeated
+                number, message, self.lengths[number] = json.loads(line)
+                self.messages[number] = message
 
     def add(self, numbers: Sequence[int], found: list[tuple[NDArray[np.float64], str]]) -> None:
-        """Store a batch: first its samples, then the lengths that mark it as finished."""
+        """Store a batch: first its samples, then messages and lengths, which mark runs as finished."""
         for number, (samples, _) in zip(numbers, found):
             self.samples[number, :, : samples.shape[1]] = samples
-        said = {number: message for number, (_, message) in zip(numbers, found) if message}
-        self.messages |= said
+        said = [(number, message, samples.shape[1]) for number, (samples, message) in zip(numbers, found) if message]
+        self.messages |= {number: message for number, message, _ in said}
         if self.folder is not None:
             self.samples.flush()  # type: ignore[attr-defined]  # a memmap here
             with (self.folder / "messages.jsonl").open("a", encoding="utf-8") as file:
-                file.writelines(json.dumps(item) + "\n" for item in said.items())
+                file.writelines(json.dumps(item) + "\n" for item in said)
         for number, (samples, _) in zip(numbers, found):
             self.lengths[number] = samples.shape[1]
 

@@ -85,6 +85,15 @@ def test_failures_are_kept_beside_results(tmp_path: Path) -> None:
     assert found.output("linkage.slider.position").mask.any(axis=1).tolist() == [False, True, True]
     lines = (tmp_path / "messages.jsonl").read_text(encoding="utf-8").splitlines()
     assert {json.loads(line)[0] for line in lines} == {1, 2}
+    # stopped after the messages and before the lengths, and while a message was written
+    lengths = np.load(tmp_path / "lengths.npy")
+    lengths[:] = 0
+    np.save(tmp_path / "lengths.npy", lengths)
+    with (tmp_path / "messages.jsonl").open("a", encoding="utf-8") as file:
+        file.write('[0, "a message that is cut')
+    again = run_many(wiring, vary, ["linkage.slider.position"], stop_time=0.3, folder=tmp_path)
+    assert (again.lengths == found.lengths).all()
+    assert again.messages == found.messages
 
 
 def test_wrong_arguments_are_refused() -> None:

@@ -34,6 +34,7 @@ from .rigs import (
     amplitude,
     between,
     complex_stiffness,
+    count_sign_changes,
     dynamic_stiffness,
     harmonic,
     largest_multiplier,
@@ -51,7 +52,6 @@ from .rigs import (
     slider,
     speed_of_fewer_peaks,
     turn,
-    turns_of_sign,
 )
 
 FINDINGS = """\
@@ -519,7 +519,7 @@ def _fig_8_15() -> tuple[Statement, ...]:
                 near(
                     "points of inflection at 500 rpm",
                     2.0,
-                    turns_of_sign(np.diff(u, 2, prepend=u[-2])),
+                    count_sign_changes(np.diff(u, 2, prepend=u[-2])),
                     0.0,
                     why="the point of inflection has not reached the third peak: a shoulder is left",
                 ),

@@ -145,14 +145,14 @@ def amplitude(of: Turn) -> float:
     return 0.5 * float(np.ptp(slider(of)))
 
 
-def turns_of_sign(x: NDArray[np.float64]) -> int:
+def count_sign_changes(x: NDArray[np.float64]) -> int:
     """Count the changes of sign of a periodic sequence."""
     return int(np.sum(np.sign(x) != np.sign(np.roll(x, 1))))
 
 
 def peaks(of: Turn) -> int:
     """Count the maxima and minima of the slider position over a turn, both together, as the thesis does."""
-    return turns_of_sign(np.diff(slider(of)))
+    return count_sign_changes(np.diff(slider(of)))
 
 
 def harmonic(of: Turn, order: int) -> float:
