@@ -426,7 +426,7 @@ fmi2Status fmi2GetFMUstate(fmi2Component component, fmi2FMUstate *state) {
 }
 
 CALL(SetFMUstate, (fmi2Component component, fmi2FMUstate state), state, state)
-CALL(SerializedFMUstateSize, (fmi2Component component, fmi2FMUstate state, size_t *size), state &&size, state, size)
+CALL(SerializedFMUstateSize, (fmi2Component component, fmi2FMUstate state, size_t *size), (state && size), state, size)
 
 fmi2Status fmi2SerializeFMUstate(fmi2Component component, fmi2FMUstate state, fmi2Byte bytes[], size_t size) {
     Guard *c = component;
@@ -437,7 +437,7 @@ fmi2Status fmi2SerializeFMUstate(fmi2Component component, fmi2FMUstate state, fm
     return mild(next.SerializeFMUstate(begin(c), state, bytes, size));
 }
 
-CALL(DeSerializeFMUstate, (fmi2Component component, const fmi2Byte bytes[], size_t size, fmi2FMUstate *state), bytes &&state,
+CALL(DeSerializeFMUstate, (fmi2Component component, const fmi2Byte bytes[], size_t size, fmi2FMUstate *state), (bytes && state),
      bytes, size, state)
 
 fmi2Status fmi2FreeFMUstate(fmi2Component component, fmi2FMUstate *state) {

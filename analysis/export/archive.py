@@ -71,7 +71,7 @@ def write(entries: Mapping[str, bytes], target: Path) -> Path:
     return target
 
 
-def documentation(
+def common_files(
     mechanism: Mechanism,
     variables: Sequence[Variable],
     title: str,

@@ -24,7 +24,7 @@ from ..libraries import require
 from ..mechanisms import check
 from ..numerics.cache import code_folder, hashes_below, keep_hashes, lock_folder, read_hashes
 from ..run import show_progress
-from .archive import SOURCES, BuildError, documentation, write
+from .archive import SOURCES, BuildError, common_files, write
 from .bill import add_bill
 from .component import MANIFEST, MEMORY, component, manifest
 from .description import Kind, build_description, description
@@ -148,7 +148,7 @@ def build_native(
     made = f"FMI {kind.fmi}.0 model exchange and co-simulation"
     variables = [entry.variable for entry in interface(mechanism)]
     icon = "model.png" if kind.fmi == 2 else "terminalsAndIcons/icon.png"
-    entries |= documentation(mechanism, variables, mechanism.title, made, _NOTES, icon)
+    entries |= common_files(mechanism, variables, mechanism.title, made, _NOTES, icon)
     target = dest / kind.file_name(mechanism)
     return write(add_bill(target.stem, entries, native=True, fmi=kind.fmi), target)
 

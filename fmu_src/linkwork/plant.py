@@ -62,6 +62,9 @@ class Plant:
     ParameterError, AssemblyError, InputError
     """
 
+    #: Evaluations of the derivatives in all steps since the plant was made or restored.
+    evaluations = 0
+
     def __init__(
         self,
         mechanism: Mechanism,
@@ -302,6 +305,7 @@ class Plant:
         self.state = result.x
         self.time = time + step
         self._step_size = result.step
+        self.evaluations += result.evaluations
         self._commanded = set()
 
     def _explain(self, error: LinkworkError, time: float, last: Vector) -> LinkworkError:
