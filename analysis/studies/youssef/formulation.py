@@ -173,10 +173,10 @@ def exact_launch() -> Callable[[NDArray[np.float64]], NDArray[np.float64]]:
 def shown_by_closure() -> tuple[Case, ...]:
     """Judge whether the failure of closure by the first approach shows the error of u, at constant speed and in a launch."""
     runs = {step: integrated(step) for step in STEPS}
-    shown = {f"step {1e3 * step:g} ms": run.gap.max() / run.errors[0] for step, run in runs.items()}
+    shown = {_step(step): run.gap.max() / run.errors[0] for step, run in runs.items()}
     for step in STEPS:
         gap, errors = launched(step)
-        shown[f"launch; step {1e3 * step:g} ms"] = gap / errors[0]
+        shown[f"launch; {_step(step)}"] = gap / errors[0]
     return tuple(Case(label=label, computed=x, lower=1.0, upper=100.0, why=KINK) for label, x in shown.items())
 
 
@@ -290,7 +290,7 @@ def with_slip(step: float) -> float:
 
 
 def stable_steps(rate: complex, steps: int = 400) -> tuple[float, float]:
-    """Return the greatest stable steps for y' = ``rate`` y by Runge-Kutta's and by Hamming's method.
+    """Return the greatest stable steps for y' = ``rate`` y (of y'' = -y where it is 1j) by Runge-Kutta's and Hamming's method.
 
     A step is stable if the solution does not grow at the end of ``steps`` steps.
     """
@@ -356,61 +356,31 @@ def parasite(past: ArrayLike, rates: ArrayLike, h: float) -> float:
 
 
 def multipliers() -> tuple[Case, ...]:
-    """Compare multipliers and accelerations with those of the plant, at constant speed and under a torque."""
+    """Compare the multipliers with torque and force of the plant, at constant speed and under a torque."""
     worst: dict[str, float] = {}
-    for drive, inputs in (
-        ("constant speed", Inputs(speed=OMEGA)),
-        ("torque", Inputs(torque=TorsionBar(torque=TORQUE))),
+    force = {"force at C in y": ("pin.C.fy", 1), "force at C in x": ("pin.C.fx", 2)}
+    for drive, inputs, compared in (
+        ("constant speed", Inputs(speed=OMEGA), {"crank torque": ("drive.applied_torque", 0), **force}),
+        ("torque", Inputs(torque=TorsionBar(torque=TORQUE)), force),
     ):
         run = simulate(TABLE, inputs, stop_time=0.3, step=0.003)
-        first = "drive.applied_torque" if inputs.speed is not None else "crank.acceleration"
-        names = {first: 0, "pin.C.fy": 1, "pin.C.fx": 2, "slider.acceleration": 3}
-        words = (
-            "crank torque" if inputs.speed is not None else "theta2''",
-            "force at C in y",
-            "force at C in x",
-            "u''",
-        )
         for i in range(1, len(run)):
             where = closed(
                 *(run[name][i] for name in ("crank.angle", "slider.position", "crank.speed", "slider.velocity"))
             )
             w = solved(*where, None if inputs.speed is not None else run["drive.applied_torque"][i])
-            for name, place in names.items():
-                label, scale = f"{words[place]}; {drive}", np.abs(run[name]).max()
+            for words, (name, place) in compared.items():
+                label, scale = f"{words}; {drive}", np.abs(run[name]).max()
                 worst[label] = max(worst.get(label, 0.0), abs(w[place] - run[name][i]) / scale)
     return tuple(at_most(label, ROUNDING, x) for label, x in worst.items())
 
 
 def compute() -> StudyResult:
     """Judge chapter II and section 3.1, and compute the closure error of the loop over time."""
-    found = {f"step {1e3 * step:g} ms": integrated(step) for step in STEPS}
-    columns = {"time [s]": found[next(iter(found))].times}
+    found = {_step(step): integrated(step) for step in STEPS}
+    columns = {"time [s]": found[_step(STEPS[0])].times}
     for label, run in found.items():
         columns[f"failure of closure; {label} [cm]"] = np.interp(columns["time [s]"], run.times, run.gap)
-    order = np.log2(integrated(STEPS[-1]).errors[1] / integrated(0.5 * STEPS[-1]).errors[1])
-    milne, hamming = (
-        parasite(past, rates, 0.1)
-        for past, rates in (((1, 0, -1), (1 / 3, 4 / 3, 1 / 3)), ((1, -9 / 8, 0, 1 / 8), (3 / 8, 6 / 8, -3 / 8, 0)))
-    )
-    long = integrated(LONG_STEP)
-    tells = {f"step {1e3 * h:g} ms": integrated(h).errors[1] / change_on_halving(h) for h in (LONG_STEP, *STEPS)}
-    large = long.errors[1] / (CM_PER_METRE * float(np.ptp(exact()(np.linspace(0.0, STOP, 2001))[0])))
-    halved = max(max(ratio, 1.0 / ratio) for ratio in map(of_runge_kutta, STEPS))
-    stable = {"y' = -y": stable_steps(-1.0), "y'' = -y": stable_steps(1j)}
-    # as many evaluations: twice the step, with four a step instead of two
-    dearer = {
-        f"{approach} approach, Hamming's {label}": integration_error(by_runge_kutta(2.0 * step, i == 0)[:, 2 - 2 * i])
-        / run.errors[i]
-        for i, approach in enumerate(("first", "second"))
-        for (label, run), step in zip(found.items(), STEPS)
-    }
-    used = runge_kutta(slider_alone, [0.0, 0.0], STEP, 1).evaluations
-    estimates, errors, _ = estimated()
-    rounded, _, roundings = estimated(unit=UNIT)
-    truncation = float(np.abs(estimates).max() / np.abs(errors).max())
-    roundoff = float(np.std(rounded - estimates) / np.std(roundings))
-    inherent = float(np.abs(estimated(START_ERROR)[0] - estimates).max()) / START_ERROR
     return StudyResult(
         number="3.1",
         claim="The multipliers are the pin forces; with all second derivatives integrated, the closure of the loop "
@@ -420,190 +390,223 @@ def compute() -> StudyResult:
             Statement(
                 "[T]he multipliers are equal to the internal forces components and the input torque.",
                 text("2.3.1, L1143-1145; for C, L1848-1852 and L2042-2046"),
-                "solution of (3.1) with the matrices (3.8) and (3.10) as printed (the minus of l2 cos theta2, which our scan "
-                "of (3.8) lacks, by (4.10); k u for k2 u in that of (3.10)), those of 3.2.2 for a torque, less torque, force "
-                "of the rocker on the coupler and accelerations by our equations of motion, which have no multipliers, "
-                "relative to the greatest of each; Table 3.1, k = 1e6 dyn/cm, mu = 3e4 dyn.s/cm, every 3 ms of 0.3 s from "
-                "theta2 = u = u' = 0, at 420 rpm and from rest with T0 = 1e8 dyn.cm",
+                "multipliers by (3.1), (3.8) and (3.10), less crank torque and force at C by our equations of motion, which "
+                "have none, relative to the greatest of each; Table 3.1, k = 1e6 dyn/cm, mu = 3e4 dyn.s/cm, 0.3 s from u = u' "
+                "= 0, at 420 rpm and, by 3.2.2, with T0 = 1e8 dyn.cm",
                 f"{ROUNDING:g}, above rounding errors",
                 multipliers(),
+                "where our scan differs, (3.8) has the minus of l2 cos theta2 as in (4.10), and (3.10) has k for k2",
             ),
-            Statement(
-                "The accuracy or even the debugging of the integration procedure may then be examined by simple "
-                "checks on loop closure.",
-                text("3.1, L1744-1748; the same in L1772-1782"),
-                "greatest failure of closure over 0.5 s relative to the greatest error of u, all second derivatives "
-                "integrated by Hamming's method with a constant step; Table 3.1, k = 1e6 dyn/cm, mu = 3e4 dyn.s/cm, at 420 rpm "
-                "and in the launch of 3.2.2 with T0 = 1e8 dyn.cm; for *debugging*, at 420 rpm, by the classical Runge-Kutta "
-                "method with a slip of ours, its last stage in the middle of the step",
-                "1 to 100, ours: the check shows an error, and no more than a hundred times as large as it is",
-                (
-                    *shown_by_closure(),
-                    Case(label=f"a slip; step {1e3 * STEP:g} ms", computed=with_slip(STEP), lower=1.0, upper=100.0),
-                ),
-            ),
-            Statement(
-                "It is important to recognise that a loop closure check is meaningful other than for trivial "
-                "arithmetical checks, only if used in conjunction with the first approach.",
-                text("3.1, L1748-1755"),
-                "greatest error of u by the second approach, which integrates u alone and closes the loop by its "
-                "kinematics, relative to its failure of closure; method of the row before, at 420 rpm",
-                "more than 100, ours as above: the check shows nothing of the error",
-                tuple(at_least(label, 100.0, run.errors[1] / run.unseen) for label, run in found.items()),
-            ),
-            Statement(
-                "[L]arge errors may be involved in the numerical integrations yet they are not realised by the designer "
-                "because the kinematics are used to force the closure of the mechanism and hence no simple check is available "
-                "to indicate whether the solution is accurate.",
-                text("3.1, L1763-1772"),
-                "greatest error of u by the second approach, as in the row before: with a step of "
-                f"{1e3 * LONG_STEP:g} ms, ours, relative to the range of u and to the failure of closure; at each step "
-                "relative to the greatest change of u when the step is halved",
-                f"more than {SMALL:g}, the rule for *small*, for a large error; more than 100, ours as above: the check shows "
-                "nothing of the error; one simple check refutes *no*",
-                (
-                    at_least(f"large error; step {1e3 * LONG_STEP:g} ms", SMALL, large),
-                    at_least(
-                        f"not seen in the closure; step {1e3 * LONG_STEP:g} ms", 100.0, long.errors[1] / long.unseen
-                    ),
-                    *(
-                        at_least(f"not seen on halving; {label}", 100.0, ratio, why="halving the step shows it")
-                        for label, ratio in tells.items()
-                    ),
-                ),
-                "the thesis has another check itself, the estimate that its methods make of their errors (L1379)",
-            ),
-            Statement(
-                "This [to integrate all the second order derivatives and bound the errors in loop closure, before the second "
-                "approach is taken] will ensure that the integration method is reliable and leads to accurate results.",
-                text("3.1, L1796-1798"),
-                "greatest error of u by the second approach, which integrates u alone, relative to the greatest failure of "
-                "closure by the first with the same step; method and motions of L1744, two of *the coming solutions* (L1784)",
-                "at most 1, ours: what bounds the failure of closure then bounds the error",
-                (
-                    *(at_most(label, 1.0, run.errors[1] / run.gap.max()) for label, run in found.items()),
-                    *(
-                        at_most(f"launch; step {1e3 * step:g} ms", 1.0, errors[1] / gap, why=KINK)
-                        for step, (gap, errors) in ((step, launched(step)) for step in STEPS)
-                    ),
-                ),
-            ),
-            Statement(
-                "Their [the Runge-Kutta methods'] serious drawbacks are, firstly, the lack of simple means of estimating the "
-                "errors; this makes them highly susceptible to numerical instabilities ...",
-                text("2.4, L1334-1340"),
-                "factor between the greatest error of u, by the second approach and the classical method of fourth order, and "
-                "its estimate by Richardson: the change when the step is halved, over 1 - 1/16; at 420 rpm, "
-                "steps of 4, 2, 1 and 0.5 ms, the greatest; greatest step with which a solution does not grow, over that of "
-                "Hamming's method, which the thesis prefers, for two equations of ours, a decay and an oscillation",
-                "more than 2, ours: an estimate is of use if it is right within a factor of 2; at most 1: *highly* is read as "
-                "more than Hamming's",
-                (
-                    at_least(
-                        "lack of an estimate",
-                        2.0,
-                        halved,
-                        why=f"halving the step estimates the error within {100 * (halved - 1.0):.1f} %, for three times the "
-                        "evaluations",
-                    ),
-                    *(
-                        at_most(
-                            f"susceptible to instabilities; {equation}",
-                            1.0,
-                            steps[0] / steps[1],
-                            why=f"it is stable up to steps of {steps[0]:.1f}, Hamming's up to {steps[1]:.2f}",
-                        )
-                        for equation, steps in stable.items()
-                    ),
-                ),
-            ),
-            Statement(
-                "... and, secondly, the large number of evaluation of the function [Phi]; four times for each step in a fourth "
-                "order method. The second of these drawbacks makes them unfavourable for use with our Lagrangian multiplier "
-                "formulation of the equations of the motion because of the large number of equations, and hence the lengthy "
-                "time involved in computation of the function [Phi].",
-                text("2.4, L1340-1356"),
-                "evaluations of Phi that a step of the classical method takes; its greatest error of u at 420 rpm, by each of "
-                "the two approaches of 3.1, over that of Hamming's with half the step (for 4 ms 62 steps of 8.06 ms), which "
-                "takes two evaluations a step and so as many in all, and as much time for them",
-                "none of a count; more than 1, the sign, as *unfavourable* says",
-                (
-                    replace(near("evaluations a step", 4.0, used, 0.0), stated="four"),
-                    *(
-                        at_least(
-                            f"unfavourable; {label}",
-                            1.0,
-                            ratio,
-                            why="by the second approach with long steps Runge-Kutta's error is the smaller",
-                        )
-                        for label, ratio in dearer.items()
-                    ),
-                ),
-            ),
-            Statement(
-                "For example, to obtain a solution equivalent to a fourth order Runge-kutta method we need to evaluate the "
-                "fourth derivative of the function [Phi].",
-                text("2.4, L1364-1370"),
-                "order of the error of a Taylor series with the derivatives of Phi up to the third; y' = Phi, as which we read "
-                "(2.27), with Phi = -y, ours, up to t = 1, from steps of 0.1 to 0.05",
-                "at most 3.5, between the orders three and four: if the fourth derivative were needed, the order would be "
-                "less without it",
-                (at_most("", 3.5, order_of_series(3), why="the third is enough, since Phi is itself a derivative"),),
-            ),
-            Statement(
-                "They [the predictor-corrector methods] provide an easy estimate of the errors, inherent, roundoff or "
-                "truncation, from the information already calculated. These errors are in all cases convergent and, thus the "
-                "methods are highly stable.",
-                text("2.4, L1379-1387"),
-                f"Hamming's estimate 9/121 (p - c) of the error of u in a step of {1e3 * STEP:g} ms from exact values, at "
-                "420 rpm, by (2.31): greatest relative to the greatest error; its change, relative to the roundings, as root "
-                f"mean squares, if the back values of u and u' are rounded to {CM_PER_METRE * UNIT:g} cm and cm/s; its "
-                f"greatest change relative to an error of {CM_PER_METRE * START_ERROR:g} cm in the start, as which we read "
-                "*inherent*; "
-                "factor by which the part of an error that follows a spurious root of the formula changes in a step, in the "
-                f"corrector alone: the greater of Hamming's, {hamming:.2f}, and the classical Milne's, whose corrector is "
-                "Simpson's rule, with y' = -y and the step 0.1, ours; the form of Milne's that CSMP has (L1411) is not said",
-                "0.5 to 2, ours as for the Runge-Kutta methods; below 1: *convergent* is read as dying out from step to step, "
-                "not as vanishing with the step, which holds of both; one counterexample refutes *in all cases*",
-                (
-                    Case(label="estimate of the truncation", computed=truncation, lower=0.5, upper=2.0),
-                    Case(
-                        label="estimate of the roundoff",
-                        computed=roundoff,
-                        lower=0.5,
-                        upper=2.0,
-                        why="the estimate shows a small part of it",
-                    ),
-                    Case(
-                        label="estimate of the inherent error",
-                        computed=inherent,
-                        lower=0.5,
-                        upper=2.0,
-                        why="the motion from the wrong start is a motion too",
-                    ),
-                    at_most("convergent", 1.0, max(hamming, milne), why="Milne's corrector is weakly unstable"),
-                ),
-            ),
-            Statement(
-                "One of their most attractive qualities is that they require only two evaluations of the function "
-                "[Phi] per step of integration.",
-                text("2.4, L1387-1391"),
-                "evaluations that a further step of (2.28) to (2.31) takes",
-                "none, they are counted",
-                (replace(near("", 2.0, evaluations_a_step(), 0.0), stated="two"),),
-            ),
-            Statement(
-                "The Hamming fourth order modified predictor-corrector is the method chosen here ...",
-                text("2.4, L1407-1409"),
-                "order at which the error of u at 420 rpm by the second approach and Hamming's method with a constant step, "
-                "(2.28) to (2.31), the formulas of DHAM in appendix 1, falls from steps of "
-                f"{1e3 * STEPS[-1]:g} to {500.0 * STEPS[-1]:g} ms; modifier and final value take the leading error out, and "
-                "add one",
-                "at least the order",
-                (replace(at_least("", 4.0, order), stated="fourth"),),
-            ),
+            *_closure_statements(),
+            *_one_step_statements(),
+            *_hamming_statements(),
         ),
     )
+
+
+def _step(step: float) -> str:
+    return f"step {1e3 * step:g} ms"
+
+
+def _closure_statements() -> list[Statement]:
+    """Judge section 3.1: what the closure of the loop shows of the error."""
+    found, long, label = {_step(step): integrated(step) for step in STEPS}, integrated(LONG_STEP), _step(LONG_STEP)
+    travel = CM_PER_METRE * float(np.ptp(exact()(np.linspace(0.0, STOP, 2001))[0]))
+    return [
+        Statement(
+            "The accuracy or even the debugging of the integration procedure may then be examined by simple checks on loop "
+            "closure.",
+            text("3.1, L1744-1748; the same in L1772-1782"),
+            "greatest failure of closure over greatest error of u, in 0.5 s, all second derivatives integrated by Hamming's "
+            "method with a constant step; mechanism and motions of the row before; for *debugging*, at 420 rpm, by "
+            "Runge-Kutta's method with a slip of ours, its last stage at mid-step",
+            "1 to 100, ours: the check shows an error, and no more than a hundred times as large as it is",
+            (
+                *shown_by_closure(),
+                Case(label=f"a slip; {_step(STEP)}", computed=with_slip(STEP), lower=1.0, upper=100.0),
+            ),
+        ),
+        Statement(
+            "It is important to recognise that a loop closure check is meaningful other than for trivial arithmetical "
+            "checks, only if used in conjunction with the first approach.",
+            text("3.1, L1748-1755"),
+            "greatest error of u by the second approach, which integrates u alone and closes the loop by its kinematics, over "
+            "its failure of closure; Hamming's method, at 420 rpm",
+            "more than 100, ours as above: the check shows nothing of the error",
+            tuple(at_least(name, 100.0, run.errors[1] / run.unseen) for name, run in found.items()),
+        ),
+        Statement(
+            "[L]arge errors may be involved in the numerical integrations yet they are not realised by the designer "
+            "because the kinematics are used to force the closure of the mechanism and hence no simple check is available "
+            "to indicate whether the solution is accurate.",
+            text("3.1, L1763-1772"),
+            f"greatest error of u by the second approach as in the row before, with a step of {1e3 * LONG_STEP:g} ms, ours: "
+            "over the range of u, over the failure of closure, and over the greatest change of u when the step is halved",
+            f"more than {SMALL:g}, the rule for *small*; more than 100, ours as above; one simple check refutes *no*",
+            (
+                at_least(f"large error; {label}", SMALL, long.errors[1] / travel),
+                at_least(f"not seen in the closure; {label}", 100.0, long.errors[1] / long.unseen),
+                at_least(
+                    f"not seen on halving; {label}",
+                    100.0,
+                    long.errors[1] / change_on_halving(LONG_STEP),
+                    why="halving the step shows the error",
+                ),
+            ),
+        ),
+        Statement(
+            "This [to integrate all the second order derivatives and bound the errors in loop closure, before the second "
+            "approach is taken] will ensure that the integration method is reliable and leads to accurate results.",
+            text("3.1, L1796-1798"),
+            "greatest error of u by the second approach over the greatest failure of closure by the first with the same step; "
+            "Hamming's method, at 420 rpm and in the launch, two of *the coming solutions* (L1784)",
+            "at most 1, ours: what bounds the failure of closure then bounds the error",
+            (
+                *(at_most(name, 1.0, run.errors[1] / run.gap.max()) for name, run in found.items()),
+                *(
+                    at_most(f"launch; {_step(step)}", 1.0, errors[1] / gap, why=KINK)
+                    for step, (gap, errors) in ((step, launched(step)) for step in STEPS)
+                ),
+            ),
+        ),
+    ]
+
+
+def _one_step_statements() -> list[Statement]:
+    """Judge section 2.4 on the Runge-Kutta methods and on series."""
+    halved = max(max(ratio, 1.0 / ratio) for ratio in map(of_runge_kutta, STEPS))
+    classical, hamming = stable_steps(1j)
+    # as many evaluations: twice the step, with four a step instead of two
+    dearer = {
+        f"{approach} approach, Hamming's {_step(step)}": integration_error(
+            by_runge_kutta(2.0 * step, i == 0)[:, 2 - 2 * i]
+        )
+        / integrated(step).errors[i]
+        for i, approach in enumerate(("first", "second"))
+        for step in (STEPS[1], STEPS[-1])
+    }
+    used = runge_kutta(slider_alone, [0.0, 0.0], STEP, 1).evaluations
+    return [
+        Statement(
+            "Their [the Runge-Kutta methods'] serious drawbacks are, firstly, the lack of simple means of estimating the "
+            "errors; this makes them highly susceptible to numerical instabilities ...",
+            text("2.4, L1334-1340"),
+            "factor between the greatest error of u and its estimate, the change when the step is halved over 1 - 1/16: second "
+            "approach, classical method, 420 rpm, greatest of steps of 4, 2, 1 and 0.5 ms; greatest stable step for y'' = -y, "
+            "ours, over that of Hamming's method",
+            "more than 2, ours: an estimate within a factor of 2 is of use; at most 1: *highly* is read as more than Hamming's",
+            (
+                at_least(
+                    "lack of an estimate",
+                    2.0,
+                    halved,
+                    why="halving the step estimates the error, for three times the evaluations",
+                ),
+                at_most(
+                    "susceptible to instabilities",
+                    1.0,
+                    classical / hamming,
+                    why=f"it is stable up to steps of {classical:.1f}, Hamming's up to {hamming:.2f}",
+                ),
+            ),
+        ),
+        Statement(
+            "... and, secondly, the large number of evaluation of the function [Phi]; four times for each step in a fourth "
+            "order method. The second of these drawbacks makes them unfavourable for use with our Lagrangian multiplier "
+            "formulation of the equations of the motion because of the large number of equations, and hence the lengthy "
+            "time involved in computation of the function [Phi].",
+            text("2.4, L1340-1356"),
+            "evaluations of Phi in a step of the classical method; its greatest error of u at 420 rpm, by each approach of "
+            "3.1, over that of Hamming's with half the step, which takes as many evaluations, and so as much time for them",
+            "none of a count; more than 1, the sign, as *unfavourable* says",
+            (
+                replace(near("evaluations a step", 4.0, used, 0.0), stated="four"),
+                *(
+                    at_least(
+                        f"unfavourable; {label}",
+                        1.0,
+                        ratio,
+                        why="by the second approach with long steps Runge-Kutta's error is the smaller",
+                    )
+                    for label, ratio in dearer.items()
+                ),
+            ),
+        ),
+        Statement(
+            "For example, to obtain a solution equivalent to a fourth order Runge-kutta method we need to evaluate the "
+            "fourth derivative of the function [Phi].",
+            text("2.4, L1364-1370"),
+            "order of the error of a Taylor series of y' = Phi with the derivatives of Phi up to the third; Phi = -y, ours, up "
+            "to t = 1, steps of 0.1 and 0.05",
+            "at most 3.5, between the orders three and four: if the fourth derivative were needed, the order would be "
+            "less without it",
+            (at_most("", 3.5, order_of_series(3), why="the third is enough, since Phi is itself a derivative"),),
+        ),
+    ]
+
+
+def _hamming_statements() -> list[Statement]:
+    """Judge section 2.4 on the predictor-corrector methods."""
+    order = np.log2(integrated(STEPS[-1]).errors[1] / integrated(0.5 * STEPS[-1]).errors[1])
+    estimates, errors, _ = estimated()
+    rounded, _, roundings = estimated(unit=UNIT)
+    truncation = float(np.abs(estimates).max() / np.abs(errors).max())
+    roundoff = float(np.std(rounded - estimates) / np.std(roundings))
+    inherent = float(np.abs(estimated(START_ERROR)[0] - estimates).max()) / START_ERROR
+    return [
+        Statement(
+            "They [the predictor-corrector methods] provide an easy estimate of the errors, inherent, roundoff or "
+            "truncation, from the information already calculated. These errors are in all cases convergent and, thus the "
+            "methods are highly stable.",
+            text("2.4, L1379-1387"),
+            f"Hamming's estimate 9/121 (p - c) of the error of u in a step of {1e3 * STEP:g} ms at 420 rpm: over the error; "
+            f"its change over roundings to {CM_PER_METRE * UNIT:g} cm, and over an error of the start (*inherent*, so read) "
+            f"of {CM_PER_METRE * START_ERROR:g} cm; factor per step of the spurious solution of Milne's corrector, for y' = -y "
+            "with the step 0.1, ours",
+            "0.5 to 2, ours: an estimate within a factor of 2 is of use; at most 1, as *convergent* says; one counterexample "
+            "refutes *in all cases*",
+            (
+                Case(label="estimate of the truncation", computed=truncation, lower=0.5, upper=2.0),
+                Case(
+                    label="estimate of the roundoff",
+                    computed=roundoff,
+                    lower=0.5,
+                    upper=2.0,
+                    why="the estimate shows a small part of it",
+                ),
+                Case(
+                    label="estimate of the inherent error",
+                    computed=inherent,
+                    lower=0.5,
+                    upper=2.0,
+                    why="the motion from the wrong start is a motion too",
+                ),
+                at_most(
+                    "convergent",
+                    1.0,
+                    parasite((1, 0, -1), (1 / 3, 4 / 3, 1 / 3), 0.1),
+                    why="Milne's corrector is weakly unstable",
+                ),
+            ),
+        ),
+        Statement(
+            "One of their most attractive qualities is that they require only two evaluations of the function "
+            "[Phi] per step of integration.",
+            text("2.4, L1387-1391"),
+            "evaluations that a further step of (2.28) to (2.31) takes",
+            "none, they are counted",
+            (replace(near("", 2.0, evaluations_a_step(), 0.0), stated="two"),),
+        ),
+        Statement(
+            "The Hamming fourth order modified predictor-corrector is the method chosen here ...",
+            text("2.4, L1407-1409"),
+            "order at which the error of u at 420 rpm falls by (2.28) to (2.31), second approach, from steps of "
+            f"{1e3 * STEPS[-1]:g} to {500.0 * STEPS[-1]:g} ms",
+            "at least the order",
+            (replace(at_least("", 4.0, order), stated="fourth"),),
+            "modifier and final value take the leading error out, and add one",
+        ),
+    ]
 
 
 def draw(result: StudyResult) -> Figure:
