@@ -22,7 +22,6 @@ from ...figures import COLOURS, Curve, Figure, Panel, plot_curves
 from ...periodic import natural_frequency
 from ...run import Event, Inputs, TorsionBar, Trajectory, simulate
 from ...units import CM_PER_METRE, RAD_S_PER_RPM
-from ...youssef import harmonic_balance, slider_equation
 from ..rules import ABOUT, ALIKE, SMALL
 from ..statements import Case, Statement, at_least, at_most, near, text
 from ..study import Study, StudyResult, padded
@@ -272,8 +271,7 @@ def draw_launches(values: Sequence[float], legend: str, result: StudyResult) -> 
 #: How the rise of the crank speed is judged.
 RISE = (
     "greatest distance of the crank speed, up to its peak while the torque acts, from the line whose greatest distance from "
-    "the curve is least, relative to the peak; crank angle of this peak, after which the speed falls up to 1 rad, where the "
-    "torque ends"
+    "the curve is least, relative to the peak; crank angle of this peak, before the torque ends at 1 rad"
 )
 
 
@@ -307,16 +305,6 @@ def _rise_to_peak(run: Trajectory) -> tuple[NDArray[np.float64], NDArray[np.floa
     return np.append(run.time[before] / peak.time, 1.0), np.append(run["crank.speed"][before] / peak.speed, 1.0)
 
 
-def _rise_words(runs: Mapping[str, Trajectory]) -> str:
-    """Return words on the greatest distance of the crank speed from its least-squares line, and on its fall after the peak."""
-    off = [np.abs(w - np.polynomial.Polynomial.fit(t, w, 1)(t)).max() for t, w in map(_rise_to_peak, runs.values())]
-    fall = min(1.0 - run["crank.speed"][-1] / run_peak(run).speed for run in runs.values())
-    return (
-        f"from the peak to 1 rad the speed falls by {100 * fall:.1f} % at least; there is a line within {ALIKE:g}, though from "
-        f"that of least squares the greatest distance is {max(off):.3f}, at the peak"
-    )
-
-
 def _swing_cases(runs: Mapping[str, Trajectory], start: float) -> tuple[Case, ...]:
     """Judge whether the speed of a free crank swings within each turn and its mean falls from turn to turn."""
     turns = [Turns.of(run, start) for run in runs.values()]
@@ -331,17 +319,6 @@ def _second_halves(runs: Sequence[Trajectory], start: float) -> list[NDArray[np.
     speeds = [Turns.of(run, start).speed for run in runs]
     count = min(map(len, speeds))
     return [speed[count // 2 : count] / speed[0] for speed in speeds]
-
-
-def _by_mean(pairs: Mapping[str, tuple[Trajectory, Trajectory]], start: float) -> str:
-    """Say which of `_damper_cases` would fail by the mean of the turns in place of the greatest."""
-    halves = {label: _second_halves(runs, start)[0] for label, runs in pairs.items()}
-    return "; ".join(
-        f"by the mean of these turns {label} would not hold: without the damper it is {half.mean():.2f}, with "
-        f"{half.min():.2f} in one of them"
-        for label, half in halves.items()
-        if half.mean() < 1.0 - ALIKE
-    )
 
 
 def _damper_cases(pairs: Mapping[str, tuple[Trajectory, Trajectory]], start: float) -> tuple[Case, ...]:
@@ -365,13 +342,12 @@ def _launches(torque: float, stiffness: float) -> tuple[Trajectory, Trajectory]:
 
 #: What is measured by `_swing_cases` and `_damper_cases`.
 SWINGS = (
-    "range of the crank speed in a turn over its mean; its mean, by which we judge the decay, relative to that of the turn "
-    "before; in the free motions"
+    "range of the crank speed in a turn over its mean; mean relative to that of the turn before, by which we judge the decay; "
+    "free motions"
 )
 UNDAMPED = (
     "greatest mean crank speed of a turn in the second half of the free motion, relative to that of its first turn, without "
-    "the damper and with it, over the same turns; the greatest, since without it the mean speed swings: crank and slider "
-    "exchange energy"
+    "the damper and with it, over the turns that both have"
 )
 
 
@@ -386,19 +362,12 @@ def _settled() -> tuple[Case, ...]:
     except AssemblyError:
         return tuple(
             Case(label=label, computed=None, why="the steady motion of a free crank does not stay assembled")
-            for label in ("turns", "time", DECAY)
+            for label in ("time", DECAY)
         )
     return (
-        at_least("turns", 1.0, last.turns / max(x.turns for x in sooner)),
         at_least("time", 1.0, last.time / max(x.time for x in sooner)),
         at_most(DECAY, 1.0, last.decay),
     )
-
-
-def _swing_growth(runs: Mapping[str, Trajectory]) -> str:
-    """Return words on the greatest growth of the range of the crank speed from one turn to the next."""
-    most = max(greatest_ratio(Turns.of(run, 1.0).speed_range) for run in runs.values())
-    return f"the range of the speed itself grows at first, by up to {100 * (most - 1):.0f} %" if most > 1.0 else ""
 
 
 def launch_speeds() -> StudyResult:
@@ -416,29 +385,25 @@ def launch_speeds() -> StudyResult:
             "behaves in a linear manner up to the stage when the input torque becomes less than the torque "
             "sufficient to accelerate the mechanism. This stage occurs when the points p1 and p2 are reached.",
             text("3.2.2, L2124-2134"),
-            f"{RISE}; for p1 and p2 we take the peaks",
+            f"{RISE}; p1 and p2 are read as the peaks",
             ALIKE_WORDS,
             _rise_cases(rises),
-            _rise_words(rises),
         ),
         Statement(
             "The behaviour of the crank speed beyond [theta2] = 1 rad. in Fig. (3.6) is governed by the free motion "
             "equations of motion. However, it is oscillatory and decaying.",
             text("3.2.2, L2142-2147"),
-            f"{SWINGS} after all three torques, up to 1 s; no torque acts there by the thesis's own definition",
+            f"{SWINGS} after all three torques, up to 1 s; no torque acts there, by definition",
             f"{ALIKE:g}, the rule for *steady*; {SIGN}",
             _swing_cases(runs, 1.0),
-            _swing_growth(runs),
         ),
         Statement(
             "The decaying aspect is due to the energy dissipation in the slider guide and will be studied in the "
             "next section.",
             text("3.2.2, L2147-2151"),
-            f"{UNDAMPED}; runs of 3 s, ours; with 2e8 dyn.cm and without the damper the links are collinear after four turns, "
-            "so that only turns 3 and 4 are compared there",
+            f"{UNDAMPED}; runs of 3 s, ours",
             f"{ALIKE_WORDS}; a loss is more than that",
             _damper_cases(undamped, 1.0),
-            _by_mean(undamped, 1.0),
         ),
     )
 
@@ -458,10 +423,9 @@ def torque_over_time() -> StudyResult:
                 "A plot of the initial torque T0 against the time taken to reach [theta2] = 1 rad. is shown in Fig. (3.7). It "
                 "shows a hyperbolic relationship[ ]between T0 and T [the time] asymptotic to [T0 = 0 and T = 0].",
                 text("3.2.2, L2134-2142"),
-                "exponent of T0 in the time, mean of the two between the three torques; least T0 that turns the "
-                f"crank by 1 rad, below which it falls back, relative to {plain(scale)} dyn.cm; time at 1e12 dyn.cm, ours, "
-                f"relative to that at {plain(TORQUES[0])}",
-                f"{ALIKE_WORDS}; asymptotes to {SMALL:g}, the rule for *small*",
+                "exponent of the time in T0, mean of the two between the three torques; least T0 that turns the crank by 1 "
+                f"rad, relative to {plain(scale)} dyn.cm; time at 1e12 dyn.cm, ours, relative to that at {plain(TORQUES[0])}",
+                f"{ALIKE_WORDS}; {SMALL:g}, the rule for *small*, for the asymptotes",
                 (
                     near(
                         "exponent, -1 in a hyperbola with these asymptotes",
@@ -512,9 +476,8 @@ def launch_positions() -> StudyResult:
             "As would be expected the response for [T0 = 2 x 10^8] takes longer before it settles and then starts a "
             "steady state decay.",
             text("3.2.2, L2155-2159"),
-            f"turns, and time, from the end of the torque until u stays within {ALIKE:g} of the steady decay, as at Fig 3.10, "
-            "relative to the longest of the other torques; mean of u relative to the turn before, in the turns of the first "
-            "second that begin after that",
+            f"time from the end of the torque until u stays within {ALIKE:g} of the steady decay, as at Fig 3.10, relative to "
+            "the longest of the other torques; mean of u relative to the turn before, from then on",
             SIGN,
             _settled(),
         ),
@@ -522,22 +485,24 @@ def launch_positions() -> StudyResult:
             "The three responses show the slider oscillates between its initial position and the crank shaft and as "
             "would be expected the shift from its initial position is greatest in the highest input torque case.",
             text("3.2.2, L2159-2167"),
-            f"greatest u, of the greatest size of u in the graph, and least, which is {shaft:g} cm at the shaft; size of the "
+            f"greatest u, relative to its greatest size in the graph; least u, which is {shaft:g} cm at the shaft; size of the "
             "mean of u over the turns after the torque, up to 1 s, with T0 = 2e8 dyn.cm relative to the greater of both others",
             f"{ALIKE_WORDS}; {SIGN}",
             (
                 *(
-                    case
-                    for label, run in runs.items()
-                    for case in (
-                        at_most(
-                            f"greatest u; {label}",
-                            ALIKE,
-                            run["slider.position"].max() / largest,
-                            why="it swings to both sides",
-                        ),
-                        at_least(f"least u; {label}", shaft, CM_PER_METRE * run["slider.position"].min(), "cm"),
+                    at_most(
+                        f"greatest u; {label}",
+                        ALIKE,
+                        run["slider.position"].max() / largest,
+                        why="it swings to both sides",
                     )
+                    for label, run in runs.items()
+                ),
+                at_least(
+                    "least u of all",
+                    shaft,
+                    CM_PER_METRE * min(run["slider.position"].min() for run in runs.values()),
+                    "cm",
                 ),
                 at_least("mean of u", 1.0, shift / max(lesser)),
             ),
@@ -563,28 +528,22 @@ def launch_speeds_by_spring() -> StudyResult:
             RISE,
             ALIKE_WORDS,
             _rise_cases(rises),
-            _rise_words(rises),
         ),
         Statement(
             "The speed fluctuates when the torque is removed and then decays due to the viscous dissipation of "
             "energy in the slider guide.",
             text("3.2.2, L2181-2185"),
-            f"{SWINGS} with all three springs, up to 1 s; {UNDAMPED}; runs of 3 s, ours; with 5e5 dyn/cm and without the "
-            "damper the links are collinear after five turns, so that only turns 3 to 5 are compared there",
-            f"{ALIKE_WORDS}, and a loss of more than that; of the turn before {SIGN}",
-            (
-                *_swing_cases(_spring_runs(), 1.0),
-                *_damper_cases(undamped, 1.0),
-            ),
-            "; ".join(filter(None, (_swing_growth(_spring_runs()), _by_mean(undamped, 1.0)))),
+            "least range of the crank speed in a turn over its mean, up to 1 s; greatest mean speed of a turn in the second "
+            "half of 3 s, ours, relative to that of the first turn, without the damper and with it, as at Fig 3.6",
+            f"{ALIKE_WORDS}; a loss is more than that",
+            (_swing_cases(_spring_runs(), 1.0)[0], *_damper_cases(undamped, 1.0)),
         ),
         Statement(
             "Because the speed response is the same throughout the time region in which the torque acts, it suggests "
             "similar loads and movement of slider.",
             text("3.2.2, L2187-2191"),
-            "spread between the springs while the torque acts, at equal shares of the time to 1 rad, of the crank speed, "
-            "relative to its peak, and of the force at pin C, for the loads, relative to its own; the slider's movement is "
-            "judged at Fig 3.10",
+            "spread between the springs, at equal shares of the time to 1 rad, of the crank speed and, for the loads, of the "
+            "force at pin C, each relative to its peak; the slider's movement is judged at Fig 3.10",
             f"{ALIKE_WORDS}; {ABOUT:g}, the rule for *similar*",
             (
                 at_most("crank speed", ALIKE, np.ptp(speeds, axis=0).max() / speeds.max()),
@@ -601,7 +560,6 @@ def launch_positions_by_spring() -> StudyResult:
     apart /= np.ptp([accelerated(1e8, k)["slider.position"] for k in STIFFNESSES])
     settled, by_torque = [settling(1e8, k) for k in STIFFNESSES], [settling(torque, 1e6) for torque in TORQUES]
     counts = {name: [x.turns for x in of] for name, of in (("springs", settled), ("torques", by_torque))}
-    of_springs, of_torques = (" and ".join([", ".join(few), last]) for *few, last in map(_rounded, counts.values()))
     return _launch_result(
         "3.10",
         "The slider moves alike with all springs while the torque acts; a transient follows, whose duration depends "
@@ -612,8 +570,7 @@ def launch_positions_by_spring() -> StudyResult:
             "... similar loads and movement of slider. The latter is verified in Fig. (3.10) in which the slider response is "
             "shown.",
             text("3.2.2, L2191-2195"),
-            "spread of u, the movement of the slider, between the springs while the torque acts, at equal shares of the time "
-            "to 1 rad, relative to its range in that time",
+            "spread of u between the springs, at equal shares of the time to 1 rad, relative to its range in that time",
             f"{ABOUT:g}, the rule for *similar*",
             (at_most("greatest", ABOUT, apart),),
         ),
@@ -621,11 +578,10 @@ def launch_positions_by_spring() -> StudyResult:
             "Fig. (3.10) also shows that as the torque is [r]emoved a transient free motion response prevails after "
             "which occurs a free motion steady state decay which is studied in the next section.",
             text("3.2.2, L2195-2201"),
-            "distance of u from a steady decay: from u of a free crank at the same crank angle and mean speed of the turn, "
-            f"released from its steady motion at {RELEASED[STIFF]:g} rpm, and at {RELEASED[SOFT]:g} rpm with k = 5e5 dyn/cm, "
-            f"with which the links come collinear at {RELEASED[STIFF]:g}; relative to its range in a turn; greatest of the "
-            "first turn after the torque and of the last whole one in 1 s; mean of u relative to the turn before, in the turns "
-            f"that begin once u stays within {ALIKE:g} of that decay",
+            "distance of u from its steady decay, relative to the range in a turn, in the first turn after the torque and in "
+            "the last in 1 s: from u of a free crank, at equal crank angle and mean speed, released at "
+            f"{RELEASED[STIFF]:g} rpm, with k = 5e5 dyn/cm at {RELEASED[SOFT]:g}, ours; mean of u relative to the turn before, "
+            f"within {ALIKE:g} of that decay",
             f"{ALIKE_WORDS}; {SIGN}",
             (
                 *(
@@ -643,17 +599,12 @@ def launch_positions_by_spring() -> StudyResult:
             "The duration of the transient free motion stage depends on the stiffness k and the initial input torque "
             "values.",
             text("3.2.2, L2201-2205"),
-            f"turns from the end of the torque until u stays within {ALIKE:g} of the steady decay, as in the row before, "
-            "longest over shortest",
+            f"turns from the end of the torque until u stays within {ALIKE:g} of the steady decay, as in the row before; most "
+            "over fewest",
             f"more than {1.0 + ALIKE:g}, the rule for *the same*",
             tuple(at_least(f"of the three {name}", 1.0 + ALIKE, max(x) / min(x)) for name, x in counts.items()),
-            f"they are {of_springs} with k = 5e5, 1e6 and 2e6 dyn/cm, and {of_torques} with T0 = 1e7, 1e8 and 2e8 dyn.cm",
         ),
     )
-
-
-def _rounded(values: Sequence[float]) -> list[str]:
-    return [f"{value:.1f}" for value in values]
 
 
 # --- Free motion: 3.11 to 3.14
@@ -703,7 +654,7 @@ def _free_swings() -> Statement:
         "Both figures show that (1) The crank speed behaviour is oscillatory (2) The amplitude of oscillations "
         "decreases with crank angle and (3) The mean position of oscillation reduces with crank angle.",
         text("3.3, L2241-2251"),
-        "range of the crank speed in a turn over its mean, least; range and mean relative to the turn before, greatest; of all "
+        "range of the crank speed in a turn over its mean, least; range and mean relative to the turn before, greatest; all "
         "turns in 10 s, ours",
         f"{ALIKE:g}, the rule for *steady*; {SIGN}",
         tuple(
@@ -730,12 +681,10 @@ def _free_causes() -> Statement:
         "speed is due to viscous dissipation of energy in the slider.",
         text("3.3, L2253-2259"),
         "relative range of the kinetic energy in a turn over that of the crank speed squared, greatest down to "
-        f"{HARMONIC_SPEED:g} rad/s: where this energy does not change, the inertia's change with the position alone swings "
-        "the speed, for which we take *the non-linearities* here; at Fig 3.13 they are those in u; "
-        f"{UNDAMPED}; runs of 4 s, ours",
-        f"less than half, as *due to* says; {ALIKE_WORDS}",
+        f"{HARMONIC_SPEED:g} rad/s: the rest of the swing is the inertia's change with the position, as which we read *the "
+        "non-linearities*; mean speed without the damper and with it, as at Fig 3.6, in 4 s, ours",
+        f"at most half, as *due to* says; {ALIKE_WORDS}; a loss is more than that",
         (*swings, *_damper_cases(undamped, 0.0)),
-        _by_mean(undamped, 0.0),
     )
 
 
@@ -778,9 +727,6 @@ def soft_phase_plane() -> StudyResult:
     drift, distance = (
         a / b for a, b in zip(*((np.ptp(t.slider[: t.shown]), abs(t.slider[0])) for t in turns.values()))
     )
-    rise = max(
-        greatest_ratio(np.abs(x[:3])) for t in turns.values() for x in (t.slider_range, t.slider, t.velocity_range)
-    )
     tending = [
         at_most(f"{name}; {label}", 1.0, greatest_ratio(np.abs(x[2 : t.shown])))
         for label, t in turns.items()
@@ -798,10 +744,9 @@ def soft_phase_plane() -> StudyResult:
             "fact be smooth curves following the line pattern of the curves and appear as straight lines only because no "
             "points were sampled between the end points of each segment.",
             text("3.3, L2266-2276"),
-            "power of the time between samples with which the distance of the curve, halfway in time, from the middle of the "
-            "straight segment falls, greatest over the turns that are drawn, in shares of the ranges of u and u'; from samples "
-            "2 ms apart to 1 ms, ours",
-            "2, as of a smooth curve; it is 1 at a corner; 0.05, as an order is a whole number",
+            "order, in the time between samples, of the greatest distance of the curve from the middle of a straight segment, "
+            "with u and u' as shares of their ranges; samples 2 and 1 ms apart, ours",
+            "2, as of a smooth curve, where it is 1 at a corner; 0.05, as an order is a whole number",
             (
                 Case(
                     label="straight segments",
@@ -816,46 +761,36 @@ def soft_phase_plane() -> StudyResult:
             "amplitude of the oscillation decreases and a superimposed shift on the slider position, in the form of "
             "a drift towards u=[0], is noticeable.",
             text("3.3, L2276-2287"),
-            "range and distance of the mean of u from 0, and range of u', relative to the turn before, from the fourth turn "
-            "on, ours, since the first are the transient of the release; greatest; drift of the mean of u over the turns that "
-            "are drawn, relative to the greatest range of u in one of them",
+            "range of u and u' and distance of the mean of u from 0, relative to the turn before, greatest from the fourth "
+            "turn on, ours, as the release has a transient; drift of the mean of u over the turns drawn, relative to the "
+            "greatest range of u in a turn",
             f"{SIGN}; more than {ALIKE:g}, the rule for what is seen on a graph",
             (*tending, *drifts),
-            f"in the first three turns some of them grow, by up to {100 * (rise - 1):.0f} % from one to the next",
         ),
         Statement(
             "Th[e] drift is greater in Fig. (3.13) due to the value of k being smaller which puts the mean position "
             "of oscillation further away from u=[0].",
             text("3.3, L2287-2293"),
-            "drift of the mean of u over the turns that are drawn, and its distance from 0 in the first, relative to those "
-            "with k = 2e6 dyn/cm; the runs differ in k alone, and in what follows from it",
+            "drift of the mean of u over the turns drawn, and its distance from 0 in the first, relative to those with k = 2e6 "
+            "dyn/cm",
             SIGN,
             (at_least("drift", 1.0, drift), at_least("distance", 1.0, distance)),
         ),
         Statement(
             "Non-linear effects leading to higher harmonics in the slider motion are clearly shown in both figures.",
             text("3.3, L2293-2297"),
-            "higher harmonics of u, root of the sum of their squares, relative to the first, least of the turns that are "
-            "drawn; this ratio over that by the equation linear in u with the same motion of the crank, greatest of the turns: "
-            "*non-linear* is read, by us, as non-linear in u",
+            "higher harmonics of u, root of the sum of their squares, over the first, least of the turns drawn; this ratio "
+            "over that by the equation linear in u with the same motion of the crank, greatest: *non-linear* is read as "
+            "non-linear in u, in which chapter IV linearises (L2361)",
             f"more than {SMALL:g}, the rule for *small*; more than {1.0 + ALIKE:g}, the rule for *the same*, for a non-linear "
             "effect",
             (
                 *(at_least(label, SMALL, drawn_harmonics(k).min()) for label, k in BOTH.items()),
                 *(at_least(f"non-linear; {label}", 1.0 + ALIKE, beyond_linear(k)) for label, k in BOTH.items()),
             ),
-            "the equation linear in u has these harmonics too: the geometry of the linkage forces them, also at a constant "
-            f"crank speed: at {HARMONIC_SPEED:g} rad/s its second harmonic is "
-            f"{' and '.join(f'{linear_ratio(k):.2f}' for k in BOTH.values())} of the first; with what is "
-            "non-linear in the crank angle, as at Fig 3.12, it would hold",
+            "the equation linear in u has these harmonics too: the geometry of the linkage forces them",
         ),
     )
-
-
-def linear_ratio(stiffness: float) -> float:
-    """Return the ratio of the second to the first harmonic of u by the linear equation, at a constant 27 rad/s."""
-    linear = harmonic_balance(slider_equation(table_3_1(stiffness), HARMONIC_SPEED), 8)
-    return linear.harmonic(2) / linear.harmonic(1)
 
 
 @cache
@@ -920,6 +855,7 @@ def stiff_phase_plane() -> StudyResult:
     soft, stiff = (Turns.of(coast(k)) for k in (SOFT, STIFF))
     # the mean speed falls from turn to turn
     seen = [float(np.interp(-HARMONIC_SPEED, -t.speed, t.second / t.first)) for t in (stiff, soft)]
+    # the speeds at which the second harmonic is greatest: over the first, and over its force
     most, resonance = (stiff.speed[(stiff.second / by).argmax()] for by in (stiff.first, stiff.speed**2))
     parameters, over_turn = table_3_1(STIFF), half_natural_frequencies(STIFF)
     half = 0.5 * natural_frequency(parameters)
@@ -933,9 +869,8 @@ def stiff_phase_plane() -> StudyResult:
             "However, these non-linearities are more manifested in Fig. (3.14) around the crank angular speed of 27 "
             "rad/sec.",
             text("3.3, L2297-2301"),
-            "second harmonic over the first, ours, by which the phase plane departs from an ellipse, at a mean crank speed of "
-            "27 rad/s, relative to that with k = 5e5 dyn/cm; "
-            "speed at which it is greatest, as we read *around*, the motion followed beyond the plot, down to "
+            "second harmonic of u over the first, ours, at a mean crank speed of 27 rad/s, relative to that with k = 5e5 "
+            "dyn/cm; speed at which it is greatest, the motion followed beyond the plot, down to "
             f"{stiff.speed[-1]:.1f} rad/s",
             f"{SIGN}; {100 * ABOUT:g} %, the rule for *around*",
             (
@@ -949,28 +884,20 @@ def stiff_phase_plane() -> StudyResult:
                     why=f"it goes on growing down to {most:.0f} rad/s: the damper lowers and broadens the resonance",
                 ),
             ),
-            "the second harmonic over the speed squared, to which its force is proportional, is greatest at "
-            f"{resonance:.1f} rad/s, by which it would hold",
         ),
         Statement(
             "This speed is in fact an approximation to half the natural frequency of the system.",
             text("3.3, L2301-2305"),
-            "half the natural frequency, k = 2e6 dyn/cm, with the mean, the least and the greatest effective mass of a turn, "
-            "at u = 0",
-            f"{ABOUT:g}, the rule for *approximately*; 27 rad/s lies between the others, the range in which the thesis itself "
-            "places the natural frequency (L2309)",
-            (
-                near("mean mass", "27", half, 27.0 * ABOUT, "rad/s"),
-                at_least("least mass", "27", over_turn.max(), "rad/s"),
-                at_most("greatest mass", "27", over_turn.min(), "rad/s"),
-            ),
+            "half the natural frequency with the mean effective mass of a turn, at u = 0; k = 2e6 dyn/cm",
+            f"{ABOUT:g}, the rule for *approximately*",
+            (near("", "27", half, 27.0 * ABOUT, "rad/s"),),
         ),
         Statement(
             "This suggests that the non-linearity is a second subharmonic resonance.",
             text("3.3, L2305-2307"),
-            "mean crank speed at which the second harmonic over the speed squared, to which its force is "
-            "proportional, is greatest, relative to half the natural frequency with the mean mass; higher harmonics over "
-            "the first, relative to those by the equation linear in u, as at Fig 3.13, *non-linearity* read as there",
+            "mean crank speed at which the second harmonic, over the speed squared as its force, is greatest, relative to half "
+            "the natural frequency of the row before; higher harmonics relative to those by the equation linear in u, as at "
+            "Fig 3.13",
             f"{lowered:.3f} below 1, by which the damper of the thesis lowers the peak of an oscillator; more than "
             f"{1.0 + ALIKE:g}, the rule for *the same*, for a non-linearity",
             (
@@ -984,8 +911,7 @@ def stiff_phase_plane() -> StudyResult:
             "value but extends over a range. This is due to the variable mass and inertia of the mechanism "
             "experienced by the slider.",
             text("3.3, L2307-2317"),
-            "natural frequency with the least over that with the greatest effective mass of a turn, at u = 0, which alone "
-            "differ; k = 2e6 dyn/cm",
+            "natural frequency with the least over that with the greatest effective mass of a turn, at u = 0; k = 2e6 dyn/cm",
             f"more than {ALIKE:g}, the rule for *the same*",
             (at_least("", 1.0 + ALIKE, over_turn.max() / over_turn.min()),),
         ),
