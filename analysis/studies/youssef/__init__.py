@@ -39,7 +39,7 @@ _ROWS = (
     ("5.1", "chapter_5", "5.3.1, L3756-3770", "First region of instability over the inertia ratio, undamped"),
     ("5.2", "chapter_5", "5.3.1, L3772-3884", "First region of instability over the crank's length, undamped"),
     ("5.3", "chapter_5", "5.3.1, L3886-3900", "First region of instability over the coupler's length, undamped"),
-    ("5.4", "chapter_5", "5.3.2, L3910-3921", "First region of instability over the inertia ratio, damped"),
+    ("5.4", "damping", "5.3.2, L3910-3921", "First region of instability over the inertia ratio, damped"),
     ("6.1", "", "6.3.2, L4446", "The four-bar with its coupler point"),
     ("6.2", "search", "6.3.3, L4555", "The search, of which the figure has the flow chart"),
     (

@@ -1,0 +1,364 @@
+"""Figure 5.4: the first region of instability with a damper, and the thesis's ways to find regions with one.
+
+A damper is omega_c = mu/(m4 + m5) (1/s).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import replace
+from functools import cache, partial
+from math import pi
+
+import numpy as np
+
+from linkwork.five_bar.published import chapter_4
+
+from ...figures import COLOURS, Curve, Figure, Panel, plot_curves
+from ...numerics.boundaries import Box, Chart, Test, chart
+from ...numerics.fourier import FourierSeries
+from ...periodic import Drive, Operation, Plane, RemovingDamping, orbit_test, removing_damping
+from ...youssef import (
+    PeriodicEquation,
+    Variant,
+    boundary_stiffnesses,
+    hill_multipliers,
+    hill_regions,
+    linear_test,
+    slider_equation,
+)
+from ..rules import ALIKE, SMALL
+from ..statements import Case, Statement, at_least, at_most, listing, near, text
+from ..study import Study, StudyResult, padded
+from .chapter_5 import COMPARED, SWEEPS, closed, held
+from .linearised import with_crank
+from .regions import crank_speed, equation, first_order, hill, removing_estimate
+from .runs import ALIKE_WORDS, SIGN
+
+#: omega_c (1/s) that removes the region up to I4 = 1.5, as stated.
+STATED = 0.45
+#: Chart of lambda_k^2 and I4, dampers omega_c (1/s) of the regions, and search range of the removing damper.
+BOX = Box(x=(0.25, 0.29), y=(0.25, 2.0))
+DAMPERS = (0.0, 0.05, 0.1, 0.15)
+RANGE = (0.0, 1.2)
+#: Crank angles at which the coefficients are divided, and number of harmonics that represents the quotients fully.
+ANGLES = np.linspace(0.0, 2.0 * pi, 256, endpoint=False)
+ALL_HARMONICS = 64
+#: Harmonics of the coefficients in (4.29) and in the listing of appendix 4.
+LISTED_HARMONICS = 2
+#: I4 at which the removing damper is computed.
+RATIOS = np.linspace(0.25, 2.0, 8)
+#: Test functions of the true orbit, and of the linear equations about zeta = 0.
+MOTIONS: Mapping[str, Callable[[Plane, int], Test]] = {
+    "true orbit": orbit_test,
+    "(4.21) as printed": partial(linear_test, variant=Variant.PRINTED),
+    "listing of appendix 4": partial(linear_test, variant=Variant.FORTRAN),
+}
+
+
+def with_damping(omega_c: float) -> Plane:
+    """Return a function of lambda_k^2 and I4 that returns the mechanism and its drive, with a damper omega_c (1/s)."""
+
+    def operation(lambda_k2: float, inertia_ratio: float) -> Operation:
+        return chapter_4(inertia_ratio, omega_c), Drive(speed=crank_speed(lambda_k2))
+
+    return operation
+
+
+@cache
+def damped_region(omega_c: float) -> Chart:
+    """Return the chart of the first region over lambda_k^2 and I4, with a damper omega_c (1/s)."""
+    return chart(orbit_test(with_damping(omega_c), -1), BOX, lines=(0, 4), samples=100)
+
+
+@cache
+def removing(motion: str, inertia_ratio: float) -> RemovingDamping:
+    """Find the damper omega_c (1/s) that removes the first region at an inertia ratio, by one of the `MOTIONS`."""
+
+    def test(lambda_k2: float, omega_c: float) -> float:
+        return MOTIONS[motion](with_damping(omega_c), -1)(lambda_k2, inertia_ratio)
+
+    return removing_damping(test, BOX.x, RANGE, samples=12)
+
+
+def removing_most(motion: str) -> float:
+    """Return the greatest damper omega_c (1/s) that is needed to remove the first region up to I4 = 1.5; see `removing`."""
+    return max(removing(motion, x).damping for x in RATIOS.tolist() if x <= 1.5)
+
+
+def multiplier(inertia_ratio: float, omega_c: float, speed: float) -> float:
+    """Return the greatest size of a Floquet multiplier of the right linear equation with a damper (1/s) at a speed (rad/s)."""
+    found = slider_equation(chapter_4(inertia_ratio, omega_c), speed)
+    return float(np.abs(hill_multipliers(found.homogeneous().stiffened(found.spring))).max())
+
+
+def region_width(found: Chart, value: float) -> float:
+    """Return the width in lambda_k^2 of the region in a chart at I4 = ``value``, zero if there is no region."""
+    roots = found.scan_line(value, samples=100).roots
+    return float(np.ptp(roots)) if len(roots) else 0.0
+
+
+def divided(found: PeriodicEquation, harmonics: int) -> PeriodicEquation:
+    """Return an equation divided by its mass, as in (5.27), with the given number of harmonics kept in the quotients."""
+    mass = found.a(ANGLES)
+    b, c, factor = (FourierSeries.from_samples(x(ANGLES) / mass, harmonics) for x in (found.b, found.c, found.factor))
+    return PeriodicEquation(a=FourierSeries.constant(1.0), b=b, c=c, factor=factor)
+
+
+def without_factor(inertia_ratio: float, lambda_c: float) -> PeriodicEquation:
+    """Return the equation (5.29) of chi, derived from the correct linear equation.
+
+    Here zeta is chi times the factor exp(-1/2 int psi1).
+    """
+    found = replace(slider_equation(chapter_4(inertia_ratio), crank_speed(0.25)), damping=lambda_c)
+    whole = divided(found.homogeneous(), ALL_HARMONICS)
+    psi1, psi2 = whole.b, whole.c
+    rest = psi2(ANGLES) - 0.5 * psi1.derivative()(ANGLES) - 0.25 * psi1(ANGLES) ** 2
+    return replace(whole, b=FourierSeries.constant(0.0), c=FourierSeries.from_samples(rest, ALL_HARMONICS))
+
+
+def shifts() -> tuple[Case, ...]:
+    """Judge how the stated damper shifts regions 1 to 4 of (5.30) and changes their widths, for the I4 `COMPARED`."""
+    found: list[tuple[float, float, float]] = []
+    for ratio in COMPARED:
+        for n, free in hill_regions(without_factor(ratio, 0.0), 4).items():
+            lambda_c = STATED / crank_speed(free.low)
+            damped = without_factor(ratio, lambda_c)
+            region, k0 = hill_regions(damped, 4)[n], damped.factor.mean
+            shift = 0.5 * (region.low + region.high - free.low - free.high)
+            found.append((shift * k0 / (0.25 * lambda_c**2 * k0**2), shift / free.low, region.width / free.width))
+    of_stated, relative, width = zip(*found)
+    return (
+        near("shift over the stated quantity", 1.0, farthest(of_stated), ALIKE),
+        at_most("shift over lambda_k^2", SMALL, max(relative)),
+        near("width over that without a damper", 1.0, farthest(width), ALIKE),
+    )
+
+
+def farthest(values: Iterable[float]) -> float:
+    """Return the value that is farthest from 1."""
+    return max(values, key=lambda x: abs(x - 1.0))
+
+
+def narrowing(charts: Mapping[float, Chart], inertia_ratio: float) -> float:
+    """Return the greatest change of the region's width from one damper to the next, negative if each change narrows the region.
+
+    Changes from a damper without a region do not count.
+    """
+    at = np.array([region_width(found, inertia_ratio) for found in charts.values()])
+    return float(np.diff(at)[at[:-1] > 0.0].max())
+
+
+def outside(omega_c: float) -> float:
+    """Return the greatest real part s1 of Lambda (5.32) outside the first region, for the I4 `COMPARED` and a damper (1/s)."""
+    sizes: list[float] = []
+    for ratio in COMPARED:
+        region = hill(chapter_4(ratio))
+        places = 0.2, region.low - 0.5 * region.width, region.high + 0.5 * region.width, 0.35
+        sizes += [multiplier(ratio, omega_c, crank_speed(lambda_k2)) for lambda_k2 in places]
+    return float(np.log(max(sizes)) / (2.0 * pi))
+
+
+def nine_terms() -> dict[int, float]:
+    """Return the errors of regions 1 to 3 by nine terms of the determinant at I4 = 1, relative to the regions' widths.
+
+    The coefficients of the divided equation (5.27) are cut after `LISTED_HARMONICS`. Each error is the greater of the region's
+    two boundaries.
+    """
+    exact = equation(chapter_4(1.0))
+    cut = divided(exact, LISTED_HARMONICS)
+    # the first boundary with the multiplier 1 is the zeroth
+    even, odd = (boundary_stiffnesses(cut, m, count=c, order=2).real for m, c in ((1, 3), (-1, 4)))
+    ends = {1: odd[:2], 2: even[1:], 3: odd[2:]}
+    return {
+        n: max(abs(ends[n][0] - whole.low), abs(ends[n][1] - whole.high)) / whole.width
+        for n, whole in hill_regions(exact, 3).items()
+    }
+
+
+def judge_damper(charts: Mapping[float, Chart]) -> tuple[Statement, ...]:
+    """Judge the statements on the regions with a damper, given their charts by omega_c (1/s)."""
+    tips = [float(found.boundaries[0].points[:, 1].min()) for d, found in charts.items() if d > 0.0]
+    growth = max(narrowing(charts, ratio) for ratio in (*COMPARED, 2.0))
+    crank, coupler = (0.001, *SWEEPS["5.2"].values), SWEEPS["5.3"].values
+    mechanism = chapter_4(1.5)
+    fast = crank_speed(0.5 * boundary_stiffnesses(equation(mechanism), 1, count=1)[0].real)
+    return (
+        Statement(
+            "It is clearly seen that regions of instability of the above system will resemble those obtained for the "
+            "case of no damping but shifted by a small amount represented by the second order quantity of [1/4 "
+            "lambda_c^2 k0^2] in (5[.]30).",
+            text("5.2.1, L3628-3635"),
+            f"regions 1 to 4 of (5.29) with omega_c = {STATED:g} 1/s and without a damper: shift of the middle in lambda_k^2 "
+            "k0 over the stated quantity; shift over lambda_k^2; width over that without. The farthest of I4 = 0.5, 1 and "
+            "1.5; right linear equation",
+            f"{ALIKE_WORDS}; {SMALL:g} for the shift over lambda_k^2, the rule for *small*",
+            shifts(),
+        ),
+        Statement(
+            "As would be expected the region is decreased in width as [omega_c] is increased.",
+            text("5.3.2, L3915-3917"),
+            "growth of the width in lambda_k^2 from one damper to the next, up to that which removes the region, the greatest "
+            "of I4 = 0.5, 1, 1.5 and 2; true periodic motion",
+            SIGN,
+            (at_most("", 0.0, growth),),
+        ),
+        Statement(
+            "It is also shifted to the right with increase of [omega_c] and is completely eliminated anywhere within "
+            "[I4 = 0] to 1.5 for the value of [omega_c] = 0.45.",
+            text("5.3.2, L3917-3921"),
+            "growth of the I4 at which the region begins, from one damper to the next, the least (*to the right* on a plot "
+            "over I4, L3910); omega_c that removes the region, the most up to I4 = 1.5; true periodic motion",
+            "none: the sign decides, and whether the region is removed",
+            (
+                at_least("growth", 0.0, np.diff(tips).min()),
+                at_most("omega_c", "0.45", removing_most("true orbit"), "1/s"),
+            ),
+        ),
+        Statement(
+            "The instability regions shown in figs. (5.2) and (5.3) were also completely eliminated for the values "
+            "of [omega_c] = 0.45 anywhere within [sigma2] = [0.]001 to 0.1 and [sigma3] = 0.8 to 1.2 respectively.",
+            text("5.3.2, L3923-3929"),
+            "omega_c that removes the region, the most over sigma2 = 0.001 and 0.01 to 0.1 in steps of 0.01 and over sigma3 = "
+            "0.8 to 1.2 in steps of 0.025; estimated from the width without a damper by the right linear equation",
+            "none: it is removed or it is not",
+            (
+                at_most("Fig 5.2", "0.45", max(removing_estimate(with_crank(x)) for x in crank), "1/s"),
+                at_most("Fig 5.3; angles held", "0.45", max(removing_estimate(held(x)) for x in coupler), "1/s"),
+                at_most("Fig 5.3; same ground link", "0.45", max(removing_estimate(closed(x)) for x in coupler), "1/s"),
+            ),
+            "on the same ground link the region is wider",
+        ),
+        Statement(
+            "Viscous damping had a stabilising effect. It was also possible to choose a value for this damping "
+            "making the linkage under study completely stable for all ranges of speeds.",
+            text("5.3.3 c, L3952-3958"),
+            "growth of the width as above; by the right linear equation at I4 = 1.5: omega_c that removes regions 1 to 4, "
+            "estimated from their widths; greatest multiplier beyond the zeroth boundary, at "
+            f"{fast:.0f} rad/s, with {STATED:g} 1/s (L3921) and a thousand times as much",
+            "none: the sign and the stability decide",
+            (
+                at_most("growth of the width", 0.0, growth),
+                at_most("omega_c", STATED, max(removing_estimate(mechanism, n) for n in range(1, 5)), "1/s"),
+                *(
+                    at_most(f"multiplier; {omega_c:g} 1/s", 1.0, multiplier(1.5, omega_c, fast))
+                    for omega_c in (STATED, 1e3 * STATED)
+                ),
+            ),
+            "beyond the zeroth boundary the slider falls away, which a damper slows but does not stop",
+        ),
+    )
+
+
+def judge_determinant() -> tuple[Statement, ...]:
+    """Judge the statements on the method (5.31) to (5.35) and on its program."""
+    dampers = {f"omega_c = {DAMPERS[2]:g} 1/s": DAMPERS[2], "without a damper, as in 5.3.3 e": 0.0}
+    apart = {
+        end: max(
+            abs(getattr(hill(p), end) - getattr(first_order(p, Variant.EXACT), end)) / hill(p).width
+            for p in map(chapter_4, COMPARED)
+        )
+        for end in ("low", "high")
+    }
+    return (
+        Statement(
+            "The values of [omega] and s2 that satisfy equations (5.35) determine the boundaries of the unstable regions.",
+            text("5.2.2, eqs (5.33) to (5.35), L3717-3719"),
+            "greatest real part s1 of Lambda outside the first region: half a width from it and at lambda_k^2 = 0.2 and 0.35, "
+            "I4 = 0.5, 1 and 1.5, right linear equation. Where it is 0, some s2 satisfies (5.35)",
+            "below 0 by more than 1e-9, above rounding errors",
+            tuple(at_most(name, -1e-9, outside(omega_c)) for name, omega_c in dampers.items()),
+            "without a damper s1 is 0 at every stable speed, not at the boundaries alone",
+        ),
+        Statement(
+            "For a particular mechanism the method is capable of giving all the boundaries of the unstable regions without "
+            "any extra work.",
+            text("5.2.2, L3730-3734"),
+            "boundaries by (5.35) cut after the ninth term (L3930), its coefficients after the second harmonic as in (4.29), "
+            "less those with more of both, over the region's width; right linear equation, divided by M as (5.27), I4 = 1, "
+            "without a damper",
+            f"{SMALL:g}, the rule for *small*",
+            tuple(at_most(f"region {n}", SMALL, x) for n, x in nine_terms().items()),
+            "the third region needs more harmonics, which is extra work",
+        ),
+        Statement(
+            "The computer orientated method provided a fast method for solving the stability problem.",
+            text("5.3.3 d, L3960-3962"),
+            why="no times are given",
+        ),
+        Statement(
+            "The computer orientated method gave results which are in good agreement with the perturbation method; "
+            "see the outer boundary of fig. (5.4) and fig. (5.1).",
+            text("5.3.3 e, L3964-3968"),
+            "boundaries of the first region without a damper, the outer ones, by (5.35) less those by (5.16), over its width; "
+            "right linear equation, the greatest of I4 = 0.5, 1 and 1.5",
+            f"{SMALL:g}, the rule for *small*: the next order",
+            tuple(at_most(end, SMALL, x) for end, x in apart.items()),
+        ),
+        Statement(
+            "THIS PROG. INV[E]STIGATES STABILITY IN PRESENCE [O]F DAMPING",
+            listing("appendix 4, L8698"),
+            "omega_c that removes the first region up to I4 = 1.5: by the equation of the listing, solved without its cut "
+            "after nine terms, and by the true periodic motion",
+            "0.0005 1/s, to which the listing's value is found",
+            (near("", f"{removing_most('listing of appendix 4'):.3f}", removing_most("true orbit"), unit="1/s"),),
+            "its regions are too wide (errata 2, 16, 17, 20)",
+        ),
+    )
+
+
+def compute() -> StudyResult:
+    """Compute the boundaries of the first region with each damper, and the damper that removes the region at each I4."""
+    charts = {omega_c: damped_region(omega_c) for omega_c in DAMPERS}
+    columns = {"I4 [1]": RATIOS}
+    for motion in MOTIONS:
+        columns[f"removing omega_c; {motion} [1/s]"] = np.array([removing(motion, x).damping for x in RATIOS.tolist()])
+    for omega_c, found in charts.items():
+        for n, boundary in enumerate(found.boundaries, start=1):
+            name = f"omega_c = {omega_c:g} 1/s; boundary {n} [1]"
+            columns[f"lambda_k^2; {name}"], columns[f"I4; {name}"] = boundary.points.T
+    return StudyResult(
+        number="5.4",
+        claim="omega_c = mu/(m4 + m5) narrows the region, and 0.45 1/s removes it up to I4 = 1.5.",
+        assignment="The dampers of the regions, 0, 0.05, 0.1 and 0.15 1/s, are ours; the damper that removes the region is "
+        "found at I4 = 0.25 to 2 in steps of 0.25.",
+        columns=padded(columns),
+        statements=(*judge_damper(charts), *judge_determinant()),
+    )
+
+
+def draw(result: StudyResult) -> Figure:
+    """Draw the first region with each damper, and the damper that removes it over I4."""
+    c = result.columns
+    boundaries = []
+    for colour, omega_c in zip(COLOURS, DAMPERS):
+        for n in (1, 2):
+            name = f"omega_c = {omega_c:g} 1/s; boundary {n} [1]"
+            if f"I4; {name}" in c:
+                label = f"{omega_c:g}" if n == 1 else ""
+                boundaries.append(Curve(x=c[f"I4; {name}"], y=c[f"lambda_k^2; {name}"], colour=colour, label=label))
+    removal = [
+        Curve(x=RATIOS, y=c[f"removing omega_c; {motion} [1/s]"][: len(RATIOS)], label=motion, line=line)
+        for motion, line in zip(MOTIONS, ("-", ":", "-."))
+    ]
+    removal.append(Curve(x=[0.0, 1.5], y=[STATED, STATED], colour="0.1", line="--", label="stated up to 1.5"))
+    panels = [
+        Panel(
+            x_label="inertia ratio I4",
+            y_label=y_label,
+            curves=curves,
+            legend=legend,
+            legend_at="upper left",
+            x_range=BOX.y,
+            y_range=y_range,
+        )
+        for y_label, curves, legend, y_range in (
+            (r"$\lambda_k^2$", boundaries, r"$\omega_c$ [1/s], true orbit", BOX.x),
+            (r"damper $\omega_c$ that removes the region [1/s]", removal, "", (0.0, 1.0)),
+        )
+    ]
+    return plot_curves(panels, title=result.heading, columns=2, size=(4.8, 4.0))
+
+
+#: The study by its number.
+STUDIES = {"5.4": Study("5.4", compute, draw)}
