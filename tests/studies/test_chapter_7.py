@@ -71,9 +71,6 @@ def test_cam() -> None:
     assert np.degrees(angle.max()) == pytest.approx(30.0, abs=0.01)
     turned = np.angle(np.roll(tangent, -1) / np.roll(tangent, 1)) / (2.0 * np.abs(0.5 * tangent))
     assert found.curvature == pytest.approx(1.0 / turned.max(), rel=1e-3)
-    assert found.hollow_curvature == pytest.approx(-1.0 / turned.min(), rel=1e-3)
-    assert found.hollow_deg == pytest.approx(360.0 * np.mean(turned < 0.0), abs=0.2)
-    assert found.base == pytest.approx(np.abs(z).min())
 
 
 # Goals: sums of squared errors at N = 24 over the weight (deg2), areas (cm2), by the number of harmonics, the printed links
@@ -243,7 +240,7 @@ class TestSeries1:
         # squares on the edge count whole
         assert h * h * len(squares) == pytest.approx(area.area, rel=0.04)
 
-    @pytest.mark.parametrize("limits", series_1.LIMITS[2:])
+    @pytest.mark.parametrize("limits", series_1.LIMITS)
     def test_enclosed_area_is_what_is_reached_and_the_hole(self, limits: tuple[float, float]) -> None:
         area = series_1.reach(*limits)
         holes = 0.0
@@ -260,15 +257,8 @@ class TestSeries1:
             assert least[k] == pytest.approx(found, abs=1e-3)
 
     @pytest.mark.slow
-    def test_more_terms_come_nearer_to_it(self) -> None:
-        least = series_1.variational().squared_error
-        eleven, many = (series_1.direct(harmonics).error for harmonics in (5, 20))
-        assert least < many < 1.01 * least < eleven
-        assert min(end for end, _ in series_1.ends_of_simplex()) == pytest.approx(eleven, rel=1e-3)
-
-    @pytest.mark.slow
     def test_a_weight_moves_error_out_of_p1_p2(self) -> None:
-        (inside, outside), (even, rest) = map(series_1.squared_errors, (series_1.direct(inside=5.0), series_1.direct()))
+        (inside, outside), (even, rest) = map(series_1.squared_errors, (series_1.direct(5.0), series_1.direct()))
         assert inside < even
         assert outside > rest
 

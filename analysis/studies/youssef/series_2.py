@@ -17,7 +17,6 @@ from math import pi, radians
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import least_squares, minimize
 
 from ...display import format_count
 from ...figures import COLOURS, Curve, Figure, Panel, plot_curves
@@ -40,7 +39,7 @@ from ..rules import ALIKE, SEEN_FALL, VERY_CLOSE_DEG
 from ..statements import Statement, at_least, at_most, near, text
 from ..study import Study, StudyResult, padded
 from .chapter_6 import ROUNDED, TABLE, best, by_readings, half_units
-from .chapter_7 import FAMILY, enclosed, reach, slider
+from .chapter_7 import LIMITS, enclosed, reach, slider
 from .problems import PROBLEMS, WEIGHT, packaging_path
 
 FloatArray = NDArray[np.float64]
@@ -169,32 +168,11 @@ def _error_ratio(task: Task, linkage: Linkage) -> float:
     return slider_motion(task, linkage, unknown, search=Search(starts=2)).best.error / evaluate(task, linkage).error
 
 
-def by_both_methods() -> tuple[float, float]:
-    """Return the least errors (deg2) of the rocker function by a descent and by the simplex.
-
-    Both vary two harmonics of the slider and the guide's angle.
-    """
-    p = PROBLEMS[ROCKER]
-    assert isinstance(p.task, RockerFunction)
-    task, root = p.task, np.sqrt(np.asarray(p.task.weights))
-    scale = np.array([*[0.01] * 5, 0.3])
-
-    def moved(x: FloatArray) -> Linkage:
-        *series, angle = x * scale
-        return replace(p.linkage, pivot=SliderMotion(FourierSeries(series[:3], np.append(0.0, series[3:])), angle))
-
-    steepest = least_squares(lambda x: root * evaluate(task, moved(x)).errors, np.zeros(6))
-    options = {"maxfev": 4000, "xatol": 1e-6, "fatol": 1e-8, "initial_simplex": np.eye(7, 6, -1)}
-    simplex = minimize(lambda x: linkage_error(ROCKER, moved(x)), np.zeros(6), method="Nelder-Mead", options=options)
-    return linkage_error(ROCKER, moved(steepest.x)), linkage_error(ROCKER, moved(simplex.x))
-
-
 def moved_rocker() -> StudyResult:
     """Compute Fig 7.11: the best slider motion with each number of harmonics, and the printed motion."""
     p = PROBLEMS[ROCKER]
     assert isinstance(p.task, RockerFunction)
     found = {n: rocker_motion(n) for n in (1, 2, 3)}
-    errors = {n: linkage_error(ROCKER, s.linkage) for n, s in found.items()}
     columns = {"crank rotation [deg]": np.degrees(TURN), "target angle [deg]": wanted_angle()}
     columns["angle; fixed [deg]"] = np.degrees(p.linkage.rocker_angle(TURN))
     columns["error; fixed [deg]"] = angle_error(p.linkage)
@@ -202,123 +180,93 @@ def moved_rocker() -> StudyResult:
         columns[f"slider; {n} [cm]"] = CM_PER_METRE * slider(solution.linkage).series(TURN)
         columns[f"error; {n} [deg]"] = angle_error(solution.linkage)
         columns[f"angle; {n} [deg]"] = wanted_angle() + columns[f"error; {n} [deg]"]
-    fewer = f"{SEEN_FALL}: a freedom more cannot raise the least error"
-    joined = readings(ROCKER)
-    best_reading = joined[0]
-    by_number = [by_readings(ROCKER, linkage) for linkage in joined]
-    still = by_readings(ROCKER, p.linkage)
-    raised = min(error / still[reading] for found_by in by_number for reading, error in found_by.items())
-    least_read, span = min(min(found_by.values()) for found_by in by_number), over_rounding(ROCKER, best_reading)
-    nearest, kept = linkage_error(ROCKER, best_reading), linkage_error(ROCKER, p.linkage)
-    whole, kept_path = linkage_error(PATH, printed(PATH)), linkage_error(PATH, PROBLEMS[PATH].linkage)
-    weights = np.asarray(p.task.weights)
-    heavy = int((weights == WEIGHT).sum())
-    # the most that (7.18) has: A0, A1, A2, B1, B2 and the guide's angle
-    unknowns = 6
-    by_derivatives, by_simplex = by_both_methods()
     return StudyResult(
         number="7.11",
         claim="The slider moved by two harmonics brings the weighted error of the rocker function from 35.0 to 4.8 deg2.",
         assignment='n is limited "to the value of 3" (L5925), but the parameters end with A2, B2: three terms, n = 0, 1, 2, '
         "are taken.",
         columns=columns,
-        statements=(
-            Statement(
-                "Since we specify the general form of motion of the slider the variational method fails and therefore only the "
-                "direct search method 'the simplex' will be considered here.",
-                text("7.3.2, L5915-5919"),
-                "with the error (7.4) of each crank angle, as in 7.2.2: how many more equations (7.6) for the slider's "
-                f"position there are, one for each of {len(weights)} crank angles, as read at Fig 6.7, than unknowns, A0 to B2 "
-                "and v; with the sum (7.5), by us: 7.2.1 allows it, 7.2.2 uses (7.4) alone: error to which a descent leads by "
-                "its derivatives with respect to these unknowns, which (7.6) puts to zero, the loop closed by its kinematics, "
-                "over that of the simplex; both with the weighted rocker function of L5941, from the pivot at rest and v = 0",
-                f"one more, with which in general no series meets them all; more than {1.0 + ALIKE:g}, the rule for *the "
-                "same*, if the method fails",
-                (
-                    at_least("equations more than unknowns, by (7.4)", 1.0, len(weights) - unknowns),
-                    at_least("error over that of the simplex, by (7.5)", 1.0 + ALIKE, by_derivatives / by_simplex),
+        statements=_rocker(),
+    )
+
+
+def _rocker() -> tuple[Statement, ...]:
+    """Judge the statements on Fig 7.11."""
+    p = PROBLEMS[ROCKER]
+    assert isinstance(p.task, RockerFunction)
+    angles, joined = len(np.asarray(p.task.weights)), readings(ROCKER)
+    best_reading, span = joined[0], over_rounding(ROCKER, joined[0])
+    least_read = min(min(by_readings(ROCKER, linkage).values()) for linkage in joined)
+    kept = linkage_error(ROCKER, p.linkage)
+    raised = linkage_error(ROCKER, best_reading) / kept
+    lowered = linkage_error(PATH, mended()) / linkage_error(PATH, PROBLEMS[PATH].linkage)
+    two, three = (linkage_error(ROCKER, rocker_motion(n).linkage) for n in (2, 3))
+    fewer = f"{SEEN_FALL}: a freedom more cannot raise the least error"
+    # the most that (7.18) has: A0, A1, A2, B1, B2 and the guide's angle
+    unknowns = 6
+    return (
+        Statement(
+            "Since we specify the general form of motion of the slider the variational method fails and therefore only the "
+            "direct search method 'the simplex' will be considered here.",
+            text("7.3.2, L5915-5919"),
+            f"number of equations less that of unknowns: (7.6) for the slider's position at each of {angles} crank angles, as "
+            "read at Fig 6.7, with the error (7.4), as 7.2.2 has it; A0 to B2 and v",
+            "one more, with which in general no series meets them all",
+            (at_least("equations less unknowns", 1.0, angles - unknowns),),
+        ),
+        Statement(
+            "All the examples discussed in the previous chapter have been tried and in all cases the errors were reduced.",
+            text("7.3.2, L5935; also 6.4.2, L4874, L4969"),
+            "error over that with the pivot fixed, the printed links kept, mended: with the printed series where there is one "
+            "(in its best reading, L5965; l4 and A0 of path-b mended), else with our best of two harmonics, the stroke at most "
+            "a fifth of the longest link (ours)",
+            fewer,
+            (
+                at_most(
+                    f"{ROCKER}, printed series",
+                    1.0 - ALIKE,
+                    raised,
+                    why="the series printed for the rocker function raises the error",
                 ),
-                f"by (7.4) alone it holds; by (7.5) the method does not fail: both methods come to {by_simplex:.2f} deg2; the "
-                f"least that we find is {errors[2]:.2f}",
-            ),
-            Statement(
-                "All the examples discussed in the previous chapter have been tried and in all cases the errors were "
-                "reduced.",
-                text("7.3.2, L5935; also 6.4.2, L4874, L4969"),
-                "error over that with the pivot fixed, the printed links kept, mended: with the two series that are printed "
-                "(the rocker function's in the best of its readings, l4 and A0 of path-b mended), and with our best of two "
-                "harmonics, the stroke at most a fifth of the longest link (our choice, so that the slider stays small beside "
-                "the linkage); packaging by the ten points of the listing (L9021-9044)",
-                fewer,
-                (
-                    at_most(
-                        "rocker-weighted, printed series",
-                        1.0 - ALIKE,
-                        nearest / kept,
-                        why="the series printed for the rocker function raises the error, by every reading of Fig 6.7 "
-                        f"to {raised:.2f} times or more",
-                    ),
-                    at_most(
-                        "path-b, printed series, A0 read as 0.31",
-                        1.0 - ALIKE,
-                        linkage_error(PATH, mended()) / kept_path,
-                    ),
-                    *(at_most(name, 1.0 - ALIKE, share) for name, share in reduced().items()),
+                at_most(f"{PATH}, printed series", 1.0 - ALIKE, lowered),
+                *(
+                    at_most(name.replace("packaging", "packaging, ten points of L9021-9044"), 1.0 - ALIKE, share)
+                    for name, share in reduced().items()
+                    if name not in SERIES
                 ),
-                f"with A0 = 3.1 as printed path-b comes to {whole:.2f} cm2, {whole / kept_path:.1f} times the error with the "
-                "pivot fixed",
             ),
-            Statement(
-                "The figure shows that the weighted portion is generated very closely.",
-                text("7.3.2, L5963"),
-                "error of the rocker angle within the weighted portion, rms, with the printed series in its best reading, see "
-                "L5965",
-                f"{VERY_CLOSE_DEG:g} deg, the rule for *very close*",
-                (at_most("printed series", VERY_CLOSE_DEG, in_window(best_reading), "deg"),),
-                "the figure is lost, and with the series as printed the links cannot be joined over the turn; with the stated "
-                f"4.8 deg2 it would be at most {np.sqrt(4.8 / heavy):.2f}, {heavy} of {len(weights)} crank angles lying in it, "
-                f"and with the best series of two harmonics it is {in_window(found[2].linkage):.2f}",
+        ),
+        Statement(
+            "The figure shows that the weighted portion is generated very closely.",
+            text("7.3.2, L5963"),
+            "error of the rocker angle within the weighted portion, rms, with the printed series in its best reading, see "
+            "L5965",
+            f"{VERY_CLOSE_DEG:g} deg, the rule for *very close*",
+            (at_most("printed series", VERY_CLOSE_DEG, in_window(best_reading), "deg"),),
+            "the printed series does not give the stated 4.8 deg2 either",
+        ),
+        Statement(
+            "In fact the error involved is 4.8 degrees2 as compared with 35.0 degrees2 in chapter 2.",
+            text("7.3.2, L5965"),
+            f"error with the printed series at {angles} crank angles, the least of all readings: its sign, that of its sines "
+            "and of v; A0 whole, a tenth or none; argument omega t or theta2; the nearest to the stated one that rounding each "
+            "number of links and series up or down gives",
+            "0.05 deg2, half a unit of the last digit",
+            (near("printed series", "4.8", np.clip(4.8, *span), unit="deg2"),),
+            f"by the other readings of Fig 6.7, where the 35.0 is judged, it is {least_read:.2f} or more",
+        ),
+        Statement(
+            "This [4.8 for 35.0 degrees2] presents an enormous reduction which would have been even more if terms in "
+            "equation (7.19) were considered.",
+            text("7.3.2, L5969"),
+            "error with the printed series, as above, over that with the pivot fixed; least error with three harmonics over "
+            "that with two, the stroke not bounded",
+            f"0.15 for *enormous*, our choice: 4.8 over 35.0 is 0.14; {fewer}",
+            (
+                at_most("printed series", 0.15, raised, why="the printed series does not give the stated 4.8"),
+                at_most("three harmonics", 1.0 - ALIKE, three / two),
             ),
-            Statement(
-                "In fact the error involved is 4.8 degrees2 as compared with 35.0 degrees2 in chapter 2.",
-                text("7.3.2, L5965"),
-                f"error with the printed series at {len(weights)} crank angles, both ends of the window in it, the least of "
-                "all readings, its sign, that of its sines and that of v; A0 whole, a tenth of it or none; its argument omega "
-                "t or theta2; the nearest to the stated one that rounding each printed number of this reading up or down gives",
-                "0.05 deg2, half a unit of the last digit",
-                (
-                    near(
-                        "printed series",
-                        "4.8",
-                        np.clip(4.8, *span),
-                        unit="deg2",
-                        why=f"the best series of two harmonics has {errors[2]:.2f} deg2, so that 4.8 is possible, but not "
-                        "with this one",
-                    ),
-                ),
-                f"over the rounding it is {span[0]:.2f} to {span[1]:.2f} deg2, with the digits as printed {nearest:.2f}, and "
-                f"by the other readings of Fig 6.7 {least_read:.2f} or more; chapter 2 stands for chapter 6, where the 35.0 is "
-                "judged",
-            ),
-            Statement(
-                "This [4.8 for 35.0 degrees2] presents an enormous reduction which would have been even more if terms in "
-                "equation (7.19) were considered.",
-                text("7.3.2, L5969"),
-                "error over that with the pivot fixed: with the printed series, as above, and the least with two harmonics, "
-                "the stroke not bounded; least with three harmonics over that with two",
-                f"0.15 for *enormous*, our choice: 4.8 over 35.0 is 0.14; {fewer}",
-                (
-                    at_most(
-                        "printed series",
-                        0.15,
-                        nearest / kept,
-                        why="the printed series does not give the stated 4.8",
-                    ),
-                    at_most("two harmonics", 0.15, errors[2] / kept),
-                    at_most("three harmonics", 1.0 - ALIKE, errors[3] / errors[2]),
-                ),
-                "there is no equation (7.19): more terms of (7.18) are meant",
-            ),
+            "there is no equation (7.19): more terms of (7.18) are meant",
         ),
     )
 
@@ -410,7 +358,6 @@ def moved_path() -> StudyResult:
     p = PROBLEMS[PATH]
     assert isinstance(p.task, UntimedPath)
     found = {n: path_motion(n) for n in PATH_SEARCHES}
-    errors = {n: linkage_error(PATH, s.linkage) for n, s in found.items()}
     linkages = {"fixed": p.linkage, "printed": mended()} | {f"{n}": s.linkage for n, s in found.items()}
     points = np.asarray(p.task.path.points)
     columns = {
@@ -425,55 +372,59 @@ def moved_path() -> StudyResult:
         columns[f"{name} distance [cm]"] = CM_PER_METRE * evaluate(p.task, linkage).errors
         if linkage.pivot is not None:
             columns[f"{name} slider [cm]"] = CM_PER_METRE * slider(linkage).series(TURN)
-    paths = {name: reduced()[name] for name in ("path-a", "path-b", "packaging")}
-    to_the_letter = replace(printed(PATH), rocker_length=p.printed.rocker_length)
-    misread, span = "A0 = 3.1 is read as 0.31", over_rounding(PATH, mended())
-    low, high = FAMILY[0], FAMILY[-1]
     return StudyResult(
         number="7.12",
         claim="The slider moved by two harmonics brings the area between path (b) and the curve from 12.6 to 4.3 cm2.",
         columns=padded(columns),
-        statements=(
-            Statement(
-                "The error is 4.3 cm2 as compared with 12.6 cm2 in chapter 6.",
-                text("7.3.2, L5994"),
-                "area with the printed series: as printed, with l4 mended as in Fig 6.10, and with A0 = 0.31 for 3.1 cm "
-                f"besides, {ROUNDED}, series and guide",
-                "0.05 cm2, half a unit of the last digit",
-                (
-                    near("as printed", "4.3", linkage_error(PATH, to_the_letter), unit="cm2", why=misread),
-                    near("l4 = 184.443 cm", "4.3", linkage_error(PATH, printed(PATH)), unit="cm2", why=misread),
-                    near(
-                        "l4 = 184.443 cm, A0 = 0.31 cm",
-                        "4.3",
-                        float(np.clip(4.3, *span)),
-                        unit="cm2",
-                    ),
+        statements=_path(),
+    )
+
+
+def _path() -> tuple[Statement, ...]:
+    """Judge the statements on Fig 7.12."""
+    to_the_letter = replace(printed(PATH), rocker_length=PROBLEMS[PATH].printed.rocker_length)
+    span, (low, high) = over_rounding(PATH, mended()), LIMITS[0]
+    return (
+        Statement(
+            "The error is 4.3 cm2 as compared with 12.6 cm2 in chapter 6.",
+            text("7.3.2, L5994"),
+            f"area with the printed series: as printed, and with l4 = 184.443 cm, as in Fig 6.10, and A0 = 0.31 cm, {ROUNDED}, "
+            "series and guide",
+            "0.05 cm2, half a unit of the last digit",
+            (
+                near(
+                    "as printed",
+                    "4.3",
+                    linkage_error(PATH, to_the_letter),
+                    unit="cm2",
+                    why="l4 = 183.443 and A0 = 3.1 are read as misprints",
                 ),
-                f"with the other digits as printed it is {linkage_error(PATH, mended()):.2f} cm2; with these links, l4 mended, "
-                f"two harmonics can reach {errors[2]:.2f} cm2, three {errors[3]:.2f} and five {errors[5]:.2f}; the 12.6 cm2 "
-                "are judged at L5051, Fig 6.9",
+                near(
+                    f"mended; rounded {min(span):.2f} to {max(span):.2f}",
+                    "4.3",
+                    float(np.clip(4.3, *span)),
+                    unit="cm2",
+                ),
             ),
-            Statement(
-                "Subject to the constraint that [theta2] increases at a constant rate, a coupler-point path may thus be "
-                "achieved anywhere within this envelope, thereby permitting a closer approximation to a desired path by "
-                "suitable control of U than could otherwise be obtained.",
-                text("7.0, L5248"),
-                "area that P reaches over that within the envelope of Fig 7.2; area between the path and the curve with our "
-                "best of two harmonics of the slider over that with the pivot fixed, as at L5935: *otherwise* is read, by us, "
-                "as with the same links, those printed, mended",
-                f"1 %, as at Fig 7.2; {SEEN_FALL}",
-                (
-                    near(
-                        f"anywhere within, U from {low:g} to {high:g}",
-                        1.0,
-                        reach(low, high).area / enclosed(low, high),
-                        0.01,
-                        why="the envelope has a hole, see Fig 7.2; between -1.499 and 1.499 P reaches all of it",
-                    ),
-                    *(at_most(name, 1.0 - ALIKE, share) for name, share in paths.items()),
+            "the 12.6 cm2 are judged at L5051, Fig 6.9",
+        ),
+        Statement(
+            "Subject to the constraint that [theta2] increases at a constant rate, a coupler-point path may thus be "
+            "achieved anywhere within this envelope, thereby permitting a closer approximation to a desired path by "
+            "suitable control of U than could otherwise be obtained.",
+            text("7.0, L5248"),
+            "area that P reaches over that within the envelope of Fig 7.2; area between path and curve with our best of two "
+            "harmonics over that with the pivot fixed, as at L5935: *otherwise* is read, by us, as with the same links",
+            f"1 %, as at Fig 7.2; {SEEN_FALL}",
+            (
+                near(
+                    f"anywhere within, U from {low:g} to {high:g}",
+                    1.0,
+                    reach(low, high).area / enclosed(low, high),
+                    0.01,
+                    why="the envelope has a hole, see Fig 7.2",
                 ),
-                "other four-bars with the pivot fixed can be more accurate yet, see L7012",
+                *(at_most(name, 1.0 - ALIKE, reduced()[name]) for name in ("path-a", "path-b", "packaging")),
             ),
         ),
     )
