@@ -11,9 +11,10 @@ moves along a line through the shaft.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import replace
 from functools import cache
-from math import inf, pi, radians, tan
+from math import pi, radians, tan
 from typing import NamedTuple
 
 import numpy as np
@@ -34,7 +35,7 @@ from ..study import Study, StudyResult, padded
 from .chapter_6 import over_least
 from .chapter_7 import slider
 from .problems import PROBLEMS
-from .series_2 import PATH, ROCKER, STATED, linkage_error, mended, path_motion, readings, rocker_motion
+from .series_2 import PATH, ROCKER, linkage_error, mended, path_motion, readings, rocker_motion
 
 NUMBER = "control"
 #: Crank speed (rad/s).
@@ -45,7 +46,7 @@ DAMPING, FRICTION = 5.0, 2.0
 PERIOD, BANDWIDTH, TURNS = 1e-3, 120.0, 3.0
 #: Load at the pin of coupler and rocker, unknown to the controller (N).
 LOAD = (-5.0, -3.0)
-#: Load (N) to which a search on the machine must adapt: three times `LOAD`.
+#: Load (N) of changed operating conditions: three times `LOAD`.
 CHANGED = (-15.0, -9.0)
 #: Trial cycles, and harmonics of the deviation that they correct.
 TRIALS, HARMONICS = 6, (8, 16)
@@ -127,39 +128,25 @@ def error_on_machine(stored: FourierSeries, load: tuple[float, float] = LOAD, sp
     return linkage_error(ROCKER, move_slider(FourierSeries.from_samples(found, max(HARMONICS))))
 
 
-def searched() -> tuple[float, float, float]:
-    """Minimise the weighted error of the rocker function in runs of the plant, by a downhill simplex; repeat with another load.
+def searched() -> tuple[float, float]:
+    """Minimise the weighted error of the rocker function in runs of the plant, by a downhill simplex.
 
-    The unknowns are the mean and two harmonics of the slider motion. Returns three errors (deg2): with the slider at rest, at
-    the end of the first search, and at the end of the second search, which begins with the result of the first and has the load
-    `CHANGED`.
+    The unknowns are the mean and two harmonics of the slider motion. Returns the errors (deg2) with the slider at rest and at
+    the end of the search.
     """
 
-    def error(c: NDArray[np.float64], load: tuple[float, float]) -> float:
-        return error_on_machine(motion_of_plant(move_slider(FourierSeries(c[:3], np.append(0.0, c[3:])))), load)
+    def error(c: NDArray[np.float64]) -> float:
+        return error_on_machine(motion_of_plant(move_slider(FourierSeries(c[:3], np.append(0.0, c[3:])))))
 
     start = np.zeros(5)
-    errors = [error(start, LOAD)]
-    for load in (LOAD, CHANGED):
-        simplex = np.vstack([start, start + STEP * np.eye(5)])
-        options = {"initial_simplex": simplex, "maxfev": SEARCHED}
-        found = minimize(error, start, args=(load,), method="Nelder-Mead", options=options)
-        start = found.x
-        errors.append(float(found.fun))
-    return errors[0], errors[1], errors[2]
+    options = {"initial_simplex": np.vstack([start, start + STEP * np.eye(5)]), "maxfev": SEARCHED}
+    return error(start), float(minimize(error, start, method="Nelder-Mead", options=options).fun)
 
 
 class Cam(NamedTuple):
-    """Plate cam with its base radius, radii of curvature and pitch curve.
+    """Plate cam: least radius of curvature of its pitch curve where this is convex (cm), and the pitch curve (cm)."""
 
-    The radii (cm) are the base radius and the least radii of curvature where the pitch curve is convex and where it is concave.
-    Then follow the angle over which it is concave (deg) and the pitch curve (cm).
-    """
-
-    base: float
     curvature: float
-    hollow_curvature: float
-    hollow_deg: float
     curve: NDArray[np.complex128]
 
 
@@ -170,17 +157,9 @@ def cam(series: FourierSeries) -> Cam:
     lift, rate, change = (CM_PER_METRE * of(angle) for of in (series, slope, slope.derivative()))
     lift = lift - lift.min()
     # |r'| / r = tan of the pressure angle
-    base = float((np.abs(rate) / tan(PRESSURE) - lift).max())
-    r = base + lift
+    r = (np.abs(rate) / tan(PRESSURE) - lift).max() + lift
     curvature = (r**2 + 2.0 * rate**2 - r * change) / (r**2 + rate**2) ** 1.5
-    hollow = curvature < 0.0
-    return Cam(
-        base=base,
-        curvature=1.0 / float(curvature.max()),
-        hollow_curvature=-1.0 / float(curvature.min()) if hollow.any() else inf,
-        hollow_deg=360.0 * float(hollow[:-1].mean()),
-        curve=r * np.exp(1j * angle),
-    )
+    return Cam(1.0 / float(curvature.max()), r * np.exp(1j * angle))
 
 
 def rms(values: NDArray[np.float64]) -> float:
@@ -193,198 +172,186 @@ def compute() -> StudyResult:
     m = machine()
     drives = {"without a spring": inverse_dynamics(m.model, m.motion, SPEED)}
     drives["with the best spring"] = inverse_dynamics(best_spring(m.model, m.motion, SPEED).parameters, m.motion, SPEED)
-    bare, sprung = (drive.rms_force for drive in drives.values())
-    faster = inverse_dynamics(m.model, m.motion, 2.0 * SPEED).rms_force
-    open_loop, closed = run(m.motion, feedback=False), run(m.motion)
-    errors = {n: np.array([1e3 * rms(deviation) for deviation in trials(n)]) for n in HARMONICS}
+    runs = {"feed-forward": run(m.motion, feedback=False), "feedback": run(m.motion)}
     cams = {
         "Fig 7.11": cam(slider(rocker_motion(2).linkage).series),
         "Fig 7.12": cam(slider(path_motion(2).linkage).series),
     }
     columns = {"crank angle [deg]": np.degrees(drives["without a spring"].crank_angle)}
     columns |= {f"force; {name} [N]": drive.force for name, drive in drives.items()}
-    for name, found in (("feed-forward", open_loop), ("feedback", closed)):
+    for name, found in runs.items():
         columns |= {
             f"turns; {name} [1]": found.loop.time * SPEED / (2.0 * pi),
             f"error; {name} [mm]": 1e3 * found.error,
         }
     columns["trial cycle [1]"] = np.arange(1.0, TRIALS + 1.0)
-    columns |= {f"rms deviation; {n} harmonics [mm]": error for n, error in errors.items()}
+    for n in HARMONICS:
+        columns[f"rms deviation; {n} harmonics [mm]"] = np.array([1e3 * rms(deviation) for deviation in trials(n)])
     for name, found_cam in cams.items():
         columns |= {f"cam of {name}; x [cm]": found_cam.curve.real, f"cam of {name}; y [cm]": found_cam.curve.imag}
-    stroke = float(np.ptp(m.motion(np.linspace(0.0, 2.0 * pi, 721))))
-    run_for = open_loop.loop.time[-1] * SPEED / (2.0 * pi)
-    missed, kept = (rms(found.error) / stroke for found in (open_loop, closed))
-    fixed, least = linkage_error(ROCKER, PROBLEMS[ROCKER].linkage), linkage_error(ROCKER, rocker_motion(2).linkage)
-    fixed_path, least_path = linkage_error(PATH, PROBLEMS[PATH].linkage), linkage_error(PATH, path_motion(2).linkage)
-    at_rest, first, second = searched()
-    kept_motion = error_on_machine(m.motion)
-    changes = {
-        name: error_on_machine(m.motion, load, speed) / kept_motion
-        for name, load, speed in (("load", CHANGED, SPEED), ("half", LOAD, 0.5 * SPEED), ("twice", LOAD, 2.0 * SPEED))
-    }
-    by_print, by_print_path = linkage_error(ROCKER, readings(ROCKER)[0]), linkage_error(PATH, mended())
-    left = " and ".join(f"{error[-1] / error[0]:.2f} ({n} harmonics)" for n, error in errors.items())
-    hollow = " and ".join(
-        f"that of {n} is hollow over {c.hollow_deg:.0f} deg, with a radius of {c.hollow_curvature:.0f} cm at least"
-        for n, c in cams.items()
-        if c.hollow_deg
-    )
-    differs = (
-        "twice the friction in the guide, coupler and slider a tenth heavier, and a load of "
-        f"({LOAD[0]:g}, {LOAD[1]:g}) N at the rocker's pin"
-    )
     return StudyResult(
         number=NUMBER,
         claim="The slider may be driven off-line, with feedback to a stored motion, or adaptively in trial cycles.",
         assignment="The thesis computes none of them. Ours: steel bars of 20 by 5 mm, "
         f"a slider of {m.model.slider_mass:.1f} kg with a damper of {DAMPING:g} N.s/m and {FRICTION:g} N of friction, at "
-        f"{SPEED * 30.0 / pi:.0f} rpm; feedback every {1e3 * PERIOD:g} ms with a bandwidth of {BANDWIDTH:g} rad/s.",
+        f"{SPEED * 30.0 / pi:.0f} rpm, moved by the best two harmonics of Fig 7.11; feedback every {1e3 * PERIOD:g} ms with a "
+        f"bandwidth of {BANDWIDTH:g} rad/s. The machine differs from the controller's model: twice the friction, coupler and "
+        f"slider a tenth heavier, a load of ({LOAD[0]:g}, {LOAD[1]:g}) N at the rocker's pin.",
         columns=padded(columns),
-        statements=(
-            Statement(
-                "An intermittent or continuous drive coupled to the primary input by means of direct mechanical connections, "
-                "an arrangement that is simple in principle but suffers from the defects of limited adaptability and "
-                "mechanical complications. Examples include secondary linkages, cams and latch mechanisms.",
-                text("7.1.1 (a), L5301-5309"),
-                "smallest plate cam for the two harmonics of Fig 7.11 and 7.12, its roller guided through its shaft, with a "
-                "pressure angle within 30 deg, the usual limit of a sliding follower: least radius of curvature of the path of "
-                f"the roller's centre where it is convex ({hollow}); weighted error of the rocker function with one harmonic, "
-                "which a Scotch yoke on the crank shaft gives, over that with the pivot fixed",
-                f"{ROLLER:g} cm, the radius of the roller, our choice; {SEEN_FALL}",
-                (
-                    *(
-                        at_least(f"cam of {n}, least radius of the path {c.base:.1f} cm", ROLLER, c.curvature, "cm")
-                        for n, c in cams.items()
-                    ),
-                    at_most("Scotch yoke", 1.0 - ALIKE, linkage_error(ROCKER, rocker_motion(1).linkage) / fixed),
-                    Case(label="latch", computed=None, why="no example is given, and our machine has none"),
-                    Case(
-                        label="simple, limited adaptability, complications",
-                        computed=None,
-                        why="there is no measure of them",
-                    ),
+        statements=(*off_line(runs["feed-forward"], cams), *on_line(runs["feedback"]), *strategy()),
+    )
+
+
+def off_line(open_loop: TrackingResult, cams: Mapping[str, Cam]) -> tuple[Statement, ...]:
+    """Judge the statements on drives without feedback (7.1.1), given such a run and the cams of Fig 7.11 and 7.12."""
+    fixed, one_harmonic = (linkage_error(ROCKER, of) for of in (PROBLEMS[ROCKER].linkage, rocker_motion(1).linkage))
+    return (
+        Statement(
+            "An intermittent or continuous drive coupled to the primary input by means of direct mechanical connections, "
+            "an arrangement that is simple in principle but suffers from the defects of limited adaptability and "
+            "mechanical complications. Examples include secondary linkages, cams and latch mechanisms.",
+            text("7.1.1 (a), L5301-5309"),
+            "smallest plate cam for the best two harmonics of each figure, with a pressure angle within 30 deg, the usual "
+            "limit: least radius of curvature of the path of the roller's centre where it is convex; for a Scotch yoke, "
+            "weighted error of the rocker function with one harmonic over that with the pivot fixed",
+            f"{ROLLER:g} cm, the radius of the roller, our choice; {SEEN_FALL}",
+            (
+                *(at_least(f"cam of {name}", ROLLER, c.curvature, "cm") for name, c in cams.items()),
+                at_most("Scotch yoke", 1.0 - ALIKE, one_harmonic / fixed),
+                Case(label="latch", computed=None, why="no example is given"),
+                Case(
+                    label="simple, limited adaptability, complications",
+                    computed=None,
+                    why="there is no measure of them",
                 ),
             ),
-            Statement(
-                "A passive mechanical system embodying elements such as springs or latches whose operation depend on the "
-                "pre-determined load or on inertia or other forces transmitted through the mechanism. The mode could be "
-                "continuous or intermittent and its advantages and disadvantages are similar to the preceding option ...",
-                text("7.1.1 (b), L5311-5319"),
-                why="no example is given, and there is no measure of its advantages; with our masses and the motion of Fig "
-                f"7.11 the best spring leaves {sprung / bare:.0%} of the rms force of the drive",
+        ),
+        Statement(
+            "A passive mechanical system embodying elements such as springs or latches whose operation depend on the "
+            "pre-determined load or on inertia or other forces transmitted through the mechanism. The mode could be "
+            "continuous or intermittent and its advantages and disadvantages are similar to the preceding option ...",
+            text("7.1.1 (b), L5311-5319"),
+            why="no example is given, and there is no measure of its advantages",
+        ),
+        Statement(
+            "An independent drive of the appropriate periodic [form] maintained in correct phase with the primary input "
+            "by non mechanical means, e. g. electrical signals: this offers considerable versatility although "
+            "reproduction of a sufficiently accurate cyclic variation may be difficult.",
+            text("7.1.1 (c), L5321"),
+            "rms deviation of the slider, over its stroke, on the machine under the force that the controller's model needs, "
+            f"without feedback; {open_loop.loop.time[-1] * SPEED / (2.0 * pi):.1f} turns, until the links cannot be joined",
+            f"more than {ALIKE:g}, the rule for *the same*; one example is enough for *may be*",
+            (
+                at_least("no feedback", ALIKE, relative_deviation(open_loop)),
+                Case(label="versatility", computed=None, why="there is no measure of versatility"),
             ),
-            Statement(
-                "An independent drive of the appropriate periodic [form] maintained in correct phase with the primary input "
-                "by non mechanical means, e. g. electrical signals: this offers considerable versatility although "
-                "reproduction of a sufficiently accurate cyclic variation may be difficult.",
-                text("7.1.1 (c), L5321"),
-                "rms deviation of the slider from the two harmonics of Fig 7.11, relative to the stroke, with the force "
-                "that the model needs and no feedback, on a machine that differs from the model by "
-                f"{differs}; over the {run_for:.1f} turns that it runs until the links cannot be joined",
-                f"more than {ALIKE:g}, the rule for *the same*; one example is enough for *may be*",
-                (
-                    at_least("no feedback", ALIKE, missed, why="then the links cannot be joined any more"),
-                    Case(label="versatility", computed=None, why="there is no measure of versatility, as at L6993"),
-                ),
+        ),
+    )
+
+
+def relative_deviation(found: TrackingResult) -> float:
+    """Return the slider's deviation (rms) in a run from the motion of Fig 7.11, relative to the stroke of this motion."""
+    return rms(found.error) / float(np.ptp(machine().motion(np.linspace(0.0, 2.0 * pi, 721))))
+
+
+def on_line(closed: TrackingResult) -> tuple[Statement, ...]:
+    """Judge the statements on drives with feedback and on those that adapt (7.1.2 to 7.3.1), given a run with feedback."""
+    at_rest, least = searched()
+    changes = ((CHANGED, SPEED), (LOAD, 0.5 * SPEED), (LOAD, 2.0 * SPEED))
+    changed = min(error_on_machine(machine().motion, *change) for change in changes)
+    return (
+        Statement(
+            "The required motion of the input is determined as previously. This is stored as a [reference] model to which "
+            "the actual motion is required to adhere by means of feedback.",
+            text("7.1.2, L5336"),
+            f"the same deviation on the same machine with feedback to the stored motion, over {TURNS:g} turns",
+            f"{ALIKE:g}, the rule for *the same*; one example is enough: the sentence describes what feedback can do",
+            (at_most("feedback", ALIKE, relative_deviation(closed)),),
+        ),
+        Statement(
+            "A variant of this arrangement is to take the mechanism manually through its correct path for the desired "
+            "overall output and to record simultaneously and separately the values of the inputs.",
+            text("7.1.2, L5346"),
+            why="no record is given",
+        ),
+        Statement(
+            "Whichever the first stage may be, considerable demands will be placed on the drive to achieve the "
+            "appropriate mechanical response, which clearly establishes a limit of the range of application.",
+            text("7.1.2, L5360"),
+            why="neither a drive nor a speed is named",
+        ),
+        Statement(
+            "If the adjustments are made automatically on the basis of a defined error criterion, the mechanism becomes "
+            "self adaptive to its reference, and is thus a self-learning device converging to the desired output.",
+            text("7.1.3, L5382"),
+            why="neither the adjustment nor the criterion is stated",
+        ),
+        Statement(
+            "Of these and other methods, the simplest and the most widely used is the mechanically coupled arrangement "
+            "of type (7.1.1).",
+            text("7.1.3, L5389"),
+            why="no survey of mechanisms is given, and there is no measure of *simplest*",
+        ),
+        Statement(
+            'The direct search method, however, may be used "on-line" and accommodate the dynamic '
+            "considerations into its structure.",
+            text("7.3.1, L5853"),
+            "weighted error of the rocker function over the last turn of a run of the machine with feedback: the least in "
+            f"{SEARCHED} runs of a downhill simplex over two harmonics of the slider, over that at rest, where it begins",
+            f"{SEEN_FALL}; one example is enough for *may be*",
+            (at_most("search on the machine", 1.0 - ALIKE, least / at_rest),),
+        ),
+        Statement(
+            "With the variational method, any change in the operating conditions require a recalculation of optimum "
+            "conditions.",
+            text("7.3.1, L5871-5873"),
+            "*operating conditions* is read as load and speed: error as in the row before, with feedback to the stored motion "
+            "of Fig 7.11, over that before the change; the least of three: three times the load, half and twice the speed",
+            f"more than {1.0 + ALIKE:g}, the rule for *the same*; one change that requires none is enough against *any*",
+            (at_least("the least", 1.0 + ALIKE, changed / error_on_machine(machine().motion)),),
+            "a motion calculated again would be the same, as no equation of the method has load or speed",
+        ),
+        Statement(
+            "The direct search merely experiments with a number of cycles, after which the controller adjusts itself, "
+            "in an optimum manner, to the changes.",
+            text("7.3.1, L5873-5879"),
+            why="neither the change nor the number of cycles is stated",
+        ),
+    )
+
+
+def strategy() -> tuple[Statement, ...]:
+    """Judge the statements on the strategy of search (7.4)."""
+    fixed, least = linkage_error(ROCKER, PROBLEMS[ROCKER].linkage), linkage_error(ROCKER, rocker_motion(2).linkage)
+    fixed_path, least_path = linkage_error(PATH, PROBLEMS[PATH].linkage), linkage_error(PATH, path_motion(2).linkage)
+    ratios = over_least() | {
+        "Fig 7.11": linkage_error(ROCKER, readings(ROCKER)[0]) / least,
+        "Fig 7.12": linkage_error(PATH, mended()) / least_path,
+    }
+    return (
+        Statement(
+            "The second input could be a slider as discussed in this chapter or could be another link resulting in a "
+            "five bar loop.",
+            text("7.4, L6013"),
+            "error with the slider moved by its best two harmonics over that with the pivot fixed, the printed links kept, "
+            "mended",
+            SEEN_FALL,
+            (
+                at_most("slider, Fig 7.11", 1.0 - ALIKE, least / fixed),
+                at_most("slider, Fig 7.12", 1.0 - ALIKE, least_path / fixed_path),
+                Case(label="another link", computed=None, why="no example of another link is given"),
             ),
-            Statement(
-                "The required motion of the input is determined as previously. This is stored as a [reference] model to which "
-                "the actual motion is required to adhere by means of feedback.",
-                text("7.1.2, L5336"),
-                f"the same deviation on the same machine with feedback to the stored motion, over {TURNS:g} turns",
-                f"{ALIKE:g}, the rule for *the same*; one example is enough: the sentence describes what feedback can do",
-                (at_most("feedback", ALIKE, kept),),
-            ),
-            Statement(
-                "A variant of this arrangement is to take the mechanism manually through its correct path for the desired "
-                "overall output and to record simultaneously and separately the values of the inputs.",
-                text("7.1.2, L5346"),
-                why="no record is given; one without errors would be the motion that the links need, computed in Fig 7.6",
-            ),
-            Statement(
-                "Whichever the first stage may be, considerable demands will be placed on the drive to achieve the "
-                "appropriate mechanical response, which clearly establishes a limit of the range of application.",
-                text("7.1.2, L5360"),
-                why=f"neither a drive nor a speed is named; ours needs {bare:.1f} N (rms) for the motion of Fig 7.11 at 120 "
-                f"rpm and {faster:.1f} N at 240 rpm",
-            ),
-            Statement(
-                "If the adjustments are made automatically on the basis of a defined error criterion, the mechanism becomes "
-                "self adaptive to its reference, and is thus a self-learning device converging to the desired output.",
-                text("7.1.3, L5382"),
-                why="neither the adjustment nor the number of cycles is stated; with ours, the series of the deviation taken "
-                f"off the stored motion after each, the deviation in cycle {TRIALS} is {left} of that in the first, and falls "
-                "ever more slowly",
-            ),
-            Statement(
-                "Of these and other methods, the simplest and the most widely used is the mechanically coupled arrangement "
-                "of type (7.1.1).",
-                text("7.1.3, L5389"),
-                why="no survey of mechanisms is given, and there is no measure of *simplest*",
-            ),
-            Statement(
-                'The direct search method, however, may be used "on-line" and accommodate the dynamic '
-                "considerations into its structure.",
-                text("7.3.1, L5853"),
-                "weighted error of the rocker function over the last turn of a run of that machine, with feedback and the "
-                f"guide of Fig 7.11, after {SEARCHED} runs of a downhill simplex over the coefficients of two harmonics, begun "
-                "with the slider at rest, over that at rest",
-                f"{SEEN_FALL}; one example is enough for *may be*",
-                (at_most("search on the machine", 1.0 - ALIKE, first / at_rest),),
-            ),
-            Statement(
-                "With the variational method, any change in the operating conditions require a recalculation of optimum "
-                "conditions.",
-                text("7.3.1, L5871-5873"),
-                "*operating conditions* is read, by us, as load and speed: weighted error of the rocker function over the last "
-                "turn of a run of that machine with feedback to the motion of Fig 7.11, stored and not calculated again, over "
-                "that without the change; the least of three changes: three times the load, half and twice the speed",
-                f"more than {1.0 + ALIKE:g}, the rule for *the same*, for a change that requires it; one that does not is "
-                "enough against *any*",
-                (at_least("the least", 1.0 + ALIKE, min(changes.values())),),
-                f"with three times the load it is {changes['load']:.2f}, at half the speed {changes['half']:.2f}, at twice the "
-                f"speed {changes['twice']:.2f}: there the feedback follows less closely, and a motion calculated again would "
-                "be the same, as no equation of the method has load or speed",
-            ),
-            Statement(
-                "The direct search merely experiments with a number of cycles, after which the controller adjusts itself, "
-                "in an optimum manner, to the changes.",
-                text("7.3.1, L5873-5879"),
-                why="neither the change nor the number of cycles is stated; with ours, and three times the load, "
-                f"{SEARCHED} runs more bring the error to {second / first:.2f} of what the first {SEARCHED} reached before the "
-                f"change, {second / least:.0f} times the least with two harmonics",
-            ),
-            Statement(
-                "The second input could be a slider as discussed in this chapter or could be another link resulting in a "
-                "five bar loop.",
-                text("7.4, L6013"),
-                "error with the slider moved by the best two harmonics over that with the pivot fixed, the printed links "
-                "kept, mended, as in Fig 7.11 and 7.12",
-                SEEN_FALL,
-                (
-                    at_most("slider, Fig 7.11", 1.0 - ALIKE, least / fixed),
-                    at_most("slider, Fig 7.12", 1.0 - ALIKE, least_path / fixed_path),
-                    Case(label="fifth link", computed=None, why="no example of a fifth link is given"),
-                ),
-            ),
-            Statement(
-                "The computer program shown in Appendix[] 5, can cope with the above defined strategy producing optimum "
-                "results in each case.",
-                text("7.4, L6026"),
-                "*optimum* is read, by us, as the least within our limits: first step, the four-bar: error of the 7 printed "
-                "linkages with a stated error, mended, over the least that we find, as at L7026; second, the slider: error of "
-                "the two printed series, as at L5935, over the least that we find with as many harmonics and the same links",
-                f"{1.0 + ALIKE:g}, the rule for *the same*",
-                (
-                    *(at_most(name, 1.0 + ALIKE, ratio, why="not an optimum") for name, ratio in over_least().items()),
-                    at_most("Fig 7.11", 1.0 + ALIKE, by_print / least, why="not an optimum"),
-                    at_most("Fig 7.12", 1.0 + ALIKE, by_print_path / least_path, why="not an optimum"),
-                    Case(label="third step, a fifth link", computed=None, why="no example is given"),
-                ),
-                f"the printed series come to {by_print:.2f} deg2 and {by_print_path:.2f} cm2, the least to {least:.2f} and "
-                f"{least_path:.2f}; by the stated {STATED[ROCKER]:g} deg2 and {STATED[PATH]:g} cm2 the ratios of Fig 7.11 and "
-                f"7.12 would be {STATED[ROCKER] / least:.2f} and {STATED[PATH] / least_path:.2f}, and neither would hold",
+        ),
+        Statement(
+            "The computer program shown in Appendix[] 5, can cope with the above defined strategy producing optimum "
+            "results in each case.",
+            text("7.4, L6026"),
+            "*optimum* is read as the least that we find: error of the printed four-bars, mended, over it, as at L7026; error "
+            "of the two printed series, as at L5935, over the least with as many harmonics and the same links",
+            f"{1.0 + ALIKE:g}, the rule for *the same*",
+            (
+                *(at_most(name, 1.0 + ALIKE, ratio, why="not an optimum") for name, ratio in ratios.items()),
+                Case(label="a fifth link, further inputs", computed=None, why="no example is given"),
             ),
         ),
     )
