@@ -12,7 +12,7 @@ from scipy.optimize import fsolve
 
 from linkwork.five_bar import dynamics, kinematics
 from linkwork.five_bar.parameters import FiveBarParameters
-from linkwork.five_bar.published import SETS, SIGMA2, chapter_4
+from linkwork.five_bar.published import SIGMA2, chapter_4
 
 from ...figures import Figure, Panel, plot_curves
 from ...numerics.fourier import FourierSeries
@@ -153,24 +153,17 @@ def coefficients(sigma2: float, inertia_ratio: float = 1.0) -> dict[str, float]:
 
 
 def constant_parts() -> dict[str, float]:
-    """Return |h0|/k0 and |g0|/k0 of the correct equation, for mechanisms of chapter V and for rig 2."""
+    """Return |h0|/k0 and |g0|/k0 of the correct equation, for mechanisms of chapter V."""
     found = {}
     for words, mechanism in (
         ("I4 = 2", chapter_4(2.0)),
         ("sigma2 = 0.1, I4 = 1", with_crank(0.1)),
         ("sigma3 = 1.2, I4 = 2", with_crank(SIGMA2, 2.0, 1.2)),
-        ("rig 2, spring C", SETS["rig-2-spring-c"].parameters),
     ):
         equation = slider_equation(mechanism, 25.0)
         for name, part in (("h0", equation.stiffness), ("g0", equation.force)):
             found[f"{name}; {words}"] = abs(part.mean) / equation.spring_factor.mean
     return found
-
-
-def scanned_mean(inertia_ratio: float) -> float:
-    """Return Q1/A1 with the only term of Q1 in the scan that remains without coupler mass: p45 sigma2 I4 cos(alpha3)."""
-    r = ratios(chapter_4(inertia_ratio))
-    return r.p45 * r.sigma2 * r.inertia_ratio * cos(DATUM.coupler) / printed(r).spring.mean
 
 
 def _first_order_quotient(part: FourierSeries, by: FourierSeries) -> tuple[float, float, float]:
@@ -240,23 +233,10 @@ def balanced(omega_c: float, as_printed: bool = True) -> float:
 
 def compute() -> StudyResult:
     """Judge the equations, and compute the coefficients of (4.21) over the crank angle."""
-    small, smaller = (deviations(s) for s in SHORT)
-    orders = [float(np.log2(x / y)) for x, y in zip(small, smaller)]
-    own = datum(SIGMA2)
-    crank, coupler, _ = map(degrees, datum(SIGMA2, DATUM.rocker))
-    longer, shorter = (expansion(x) for x in SHORT)
-    left = {name: np.log2(longer[name] / shorter[name]) for name in longer}
     mechanism = chapter_4(1.0)
-    parts = printed(ratios(mechanism))
-    seconds = np.array([(x.cos[1], x.sin[1]) for x in (parts.spring, parts.inertia, parts.stiffness)])
-    apart = parts.spring.mean / np.abs(seconds).max()
-    solution = (
-        "error of the solution of (4.33) with these coefficients against the balance of two harmonics of (4.29), relative to "
-        "the greatest of its coefficients, the most at 10, 25 and 40 rad/s and I4 = 0.5, 1 and 1.5, which are ours"
-    )
     ways = {
         "right": _quotients(slider_equation(mechanism, 1.0)),
-        "(4.21) as printed": _first_order_series(parts),
+        "(4.21) as printed": _first_order_series(printed(ratios(mechanism))),
         "listing of appendix 2": _first_order_series(listed(ratios(mechanism))),
     }
     columns = {"crank angle [deg]": np.degrees(TURN)}
@@ -269,132 +249,150 @@ def compute() -> StudyResult:
         "mechanism, linearised exactly about zeta = u/l4 = 0, with ' = d/d(theta), M, K and F of the period of the crank, "
         "lambda_k = omega_k/omega, omega_k^2 = k/(m4 + m5), lambda_c = omega_c/omega and omega_c = mu/(m4 + m5).",
         columns=columns,
-        statements=(
-            Statement(
-                "The angles [alpha] and [alpha3] are then calculated accordingly.",
-                text("4.1, eqs (4.1), (4.6), L2404-2417"),
-                "datum by (4.1) and the closure (4.6) at sigma2 = 0.05, sigma3 = 1 and sigma = 1, which the thesis does not "
-                "state but its angles give, beside that of appendices 2 to 4: ALF, ALF3, ALF4 (L8404), where the scan's "
-                "120.99. is read 120.,9., two numbers",
-                "half a degree: the listings have whole ones",
-                tuple(
-                    near(
-                        name,
-                        f"{degrees(x):.0f}",
-                        degrees(y),
-                        unit="deg",
-                        why="with alpha4 rounded to 120 deg before (4.6) is solved, alpha3 is "
-                        f"{coupler:.2f} and alpha {crank:.2f} deg",
-                    )
-                    for name, x, y in zip(("alpha", "alpha3", "alpha4"), DATUM, own)
-                ),
-            ),
-            Statement(
-                "Substituting equations (4.6[)] into equations (4.5) we obtain: [(4.7)] and hence [(4.8)]",
-                text("4.1, eqs (4.2) to (4.8), L2459-2477"),
-                f"residuals of (4.5) and (4.7) at sigma2 = {SHORT[0]:g}, relative to it, with xi3 and xi4 by (4.8); order in "
-                "the crank's length of the errors of xi3 and xi4 against the closed linkage, from sigma2 = "
-                f"{SHORT[0]:g} to {SHORT[1]:g}; greatest over a turn, at zeta = sigma2/2, sigma = 1 and sigma3 = "
-                f"{COUPLER:g}, which are ours",
-                f"{ROUNDING:g}, above rounding errors; 2, the first order that is neglected in (4.4), and 0.05, as an order is "
-                "a whole number",
-                (
-                    *(at_most(f"residual of {name}", ROUNDING, x) for name, x in eliminations(SHORT[0]).items()),
-                    *(near(f"order of the error of {name}", 2.0, x, 0.05) for name, x in zip(("xi3", "xi4"), orders)),
-                ),
-            ),
-            Statement(
-                "Assuming a constant crank angular speed [omega], i.e. [(4.9)] and no gravitational forces, then by "
-                "application of the Lagrangian multiplier method stated in equation (2.5) the following equations are "
-                "obtained.",
-                text("4.2.1, eqs (4.9) to (4.20), L2495-2613"),
-                "residual of each, with the accelerations and, for the multipliers, the pin force at C and the crank torque by "
-                "our equations of motion, for the mechanism of Table 3.1 without gravity at 25 crank angles with slider "
-                "positions and velocities that are ours; the damper's term of (4.18), illegible in the scan, by (4.13); "
-                "greatest, relative to the greatest term",
-                f"{ROUNDING:g}, above rounding errors",
-                tuple(at_most(name, ROUNDING, x) for name, x in residuals().items()),
-            ),
-            Statement(
-                "If equations (4.3a) and (4.8) are substituted into this slider equation, and second and higher order "
-                "multiples of [zeta] and its derivatives are ignored the following linearised equation of motion of the slider "
-                "may be obtained. [(4.21)]",
-                text("4.2.1, eq (4.21), L2620-2794"),
-                "coefficients of first order after division by A1 + B1 cos + C1 sin, the factor of the spring, relative to "
-                f"those of the right equation, at I4 = 1 and sigma2 = {SHORT[1]:g}, about the datum by (4.1) and (4.6), with "
-                "massless coupler and centre of mass of the rocker on the slider as in 4.5; the factor of zeta' without a "
-                "damper relative to M'",
-                f"{LIMIT:g}, more than the terms of second order, which are a few sigma2",
-                (
-                    *(
-                        Case(label=name, computed=None, why="its sign cannot be read, its size is right")
-                        if name.startswith("P1")
-                        else near(name, 1.0, x, LIMIT, why="three times too large")
-                        for name, x in coefficients(SHORT[1]).items()
-                    ),
-                    near("zeta' without a damper", 1.0, 0.0, LIMIT, why="M' zeta' is missing"),
-                ),
-                "R1 and S1 are read from U and V of appendix 2 (L8449-8450): the scan's lines of them (L2786-2794) are not "
-                "whole and have terms in r4 and mr3 only, which vanish under these conditions. G1 vanishes too; Q1 in the "
-                "scan has a term in I4 (L2781), where the right equation has none of first order and the programs have no "
-                "mean of the force: it is not judged, nor are the terms with the coupler's mass and with r4",
-            ),
-            Statement(
-                "The coefficients B1, C1, H1, P1, [Q1], E1 and F1 are much smaller than those of A1 a[nd] D1 by at "
-                "least a factor [...] in the worst cases.",
-                text("4.3, L2797-2801"),
-                why="the factor cannot be read, and Q1 is our reading; at I4 = 1 and sigma2 = 0.05 the greatest of the others "
-                f"is 1/{apart:.0f} of A1",
-            ),
-            Statement(
-                "Therefore we may write : [(4.22)] where [epsilon] is a small parameter and [h0], g0 << k0.",
-                text("4.3, eq (4.22), L2801-2837"),
-                "means of K and F of the right linear equation, in size, over that of the spring's factor, which is 1: G1 and "
-                "Q1 over A1; at that end of each of Figs 5.1 to 5.3 where they are greatest, with sigma2 = 0.05 and sigma3 = 1 "
-                "unless another is named, and for rig 2, whose coupler has mass",
-                f"{SMALL:g}, the rule for *small*, as *<<* says",
-                tuple(at_most(name, SMALL, x) for name, x in constant_parts().items()),
-                "G1 as printed vanishes with a massless coupler; in the scan Q1 has a term in I4 (L2781), by which g0 would be "
-                f"{scanned_mean(2.0):.2g} of k0 at I4 = 2; the programs have no mean of the force; what is left by the right "
-                "equation is of second order in the crank's length; that epsilon is small is not judged: it has no value, see "
-                "L2797",
-            ),
-            Statement(
-                "[W]hich, if terms in the order of third and higher powers of [epsilon] are ignored, may be written "
-                "[(4.23)] ... Similarly the stiffness term may be written : [(4.25)] ... In a similar manner the right hand "
-                "side may be written : [(4.27)]",
-                text("4.3, eqs (4.22) to (4.28), L2853-2916"),
-                "order in sigma2, to which we take epsilon to be proportional, of what (4.23) to (4.28) leave out of S, the "
-                "factor of damper and spring, and of K and F, each a quotient of the printed coefficients, from sigma2 = "
-                f"{SHORT[0]:g} to {SHORT[1]:g}; I4 = 1; b4 of (4.26) with k3 k6 + k4 k5, as the listing has it (L8448), where "
-                "the scan has k3 k5 + k4 k5",
-                "3; 0.05, as an order is a whole number",
-                tuple(
-                    at_least(f"{part}; {name}", 2.95, x, why="the mean has a part of second order too")
-                    for part, orders_of in left.items()
-                    for name, x in zip(("mean", "first harmonic", "second harmonic"), orders_of)
-                ),
-            ),
-            Statement(
-                "Equating constant terms and coefficients of Cos[theta], Sin[theta], Cos2[theta] and Sin2[theta] on "
-                "both sides of equation (4.31) we obtain the [f]ollowing recurrence relationships.",
-                text("4.4.1, eqs (4.30) to (4.33), L2988-3049"),
-                f"{solution}; without a damper; signs that the scan of (4.32) has lost are those of (4.34) at lambda_c = 0",
-                f"{ROUNDING:g}, above rounding errors",
-                (at_most("", ROUNDING, balanced(0.0)),),
-            ),
-            Statement(
-                "Assuming a solution of [zeta] as described in (4.30) and substituting it in equation (4.29), then multiplying "
-                "and equating the coefficients of the trig[o]nometric functions of [theta] on both sides of that equation in a "
-                "similar manner to the preceding section, we obtain ... [(4.34)]",
-                text("4.4.2, eqs (4.34), (4.35), L3053-3099"),
-                f"{solution}; with a damper of omega_c = 1.2 1/s, the greatest of appendix 2",
-                f"{ROUNDING:g}, above rounding errors",
-                (at_most("", ROUNDING, balanced(1.2)),),
-                "2 lambda_c and 4 lambda_c stand for 2 lambda_c k0 and 4 lambda_c k0, in the listing too (L8488, L8492, L8501)",
+        statements=(*_kinematics(), *_equation(), *_simplification(), *_balance()),
+    )
+
+
+def _kinematics() -> list[Statement]:
+    """Judge section 4.1: the datum and the linearised kinematics, eqs (4.1) to (4.8)."""
+    small, smaller = (deviations(s) for s in SHORT)
+    orders = [float(np.log2(x / y)) for x, y in zip(small, smaller)]
+    rounded = degrees(datum(SIGMA2, DATUM.rocker).crank)
+    return [
+        Statement(
+            "The angles [alpha] and [alpha3] are then calculated accordingly.",
+            text("4.1, eqs (4.1), (4.6), L2404-2417"),
+            "datum by (4.1) and (4.6), beside ALF, ALF3, ALF4 of appendices 2 to 4 (L8404; 120.99. is read 120.,9.); sigma2 = "
+            "0.05, sigma3 = 1 and sigma = 1, which the thesis does not state but its angles give",
+            "half a degree: the listings have whole ones",
+            tuple(
+                near(
+                    name,
+                    f"{degrees(x):.0f}",
+                    degrees(y),
+                    unit="deg",
+                    why=f"with alpha4 rounded to 120 deg before (4.6) is solved, alpha is {rounded:.1f} deg",
+                )
+                for name, x, y in zip(("alpha", "alpha3", "alpha4"), DATUM, datum(SIGMA2))
             ),
         ),
+        Statement(
+            "Substituting equations (4.6[)] into equations (4.5) we obtain: [(4.7)] and hence [(4.8)]",
+            text("4.1, eqs (4.2) to (4.8), L2459-2477"),
+            f"residuals of (4.5) and (4.7) with xi3 and xi4 by (4.8), relative to sigma2 = {SHORT[0]:g}; order in sigma2, down "
+            f"to {SHORT[1]:g}, of the errors of xi3 and xi4 against the closed linkage; greatest over a turn at zeta = "
+            f"sigma2/2, sigma = 1 and sigma3 = {COUPLER:g}, ours",
+            f"{ROUNDING:g}, above rounding errors; 2, the first order that is neglected in (4.4), and 0.05, as an order is "
+            "a whole number",
+            (
+                *(at_most(f"residual of {name}", ROUNDING, x) for name, x in eliminations(SHORT[0]).items()),
+                *(near(f"order of the error of {name}", 2.0, x, 0.05) for name, x in zip(("xi3", "xi4"), orders)),
+            ),
+        ),
+    ]
+
+
+def _equation() -> list[Statement]:
+    """Judge section 4.2: the equations of motion and the linearised equation, eqs (4.9) to (4.21)."""
+    return [
+        Statement(
+            "Assuming a constant crank angular speed [omega], i.e. [(4.9)] and no gravitational forces, then by "
+            "application of the Lagrangian multiplier method stated in equation (2.5) the following equations are "
+            "obtained.",
+            text("4.2.1, eqs (4.9) to (4.20), L2495-2613"),
+            "residual of each over its greatest term, with accelerations, pin force at C and crank torque by our equations of "
+            "motion; Table 3.1 without gravity, 25 crank angles, slider positions and velocities of ours; the damper's term "
+            "of (4.18), illegible in the scan, by (4.13)",
+            f"{ROUNDING:g}, above rounding errors",
+            tuple(at_most(name, ROUNDING, x) for name, x in residuals().items()),
+        ),
+        Statement(
+            "If equations (4.3a) and (4.8) are substituted into this slider equation, and second and higher order "
+            "multiples of [zeta] and its derivatives are ignored the following linearised equation of motion of the slider "
+            "may be obtained. [(4.21)]",
+            text("4.2.1, eq (4.21), L2620-2794"),
+            "coefficients after division by A1 + B1 cos + C1 sin, the factor of the spring, over those of the right equation, "
+            f"to first order; I4 = 1, sigma2 = {SHORT[1]:g}, datum by (4.1), conditions of 4.5; factor of zeta' without a "
+            "damper over M'",
+            f"{LIMIT:g}, more than the terms of second order, which are a few sigma2",
+            (
+                *(
+                    Case(label=name, computed=None, why="its sign cannot be read, its size is right")
+                    if name.startswith("P1")
+                    else near(name, 1.0, x, LIMIT, why="three times too large")
+                    for name, x in coefficients(SHORT[1]).items()
+                ),
+                near("zeta' without a damper", 1.0, 0.0, LIMIT, why="M' zeta' is missing"),
+            ),
+            "R1 and S1 are read from appendix 2 (L8449); not judged: G1, Q1, terms with r4 and the coupler's mass",
+        ),
+    ]
+
+
+def _simplification() -> list[Statement]:
+    """Judge section 4.3: the expansion in epsilon, eqs (4.22) to (4.28)."""
+    longer, shorter = (expansion(x) for x in SHORT)
+    left = {name: np.log2(longer[name] / shorter[name]) for name in longer}
+    return [
+        Statement(
+            "The coefficients B1, C1, H1, P1, [Q1], E1 and F1 are much smaller than those of A1 a[nd] D1 by at "
+            "least a factor [...] in the worst cases.",
+            text("4.3, L2797-2801"),
+            why="the factor cannot be read",
+        ),
+        Statement(
+            "Therefore we may write : [(4.22)] where [epsilon] is a small parameter and [h0], g0 << k0.",
+            text("4.3, eq (4.22), L2801-2837"),
+            "means of K and F of the right linear equation, in size, over that of the spring's factor; at that end of each of "
+            "Figs 5.1 to 5.3 where they are greatest, with sigma2 = 0.05 and sigma3 = 1 unless another is named",
+            f"{SMALL:g}, the rule for *small*, as *<<* says",
+            tuple(at_most(name, SMALL, x) for name, x in constant_parts().items()),
+            "that epsilon is small is not judged: it has no value",
+        ),
+        Statement(
+            "[W]hich, if terms in the order of third and higher powers of [epsilon] are ignored, may be written "
+            "[(4.23)] ... Similarly the stiffness term may be written : [(4.25)] ... In a similar manner the right hand "
+            "side may be written : [(4.27)]",
+            text("4.3, eqs (4.22) to (4.28), L2853-2916"),
+            "order in sigma2, as which we take epsilon, of what (4.23) to (4.28) leave out of S, the factor of damper and "
+            f"spring, of K and of F, from sigma2 = {SHORT[0]:g} to {SHORT[1]:g}; I4 = 1; b4 with k3 k6 + k4 k5, as in the "
+            "listing (L8448)",
+            "3; 0.05, as an order is a whole number",
+            tuple(
+                at_least(f"{part}; {name}", 2.95, x, why="the mean has a part of second order too")
+                for part, orders_of in left.items()
+                for name, x in zip(("mean", "first harmonic", "second harmonic"), orders_of)
+            ),
+        ),
+    ]
+
+
+def _balance() -> list[Statement]:
+    """Judge section 4.4: the balance of two harmonics, eqs (4.29) to (4.35)."""
+    solution = (
+        "error of the solution of (4.33) with these coefficients against the balance of two harmonics of (4.29), relative to "
+        "the greatest of its coefficients, the most at 10, 25 and 40 rad/s and I4 = 0.5, 1 and 1.5, ours"
     )
+    return [
+        Statement(
+            "Equating constant terms and coefficients of Cos[theta], Sin[theta], Cos2[theta] and Sin2[theta] on "
+            "both sides of equation (4.31) we obtain the [f]ollowing recurrence relationships.",
+            text("4.4.1, eqs (4.30) to (4.33), L2988-3049"),
+            f"{solution}; without a damper; signs that the scan of (4.32) has lost are those of (4.34)",
+            f"{ROUNDING:g}, above rounding errors",
+            (at_most("", ROUNDING, balanced(0.0)),),
+        ),
+        Statement(
+            "Assuming a solution of [zeta] as described in (4.30) and substituting it in equation (4.29), then multiplying "
+            "and equating the coefficients of the trig[o]nometric functions of [theta] on both sides of that equation in a "
+            "similar manner to the preceding section, we obtain ... [(4.34)]",
+            text("4.4.2, eqs (4.34), (4.35), L3053-3099"),
+            f"{solution}; with omega_c = 1.2 1/s, the greatest of appendix 2",
+            f"{ROUNDING:g}, above rounding errors",
+            (at_most("", ROUNDING, balanced(1.2)),),
+            "2 lambda_c and 4 lambda_c stand for 2 lambda_c k0 and 4 lambda_c k0",
+        ),
+    ]
 
 
 def _first_order_series(parts: Coefficients) -> tuple[FourierSeries, ...]:
