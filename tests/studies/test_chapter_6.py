@@ -12,10 +12,10 @@ from scipy.stats import mannwhitneyu
 from analysis.studies.statements import near
 from analysis.studies.youssef import search
 from analysis.studies.youssef.chapter_6 import best, half_units, pairing_area, rounded, straight_error
-from analysis.studies.youssef.packaging import TRAVEL_CM, nineteen_points, straightest
-from analysis.studies.youssef.problems import PROBLEMS, packaging_path
+from analysis.studies.youssef.packaging import TRAVEL_CM, straightest
+from analysis.studies.youssef.problems import PROBLEMS
 from analysis.studies.youssef.quality import arguments, both, linkages
-from analysis.synthesis import Linkage, curve_distance, evaluate, turn
+from analysis.synthesis import Linkage, evaluate, turn
 from tests import published
 
 from .results import check, every
@@ -71,12 +71,6 @@ class TestPairingArea:
     def test_a_window_that_is_too_narrow_lags_behind(self) -> None:
         wide, narrow = (pairing_area(circle(1.0, 24), circle(1.2, 96), window=window) for window in (1.0, 0.5))
         assert narrow > 2.0 * wide
-
-
-def test_nineteen_points_on_the_desired_path() -> None:
-    points = nineteen_points()
-    assert len(points) == 19
-    assert curve_distance(packaging_path().points, points).max() < 1e-12
 
 
 def test_the_straightest_travel_of_the_printed_packaging_machine() -> None:
