@@ -738,9 +738,9 @@ def _torque_conclusion() -> Statement:
         "different springs for this particular mechanism occurs only at the instances when appreciable differences in "
         "the slider accelerations leading to different inertial loads are present.",
         text("3.2.1, L2017-2029"),
-        "share of the crank angles at which the springs' torques differ, where the slider's accelerations differ too; greatest "
-        "difference of the acceleration's part of the torque, for *leading to different inertial loads*; relative to the "
-        "greatest torque and acceleration in size",
+        "of the crank angles at which the springs' torques differ, the share at which the slider's accelerations differ too; "
+        "for *leading to different inertial loads*, greatest difference of the acceleration's part of the torque; all relative "
+        "to the greatest torque, or acceleration, in size",
         f"all; {ALIKE_WORDS}",
         (
             near("torques differ where accelerations do", 1.0, np.mean(unequal[apart > ALIKE] > ALIKE), 0.0),

@@ -581,7 +581,7 @@ def launch_positions_by_spring() -> StudyResult:
             "distance of u from its steady decay, relative to the range in a turn, in the first turn after the torque and in "
             "the last in 1 s: from u of a free crank, at equal crank angle and mean speed, released at "
             f"{RELEASED[STIFF]:g} rpm, with k = 5e5 dyn/cm at {RELEASED[SOFT]:g}, ours; mean of u relative to the turn before, "
-            f"within {ALIKE:g} of that decay",
+            f"once within {ALIKE:g} of that decay",
             f"{ALIKE_WORDS}; {SIGN}",
             (
                 *(
@@ -895,9 +895,9 @@ def stiff_phase_plane() -> StudyResult:
         Statement(
             "This suggests that the non-linearity is a second subharmonic resonance.",
             text("3.3, L2305-2307"),
-            "mean crank speed at which the second harmonic, over the speed squared as its force, is greatest, relative to half "
-            "the natural frequency of the row before; higher harmonics relative to those by the equation linear in u, as at "
-            "Fig 3.13",
+            "mean crank speed at which the second harmonic over the speed squared, with which its force grows, is greatest, "
+            "relative to half the natural frequency of the row before; higher harmonics relative to those by the equation "
+            "linear in u, as at Fig 3.13",
             f"{lowered:.3f} below 1, by which the damper of the thesis lowers the peak of an oscillator; more than "
             f"{1.0 + ALIKE:g}, the rule for *the same*, for a non-linearity",
             (
