@@ -71,9 +71,8 @@ class TestPulses:
         assert 0.5 * inertia * (speed[high] ** 2 - speed[low] ** 2) == pytest.approx(work, rel=0.02)
 
 
-@pytest.mark.parametrize(("rig", "spring", "damping"), [(1, "A", 9.0), (2, "C", 5.5)])
-def test_dry_friction_is_told_from_damping(rig: int, spring: str, damping: float) -> None:
-    assert chapter_8.FOUND[rig] == (damping, spring)
+@pytest.mark.parametrize(("spring", "damping"), [("A", 9.0), ("C", 5.5)])
+def test_dry_friction_is_told_from_damping(spring: str, damping: float) -> None:
     time = np.linspace(0.0, chapter_8.LENGTH, 4001)
     rubbed, mass = chapter_8.impulse_response(spring, time, chapter_8.DRY), rigs.rig(spring).slider_mass
     assert fit_decay(time, rubbed, friction=True).damping(mass)[0] == pytest.approx(damping, rel=0.01)
@@ -208,13 +207,9 @@ class TestFriction:
 
     @pytest.mark.long
     @pytest.mark.parametrize("spring", ["A", "B"])
-    def test_friction_lowers_the_amplitude_and_hides_the_higher_harmonics(self, spring: str) -> None:
+    def test_friction_lowers_the_amplitude(self, spring: str) -> None:
         sizes = [rigs.over_speed(spring, c).max() for c in rig_1.COEFFICIENTS]
         assert (np.diff(sizes) < 0.0).all()
-        rises = [rigs.rise(spring, c, 3) for c in rig_1.COEFFICIENTS]
-        assert rises[0] == pytest.approx(rigs.peak_rise(spring, 3), abs=1e-2)
-        assert (np.diff(rises) <= 0.0).all()
-        assert rises[-1] < rigs.NOTICED < rises[0]
 
     @pytest.mark.long
     def test_no_coefficient_moves_the_local_maximum_towards_290_rpm(self) -> None:
@@ -300,13 +295,6 @@ class TestRig2:
         for speed in (200.0, 400.0, 700.0, 1000.0):
             full = rigs.harmonic(rigs.turn(spring, speed), 2) / rig_2.length(spring)
             assert rig_2.linear_motion(spring, speed).harmonic(2) == pytest.approx(full, rel=0.1)
-
-    @pytest.mark.slow
-    @pytest.mark.parametrize("spring", "CD")
-    def test_friction_by_the_weight_widens_the_resonance_and_lowers_the_amplitude_beyond_it(self, spring: str) -> None:
-        rubbed = {"slider_coulomb_friction": rigs.SLIGHT * rigs.rig(spring).slider_mass * 9.81}
-        assert max(rig_2.amplitudes_beyond(spring, **rubbed)) < 1.0
-        assert rig_2.width(spring, **rubbed) > rig_2.width(spring)
 
     def test_a_damper_widens_the_resonance_in_proportion(self) -> None:
         """That of a lightly damped mass on a spring is mu / m."""

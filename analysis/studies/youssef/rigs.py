@@ -34,8 +34,6 @@ from ..study import StudyResult
 from ..variation import cache, vary
 
 LOST = "the measured curve is lost with the figure"
-#: Study of friction in the guide of rig 1, as its heading names it.
-FRICTION = "*What friction explains of the amplitudes; rig 1, springs A and B*"
 #: Relative rise of the amplitude up to which no one notices it on a graph.
 NOTICED = ALIKE
 SEEN_IN_RECORDS = (
@@ -49,16 +47,8 @@ RIG = {"A": 1, "B": 1, "C": 2, "D": 2}
 #: on; below it the branches that come down from resonance run into the limit of assembly.
 SLOWEST, SPLIT = 100.0, 900.0
 FASTEST = {"A": 1200.0, "B": 1300.0, "C": 1300.0, "D": 1300.0}
-#: Speeds (rpm) of the studies of friction in the guide, for rig 2 about half the natural frequency.
-GRID = {
-    spring: np.arange(first, last + 1.0, step)
-    for spring, first, last, step in (
-        ("A", 150, 520, 5.0),
-        ("B", 250, 820, 5.0),
-        ("C", 250, 350, 2.0),
-        ("D", 360, 500, 2.0),
-    )
-}
+#: Speeds (rpm) of the study of friction in the guide of rig 1.
+GRID = {"A": np.arange(150.0, 521.0, 5.0), "B": np.arange(250.0, 821.0, 5.0)}
 #: Half a unit of the last digit of the printed stiffness (N/m): 3, 11, 4 and 8 times 10^6 dyn/cm.
 HALF_DIGIT = 500.0
 #: Samples of a turn.
@@ -135,11 +125,6 @@ def complex_stiffness(p: FiveBarParameters, rates: NDArray[np.float64]) -> NDArr
     return np.asarray(p.slider_stiffness - mean_effective_mass(p) * rates**2 + 1j * p.slider_damping * rates)
 
 
-def dynamic_stiffness(p: FiveBarParameters, rates: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the magnitude of `complex_stiffness` (N/m): force amplitude divided by displacement amplitude."""
-    return np.abs(complex_stiffness(p, rates))
-
-
 def amplitude(of: Turn) -> float:
     """Return the amplitude (cm): half the range of the slider position."""
     return 0.5 * float(np.ptp(slider(of)))
@@ -186,18 +171,15 @@ def near_fraction(spring: str, order: int) -> tuple[float, float]:
     return between(motions(spring).maxima(), 0.9 * place, 1.1 * place)
 
 
-def near_half_rounded(spring: str) -> NDArray[np.float64]:
-    """Return the speeds (rpm) of the maximum near half the natural frequency and of the next minimum, shape (2, 2).
+def near_half(spring: str, stiffness: float) -> tuple[float, float]:
+    """Return the speeds (rpm) of the amplitude's maximum near half the natural frequency and of the next minimum.
 
-    The rows are for the stiffness that is printed, rounded down and up.
+    ``stiffness`` is that of the spring (N/m).
     """
-    found = []
-    for stiffness in rounded(spring):
-        place = 0.5 * natural_speed(spring, slider_stiffness=stiffness)
-        of = response(spring, 0.9 * place, 1.4 * place, COARSE, slider_stiffness=stiffness)
-        top, _ = between(of.maxima(), 0.9 * place, 1.1 * place)
-        found.append((top, between(of.minima(), top, 1.4 * place)[0]))
-    return np.array(found)
+    place = 0.5 * natural_speed(spring, slider_stiffness=stiffness)
+    of = response(spring, 0.9 * place, 1.4 * place, COARSE, slider_stiffness=stiffness)
+    top, _ = between(of.maxima(), 0.9 * place, 1.1 * place)
+    return top, between(of.minima(), top, 1.4 * place)[0]
 
 
 def peak_rise(spring: str, order: int) -> float:
@@ -237,16 +219,6 @@ def follow(spring: str, speeds: Sequence[float], **changes: float) -> NDArray[np
         start = motion.start
         found.append(CM_PER_METRE * motion.amplitude)
     return np.array(found)
-
-
-def rise(spring: str, coefficient: float, order: int) -> float:
-    """Return the relative excess as `peak_rise` does, with a coefficient of friction in the guide; 0 without such a maximum."""
-    size, speeds = over_speed(spring, coefficient), GRID[spring]
-    tops = np.flatnonzero((size[1:-1] > size[:-2]) & (size[1:-1] > size[2:])) + 1
-    lows = np.flatnonzero((size[1:-1] < size[:-2]) & (size[1:-1] < size[2:])) + 1
-    for top in tops[np.abs(speeds[tops] * order / natural_speed(spring) - 1.0) < 0.1]:
-        return float(size[top] / size[lows[lows > top][0]]) - 1.0
-    return 0.0
 
 
 def branch_columns(branch: Branch, name: str) -> dict[str, NDArray[np.float64]]:
