@@ -47,12 +47,11 @@ reaches 74 and 89 % of what it encloses; between -1.5 and 1.5, where the crank t
 If the coupler cannot point at the desired point the rocker need not stand upright: for places below the slider's line it
 hangs. The printed series for the rocker function gives the stated 4.8 deg2 in none of the readings tried (of its signs, of
 A0 and of its argument): as printed the links cannot be joined, and where they can the error is more than with the pivot
-fixed; the best that we find has 0.72. That for path (b) is within 5 % of the best that we find.
+fixed. That for path (b) is within 5 % of the best that we find.
 
 *What cannot be told.* Series 1 (Fig 7.4 to 7.10) stands on a desired curve that is lost. Its figures are drawn with a curve
 of ours, and what the thesis says of the lost one has no verdict. Of a mechanism that corrects itself neither the adjustment
-nor the number of trial cycles is stated: with ours the deviation falls to an eighth or a quarter in six cycles, ever more
-slowly. Methods that are only named, as teach-in, latches or further inputs, have no example to judge.
+nor the criterion is stated. Methods that are only named, as teach-in, latches or further inputs, have no example to judge.
 """
 
 FloatArray = NDArray[np.float64]
@@ -227,8 +226,8 @@ def family() -> StudyResult:
                 "anywhere in an infinite variety, yet still prescribing the same originally desired precision points.",
                 text("7.0, L5203"),
                 f"distance of P from its place at U = 1 and the same crank angle, with u = a sin^2({PRECISION} theta2 / 2), "
-                f"over all of a = {', '.join(f'{a:g}' for a in BETWEEN)} l3 (ours): the greatest at the {PRECISION} angles "
-                "where u = 0; the greatest in each part between two of them, of the parts the least",
+                f"the greatest of a = {', '.join(f'{a:g}' for a in BETWEEN)} l3 (ours): at the {PRECISION} precision points, "
+                "where u = 0; in the part between two of them where it is least",
                 f"1e-12 l3, the rounding; more than {READ:g} l3, what a graph can be read to",
                 (
                     at_most("at the precision points", 1e-12, kept, "l3"),

@@ -304,7 +304,7 @@ def compute_harmonics() -> StudyResult:
                 "what the experiment showed is judged at L6871",
                 f"{100 * ABOUT:g} %, the rule for *about*, as no digit after 50 is given",
                 tuple(near(f"spring {s}", "50", _greatest(s, 1) / _greatest(s, 2), ABOUT * 50.0) for s in "CD"),
-                "as printed, (4.21) has terms that the scan garbles",
+                "the equation as printed cannot be solved: the scan garbles terms of (4.21)",
             ),
         ),
     )
