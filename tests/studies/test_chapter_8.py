@@ -18,7 +18,7 @@ from analysis import Inputs, simulate
 from analysis.cli import main
 from analysis.numerics.decay import fit_decay
 from analysis.periodic import Crossing, mean_effective_mass, natural_frequency
-from analysis.studies.youssef import chapter_8, rig_1, rig_2, rigs
+from analysis.studies.youssef import instruments, rig_1, rig_2, rigs
 from analysis.studies.youssef.runs import SteadyTurn, steady_turn
 from analysis.units import RAD_S_PER_RPM
 from analysis.youssef import nonlinear_harmonic_balance
@@ -56,7 +56,7 @@ class TestPulses:
     @pytest.mark.parametrize("order", [1, 2, 8])
     def test_a_harmonic_is_averaged_over_the_pitch(self, order: int) -> None:
         angle = np.linspace(0.0, 2.0 * np.pi, 14401)
-        pulses = chapter_8.speed_by_pulses(44.0 * (1.0 + 1e-3 * np.cos(order * angle)))
+        pulses = instruments.speed_by_pulses(44.0 * (1.0 + 1e-3 * np.cos(order * angle)))
         # sin(x)/x of half the pitch
         found = 2.0 * np.abs(np.fft.rfft(pulses)[order]) / len(pulses)
         assert found == pytest.approx(0.044 * np.sinc(order / 60.0), rel=1e-3)
@@ -64,7 +64,7 @@ class TestPulses:
     def test_speed_by_the_energy(self) -> None:
         """Kinetic energy gained from the least to the greatest speed is the work of the torques in between."""
         inertia = 2e-2
-        speed, torque = chapter_8.speed_of_crank(inertia), rigs.turn("A", chapter_8.PULSED)["drive.applied_torque"]
+        speed, torque = instruments.speed_of_crank(inertia), rigs.turn("A", instruments.PULSED)["drive.applied_torque"]
         low, high = int(speed[:-1].argmin()), int(speed[:-1].argmax())
         between = np.arange(low, high if high > low else high + len(torque)) % len(torque)
         work = (torque.mean() - torque[between]).sum() * 2.0 * np.pi / len(torque)
@@ -73,8 +73,8 @@ class TestPulses:
 
 @pytest.mark.parametrize(("spring", "damping"), [("A", 9.0), ("C", 5.5)])
 def test_dry_friction_is_told_from_damping(spring: str, damping: float) -> None:
-    time = np.linspace(0.0, chapter_8.LENGTH, 4001)
-    rubbed, mass = chapter_8.impulse_response(spring, time, chapter_8.DRY), rigs.rig(spring).slider_mass
+    time = np.linspace(0.0, instruments.LENGTH, 4001)
+    rubbed, mass = instruments.impulse_response(spring, time, instruments.DRY), rigs.rig(spring).slider_mass
     assert fit_decay(time, rubbed, friction=True).damping(mass)[0] == pytest.approx(damping, rel=0.01)
     assert fit_decay(time, rubbed).damping(mass)[0] > damping + 1.0
 
@@ -100,8 +100,8 @@ def test_impulse_response(spring: str, friction: float) -> None:
         force = p.slider_stiffness * y[0] + p.slider_damping * y[1] + friction * np.tanh(y[1] / 1e-5)
         return [y[1], -force / p.slider_mass]
 
-    run = solve_ivp(rates, (0.0, 0.4), (0.0, chapter_8.KICK), t_eval=time, method="Radau", rtol=1e-8, atol=1e-10)
-    np.testing.assert_allclose(chapter_8.impulse_response(spring, time, friction), run.y[0], atol=2e-6)
+    run = solve_ivp(rates, (0.0, 0.4), (0.0, instruments.KICK), t_eval=time, method="Radau", rtol=1e-8, atol=1e-10)
+    np.testing.assert_allclose(instruments.impulse_response(spring, time, friction), run.y[0], atol=2e-6)
 
 
 class TestRig1:

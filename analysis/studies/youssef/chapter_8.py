@@ -1,15 +1,14 @@
 """Figures of chapter VIII: the slider motion of both rigs, measured and computed.
 
 The measured curves are lost with the figures; the text describes most of them. Theory is the periodic motion of the
-full equations with the measured damping. The resonance curves of rig 2 are in `rig_2`; friction and resonance of rig 1 are
-in `rig_1`.
+full equations with the measured damping. The instruments (Fig 8.4, 8.6) are in `instruments`, the resonance curves of rig 2 in
+`rig_2`, and friction and resonance of rig 1 in `rig_1`.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from math import atan2, pi, sqrt
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,10 +16,10 @@ from scipy.optimize import brentq
 
 from ...figures import COLOURS, Curve, Figure, Panel, plot_curves
 from ...periodic import Turn
-from ...units import CM_PER_METRE, RAD_S_PER_RPM
-from ..rules import ABOUT, ABOUT_DEG, ALIKE, READ, SMALL
+from ...units import RAD_S_PER_RPM
+from ..rules import ABOUT, ABOUT_DEG, ALIKE, SMALL
 from ..statements import Statement, at_least, at_most, near, text
-from ..study import Study, StudyResult, padded, result_curves
+from ..study import Study, StudyResult
 from . import rig_1
 from .rigs import (
     LOST,
@@ -76,174 +75,6 @@ the slider moves more than twice as far near half the natural frequency, where t
 equation ignores makes both smaller. Friction and a stronger damper widen the resonance and lower the amplitude beyond it, a
 weaker damper the reverse: no one of them does both.
 """
-
-# --- 8.4: crank speed from the widths of the photocell's pulses
-
-#: Number of holes in the disc, and moments of inertia (kg.m2) that we assume for the crank with its flywheels: none is printed.
-HOLES, INERTIAS = 60, (5e-3, 2e-2)
-#: Crank speed (rpm).
-PULSED = 420.0
-
-
-def speed_of_crank(inertia: float) -> NDArray[np.float64]:
-    """Return the crank speed (rad/s) over a turn under a constant drive torque, for a crank inertia (kg.m2).
-
-    The torque that the links need is that of the steady motion at `PULSED` rpm.
-    """
-    torque = turn("A", PULSED)["drive.applied_torque"]
-    energy = np.cumsum(torque.mean() - torque) * 2.0 * pi / len(torque)
-    energy = np.append(energy[-1], energy)
-    return np.asarray(np.sqrt((PULSED * RAD_S_PER_RPM) ** 2 + 2.0 * (energy - energy.mean()) / inertia))
-
-
-def speed_by_pulses(speed: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the mean speeds between successive holes (rad/s), from the times at which the holes pass the photocell."""
-    angle = np.linspace(0.0, 2.0 * pi, len(speed))
-    time = np.append(0.0, np.cumsum(0.5 * (1.0 / speed[1:] + 1.0 / speed[:-1]) * np.diff(angle)))
-    width = np.diff(np.interp(np.linspace(0.0, 2.0 * pi, HOLES + 1), angle, time))
-    return np.asarray(2.0 * pi / HOLES / width)
-
-
-def compute_pulses() -> StudyResult:
-    """Compute the crank speed over a turn, and the speed that the widths of the pulses give."""
-    speeds = {inertia: speed_of_crank(inertia) for inertia in INERTIAS}
-    pulses = {inertia: speed_by_pulses(speed) for inertia, speed in speeds.items()}
-    crank_angle = np.linspace(0.0, 360.0, len(speeds[INERTIAS[0]]))
-    columns = {"crank angle [deg]": crank_angle, "place of a pulse [deg]": (np.arange(HOLES) + 0.5) * 360.0 / HOLES}
-    for inertia in INERTIAS:
-        columns[f"crank speed; {inertia:g} kg.m2 [rpm]"] = speeds[inertia] / RAD_S_PER_RPM
-        columns[f"crank speed by the pulses; {inertia:g} kg.m2 [rpm]"] = pulses[inertia] / RAD_S_PER_RPM
-    varies = {inertia: float(np.ptp(speed) / speed.mean()) for inertia, speed in speeds.items()}
-    return StudyResult(
-        number="8.4",
-        claim="The widths of the pulses of a photocell behind sixty holes show whether the speed varies within a turn.",
-        assignment="No moment of inertia of crank and flywheels is printed: two are tried out, driven by a constant torque, "
-        f"with spring A about {PULSED:g} rpm; the torque of the links is that at this speed.",
-        columns=padded(columns),
-        statements=(
-            Statement(
-                "Since each pulse corresponds to a hole a comparison of the width of each shows whether the speed varies "
-                "within the crank cycle.",
-                text("8.2.1.2, L6255"),
-                "range of the crank speed over a turn by the times from hole to hole, for which the widths are taken, over the "
-                "range itself",
-                f"{READ:g}, the rule for what is read from a graph",
-                tuple(
-                    near(
-                        f"{i:g} kg.m2, speed varies by {varies[i]:.1%}",
-                        1.0,
-                        np.ptp(pulses[i]) / np.ptp(speeds[i]),
-                        READ,
-                    )
-                    for i in INERTIAS
-                ),
-            ),
-            Statement(
-                "A further [flywheel] (4) is mounted on the shaft to ensure constant speed input.",
-                text("8.2.1.1, L6140-6142"),
-                why="no moment of inertia of crank and flywheels is printed",
-            ),
-        ),
-    )
-
-
-def draw_pulses(result: StudyResult) -> Figure:
-    """Draw the speed over the crank angle, with the speeds from the pulses as marks."""
-    curves = []
-    for inertia, colour in zip(INERTIAS, COLOURS):
-        names = {"crank angle [deg]": "crank speed", "place of a pulse [deg]": "crank speed by the pulses"}
-        for (place, name), look in zip(names.items(), ({}, {"line": "", "marker": "."})):
-            label = f"{inertia:g} kg.m2{', pulses' if look else ''}"
-            y = result.columns[f"{name}; {inertia:g} kg.m2 [rpm]"]
-            curves.append(Curve(x=result.columns[place], y=y, label=label, colour=colour, **look))  # type: ignore[arg-type]
-    panel = Panel(
-        x_label="crank angle [deg]",
-        y_label="crank speed [rpm]",
-        curves=curves,
-        legend_at="outside",
-        x_ticks=range(0, 361, 45),
-    )
-    return plot_curves([panel], title=result.heading)
-
-
-# --- 8.6: the damping coefficient from the slider's impulse response
-
-#: Spring with which each rig is shown.
-DECAYING = {1: "A", 2: "C"}
-#: Velocity after the impulse (m/s), length of the record (s), and dry friction (N): our choices.
-KICK, LENGTH, DRY = 1.0, 1.0, 0.5
-
-
-def impulse_response(spring: str, time: NDArray[np.float64], friction: float = 0.0) -> NDArray[np.float64]:
-    """Return the position (m) over time (s) of the disconnected slider after an impulse.
-
-    Dry friction (N) shifts the centre of each half swing.
-    """
-    p = rig(spring)
-    decay = 0.5 * p.slider_damping / p.slider_mass
-    frequency = sqrt(p.slider_stiffness / p.slider_mass - decay**2)
-    u = np.zeros(len(time))
-    begin, x, v, side = 0.0, 0.0, KICK, 1.0
-    while begin <= time[-1]:
-        centre = -side * friction / p.slider_stiffness
-        a = x - centre
-        b = (v + decay * a) / frequency
-        # the slider turns back at zero velocity, or stays there if the spring is weaker than the friction
-        last = (atan2(v, decay * b + frequency * a) if v else pi) / frequency
-        s = np.append(time - begin, last)
-        swing = centre + np.exp(-decay * s) * (a * np.cos(frequency * s) + b * np.sin(frequency * s))
-        u = np.where(time >= begin, swing[:-1], u)
-        begin, x, v, side = begin + last, float(swing[-1]), 0.0, -side
-        if abs(x) * p.slider_stiffness <= friction:
-            return np.where(time >= begin, x, u)
-    return u
-
-
-def compute_decay() -> StudyResult:
-    """Compute records of the impulse response like those of the thesis, without and with dry friction."""
-    time = np.linspace(0.0, LENGTH, 4001)
-    columns = {"time [s]": time}
-    for number, spring in DECAYING.items():
-        for name, friction in (("", 0.0), (f" with {DRY:g} N of dry friction", DRY)):
-            u = CM_PER_METRE * impulse_response(spring, time, friction)
-            columns[f"slider position u{name}; rig {number}; spring {spring} [cm]"] = u
-    return StudyResult(
-        number="8.6",
-        claim="The slider, disconnected and struck, swings out; its logarithmic decrement gives the damping coefficient.",
-        assignment="The text does not say whose response is shown: both rigs', computed, with springs A and C; the blow gives "
-        f"the slider {KICK:g} m/s, and the dry friction is {DRY:g} N, our choices.",
-        columns=columns,
-        statements=(
-            Statement(
-                "Average values of the coefficient were found to be [9 x 10^3 dyne.Sec/cm.] for Experimental Rig 1 and [5.5 "
-                "x 10^3 dyne.Sec/cm.] for Experimental Rig 2 (linearised rig).",
-                text("8.3.3, L6401"),
-                why=LOST,
-            ),
-            Statement(
-                "Theoretical calculations of the stiffness, based on the number of coils, the wire and mean coil diameters "
-                "and the modulus of rigidity of the material gave good agreement with the experimentally determined values.",
-                text("8.3.2, L6383"),
-                why="no number of coils, diameter or modulus is printed",
-            ),
-        ),
-    )
-
-
-def draw_decay(result: StudyResult) -> Figure:
-    """Draw the records of the impulse response, one panel for each rig."""
-    panels = []
-    for number, spring in DECAYING.items():
-        names = [name for name in result.columns if f"spring {spring}" in name]
-        curves = result_curves(
-            result, "time [s]", {n: f"{DRY:g} N of dry friction" if "dry" in n else "damper alone" for n in names}
-        )
-        title = f"rig {number}, spring {spring}"
-        panels.append(
-            Panel(x_label="time [s]", y_label="slider position u [cm]", title=title, curves=curves, x_range=(0.0, 0.6))
-        )
-    return plot_curves(panels, title=result.heading, columns=2, size=(4.8, 3.4))
-
 
 # --- 8.7 to 8.18: the slider over the crank angle
 
@@ -796,11 +627,5 @@ TURNS = (
     ),
 )
 
-STUDIES = {
-    study.number: study
-    for study in (
-        Study("8.4", compute_pulses, draw_pulses),
-        Study("8.6", compute_decay, draw_decay),
-        *(row.study for row in TURNS),
-    )
-}
+#: The studies by number.
+STUDIES = {row.number: row.study for row in TURNS}
