@@ -186,33 +186,6 @@ class TestSearch:
             assert search.descended(begun, side)[1] == pytest.approx(search.error(v), rel=1e-3)
 
     @pytest.mark.long
-    @pytest.mark.parametrize("angles", ["0 to 360 deg", "free"])
-    def test_fewer_points_first_lower_the_errors_whatever_bounds_the_angles(
-        self, angles: str, monkeypatch: pytest.MonkeyPatch
-    ) -> None:
-        low, high = search.LOW.copy(), search.HIGH.copy()
-        if angles == "free":
-            low[7:], high[7:] = -1e3, 1e3
-        else:
-            low[7:], high[7:] = 0.0, 2.0 * np.pi
-            monkeypatch.setattr(search, "LOW", low)
-            monkeypatch.setattr(search, "HIGH", high)
-
-        def admitted(v: np.ndarray, towards: np.ndarray) -> np.ndarray:
-            v = np.clip(v, low, high)
-            while not search.closes(v):
-                v = np.clip(0.75 * v + 0.25 * towards, low, high)
-            return v
-
-        monkeypatch.setattr(search, "admitted", admitted)
-        search.ranked.cache_clear()
-        plain, points, *_ = search.ranked()
-        search.ranked.cache_clear()
-        for of in ("error", "evaluations"):
-            ends = ([getattr(end, of) for end in ends] for ends in (points, plain))
-            assert mannwhitneyu(*ends, alternative="less").pvalue < search.CHANCE
-
-    @pytest.mark.long
     def test_half_of_the_points_first_lower_the_errors_for_no_less_work(self, monkeypatch: pytest.MonkeyPatch) -> None:
         monkeypatch.setattr(search, "FEWER_POINTS", 36)
         search.ranked.cache_clear()

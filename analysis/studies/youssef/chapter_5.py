@@ -172,9 +172,9 @@ def judge_inertia(found: Mapping[str, Sequence[Region]]) -> tuple[Statement, ...
             "The region in [lambda_k^2] as a band also increases linearly with [I4] indicating that [insta]bility occurs "
             "when [omega]=A.[omega_k] with A=2 when [I4]=0 and decreasing with increase of I4.",
             text("5.3.1, L3764-3770; the same in L3946-3950"),
-            "distance of the middle of the region from the straight line through 1/4 at I4 = 0 and its value at I4 = 2, "
-            "relative to the line's rise; A = omega/omega_k in the middle, at I4 = 0; growth of A from one I4 to the next; "
-            "true periodic motion, at I4 = 0 the right linear equation",
+            "distance of the region's middle from the straight line between 1/4 at I4 = 0 and its value at I4 = 2, relative to "
+            "the line's rise; axis A = omega/omega_k in the middle at I4 = 0; growth of A with I4; true periodic motion, at "
+            "I4 = 0 the right linear equation",
             f"{ALIKE:g}, the rule for *linear*; 1e-5 for A = 2, above rounding errors; {SIGN}",
             (
                 at_most("distance from the line", ALIKE, bent),

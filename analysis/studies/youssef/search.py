@@ -8,19 +8,20 @@ lengths are printed; the bounds of place and angles are ours.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import replace
-from functools import cache, partial
+from functools import cache
 from itertools import pairwise
 from math import pi
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.optimize import least_squares
 from scipy.stats import mannwhitneyu
 
 from ...figures import COLOURS, Curve, Figure, Panel, plot_curves
-from ...synthesis import UntimedPath, area_difference, turn
+from ...synthesis import RockerFunction, TargetPath, UntimedPath, area_difference, turn
 from ...units import CM_PER_METRE
 from ..rules import ALIKE, SMALL
 from ..statements import Case, Statement, at_least, at_most, near, text
@@ -49,40 +50,40 @@ DESCENTS, APART, COUNTED = 40, 0.1, (5, FEWER_POINTS, N)
 ROCKER = [2, 3, 4, 5, 8]
 #: Random sets by (6.11), and probability below which a difference is not taken for chance.
 SETS, CHANCE = 2000, 0.05
+#: Kinds of searches: from random sets, and with minima already located among the sets.
+PLAIN, KNOWN = "random sets", "with known minima"
+#: Tolerances in words.
+ALL, LEVEL = f"all, within {SMALL:g} of its error, the rule for *small*", f"{CHANCE:g}, the usual level of significance"
 
 Error = Callable[[FloatArray], float]
 
 
 class Found(NamedTuple):
-    """Result of a search: parameters, error (cm2) and number of evaluations.
-
-    ``included`` are the indices of the earlier searches whose results are among the starting sets; empty if there are none.
-    """
+    """Result of a search: parameters, error (cm2) and number of evaluations."""
 
     parameters: FloatArray
     error: float
     evaluations: int
-    included: tuple[int, ...] = ()
 
 
-def residuals(v: FloatArray, n: int = N, semi_axis: float = 10.0) -> tuple[FloatArray, FloatArray]:
-    """Return the distances along x and y (cm) of P from n points of an ellipse, by each of the two closures.
+def residuals(v: FloatArray, n: int = N) -> tuple[FloatArray, FloatArray]:
+    """Return the distances along x and y (cm) of P from n points of ellipse (a), by each of the two closures.
 
-    ``v`` are the parameters in the order of `LOW`; ``semi_axis`` (cm) is 10 for ellipse (a), 15 for (b).
+    ``v`` are the parameters in the order of `LOW`.
     """
     x0, y0, l1, l2, l3, l4, r, a1, th20, a2 = v
     pin = l2 * np.exp(1j * (turn(n) + th20))
     reach = np.abs(l1 - pin)
     turned = np.arccos(np.clip((l3**2 + reach**2 - l4**2) / (2.0 * l3 * reach), -1.0, 1.0))
-    target = CM_PER_METRE * ellipse(semi_axis, n) @ np.array([1.0, 1j])
+    target = CM_PER_METRE * ellipse(10.0, n) @ np.array([1.0, 1j])
     points = (pin + r * np.exp(1j * (np.angle(l1 - pin) + side * turned + a2)) for side in (1.0, -1.0))
     first, second = (x0 + 1j * y0 + np.exp(1j * a1) * p - target for p in points)
     return np.concatenate([first.real, first.imag]), np.concatenate([second.real, second.imag])
 
 
-def error(v: FloatArray, n: int = N, semi_axis: float = 10.0) -> float:
+def error(v: FloatArray, n: int = N) -> float:
     """Return the sum of the squared distances (cm2) by the better of the two closures; see `residuals`."""
-    return min(float(away @ away) for away in residuals(v, n, semi_axis))
+    return min(float(away @ away) for away in residuals(v, n))
 
 
 def closes(v: FloatArray) -> bool:
@@ -165,17 +166,11 @@ def searches() -> dict[str, tuple[Found, ...]]:
     plain = [downhill(error, starting_sets(random, [])) for _ in range(SEARCHES)]
     fresh, fewer_points, fewer = [], [], []
     for _ in range(SEARCHES):
-        included = tuple(int(i) for i in random.choice(SEARCHES, INCLUDED, replace=False))
-        sets = starting_sets(random, [plain[i].parameters for i in included])
-        fresh.append(downhill(error, sets)._replace(included=included))
+        included = random.choice(SEARCHES, INCLUDED, replace=False)
+        fresh.append(downhill(error, starting_sets(random, [plain[i].parameters for i in included])))
         fewer_points.append(_points_first(random))
         fewer.append(_parameters_first(random))
-    kinds = {
-        "random sets": plain,
-        "with known minima": fresh,
-        "12 points first": fewer_points,
-        "5 parameters first": fewer,
-    }
+    kinds = {PLAIN: plain, KNOWN: fresh, "12 points first": fewer_points, "5 parameters first": fewer}
     return {name: tuple(found) for name, found in kinds.items()}
 
 
@@ -259,211 +254,188 @@ def minima(n: int) -> FloatArray:
 
 def compute() -> StudyResult:
     """Compute the results of all searches, and judge the statements on the search."""
-    found, least = searches(), our_error(PROBLEM)
-    errors = {name: np.sort([end.error for end in ends]) for name, ends in found.items()}
-    plain, *techniques = errors
-    located = errors[plain][0]
-    reached = {name: e <= (1.0 + SMALL) * located for name, e in errors.items()}
-    as_good = np.array([end.error for end in found[plain]]) <= (1.0 + SMALL) * located
-    usual = float(np.median([end.evaluations for end in found[plain]]))
-    at_once = {
-        name: near(
-            name, 1.0, np.mean([e.error <= (1.0 + SMALL) * located and e.evaluations <= usual for e in ends]), 0.0
-        )
-        for name, ends in found.items()
-        if name != plain
-    }
-    taken = {name: [end.evaluations for end in ends] for name, ends in found.items()}
-    from_random, points_first, five_first, nine_first = (
-        np.array([(end.error, end.evaluations) for end in ends]).T for ends in ranked()
-    )
-
-    def by_chance(with_it: FloatArray, name: str = "") -> tuple[Case, ...]:
-        """Judge if a technique lowers the errors and the evaluations, compared with searches from random sets."""
-        errors_by, work_by = (
-            float(mannwhitneyu(of, than, alternative="less").pvalue) for of, than in zip(with_it, from_random)
-        )
-        share = np.median(with_it[1]) / np.median(from_random[1])
-        return (
-            at_most(f"{name}errors lower by chance", CHANCE, errors_by, why=luck),
-            at_most(f"{name}evaluations fewer by chance", CHANCE, work_by, why=f"their median is {share:.2f} of that"),
-        )
-
-    middle, work_middle = (
-        " for ".join(f"{np.median(of[row]):.3g}" for of in (points_first, from_random)) for row in (0, 1)
-    )
-    begun = [bool(set(end.included) & set(np.flatnonzero(as_good))) for end in found[techniques[0]]]
-    others = [e.error <= (1.0 + SMALL) * located for e, there in zip(found[techniques[0]], begun) if not there]
-    bottoms = {name: np.array([bottom(end) for end in ends]) for name, ends in found.items()}
-    at_bottom = np.mean([end.error for end in found[plain]] <= (1.0 + SMALL) * bottoms[plain])
-    every = np.concatenate(list(bottoms.values()))
-    kept = every[np.isfinite(every)]
-    images = "all end beside mirror images of one minimum, of the same error, and differ by how far from it they stop"
-    count, by_rocker = np.array(taken[plain]), work(rocker_error, ROCKER)
-    by_b = mannwhitneyu(work(partial(error, semi_axis=15.0)), count).pvalue
-    least_at = {n: minima(n) for n in COUNTED}
-    numbers = [errors_at.size for errors_at in least_at.values()]
-    counted = f"{', '.join(map(str, numbers))} at {', '.join(map(str, COUNTED))} points"
-    random = np.random.default_rng(611)
-    sets = np.array([drawn(random) for _ in range(SETS)])
-    outside = int(np.sum((sets < LOW) | (sets > HIGH)))
-    open_links = 1.0 - np.mean([closes(v) for v in sets])
-    luck = "they are not shown to be lower than those from random sets"
-    within = f"all, within {SMALL:g} of it, the rule for *small*"
-    optimum = "the best end of those from random sets, which the thesis calls the global optimum (L4338)"
-    short = f"that end is at {located:.2f} cm2, the least error at {least:.2f} cm2"
+    found = searches()
     columns = {"share of the searches [%]": 100.0 * (np.arange(SEARCHES) + 0.5) / SEARCHES}
-    columns |= {f"error; {name} [cm2]": e for name, e in errors.items()} | {
-        "least error [cm2]": np.full(SEARCHES, least)
-    }
+    columns |= {f"error; {name} [cm2]": np.sort([end.error for end in ends]) for name, ends in found.items()}
+    columns["least error [cm2]"] = np.full(SEARCHES, our_error(PROBLEM))
     return StudyResult(
         number="6.2",
         claim="The simplex begins at sets of random parameters within their bounds, and is repeated with what it found.",
         assignment=(
             f"The program of appendix 5, repeated, for ellipse (a) with bounds on the lengths: {SEARCHES} searches of each "
-            "kind. The bounds of place, r and angles are ours."
+            "kind. The bounds of place, r and angles are ours. (6.15) tests the errors too, which in the program is a comment "
+            "(L9663), but each parameter by itself, as in the program."
         ),
         columns=columns,
         statements=(
-            Statement(
-                "The method stops when a convergence criterion is satisfied and is [said then] to have located a minimum[.]",
-                text("6.3.1, L4324"),
-                f"share of {SEARCHES} searches from random sets whose error at the end is that of the minimum next to it, to "
-                f"which a descent with derivatives leads; (6.15) with the program's small number {EPS:g} stopped "
-                f"{np.sum(count < MOST)} of them",
-                within,
-                (near("at a minimum", 1.0, at_bottom, 0.0, why="it stops before it is there"),),
-                "(6.15) divides by the parameters, which may be zero: as in the program each is compared by itself; the errors "
-                "are tested too, which in the program is a comment (L9663)",
+            *judge_located(found),
+            judge_minima(),
+            *judge_techniques(),
+            judge_all_techniques(found),
+            judge_sets(),
+            judge_time(found),
+        ),
+    )
+
+
+def reached(ends: tuple[Found, ...], plain: tuple[Found, ...], *, quickly: bool) -> NDArray[np.bool_]:
+    """Return for each search whether it reaches the best end of those from random sets ``plain``.
+
+    With ``quickly`` it must not take more evaluations than their median.
+    """
+    best = min(end.error for end in plain)
+    usual = np.median([end.evaluations for end in plain]) if quickly else np.inf
+    return np.array([end.error <= (1.0 + SMALL) * best and end.evaluations <= usual for end in ends])
+
+
+def judge_located(found: Mapping[str, tuple[Found, ...]]) -> tuple[Statement, ...]:
+    """Judge what the searches locate, and whether located minima help a fresh search."""
+    plain = found[PLAIN]
+    ends, bottoms = np.array([end.error for end in plain]), np.array([bottom(end) for end in plain])
+    return (
+        Statement(
+            "The method stops when a convergence criterion is satisfied and is [said then] to have located a minimum[.]",
+            text("6.3.1, L4324"),
+            f"share of {SEARCHES} searches from random sets, stopped by (6.15) with the program's small number {EPS:g}, whose "
+            "error is that of the minimum to which a descent with derivatives then leads",
+            ALL,
+            (near("at a minimum", 1.0, np.mean(ends <= (1.0 + SMALL) * bottoms), 0.0),),
+            "they stop before they are there",
+        ),
+        Statement(
+            "It is therefore necessary to begin the optimisation from as many initial points as possible.",
+            text("6.3.1, L4332"),
+            "greatest over least error of the ends of these searches, which the thesis calls located minima, and of the minima "
+            "to which descents from them lead, the angles free",
+            f"{1.0 + ALIKE:g}, the rule for *the same*",
+            (
+                at_least("ends of the searches", 1.0 + ALIKE, ends.max() / ends.min()),
+                at_least("minima next to them", 1.0 + ALIKE, np.nanmax(bottoms) / np.nanmin(bottoms)),
             ),
-            Statement(
-                "It is therefore necessary to begin the optimisation from as many initial points as possible.",
-                text("6.3.1, L4332"),
-                "greatest over least error of the minima next to the ends of these searches, and of all that are shown, to "
-                "which descents with derivatives lead, the angles free, as they are periodic; of the ends from random sets, "
-                "which the thesis calls located minima; of the minima of L4345 at "
-                f"{COUNTED[0]} points; ellipse (a) with bounds is our choice",
-                f"{1.0 + ALIKE:g}, the rule for *the same*",
-                (
-                    at_least(
-                        f"{SEARCHES} from random sets",
-                        1.0 + ALIKE,
-                        np.nanmax(bottoms[plain]) / np.nanmin(bottoms[plain]),
-                        why=images,
-                    ),
-                    at_least(
-                        f"{kept.size} of the {every.size} shown", 1.0 + ALIKE, kept.max() / kept.min(), why=images
-                    ),
-                    at_least(
-                        f"the {SEARCHES} ends from random sets themselves",
-                        1.0 + ALIKE,
-                        errors[plain][-1] / errors[plain][0],
-                    ),
-                    at_least(
-                        f"{COUNTED[0]} points, {numbers[0]} minima",
-                        1.0 + ALIKE,
-                        least_at[COUNTED[0]][-1] / least_at[COUNTED[0]][0],
-                    ),
-                ),
-                f"from {every.size - kept.size} of the {every.size} the descent leads to links that do not close",
-            ),
-            Statement(
-                "It is found that the global optimum is always reached quickly if some of the minima already located are "
-                "included as initial values in a fresh optimisation cycle.",
-                text("6.3.1, L4341-4345"),
-                f"share of {SEARCHES} searches whose sets include {INCLUDED} of the ends above, our choice, drawn at random, "
-                f"that reach {optimum}, quickly: with no more evaluations than searches from random sets, median",
-                within,
-                (at_once[techniques[0]],),
-                f"{short}; {np.sum(reached[plain])} of the {SEARCHES} ends are as good, and {sum(begun)} of the searches begin "
-                f"with one of them, at the goal, as all would if one were always included; of the other {len(others)}, "
-                f"{sum(others)} reaches it",
-            ),
-            Statement(
-                "It is also found that the number of minima of the quality function increases with the number of specified "
-                "output points.",
-                text("6.3.1, L4345"),
-                f"minima for ellipse (a), of errors more than {APART:g} cm2 apart (at n points counted {N}/n times), to which "
-                f"descents with derivatives lead from {DESCENTS} random sets by (6.11), by either closure, the angles free: "
-                "how many more at the greater number of points, our choice, but at least five: with fewer the ten parameters "
-                "can make the error zero, along a continuum that has no number",
-                "at least one more, the rule for *increases*",
-                tuple(
-                    at_least(f"from {few} to {many} points", 1.0, more - fewer, why=counted)
-                    for (few, many), (fewer, more) in zip(pairwise(COUNTED), pairwise(numbers))
-                ),
-            ),
-            Statement(
-                "A good technique is to find the optimum values of linkage parameters to yield a minimum error over a "
-                "decreased number of specified output points. These values are then used again in the optimisation but this "
-                "time taking all the specified output points into consideration.",
-                text("6.3.1, L4349-4359"),
-                f"probability that the errors at the end of {RANKED} searches which begin with {FEWER_POINTS} points, our "
-                "choice, are so much lower, and their evaluations so much fewer, than those of as many from random sets by "
-                f"chance (rank test); an evaluation at {FEWER_POINTS} points counts by their share of {N}",
-                f"{CHANCE:g}, the usual level of significance",
-                by_chance(points_first),
-                # see test_chapter_6.py
-                f"the medians are {middle} cm2 and {work_middle} evaluations; both hold too if the search bounds the angles by "
-                "0 and 360 deg, or not at all; with 36 points first the errors are lower, the evaluations not fewer",
-            ),
-            Statement(
-                "Another useful technique is to perform the optimisation for a decreased number of linkage parameters and "
-                "to use the values obtained in the initial guesses of the complete optimisation programme.",
-                text("6.3.1, L4359"),
-                f"probability that the errors at the end of {RANKED} searches which begin with X0, Y0, l2, a1 and th20 alone, "
-                "or with all but a2, our choices of five and nine of the ten, as the thesis names neither which nor how many, "
-                "are so much lower, and their evaluations so much fewer, than those of as many from random sets by chance "
-                "(rank test)",
-                f"{CHANCE:g}, the usual level of significance",
-                (*by_chance(five_first, "five; "), *by_chance(nine_first, "nine; ")),
-            ),
-            Statement(
-                "These techniques have, in all cases tried, located the global minimum quickly and efficiently.",
-                text("6.3.1, L4365-4369"),
-                f"share of the searches with either technique that reach {optimum}, quickly: with no more evaluations in both "
-                f"steps, those at {FEWER_POINTS} points counted by their share of {N}, than searches from random sets, median; "
-                "points and parameters are our choices above",
-                within,
-                tuple(at_once[name] for name in techniques[1:]),
-                f"{short}; "
-                + " and ".join(str(np.sum(reached[name])) for name in techniques[1:])
-                + f" of {SEARCHES} reach it at all; the cases that the thesis tried are not named, and five of its printed "
-                "linkages are no minima, see L5136",
-            ),
-            Statement(
-                "The remaining sets are then obtained using the following equation [(6.11)]. This generates quickly and "
-                "efficiently all the sets of required initial values and ensures that they satisfy all the explicit "
-                "externally imposed constraints described in equation (6.10).",
-                text("6.3.1, L4377"),
-                f"parameters outside their bounds in {SETS} sets by (6.11), X uniform over a turn, our choice",
-                "none of a count",
-                (
-                    near("parameters outside", 0.0, outside, 0.0),
-                    Case(
-                        label="quickly and efficiently",
-                        computed=None,
-                        why="there is no measure of *quickly and efficiently*",
-                    ),
-                ),
-                f"in {open_links:.0%} of the sets the links do not close, for which the thesis moves back by quarters",
-            ),
-            Statement(
-                "The compilation time of the program is about 17 seconds and the running time depends on the form of the "
-                "desired output and the quality of the initial guess of linkage parameters.",
-                text("6.5, L5158-5164"),
-                "the running time by the number of evaluations: probability that those of "
-                f"{SEARCHES} searches differ so much by chance (rank test, two-sided) from those of as many from random sets: "
-                f"of searches whose sets include {INCLUDED} located minima, and of searches from the same random sets for the "
-                f"unweighted rocker function (6.18), {N} crank angles, by its five parameters",
-                f"{CHANCE:g}, the usual level of significance",
-                (
-                    at_most("by the quality of the guess", CHANCE, mannwhitneyu(taken[techniques[0]], count).pvalue),
-                    at_most("by the output, rocker function", CHANCE, mannwhitneyu(by_rocker, count).pvalue),
-                    Case(label="compilation", computed=None, why="the machine, an IBM 360/67 (L1293), is not at hand"),
-                ),
-                f"ellipse (b), an output of the same form, makes no difference that is shown: the probability is {by_b:.2f}",
-            ),
+            "all end beside one minimum or its mirror images, and differ by how far from it they stop",
+        ),
+        Statement(
+            "It is found that the global optimum is always reached quickly if some of the minima already located are "
+            "included as initial values in a fresh optimisation cycle.",
+            text("6.3.1, L4341-4345"),
+            f"share of {SEARCHES} fresh searches that reach the best of these ends, the thesis's global optimum (L4338), with "
+            f"no more evaluations than the median from random sets; {INCLUDED} of the ends, drawn at random, are among the "
+            "sets of each",
+            ALL,
+            (near(KNOWN, 1.0, reached(found[KNOWN], plain, quickly=True).mean(), 0.0),),
+            "the ends included need not be near the best",
+        ),
+    )
+
+
+def judge_minima() -> Statement:
+    """Judge the statement on the number of minima."""
+    numbers = [minima(n).size for n in COUNTED]
+    return Statement(
+        "It is also found that the number of minima of the quality function increases with the number of specified "
+        "output points.",
+        text("6.3.1, L4345"),
+        f"minima for ellipse (a), of errors per {N} points more than {APART:g} cm2 apart, to which descents lead from "
+        f"{DESCENTS} random sets by (6.11), by either closure, the angles free: how many more at the greater number of points "
+        "(ours)",
+        "at least one more, the rule for *increases*",
+        tuple(
+            at_least(f"from {few} to {many} points", 1.0, more - fewer)
+            for (few, many), (fewer, more) in zip(pairwise(COUNTED), pairwise(numbers))
+        ),
+        f"{', '.join(map(str, numbers))} minima at {', '.join(map(str, COUNTED))} points",
+    )
+
+
+def judge_techniques() -> tuple[Statement, ...]:
+    """Judge the techniques of beginning with fewer points or with fewer parameters, by rank tests."""
+    plain, points, five, nine = (np.array([(end.error, end.evaluations) for end in ends]).T for ends in ranked())
+
+    def by_chance(with_it: FloatArray, name: str = "") -> tuple[Case, ...]:
+        """Judge if a technique lowers the errors and the evaluations, compared with searches from random sets."""
+        chances = (float(mannwhitneyu(of, than, alternative="less").pvalue) for of, than in zip(with_it, plain))
+        return tuple(
+            at_most(f"{name}{what} by chance", CHANCE, chance)
+            for what, chance in zip(("errors lower", "evaluations fewer"), chances)
+        )
+
+    return (
+        Statement(
+            "A good technique is to find the optimum values of linkage parameters to yield a minimum error over a "
+            "decreased number of specified output points. These values are then used again in the optimisation but this "
+            "time taking all the specified output points into consideration.",
+            text("6.3.1, L4349-4359"),
+            f"probability that the errors of {RANKED} searches which begin with {FEWER_POINTS} points (ours) are so much "
+            "lower, and their evaluations so much fewer, than those of as many from random sets by chance (rank test); an "
+            f"evaluation at {FEWER_POINTS} points counts by their share of {N}",
+            LEVEL,
+            by_chance(points),
+            # see test_chapter_6.py
+            "with 36 points first the errors are lower too, the evaluations not fewer",
+        ),
+        Statement(
+            "Another useful technique is to perform the optimisation for a decreased number of linkage parameters and "
+            "to use the values obtained in the initial guesses of the complete optimisation programme.",
+            text("6.3.1, L4359"),
+            f"as at L4349, for {RANKED} searches which begin with X0, Y0, l2, a1 and th20 alone, or with all but a2: our "
+            "choices of five and nine of the ten, as the thesis names neither which nor how many",
+            LEVEL,
+            (*by_chance(five, "five; "), *by_chance(nine, "nine; ")),
+            "five gain nothing; with nine the errors are lower, for more evaluations",
+        ),
+    )
+
+
+def judge_all_techniques(found: Mapping[str, tuple[Found, ...]]) -> Statement:
+    """Judge whether the techniques locate the global minimum quickly."""
+    plain = found[PLAIN]
+    techniques = {name: ends for name, ends in found.items() if name not in (PLAIN, KNOWN)}
+    slowly = " and ".join(str(reached(ends, plain, quickly=False).sum()) for ends in techniques.values())
+    return Statement(
+        "These techniques have, in all cases tried, located the global minimum quickly and efficiently.",
+        text("6.3.1, L4365-4369"),
+        f"share of {SEARCHES} searches with either technique, points and parameters as above, that reach the best end from "
+        "random sets, the thesis's global optimum (L4338), with no more evaluations in both steps than the median from "
+        "random sets",
+        ALL,
+        tuple(near(name, 1.0, reached(ends, plain, quickly=True).mean(), 0.0) for name, ends in techniques.items()),
+        f"{slowly} of {SEARCHES} reach it at all; the cases that the thesis tried are not named",
+    )
+
+
+def judge_sets() -> Statement:
+    """Judge the statement on random sets by (6.11)."""
+    random = np.random.default_rng(611)
+    sets = np.array([drawn(random) for _ in range(SETS)])
+    return Statement(
+        "The remaining sets are then obtained using the following equation [(6.11)]. This generates quickly and "
+        "efficiently all the sets of required initial values and ensures that they satisfy all the explicit "
+        "externally imposed constraints described in equation (6.10).",
+        text("6.3.1, L4377"),
+        f"parameters outside their bounds in {SETS} sets by (6.11), X uniform over a turn (ours)",
+        "none of a count",
+        (
+            near("parameters outside", 0.0, np.sum((sets < LOW) | (sets > HIGH)), 0.0),
+            Case(label="quickly and efficiently", computed=None, why="there is no measure of that"),
+        ),
+    )
+
+
+def judge_time(found: Mapping[str, tuple[Found, ...]]) -> Statement:
+    """Judge the statement on the times of compilation and of a run."""
+    plain, known = ([end.evaluations for end in found[kind]] for kind in (PLAIN, KNOWN))
+    return Statement(
+        "The compilation time of the program is about 17 seconds and the running time depends on the form of the "
+        "desired output and the quality of the initial guess of linkage parameters.",
+        text("6.5, L5158-5164"),
+        f"for the running time: probability that the evaluations of {SEARCHES} searches differ so much by chance (rank test, "
+        "two-sided) from those above from random sets: of searches for the unweighted rocker function by its five parameters, "
+        "and of those with located minima among their sets",
+        LEVEL,
+        (
+            at_most("form of the output", CHANCE, mannwhitneyu(work(rocker_error, ROCKER), plain).pvalue),
+            at_most("quality of the guess", CHANCE, mannwhitneyu(known, plain).pvalue),
+            Case(label="compilation", computed=None, why="the machine, an IBM 360/67 (L1293), is not at hand"),
         ),
     )
 
@@ -490,91 +462,95 @@ def draw(result: StudyResult) -> Figure:
 
 # --- 6.3: the area between curves, and the two closures
 
-#: Problems whose printed linkages have a coupler point.
-PATHS = ("ellipse-a", "ellipse-b", PROBLEM, "path-a", "path-b")
 #: Change of the crank's phase (rad) under which an area must not change, and steps by which the first desired point is moved.
 PHASE, FIRST = 0.6, 24
 
 
 def compute_closures() -> StudyResult:
-    """Compute the coupler curves and errors by both closures, and the area between curves by triangles."""
-    columns: dict[str, FloatArray] = {}
-    ratios, phases, triangles = [], [], []
-    for name in (*PATHS, "packaging"):
-        p = PROBLEMS[name]
-        # the points of the program, whose polygon is that of the task
-        right, other = (
-            p.linkage_error(replace(p.linkage, branch=branch)) for branch in (p.linkage.branch, -p.linkage.branch)
-        )
-        ratios.append(at_least(name, 1.0 + ALIKE, other / right))
-    for name in ("path-a", "path-b"):
-        p = PROBLEMS[name]
-        assert isinstance(p.task, UntimedPath)
-        points = np.asarray(p.task.path.points)
-        curve, finer = (p.linkage.path(turn(n * len(points))) for n in (1, 2))
-        area = area_difference(curve, p.task.path)
-        moved = replace(p.linkage, crank_phase=p.linkage.crank_phase + PHASE)
-        phases.append(near(name, 1.0, area_difference(moved.path(turn(len(points))), p.task.path) / area, ALIKE))
-        steps = range(0, len(points), len(points) // FIRST)
-        for how, actual in (("chosen", finer), ("in order", curve)):
-            shares = [pairing_area(np.roll(points, -k, axis=0), actual, window=2) / area for k in steps]
-            farthest = max(shares, key=lambda share: abs(share - 1.0))
-            off = [k for k, share in zip(steps, shares) if abs(share - 1.0) > ALIKE]
-            at = " or ".join(map(str, off))
-            why = f"in order it fails with the first point at {at} deg, where partners lie far apart"
-            triangles.append(near(f"{name}, {how}", 1.0, farthest, ALIKE, why=why))
+    """Compute the coupler curves by both closures, and judge the statements on the area and on the closures."""
     p = PROBLEMS["path-a"]
-    shapes = {"target": np.asarray(p.task.path.points), "printed closure": p.linkage.path(turn(360))}  # type: ignore[union-attr]
-    shapes["other closure"] = replace(p.linkage, branch=-1).path(turn(360))
+    shapes = {
+        "target": np.asarray(path_of("path-a").points),
+        "printed closure": p.linkage.path(turn(360)),
+        "other closure": replace(p.linkage, branch=-1).path(turn(360)),
+    }
+    columns: dict[str, FloatArray] = {}
     for name, xy in shapes.items():
         columns |= {f"{name} {axis} [cm]": CM_PER_METRE * np.append(xy[:, k], xy[0, k]) for k, axis in enumerate("xy")}
-    branches = [p.linkage.branch for p in PROBLEMS.values() if "rocker" not in p.source]
-    same = f"{ALIKE:g}, the rule for *the same*"
     return StudyResult(
         number="6.3",
         claim="The area between curves is that of triangles between their points; of two closures the better is taken.",
         assignment="The plot has path (a), the printed linkage.",
         columns=padded(columns),
-        statements=(
-            Statement(
-                "A finite approximation of this relation is obtained by taking a large and equal number of points on the "
-                "desired and actual curves.",
-                text("6.2.2, L4230"),
-                "area of the triangles between 360 points of each curve over the area between the curves; printed "
-                "linkages, mended: the actual points chosen from 720, as the program does (ICP = 2, L8973), and as "
-                f"many points on both, which it pairs in order (L9894-9898); the farthest from 1 of {FIRST} first points, "
-                f"{360 // FIRST} deg apart in the ellipse's parameter",
-                same,
-                tuple(triangles),
-            ),
-            Statement(
-                "The linkage parameters sufficient for the optimisation in coupler path generation are the same as "
-                "mentioned earlier for coupler function generation although the parameter [theta20] is redundant; in this "
-                "case, it will be retained to maintain a consistency in presentation of results.",
-                text("6.4.1, L4696"),
-                f"area with theta20 greater by {PHASE:g} rad over that as printed; printed linkages, mended; of the three "
-                "linkages printed for paths those with theta20; that the parameters suffice follows from (6.17)",
-                f"{same}; none of a count",
-                (
-                    *phases,
-                    near("linkages with theta20", 3.0, 2.0, 0.0, why="that of the packaging machine has none (L5127)"),
-                ),
-            ),
-            Statement(
-                "Therefore in evaluating the quality function we must explore both closures and note the closure "
-                "corresponding to the minimum error in output generation.",
-                text("6.4.1, L4804"),
-                "error by the other closure over that by the better one, of the printed linkages with a coupler point, mended, "
-                "the packaging machine by the ten points of the program (L9021); number of these linkages by the better "
-                "closure",
-                f"at least {1.0 + ALIKE:g}, more than *the same*, so that the closure matters; one of each is enough for *must "
-                "explore both*",
-                (
-                    *ratios,
-                    at_least("linkages with C to the left of BD", 1.0, branches.count(1)),
-                    at_least("with C to the right of BD: the packaging machine's", 1.0, branches.count(-1)),
-                ),
-            ),
+        statements=(*judge_area(), judge_closures()),
+    )
+
+
+def path_of(name: str) -> TargetPath:
+    """Return the desired path of a problem of chapter VI."""
+    task = PROBLEMS[name].task
+    assert isinstance(task, UntimedPath)
+    return task.path
+
+
+def judge_area() -> tuple[Statement, ...]:
+    """Judge the statements on the area between curves by triangles, and on the crank's phase."""
+    phases, triangles = [], []
+    for name in ("path-a", "path-b"):
+        linkage, path = PROBLEMS[name].linkage, path_of(name)
+        points = np.asarray(path.points)
+        curve, finer = (linkage.path(turn(n * len(points))) for n in (1, 2))
+        area = area_difference(curve, path)
+        moved = replace(linkage, crank_phase=linkage.crank_phase + PHASE).path(turn(len(points)))
+        phases.append(near(name, 1.0, area_difference(moved, path) / area, ALIKE))
+        for how, actual in (("chosen", finer), ("in order", curve)):
+            firsts = range(0, len(points), len(points) // FIRST)
+            shares = [pairing_area(np.roll(points, -k, axis=0), actual, window=2) / area for k in firsts]
+            triangles.append(near(f"{name}, {how}", 1.0, max(shares, key=lambda share: abs(share - 1.0)), ALIKE))
+    same = f"{ALIKE:g}, the rule for *the same*"
+    return (
+        Statement(
+            "A finite approximation of this relation is obtained by taking a large and equal number of points on the "
+            "desired and actual curves.",
+            text("6.2.2, L4230"),
+            "area of the triangles over the area between the curves, 360 points on each, printed linkages, mended; the actual "
+            "points are chosen from 720 (L8973) or paired in order (L9894-9898); the farthest from 1 of "
+            f"{FIRST} first points, {360 // FIRST} deg apart",
+            same,
+            tuple(triangles),
+            "in order, partners lie far apart with some of the first points",
+        ),
+        Statement(
+            "The linkage parameters sufficient for the optimisation in coupler path generation are the same as "
+            "mentioned earlier for coupler function generation although the parameter [theta20] is redundant; in this "
+            "case, it will be retained to maintain a consistency in presentation of results.",
+            text("6.4.1, L4696"),
+            f"area with theta20 greater by {PHASE:g} rad over that as printed, printed linkages, mended; how many of the three "
+            "linkages printed for paths retain theta20. That the parameters suffice follows from (6.17)",
+            f"{same}; none of a count",
+            (*phases, near("linkages with theta20", 3.0, 2.0, 0.0)),
+            "that of the packaging machine has none (L5127)",
+        ),
+    )
+
+
+def judge_closures() -> Statement:
+    """Judge the statement on the two closures."""
+    paths = [p for p in PROBLEMS.values() if not isinstance(p.task, RockerFunction)]
+    ratios = [p.linkage_error(replace(p.linkage, branch=-p.linkage.branch)) / p.linkage_error(p.linkage) for p in paths]
+    branches = [p.linkage.branch for p in paths]
+    return Statement(
+        "Therefore in evaluating the quality function we must explore both closures and note the closure "
+        "corresponding to the minimum error in output generation.",
+        text("6.4.1, L4804"),
+        "error by the other closure over that by the better one, the least of the printed linkages with a coupler point, "
+        "mended, the packaging machine by the ten points of the program (L9021); number of these linkages by the better "
+        "closure",
+        f"at least {1.0 + ALIKE:g}, more than *the same*; one of each is enough for *must explore both*",
+        (
+            at_least("other closure over the better", 1.0 + ALIKE, min(ratios)),
+            at_least("linkages with C to the left of BD", 1.0, branches.count(1)),
+            at_least("linkages with C to the right of BD", 1.0, branches.count(-1)),
         ),
     )
 
