@@ -149,8 +149,6 @@ COEFFICIENTS = (0.0, SLIGHT, 0.1, 0.15)
 #: Speeds (rpm) of the figures where theory and experiment are compared, and those of the turns shown.
 COMPARED = {"A": (390.0, 420.0, 450.0), "B": (600.0, 660.0, 720.0)}
 SHOWN = {"A": 420.0, "B": 660.0}
-#: Friction radius of the pins B, C and D (m): a dry bearing of PTFE, coefficient 0.05 to 0.1, on a pin of 3 to 6 mm.
-PIN_RADIUS = 3e-4
 
 
 def lowered(coefficient: float) -> NDArray[np.float64]:

@@ -18,7 +18,6 @@ from ..rules import ABOUT, ALIKE, SMALL
 from ..statements import Case, Statement, at_least, at_most, near, text
 from ..study import Study, StudyResult, padded
 from ..variation import cache
-from .rig_1 import PIN_RADIUS
 from .rigs import (
     FASTEST,
     LOST,
@@ -48,6 +47,8 @@ CURVE = np.arange(SLOWEST, FASTEST["C"] + 1.0, 10.0)
 RANGE = np.arange(300.0, 1001.0, 10.0).tolist()
 #: Speeds (rpm) beyond resonance, by spring, at which the amplitude is compared, and dampers relative to the rig's.
 BEYOND, DAMPERS = {"C": (650.0, 700.0, 800.0, 900.0, 1000.0), "D": (890.0, 950.0, 1000.0)}, (1.25, 0.8)
+#: Friction radius of the pins B, C and D (m): a dry bearing of PTFE, coefficient 0.05 to 0.1, on a pin of 3 to 6 mm.
+PIN_RADIUS = 3e-4
 #: How the width of a resonance is measured, in words.
 WIDTH = "width of the range of speeds at which the amplitude over the speed squared is at least 0.71 of its greatest"
 
