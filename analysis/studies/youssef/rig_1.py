@@ -266,7 +266,7 @@ def _friction(ends: tuple[float, float]) -> tuple[Statement, ...]:
             "with variation of crank speed and also within one crank cycle.",
             text("8.4.1.1, L6496"),
             "guide's force: the greatest over the mean in a turn, the greatest at 450 over that at 390 rpm, its greatest "
-            "difference from the vertical force in the joint over itself; friction: decrease of the amplitude in cm, the "
+            "difference from the vertical force in the joint over the greatest; friction: decrease of the amplitude in cm, the "
             "greatest over the least of the three speeds, and greatest difference of u from u with constant friction of the "
             "same mean, over the amplitude",
             f"more than {1.0 + ALIKE:g} for a ratio and {ALIKE:g} for a difference that is seen; at most {ALIKE:g} for the "
