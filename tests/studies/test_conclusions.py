@@ -7,7 +7,7 @@ from collections.abc import Callable
 import pytest
 
 from analysis.studies.statements import HOLDS, Statement
-from analysis.studies.youssef.conclusions import introduction, linearised
+from analysis.studies.youssef.conclusions_linear import introduction, linearised
 
 from .results import check, expected
 

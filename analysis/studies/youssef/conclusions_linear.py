@@ -1,0 +1,275 @@
+"""Verdicts on the conclusions of the thesis about the linear equation: section 8.0, and 9.1 on resonance and stability."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import replace
+from functools import cache
+from math import sqrt
+
+import numpy as np
+from numpy.typing import NDArray
+
+from linkwork.five_bar.parameters import FiveBarParameters
+from linkwork.five_bar.published import SQUARE_OF_OMEGA_K, chapter_4
+
+from ...periodic import natural_frequency
+from ...youssef import HarmonicMotion, harmonic_balance, resonance, slider_equation
+from ..rules import ABOUT, ALIKE, SMALL
+from ..statements import Case, Statement, at_least, at_most, near, text
+from .chapter_4 import DAMPERS
+from .chapter_5 import closed, held
+from .linearised import with_crank
+from .regions import axis, hill, removing_estimate
+
+OMEGA_K = sqrt(SQUARE_OF_OMEGA_K)
+#: Inertia ratios of the stability, and of the resonance with its dampers omega_c (1/s) and speeds (rad/s).
+RATIOS, RESONANT = (0.25, 0.5, 1.0, 1.5, 2.0), (0.5, 1.0, 1.5)
+WEAK, STRONG = DAMPERS[0], DAMPERS[-1]
+SPEEDS = np.arange(10.0, 45.0, 0.05)
+#: Lengths of crank and coupler relative to the rocker's, in the ranges of Fig 5.2 and 5.3.
+CRANKS, COUPLERS = (0.01, 0.03, 0.05, 0.07, 0.1), (0.8, 0.9, 1.0, 1.1, 1.2)
+#: Amplitude u/l4 above which a speed counts as resonant.
+LARGE = 0.05
+#: Words for the equation behind the numbers of chapters IV and V, for the speeds and for the dampers.
+RIGHT = "right linear equation"
+SPEEDS_WORDS = "10 to 45 rad/s in steps of 0.05 (ours)"
+DAMPERS_WORDS = f"omega_c = {WEAK:g} and {STRONG:g} 1/s (Fig 4.6)"
+SIGN = "none, the sign decides"
+
+
+@cache
+def short_crank(inertia_ratio: float, damper: float, most: int) -> tuple[HarmonicMotion, ...]:
+    """Return the motion u/l4 of chapter IV's mechanism at each of the `SPEEDS`, with the harmonics up to ``most``."""
+    found = slider_equation(chapter_4(inertia_ratio), 1.0)
+    return tuple(
+        harmonic_balance(replace(found, spring=SQUARE_OF_OMEGA_K / w**2, damping=damper / w), most)
+        for w in SPEEDS.tolist()
+    )
+
+
+def harmonic(order: int, inertia_ratio: float, damper: float, most: int = 2) -> NDArray[np.float64]:
+    """Return the amplitude of one harmonic of u/l4 at each of the `SPEEDS`; see `short_crank`."""
+    return np.array([motion.harmonic(order) for motion in short_crank(inertia_ratio, damper, most)])
+
+
+@cache
+def unlike_oscillator(inertia_ratio: float) -> tuple[float, float]:
+    """Compare the motion with that of a damped oscillator under a force that grows with the square of the speed.
+
+    The oscillator has the mean values of M and K, and the force that fits the first harmonic at the mean of all speeds. The
+    results are the greatest differences from its amplitude, relative to it, of the first harmonic and of the amplitude by both
+    harmonics. Each is the greater result of two dampers.
+    """
+    found, compared = slider_equation(chapter_4(inertia_ratio), 1.0), []
+    for damper in (WEAK, STRONG):
+        mass = found.mass.mean - found.stiffness.mean
+        stiffness = np.abs(SQUARE_OF_OMEGA_K / SPEEDS**2 - mass + 1j * damper / SPEEDS)
+        first = harmonic(1, inertia_ratio, damper)
+        both = np.array([motion.amplitude for motion in short_crank(inertia_ratio, damper, 2)])
+        oscillator = (first * stiffness).mean() / stiffness
+        compared.append([np.abs(size / oscillator - 1.0).max() for size in (first, both)])
+    one, two = np.max(compared, axis=0).tolist()
+    return one, two
+
+
+def like_oscillator(why: str = "") -> tuple[Case, ...]:
+    """Judge whether the slider moves as a damped oscillator does; see `unlike_oscillator`."""
+    found = np.max([unlike_oscillator(i) for i in RESONANT], axis=0)
+    return tuple(at_most(name, ABOUT, x, why=why) for name, x in zip(("first harmonic", "both harmonics"), found))
+
+
+def speeds_above(level: float, curve: NDArray[np.float64]) -> float:
+    """Return the width (rad/s) of the speed range between the first and the last speed at which a curve crosses a level.
+
+    ``curve`` has a value for each of the `SPEEDS`.
+    """
+    (at,) = np.nonzero((curve[:-1] > level) != (curve[1:] > level))
+    passed = SPEEDS[at] + (level - curve[at]) / (curve[at + 1] - curve[at]) * np.diff(SPEEDS)[at]
+    return float(np.ptp(passed))
+
+
+def width(parameters: FiveBarParameters, number: int = 1) -> float:
+    """Return the width in lambda_k^2 of the region of instability with the given number, by Hill's determinant."""
+    return hill(parameters, number).width
+
+
+def removed(mechanisms: Iterable[FiveBarParameters]) -> float:
+    """Return the damping ratio that removes the first four regions of instability of all given mechanisms.
+
+    It is relative to the critical damping of the mass m4 + m5 on the spring.
+    """
+    return max(removing_estimate(p, number) for p in mechanisms for number in range(1, 5)) / (2.0 * OMEGA_K)
+
+
+def second_region(inertia_ratio: float) -> float:
+    """Return the width in lambda_k^2 of the region of instability at the natural frequency, relative to that at twice it."""
+    parameters = chapter_4(inertia_ratio)
+    return width(parameters, 2) / width(parameters)
+
+
+def only() -> tuple[Case, Case]:
+    """Judge whether there is a region of instability near twice the natural frequency only."""
+    least = min(map(second_region, RATIOS))
+    return (
+        near("speed of the region over the natural frequency", 2.0, twice_natural(), 2.0 * ABOUT),
+        at_most("region at the natural frequency", SMALL, least, why="without a damper there is one too"),
+    )
+
+
+def twice_natural() -> float:
+    """Return the speed in the middle of the first region divided by the natural frequency.
+
+    The result is that of the inertia ratio in `RATIOS` for which it is farthest from 2.
+    """
+    found = [axis(hill(chapter_4(i))) * OMEGA_K / natural_frequency(chapter_4(i)) for i in RATIOS]
+    return max(found, key=lambda x: abs(x - 2.0))
+
+
+def _listed(values: Iterable[float]) -> str:
+    *first, last = (f"{value:g}" for value in values)
+    return f"{', '.join(first)} and {last}"
+
+
+def introduction() -> tuple[Statement, ...]:
+    """Judge the statements of section 8.0 on the theory."""
+    removing = {
+        "rocker's inertia": removed(map(chapter_4, RATIOS)),
+        "crank": removed(map(with_crank, CRANKS)),
+        "coupler, angles held": removed(map(held, COUPLERS)),
+        "coupler, same ground link": removed(map(closed, COUPLERS)),
+    }
+    return (
+        Statement(
+            "The resonance analysis showed a behaviour similar to a second order system while the stability analysis showed "
+            "instability in the second region, i. e. in the vicinity of twice the natural frequency only.",
+            text("8.0, L6057"),
+            "amplitude as at L7102; speed in the middle of the region near twice the natural frequency over this frequency, "
+            "and width of the region at the natural frequency, as at L7116",
+            f"{ABOUT:g}, the rule for *similar* and, of 2, for *near*, for *vicinity* too; {SMALL:g}, the rule for "
+            "*negligible*, for a region that is not counted",
+            (
+                *like_oscillator("near half the natural frequency the second harmonic has its own resonance"),
+                *only(),
+            ),
+        ),
+        Statement(
+            "The instability, however, disappeared completely by addition of a small value of damping.",
+            text("8.0, L6063"),
+            "omega_c that removes the regions near twice, once, two thirds and half of the natural frequency, over the "
+            "critical one, 2 omega_k: the most of I4 = 0.25 to 2, of l2/l4 = 0.01 to 0.1 at I4 = 1 and of l3/l4 = 0.8 to 1.2 "
+            f"at I4 = 2; estimated by the {RIGHT} from their widths without a damper",
+            f"{SMALL:g}, the rule for *small*",
+            tuple(at_most(name, SMALL, share) for name, share in removing.items()),
+            "the slider's fall beyond the zeroth boundary is judged at L3952",
+        ),
+    )
+
+
+def linearised() -> tuple[Statement, ...]:
+    """Judge the conclusions on the linear equation and its stability."""
+    return (*_on_resonance(), *_on_stability())
+
+
+def _on_resonance() -> tuple[Statement, ...]:
+    """Judge the conclusions on the motion of the slider with a short crank."""
+    each = [(i, damper) for i in RESONANT for damper in (WEAK, STRONG)]
+    first, second = ({which: harmonic(n, *which) for which in each} for n in (1, 2))
+    five = {which: [harmonic(n, *which, 5) for n in range(1, 6)] for which in each}
+    speeds = np.array([resonance(chapter_4(i))[0] for i in RATIOS])
+    bend = np.abs(speeds - np.polyval(np.polyfit(RATIOS, speeds, 1), RATIOS)).max() / np.ptp(speeds)
+    # by damper, then by inertia
+    curves = [[first[i, damper] for i in RESONANT] for damper in (WEAK, STRONG)]
+    tops = np.array([[of.max() for of in row] for row in curves])
+    wide = np.array([[speeds_above(LARGE, of) for of in row] for row in curves])
+    half = [speeds_above(0.5 * of.max(), of) for of in curves[-1]]
+    return (
+        Statement(
+            "Results for a short crank showed similarity to a damped second order linear system behaviour.",
+            text("9.1, L7102"),
+            "slider's amplitude, by the first harmonic and by both, less that of one damped mass on a spring under an "
+            "unbalance, relative to it; means of M and K, the unbalance that fits the first harmonic on the average; the most "
+            f"of I4 = 0.5, 1 and 1.5, {DAMPERS_WORDS}, {SPEEDS_WORDS}; {RIGHT}",
+            f"{ABOUT:g}, the rule for *similar*",
+            like_oscillator(),
+            "near half the natural frequency the second harmonic, judged next, has its own resonance",
+        ),
+        Statement(
+            "The major harmonic in the solution was the first harmonic; the remaining ones were almost negligible.",
+            text("9.1, L7104"),
+            "second harmonic over the first, and greatest of the third to fifth over it: greatest over greatest, and at the "
+            "same speed; speeds, I4 and dampers of the row before, the most",
+            f"{SMALL:g}, the rule for *negligible*",
+            (
+                at_most("second, greatest over greatest", SMALL, max(second[x].max() / first[x].max() for x in each)),
+                at_most("second, at the same speed", SMALL, max((second[x] / first[x]).max() for x in each)),
+                at_most(
+                    "third to fifth, greatest over greatest",
+                    SMALL,
+                    max(np.max(higher) / one.max() for one, _, *higher in five.values()),
+                ),
+                at_most(
+                    "third to fifth, at the same speed",
+                    SMALL,
+                    max((higher / one).max() for one, _, *higher in five.values()),
+                ),
+            ),
+            "near half and a third of the natural frequency the second and the third have their own resonances",
+        ),
+        Statement(
+            "It was found that the increase in the rocker inertia decreased the natural frequency linearly, increased the "
+            "amplitude of vibrations and widened the region of resonance.",
+            text("9.1, L7110"),
+            f"resonant speeds without a damper, I4 = {_listed(RATIOS)}: distance from a line, relative to their range, and "
+            "greatest growth; least growth, from I4 = 0.5 to 1 and 1.5, of the greatest amplitude and of the range of speeds "
+            f"with u/l4 above {LARGE:g} (ours), {DAMPERS_WORDS}; {RIGHT}",
+            f"{ALIKE:g}, the rule for *linear*; {SIGN}",
+            (
+                at_most("distance from a line", ALIKE, bend),
+                at_most("growth of the resonant speed", 0.0, np.diff(speeds).max(), "rad/s"),
+                at_least("growth of the amplitude u/l4", 0.0, np.diff(tops).min()),
+                at_least("growth of the range", 0.0, np.diff(wide).min(), "rad/s"),
+            ),
+            f"the range above half of the peak shrinks: at {STRONG:g} 1/s from {half[0]:.2f} to {half[-1]:.2f} rad/s",
+        ),
+    )
+
+
+def _on_stability() -> tuple[Statement, ...]:
+    """Judge the conclusions on the regions of instability."""
+    by_crank = [width(with_crank(s)) for s in CRANKS]
+    by_coupler = [width(closed(s)) for s in COUPLERS]
+    by_inertia = [width(chapter_4(i)) for i in RATIOS]
+    narrow = max(2.0 * width(p) / (hill(p).low + hill(p).high) for p in map(chapter_4, RATIOS))
+    return (
+        Statement(
+            "The stability analysis showed a narrow region of instability in the [vicinity of w = 2wn] only, where [wn is "
+            "the] natural frequency.",
+            text("9.1, L7116"),
+            "region near twice the natural frequency: width in lambda_k^2 over its middle, the most; speed in its middle over "
+            "this frequency, with the mean mass, the farthest from 2; for *only*, width of the region at the natural frequency "
+            f"over that of this one, the least; I4 = 0.25 to 2, without a damper, {RIGHT}",
+            f"{SMALL:g}, the rule for *small*, for *narrow* too; {ABOUT:g} of 2, the rule for *near*, for *vicinity* too",
+            (at_most("width", SMALL, narrow), *only()),
+        ),
+        Statement(
+            "Instability of the slider motion was shown to increase with increase of crank length, decrease of coupler "
+            "length and increase of output inertia.",
+            text("9.1, L7120"),
+            "*instability* is read as the width of the first region in lambda_k^2, which Figs 5.1 to 5.3 show: its least "
+            f"growth between neighbours of l2/l4 = {_listed(CRANKS)} at I4 = 1, of l3/l4 = {_listed(COUPLERS[::-1])} at I4 = "
+            f"2, and of I4 = {_listed(RATIOS)}; without a damper, {RIGHT}",
+            SIGN,
+            (
+                at_least("longer crank", 0.0, np.diff(by_crank).min()),
+                at_least(
+                    "shorter coupler, same ground link",
+                    0.0,
+                    -np.diff(by_coupler).max(),
+                    why="on the same ground link the region is narrowest where coupler and rocker are about equal",
+                ),
+                at_least("shorter coupler, angles held", 0.0, -np.diff([width(held(s)) for s in COUPLERS]).max()),
+                at_least("larger inertia", 0.0, np.diff(by_inertia).min()),
+            ),
+        ),
+    )
