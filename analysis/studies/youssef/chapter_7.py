@@ -520,7 +520,7 @@ def _unweighted() -> tuple[Statement, ...]:
             "If an infinite number of terms were used the direct search would have led to the variational results.",
             text("7.3.1, L5768"),
             "squared error of the series with as many terms as there are desired points, which takes the variational U at "
-            "each, over that of the variational method, less 1; 20 random curves of 73 points, greatest",
+            "each, over that of the variational method, less 1; 20 random curves of 73 points (ours), greatest",
             "1e-9, the rounding",
             (
                 at_most("the best series", 1e-9, with_all_terms()),

@@ -147,7 +147,7 @@ OF_FIGURES = {s: sorted({*SPEEDS[s], *rig_1.COMPARED[s]}) for s in "AB"}
 #: Tolerance of a speed that is printed in tens of rpm.
 TENS = "5 rpm, half a unit of the last digit of a speed in tens"
 #: Which speed is compared with the stated one, in words.
-NEAREST = "of a speed the nearest to the stated one that rounding the printed stiffness"
+NEAREST = "a stated speed is compared with the nearest within the rounding of the printed stiffness"
 
 
 def _periodic() -> tuple[Statement, ...]:
@@ -274,8 +274,7 @@ def _amplitude_a() -> Statement:
         "where it reaches a maximum after which the amplitude decreases with increase of speed up to 345 RPM beyond "
         "which it increases with increase of speed.",
         text("8.4.1.2, L6734"),
-        f"amplitude over the speed with spring A, from 240 rpm on, the lowest of the figures; {NEAREST}, of one digit, "
-        "gives",
+        f"amplitude over the speed with spring A, from 240 rpm on, the lowest of the figures; {NEAREST}, of one digit",
         f"{TENS}; 0.5 rpm of 345 rpm, by the same rule; {ALIKE:g}, the rule for *the same*; of rises the sign alone",
         (
             at_least("least rise by 10 rpm, 240 to 290 rpm", 0.0, _least_rise("A", range(240, 291, 10)), "cm"),
@@ -369,8 +368,8 @@ def _fig_8_16() -> tuple[Statement, ...]:
             "The amplitude of oscillations increases with speed up to 580 RPM, i.e. half the natural frequency, where it "
             "reaches a maximum after which the amplitude decreases and then increases with increase of speed.",
             text("8.4.1.2, L6752"),
-            f"amplitude over the speed with spring B, from 500 rpm on, the lowest of the figures; {NEAREST}, of two digits, "
-            "gives",
+            f"amplitude over the speed with spring B, from 500 rpm on, the lowest of the figures; {NEAREST}, of two "
+            "digits",
             f"{TENS}; {ALIKE:g}, the rule for *the same*; of rises and falls the sign alone",
             (
                 at_least("least rise by 10 rpm, 500 to 560 rpm", 0.0, _least_rise("B", range(500, 561, 10)), "cm"),

@@ -167,8 +167,8 @@ def _resonance() -> tuple[Statement, ...]:
             "These are in good agreement with theoretical calculations based on the equivalent mass of the linkage which "
             "are 582 and 829 for springs C and D respectively.",
             text(f"{section}, L6865"),
-            "natural frequency by the mean effective mass, the nearest to the stated one that rounding the printed stiffness, "
-            "of one digit, gives; printed frequency of the sentence before over that with the stiffness as printed",
+            "natural frequency by the mean effective mass, the nearest to the stated one within the rounding of the printed "
+            "stiffness, of one digit; printed frequency of the sentence before over that with the stiffness as printed",
             f"0.5 rpm, half a unit of the last digit; {ALIKE:g}, for *good agreement* as for *the same*",
             (
                 *(
