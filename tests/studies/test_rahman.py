@@ -16,12 +16,11 @@ from analysis import studies
 from analysis.cli import main
 from analysis.numerics.dual import Dual
 from analysis.slider_crank import JointLoads, close, follow, joint_loads
-from analysis.slider_crank.closure import Rows
 from analysis.slider_crank.dual_dynamics import Binor
 from analysis.studies import ENTRIES, RAHMAN
 from analysis.studies.rahman import closure, forces, method, rates
 from analysis.studies.rahman import figures as rahman
-from analysis.studies.rahman.printed import CRANK_AT_SPEED, GENERAL, dependable, joint_rates, turn
+from analysis.studies.rahman.printed import CRANK_AT_SPEED, GENERAL, joint_rates
 from analysis.studies.rahman.table import (
     CAPTIONS,
     COMPONENTS,
@@ -61,8 +60,7 @@ SHOWN = (
     ("1", "rahman-closure", "The iterative process", "error of S4, a4 = 10 in at S1 = 3.5 in", 5.88),
     # of an axis that is turned by 0.8 rad
     ("2", "rahman-rates", "where symbols", "angular velocity", 2.0 * sin(0.4) * 2.1),
-    ("3", "rahman-rates", "The final", "row 37f, a4 = 30 in at S1 = 9 in", 83.74),
-    ("3", "rahman-rates", "The final", "row 37f, alpha4 = 310 deg", 215.17),
+    ("3", "rahman-rates", "The final", "row 37f", 28.99),
     ("3", "rahman-rates", "Since rank", "coefficients with the right side", 6.0),
     # the term that is too large, by 1 - cos^2 eta2
     (
@@ -80,7 +78,7 @@ SHOWN = (
         "right side of row 6",
         CRANK_IN * CRANK_SPEED * sin(2.1) * (1.0 - sin(0.35)),
     ),
-    ("9", "rahman-rates", "S1' = alpha S1 cos", "alpha = 2", 2.0 * 2.0 * cos(1.8) * (1.0 - sin(1.8)) * CRANK_SPEED),
+    ("9", "rahman-rates", "S1' = alpha S1 cos", "eq 28a", 2.0 * 2.0 * cos(1.8) * (1.0 - sin(1.8)) * CRANK_SPEED),
     ("9", "rahman-forces", "Specific gravity", "m1", 1.0 - 62.43 / 12.0**3),
 )
 
@@ -462,18 +460,6 @@ class TestMethod:
 
     @pytest.mark.slow
     @pytest.mark.parametrize(
-        ("rows", "from_before", "rotation", "error", "digit"),
-        [("printed", False, 23.0, 4.62, 0.05), ("upper", True, 20.3, 2.31, 0.05), ("all", True, 20.26, 1.71, 0.005)],
-    )
-    def test_variants_of_the_iteration(
-        self, rows: Rows, from_before: bool, rotation: float, error: float, digit: float
-    ) -> None:
-        found = turn(parameters(10.0), 3.5, rows, from_before=from_before)
-        assert np.max(found.rotation_deg) == pytest.approx(rotation, abs=digit)
-        assert np.max(found.error_in) == pytest.approx(error, abs=0.005)
-
-    @pytest.mark.slow
-    @pytest.mark.parametrize(
         ("case", "printed", "mended"), list(zip(method.ROW_F, (84.0, 215.0), (40.0, 66.0))), ids=["S1", "310"]
     )
     def test_the_unsolved_row(self, case: Case, printed: float, mended: float) -> None:
@@ -485,16 +471,6 @@ class TestMethod:
     def test_theta2_rate_as_printed_and_mended(self, erratum_4: bool, rate: float) -> None:
         found = joint_rates(CRANK_AT_SPEED, GENERAL, erratum_4=erratum_4)
         assert float(found.th2) == pytest.approx(rate, abs=5e-5)
-
-    @pytest.mark.slow
-    def test_davidon_fletcher_powell_ends_at_a_least_error_which_is_not_zero(self) -> None:
-        """In the plane it closes the loop. With the twist it ends lower than the printed iteration, and the loop stays open."""
-        flat, _, settled = dependable(parameters(10.0), 0.0)
-        assert settled
-        assert flat.max() < 1e-9
-        rotation, position, _ = dependable(parameters(20.0, 232.0), 0.0)
-        assert rotation.max() > 20.0
-        assert position.max() > 1.0
 
     @pytest.mark.parametrize("case", method.OUT, ids=lambda case: case.name)
     def test_planar_estimates_miss_the_tilt_of_the_rod_most(self, case: Case) -> None:

@@ -7,7 +7,6 @@ from itertools import pairwise, product
 from typing import cast
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import root
 from scipy.spatial.transform import Rotation
 
@@ -15,11 +14,11 @@ from linkwork.slider_crank.published import parameters
 
 from ...numerics.dual import Dual, about_i, about_j, about_k
 from ...slider_crank import Settled, assembly_margin, close, constant_shift, greatest_shift, settle
-from ...slider_crank.closure import chain, equations, freedoms, planar, residuals
+from ...slider_crank.closure import chain, equations, planar, residuals
 from ...units import INCH
 from ..statements import Statement, at_least, at_most, near, text
 from ..study import Study, StudyResult, padded
-from ..variation import cache, unvaried
+from ..variation import unvaried
 from .figures import (
     ALL,
     ANGLE,
@@ -50,22 +49,15 @@ from .printed import (
     MAX_STEPS,
     STEP,
     STEP_DEG,
-    Turn,
-    dependable,
     turn,
 )
 from .table import IDEAL, TWISTS_REACHED_DEG, Case
 
 #: Rows and columns of the entries 21, 31 and 32, the right sides of eqs 20.
 _BELOW = ([1, 2, 2], [0, 0, 1])
-#: Runs that do not settle, one for each offset of L1121 and one beyond each limit of the twist.
-UNSETTLED = (
-    *(
-        Case(f"a4 = {a4:g} in at S1 = {shift:g} in", a4, shift, IDEAL.twist_deg)
-        for a4, shift in ((0.0, 2.5), (10.0, 6.0), (20.0, 7.0), (30.0, 11.0))
-    ),
-    *(Case(f"alpha4 = {twist:g} deg", 20.0, 0.0, twist) for twist in (231.0, 312.0)),
-)
+#: Planar mechanisms of section 3.1, and what they are called in the labels of cases.
+PLANES = tuple(Case("", a4, 0.0, 270.0) for a4 in (0.0, 10.0, 20.0, 30.0))
+IN_PLANE, OUT_OF_IT = "in the plane, a4 = 0, 10, 20, 30 in", f"out of the plane, the {len(OUT)} cases of the graphs"
 #: A larger limit (rad, in) on a small step, for comparison: the thesis gives no limit.
 LOOSE = 1e-3
 #: Differential operator of a rotation about k, eqs 2a and 3a.
@@ -159,26 +151,22 @@ def _nine_equations(case: Case, angle: float, q: FloatArray) -> tuple[FloatArray
     return np.stack([part.ravel() for h in sides for part in (h.real, h.dual / INCH)], -1), right
 
 
-def _independent() -> tuple[int, float, float]:
-    """Return the number of independent equations in 19a, and how much the dependent equations contradict them: order and size.
+def _independent() -> tuple[int, float]:
+    """Return the number of independent equations in 19a, and the order to which the dependent equations agree with them.
 
     The number is the rank of the left sides in a general position. Left sides on opposite sides of the diagonal add up to
     zero, so their right sides should too. The order is the power of the opening (rad, in) with which these sums of right sides
-    decrease as a closed planar loop is opened less and less. The size is the greatest real part of the sums where the iteration
-    ends in the first case out of the plane.
+    decrease as a closed planar loop is opened less and less.
     """
 
-    def odds(case: Case, angle: float, q: FloatArray) -> FloatArray:
-        _, right = _nine_equations(case, angle, q)
-        return np.asarray(np.abs(right + np.swapaxes(right, 0, 1)).max((0, 1)))
+    def odds(q: FloatArray) -> float:
+        _, right = _nine_equations(PLANE, AT, q)
+        return float(np.abs(right + np.swapaxes(right, 0, 1)).max())
 
-    (first, *_), at = OPEN, 0.9
-    left, _ = _nine_equations(first, at, np.array([float(x) for x in GENERAL]))
-    closed = planar(parameters(PLANE.offset_in), np.array([at]))[0] / [1.0, 1.0, 1.0, 1.0, INCH]
-    wide, narrow = (odds(PLANE, at, closed + off * np.array([0.3, 0.5, -0.4, 0.6, 0.2])) for off in (2e-3, 1e-3))
-    ended = zip(np.radians(GRID_DEG).tolist(), followed(first).unknowns[:, 0])
-    worst = max(float(odds(first, angle, q)[0]) for angle, q in ended)
-    return int(np.linalg.matrix_rank(left)), float(np.log2(wide.max() / narrow.max())), worst
+    left, _ = _nine_equations(OPEN[0], AT, np.array([float(x) for x in GENERAL]))
+    closed = planar(parameters(PLANE.offset_in), np.array([AT]))[0] / [1.0, 1.0, 1.0, 1.0, INCH]
+    wide, narrow = (odds(closed + off * np.array([0.3, 0.5, -0.4, 0.6, 0.2])) for off in (2e-3, 1e-3))
+    return int(np.linalg.matrix_rank(left)), float(np.log2(wide / narrow))
 
 
 def _joint_freedoms() -> tuple[int, ...]:
@@ -200,89 +188,73 @@ def _joint_freedoms() -> tuple[int, ...]:
     return tuple(ranks)
 
 
-def _settled(a4: float, shifts: FloatArray, off: float) -> NDArray[np.bool_]:
-    """Return whether the printed iteration converges at every crank angle, at n shifts (in) and beside them; shape (n, 3).
-
-    The columns are for the shift minus ``off``, the shift itself, and the shift plus ``off``.
-    """
-    each = shifts[:, None] + off * np.array([-1.0, 0.0, 1.0])
-    return turn(parameters(a4), each.ravel()).settled.reshape(each.shape)
-
-
-@cache
-def _twisted(twist_deg: float) -> Turn:
-    """Run the iteration over a turn at a4 = 20 in and S1 = 0 with a twist alpha4 (deg)."""
-    return turn(parameters(20.0, twist_deg), 0.0)
+def _twisted_settles(twist_deg: float) -> bool:
+    """Return whether the iteration converges at every angle of a turn at a4 = 20 in and S1 = 0 with a twist alpha4 (deg)."""
+    return bool(followed(Case("", 20.0, 0.0, twist_deg)).settled.all())
 
 
 def _limits() -> tuple[Statement, ...]:
-    """Judge the stated limits of the iteration, and the conclusions on the mechanism that the thesis draws from them."""
-    place = text("section 3.2, L1121")
+    """Judge the limits of S1 and alpha4 that section 3.2 states of the iteration."""
+    tried = np.arange(0.0, 11.5, 0.5)
     reached = {}
-    for a4, first, last, stated in (
-        (0.0, 1.0, 6.0, 1.5),
-        (10.0, 3.5, 8.0, 3.5),
-        (20.0, 3.5, 7.5, 3.5),
-        (30.0, 0.0, 11.0, 9.0),
-    ):
-        tried = np.arange(first, last + 0.25, 0.5)
-        settled = _settled(a4, tried, 1e-6)
-        # the program "converges as long as", but elsewhere "fails if greater"
-        settled = np.logical_and.accumulate(settled) if a4 == 30.0 else settled
-        # each way of rounding has its limit
-        limits = [float(np.max(tried[each], initial=0.0)) for each in settled.T]
-        reached[a4] = limits[int(np.argmin(np.abs(np.array(limits) - stated)))]
-    between = np.linspace(*TWISTS_REACHED_DEG, 7).tolist()
-    within = float(np.mean([_twisted(twist).settled.all() for twist in between]))
+    for a4 in (0.0, 10.0, 20.0, 30.0):
+        settled = turn(parameters(a4), tried).settled
+        reached[a4] = float(np.max(tried[np.logical_and.accumulate(settled)], initial=0.0))
+    within = float(np.mean([_twisted_settles(twist) for twist in np.linspace(*TWISTS_REACHED_DEG, 7).tolist()]))
     twists = []
     for which, limit, way in zip(("least", "greatest"), TWISTS_REACHED_DEG, (-1.0, 1.0)):
         found = limit
-        while _twisted(found + way).settled.all():
+        while _twisted_settles(found + way):
             found += way
         twists.append(near(f"{which} alpha4", f"{limit:g}", found, 1.0, "deg"))
-    at_ends = (*TWISTS_REACHED_DEG, TWISTS_REACHED_DEG[1] + 1.0)
-    *needed, too_many = (int(_twisted(twist).steps.max()) for twist in at_ends)
-    shifts = {a4: (greatest_shift(parameters(a4)) or 0.0) / INCH for a4 in (0.0, 10.0, 20.0, 30.0)}
-    beyond = [
-        at_most(
-            f"a4 = {a4:g} in, S1 = {shift + 1.0:.4g} in",
-            0.0,
-            assembly_margin(parameters(a4), constant_shift((shift + 1.0) * INCH)).length / INCH,
-            "in",
-        )
-        for a4, shift in shifts.items()
-    ]
-    margins = [assembly_margin(parameters(a4), constant_shift(shift * INCH)).length for a4, shift in shifts.items()]
-    meeting = np.array(margins) / INCH
-    own = "the thesis gives neither the accuracy nor the number of corrections that it allows, on which the last step depends"
-    return (
+    place, step = text("section 3.2, L1121"), "0.5 in, the step of the limits"
+    no_offset, increased, twist = (
         Statement(
             "For the particular link lengths as mentioned before, when offset [a4] is zero, the program fails to "
             "converge if the term [S1] is greater than 1.5 inches.",
             place,
-            "greatest S1, by halves of an inch from 1 to 6 in, at which the printed iteration settles at every angle; three "
-            "such limits are computed, with S1 less 1e-6 in, as it is, and plus 1e-6 in, which round differently, and the one "
-            "nearest to the stated limit counts",
-            f"0.5 in, the step of the limits; {own}",
+            "greatest S1, by halves of an inch, up to which the printed iteration settles at every angle",
+            step,
             (near("a4 = 0", "1.5", reached[0.0], 0.5, "in"),),
-            "up to 2 in rounding decides whether it settles, from 2.5 to 6 in it never does",
+            "at 1.5 in rounding decides",
         ),
         Statement(
             "When offset is increased to 10 inches or greater, the program fails to converge if the term [S1] is "
             "greater than 3.5 inches and when offset [a4] is 30 inches, the program converges as long as the term "
             "[S1] is less than or equal to 9 inches.",
             place,
-            "limit as in the row before, from 3.5 to 8 in and from 3.5 to 7.5 in; with a4 = 30 in, by *as long as*, the "
-            "greatest S1 from 0 to 11 in up to which the printed iteration settles",
-            f"0.5 in, the step of the limits; {own}",
+            "limit as in the row before",
+            step,
             (
                 near("a4 = 10 in", "3.5", reached[10.0], 0.5, "in"),
                 near("a4 = 20 in, which is greater than 10 in", "3.5", reached[20.0], 0.5, "in"),
                 near("a4 = 30 in", "9", reached[30.0], 0.5, "in"),
             ),
-            "the limit grows from 10 in on, as the sentence's second half has it; with 20 and 30 in the iteration settles here "
-            "and there beyond it again",
+            "the limit grows with the offset from 10 in on",
         ),
+        Statement(
+            "When offset [a4] is 20 inches and crank axial displacement [S1] is zero, the program converges as long "
+            "as offset [alpha4] is between 232 and 310 degrees.",
+            place,
+            "least and greatest alpha4, by degrees, up to which the printed iteration settles at every angle; share of seven "
+            "twists, evenly from 232 to 310 deg, at which it settles",
+            "1 deg, the step of the limits; none of the share",
+            (*twists, at_least("232 to 310 deg", 1.0, within)),
+            "the loops on which it settles are open (erratum 1)",
+        ),
+    )
+    return no_offset, increased, *_mechanism_limits(), twist
+
+
+def _mechanism_limits() -> tuple[Statement, Statement]:
+    """Judge what section 3.2 infers from the limits of the iteration about the mechanism itself."""
+    shifts = {a4: (greatest_shift(parameters(a4)) or 0.0) / INCH for a4 in (0.0, 10.0, 20.0, 30.0)}
+
+    def margin(a4: float, shift: float) -> float:
+        return float(assembly_margin(parameters(a4), constant_shift(shift * INCH)).length / INCH)
+
+    place = text("section 3.2, L1121")
+    return (
         Statement(
             "From this observation [of the limits of S1] it can be inferred that in order for the mechanism to work, with "
             "the increase of crank axial shift, offset [a4] should be increased.",
@@ -293,8 +265,7 @@ def _limits() -> tuple[Statement, ...]:
                 at_least(f"a4 = {before:g} to {after:g} in", 0.0, shifts[after] - shifts[before], "in")
                 for before, after in pairwise(shifts)
             ),
-            "the mechanism works up to S1 = sqrt(a2^2 - (a1 + a4)^2), which falls from 48.5 to 27.1 in; the limits "
-            "are those of the iteration alone",
+            "the mechanism works up to S1 = sqrt(a2^2 - (a1 + a4)^2); the stated limits are the iteration's alone",
         ),
         Statement(
             "In the case of mechanism failure, it will either lose closure, i.e. one link or more will get detached "
@@ -304,22 +275,14 @@ def _limits() -> tuple[Statement, ...]:
             "cannot close; at the greatest S1, greatest of the four, zero where the two assemblies meet, so that the slider "
             "can go to the opposite side",
             f"none, the sign decides; {ROUNDING}, of zero",
-            (*beyond, nothing("a4 = 0, 10, 20, 30 in, greatest S1", meeting, "in")),
-            "the crank angle being given, as in the thesis: else the crank may stop there; at the thesis's own limits neither "
-            "occurs, see the row before; to which side the slider goes depends on the forces and is not measured",
-        ),
-        Statement(
-            "When offset [a4] is 20 inches and crank axial displacement [S1] is zero, the program converges as long "
-            "as offset [alpha4] is between 232 and 310 degrees.",
-            place,
-            "limits of alpha4, by degrees, at which the printed iteration settles at every angle; share of alpha4 = 232 to 310 "
-            "deg by 13 deg at which it settles",
-            f"1 deg, the step of the limits; none of the share; {own}",
-            (*twists, at_least("232 to 310 deg", 1.0, within)),
-            f"if {max(needed)} to {too_many - 1} corrections are allowed at an angle, and not {MAX_STEPS} as here, the limits "
-            "are the stated ones exactly; the loops on which it settles are open, at 232 deg by up to "
-            f"{np.max(followed(OPEN[1]).rotation_deg):.0f} deg (erratum 1); the mechanism itself turns fully at every "
-            "alpha4",
+            (
+                *(
+                    at_most(f"a4 = {a4:g} in, S1 = {shift + 1.0:.4g} in", 0.0, margin(a4, shift + 1.0), "in")
+                    for a4, shift in shifts.items()
+                ),
+                nothing("a4 = 0, 10, 20, 30 in, greatest S1", [margin(*at) for at in shifts.items()], "in"),
+            ),
+            "where the thesis's program fails, the mechanism does not, by the row before",
         ),
     )
 
@@ -363,19 +326,9 @@ def endings(cases: tuple[Case, ...], offs: tuple[float, ...] = (0.0,), small: fl
     return ended
 
 
-def _poor_starts(cases: tuple[Case, ...]) -> tuple[float, float]:
-    """Return the fractions of runs from poor estimates that converge, and that end on the closed loop.
-
-    The estimates of theta2 and theta3 are each wrong by -120, -60, 60, 120 and 180 deg (see `endings`).
-    """
-    ended = endings(cases, (-120.0, -60.0, 60.0, 120.0, 180.0))
-    closed = [(found.rotation_residual < NOTHING) & (found.position_error < NOTHING) for found in ended]
-    return float(np.mean([found.settled for found in ended])), float(np.mean(closed))
-
-
 def _steps_from_near(case: Case, small: float) -> FloatArray:
     """Return the numbers of corrections at the crank angles where the iteration starts within 20 deg of its result."""
-    found = turn(parameters(case.offset_in, case.twist_deg), case.shift_in, small=small)
+    found = followed(case, small)
     changes = np.degrees(np.abs(np.diff(found.unknowns[:, 0, :4], axis=0))).max(-1)
     return np.asarray(found.steps[1:, 0][changes <= 20.0])
 
@@ -406,13 +359,6 @@ def _opening_of_estimates() -> float:
     return worst
 
 
-def _system(case: Case, unknowns: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return the matrix A and the right side V of eq 23 at each angle of the grid, given the n unknown vectors (n, 5)."""
-    angle, shift = np.radians(GRID_DEG), np.full(GRID_DEG.size, case.shift_in * INCH)
-    unknowns = unknowns * [1.0, 1.0, 1.0, 1.0, INCH]
-    return equations(*chain(parameters(case.offset_in, case.twist_deg), angle, shift, unknowns), INCH, "printed")
-
-
 def _condition(case: Case) -> float:
     """Return the least value, over the corrections of a turn, of the least singular value of A divided by the greatest.
 
@@ -438,19 +384,19 @@ def _condition(case: Case) -> float:
     return least
 
 
-def _first_correction(case: Case) -> tuple[float, float]:
-    """Return the greatest entries of A Delta - V and of Delta - A^-1 V, for Delta = (A'A)^-1 A'V.
+def _apart_from_the_inverse(case: Case) -> float:
+    """Return the greatest entry of Delta - A^-1 V for Delta = (A'A)^-1 A'V, over the first corrections of a turn.
 
-    A^-1 is the name of (A'A)^-1 A' in L457. Delta is the first correction at an angle, from the solution at the previous angle.
+    A^-1 is the name of (A'A)^-1 A' in L457. A first correction is one from the solution at the previous angle.
     """
-    matrix, right = _system(case, np.roll(followed(case).unknowns[:, 0], 1, axis=0))
-    transposed = np.swapaxes(matrix, -1, -2)
-    delta = np.linalg.solve(transposed @ matrix, transposed @ right[..., None])
+    angle, shift = np.radians(GRID_DEG), np.full(GRID_DEG.size, case.shift_in * INCH)
+    start = np.roll(followed(case).unknowns[:, 0], 1, axis=0) * [1.0, 1.0, 1.0, 1.0, INCH]
+    loop = chain(parameters(case.offset_in, case.twist_deg), angle, shift, start)
+    matrix, right = equations(*loop, INCH, "printed")
+    transposed, right = np.swapaxes(matrix, -1, -2), right[..., None]
+    delta = np.linalg.solve(transposed @ matrix, transposed @ right)
     inverse = np.linalg.inv(transposed @ matrix) @ transposed
-    return (
-        float(np.abs(matrix @ delta - right[..., None]).max()),
-        float(np.abs(delta - inverse @ right[..., None]).max()),
-    )
+    return float(np.abs(delta - inverse @ right).max())
 
 
 def _right_angle_condition() -> float:
@@ -461,63 +407,29 @@ def _right_angle_condition() -> float:
     return float(singular[-1] / singular[0])
 
 
-def closure() -> StudyResult:
-    """Compute the closure error at the end of the iteration over a turn, and judge the statements on the loop closure."""
-    columns = {ANGLE: GRID_DEG}
-    (first, *_), sparse = OPEN, GRID_DEG[::2]
-    p, unknowns = parameters(first.offset_in), followed(first).unknowns[4, 0] * [1.0, 1.0, 1.0, 1.0, INCH]
-    left = freedoms(p, float(np.radians(GRID_DEG[4])), first.shift_in * INCH, unknowns)
-    determined, combined = [], []
-    for case in (PLANE, *OPEN):
-        found = followed(case)
-        mechanism = parameters(case.offset_in, case.twist_deg)
-        rotation, error, _ = dependable(mechanism, case.shift_in)
-        determined += [
-            nothing(f"loop open, {case.name}", np.max(found.rotation_deg), "deg"),
-            nothing(f"error of S4, {case.name}", np.max(found.error_in), "in"),
-        ]
-        combined.append(f"{np.max(rotation):.2g} deg and {np.max(error):.2g} in ({case.name})")
-        if case != PLANE:
-            columns[f"rotation left as printed; {case.name} [deg]"] = found.rotation_deg[:, 0]
-            columns[f"error of S4 as printed; {case.name} [in]"] = found.error_in[:, 0]
-            columns[f"rotation left with Davidon Fletcher Powell; {case.name} [deg]"] = np.interp(
-                GRID_DEG, sparse, rotation
-            )
-            columns[f"error of S4 with Davidon Fletcher Powell; {case.name} [in]"] = np.interp(GRID_DEG, sparse, error)
-    unmet, by_name = np.transpose([_first_correction(case) for case in (PLANE, *OPEN)])
+def _detection() -> Statement:
+    """Judge whether the iteration detects that a solution is possible, as the abstract states."""
     missed, wrong = _detection_errors()
-    rank, order, odds = _independent()
-    half_turn, open_22 = np.diag([1.0, -1.0, -1.0]), _rotation_that_meets_22()
-    open_deg = np.degrees(Rotation.from_matrix(open_22).magnitude())
-    planes = tuple(Case("", a4, 0.0, 270.0) for a4 in (0.0, 10.0, 20.0, 30.0))
-    away = (-20.0, -10.0, 0.0, 10.0, 20.0)
-    out_of_it = f"out of the plane, the {len(OUT)} cases of the graphs"
-    made = {
-        f"{where}; to {small:g}": np.concatenate(steps)
-        for small in (STEP, LOOSE)
-        for where, steps in (
-            ("in the plane, a4 = 0, 10, 20, 30 in", [found.steps for found in endings(planes, away, small)]),
-            (out_of_it, [_steps_from_near(case, small) for case in OUT]),
-        )
-    }
-    (settled, on_it), (settled_out, _) = _poor_starts(planes), _poor_starts(OUT)
-    failing = "; ".join(case.name for case in UNSETTLED)
-    conclusions = text("section 3.3, L1131")
-    statements = (
-        Statement(
-            "The approach is developed in such a manner that a digital computer can detect when a solution is "
-            "possible and then solve the whole problem.",
-            text("abstract, L45"),
-            "shares of the shifts at which the crank turns fully, 0 to 48 in by 2 in at a4 = 0, 10, 20, 30 in; the iteration "
-            "as printed, by Newton and Raphson, from the planar estimate at every 30 deg, each angle on its own, not from the "
-            "one before as in L465",
-            f"none of a share; {NOTHING:g} rad, the rounding, of an open loop",
-            (
-                at_most("a solution is possible, and the iteration does not settle", 0.0, missed),
-                at_most("the iteration settles on a loop that is open", 0.0, wrong),
-            ),
-            "the iteration settles where its steps become small, which says nothing of the loop (erratum 1)",
+    return Statement(
+        "The approach is developed in such a manner that a digital computer can detect when a solution is "
+        "possible and then solve the whole problem.",
+        text("abstract, L45"),
+        "of the shifts at which the crank turns fully, by 2 in from 0, a4 = 0, 10, 20, 30 in, the shares at which the printed "
+        "iteration, from the planar estimate at every 30 deg, fails",
+        f"none of a share; {NOTHING:g} rad, the rounding, of an open loop",
+        (
+            at_most("it does not settle at every angle", 0.0, missed),
+            at_most("it settles, and a loop is open", 0.0, wrong),
         ),
+        "the iteration settles where its steps become small, which says nothing of the loop (erratum 1)",
+    )
+
+
+def _matrices() -> tuple[Statement, ...]:
+    """Judge the freedoms of the joints, the matrices of eqs 1 to 4, and the operators of eqs 2a to 4a."""
+    words, counts = ("one and one", "three", "three", "one"), (2.0, 3.0, 3.0, 1.0)
+    joints = enumerate(zip(words, counts, _joint_freedoms()), start=1)
+    return (
         Statement(
             "Fig. 3 is the generalized slider crank in which joint 1 is cylindrical with one translational and one "
             "rotational degrees of freedom, joints 2 and 3 are ball joints, each of which has three rotational "
@@ -526,15 +438,8 @@ def closure() -> StudyResult:
             "freedoms that the matrices of eqs 1 to 4 give each joint: the rank of their derivatives by its variables, in a "
             "general position",
             "none of a count",
-            tuple(
-                replace(near(f"joint {n}", float(count), found, 0.0), stated=words)
-                for n, (words, count, found) in enumerate(
-                    zip(("one and one", "three", "three", "one"), (2, 3, 3, 1), _joint_freedoms()), start=1
-                )
-            ),
-            "erratum 1: eqs 2 and 3 give each ball joint two rotations. So the chain of joints has "
-            f"{left} freedom, and theta1 and S1 cannot both be given; with three it would have 2 + 3 + 3 + 1 - 6 = 3, of which "
-            "one is the spin of the rod",
+            tuple(replace(near(f"joint {n}", count, found, 0.0), stated=word) for n, (word, count, found) in joints),
+            "erratum 1: eqs 2 and 3 give each ball joint two rotations",
         ),
         Statement(
             "Therefore, the transformation matrix, specifying the location of coordinate frame {2} with respect to frame {1}, "
@@ -544,7 +449,6 @@ def closure() -> StudyResult:
             "in a general position, lengths in inches",
             ROUNDING,
             (nothing("eqs 1 to 4", _matrices_error()),),
-            "the row above judges whether the rotations are those of ball joints",
         ),
         Statement(
             "hence partial differential operator [Q_L eta_2] can be written as,",
@@ -554,31 +458,33 @@ def closure() -> StudyResult:
             f"{ROUGH:g}, the error of the quotients",
             (at_most("eqs 2a, 2b, 3a, 3b, 4a", ROUGH, _operator_error()),),
         ),
+    )
+
+
+def _step() -> tuple[Statement, ...]:
+    """Judge the equations of a step of the iteration, eqs 19a to 23a."""
+    rank, order = _independent()
+    half_turn, open_22 = np.diag([1.0, -1.0, -1.0]), _rotation_that_meets_22()
+    open_deg = np.degrees(Rotation.from_matrix(open_22).magnitude())
+    return (
         Statement(
             "The numerical method being used to determine the displacements is based on the algorithm (12) introduced "
             "by Hall, Root & Sandgren (1977). This algorithm is the combination of Davidon-Fletcher-Powell optimization "
             "routine with the Newton-Raphson method as applied to kinematics by Uicker, Denavit and Hartenberg (1964).",
             text("section 2.6.1, L366; abstract, L45"),
-            why="the thesis prints the Newton-Raphson half alone (eqs 7 to 26), and its program is missing. The reference "
-            "was not at hand; ours: a step by eq 23a is taken where it halves the sum of squares of eq 25, and a step of "
-            "Davidon, Fletcher and Powell down that sum where it does not. It leaves a rotation round the loop and an error of "
-            f"S4, greatest of the turn by {2.0 * STEP_DEG:g} deg after at most {MAX_STEPS} steps, of {', '.join(combined)}. "
-            "Out of the plane the loop of eqs 2 and 3 cannot close (erratum 1)",
+            why="the thesis prints the Newton-Raphson half alone (eqs 7 to 26), and its program is missing",
         ),
         Statement(
             "So from equation (19a) nine dual equations can be written from this matrix equation, out of which only three are "
             "independent.",
             text("section 2.6.1, eqs 19a, 19b, L416"),
-            "rank of the nine left sides, by eqs 12 to 16, in a general position; order, in the angles and the S4 by which a "
-            "closed loop in the plane is opened, of the sums of opposite right sides, which vanish if the three give the "
-            "others, those on the diagonal among them",
-            "none of a count; 2, the first order that eq 11 neglects; 0.05, as an order is a whole number",
+            "rank of the nine left sides, by eqs 12 to 16, in a general position; order, in the opening of a planar loop, of "
+            "the sums of opposite right sides, which vanish if three equations give the other six",
+            "none of a count; 2, as eq 11 neglects the second order; 0.05, as an order is a whole number",
             (
                 replace(near("independent left sides", 3.0, rank, 0.0), stated="three"),
-                at_least("order of the rest of the right sides", 1.95, order),
+                at_least("order of the sums of right sides", 1.95, order),
             ),
-            f"so it is to first order; out of the plane ({OPEN[0].name}), where the loop stays open (erratum 1), the other six "
-            f"contradict the three by up to {odds:.2g} in a real part where the iteration ends",
         ),
         Statement(
             "Equation set (20) does not include the constraint that the each diagonal element must be equal to unity at "
@@ -586,41 +492,46 @@ def closure() -> StudyResult:
             "and Erdman (1984).",
             text("section 2.6.1, eqs 20, 22, L430-436"),
             "right sides of eqs 20 for a loop that is open by half a turn about i; greatest departure from unity of a diagonal "
-            "element of a rotation for which the right sides of eqs 22 vanish, sought from a rotation by 42 deg, our choice",
+            "element of a loop that is open and for which the right sides of eqs 22 vanish",
             ROUNDING,
             (
-                nothing("not in eqs 20: right sides, half a turn", np.max(np.abs(half_turn[_BELOW]))),
-                nothing("in eqs 22: diagonal elements", np.diag(open_22) - 1.0),
+                nothing("not in eqs 20: half a turn", half_turn[_BELOW]),
+                nothing(f"in eqs 22: a loop open by {open_deg:.1f} deg", np.diag(open_22) - 1.0),
             ),
-            f"eqs 22 exclude half a turn, but a loop that is open by {open_deg:.1f} deg meets them as well",
+            "eqs 22 exclude half a turn, but not every open loop",
         ),
         Statement(
             "Hence the modified form of equation (23) is as follows: [Delta = (A'A)^-1 A'V] which is exactly same as [Delta = "
             "A^-1 V].",
             text("section 2.6.1, eq 23a, L457-463"),
-            "difference of the two sides, A^-1 being the name that L457 gives to (A'A)^-1 A'; *form of equation (23)* is read, "
-            "by us, as meeting it, A Delta = V, as Delta would by an inverse of A: greatest entry of A Delta - V; each at the "
-            "first correction from the angle before, greatest of the turn, lengths in inches",
+            "difference of the two sides, A^-1 being what L457 gives, greatest of the first corrections of a turn; "
+            f"{OPEN[0].name}, lengths in inches",
             ROUNDING,
-            (
-                nothing("the two sides, with A^-1 as L457 has it", by_name.max()),
-                *(nothing(f"as a form of eq 23; {case.name}", entry) for case, entry in zip((PLANE, *OPEN), unmet)),
-            ),
-            "the same by the name that L457 gives; six rows for five unknowns: in the plane eq 23 is met only once the loop is "
-            f"closed, before that to second order in the step of the crank, here {STEP_DEG:g} deg, ours; out of it never "
-            "(erratum 1)",
+            (nothing("the two sides", _apart_from_the_inverse(OPEN[0])),),
+            "A is 6 x 5, so that Delta need not meet eq 23 itself",
         ),
+    )
+
+
+def _ends() -> tuple[Statement, ...]:
+    """Judge the displacements at the end of the iteration, and the estimates at its start."""
+    determined = []
+    for case in (PLANE, *OPEN):
+        found = followed(case)
+        determined += [
+            nothing(f"loop open, {case.name}", found.rotation_deg, "deg"),
+            nothing(f"error of S4, {case.name}", found.error_in, "in"),
+        ]
+    return (
         Statement(
             "The iterative process is continued until the absolute values of all error terms are less than or equal "
             "to the desired accuracy limits. At this point the displacements are determined only for the first "
-            "position of the input link.",
+            "position of the input link. ... This process is continued for a complete rotation of the input link, the crank.",
             text("section 2.6.1, L465"),
-            "rotation round the loop and error of S4 where the printed iteration ends, greatest of the turn, through which "
-            "L465 goes on in the same way",
+            "rotation round the loop and error of S4 where the printed iteration ends, greatest of the turn",
             ROUNDING,
             tuple(determined),
-            "erratum 1: small steps are no closed loop; at the first position, theta1 = 0, the loop is already open by "
-            f"{', '.join(f'{followed(case).rotation_deg[0, 0]:.0f}' for case in OPEN)} deg in the three cases out of the plane",
+            "erratum 1: small steps are no closed loop",
         ),
         Statement(
             "From geometry the following formulas for the joint variables can be written.",
@@ -629,58 +540,71 @@ def closure() -> StudyResult:
             "1e-12, the rounding",
             (at_most("open", 1e-12, _opening_of_estimates()),),
         ),
-        *_limits(),
+    )
+
+
+def _convergence() -> tuple[Statement, ...]:
+    """Judge what section 3.3 states of the starts, the number of iterations, and a singular matrix A."""
+    poor, fair = (-120.0, -60.0, 60.0, 120.0, 180.0), (-20.0, -10.0, 0.0, 10.0, 20.0)
+    settled = {
+        where: np.mean([found.settled for found in endings(cases, poor)])
+        for where, cases in ((IN_PLANE, PLANES), (OUT_OF_IT, OUT))
+    }
+    made = {
+        f"{where}; to {small:g}": np.concatenate(steps)
+        for small in (STEP, LOOSE)
+        for where, steps in (
+            (IN_PLANE, [found.steps for found in endings(PLANES, fair, small)]),
+            (OUT_OF_IT, [_steps_from_near(case, small) for case in OUT]),
+        )
+    }
+    place = text("section 3.3, L1131")
+    return (
         Statement(
             "The main disadvantage of this method is that if we can not make good initial estimates for joint "
             "displacements, ... the method will not converge.",
-            conclusions,
+            place,
             "share of starts from which the iteration settles: planar estimates, by 30 deg of the crank, with theta2 and "
             "theta3 off, each by 60 or 120 deg either way or by 180 deg, our choice",
             "none of a share",
-            (
-                at_most("in the plane, a4 = 0, 10, 20, 30 in", 0.0, settled),
-                at_most(out_of_it, 0.0, settled_out),
-            ),
-            f"in the plane it settles on the loop sought from {100.0 * on_it:.0f} % of these estimates, and from nearly all "
-            "others on another closed loop, with the slider on the other side; out of the plane on open loops; the second "
-            "digit of the shares depends on rounding",
+            tuple(at_most(where, 0.0, share) for where, share in settled.items()),
+            "it settles all the same, though not always on the loop that is sought",
         ),
         Statement(
             "Usually the process converges in 3 to 6 iterations if estimates are within 20 degrees, which is quite "
             "possible by using the direct formula for the planar case.",
-            conclusions,
-            "share of starts from which 3 to 6 corrections are made until one is below "
-            f"{STEP:g} or {LOOSE:g} (rad, in), both ours: in the plane planar estimates, by 30 deg of the crank, with theta2 "
-            "and theta3 off, each by 0, 10 or 20 deg either way, not both by 0; out of it the angle before, where this is "
-            "within 20 deg of where the iteration ends; greatest difference of the planar estimates (section 2.6.2, theta1 = "
-            "0) from the angles of the closed loop",
+            place,
+            f"share of starts from which 3 to 6 corrections reach one below {STEP:g} or {LOOSE:g} (rad, in), ours: in the "
+            "plane estimates by 30 deg with theta2 and theta3 off by 0, 10 or 20 deg, out of it the angle before, if within 20 "
+            "deg; greatest error of the planar estimates at theta1 = 0",
             "more than half, as *usually* says; 20 deg as stated",
             (
                 *(at_least(label, 0.5, np.mean((steps >= 3) & (steps <= 6))) for label, steps in made.items()),
                 *(at_most(f"estimates, {full_name(case)}", "20", _estimate_error(case), "deg") for case in OUT),
             ),
-            "out of the plane the accuracy decides, which the thesis does not give; up to "
-            f"{np.max(made[f'{out_of_it}; to {STEP:g}']):.0f} corrections are made there, since there is no loop to converge "
-            "to. With a twist the planar eta2 = 0 is off by more",
+            "out of the plane the accuracy, which the thesis does not give, decides; with a twist the planar eta2 fails",
         ),
         Statement(
             "Another great disadvantage is that matrix A may become singular. Fortunately it never happened while "
             "running the program.",
-            conclusions,
-            "least singular value of A relative to its greatest, lengths in inches, at every correction, least of the turn; "
-            "runs that do not settle, which the thesis made too (L1121), up to the angle at which they do not",
+            place,
+            "least singular value of A relative to its greatest, lengths in inches, least of all corrections of a turn",
             ROUNDING,
             (
-                nothing(
-                    "may: rod at right angles to the guide, which it reaches from a4 = 38 in on",
-                    _right_angle_condition(),
-                ),
-                *(at_least(f"never: {full_name(case)}", NOTHING, _condition(case)) for case in (IDEAL, *ALL)),
-                at_least(f"never, though not settling: {failing}", NOTHING, min(map(_condition, UNSETTLED))),
+                nothing("may: a4 = 38 in, rod at right angles to the guide", _right_angle_condition()),
+                at_least("never: least of the ten cases of the graphs", NOTHING, min(map(_condition, (IDEAL, *ALL)))),
             ),
-            "in the runs that do not settle its size depends on rounding",
         ),
     )
+
+
+def closure() -> StudyResult:
+    """Compute the closure error at the end of the iteration over a turn, and judge the statements on the loop closure."""
+    columns = {ANGLE: GRID_DEG}
+    for case in OPEN:
+        found = followed(case)
+        columns[f"rotation left as printed; {case.name} [deg]"] = found.rotation_deg[:, 0]
+        columns[f"error of S4 as printed; {case.name} [in]"] = found.error_in[:, 0]
     return StudyResult(
         number="rahman-closure",
         claim="Rahman states: the iteration of section 2.6.1 finds theta2, eta2, theta3, eta3 and S4 for given theta1 and S1.",
@@ -688,7 +612,7 @@ def closure() -> StudyResult:
         f"from the angle before. It settles where a correction is below {STEP:g} rad and {STEP:g} in, within {MAX_STEPS} "
         "corrections: our choice, since the thesis gives neither the step, the accuracy nor the number.",
         columns=padded(columns),
-        statements=statements,
+        statements=(_detection(), *_matrices(), *_step(), *_ends(), *_limits(), *_convergence()),
     )
 
 

@@ -205,7 +205,7 @@ def _motion() -> tuple[Statement, ...]:
             "mean power at 50 rpm in the ideal case less the least at a4 = 10, 20, 30 in, S1 = 3.5 in",
             f"more than {NOTHING:g} lb.in/s, the rounding",
             tuple(saved),
-            "a given torque at a given speed takes the same power at any offset, a given load more by the longer stroke",
+            "the torque at this speed takes the same power at any offset, a load more by the longer stroke",
         ),
     )
 
@@ -243,7 +243,7 @@ def _forces() -> tuple[Statement, ...]:
             f"the ideal case and a4 = 10, 20, 30 in with S1 = 3.5 in, {FROM_DEAD}, our choice",
             "none, the sign decides",
             tuple(gains),
-            "the others do not grow at every step; with 3, 5, 15, 20 or 30 deg in place of 10 two or three grow",
+            "the others fall at a step; with 3, 5, 15, 20 or 30 deg two or three grow",
         ),
         Statement(
             "In most of the joint force and torque graphs (except for [3F3j] with no spike, [3F3k] with one spike and [4F4k] "
@@ -340,7 +340,7 @@ def _constant() -> tuple[Statement, ...]:
                 *(nothing(symbol, moment, "lb.in") for symbol, moment in guide.items()),
                 *(nothing(f"2F2k; {full_name(case)}", pin, "lb") for case, pin in size["2F2k"].items()),
             ),
-            "4T4 is zero because the slider's centre of mass is in its pin (g3 = 0); 2F2k is zero in the plane alone",
+            "4T4 is zero since the slider's centre of mass is in its pin; 2F2k is zero in the plane alone",
         ),
         Statement(
             "Another force component along the j-axis of joint 2, i.e. [2F2j] is constant (-8.33 lbs) throughout one complete "

@@ -13,12 +13,11 @@ from linkwork.slider_crank.published import parameters
 
 from ...figures import Curve, Figure, Panel, plot_curves
 from ...numerics.dual import Dual, about_i, about_j, about_k
-from ...slider_crank.closure import Rows
 from ..rules import ABOUT_DEG
 from ..study import StudyResult
 from ..variation import cache
 from .figures import ALL, ANGLE, clear, printed, printed_symbol
-from .printed import CRANK_AT_SPEED, GENERAL, Joints, Turn, turn
+from .printed import CRANK_AT_SPEED, GENERAL, STEP, Joints, Turn, turn
 from .table import IDEAL, Case
 
 FloatArray = NDArray[np.float64]
@@ -37,21 +36,24 @@ OPEN = (
 #: Cases for row 37f, which is judged where |sin theta2| is above `CLEAR_SINE`, since eq 41 divides by sin theta2.
 ROW_F = (Case("a4 = 30 in at S1 = 9 in", 30.0, 9.0, 270.0), OPEN[2])
 CLEAR_SINE = float(np.sin(np.radians(ABOUT_DEG)))
-AWAY = f"where theta2 is over {ABOUT_DEG:g} deg from 0 and half a turn, the rule for *near*, since eq 41 divides by its sine"
 #: Motion in which second rates are judged: the crank accelerates (rad/s2), the shift has a rate (in/s) and accelerates (in/s2).
 MOVING = CRANK_AT_SPEED._replace(shift_rate=1.3, acceleration=3.0, shift_acceleration=0.7)
 AT_RATES = "with S1' = 1.3 in/s, theta1'' = 3 rad/s2 and S1'' = 0.7 in/s2"
-DOTS = "where a second rate has one dot in our scan, two are read; the print may have them"
+DOTS = "second rates with one dot in our scan are read with two"
 #: Words on a slip of one character.
 MAYBE = "so in our scan; the print may be right"
 #: Step of difference quotients, and their largest relative error.
 H, ROUGH = 1e-6, 1e-7
 
 
-@cache
-def followed(case: Case, rows: Rows = "printed", from_before: bool = True) -> Turn:
+def followed(case: Case, small: float = STEP) -> Turn:
     """Run the iteration over a turn for the mechanism of a case; see `turn`."""
-    return turn(parameters(case.offset_in, case.twist_deg), case.shift_in, rows, from_before=from_before)
+    return _followed(*case[1:], small)
+
+
+@cache
+def _followed(offset_in: float, shift_in: float, twist_deg: float, small: float) -> Turn:
+    return turn(parameters(offset_in, twist_deg), shift_in, small=small)
 
 
 def joints(unknowns: FloatArray) -> Joints:
@@ -81,7 +83,7 @@ def difference(a: Dual, b: Dual) -> float:
 #: Labels of the axes by the unit of their columns.
 _SHOWN = {"[deg]": "rotation left", "[in]": "error of S4", "[in/s]": "opening of the loop", "[lb]": "4F4k"}
 #: Columns drawn dashed, over the others.
-_DASHED = ("loop mended", "both mended", "Davidon")
+_DASHED = ("loop mended", "both mended")
 
 
 def draw(result: StudyResult) -> Figure:

@@ -15,7 +15,6 @@ from ..statements import Statement, at_least, at_most, near, text
 from ..study import Study, StudyResult, padded
 from ..variation import unvaried
 from .figures import (
-    ALL,
     ANGLE,
     ANGLES_DEG,
     NOTHING,
@@ -26,12 +25,12 @@ from .figures import (
     nothing,
 )
 from .method import (
+    AT,
     AT_RATES,
-    AWAY,
     CLEAR_SINE,
+    DOTS,
     MAYBE,
     MOVING,
-    PLANE,
     ROW_F,
     FloatArray,
     H,
@@ -59,7 +58,7 @@ from .printed import (
     separated_rates,
     velocities,
 )
-from .table import FAMILIES, IDEAL, Case
+from .table import IDEAL, Case
 
 
 def row_f(case: Case) -> tuple[FloatArray, FloatArray]:
@@ -101,12 +100,12 @@ def _velocities() -> dict[str, float]:
     }
 
 
-def _sinusoidal(ratio: float) -> tuple[float, float]:
-    """Return the errors of eq 28a (in/s) and of eq 28b (in/s2) at alpha = ``ratio``.
+def _sinusoidal() -> tuple[float, float]:
+    """Return the errors of eq 28a (in/s) and of eq 28b (in/s2) at alpha = 2.
 
     Eq 28a should be the rate of eq 28, and eq 28b the rate of eq 28a with its amplitude mended.
     """
-    amplitude, angle, speed, acceleration, h = 2.0, 0.9, CRANK_SPEED, 3.0, 1e-20
+    ratio, amplitude, angle, speed, acceleration, h = 2.0, 2.0, AT, CRANK_SPEED, 3.0, 1e-20
     # derivatives along the motion by a complex step, which has no rounding error
     moved, quicker = angle + 1j * h * speed, speed + 1j * h * acceleration
     shift = amplitude * np.sin(ratio * moved)
@@ -124,38 +123,8 @@ def _rows(crank: Crank, q: Joints) -> tuple[FloatArray, FloatArray]:
     return np.stack([loop_rates(crank, q, Joints(*unit)) - right for unit in np.eye(5)], -1), right
 
 
-def _printed_rates() -> tuple[Statement, ...]:
-    """Judge eqs 28a to 31, 37 to 43 and 38a to 42a in a general position, with the shift in motion."""
-    crank = MOVING
-    matrix, right = _rows(crank, GENERAL)
-    flat = joints(planar(parameters(PLANE.offset_in), np.array([1.0])) / [1.0, 1.0, 1.0, 1.0, INCH])
-    at_rest = _rows(CRANK_AT_SPEED, Joints(*(x[0] for x in flat)))
-    ranks = [
-        int(np.linalg.matrix_rank(m)) for m in (matrix, np.column_stack([matrix, right]), np.column_stack(at_rest))
-    ]
-    solved, rates = Joints(*np.linalg.solve(matrix[:5], -right[:5])), joint_rates(crank, GENERAL)
-    seconds = joint_accelerations(crank, GENERAL, rates)
-    quicker, moved, _ = later(crank, GENERAL, rates, seconds)
-    rough = max(abs(float(a - b.imag / 1e-20)) for a, b in zip(seconds, joint_rates(quicker, moved)))
-    order = [Joints._fields.index(name) for name in ("th2", "th3", "eta2", "eta3", "s4")]
-    eq_38 = separated_rates(crank, GENERAL) - np.column_stack([matrix[:, order], -right])
-    ratios = (0.5, 1.0, 2.0)
-    slips = {ratio: _sinusoidal(ratio) for ratio in ratios}
-    names = ("theta2' by eq 39", "eta2' by eq 41", "theta3' by eq 40", "eta3' by eq 42", "S4' by eq 43")
-    reasons = ("erratum 4: no cos^2 eta2", "", "", "", "")
-    errors = [
-        nothing(name, a - b, "in/s" if "S4" in name else "rad/s", why=why)
-        for name, a, b, why in zip(names, rates, solved, reasons)
-    ]
-    unsolved = [
-        nothing(
-            f"row 37f, {case.name}",
-            np.nanmax(np.abs(row_f(case)[0])),
-            "in/s",
-            why=why,
-        )
-        for case, why in zip(ROW_F, 2 * ("erratum 3: it is left unsolved",))
-    ]
+def _of_frames() -> tuple[Statement, ...]:
+    """Judge the velocities of eqs 30 to 36, 44 and 45."""
     return (
         Statement(
             "where symbols [eta2'] and [theta2'] denote rotational velocities about the [j2] and [k2] axes at joint 2 "
@@ -177,6 +146,24 @@ def _printed_rates() -> tuple[Statement, ...]:
             tuple(nothing(label, size, "in/s") for label, size in _velocities().items()),
             "with the velocities of eqs 30 and 31, which have erratum 2",
         ),
+    )
+
+
+def _solved() -> tuple[Statement, ...]:
+    """Judge eqs 38 to 43 by comparison with eqs 37a to 37f, in a general position with the shift in motion."""
+    matrix, right = _rows(MOVING, GENERAL)
+    found = joint_rates(MOVING, GENERAL)
+    order = [Joints._fields.index(name) for name in ("th2", "th3", "eta2", "eta3", "s4")]
+    eq_38 = separated_rates(MOVING, GENERAL) - np.column_stack([matrix[:, order], -right])
+    errors = [
+        nothing(name, rate - solved, "in/s" if "S4" in name else "rad/s", why="erratum 4: no cos^2 eta2")
+        for name, rate, solved in zip(
+            ("theta2' by eq 39", "eta2' by eq 41", "theta3' by eq 40", "eta3' by eq 42", "S4' by eq 43"),
+            found,
+            np.linalg.solve(matrix[:5], -right[:5]),
+        )
+    ]
+    return (
         Statement(
             "Now separating the unknowns to form a column matrix and a coefficient matrix, the product of these two "
             "matrices must be equal to some column matrix as shown below:",
@@ -192,50 +179,66 @@ def _printed_rates() -> tuple[Statement, ...]:
         Statement(
             "Since rank of the coefficient matrix equals 5, the number of columns, a unique solution can be obtained.",
             text("section 2.7, L563"),
-            "ranks of eqs 37a to 37f in a general position with S1' = 1.3 in/s, and in the plane, a4 = 10 in, theta1 = 1 rad, "
-            "at constant shift; a solution needs equal ones",
+            "ranks of eqs 37a to 37f in a general position with S1' = 1.3 in/s; a solution needs equal ones",
             "none of a count",
             (
-                near("coefficients", "5", ranks[0], 0.0),
-                near("coefficients with the right side", 5.0, ranks[1], 0.0),
-                near("coefficients with the right side, in the plane", 5.0, ranks[2], 0.0),
+                near("coefficients", "5", np.linalg.matrix_rank(matrix), 0.0),
+                near(
+                    "coefficients with the right side",
+                    5.0,
+                    np.linalg.matrix_rank(np.column_stack([matrix, right])),
+                    0.0,
+                ),
             ),
-            "erratum 3: six equations for five unknowns, of which five are solved; in the plane the sixth is met as well",
+            "erratum 3: six equations for five unknowns, of which five are solved",
         ),
         Statement(
             "The final solutions for all the unknowns are as follows:",
             text("section 2.7, eqs 39 to 43, L563-573"),
-            "difference from the solution of eqs 37a to 37e in a general position with S1' = 1.3 in/s, and what "
-            f"remains of eq 37f with the joints at which the printed iteration ends at every fifth degree, {AWAY}",
+            "difference from the solution of eqs 37a to 37e, and what remains of eq 37f, in a general position with S1' = 1.3 "
+            "in/s",
             ROUNDING,
-            (*errors, *unsolved),
+            (
+                *errors,
+                nothing("row 37f", loop_rates(MOVING, GENERAL, found)[5], "in/s", why="erratum 3: it is left unsolved"),
+            ),
         ),
+    )
+
+
+def _derivatives() -> tuple[Statement, ...]:
+    """Judge eqs 28a, 28b and 38a to 42a as derivatives."""
+    of_28a, of_28b = _sinusoidal()
+    found = joint_rates(MOVING, GENERAL)
+    seconds = joint_accelerations(MOVING, GENERAL, found)
+    quicker, moved, _ = later(MOVING, GENERAL, found, seconds)
+    rough = max(abs(float(a - b.imag / 1e-20)) for a, b in zip(seconds, joint_rates(quicker, moved)))
+    return (
         Statement(
             "S1' = alpha S1 cos(alpha theta1) theta1' [when S1 is sinusoidal] (28a)",
             text("section 2.7, eq 28a, L581; L583, in brackets, says what it is the derivative of"),
-            "S1' by eq 28a less the rate of eq 28, at theta1 = 0.9 rad with an amplitude of 2 in",
+            "S1' by eq 28a less the rate of eq 28, at theta1 = 0.9 rad with alpha = 2 and an amplitude of 2 in",
             ROUNDING,
-            tuple(nothing(f"alpha = {ratio:g}", slip, "in/s") for ratio, (slip, _) in slips.items()),
+            (nothing("eq 28a", of_28a, "in/s"),),
             f"erratum 9: S1 for its amplitude S_S1, {MAYBE}",
         ),
         Statement(
             "S1'' = alpha S_S1 [cos(alpha theta1) theta1'' - alpha sin(alpha theta1) theta1'^2] (28b)",
             text("section 2.8, eq 28b, L955; L957, in brackets, says what it is the derivative of"),
-            "S1'' by eq 28b less the rate of eq 28a with its amplitude mended, angle and amplitude as in the row before, with "
-            "a crank acceleration of 3 rad/s2",
+            "S1'' by eq 28b less the rate of eq 28a with its amplitude mended, at the values of the row before, with a crank "
+            "acceleration of 3 rad/s2",
             ROUNDING,
-            tuple(nothing(f"alpha = {ratio:g}", slip, "in/s2") for ratio, (_, slip) in slips.items()),
+            (nothing("eq 28b", of_28b, "in/s2"),),
         ),
         Statement(
             "Equations (69a) through (69q) involve acceleration terms which are obtained by differentiating "
             "equations (38) through (42) with respect to time. Hence the five acceleration equations are as follows:",
             text("section 2.8, eqs 38a to 42a, L1035-1045"),
             "greatest difference from the rates of eqs 39 to 43, which this sentence calls 38 to 42, in a general position "
-            f"{AT_RATES}; S1'' has one dot in our scan, once in each equation: two are read, and the print may have them",
+            f"{AT_RATES}; {DOTS}",
             ROUNDING,
             (nothing("eqs 38a to 42a", rough, "rad/s2 or in/s2"),),
-            "as a derivative; 38a is the rate of eq 39 as printed and has its erratum 4. That accelerations enter 69a to 69q, "
-            "by f1, f2 and f3, is plain",
+            "38a is the rate of eq 39 as printed and has its erratum 4",
         ),
     )
 
@@ -315,97 +318,58 @@ def _roundoff(q: Joints) -> float:
     return max(float(np.abs(x - y).max() / np.abs(y).max()) for x, y in zip(short, long) if np.abs(y).max() > NOTHING)
 
 
-def _dead_centres() -> tuple[Statement, ...]:
-    """Judge the cause that section 3.2 gives for the spikes, in the plane and out of it."""
-    cases = [Case(f"a4 = {a4:g} in, S1 = 0", a4, 0.0, 270.0) for a4 in (10.0, 20.0, 30.0)]
-    twisted = [case for case in FAMILIES["twist"].cases if case.twist_deg != IDEAL.twist_deg]
-    worst, least, rough, near_zero, high, whole = 0.0, np.inf, 0.0, [], [], []
-    for case, shifted in zip(cases, OFFSETS):
-        p, centres = parameters(case.offset_in), dead_centres_deg(case)
-        q = joints(planar(p, np.radians(ANGLES_DEG)) / [1.0, 1.0, 1.0, 1.0, INCH])
-        worst = max(worst, *_near_dead_centres(case, q, ANGLES_DEG).values())
-        least = min(least, float(np.abs(np.sin(q.th3)).min()))
-        th2 = np.degrees(planar(p, np.radians(centres))[:, 0]) % 360.0
-        near_zero += [
-            at_most(
-                f"theta2 at the {which} spike, {case.name}", VERY_CLOSE_DEG, float(min(angle, 360.0 - angle)), "deg"
-            )
-            for which, angle in zip(("first", "second"), th2)
-        ]
-        angles, unknowns = ANGLES_DEG[:-1], _ended_on_turn(shifted)
-        rough = max(rough, _roundoff(joints(unknowns)))
-        whole.append(_near_dead_centres(shifted, joints(unknowns[::2]), angles[::2])["th2"])
-        beside, closest = _beside_zeros(shifted, angles, unknowns)
-        all_angles, q = np.append(angles, beside), joints(np.concatenate([unknowns, closest]))
-        ratios = _near_dead_centres(shifted, q, all_angles)
-        high += [
-            at_least(f"{words}, {full_name(shifted)}", ABNORMAL, ratios[name]) for name, words in EQUATIONS.items()
-        ]
+def _denominators() -> Statement:
+    """Judge where the sines in the denominators of eqs 38a to 42a vanish, in the plane."""
+    planes = (IDEAL, *(Case(f"a4 = {a4:g} in, S1 = 0", a4, 0.0, 270.0) for a4 in (10.0, 20.0, 30.0)))
     zeros = [
         near(f"sin theta2 = 0, {case.name}, {which}", stated, at, ABOUT_DEG, "deg")
-        for case in (IDEAL, *cases, *twisted)
+        for case in planes
         for which, stated, at in zip(("first", "second"), ("100", "300"), dead_centres_deg(case))
     ]
-    by_shift = max(np.abs(dead_centres_deg(case) - dead_centres_deg(case._replace(shift_in=0.0))).max() for case in ALL)
-    by_iteration = [
-        f"{first:.1f} and {second:.1f} deg with {case.name}"
-        for case in twisted
-        for first, second in [_zeros(case, ANGLES_DEG[:-1], _ended_on_turn(case))[0]]
-    ]
-    place = text("section 3.2, L1115")
-    return (
-        Statement(
-            "Although all the dynamic equations ((68a) through (68g) and (68i) through (68q)) are free from sine or "
-            "cosine terms in the denominator, the expressions for acceleration (equation (38a) through (42a)) are "
-            "not free from sine terms which become very very close to zero at some particular positions of the "
-            "crank, i.e. near 100 degrees and 300 degrees.",
-            place,
-            "sines and cosines in the denominators of what is printed as 69a to 69g and 69i to 69q, counted; crank angles at "
-            "which sin theta2 vanishes, which stands in the denominators of 40a and 41a, on the right mechanism, with a twist "
-            "at a4 = 20 in, S1 = 0; least distance of theta3 from 0 or half a turn, since its sine stands in all five",
-            f"none of a count; {ABOUT_DEG:g} deg, the rule for *near*; {VERY_CLOSE_DEG:g} deg, the rule for *very close*",
-            (
-                near("sines and cosines in denominators", 0.0, 0, 0.0),
-                *zeros,
-                at_most(
-                    "theta3 from 0 or half a turn, a4 = 10, 20, 30 in, S1 = 0, least",
-                    VERY_CLOSE_DEG,
-                    np.degrees(np.arcsin(least)),
-                    "deg",
-                ),
-            ),
-            "theta2 is 0 or half a turn at the dead centres, which the offset and the twist move, and the shifts of the graphs "
-            f"by at most {by_shift:.1f} deg; where the printed iteration ends with a twist, sin theta2 vanishes at "
-            f"{' and at '.join(by_iteration)}, none of them near. "
-            "Sin theta3 does not vanish, so that 39a and 42a stay finite. Out of the plane 40a and 41a are unbounded, and with "
-            "them 38a, because eq 41 divides by sin theta2 and row 37f is left out "
-            "(erratum 3); in the plane 40a and 41a are zero",
+    sines = [np.sin(planar(parameters(case.offset_in), np.radians(ANGLES_DEG))[:, 2]) for case in planes]
+    return Statement(
+        "Although all the dynamic equations ((68a) through (68g) and (68i) through (68q)) are free from sine or "
+        "cosine terms in the denominator, the expressions for acceleration (equation (38a) through (42a)) are "
+        "not free from sine terms which become very very close to zero at some particular positions of the "
+        "crank, i.e. near 100 degrees and 300 degrees.",
+        text("section 3.2, L1115"),
+        "sines and cosines in the denominators of what is printed as 69a to 69g and 69i to 69q, counted; crank angles at which "
+        "sin theta2, which divides in 40a and 41a, vanishes in the plane; there the least distance of theta3, whose sine "
+        "divides in all five, from 0 or half a turn",
+        f"none of a count; {ABOUT_DEG:g} deg, the rule for *near*; {VERY_CLOSE_DEG:g} deg, the rule for *very close*",
+        (
+            near("sines and cosines in denominators", 0.0, 0, 0.0),
+            *zeros,
+            at_most("theta3 from 0 or half a turn", VERY_CLOSE_DEG, np.degrees(np.arcsin(np.abs(sines).min())), "deg"),
         ),
-        Statement(
-            "Using the computer program it has been observed that near those particular values for input crank "
-            "angle, the joint angle [theta2] goes very close to zero degrees and thus the calculated values of the "
-            "acceleration terms, at those particular positions, go abnormally high on account of roundoff errors in "
-            "the computer calculations, which is clearly inaccurate.",
-            place,
-            "distance of theta2 from 0 at the dead centres; greatest accelerations, at half degrees, within "
-            f"{ABOUT_DEG:g} deg of a dead centre relative to those elsewhere: in the plane, where 40a and 41a are zero, and "
-            f"where the printed iteration ends, there {BESIDE_DEG:g} deg, our choice, before and after each zero of sin theta2 "
-            "too; there, at half degrees, also the greatest share of the greatest acceleration that is roundoff, by numbers "
-            "with three digits more and joints off by the last digit of a turn",
-            f"{VERY_CLOSE_DEG:g} deg, the rule for *very close*; {ABNORMAL:g} times, the rule for *abnormally*; half of it, "
-            "for *on account of*",
-            (
-                *near_zero,
-                at_least("in the plane, by 38a, 39a, 42a", ABNORMAL, worst),
-                *high,
-                at_least("share that is roundoff", 0.5, rough),
-            ),
-            "at the second spike theta2 is half a turn. Out of the plane 40a and 41a grow without bound there, and with them "
-            "38a, but not by roundoff, here in double precision (the thesis does not say which it used): eq 41 divides by sin "
-            "theta2, and row 37f is left out (erratum 3); at whole degrees 38a is abnormal with a4 = 10 in alone of these "
-            f"three ({whole[0]:.1f}; {whole[1]:.2f} and {whole[2]:.2f} with 20 and 30 in). 39a and 42a stay finite, as all "
-            "five are in the plane: the spikes of the forces come from the torque, which has no lever on the slider there",
+        "theta2 is 0 or half a turn at the dead centres, which the offset moves",
+    )
+
+
+def _abnormal() -> Statement:
+    """Judge the cause that section 3.2 gives for the spikes, in the case whose dead centres lie near 100 and 300 deg."""
+    case, angles = OFFSETS[1], ANGLES_DEG[:-1]
+    unknowns = _ended_on_turn(case)
+    beside, closest = _beside_zeros(case, angles, unknowns)
+    ratios = _near_dead_centres(case, joints(np.concatenate([unknowns, closest])), np.append(angles, beside))
+    th2 = np.abs((np.degrees(closest[: closest.shape[0] // 2, 0]) + 180.0) % 360.0 - 180.0)
+    return Statement(
+        "Using the computer program it has been observed that near those particular values for input crank "
+        "angle, the joint angle [theta2] goes very close to zero degrees and thus the calculated values of the "
+        "acceleration terms, at those particular positions, go abnormally high on account of roundoff errors in "
+        "the computer calculations, which is clearly inaccurate.",
+        text("section 3.2, L1115"),
+        f"{full_name(case)}, where the printed iteration ends: theta2 where its sine vanishes; greatest accelerations within "
+        f"{ABOUT_DEG:g} deg of a dead centre relative to those elsewhere, by half degrees and {BESIDE_DEG:g} deg, our choice, "
+        "beside these places; greatest share of them, by half degrees, that is roundoff in double precision",
+        f"{VERY_CLOSE_DEG:g} deg, the rule for *very close*; {ABNORMAL:g} times, the rule for *abnormally*; half of it, "
+        "for *on account of*",
+        (
+            *(at_most(f"{which} theta2", VERY_CLOSE_DEG, at, "deg") for which, at in zip(("first", "second"), th2)),
+            *(at_least(words, ABNORMAL, ratios[name]) for name, words in EQUATIONS.items()),
+            at_least("share that is roundoff", 0.5, _roundoff(joints(unknowns))),
         ),
+        "38a, 40a and 41a are unbounded, as eq 41 divides by sin theta2; roundoff does not decide",
     )
 
 
@@ -420,7 +384,7 @@ def rates() -> StudyResult:
         number="rahman-rates",
         claim="Rahman states: eqs 39 to 43 give all velocities of the joints, and eqs 38a to 42a their accelerations.",
         columns=padded(columns),
-        statements=(*_printed_rates(), *_dead_centres()),
+        statements=(*_of_frames(), *_solved(), *_derivatives(), _denominators(), _abnormal()),
     )
 
 
