@@ -575,8 +575,8 @@ def _convergence() -> tuple[Statement, ...]:
             "possible by using the direct formula for the planar case.",
             place,
             f"share of starts from which 3 to 6 corrections reach one below {STEP:g} or {LOOSE:g} (rad, in), ours: in the "
-            "plane estimates by 30 deg with theta2 and theta3 off by 0, 10 or 20 deg, out of it the angle before, if within 20 "
-            "deg; greatest error of the planar estimates at theta1 = 0",
+            "plane planar estimates at every 30 deg, theta2 and theta3 off by 0, 10 or 20 deg, out of it the angle before, if "
+            "within 20 deg; greatest error of the planar estimates at theta1 = 0",
             "more than half, as *usually* says; 20 deg as stated",
             (
                 *(at_least(label, 0.5, np.mean((steps >= 3) & (steps <= 6))) for label, steps in made.items()),

@@ -14,16 +14,8 @@ from .method import OUT, PLANE
 from .table import COMPONENTS
 
 
-def conclusions() -> StudyResult:
-    """Judge the statements of section 3.3 on the method as a whole."""
-    ended = endings(OUT)
-    cases = (
-        f"the {len(ended)} cases of the figures that are out of the plane whose loop the printed iteration closes, from the "
-        "planar estimate at every 30 deg"
-    )
-    all_closed = f"all of them; {ROUNDING}, of a closed loop"
-    closed = float(np.mean([found.rotation_residual.max() < NOTHING for found in ended]))
-    numbers = float(np.mean([np.isfinite(found.unknowns).all() for found in ended]))
+def _design() -> tuple[Statement, ...]:
+    """Judge what section 3.3 says of the method's use in design, by the errors of the printed equations in the plane."""
     right = {symbol: values(PLANE, COMPONENTS[symbol]) for symbol in PLANAR}
     static = planar_forces(erratum_5=True, erratum_6=True, share=0.0)
     inertial = {s: right[s] - static[s] for s in PLANAR}
@@ -41,9 +33,54 @@ def conclusions() -> StudyResult:
             if size > NOTHING
         )
 
-    balancing = error({s: inertial[s] for s in ("1F1i", "1F1j")})
     varied = sum(len(set(values)) > 1 for values in list(zip(*ALL))[1:])
-    kinds, place, last = "dimensions that are varied", text("section 3.3, L1129"), text("section 3.3, L1131")
+    kinds, place = "dimensions that are varied", text("section 3.3, L1129")
+    return (
+        Statement(
+            "Since the present work investigates dynamic forces and torques at each joint of a slider crank with "
+            "all kinds of manufacturing tolerances, the results provide information needed for the sizing and "
+            "dynamic balancing of a high speed slider crank in the design stage.",
+            place,
+            f"{kinds}, of a1, a2, a4, S1, alpha4 (section 3.1); greatest relative error by the printed equations in the "
+            f"plane, a4 = 10 in, {FROM_DEAD}: of the joint forces, and of the bearing force by its part from inertia",
+            f"none of a count; {ROUNDING}",
+            (
+                near(kinds, 5.0, varied, 0.0),
+                nothing("for sizing, joint forces", error(right)),
+                nothing("for balancing, bearing", error({s: inertial[s] for s in ("1F1i", "1F1j")})),
+            ),
+            "a1 and a2 are not varied; errata 5 and 6",
+        ),
+        Statement(
+            "This analysis can be used to determine the effect and significance of the inertia forces acting on "
+            "each link due to its own mass and mass moment of inertia.",
+            place,
+            "greatest error of a joint force by the printed equations in the plane, a4 = 10 in, relative to the greatest "
+            f"part of it that inertia has, {FROM_DEAD}",
+            ROUNDING,
+            (nothing("as printed", error(inertial)),),
+            "errata 5 and 6",
+        ),
+        Statement(
+            "It is expected that this investigation will enable designers to have better insight into the "
+            "designing and testing of high speed spatial mechanisms and robot manipulators.",
+            place,
+            why="an expectation, for which the thesis gives no measure",
+        ),
+    )
+
+
+def conclusions() -> StudyResult:
+    """Judge the statements of section 3.3 on the method as a whole."""
+    ended = endings(OUT)
+    cases = (
+        f"the {len(ended)} cases of the figures that are out of the plane whose loop the printed iteration closes, from the "
+        "planar estimate at every 30 deg"
+    )
+    all_closed = f"all of them; {ROUNDING}, of a closed loop"
+    closed = float(np.mean([found.rotation_residual.max() < NOTHING for found in ended]))
+    numbers = float(np.mean([np.isfinite(found.unknowns).all() for found in ended]))
+    place = text("section 3.3, L1131")
     return StudyResult(
         number="rahman-conclusions",
         claim="Rahman states: the method serves the design of spatial mechanisms, and is general, concise and economical. What "
@@ -58,42 +95,11 @@ def conclusions() -> StudyResult:
                 (at_least("cases closed", 1.0, closed),),
                 "the plane, in which eta2 = eta3 = 0, does not show erratum 1",
             ),
-            Statement(
-                "Since the present work investigates dynamic forces and torques at each joint of a slider crank with "
-                "all kinds of manufacturing tolerances, the results provide information needed for the sizing and "
-                "dynamic balancing of a high speed slider crank in the design stage.",
-                place,
-                f"{kinds}, of a1, a2, a4, S1, alpha4 (section 3.1); greatest relative "
-                f"error by the printed equations in the plane, a4 = 10 in, {FROM_DEAD}: of the joint forces, and of the "
-                "bearing force by its part from inertia",
-                f"none of a count; {ROUNDING}",
-                (
-                    near(kinds, 5.0, varied, 0.0),
-                    nothing("for sizing, joint forces", error(right)),
-                    nothing("for balancing, bearing", balancing),
-                ),
-                "a1 and a2 are not varied; errata 5 and 6",
-            ),
-            Statement(
-                "This analysis can be used to determine the effect and significance of the inertia forces acting on "
-                "each link due to its own mass and mass moment of inertia.",
-                place,
-                "greatest error of a joint force by the printed equations in the plane, a4 = 10 in, relative to the greatest "
-                f"part of it that inertia has, {FROM_DEAD}",
-                ROUNDING,
-                (nothing("as printed", error(inertial)),),
-                "errata 5 and 6",
-            ),
-            Statement(
-                "It is expected that this investigation will enable designers to have better insight into the "
-                "designing and testing of high speed spatial mechanisms and robot manipulators.",
-                place,
-                why="an expectation, for which the thesis gives no measure",
-            ),
+            *_design(),
             Statement(
                 "Since this method is well adapted for digital computation, any complex system can be analyzed using this "
                 "analytical tool.",
-                last,
+                place,
                 f"share of {cases}",
                 all_closed,
                 (at_least("cases closed", 1.0, closed),),
@@ -102,7 +108,7 @@ def conclusions() -> StudyResult:
             Statement(
                 "The main advantages of this method are its generality and that all calculations can be performed on "
                 "digital computer.",
-                last,
+                place,
                 f"generality: share of {cases}; calculations: share of them in which it ends with numbers at these angles",
                 all_closed,
                 (at_least("generality", 1.0, closed), at_least("calculations", 1.0, numbers)),
@@ -111,7 +117,7 @@ def conclusions() -> StudyResult:
             Statement(
                 "Other advantages are that this method is concise, flexible, economical and its analytical approach "
                 "is independent of visualization.",
-                last,
+                place,
                 why="the thesis gives no measure of any of these",
             ),
         ),

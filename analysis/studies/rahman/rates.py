@@ -58,7 +58,7 @@ from .printed import (
     separated_rates,
     velocities,
 )
-from .table import IDEAL, Case
+from .table import IDEAL, SPIKES_DEG, Case
 
 
 def row_f(case: Case) -> tuple[FloatArray, FloatArray]:
@@ -365,7 +365,7 @@ def _abnormal() -> Statement:
         f"{VERY_CLOSE_DEG:g} deg, the rule for *very close*; {ABNORMAL:g} times, the rule for *abnormally*; half of it, "
         "for *on account of*",
         (
-            *(at_most(f"{which} theta2", VERY_CLOSE_DEG, at, "deg") for which, at in zip(("first", "second"), th2)),
+            *(at_most(f"theta2 near {spike:g} deg", VERY_CLOSE_DEG, at, "deg") for spike, at in zip(SPIKES_DEG, th2)),
             *(at_least(words, ABNORMAL, ratios[name]) for name, words in EQUATIONS.items()),
             at_least("share that is roundoff", 0.5, _roundoff(joints(unknowns))),
         ),
