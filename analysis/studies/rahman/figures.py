@@ -250,8 +250,8 @@ def _forces() -> tuple[Statement, ...]:
             "with one spike) two spikes are seen, one near 100 degrees and other near 300 degrees.",
             text("section 3.3, L1125"),
             "poles (spikes) of each component in a turn, in the nine cases beside the ideal one where it does not vanish, the "
-            "count that differs most from the stated one; greatest distance of their dead centres, where the poles lie, from 100 "
-            "and 300 deg",
+            "count that differs most from the stated one; greatest distance of their dead centres, where the poles lie, from "
+            "100 and 300 deg",
             f"none of a count; {ABOUT_DEG:g} deg, the rule for *near*",
             tuple(spikes),
             "3F3k is finite at the dead centres, 4F4k at neither; the offset and the twist move them",
