@@ -70,7 +70,7 @@ def compute_rig_1() -> StudyResult:
     columns[f"speed; {SPECIAL} [rpm]"] = np.array([s.parameter for s in special]) / RAD_S_PER_RPM
     columns[f"amplitude; {SPECIAL} [cm]"] = CM_PER_METRE * np.array([s.orbit.amplitude for s in special])
     stopped = {s: amplitude(turn(s, float(STOPPED[s]))) for s in "AB"}
-    accommodated = {s: greatest_before(s) for s in "AB"}
+    accommodated = {s: accommodated_amplitude(s) for s in "AB"}
     at, most = accommodated["B"]
     return StudyResult(
         number="rig-1-resonance",
@@ -101,7 +101,7 @@ def compute_rig_1() -> StudyResult:
     )
 
 
-def greatest_before(spring: str) -> tuple[float, float]:
+def accommodated_amplitude(spring: str) -> tuple[float, float]:
     """Return the speed (rpm) and the size (cm) of the greatest amplitude below the speed at which the guide was too short.
 
     The speeds begin with the lowest of the figures, in steps of 5 rpm.

@@ -470,7 +470,7 @@ def compute_closures() -> StudyResult:
     """Compute the coupler curves by both closures, and judge the statements on the area and on the closures."""
     p = PROBLEMS["path-a"]
     shapes = {
-        "target": np.asarray(path_of("path-a").points),
+        "target": np.asarray(target_path("path-a").points),
         "printed closure": p.linkage.path(turn(360)),
         "other closure": replace(p.linkage, branch=-1).path(turn(360)),
     }
@@ -486,7 +486,7 @@ def compute_closures() -> StudyResult:
     )
 
 
-def path_of(name: str) -> TargetPath:
+def target_path(name: str) -> TargetPath:
     """Return the desired path of a problem of chapter VI."""
     task = PROBLEMS[name].task
     assert isinstance(task, UntimedPath)
@@ -497,7 +497,7 @@ def judge_area() -> tuple[Statement, ...]:
     """Judge the statements on the area between curves by triangles, and on the crank's phase."""
     phases, triangles = [], []
     for name in ("path-a", "path-b"):
-        linkage, path = PROBLEMS[name].linkage, path_of(name)
+        linkage, path = PROBLEMS[name].linkage, target_path(name)
         points = np.asarray(path.points)
         curve, finer = (linkage.path(turn(n * len(points))) for n in (1, 2))
         area = area_difference(curve, path)
