@@ -276,12 +276,12 @@ def _momentum_rates() -> tuple[Statement, ...]:
     # the rates of eqs 54 to 56, and the momenta whose rates they should be, a moment later
     seconds = joint_accelerations(MOVING, GENERAL, r)
     of_rates = Crank(CRANK, ROD, MOVING.acceleration, MOVING.shift_acceleration)
-    crank, *moving = later(MOVING, GENERAL, r, seconds)
+    crank, q, rate = later(MOVING, GENERAL, r, seconds)
     rod_rate, slider_rate = forward_momentum_rates(MOVING, b, GENERAL, r, seconds, G3)
     forward = {
         "eq 54": (crank_momentum(of_rates, b), crank_momentum(crank, b)),
-        "eq 55": (rod_rate, b.masses[1] * forward_rod_momentum(crank, b, *moving)),
-        "eq 56": (slider_rate, forward_slider_momentum(crank, b, *moving, G3)),
+        "eq 55": (rod_rate, b.masses[1] * forward_rod_momentum(crank, b, q, rate)),
+        "eq 56": (slider_rate, forward_slider_momentum(crank, b, q, rate, G3)),
     }
     a = joint_accelerations(still, GENERAL, unmoved)
     _, *moved = later(still, GENERAL, unmoved, a)
@@ -294,7 +294,7 @@ def _momentum_rates() -> tuple[Statement, ...]:
             f"difference from the rates of eqs 49a to 51a, erratum 9 mended, in a general position {AT_RATES}, g3 = {G3:g} in; "
             f"{DOTS}, and missing brackets are added",
             ROUNDING,
-            tuple(nothing(label, difference(rate, _rate(h)), "lb") for label, (rate, h) in forward.items()),
+            tuple(nothing(label, difference(found, _rate(h)), "lb") for label, (found, h) in forward.items()),
         ),
         Statement(
             "Now, backward path equations (52a) and (53a) are differentiated with respect to time. The following "
@@ -304,7 +304,7 @@ def _momentum_rates() -> tuple[Statement, ...]:
             "g3 = 0; greatest difference of the force parts of 57 from 55 and of 58 from 56, where the momenta of the two "
             f"paths are compared above; {DOTS}",
             ROUNDING,
-            (*(nothing(label, difference(rate, _rate(h)), "lb") for label, rate, h in backward), *replacements()),
+            (*(nothing(label, difference(found, _rate(h)), "lb") for label, found, h in backward), *replacements()),
             PATHS,
         ),
         Statement(
