@@ -20,7 +20,7 @@ from analysis.slider_crank.dual_dynamics import Binor
 from analysis.studies import ENTRIES, RAHMAN
 from analysis.studies.rahman import closure, forces, method, rates
 from analysis.studies.rahman import figures as rahman
-from analysis.studies.rahman.printed import CRANK_AT_SPEED, GENERAL, joint_rates
+from analysis.studies.rahman.printed import CRANK_AT_SPEED, GENERAL, dependable, joint_rates
 from analysis.studies.rahman.table import (
     CAPTIONS,
     COMPONENTS,
@@ -471,6 +471,16 @@ class TestMethod:
     def test_theta2_rate_as_printed_and_mended(self, erratum_4: bool, rate: float) -> None:
         found = joint_rates(CRANK_AT_SPEED, GENERAL, erratum_4=erratum_4)
         assert float(found.th2) == pytest.approx(rate, abs=5e-5)
+
+    @pytest.mark.slow
+    def test_davidon_fletcher_powell_ends_at_a_least_error_which_is_not_zero(self) -> None:
+        """In the plane it closes the loop. With the twist it ends lower than the printed iteration, and the loop stays open."""
+        flat, _, settled = dependable(parameters(10.0), 0.0)
+        assert settled
+        assert flat.max() < 1e-9
+        rotation, position, _ = dependable(parameters(20.0, 232.0), 0.0)
+        assert rotation.max() > 20.0
+        assert position.max() > 1.0
 
     @pytest.mark.parametrize("case", method.OUT, ids=lambda case: case.name)
     def test_planar_estimates_miss_the_tilt_of_the_rod_most(self, case: Case) -> None:

@@ -18,7 +18,7 @@ from ...slider_crank.closure import chain, equations, planar, residuals
 from ...units import INCH
 from ..statements import Statement, at_least, at_most, near, text
 from ..study import Study, StudyResult, padded
-from ..variation import unvaried
+from ..variation import cache, unvaried
 from .figures import (
     ALL,
     ANGLE,
@@ -49,6 +49,7 @@ from .printed import (
     MAX_STEPS,
     STEP,
     STEP_DEG,
+    dependable,
     turn,
 )
 from .table import IDEAL, TWISTS_REACHED_DEG, Case
@@ -461,9 +462,15 @@ def _matrices() -> tuple[Statement, ...]:
     )
 
 
+@cache
+def _combined(case: Case) -> tuple[FloatArray, FloatArray, bool]:
+    return dependable(parameters(case.offset_in, case.twist_deg), case.shift_in)
+
+
 def _step() -> tuple[Statement, ...]:
     """Judge the equations of a step of the iteration, eqs 19a to 23a."""
     rank, order = _independent()
+    least = min(float(_combined(case)[0].max()) for case in OPEN)
     half_turn, open_22 = np.diag([1.0, -1.0, -1.0]), _rotation_that_meets_22()
     open_deg = np.degrees(Rotation.from_matrix(open_22).magnitude())
     return (
@@ -472,7 +479,8 @@ def _step() -> tuple[Statement, ...]:
             "by Hall, Root & Sandgren (1977). This algorithm is the combination of Davidon-Fletcher-Powell optimization "
             "routine with the Newton-Raphson method as applied to kinematics by Uicker, Denavit and Hartenberg (1964).",
             text("section 2.6.1, L366; abstract, L45"),
-            why="the thesis prints the Newton-Raphson half alone (eqs 7 to 26), and its program is missing",
+            why="the thesis prints the Newton-Raphson half alone (eqs 7 to 26), and its program is missing; joined in our "
+            f"way, both leave the loop open by {least:.0f} deg and more in the turn out of the plane",
         ),
         Statement(
             "So from equation (19a) nine dual equations can be written from this matrix equation, out of which only three are "
@@ -605,6 +613,13 @@ def closure() -> StudyResult:
         found = followed(case)
         columns[f"rotation left as printed; {case.name} [deg]"] = found.rotation_deg[:, 0]
         columns[f"error of S4 as printed; {case.name} [in]"] = found.error_in[:, 0]
+        rotation, error, _ = _combined(case)
+        columns[f"rotation left with Davidon Fletcher Powell; {case.name} [deg]"] = np.interp(
+            GRID_DEG, GRID_DEG[::2], rotation
+        )
+        columns[f"error of S4 with Davidon Fletcher Powell; {case.name} [in]"] = np.interp(
+            GRID_DEG, GRID_DEG[::2], error
+        )
     return StudyResult(
         number="rahman-closure",
         claim="Rahman states: the iteration of section 2.6.1 finds theta2, eta2, theta3, eta3 and S4 for given theta1 and S1.",

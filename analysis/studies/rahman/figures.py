@@ -63,12 +63,13 @@ matrices, and finds from it velocities, accelerations and joint forces under a t
 algebra is right: the matrices and operators, the accelerations but for 38a, the momenta but for two symbols, their rates, the
 inertia forces. In the plane, with the signs of errata 5 and 6 mended, its forces agree with Newton and Euler.
 
-Out of the plane the method fails at its root. A ball joint has three rotations, and eqs 2 and 3 give it two (erratum 1): the
-chain has one freedom, so that crank angle and shift cannot both be given. The iteration stops where its steps become small, on
-loops that are open by up to 38 deg, with the slider wrong by up to 6 in. The limits of S1 and alpha4 within which "the program
-converges" are, but for a4 = 20 in, those of this iteration. The mechanism works far beyond them, and its greatest shift falls
-with the offset, where the thesis infers that it rises. The axial force on the crank, which the thesis puts to zero, is an
-unknown (erratum 7), so that 2F2k is not zero and the bearing moments 1T1i and 1T1j lack a part.
+Out of the plane the method fails at its root. A ball joint has three rotations, and eqs 2 and 3 give it two (erratum
+1): the chain has one freedom, so that crank angle and shift cannot both be given. The iteration stops where its steps
+become small, on loops that are open by up to 38 deg, with the slider wrong by up to 6 in; with Davidon, Fletcher and
+Powell's steps, joined in our way, the loops stay open as well. The limits of S1 and alpha4 within which "the program
+converges" are, but for a4 = 20 in, those of this iteration. The mechanism works far beyond them, and its greatest shift
+falls with the offset, where the thesis infers that it rises. The axial force on the crank, which the thesis puts to
+zero, is an unknown (erratum 7), so that 2F2k is not zero and the bearing moments 1T1i and 1T1j lack a part.
 
 Of the conclusions on the engine, the displacements are almost sinusoidal, and a shift does load the bearing by two more
 moments. The offset lengthens the stroke, and saves no power. Clear of the dead centres most forces do not grow at every step

@@ -83,7 +83,7 @@ def difference(a: Dual, b: Dual) -> float:
 #: Labels of the axes by the unit of their columns.
 _SHOWN = {"[deg]": "rotation left", "[in]": "error of S4", "[in/s]": "opening of the loop", "[lb]": "4F4k"}
 #: Columns drawn dashed, over the others.
-_DASHED = ("loop mended", "both mended")
+_DASHED = ("loop mended", "both mended", "Davidon")
 
 
 def draw(result: StudyResult) -> Figure:

@@ -16,8 +16,8 @@ from linkwork.slider_crank.parameters import SliderCrankParameters
 from linkwork.slider_crank.published import CRANK_SPEED, POUND_FORCE
 
 from ...numerics.dual import Dual, about_i, about_j, about_k, stack
-from ...slider_crank import settle
-from ...slider_crank.closure import chain
+from ...slider_crank import close, settle
+from ...slider_crank.closure import chain, equations, planar, residuals
 from ...units import INCH
 
 FloatArray = NDArray[np.float64]
@@ -74,6 +74,57 @@ def turn(p: SliderCrankParameters, shift_in: ArrayLike, *, small: float = STEP) 
         found.steps[at] = ended.steps[ended.settled]
         start = ended.unknowns[ended.settled]
     return found
+
+
+def dependable(p: SliderCrankParameters, shift_in: float) -> tuple[FloatArray, FloatArray, bool]:
+    """Close the loop at every second angle of `GRID_DEG` by Newton-Raphson and Davidon-Fletcher-Powell steps combined our way.
+
+    The thesis prints the Newton-Raphson steps only (eqs 7 to 26); its reference 12, on the combination, was not at hand. A
+    step by eq 23a is taken if it halves the sum of squares of eq 25, with lengths in inches; otherwise a
+    Davidon-Fletcher-Powell step reduces that sum. The start is the planar estimate, then the solution at the previous angle.
+    Returns the rotation by which the loop is open (deg) and the error of S4 (in) at each angle, and whether the last step was
+    small at every angle.
+    """
+    unit, angles = np.array([1.0, 1.0, 1.0, 1.0, INCH]), np.radians(GRID_DEG[::2])
+    away = 1e-6 * np.concatenate([np.zeros((1, 5)), np.eye(5), -np.eye(5)])
+    q, ended, settled = planar(p, angles[:1])[0] / unit, [], True
+    for angle in angles:
+
+        def at(q: FloatArray, angle: float = angle) -> tuple[FloatArray, FloatArray, float, FloatArray]:
+            """Return A and V of eqs 24 and 25, the sum of squares of V, and its gradient."""
+            th, s1 = np.full(len(away), angle), np.full(len(away), shift_in * INCH)
+            matrix, right = equations(*chain(p, th, s1, (q + away) * unit), INCH, "printed")
+            sums = np.sum(right**2, -1)
+            return matrix[0], right[0], float(sums[0]), (sums[1:6] - sums[6:]) / 2e-6
+
+        matrix, right, error, slope = at(q)
+        metric: FloatArray = np.empty(0)
+        for _ in range(MAX_STEPS):
+            step = np.linalg.pinv(matrix) @ right
+            new = at(q + step)
+            if new[2] <= 0.5 * error:
+                metric = np.empty(0)
+            else:
+                metric = metric if metric.size else np.asarray(np.linalg.pinv(matrix.T @ matrix))
+                step = -metric @ slope
+                while (new := at(q + step))[2] > error and np.abs(step).max() > STEP:
+                    step *= 0.5
+                change = new[3] - slope
+                turned = metric @ change
+                if step @ change > 0.0:
+                    metric = (
+                        metric + np.outer(step, step) / (step @ change) - np.outer(turned, turned) / (change @ turned)
+                    )
+            q, (matrix, right, error, slope) = q + step, new
+            if np.abs(step).max() <= STEP:
+                break
+        else:
+            settled = False
+        ended.append(q)
+    shifts, found = np.full(angles.size, shift_in * INCH), np.array(ended) * unit
+    rotation, _ = residuals(chain(p, angles, shifts, found)[0])
+    position = np.abs(found[:, 4] - close(p, angles, shifts).slider_position)
+    return np.degrees(rotation), position / INCH, settled
 
 
 class Crank(NamedTuple):
