@@ -42,6 +42,7 @@ from .style import (
     Figure,
     figure_style,
     finish,
+    frame_drawing,
     write_title,
 )
 
@@ -117,12 +118,6 @@ class _Scene:
     def point(self, s: float, n: float) -> NDArray[np.float64]:
         """Return the point at a distance s along the guide from the slider's zero, and n to the left of the guide (cm)."""
         return self.zero + s * self.along + n * self.left
-
-    def prepare(self, axis: Axes) -> None:
-        axis.set_aspect("equal")
-        axis.set_xlim(self.low[0], self.high[0])
-        axis.set_ylim(self.low[1], self.high[1])
-        axis.set_axis_off()
 
     def draw(self, axis: Axes, q: _Pins, *, letters: bool = True, trace: NDArray[np.float64] | None = None) -> None:
         """Draw the whole mechanism at one configuration; ``trace`` is the path of P in cm, shape (n, 2)."""
@@ -288,7 +283,7 @@ def draw_linkage(
     with figure_style():
         figure = Figure(figsize=(6.4, 6.4 * height / width + (0.3 if title else 0.0)))
         axis = figure.subplots()
-        scene.prepare(axis)
+        frame_drawing(axis, scene.low, scene.high)
         scene.draw(axis, q, trace=path)
         if title:
             axis.set_title(title, fontsize=TITLE, fontweight="bold")
@@ -307,7 +302,7 @@ def _draw_at_start(parameters: FiveBarParameters, axis: Axes, run: Trajectory) -
         x, y = (k.l2 * f(turned) + k.l3 * f(tilted) for f in (np.cos, np.sin))
         name, path = "C", CM_PER_METRE * np.column_stack([x, y])
     scene = _Scene(parameters, configurations, SMALL)
-    scene.prepare(axis)
+    frame_drawing(axis, scene.low, scene.high)
     samples, when = last_samples(run)
     scene.draw(axis, configurations[0], trace=path[samples])
     return f"at {run.time[0]:.4g} s, with the path of {name} {when}"
@@ -362,7 +357,7 @@ def animate_linkage(
         with gif(figure, path, frames_per_second) as (file, add_frame):
             for i, q in zip(chosen, configurations):
                 above.clear()
-                scene.prepare(above)
+                frame_drawing(above, scene.low, scene.high)
                 scene.draw(above, q, letters=False, trace=trace[: i + 1])
                 done.set_data(time[: i + 1], u[: i + 1])
                 dot.set_data(time[i : i + 1], u[i : i + 1])

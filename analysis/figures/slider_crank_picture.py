@@ -51,6 +51,7 @@ from .style import (
     TRACE,
     figure_style,
     finish,
+    frame_drawing,
     legend_above,
     write_title,
 )
@@ -216,12 +217,6 @@ class _Scene:
     @property
     def _rail(self) -> tuple[float, float]:
         return self.least - 2.3 * self.size, self.most + 2.3 * self.size
-
-    def prepare(self, axis: Axes) -> None:
-        axis.set_aspect("equal")
-        axis.set_xlim(self.low[0], self.high[0])
-        axis.set_ylim(self.low[1], self.high[1])
-        axis.set_axis_off()
 
     def draw(self, axis: Axes, pose: _Pose, *, letters: bool = True) -> None:
         """Draw the whole mechanism at one configuration, with the paths of its pins."""
@@ -420,7 +415,7 @@ def _draw_at_start(parameters: SliderCrankParameters, axis: Axes, run: Trajector
     )
     samples, when = last_samples(run)
     scene = _Scene(parameters, [_Track(poses, crank[samples], slider[samples])], poses, "mm", VIEW)
-    scene.prepare(axis)
+    frame_drawing(axis, scene.low, scene.high)
     scene.draw(axis, poses[0], letters=False)
     return f"at {run.time[0]:.4g} s, with the paths of the pins {when}"
 
@@ -432,7 +427,7 @@ def _sheet(scene: _Scene, wide: float, *, head: float, foot: float = 0.0) -> tup
     figure = Figure(figsize=(wide, head + tall + foot))
     FigureCanvasAgg(figure)
     axis = figure.add_axes((0.0, foot / (head + tall + foot), 1.0, tall / (head + tall + foot)))
-    scene.prepare(axis)
+    frame_drawing(axis, scene.low, scene.high)
     axis.apply_aspect()
     return figure, axis
 

@@ -126,6 +126,14 @@ def finish(figure: Figure) -> Figure:
     return figure
 
 
+def frame_drawing(axis: Axes, low: Any, high: Any) -> None:
+    """Show the box from ``low`` to ``high`` to scale, without axes."""
+    axis.set_aspect("equal")
+    axis.set_xlim(low[0], high[0])
+    axis.set_ylim(low[1], high[1])
+    axis.set_axis_off()
+
+
 def align_labels(axes: Sequence[Axes]) -> None:
     """Put the y labels of axes in one column, at the distance from the axes that the widest tick labels need.
 

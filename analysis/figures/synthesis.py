@@ -6,7 +6,7 @@ Lengths are shown in mm, angles in degrees.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from math import ceil, hypot, log10
+from math import ceil, log10
 from pathlib import Path
 from textwrap import fill
 from typing import Any
@@ -157,7 +157,7 @@ def _draw_linkage(
     _draw_line(axis, [a, e], linewidth=HAIR, linestyle=(0, (9, 3, 2, 3)), color="0.55", zorder=1)
     _draw_support(axis, a, unit)
     if scene.guide is not None:
-        _draw_slider(axis, MM_PER_METRE * scene.guide, d, unit)
+        _draw_slider(axis, MM_PER_METRE * scene.guide, scene.guide_directions(), d, unit)
     else:
         _draw_support(axis, e if scene.second_crank else d, unit)
     if scene.second_crank:
@@ -177,11 +177,10 @@ def _draw_linkage(
         _write_letters(axis, scene, at, unit)
 
 
-def _draw_slider(axis: Axes, guide: FloatArray, d: FloatArray, unit: float) -> None:
-    way = guide[1] - guide[0]
-    length = hypot(*way)
-    along = way / length if length > 0.0 else np.array([1.0, 0.0])
-    left = np.array([-along[1], along[0]])
+def _draw_slider(
+    axis: Axes, guide: FloatArray, directions: tuple[FloatArray, FloatArray], d: FloatArray, unit: float
+) -> None:
+    along, left = directions
     for side in (-0.8, 0.8):
         rail = [guide[0] - 2.2 * unit * along + side * unit * left, guide[1] + 2.2 * unit * along + side * unit * left]
         _draw_line(axis, rail, linewidth=THIN, zorder=3)

@@ -8,11 +8,13 @@ import os
 import stat
 import zlib
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from pathlib import Path
 from zipfile import BadZipFile, LargeZipFile, ZipFile
 
 from linkwork.errors import InputError, LinkworkError
+
+from ..numerics.cache import written_whole
 
 #: Greatest size of a text file (MB), by its ending; ``""`` for all others.
 _TEXT = {".toml": 16, ".json": 16, ".svg": 8, "": 1024}
@@ -61,16 +63,12 @@ def check_ending(path: Path, known: Sequence[str]) -> str:
 
 @contextmanager
 def write_completely(path: Path) -> Iterator[Path]:
-    """Yield a temporary path to write to; at the end the file is renamed to ``path``, so that no incomplete file appears."""
-    part = prepare(path).with_name(f"{path.name}.{os.getpid()}.part")
+    """Yield a temporary path as `written_whole`; create the folder, and raise WritingError if the file cannot be written."""
     try:
-        yield part
-        os.replace(part, path)
+        with written_whole(prepare(path)) as part:
+            yield part
     except OSError as error:
         raise WritingError(f"{path} cannot be written: {error.strerror or error}") from error
-    finally:
-        with suppress(OSError):
-            part.unlink(missing_ok=True)
 
 
 def read_text(path: Path) -> str:

@@ -6,8 +6,8 @@ import hashlib
 import os
 import sys
 import tempfile
-from collections.abc import Mapping
-from contextlib import suppress
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager, suppress
 from functools import cache
 from pathlib import Path
 
@@ -46,14 +46,22 @@ def lock_folder(folder: Path) -> FileLock:
     return FileLock(folder.with_suffix(".lock"))
 
 
-def store_file(path: Path, content: bytes) -> None:
-    """Write a file so that no other process sees it half written."""
-    part = path.with_suffix(f".{os.getpid()}")
+@contextmanager
+def written_whole(path: Path) -> Iterator[Path]:
+    """Yield a path to write to beside ``path``; at the end it is renamed, so that no process sees a file half written."""
+    part = path.with_name(f"{path.name}.{os.getpid()}.part")
     try:
-        part.write_bytes(content)
+        yield part
         os.replace(part, path)
     finally:
-        part.unlink(missing_ok=True)
+        with suppress(OSError):
+            part.unlink(missing_ok=True)
+
+
+def store_file(path: Path, content: bytes) -> None:
+    """Write a file so that no other process sees it half written."""
+    with written_whole(path) as part:
+        part.write_bytes(content)
 
 
 def keep(path: Path, content: bytes) -> None:

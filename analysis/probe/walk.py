@@ -334,22 +334,19 @@ def derivative_arguments(
     return [*about, given, result] if version == 2 else [*about, given, len(given), result, len(result)]
 
 
-def _output_derivatives(walk: Walk) -> list[Any] | None:
-    outputs = [
-        v for v in walk.model.variables if v.causality == "output" and v.is_real and v.variability == "continuous"
-    ]
-    if not outputs:
-        return None
-    extra = [1] if walk.model.version == 3 else []
-    return [references([walk.rng.choice(outputs)]), 1, (ctypes.c_int * 1)(1), (ctypes.c_double * 1)(), *extra]
+def _time_derivatives(causality: str) -> Callable[[Walk], list[Any] | None]:
+    """Return the arguments of a call that gets the first time derivative of an output, or sets that of an input."""
 
+    def arguments(walk: Walk) -> list[Any] | None:
+        known = walk.model.variables
+        known = tuple(v for v in known if v.causality == causality and v.is_real and v.variability == "continuous")
+        if not known:
+            return None
+        slope = walk.rng.gauss(0, 1) if causality == "input" else 0.0
+        extra = [1] if causality == "output" and walk.model.version == 3 else []
+        return [references([walk.rng.choice(known)]), 1, (ctypes.c_int * 1)(1), (ctypes.c_double * 1)(slope), *extra]
 
-def _input_derivatives(walk: Walk) -> list[Any] | None:
-    inputs = [v for v in walk.model.variables if v.causality == "input" and v.is_real and v.variability == "continuous"]
-    if not inputs:
-        return None
-    slope = walk.rng.gauss(0, 1)
-    return [references([walk.rng.choice(inputs)]), 1, (ctypes.c_int * 1)(1), (ctypes.c_double * 1)(slope)]
+    return arguments
 
 
 def _update_arguments(walk: Walk) -> list[Any]:
@@ -386,9 +383,9 @@ _ARGUMENTS: dict[str, Callable[[Walk], list[Any] | None]] = {
     "settime": _set_time,
     "getdirectionalderivative": _derivative(False),
     "getadjointderivative": _derivative(True),
-    "getrealoutputderivatives": _output_derivatives,
-    "getoutputderivatives": _output_derivatives,
-    "setrealinputderivatives": _input_derivatives,
+    "getrealoutputderivatives": _time_derivatives("output"),
+    "getoutputderivatives": _time_derivatives("output"),
+    "setrealinputderivatives": _time_derivatives("input"),
     "newdiscretestates": _update_arguments,
     "updatediscretestates": _update_arguments,
     "completedintegratorstep": _completed_step_arguments,

@@ -144,6 +144,14 @@ class LinkageScene:
         )
         return np.column_stack([ends.real, ends.imag])
 
+    def guide_directions(self) -> tuple[FloatArray, FloatArray]:
+        """Return the unit vectors along the guide and to its left; the guide of a slider that rests is level."""
+        assert self.guide is not None
+        way = self.guide[1] - self.guide[0]
+        length = hypot(*way)
+        along = way / length if length > 0.0 else np.array([1.0, 0.0])
+        return along, np.array([-along[1], along[0]])
+
     @property
     def second_crank(self) -> bool:
         """Return whether D is on a second crank about E."""
@@ -236,7 +244,7 @@ def drawing(solution: Solution, rotation: float | None = None, *, poses: int = 0
     if p is not None:
         circles.append(Circle(layer="coupler", centre=p, radius=0.7 * radius))
     if scene.guide is not None:
-        guide, block = _guide_and_block(scene.guide, np.array(d), radius)
+        guide, block = _guide_and_block(scene.guide, scene.guide_directions(), np.array(d), radius)
         lines.append(guide)
         polylines.append(block)
     polylines += [_curve("coupler-curve", piece) for piece in scene.curves]
@@ -423,11 +431,10 @@ def _curve(layer: str, points: FloatArray) -> Polyline:
     return Polyline(layer=layer, points=points[:-1] if closed else points, closed=closed)
 
 
-def _guide_and_block(guide: FloatArray, d: FloatArray, radius: float) -> tuple[Line, Polyline]:
-    way = guide[1] - guide[0]
-    length = hypot(*way)
-    along = way / length if length > 0.0 else np.array([1.0, 0.0])
-    left = np.array([-along[1], along[0]])
+def _guide_and_block(
+    guide: FloatArray, directions: tuple[FloatArray, FloatArray], d: FloatArray, radius: float
+) -> tuple[Line, Polyline]:
+    along, left = directions
     ends = [guide[0] - 4.0 * radius * along, guide[1] + 4.0 * radius * along]
     block = np.array([d + radius * (3.0 * s * along + 2.0 * n * left) for s, n in ((-1, -1), (1, -1), (1, 1), (-1, 1))])
     start, end = ((float(x), float(y)) for x, y in ends)
