@@ -131,7 +131,7 @@ MECHANISM = Mechanism(
     ),
     experiment=(0.0, 1.0, 1e-3, 1e-9),
     modules=(friction, planar, equations),
-    equations=Equations(*(getattr(equations, name) for name in Equations._fields)),
+    equations=Equations.of(equations),
     check_assembly=check_assembly,
     error_scale=equations.error_scale,
     unjoined=planar.UNJOINED,

@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from importlib import import_module
-from math import degrees
+from math import degrees, pi
 from types import MappingProxyType, ModuleType
 from typing import Any, NamedTuple
 
@@ -90,6 +90,21 @@ class Channel(NamedTuple):
     displacement: str = ""
 
 
+#: A crank driven by a torque or at a commanded speed, as the first freedom, and its channels.
+CRANK = Freedom(
+    "crank.angle",
+    "crank.speed",
+    ("crank_angle", "crank_speed"),
+    Mode("drive.mode", ("torque", "speed"), ("torque", "speed")),
+    2.0 * pi,
+)
+CRANK_CHANNELS = (
+    Channel("drive.torque", "torque", freedom=0),
+    Channel("drive.speed", "speed", "command", 0),
+    Channel("drive.acceleration", "acceleration", "rate", 0),
+)
+
+
 class Equations(NamedTuple):
     """The equations of a mechanism: arithmetic on floats without branches.
 
@@ -124,6 +139,11 @@ class Equations(NamedTuple):
     jump: Callable[..., Any]
     start: Callable[..., Any]
     energy: Callable[..., float]
+
+    @classmethod
+    def of(cls, module: ModuleType) -> Equations:
+        """Return the equations of a module whose functions have these names."""
+        return cls(*(getattr(module, name) for name in cls._fields))
 
 
 class Joint(NamedTuple):

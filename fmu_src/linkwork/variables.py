@@ -141,25 +141,30 @@ def parameter(
     The lower bound follows from the ``RULES`` of this object. Angles are shown in degrees.
     """
     field = field_name(name)
-    minimum = None if field in start.RULES.free_sign else 0.0
-    display = "deg" if unit == "rad" else ""
-    return Variable(
-        name,
-        "parameter",
-        unit,
-        description,
-        symbol,
-        getattr(start, field),
-        minimum=minimum,
-        display=display,
-        role=role,
-        of=of,
-    )
+    shown: dict[str, Any] = {
+        "minimum": None if field in start.RULES.free_sign else 0.0,
+        "display": "deg" if unit == "rad" else "",
+    }
+    return Variable(name, "parameter", unit, description, symbol, getattr(start, field), **shown, role=role, of=of)
+
+
+def centre(start: Any, name: str, unit: str, description: str, symbol: str = "") -> Variable:
+    """Return the variable of a parameter that places a centre of mass, see `parameter`."""
+    return parameter(start, name, unit, description, symbol, "centre of mass")
 
 
 def choice(name: str, description: str, start: int, least: int, greatest: int) -> Variable:
     """Return the variable of a parameter that is a whole number from ``least`` to ``greatest``."""
     return Variable(name, "parameter", "", description, "", start, "Integer", least, greatest)
+
+
+def crank_start(angle: str, speed: float, replaced: str) -> tuple[Variable, Variable]:
+    """Return the parameters of the crank's angle and speed at the start; ``replaced`` says when drive.speed takes its place."""
+    text = f"Crank speed at the start; {replaced} drive.speed takes its place"
+    return (
+        Variable("initial.crank_angle", "parameter", "rad", "Crank angle at the start", angle, display="deg"),
+        Variable("initial.crank_speed", "parameter", "rad/s", text, rf"\dot{angle}", speed, display="rpm"),
+    )
 
 
 def speed_inputs(angle: str, start: float) -> tuple[Variable, Variable]:
@@ -193,6 +198,16 @@ def energy_outputs(potential: str, dissipated: str, supplied: str) -> tuple[Vari
         output("energy.dissipated", "J", f"Work lost in {dissipated} since the start", "", "state"),
         output("energy.supplied", "J", f"Work of {supplied} since the start", "", "speed"),
         output("energy.residual", "J", balance, "", "speed", role="residual"),
+    )
+
+
+def closure_outputs(transmission: str, greatest: float) -> tuple[Variable, Variable]:
+    """Return the outputs of the closure's residual and of the transmission angle, described by ``transmission``, in rad."""
+    text = "Length by which the loop fails to close"
+    angle: dict[str, Any] = {"minimum": 0.0, "maximum": greatest, "display": "deg", "role": "transmission"}
+    return (
+        output("closure.residual", "m", text, "", *POSITION, minimum=0.0, role="residual"),
+        output("transmission.angle", "rad", transmission, "", *POSITION, **angle),
     )
 
 

@@ -225,9 +225,7 @@ def test_energies_are_those_of_the_particles(kind: Kind, data: st.DataObject) ->
     springs = kind.springs(x, par)
     size = sum(map(abs, weights)) + springs
     assert kind.D.potential_energy(e.g, x[1], p) == pytest.approx(sum(weights) + springs, abs=1e-12 * size)
-    assert kind.D.mechanical_energy(x, p) == pytest.approx(
-        kinetic + sum(weights) + springs, abs=1e-9 * (kinetic + size)
-    )
+    assert kind.D.energy(x, p) == pytest.approx(kinetic + sum(weights) + springs, abs=1e-9 * (kinetic + size))
 
 
 @every_kind
@@ -293,7 +291,7 @@ def test_power_balance(seed: int, kind: Kind, drive: str) -> None:
     e = kind.evaluate(x, i, p)
     dx = kind.D.derivative(x, i, p)
     assert dx[:2] == x[2:4]
-    (change,) = along(lambda y: (kind.D.mechanical_energy(y, p),), x, dx, kind.time_step(x, e, p))
+    (change,) = along(lambda y: (kind.D.energy(y, p),), x, dx, kind.time_step(x, e, p))
     assert change == pytest.approx(dx[5] - dx[4], abs=1e-7 * max(abs(dx[5]), abs(dx[4]), abs(change)))
     power = kind.power(x, e, i, case.parameters)
     assert dx[5] == pytest.approx(power.supplied, rel=kind.precision)
@@ -490,7 +488,7 @@ def test_outputs_carry_the_configuration_and_the_forces() -> None:
     assert (cos(o.coupler_angle), sin(o.coupler_angle)) == pytest.approx((e.g.c3, e.g.s3), abs=1e-14)
     assert (cos(o.rocker_angle), sin(o.rocker_angle)) == pytest.approx((e.g.c4, e.g.s4), abs=1e-14)
     assert (o.coupler_point_x, o.coupler_point_y) == K.coupler_point(e.g, p)
-    assert o.energy_kinetic + o.energy_potential == D.mechanical_energy(x, p)
+    assert o.energy_kinetic + o.energy_potential == D.energy(x, p)
     assert o.energy_residual == pytest.approx(o.energy_kinetic + o.energy_potential - 2.0 + 3.0 - 5.0, rel=1e-14)
     assert o.closure_residual < 1e-14
     assert sin(o.transmission_angle) == pytest.approx(abs(e.g.s43), abs=1e-14)

@@ -61,7 +61,7 @@ def test_energy_balance(seed: int, drive: str) -> None:
     x, i, p = case.state, case.inputs(drive), case.p
     dx, o = D.derivative(x, i, p), D.outputs(x, i, 0.0, p)
     speed = max(abs(x[2]), abs(o.crank_acceleration) ** 0.5, abs(o.slider_acceleration / p.l2) ** 0.5, 1.0)
-    (change,) = along(lambda y: (D.mechanical_energy(y, p),), x, dx, 1e-4 / speed)
+    (change,) = along(lambda y: (D.energy(y, p),), x, dx, 1e-4 / speed)
     assert change == pytest.approx(dx[5] - dx[4], abs=1e-6 * max(abs(dx[4]), abs(dx[5])))
     assert dx[4] > D.derivative(x, i, seeded(seed).p)[4] >= 0.0
 

@@ -178,7 +178,7 @@ def test_outputs_carry_the_configuration_and_the_forces() -> None:
     assert triple("slider_pin_f") == list(e.forces.slider_pin)
     assert triple("guide_f") == list(e.forces.guide)
     assert triple("guide_m") == list(e.forces.guide_moment)
-    assert o.energy_kinetic + o.energy_potential == D.mechanical_energy(x, p)
+    assert o.energy_kinetic + o.energy_potential == D.energy(x, p)
     assert (o.energy_dissipated, o.energy_supplied) == (3.0, 5.0)
     assert o.energy_residual == pytest.approx(o.energy_kinetic + o.energy_potential - 2.0 + 3.0 - 5.0, rel=1e-14)
     assert o.closure_residual < 1e-14

@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-from math import pi
-
 from .. import friction
-from ..mechanism import Channel, Equations, Freedom, Link, Mechanism, Mode
+from ..mechanism import CRANK, CRANK_CHANNELS, Channel, Equations, Freedom, Link, Mechanism
 from . import assembly, cases, drawing, dynamics, kinematics, published, variables
 from .parameters import FiveBarParameters, InitialState
 
@@ -30,19 +28,11 @@ MECHANISM = Mechanism(
     initial=InitialState,
     published=published.SETS,
     freedoms=(
-        Freedom(
-            "crank.angle",
-            "crank.speed",
-            ("crank_angle", "crank_speed"),
-            Mode("drive.mode", ("torque", "speed"), ("torque", "speed")),
-            2.0 * pi,
-        ),
+        CRANK,
         Freedom("slider.position", "slider.velocity", ("slider_position", "slider_velocity")),
     ),
     channels=(
-        Channel("drive.torque", "torque", freedom=0),
-        Channel("drive.speed", "speed", "command", 0),
-        Channel("drive.acceleration", "acceleration", "rate", 0),
+        *CRANK_CHANNELS,
         Channel("slider.force", "force", freedom=1),
         Channel("load.fx", "load_x", displacement="coupler.point.x"),
         Channel("load.fy", "load_y", displacement="coupler.point.y"),
@@ -51,15 +41,7 @@ MECHANISM = Mechanism(
     position_parameters=variables.POSITION_PARAMETERS,
     experiment=(0.0, 0.4285714285714286, 1e-3, 1e-9),  # three revolutions at 420 rpm
     modules=(friction, kinematics, dynamics),
-    equations=Equations(
-        apply_inputs=dynamics.apply_inputs,
-        derivative=dynamics.derivative,
-        outputs=dynamics.outputs,
-        clearance=dynamics.clearance,
-        jump=dynamics.jump,
-        start=dynamics.complete_start,
-        energy=dynamics.mechanical_energy,
-    ),
+    equations=Equations.of(dynamics),
     check_assembly=lambda parameters, x: assembly.check_assembly(parameters, x[0], x[1]),
     error_scale=assembly.error_scale,
     unjoined=assembly.UNJOINED,

@@ -372,7 +372,7 @@ def potential_energy(g: Position, u: float, p: Constants) -> float:
     return 0.5 * p.k * stretch * stretch - p.gx * x - p.gy * y
 
 
-def mechanical_energy(x: State, p: Constants) -> float:
+def energy(x: State, p: Constants) -> float:
     """Compute the kinetic plus potential energy (J)."""
     g = position(x[0], x[1], p)
     return kinetic_energy(inertia(g, coefficients(g, p), p), x[2], x[3]) + potential_energy(g, x[1], p)
@@ -403,7 +403,7 @@ def apply_inputs(modes: tuple[float, ...], u: tuple[float, ...], p: Constants) -
     return Inputs(drive, (1.0 - drive) * torque, drive * acceleration, force, load_x, load_y)
 
 
-def complete_start(x: State, i: Inputs, p: Constants) -> State:
+def start(x: State, i: Inputs, p: Constants) -> State:
     """Return the initial state unchanged, because its components do not depend on each other."""
     return x
 

@@ -34,7 +34,6 @@ def _from_cgs(
     inertias_g_cm2: tuple[float, float],
     stiffness_dyn_cm: float,
     damping_dyn_s_cm: float,
-    inclination: float = 0.0,
     gravity: float = 9.81,
 ) -> FiveBarParameters:
     return FiveBarParameters(
@@ -54,7 +53,6 @@ def _from_cgs(
         rocker_cog_distance=cog_cm[1] / CM_PER_METRE,
         slider_stiffness=stiffness_dyn_cm / DYN_PER_CM_PER_NEWTON_PER_METRE,
         slider_damping=damping_dyn_s_cm / DYN_PER_CM_PER_NEWTON_PER_METRE,
-        ground_inclination=inclination,
         gravity=gravity,
     )
 

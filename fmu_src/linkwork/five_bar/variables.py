@@ -12,8 +12,11 @@ from ..variables import (
     POSITION,
     RATE,
     Variable,
+    centre,
     choice,
+    closure_outputs,
     crank_outputs,
+    crank_start,
     energy_outputs,
     output,
     parameter,
@@ -24,7 +27,7 @@ from ..variables import (
 from .published import SETS
 
 _SET = SETS["table-3.1"]
-_parameter = partial(parameter, _SET.parameters)
+_parameter, _centre = partial(parameter, _SET.parameters), partial(centre, _SET.parameters)
 _SLIDE = "slider.position"
 
 PARAMETERS = (
@@ -46,40 +49,12 @@ PARAMETERS = (
     ),
     _parameter("coupler.inertia", "kg.m2", "Moment of inertia of the coupler about its centre of mass", "I_{G3}"),
     _parameter("rocker.inertia", "kg.m2", "Moment of inertia of the rocker about its centre of mass", "I_{G4}"),
-    _parameter(
-        "crank.cog_distance", "m", "Centre of mass of the crank, distance from A", "l_{G2}", role="centre of mass"
-    ),
-    _parameter(
-        "coupler.cog_distance",
-        "m",
-        "Centre of mass of the coupler, distance from the crank pin B",
-        "l_{G3}",
-        role="centre of mass",
-    ),
-    _parameter(
-        "rocker.cog_distance",
-        "m",
-        "Centre of mass of the rocker, distance from the slider pin D",
-        "l_{G4}",
-        role="centre of mass",
-    ),
-    _parameter(
-        "crank.cog_angle", "rad", "Direction of the crank's centre of mass from A to B", "\\nu_2", role="centre of mass"
-    ),
-    _parameter(
-        "coupler.cog_angle",
-        "rad",
-        "Direction of the coupler's centre of mass from B to C",
-        "\\nu_3",
-        role="centre of mass",
-    ),
-    _parameter(
-        "rocker.cog_angle",
-        "rad",
-        "Direction of the rocker's centre of mass from D to C",
-        "\\nu_4",
-        role="centre of mass",
-    ),
+    _centre("crank.cog_distance", "m", "Centre of mass of the crank, distance from A", "l_{G2}"),
+    _centre("coupler.cog_distance", "m", "Centre of mass of the coupler, distance from the crank pin B", "l_{G3}"),
+    _centre("rocker.cog_distance", "m", "Centre of mass of the rocker, distance from the slider pin D", "l_{G4}"),
+    _centre("crank.cog_angle", "rad", "Direction of the crank's centre of mass from A to B", "\\nu_2"),
+    _centre("coupler.cog_angle", "rad", "Direction of the coupler's centre of mass from B to C", "\\nu_3"),
+    _centre("rocker.cog_angle", "rad", "Direction of the rocker's centre of mass from D to C", "\\nu_4"),
     _parameter("slider.guide_angle", "rad", "Direction of the slider's guide from the ground link", "\\alpha"),
     _parameter("slider.stiffness", "N/m", "Stiffness of the spring on the slider", "k", "stiffness", _SLIDE),
     _parameter("slider.spring_free_position", "m", "Slider position at which the spring is free", "u_0", role="spring"),
@@ -118,16 +93,7 @@ PARAMETERS = (
         1,
     ),
     choice("drive.mode", "0: drive.torque acts on the crank; 1: the crank turns at drive.speed", 1, 0, 1),
-    Variable("initial.crank_angle", "parameter", "rad", "Crank angle at the start", "\\theta_2", display="deg"),
-    Variable(
-        "initial.crank_speed",
-        "parameter",
-        "rad/s",
-        "Crank speed at the start; in speed drive drive.speed takes its place",
-        "\\dot\\theta_2",
-        _SET.crank_speed,
-        display="rpm",
-    ),
+    *crank_start("\\theta_2", _SET.crank_speed, "in speed drive"),
     Variable("initial.slider_position", "parameter", "m", "Slider position at the start", "u"),
     Variable("initial.slider_velocity", "parameter", "m/s", "Slider velocity at the start", "\\dot u"),
     tolerance_parameter(),
@@ -144,44 +110,24 @@ INPUTS = (
 )
 
 
-def _pin(pin: str, description: str) -> tuple[Variable, Variable]:
-    return (
-        output(
-            f"pin.{pin}.fx", "N", f"Force of {description}, along the ground link", role="joint force", of=f"pin.{pin}"
-        ),
-        output(
-            f"pin.{pin}.fy",
-            "N",
-            f"Force of {description}, to the left of the ground link",
-            role="joint force",
-            of=f"pin.{pin}",
-        ),
+def _pin(pin: str, description: str) -> tuple[Variable, ...]:
+    directions = {"x": "along the ground link", "y": "to the left of the ground link"}
+    return tuple(
+        output(f"pin.{pin}.f{axis}", "N", f"Force of {description}, {way}", role="joint force", of=f"pin.{pin}")
+        for axis, way in directions.items()
     )
+
+
+def _angle(name: str, description: str, symbol: str) -> Variable:
+    text = f"{description}, continuous unless B passes behind D"
+    return output(name, "rad", text, symbol, *POSITION, minimum=-2.0 * pi, maximum=2.0 * pi, display="deg")
 
 
 #: The real outputs stand in the order of `dynamics.Outputs`.
 OUTPUTS = (
     *crank_outputs("\\theta_2"),
-    output(
-        "coupler.angle",
-        "rad",
-        "Coupler angle B to C, continuous unless B passes behind D",
-        "\\theta_3",
-        *POSITION,
-        minimum=-2.0 * pi,
-        maximum=2.0 * pi,
-        display="deg",
-    ),
-    output(
-        "rocker.angle",
-        "rad",
-        "Absolute rocker angle D to C, continuous unless B passes behind D",
-        "\\theta_4 + \\alpha",
-        *POSITION,
-        minimum=-2.0 * pi,
-        maximum=2.0 * pi,
-        display="deg",
-    ),
+    _angle("coupler.angle", "Coupler angle B to C", "\\theta_3"),
+    _angle("rocker.angle", "Absolute rocker angle D to C", "\\theta_4 + \\alpha"),
     output("slider.position", "m", "Slider position along the guide", "u", *POSITION),
     output("slider.velocity", "m/s", "Slider velocity", "\\dot u", *RATE, rate_of="slider.position"),
     output("slider.acceleration", "m/s2", "Slider acceleration", "\\ddot u", rate_of="slider.velocity"),
@@ -210,20 +156,7 @@ OUTPUTS = (
         "damper, guide and pins",
         "crank torque, slider force and load",
     ),
-    output(
-        "closure.residual", "m", "Length by which the loop fails to close", "", *POSITION, minimum=0.0, role="residual"
-    ),
-    output(
-        "transmission.angle",
-        "rad",
-        "Angle between coupler and rocker at C",
-        "",
-        *POSITION,
-        minimum=0.0,
-        maximum=pi,
-        display="deg",
-        role="transmission",
-    ),
+    *closure_outputs("Angle between coupler and rocker at C", pi),
     *status_variables(),
 )
 

@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-from math import pi
-
 from .. import friction
-from ..mechanism import Channel, Equations, Freedom, Link, Mechanism, Mode
+from ..mechanism import CRANK, CRANK_CHANNELS, Channel, Equations, Freedom, Link, Mechanism, Mode
 from . import assembly, cases, drawing, dynamics, kinematics, published, variables, vectors
 from .parameters import InitialState, SliderCrankParameters
 
@@ -37,13 +35,7 @@ MECHANISM = Mechanism(
     initial=InitialState,
     published=published.SETS,
     freedoms=(
-        Freedom(
-            "crank.angle",
-            "crank.speed",
-            ("crank_angle", "crank_speed"),
-            Mode("drive.mode", ("torque", "speed"), ("torque", "speed")),
-            2.0 * pi,
-        ),
+        CRANK,
         Freedom(
             "shift.position",
             "shift.velocity",
@@ -53,9 +45,7 @@ MECHANISM = Mechanism(
         ),
     ),
     channels=(
-        Channel("drive.torque", "torque", freedom=0),
-        Channel("drive.speed", "speed", "command", 0),
-        Channel("drive.acceleration", "acceleration", "rate", 0),
+        *CRANK_CHANNELS,
         Channel("axial.force", "axial_force", freedom=1),
         Channel("axial.speed", "shift_speed", "command", 1),
         Channel("axial.acceleration", "rate of shift_speed", "rate", 1),
@@ -65,15 +55,7 @@ MECHANISM = Mechanism(
     position_parameters=variables.POSITION_PARAMETERS,
     experiment=(0.0, 2.4, 5e-3, 1e-9),  # two revolutions at 50 rpm
     modules=(friction, vectors, kinematics, dynamics),
-    equations=Equations(
-        apply_inputs=dynamics.apply_inputs,
-        derivative=dynamics.derivative,
-        outputs=dynamics.outputs,
-        clearance=dynamics.clearance,
-        jump=dynamics.jump,
-        start=dynamics.complete_start,
-        energy=dynamics.mechanical_energy,
-    ),
+    equations=Equations.of(dynamics),
     check_assembly=lambda parameters, x: assembly.check_assembly(parameters, x[0], x[1]),
     error_scale=assembly.error_scale,
     unjoined=assembly.UNJOINED,

@@ -329,7 +329,7 @@ def potential_energy(q: Position, s1: float, p: Constants) -> float:
     return 0.5 * (p.k * stretch * stretch + p.kx * shift * shift) - dot(Vector(p.gx, p.gy, p.gz), moved)
 
 
-def mechanical_energy(x: State, p: Constants) -> float:
+def energy(x: State, p: Constants) -> float:
     """Compute the kinetic plus potential energy (J)."""
     q = position(x[0], x[1], p)
     return kinetic_energy(inertia(q, coefficients(q, p), p), x[2], x[3]) + potential_energy(q, x[1], p)
@@ -379,7 +379,7 @@ def apply_inputs(modes: tuple[float, ...], u: tuple[float, ...], p: Constants) -
     )
 
 
-def complete_start(x: State, i: Inputs, p: Constants) -> State:
+def start(x: State, i: Inputs, p: Constants) -> State:
     """Return the initial state of a run, with the shift and axial velocity that a groove imposes, if there is one."""
     return impose_groove(x, i.groove, p)
 

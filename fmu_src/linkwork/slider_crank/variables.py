@@ -12,8 +12,11 @@ from ..variables import (
     POSITION,
     RATE,
     Variable,
+    centre,
     choice,
+    closure_outputs,
     crank_outputs,
+    crank_start,
     energy_outputs,
     output,
     parameter,
@@ -24,7 +27,7 @@ from ..variables import (
 from .published import CRANK_SPEED, OFFSET_CASE
 
 _MECHANISM, _INITIAL = OFFSET_CASE
-_parameter = partial(parameter, _MECHANISM)
+_parameter, _centre = partial(parameter, _MECHANISM), partial(centre, _MECHANISM)
 
 PARAMETERS = (
     _parameter("crank.length", "m", "Crank, from its axis to the crank pin; greater than zero", "a_1"),
@@ -37,40 +40,16 @@ PARAMETERS = (
     _parameter("rod.mass", "kg", "Mass of the rod", "m_2"),
     _parameter("slider.mass", "kg", "Mass of the slider", "m_3"),
     _parameter("crank.inertia", "kg.m2", "Moment of inertia of the crank about its axis; greater than zero"),
-    _parameter(
-        "crank.cog_x", "m", "Centre of mass of the crank, from the axis towards the crank pin", role="centre of mass"
-    ),
-    _parameter("crank.cog_y", "m", "Centre of mass of the crank, across axis and crank", role="centre of mass"),
-    _parameter(
-        "crank.cog_z",
-        "m",
-        "Centre of mass of the crank, along the axis from the plane of the crank pin",
-        role="centre of mass",
-    ),
+    _centre("crank.cog_x", "m", "Centre of mass of the crank, from the axis towards the crank pin"),
+    _centre("crank.cog_y", "m", "Centre of mass of the crank, across axis and crank"),
+    _centre("crank.cog_z", "m", "Centre of mass of the crank, along the axis from the plane of the crank pin"),
     _parameter("crank.product_xz", "kg.m2", "Product of inertia of the crank: integral of x z over its mass"),
     _parameter("crank.product_yz", "kg.m2", "Product of inertia of the crank: integral of y z over its mass"),
     _parameter("rod.inertia", "kg.m2", "Moment of inertia of the rod, transverse, about its centre of mass"),
-    _parameter(
-        "rod.cog_distance", "m", "Centre of mass of the rod, distance from the crank pin", role="centre of mass"
-    ),
-    _parameter(
-        "slider.cog_x",
-        "m",
-        "Centre of mass of the slider from its pin, along the common normal (i of frame 4)",
-        role="centre of mass",
-    ),
-    _parameter(
-        "slider.cog_y",
-        "m",
-        "Centre of mass of the slider from its pin, across guide and common normal (j)",
-        role="centre of mass",
-    ),
-    _parameter(
-        "slider.cog_z",
-        "m",
-        "Centre of mass of the slider from its pin, along the guide against its position (k)",
-        role="centre of mass",
-    ),
+    _centre("rod.cog_distance", "m", "Centre of mass of the rod, distance from the crank pin"),
+    _centre("slider.cog_x", "m", "Centre of mass of the slider from its pin, along the common normal (i of frame 4)"),
+    _centre("slider.cog_y", "m", "Centre of mass of the slider from its pin, across guide and common normal (j)"),
+    _centre("slider.cog_z", "m", "Centre of mass of the slider from its pin, along the guide against its position (k)"),
     _parameter("slider.stiffness", "N/m", "Stiffness of the spring on the slider", "", "stiffness", "slider.position"),
     _parameter("slider.spring_free_position", "m", "Slider position at which its spring is free", role="spring"),
     _parameter("slider.damping", "N.s/m", "Viscous damping of the slider", "", "damping", "slider.position"),
@@ -104,16 +83,7 @@ PARAMETERS = (
         0,
         2,
     ),
-    Variable("initial.crank_angle", "parameter", "rad", "Crank angle at the start", "\\theta_1", display="deg"),
-    Variable(
-        "initial.crank_speed",
-        "parameter",
-        "rad/s",
-        "Crank speed at the start; where drive.mode is 1 drive.speed takes its place",
-        "\\dot\\theta_1",
-        _INITIAL.crank_speed,
-        display="rpm",
-    ),
+    *crank_start("\\theta_1", _INITIAL.crank_speed, "where drive.mode is 1"),
     Variable(
         "initial.shift_position",
         "parameter",
@@ -202,20 +172,7 @@ OUTPUTS = (
         "dampers and guide",
         "crank torque, axial force and slider load",
     ),
-    output(
-        "closure.residual", "m", "Length by which the loop fails to close", "", *POSITION, minimum=0.0, role="residual"
-    ),
-    output(
-        "transmission.angle",
-        "rad",
-        "Angle between the rod and the plane normal to the guide; 0 at the limit of assembly",
-        "",
-        *POSITION,
-        minimum=0.0,
-        maximum=0.5 * pi,
-        display="deg",
-        role="transmission",
-    ),
+    *closure_outputs("Angle between the rod and the plane normal to the guide; 0 at the limit of assembly", 0.5 * pi),
     output(
         "assembly.margin",
         "m",

@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from math import pi
 from typing import ClassVar
 
-from linkwork.mechanism import Channel, Equations, Freedom, Mechanism, Mode, PublishedSet
+from linkwork.mechanism import CRANK, CRANK_CHANNELS, Channel, Equations, Freedom, Mechanism, PublishedSet
 from linkwork.parameters import CheckedParameters, CheckedState, Rules
 from linkwork.variables import Variable, output, status_variables, tolerance_parameter
 
@@ -103,26 +102,18 @@ MECHANISM = Mechanism(
         "rotor-demo": PublishedSet(_DEMO, Initial(rotor_speed=_SPEED), {"speed": _SPEED}, "made up for the tests")
     },
     freedoms=(
-        Freedom(
-            "rotor.angle",
-            "rotor.speed",
-            ("rotor_angle", "rotor_speed"),
-            Mode("drive.mode", ("torque", "speed"), ("torque", "speed")),
-            2.0 * pi,
-        ),
+        CRANK._replace(coordinate="rotor.angle", rate="rotor.speed", initial=("rotor_angle", "rotor_speed")),
         Freedom("cart.position", "cart.velocity", ("cart_position", "cart_velocity")),
     ),
     channels=(
-        Channel("drive.torque", "torque", freedom=0),
-        Channel("drive.speed", "speed", "command", 0),
-        Channel("drive.acceleration", "acceleration", "rate", 0),
+        *CRANK_CHANNELS,
         Channel("cart.force", "force", freedom=1),
     ),
     variables=VARIABLES,
     position_parameters=("initial.rotor_angle", "initial.cart_position"),
     experiment=(0.0, 1.0, 1e-3, 1e-9),
     modules=(equations,),
-    equations=Equations(*(getattr(equations, name) for name in Equations._fields)),
+    equations=Equations.of(equations),
     check_assembly=lambda parameters, x: None,
     error_scale=equations.error_scale,
 )

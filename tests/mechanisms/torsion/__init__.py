@@ -111,7 +111,7 @@ MECHANISM = Mechanism(
     position_parameters=("initial.crank_angle", "initial.rotor_angle"),
     experiment=(0.0, 1.0, 1e-3, 1e-9),
     modules=(equations,),
-    equations=Equations(*(getattr(equations, name) for name in Equations._fields)),
+    equations=Equations.of(equations),
     check_assembly=lambda parameters, x: None,
     error_scale=equations.error_scale,
 )
