@@ -78,8 +78,8 @@ def free_run(mechanism: str, turns: float, *, begun: float = 0.0, **options: Any
     return residual, float(run["crank.angle"][-1] - run["crank.angle"][0])
 
 
-def compare_late_run(what: str, late: float = LATE, **options: Any) -> tuple[float, float]:
-    """Compare a run of half a second that begins at the time ``late`` (s) with a run that begins at zero.
+def compare_late_run(what: str, **options: Any) -> tuple[float, float]:
+    """Compare a run of half a second that begins at the time `LATE` (s) with a run that begins at zero.
 
     ``what`` is the name of their inputs in `ACTING`.
 
@@ -90,7 +90,7 @@ def compare_late_run(what: str, late: float = LATE, **options: Any) -> tuple[flo
     """
     # sample times that are exact floats in both runs
     samples = np.arange(513) * 2.0**-10
-    runs = [simulate(TABLE_3_1, ACTING[what](t0), samples=t0 + samples, **options) for t0 in (0.0, late)]
+    runs = [simulate(TABLE_3_1, ACTING[what](t0), samples=t0 + samples, **options) for t0 in (0.0, LATE)]
     u = [run["slider.position"] for run in runs]
     return float(np.abs(u[1] - u[0]).max() / np.abs(u[0]).max()), runs[1].statistics["steps"] / runs[0].statistics[
         "steps"
@@ -113,9 +113,9 @@ def plant_run(mechanism: str, *, time: float = 0.0, begun: float = 0.0, toleranc
 
 
 def compare_late_fmu(
-    file: str | Path, mechanism: str, step: float, interface: str = "co-simulation", late: float = LATE
+    file: str | Path, mechanism: str, step: float, interface: str = "co-simulation"
 ) -> tuple[float, float]:
-    """Compare 512 steps of a built FMU from the time ``late`` (s) with 512 steps from zero.
+    """Compare 512 steps of a built FMU from the time `LATE` (s) with 512 steps from zero.
 
     Returns
     -------
@@ -124,7 +124,7 @@ def compare_late_fmu(
     """
     parameters, start, _ = FREE[mechanism]
     options = {"initial": start, "step": step, "interface": interface}
-    runs = [cosimulate(file, parameters, start_time=t0, stop_time=t0 + 512 * step, **options) for t0 in (0.0, late)]
+    runs = [cosimulate(file, parameters, start_time=t0, stop_time=t0 + 512 * step, **options) for t0 in (0.0, LATE)]
     for run in runs:
         if run.status:
             raise RuntimeError(run.message)

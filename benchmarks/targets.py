@@ -82,11 +82,11 @@ def curves(n: int) -> dict[str, FloatArray]:
     }
 
 
-def polygon_points(corners: ArrayLike, n: int = CURVE) -> FloatArray:
-    """Return n points at equal distances along a closed polygon, shape (n, 2)."""
+def polygon_points(corners: ArrayLike) -> FloatArray:
+    """Return `CURVE` points at equal distances along a closed polygon, shape (n, 2)."""
     line = closed_vertices(np.asarray(corners, dtype=float), True)
     length = float(np.hypot(*np.diff(line, axis=0).T).sum())
-    return interpolate_polyline(line, np.linspace(0.0, length, n, endpoint=False))
+    return interpolate_polyline(line, np.linspace(0.0, length, CURVE, endpoint=False))
 
 
 def hand_drawn(seed: int) -> TargetPath:

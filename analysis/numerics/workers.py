@@ -86,9 +86,9 @@ def check_jobs(n_jobs: int | None) -> None:
         raise InputError("0 cores: give a number of cores, or -1 for all")
 
 
-def worker_count(n_jobs: int | None, *, threads: bool = False) -> int:
+def worker_count(n_jobs: int | None) -> int:
     """Return how many workers `run_in_parallel` uses, as `joblib.Parallel` counts them; on a cluster, all of its cores."""
-    return _workers(n_jobs, threads)[0]
+    return _workers(n_jobs, threads=False)[0]
 
 
 def share_memory(n_jobs: int | None, *, threads: bool = False) -> bool:

@@ -141,14 +141,11 @@ def verdict(multipliers: ArrayLike, tolerance: float = TOLERANCE) -> StabilityVe
     return StabilityVerdict(stability=stability, margin=margin, tolerance=tolerance, largest_multiplier=largest)
 
 
-def crossing(multiplier: complex, angle: float = REAL_ANGLE) -> Crossing:
-    """Return the kind of bifurcation at which a multiplier crosses the unit circle.
-
-    The multiplier counts as real if it lies within ``angle`` (rad) of the real axis.
-    """
-    if abs(np.angle(multiplier)) <= angle:
+def crossing(multiplier: complex) -> Crossing:
+    """Return the kind of bifurcation at which a multiplier crosses the unit circle."""
+    if abs(np.angle(multiplier)) <= REAL_ANGLE:
         return Crossing.FOLD
-    if abs(np.angle(-multiplier)) <= angle:
+    if abs(np.angle(-multiplier)) <= REAL_ANGLE:
         return Crossing.PERIOD_DOUBLING
     return Crossing.TORUS
 

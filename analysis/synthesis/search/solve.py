@@ -551,7 +551,6 @@ def trade_off(
 def solve_both_ways(
     order: Sequence[int],
     search: Callable[[int, Sequence[Solution], bool], Sequence[Solution]],
-    begin: Sequence[Solution] = (),
 ) -> tuple[dict[int, Solution], int | None]:
     """Solve a series of problems, from the loosest to the tightest and back, each starting from the previous solutions.
 
@@ -562,8 +561,6 @@ def solve_both_ways(
     search : callable
         Function of the index of a problem, the guesses, and whether the pass goes back from the tightest problem to the
         loosest; it returns solutions or raises `InfeasibleError`.
-    begin : sequence of Solution
-        Guesses for the first problem.
 
     Returns
     -------
@@ -575,7 +572,7 @@ def solve_both_ways(
     """
     found: dict[int, Solution] = {}
     for back in (False, True):
-        previous = [] if back else list(begin)
+        previous: list[Solution] = []
         for number, k in enumerate(order[::-1] if back else order):
             own = [found[k]] if k in found else []
             guesses = [*previous, *own]
