@@ -8,7 +8,6 @@ import pkgutil
 import re
 import shlex
 import shutil
-import subprocess
 import sys
 import tomllib
 from importlib.util import find_spec
@@ -26,7 +25,7 @@ from analysis.studies.statements import FAILS, HOLDS, IN_PART
 from analysis.studio import PAGE, page_case
 from linkwork import __version__
 
-from .scripts import script_of_docs
+from .scripts import called, script_of_docs
 from .studies.results import expected
 
 ROOT = Path(__file__).parents[1]
@@ -133,10 +132,7 @@ def test_the_code_of_the_readme_runs(fmus, natives, tmp_path):
     assert len(blocks) == 4
     for block in blocks:
         assert len(block.strip().splitlines()) <= 12
-        done = subprocess.run(
-            [sys.executable, "-c", block], cwd=tmp_path, capture_output=True, text=True, timeout=300, check=False
-        )
-        assert done.returncode == 0, done.stderr
+        called(sys.executable, "-c", block, cwd=tmp_path)
 
 
 #: Of the numbers on a page: what another machine or another release of IPOPT may make of them.
@@ -198,9 +194,7 @@ def run_page(name, tmp_path):
             ]
             assert all(line.startswith("linkwork ") for line in block.strip().splitlines())
         for run in runs:
-            done = subprocess.run(run, cwd=tmp_path, capture_output=True, text=True, timeout=600, check=False)
-            assert done.returncode == 0, done.stderr
-            printed += [words_of(line) for line in done.stdout.splitlines()]
+            printed += [words_of(line) for line in called(*run, cwd=tmp_path).splitlines()]
             commands += 1
     return commands, checked, printed
 
@@ -310,14 +304,7 @@ def site(tmp_path_factory):
     """The site, built without a warning: its links lead somewhere, its notebooks run, every page is in its contents."""
     folder = tmp_path_factory.mktemp("docs")
     build = [sys.executable, "-m", "sphinx", "--quiet", "--fail-on-warning", "--keep-going"]
-    done = subprocess.run(
-        [*build, "-d", folder / "doctrees", ROOT / "docs", folder / "site"],
-        capture_output=True,
-        text=True,
-        timeout=500,
-        check=False,
-    )
-    assert done.returncode == 0, done.stderr
+    called(*build, "-d", folder / "doctrees", ROOT / "docs", folder / "site")
     return folder / "site"
 
 

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import json
 import os
-import subprocess
 import sys
 import sysconfig
 import tomllib
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from zipfile import ZipFile
 
@@ -17,20 +17,15 @@ from packaging.requirements import Requirement
 
 import linkwork
 from analysis.export import SOURCES
+from tests.scripts import called
 
 ROOT = Path(__file__).parents[1]
 
 pytestmark = pytest.mark.slow
 
 
-def called(*words: object, cwd: Path) -> str:
-    """Standard output of a command that ends well, without the checkout on its path."""
-    environment = {name: value for name, value in os.environ.items() if name != "PYTHONPATH"}
-    done = subprocess.run(
-        [str(word) for word in words], cwd=cwd, env=environment, capture_output=True, text=True, timeout=300, check=False
-    )  # fmt: skip
-    assert done.returncode == 0, done.stdout + done.stderr
-    return done.stdout
+#: Standard output of a command that ends well, without the checkout on its path.
+output_of = partial(called, env={name: value for name, value in os.environ.items() if name != "PYTHONPATH"})
 
 
 @pytest.fixture(scope="module")
@@ -39,7 +34,7 @@ def wheel(tmp_path_factory: pytest.TempPathFactory) -> Path:
     if released := os.environ.get("LINKWORK_WHEEL"):
         return ROOT / released
     folder = tmp_path_factory.mktemp("wheel")
-    called(sys.executable, "-m", "hatchling", "build", "-t", "wheel", "-d", folder, cwd=ROOT)
+    output_of(sys.executable, "-m", "hatchling", "build", "-t", "wheel", "-d", folder, cwd=ROOT)
     (path,) = folder.glob("*.whl")
     return path
 
@@ -48,13 +43,13 @@ def wheel(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def installed(wheel: Path, tmp_path_factory: pytest.TempPathFactory) -> Callable[..., str]:
     """The command of an environment that has the wheel, and the libraries of this one, called in a folder of its own."""
     folder = tmp_path_factory.mktemp("elsewhere")
-    called(sys.executable, "-m", "venv", "--without-pip", "venv", cwd=folder)
+    output_of(sys.executable, "-m", "venv", "--without-pip", "venv", cwd=folder)
     python = folder / "venv" / ("Scripts/python.exe" if os.name == "nt" else "bin/python")
-    called(sys.executable, "-m", "pip", "--python", python, "install", "--no-deps", "--no-index", wheel, cwd=folder)
+    output_of(sys.executable, "-m", "pip", "--python", python, "install", "--no-deps", "--no-index", wheel, cwd=folder)
     # a folder in a .pth file is searched last, and its own .pth files, such as a checkout's, are not read
-    site = called(python, "-c", "import sysconfig; print(sysconfig.get_path('purelib'))", cwd=folder).strip()
+    site = output_of(python, "-c", "import sysconfig; print(sysconfig.get_path('purelib'))", cwd=folder).strip()
     Path(site, "libraries.pth").write_text(sysconfig.get_path("purelib"), encoding="utf-8")
-    return lambda *words: called(python.with_stem("linkwork"), *words, cwd=folder)
+    return lambda *words: output_of(python.with_stem("linkwork"), *words, cwd=folder)
 
 
 def test_the_wheel_has_two_packages_that_are_typed_and_no_other_module(wheel: Path) -> None:

@@ -14,7 +14,7 @@ from analysis.studio import PAGE
 from tests.mechanisms import pendulum, rotor_on_cart, torsion
 
 if TYPE_CHECKING:
-    from playwright.sync_api import Browser
+    from playwright.sync_api import Browser, Page
 
 
 @pytest.fixture
@@ -41,6 +41,25 @@ def own_linkages() -> Iterator[None]:
     yield
     MECHANISMS.clear()
     MECHANISMS.update(before)
+
+
+def opened(browser: Browser, path: Path) -> Page:
+    """Open a page of the studio, paused; an error of the page fails the test."""
+    made = browser.new_page(viewport={"width": 1400, "height": 1000})
+    made.set_default_timeout(600_000)
+    made.on("pageerror", lambda error: pytest.fail(f"the page: {error}"))
+    made.goto(path.as_uri())
+    made.wait_for_function("document.documentElement.dataset.ready")
+    made.click("#play")
+    return made
+
+
+@pytest.fixture(scope="module")
+def page(browser: Browser) -> Iterator[Page]:
+    """The built page, opened as a file."""
+    made = opened(browser, PAGE)
+    yield made
+    made.close()
 
 
 @pytest.fixture

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-import subprocess
 import sys
 from io import StringIO
 from pathlib import Path
@@ -31,6 +30,7 @@ from analysis.files import (
 from analysis.files.drawings import UNITS
 from analysis.synthesis.result.drawing import LAYERS
 from linkwork.errors import InputError, LinkworkError, ParameterError, UnknownNameError
+from tests.scripts import called
 
 RNG = np.random.default_rng(4)
 CURVE = RNG.normal(size=(72, 2)) * 0.1 + [0.3, -0.2]
@@ -214,14 +214,7 @@ def test_same_drawing_same_bytes() -> None:
         "print(hashlib.sha256((to_dxf(DRAWING) + to_svg(DRAWING)).encode()).hexdigest())"
     )
     digests = {
-        subprocess.run(
-            [sys.executable, "-c", code],
-            env={"PYTHONHASHSEED": seed, "PATH": ""},
-            cwd=Path(__file__).parents[2],
-            capture_output=True,
-            text=True,
-            check=True,
-        ).stdout
+        called(sys.executable, "-c", code, env={"PYTHONHASHSEED": seed, "PATH": ""}, cwd=Path(__file__).parents[2])
         for seed in ("1", "4")
     }
     assert len(digests) == 1

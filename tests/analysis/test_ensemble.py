@@ -35,6 +35,7 @@ from analysis.run import EnsembleBroken, EnsembleInterrupted, batches
 from linkwork.errors import InputError, ParameterError
 from linkwork.five_bar.parameters import FiveBarParameters, InitialState
 from linkwork.five_bar.published import SETS, TABLE_3_1
+from tests.scripts import called
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 SPEED = SETS["table-3.1"].crank_speed
@@ -503,13 +504,6 @@ def test_what_is_not_usable_is_refused_and_names_its_run(change: dict[str, Any],
 
 
 def test_example_with_dask() -> None:
-    done = subprocess.run(
-        [sys.executable, "-W", "error", str(EXAMPLES / "dask_ensemble.py"), "--mechanisms", "40"],
-        capture_output=True,
-        text=True,
-        timeout=120,
-        check=False,
-        env=os.environ | {"PYTHONDONTWRITEBYTECODE": "1"},
-    )
-    assert done.returncode == 0, done.stdout + done.stderr
-    assert "40 mechanisms" in done.stdout
+    words = ["-W", "error", EXAMPLES / "dask_ensemble.py", "--mechanisms", "40"]
+    printed = called(sys.executable, *words, env=os.environ | {"PYTHONDONTWRITEBYTECODE": "1"}, timeout=120)
+    assert "40 mechanisms" in printed

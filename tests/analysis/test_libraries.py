@@ -17,6 +17,7 @@ from numba.core.codegen import JITCodeLibrary
 from numba.core.compiler import Compiler, Flags
 
 from analysis.libraries import MissingLibraryError, require
+from tests.scripts import called
 
 ROOT = Path(__file__).parents[2]
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
@@ -79,13 +80,14 @@ cosimulate({fmu!r}, "table-3.1", stop_time="20 ms", step=1e-3)
 """
 
 
+def run_without(missing: set[str], program: str, folder: Path) -> str:
+    """What a program prints in a process in which some modules are missing."""
+    return called(sys.executable, "-c", BLOCKED.format(blocked=missing) + program, cwd=folder)
+
+
 def test_the_core_alone_builds_runs_checks_and_plots(fmu: Path, tmp_path: Path) -> None:
-    program = BLOCKED.format(blocked=set().union(*EXTRAS.values())) + CORE_ALONE.format(fmu=str(fmu))
-    done = subprocess.run(
-        [sys.executable, "-c", program], cwd=tmp_path, capture_output=True, text=True, timeout=300, check=False
-    )
-    assert done.returncode == 0, done.stderr
-    assert "FiveBarSlider.fmu: valid" in done.stdout
+    printed = run_without(set().union(*EXTRAS.values()), CORE_ALONE.format(fmu=str(fmu)), tmp_path)
+    assert "FiveBarSlider.fmu: valid" in printed
 
 
 #: What needs a library of an extra.
@@ -105,15 +107,12 @@ NEEDING = {
 @pytest.fixture(scope="module")
 def said(tmp_path_factory: pytest.TempPathFactory) -> str:
     """The errors of all that needs an extra, one a line, from a process in which the extras are missing."""
-    program = BLOCKED.format(blocked=set().union(*EXTRAS.values()) - {"dask"}) + (
+    program = (
         f"for code in {list(NEEDING.values())}:\n"
         "    try: exec(code)\n"
         "    except Exception as error: print(type(error).__name__, error)\n"
     )
-    folder = tmp_path_factory.mktemp("without")
-    done = subprocess.run([sys.executable, "-c", program], cwd=folder, capture_output=True, text=True, timeout=300)
-    assert done.returncode == 0, done.stderr
-    return done.stdout
+    return run_without(set().union(*EXTRAS.values()) - {"dask"}, program, tmp_path_factory.mktemp("without"))
 
 
 @pytest.mark.parametrize("library", NEEDING)

@@ -32,7 +32,8 @@ from linkwork.mechanism import Mechanism
 from linkwork.parameters import field_name
 from tests.oracles.planar import Multipliers, Solution
 
-from .test_studio import _drag, _opened, _shown, in_browser
+from .conftest import opened
+from .test_studio import _drag, _shown, in_browser
 
 FOLDER = Path(__file__).parents[2] / "examples" / "linkages"
 FILES = sorted(FOLDER.glob("*.toml"))
@@ -532,7 +533,7 @@ def test_a_geared_five_bar_that_was_found_becomes_an_fmu_and_a_page(browser, tmp
     wanted = found.path(20.0 * fmu.time)
     np.testing.assert_allclose(np.column_stack([fmu["P.x"], fmu["P.y"]]), wanted, atol=1e-8)
     (tmp_path / "page.html").write_text(make_page(page_state(case)), encoding="utf-8")
-    page = _opened(browser, tmp_path / "page.html")
+    page = opened(browser, tmp_path / "page.html")
     shown = _shown(page)["columns"]
     np.testing.assert_allclose(
         shown["P.x"], found.path(shown["crank.angle"] - case.initial.crank_angle)[:, 0], atol=1e-9
@@ -654,7 +655,7 @@ def test_a_linkage_moves_in_the_studio_and_is_dragged(browser, tmp_path, path):
     case = load_case(path, {"motor.torque": 0.5} if path.stem == "stephenson-2" else {})
     bars = {n: b.bar for n, b in read_description(tables_in(path)).bodies.items() if b.bar}
     (tmp_path / "page.html").write_text(make_page(page_state(case)), encoding="utf-8")
-    page = _opened(browser, tmp_path / "page.html")
+    page = opened(browser, tmp_path / "page.html")
     root = "document.documentElement.dataset"
     settled = f"window.studio.solver.id === Number({root}.answer) && {root}.settled === 'true'"
 

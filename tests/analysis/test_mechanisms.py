@@ -22,6 +22,7 @@ from analysis import Inputs, compare, cosimulate, simulate
 from analysis.export import build
 from analysis.files import read_csv
 from analysis.linear import (
+    PeriodicModel,
     SampledController,
     control_loop,
     design_lqr,
@@ -46,6 +47,10 @@ from tests.mechanisms import pendulum, rotor_on_cart
 pytestmark = pytest.mark.usefixtures("registered")
 
 ROTOR, PENDULUM = rotor_on_cart.MECHANISM, pendulum.MECHANISM
+
+
+#: The rotor on the cart at its speed.
+TURNING = Inputs(speed=20.0)
 
 
 def demo(mechanism: Mechanism) -> Any:
@@ -228,26 +233,30 @@ def test_torque_balances_the_pendulum_upside_down() -> None:
     assert largest_difference(loop, linear) < 1e-3
 
 
-def test_cart_is_held_in_process_and_through_the_fmu(fmus: dict[str, Path]) -> None:
+@pytest.fixture(scope="module")
+def shaken() -> PeriodicModel:
+    """The linear models of the cart about the motion in which the rotor shakes it."""
+    parameters = demo(ROTOR).parameters
+    return linearise_orbit(parameters, settled_motion(parameters, TURNING), TURNING)
+
+
+def test_cart_is_held_in_process_and_through_the_fmu(shaken: PeriodicModel, fmus: dict[str, Path]) -> None:
     """The rotor shakes it: far less with control than without."""
-    published, turning = demo(ROTOR), Inputs(speed=20.0)
-    models = linearise_orbit(published.parameters, settled_motion(published.parameters, turning), turning)
-    controller = SampledController(design_pid(models.mean(), bandwidth=300.0), 1e-3)
+    published = demo(ROTOR)
+    controller = SampledController(design_pid(shaken.mean(), bandwidth=300.0), 1e-3)
     options: dict[str, Any] = {"initial": published.initial, "stop_time": 0.5}
-    loop = control_loop(published.parameters, controller, 0.0, turning, **options)
-    outside = control_loop(published.parameters, controller, 0.0, turning, fmu=fmus["rotor-on-cart"], **options)
+    loop = control_loop(published.parameters, controller, 0.0, TURNING, **options)
+    outside = control_loop(published.parameters, controller, 0.0, TURNING, fmu=fmus["rotor-on-cart"], **options)
     np.testing.assert_allclose(outside.states, loop.states, atol=1e-11)
-    window = loop.metrics(band=1e-3, window=models.period)
-    assert window.peak_error < 0.05 * np.ptp(models.states[:, 1])
+    window = loop.metrics(band=1e-3, window=shaken.period)
+    assert window.peak_error < 0.05 * np.ptp(shaken.states[:, 1])
 
 
-def test_cart_about_its_shaken_motion_is_time_invariant() -> None:
-    published, turning = demo(ROTOR), Inputs(speed=20.0)
-    models = linearise_orbit(published.parameters, settled_motion(published.parameters, turning), turning)
-    assert models.period == pytest.approx(pi / 10.0)
-    np.testing.assert_allclose(models.monodromy(), expm(models.mean().A * models.period), atol=1e-8)
+def test_cart_about_its_shaken_motion_is_time_invariant(shaken: PeriodicModel) -> None:
+    assert shaken.period == pytest.approx(pi / 10.0)
+    np.testing.assert_allclose(shaken.monodromy(), expm(shaken.mean().A * shaken.period), atol=1e-8)
     wrong = {"speed": 20.0, "force": 5.0}
-    assert linearise_orbit(published.parameters, models.states, Inputs(**wrong)).mean().inputs == Inputs(**wrong)
+    assert linearise_orbit(demo(ROTOR).parameters, shaken.states, Inputs(**wrong)).mean().inputs == Inputs(**wrong)
 
 
 #: The slider-crank of the FMU with a spring and a damper along the crank's axis.

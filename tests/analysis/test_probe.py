@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import subprocess
 import sys
 import tarfile
 import zipfile
@@ -18,6 +17,7 @@ from analysis import probe
 from analysis.cli import main
 from analysis.probe.walk import Walk
 from linkwork.errors import InputError
+from tests.scripts import called
 
 SOURCES = Path(__file__).parent / "probed"
 ENDING = {"linux": ".so", "win32": ".dll", "darwin": ".dylib"}[sys.platform]
@@ -31,21 +31,8 @@ def compiled(folder: Path, name: str, description: str, platform: str) -> Path:
 
     library = folder / f"{name}{ENDING}"
     headers = Path(fmpy.__file__).parent / "c-code"
-    options = ["-shared", "-fPIC", "-O1", "-std=c11", "-Wall", "-fno-sanitize=all"]
-    command = [
-        sys.executable,
-        "-m",
-        "ziglang",
-        "cc",
-        *options,
-        f"-I{headers}",
-        SOURCES / f"{name}.c",
-        "-o",
-        library,
-        "-lm",
-    ]
-    made = subprocess.run(command, capture_output=True, text=True)
-    assert made.returncode == 0, made.stderr
+    options = ["-shared", "-fPIC", "-O1", "-std=c11", "-Wall", "-fno-sanitize=all", f"-I{headers}"]
+    called(sys.executable, "-m", "ziglang", "cc", *options, SOURCES / f"{name}.c", "-o", library, "-lm")
     path = folder / f"{name}.fmu"
     with zipfile.ZipFile(path, "w") as archive:
         archive.write(SOURCES / description, "modelDescription.xml")
@@ -81,7 +68,7 @@ def test_nothing_is_found_in_a_correct_fmu(fmus, version, interface, monkeypatch
     assert report.calls > 6000
 
 
-#: fault, interface, check that finds it, severity, key of the finding
+#: Of FMI 2.0: fault, interface, check that finds it, severity, key of the finding
 PLANTED = [
     ("crash", "cs", "forbidden", "crash", "GetInteger: unknown value reference"),
     ("free", "me", "forbidden", "crash", "FreeFMUstate: NULL pointer"),
@@ -110,28 +97,6 @@ PLANTED = [
     ("bounds", "cs", "parameters", "questionable", "k: accepted beyond its range"),
     ("euler", "cs", "split", "questionable", "step and halves: difference"),
 ]
-
-
-def names(calls: list[str]) -> list[str]:
-    return [call.split("(")[0] for call in calls]
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize(("fault", "interface", "check", "severity", "key"), PLANTED)
-def test_a_planted_fault_is_found(fmu, fault, interface, check, severity, key, monkeypatch):
-    monkeypatch.setenv("PROBE_FAULT", fault)
-    checks = ["serialize", check] if check == "deserialize" else [check]
-    report = probe.probe(fmu, calls=3000, interface=interface, checks=checks, hang=2.0)
-    found = {(finding.severity, finding.key): finding for finding in report.findings}
-    finding = found[severity, f"{interface}: {key}"]
-    assert finding.calls
-    if severity != "questionable":  # the case alone shows it again
-        calls, again = probe.replay(fmu, finding.replay, hang=2.0)
-        assert finding.key in {one.key for one in again}
-        if check != "leaks":  # of which only the latest calls are kept
-            assert names(calls)[: len(finding.calls)] == names(finding.calls)
-
-
 #: The same for FMI 3.0, where the probe goes another way.
 PLANTED_IN_3 = [
     ("free", "cs", "forbidden", "crash", "FreeFMUState: NULL pointer"),
@@ -149,10 +114,28 @@ PLANTED_IN_3 = [
 ]
 
 
+def names(calls: list[str]) -> list[str]:
+    return [call.split("(")[0] for call in calls]
+
+
 @pytest.mark.slow
-@pytest.mark.parametrize(("fault", "interface", "check", "severity", "key"), PLANTED_IN_3)
-def test_a_planted_fault_is_found_in_fmi_3(fmus, fault, interface, check, severity, key, monkeypatch):
-    test_a_planted_fault_is_found(fmus[3], fault, interface, check, severity, key, monkeypatch)
+@pytest.mark.parametrize(
+    ("version", "fault", "interface", "check", "severity", "key"),
+    [*((2, *row) for row in PLANTED), *((3, *row) for row in PLANTED_IN_3)],
+)
+def test_a_planted_fault_is_found(fmus, version, fault, interface, check, severity, key, monkeypatch):
+    fmu = fmus[version]
+    monkeypatch.setenv("PROBE_FAULT", fault)
+    checks = ["serialize", check] if check == "deserialize" else [check]
+    report = probe.probe(fmu, calls=3000, interface=interface, checks=checks, hang=2.0)
+    found = {(finding.severity, finding.key): finding for finding in report.findings}
+    finding = found[severity, f"{interface}: {key}"]
+    assert finding.calls
+    if severity != "questionable":  # the case alone shows it again
+        calls, again = probe.replay(fmu, finding.replay, hang=2.0)
+        assert finding.key in {one.key for one in again}
+        if check != "leaks":  # of which only the latest calls are kept
+            assert names(calls)[: len(finding.calls)] == names(finding.calls)
 
 
 @pytest.mark.slow

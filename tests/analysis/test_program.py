@@ -328,6 +328,9 @@ class TestWeights:
         assert np.delete(solution.evaluation.errors, 5).max() < 0.01
 
 
+FOUR_BAR = syn.Linkage(ground_length=0.4, crank_length=0.1, coupler_length=0.35, rocker_length=0.3)
+
+
 class TestMovedPivot:
     @pytest.mark.parametrize(
         "unknown", [syn.SliderUnknown(harmonics=2), syn.CrankUnknown(ratio=2, length=(0.01, 0.05), harmonics=1)]
@@ -338,9 +341,7 @@ class TestMovedPivot:
             pivot = syn.SliderMotion(FourierSeries(np.array([0.1, 0.2, 0.3]), np.array([0.0, 0.4, 0.5])), 0.7)
         else:
             pivot = syn.SecondCrank(0.02, 2, 0.3, FourierSeries(np.array([0.0, 0.2]), np.array([0.0, 0.4])))
-        linkage = syn.Linkage(ground_length=0.4, crank_length=0.1, coupler_length=0.35, rocker_length=0.3).with_pivot(
-            pivot
-        )
+        linkage = FOUR_BAR.with_pivot(pivot)
         normal = syn.normal_form(TASK)
         again = make_linkage(make_start(linkage, normal, unknown), normal, unknown)
         np.testing.assert_allclose(again.displacement(syn.turn(9)), linkage.displacement(syn.turn(9)), atol=1e-14)
@@ -388,6 +389,13 @@ def violations(program: Program, start: Start, *, first: bool = False) -> dict[s
     return {name: max(v for v, own in zip(over, names) if own == name) for name in names}
 
 
+def excess(linkage: syn.Linkage, unknown: Any, name: str, *, first: bool = False) -> float:
+    """How far a linkage is outside the constraints of one name."""
+    normal = syn.normal_form(TASK)
+    program = Program(normal, make_limits(TASK, normal, None, syn.USUAL), unknown)
+    return violations(program, make_start(linkage, normal, unknown), first=first)[name]
+
+
 class TestBetween:
     """What is held at places only is held in between: the extremes are put where they are farthest from any place."""
 
@@ -404,48 +412,31 @@ class TestBetween:
         for factor in (1.0 - 1e-5, 1.0 + 1e-5):
             cosines, sines = np.zeros(3), np.zeros(3)
             cosines[2], sines[2] = factor * size * math.cos(turned), factor * size * math.sin(turned)
-            linkage = syn.Linkage(
-                ground_length=0.4, crank_length=0.1, coupler_length=0.35, rocker_length=0.3,
-                pivot=syn.SliderMotion(FourierSeries(cosines, sines), 0.3),
-            )  # fmt: skip
+            linkage = FOUR_BAR.with_pivot(syn.SliderMotion(FourierSeries(cosines, sines), 0.3))
             unknown = syn.SliderUnknown(harmonics=harmonics, **{bound: most})
-            normal = syn.normal_form(TASK)
-            program = Program(normal, make_limits(TASK, normal, None, syn.USUAL), unknown)
             for first in (False, True):
-                over = violations(program, make_start(linkage, normal, unknown), first=first)[name]
-                assert (over > 0.0) == (factor > 1.0)
+                assert (excess(linkage, unknown, name, first=first) > 0.0) == (factor > 1.0)
 
     @pytest.mark.parametrize("u", [0.39, 0.41, -0.39, -0.41])
     def test_a_slider_stays_within_the_ground_link_of_its_middle(self, u: float) -> None:
         pivot = syn.SliderMotion(FourierSeries(np.array([u, 0.0]), np.zeros(2)), 0.3)
-        linkage = syn.Linkage(ground_length=0.4, crank_length=0.1, coupler_length=0.35, rocker_length=0.3).with_pivot(
-            pivot
-        )
-        normal, unknown = syn.normal_form(TASK), syn.SliderUnknown(harmonics=1)
-        program = Program(normal, make_limits(TASK, normal, None, syn.USUAL), unknown)
-        over = violations(program, make_start(linkage, normal, unknown))["slider position"]
-        assert (over > 0.0) == (abs(u) > linkage.ground_length)
+        over = excess(FOUR_BAR.with_pivot(pivot), syn.SliderUnknown(harmonics=1), "slider position")
+        assert (over > 0.0) == (abs(u) > FOUR_BAR.ground_length)
 
     @pytest.mark.parametrize("rate", [0.4999, 0.5001, -0.4999, -0.5001])
     def test_speed_of_the_second_crank(self, rate: float) -> None:
         pivot = syn.SecondCrank(0.02, 1, 0.3, FourierSeries(np.zeros(2), np.array([0.0, rate])))
-        linkage = syn.Linkage(ground_length=0.4, crank_length=0.1, coupler_length=0.35, rocker_length=0.3).with_pivot(
-            pivot
-        )
         unknown = syn.CrankUnknown(ratio=1, length=(0.001, 0.05), harmonics=1, speed=0.5)
-        normal = syn.normal_form(TASK)
-        program = Program(normal, make_limits(TASK, normal, None, syn.USUAL), unknown)
-        over = violations(program, make_start(linkage, normal, unknown))["speed of the second crank"]
+        over = excess(FOUR_BAR.with_pivot(pivot), unknown, "speed of the second crank")
         assert (over > 0.0) == (abs(rate) > 0.5)
 
     @pytest.mark.parametrize(("share", "refused"), [(1.1e-3, False), (0.9e-3, True), (7.9, False), (8.1, True)])
     def test_rotation_from_one_untimed_station_to_the_next(self, share: float, refused: bool) -> None:
         task = syn.UntimedPath(path=syn.TargetPath(points=ellipse(24), closed=True), measure="distance", samples=36)
-        linkage = syn.Linkage(ground_length=0.4, crank_length=0.1, coupler_length=0.35, rocker_length=0.3)
         normal = syn.normal_form(task)
         gaps = np.full(normal.n, (normal.n - share) / (normal.n - 1.0)) * 2.0 * math.pi / normal.n
         gaps[3] = share * 2.0 * math.pi / normal.n
-        start = replace(make_start(linkage, normal), rotation=np.append(0.0, np.cumsum(gaps[:-1])))
+        start = replace(make_start(FOUR_BAR, normal), rotation=np.append(0.0, np.cumsum(gaps[:-1])))
         over = violations(Program(normal, make_limits(task, normal, None, syn.USUAL)), start)["order of the stations"]
         assert (over > 0.0) == refused
 

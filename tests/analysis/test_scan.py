@@ -57,11 +57,17 @@ def same(a: syn.Linkage, b: syn.Linkage) -> None:
         assert (left + pi) % (2.0 * pi) - pi == pytest.approx(0.0, abs=1e-6), name
 
 
+def placed(row: FloatArray, task: syn.Task, *constraints: syn.Constraint) -> tuple[Candidates, Normal]:
+    normal, limits = stated(task, *constraints)
+    return _place_shapes(normal, limits, row, 1, 0), normal
+
+
 class TestVariableProjection:
+    ROW = shape(KNOWN, phase=1.1 / (2.0 * pi))
+
     def test_place_size_direction_and_coupler_point_follow_from_shape_and_phase(self) -> None:
         rotation = syn.turn(16)
-        normal, limits = stated(syn.TimedPath(points=KNOWN.path(rotation), rotation=rotation))
-        found = _place_shapes(normal, limits, shape(KNOWN, phase=1.1 / (2.0 * pi)), 1, 0)
+        found, normal = placed(self.ROW, syn.TimedPath(points=KNOWN.path(rotation), rotation=rotation))
         assert found.quality[0] == pytest.approx(0.0, abs=1e-10)
         same(first(found, normal), KNOWN)
 
@@ -77,8 +83,7 @@ class TestVariableProjection:
     def test_the_coupler_angle_follows_as_well(self) -> None:
         rotation = np.linspace(0.0, 4.0, 9)
         angle = KNOWN.coupler_angle(rotation) + 0.9
-        normal, limits = stated(syn.Motion(points=KNOWN.path(rotation), angle=angle, rotation=rotation))
-        found = _place_shapes(normal, limits, shape(KNOWN, phase=1.1 / (2.0 * pi)), 1, 0)
+        found, normal = placed(self.ROW, syn.Motion(points=KNOWN.path(rotation), angle=angle, rotation=rotation))
         assert found.quality[0] == pytest.approx(0.0, abs=1e-10)
         same(first(found, normal), replace(KNOWN, output_angle=0.9))
 
@@ -96,23 +101,20 @@ class TestVariableProjection:
     def test_a_rocker_function_is_compared_at_its_mounting_angle(self) -> None:
         rotation = syn.turn(12)
         angle = KNOWN.rocker_angle(rotation) + 0.4
-        row = shape(KNOWN, phase=1.1 / (2.0 * pi))
-        normal, limits = stated(syn.RockerFunction(angle=angle, rotation=rotation, mounting=True))
-        found = _place_shapes(normal, limits, row, 1, 0)
+        found, _ = placed(self.ROW, syn.RockerFunction(angle=angle, rotation=rotation, mounting=True))
         assert found.quality[0] == pytest.approx(0.0, abs=1e-20)
         assert found.q[0, 10] == pytest.approx(0.4)
-        normal, limits = stated(syn.RockerFunction(angle=angle, rotation=rotation))
-        assert _place_shapes(normal, limits, row, 1, 0).quality[0] == pytest.approx(12 * 0.4**2)
+        found, _ = placed(self.ROW, syn.RockerFunction(angle=angle, rotation=rotation))
+        assert found.quality[0] == pytest.approx(12 * 0.4**2)
 
     def test_it_is_the_weighted_least_squares_optimum(self) -> None:
         """Of a target no linkage meets: no small change of place, size, direction and coupler point is better."""
         random = np.random.default_rng(0)
         points = random.normal(size=(10, 2))
         weights = random.uniform(0.2, 3.0, 10)
-        normal, limits = stated(syn.TimedPath(points=points, weights=weights))
-        found = _place_shapes(normal, limits, shape(KNOWN, phase=0.3), 1, 0)
-        best = first(found, normal)
         task = syn.TimedPath(points=points, weights=weights)
+        found, normal = placed(shape(KNOWN, phase=0.3), task)
+        best = first(found, normal)
         error = syn.evaluate(task, best).error
         assert error == pytest.approx(found.quality[0] * normal.unit**2, rel=1e-8)
         turned = best.scale(1.01)
@@ -129,37 +131,36 @@ class TestVariableProjection:
 
     def test_bounds_on_links_hold_and_the_rest_follows_once_more(self) -> None:
         rotation = syn.turn(16)
-        normal, limits = stated(
-            syn.TimedPath(points=KNOWN.path(rotation), rotation=rotation),
-            syn.LargestLink(length=0.3),
-            syn.Assembly(branch=1),
-        )
-        found = _place_shapes(normal, limits, shape(KNOWN, phase=1.1 / (2.0 * pi)), 1, 0)
+        task = syn.TimedPath(points=KNOWN.path(rotation), rotation=rotation)
+        found, normal = placed(self.ROW, task, syn.LargestLink(length=0.3), syn.Assembly(branch=1))
         linkage = first(found, normal)
         assert linkage.largest_link == pytest.approx(0.3)
         assert linkage.point_distance <= 0.3
         assert found.quality[0] > 1e-4
-        error = syn.evaluate(syn.TimedPath(points=KNOWN.path(rotation), rotation=rotation), linkage).error
+        error = syn.evaluate(task, linkage).error
         assert error == pytest.approx(found.quality[0] * normal.unit**2, rel=1e-9)
         moved = [linkage.translate(0.01, 0.0), linkage.translate(0.0, 0.01)]
-        task = syn.TimedPath(points=KNOWN.path(rotation), rotation=rotation)
-        assert all(syn.evaluate(task, other).error > syn.evaluate(task, linkage).error for other in moved)
+        assert all(syn.evaluate(task, other).error > error for other in moved)
 
 
 class TestUntimed:
-    LONGEST = 1.0
     #: What `_paths` makes of the coupler point: distance as a share of the logarithm's range, direction of a turn.
-    DISTANCE = (log(0.25 / 0.4) - log(0.1)) / log(30.0)
+    ROW = shape(KNOWN, distance=(log(0.25 / 0.4) - log(0.1)) / log(30.0), direction=0.7 / (2.0 * pi))
+
+    def placed(self, points: FloatArray, way: int, *, closed: bool) -> tuple[Candidates, Normal, float]:
+        """What is found for a curve, and how far it is from the curve; its rotations go the curve's way."""
+        task = syn.UntimedPath(path=syn.TargetPath(points=points[::way], closed=closed))
+        found, normal = placed(self.ROW, task, syn.LargestLink(length=2.0))
+        assert found.rotation is not None
+        assert np.all(np.sign(np.diff(found.rotation[0])) == way)
+        traced = first(found, normal).path(found.rotation[0]) @ [1.0, 1j]
+        return found, normal, np.abs(traced - normal.origin - normal.unit * normal.points).max()
 
     @pytest.mark.parametrize("way", [1, -1])
     @pytest.mark.parametrize("begin", [0, 17, 90])
     def test_a_closed_curve_is_laid_over_itself_whatever_its_start_and_direction(self, begin: int, way: int) -> None:
-        points = np.roll(KNOWN.path(syn.turn(120)), -begin, axis=0)[::way]
-        normal, limits = stated(
-            syn.UntimedPath(path=syn.TargetPath(points=points, closed=True)), syn.LargestLink(length=2.0)
-        )
-        row = shape(KNOWN, distance=self.DISTANCE, direction=0.7 / (2.0 * pi))
-        found = _place_shapes(normal, limits, row, 1, 0)
+        points = np.roll(KNOWN.path(syn.turn(120)), -begin, axis=0)
+        found, normal, apart = self.placed(points, way, closed=True)
         linkage = first(found, normal)
         # to the accuracy of polylines of 64 points
         assert found.quality[0] < 1e-3 * normal.n
@@ -168,26 +169,12 @@ class TestUntimed:
             assert getattr(linkage, name) == pytest.approx(
                 getattr(KNOWN, name), abs=0.06 if "angle" in name else 0.012
             ), name
-        assert found.rotation is not None
-        steps = np.diff(found.rotation[0])
-        assert np.all(np.sign(steps) == way)
-        apart = np.abs(linkage.path(found.rotation[0]) @ [1.0, 1j] - normal.origin - normal.unit * normal.points)
-        assert apart.max() < 0.03 * normal.unit
+        assert apart < 0.03 * normal.unit
 
     @pytest.mark.parametrize("way", [1, -1])
     def test_an_open_piece_is_found_on_the_curve(self, way: int) -> None:
-        points = KNOWN.path(np.linspace(1.0, 3.3, 40))[::way]
-        normal, limits = stated(
-            syn.UntimedPath(path=syn.TargetPath(points=points, closed=False)), syn.LargestLink(length=2.0)
-        )
-        row = shape(KNOWN, distance=self.DISTANCE, direction=0.7 / (2.0 * pi))
-        found = _place_shapes(normal, limits, row, 1, 0)
-        assert found.rotation is not None
-        assert np.all(np.sign(np.diff(found.rotation[0])) == way)
-        apart = np.abs(
-            first(found, normal).path(found.rotation[0]) @ [1.0, 1j] - normal.origin - normal.unit * normal.points
-        )
-        assert apart.max() < 0.05 * normal.unit
+        _, normal, apart = self.placed(KNOWN.path(np.linspace(1.0, 3.3, 40)), way, closed=False)
+        assert apart < 0.05 * normal.unit
 
     def test_precision_points_come_in_order(self) -> None:
         normal, limits = stated(
@@ -200,12 +187,16 @@ class TestUntimed:
             assert abs(start.rotation[-1] - start.rotation[0]) < 2.0 * pi
 
 
+def tried(*constraints: syn.Constraint, **bounds: tuple[float, float]) -> FloatArray:
+    """The shapes that are tried for a path."""
+    _, limits = stated(syn.TimedPath(points=KNOWN.path(syn.turn(8))), *constraints, **bounds)
+    return np.vstack(list(_allowed_shapes(limits, 0, 300)))
+
+
 class TestShapes:
     @pytest.mark.parametrize("type_", ["crank-rocker", "drag-link", "double-rocker", "rocker-crank", "triple-rocker"])
     def test_only_the_type_asked_for_is_tried(self, type_: str) -> None:
-        task = syn.TimedPath(points=KNOWN.path(syn.turn(8)))
-        _, limits = stated(task, syn.Grashof(type=type_))
-        rows = np.vstack(list(_allowed_shapes(limits, 0, 300)))
+        rows = tried(syn.Grashof(type=type_))
         # about one in a hundred is a drag link
         assert len(rows) > 100
         for l2, l3, l4 in rows[:, :3]:
@@ -213,9 +204,7 @@ class TestShapes:
             assert linkage.grashof == type_
 
     def test_only_transmission_angles_asked_for_are_tried_within_the_ranges(self) -> None:
-        task = syn.TimedPath(points=KNOWN.path(syn.turn(8)))
-        _, limits = stated(task, syn.LeastTransmission(angle=0.9))
-        rows = np.vstack(list(_allowed_shapes(limits, 0, 300)))
+        rows = tried(syn.LeastTransmission(angle=0.9))
         for l2, l3, l4 in rows[:, :3]:
             linkage = syn.Linkage(ground_length=1.0, crank_length=l2, coupler_length=l3, rocker_length=l4)
             assert linkage.least_transmission >= 0.9 - 1e-12
@@ -224,9 +213,7 @@ class TestShapes:
             assert column.max() <= high
 
     def test_shapes_that_no_size_can_fit_are_left_out(self) -> None:
-        task = syn.TimedPath(points=KNOWN.path(syn.turn(8)))
-        _, limits = stated(task, ground_length=(0.3, 0.5), crank_length=(0.2, 0.25))
-        rows = np.vstack(list(_allowed_shapes(limits, 0, 300)))
+        rows = tried(ground_length=(0.3, 0.5), crank_length=(0.2, 0.25))
         assert rows[:, 0].min() >= 0.4 - 1e-12
         assert rows[:, 0].max() <= 0.25 / 0.3 + 1e-12
 

@@ -340,26 +340,23 @@ def test_start_time_shifts_a_run_and_nothing_else(start: float, method: str) -> 
 
 @pytest.mark.parametrize("hold", [None, 0.1])
 @pytest.mark.parametrize("method", ["compiled", "DOP853"])
-def test_samples_at_a_jump_belong_to_what_follows(method: str, hold: float | None) -> None:
-    # 0.3 and 3 * 0.1 are not the same float
-    inputs = Inputs(torque=steps([0.0, 0.3, 0.6], [0.1, 0.7, 0.2]), force=steps([0.0, 0.7], [0.0, 1.0]))
-    ours = table_3_1(inputs, stop_time=0.8, step=0.1, hold=hold, method=method)
-    assert ours["drive.applied_torque"].tolist() == [0.1, 0.1, 0.1, 0.7, 0.7, 0.7, 0.2, 0.2, 0.2]
-
-
-@pytest.mark.parametrize("hold", [None, 0.1])
-@pytest.mark.parametrize("method", ["compiled", "DOP853"])
-def test_jump_that_misses_a_sample_by_rounding_is_at_the_sample(method: str, hold: float | None) -> None:
-    just_after = float(np.nextafter(0.4, 1.0))
-    inputs = Inputs(torque=steps([0.0, just_after], [0.1, 0.7]))
-    ours = table_3_1(inputs, stop_time=0.6, step=0.1, hold=hold, method=method)
-    assert ours["drive.applied_torque"].tolist() == [0.1, 0.1, 0.1, 0.1, 0.7, 0.7, 0.7]
-
-
-@pytest.mark.parametrize("method", ["compiled", "DOP853"])
-def test_jump_at_the_very_end_is_seen_by_the_last_sample(method: str) -> None:
-    ours = table_3_1(Inputs(torque=steps([0.0, 0.1], [0.1, 0.7])), stop_time=0.1, step=0.05, method=method)
-    assert ours["drive.applied_torque"].tolist() == [0.1, 0.1, 0.7]
+@pytest.mark.parametrize(
+    ("times", "values", "samples"),
+    [
+        # 0.3 and 3 * 0.1 are not the same float
+        ([0.0, 0.3, 0.6], [0.1, 0.7, 0.2], [0.1, 0.1, 0.1, 0.7, 0.7, 0.7, 0.2, 0.2, 0.2]),
+        # past a sample by rounding alone
+        ([0.0, float(np.nextafter(0.4, 1.0))], [0.1, 0.7], [0.1, 0.1, 0.1, 0.1, 0.7, 0.7, 0.7]),
+        # at the very end
+        ([0.0, 0.2], [0.1, 0.7], [0.1, 0.1, 0.7]),
+    ],
+)
+def test_samples_at_a_jump_belong_to_what_follows(
+    times: list[float], values: list[float], samples: list[float], method: str, hold: float | None
+) -> None:
+    inputs = Inputs(torque=steps(times, values), force=steps([0.0, 0.7], [0.0, 1.0]))
+    ours = table_3_1(inputs, stop_time=0.1 * (len(samples) - 1), step=0.1, hold=hold, method=method)
+    assert ours["drive.applied_torque"].tolist() == samples
 
 
 def test_held_inputs_are_constant_between_the_points_of_the_grid() -> None:

@@ -14,6 +14,8 @@ from scipy.linalg import expm
 from analysis import Inputs, simulate, steps
 from analysis.linear import (
     DesignError,
+    Equilibrium,
+    LinearModel,
     LoopResult,
     SampledController,
     control_loop,
@@ -80,10 +82,19 @@ def test_lqr_keeps_its_return_difference(which, integral, request) -> None:
     assert design.poles.real.max() < 0.0
 
 
+#: Weights of the control that keeps the crank upright.
+BALANCE = {"crank.angle": 1e2, "slider.position": 1e6}
+
+
+def upright_crank() -> tuple[Equilibrium, LinearModel]:
+    """The unstable equilibrium without a drive, and its linear model."""
+    upright = next(one for one in find_equilibria(TABLE_3_1) if not one.stable)
+    return upright, linearise(TABLE_3_1, upright.state, upright.inputs)
+
+
 def test_lqr_of_a_heavy_force_only_moves_the_unstable_poles() -> None:
     """With no weight but on the force the stable poles stay and the unstable one is mirrored."""
-    upright = next(one for one in find_equilibria(TABLE_3_1) if not one.stable)
-    model = linearise(TABLE_3_1, upright.state, upright.inputs)
+    _, model = upright_crank()
     design = design_lqr(model, np.full(4, 1e-9), 1e3)
     mirrored = np.where(model.poles.real > 0.0, -model.poles.conj(), model.poles)
     # of the two nearly equal real poles the product and sum are what is determined
@@ -281,11 +292,9 @@ def test_a_limited_force_is_kept_and_does_not_wind_up(held) -> None:
 
 
 def test_the_slider_force_balances_the_crank() -> None:
-    upright = next(one for one in find_equilibria(TABLE_3_1) if not one.stable)
-    model = linearise(TABLE_3_1, upright.state, upright.inputs)
-    design = design_lqr(model, {"crank.angle": 1e2, "slider.position": 1e6})
+    upright, model = upright_crank()
     lean = start(model, 0.02, 0.0, 0.0, 0.0)
-    controller = SampledController(design, 2e-3)
+    controller = SampledController(design_lqr(model, BALANCE), 2e-3)
     loop = control_loop(TABLE_3_1, controller, upright["slider.position"], initial=lean, stop_time=2.0)
     assert abs(loop.states[-1, 0] - upright["crank.angle"]) < 1e-5
     fallen = simulate(TABLE_3_1, initial=lean, stop_time=2.0, step=1e-2)
@@ -293,13 +302,10 @@ def test_the_slider_force_balances_the_crank() -> None:
 
 
 def test_a_loop_that_loses_the_assembly_ends_there() -> None:
-    upright = next(one for one in find_equilibria(TABLE_3_1) if not one.stable)
-    model = linearise(TABLE_3_1, upright.state, upright.inputs)
-    design = design_lqr(model, {"crank.angle": 1e2, "slider.position": 1e6})
+    upright, model = upright_crank()
     lean = start(model, 0.3, 0.0, 0.0, 0.0)
-    loop = control_loop(
-        TABLE_3_1, SampledController(design, 1e-3), upright["slider.position"], initial=lean, stop_time=1.0
-    )
+    controller = SampledController(design_lqr(model, BALANCE), 1e-3)
+    loop = control_loop(TABLE_3_1, controller, upright["slider.position"], initial=lean, stop_time=1.0)
     assert loop.status == loop.trajectory.status == 3
     assert "limit of assembly" in loop.message
     assert 10 < len(loop.time) == len(loop.states) == len(loop.trajectory) < 100

@@ -34,7 +34,7 @@ from analysis.slider_crank import (
 )
 from linkwork.errors import AssemblyError, InputError, ParameterError
 from linkwork.slider_crank import dynamics, kinematics
-from linkwork.slider_crank.parameters import SliderCrankParameters
+from linkwork.slider_crank.parameters import Constants, SliderCrankParameters
 from linkwork.slider_crank.published import CRANK_SPEED, CRANK_TORQUE, parameters
 
 from ..published_rahman import (
@@ -78,6 +78,15 @@ def relative(found: Any, true: Any, scale: float = 0.0) -> float:
     return float(np.max(np.abs(a - b))) / max(float(np.max(np.abs(b))), scale, 1e-300)
 
 
+def assert_forces(turn: ForceTurn, r: dynamics.Reactions, p: Constants, share: float) -> float:
+    """The forces in the joints are the plant's, to ``share`` of the largest, which is returned."""
+    level = max(abs(x) for name in JOINTS if "moment" not in name for x in getattr(r, name))
+    for name, joint in JOINTS.items():
+        size = level * (p.a1 if joint.unit == "N.m" else 1.0)
+        assert relative(turn.vector(name)[0], getattr(r, name), size) < share
+    return level
+
+
 @given(cases())
 def test_equal_to_the_plant_where_the_load_is_given(case: Case) -> None:
     p = case.p
@@ -87,15 +96,13 @@ def test_equal_to_the_plant_where_the_load_is_given(case: Case) -> None:
     m = dynamics.motion(q, kinematics.coefficients(q, p), x, inputs, p)
     r = dynamics.reactions(q, x, m, inputs, p)
     turn = turn_of(case, load=case.load)
-    level = max(abs(x) for name in JOINTS if "moment" not in name for x in getattr(r, name))
+    level = assert_forces(turn, r, p, 1e-12)
     assert relative(turn.slider_position, q.s4) < 1e-12
     assert relative(turn.slider_velocity, m.slider_velocity, abs(x[2]) * p.a1) < 1e-12
     assert relative(turn.slider_acceleration, m.slider_acceleration, x[2] ** 2 * p.a1) < 1e-12
     assert relative(turn.torque, m.torque, level * p.a1) < 1e-12
     assert relative(turn.axial_force, r.axial, level) < 1e-12
     assert relative(turn.applied_axial_force, m.force, level) < 1e-12
-    for name, joint in JOINTS.items():
-        assert relative(turn.vector(name)[0], getattr(r, name), level * (p.a1 if joint.unit == "N.m" else 1.0)) < 1e-12
 
 
 @given(cases())
@@ -113,10 +120,7 @@ def test_the_load_that_is_found_keeps_the_motion_under_the_torque(case: Case) ->
     assert turn.torque[0] == case.torque
     scale = abs(case.acceleration) + (abs(case.torque) + abs(inputs.load * k.kth)) / dynamics.inertia(q, k, p).m11
     assert abs(m.crank_acceleration - case.acceleration) < 1e-9 * scale
-    r = dynamics.reactions(q, x, m, inputs, p)
-    level = max(abs(x) for name in JOINTS if "moment" not in name for x in getattr(r, name))
-    for name, joint in JOINTS.items():
-        assert relative(turn.vector(name)[0], getattr(r, name), level * (p.a1 if joint.unit == "N.m" else 1.0)) < 1e-8
+    assert_forces(turn, dynamics.reactions(q, x, m, inputs, p), p, 1e-8)
 
 
 @pytest.mark.parametrize("seed", range(6))

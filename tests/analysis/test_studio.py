@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import subprocess
 import sys
 import tomllib
 from collections.abc import Callable, Iterator, Mapping
@@ -25,6 +24,9 @@ from linkwork.five_bar.parameters import InitialState
 from linkwork.five_bar.published import TABLE_3_1
 from tests import slider_cranks, strategies
 from tests.mechanisms import pendulum
+from tests.scripts import called
+
+from .conftest import opened
 
 ROOT = Path(__file__).parents[2]
 #: The mechanisms of the house: other tests describe linkages of their own.
@@ -38,24 +40,6 @@ if TYPE_CHECKING:
     from playwright.sync_api import Browser, Page
 
 in_browser = pytest.mark.slow
-
-
-@pytest.fixture(scope="module")
-def page(browser: Browser) -> Iterator[Page]:
-    """The built page, opened as a file."""
-    made = _opened(browser, PAGE)
-    yield made
-    made.close()
-
-
-def _opened(browser: Browser, path: Path) -> Page:
-    made = browser.new_page(viewport={"width": 1400, "height": 1000})
-    made.set_default_timeout(600_000)
-    made.on("pageerror", lambda error: pytest.fail(f"the page: {error}"))
-    made.goto(path.as_uri())
-    made.wait_for_function("document.documentElement.dataset.ready")
-    made.click("#play")
-    return made
 
 
 def _load(page: Page, state: Mapping[str, Any]) -> dict[str, Any]:
@@ -398,17 +382,9 @@ def test_motion_drawing_and_lines_are_saved(page: Page, tmp_path: Path) -> None:
     torque = Case(title="", parameters=TABLE_3_1, inputs=Inputs(torque=0.3), initial=start, stop_time=1.0)
     for state in (opening_state(), page_state(torque)):
         found = _load(page, state)
-        done = subprocess.run(
-            [sys.executable, _saved(page, "python")],
-            cwd=tmp_path,
-            capture_output=True,
-            text=True,
-            timeout=600,
-            check=False,
-        )
-        assert done.returncode == 0, done.stderr
+        printed = called(sys.executable, _saved(page, "python"), cwd=tmp_path)
         assert found["answer"]["orbit"]["found"], found["answer"]["orbit"]
-        assert f"{2.0 * np.pi / found['answer']['orbit']['period']:.4g} rad/s" in done.stdout
+        assert f"{2.0 * np.pi / found['answer']['orbit']['period']:.4g} rad/s" in printed
 
 
 @in_browser
@@ -434,7 +410,7 @@ def test_a_mechanism_of_ones_own_opens_in_the_page(browser: Browser, tmp_path: P
         )
         path = tmp_path / "own.html"
         path.write_text(make_page(page_state(case) | {"source": "run"}), encoding="utf-8")
-        page = _opened(browser, path)
+        page = opened(browser, path)
         found = _shown(page)["columns"]
         wanted = simulate(case.parameters, case.inputs, initial=case.initial, stop_time=0.02, **_HELD)
         _near(found["pendulum.angle"], wanted["pendulum.angle"])

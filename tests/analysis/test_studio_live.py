@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import tomllib
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -14,21 +14,13 @@ import pytest
 from analysis.mechanisms import PUBLISHED, find_mechanism
 from analysis.periodic import Drive, frequency_response, natural_frequency, newton_orbit, steady_drive
 from analysis.run import Case, InductionMotor, Inputs, read_case, simulate
-from analysis.studio import PAGE, page_case, page_state
+from analysis.studio import page_case, page_state
 from benchmarks.studio import figures_in_words, measure_page
-from tests.analysis.test_studio import _HELD, _load, _near, _opened, _saved, _varied, in_browser
+from tests.analysis.test_studio import _HELD, _load, _near, _saved, _varied, in_browser
 
 RPM = np.pi / 30.0
 RIG = PUBLISHED["rig-1-spring-b"]
 MOTOR = InductionMotor(breakdown_torque=6.0, breakdown_slip=0.15, synchronous_speed=48.0)
-
-
-@pytest.fixture(scope="module")
-def page(browser: Any) -> Iterator[Any]:
-    """The built page, opened as a file."""
-    made = _opened(browser, PAGE)
-    yield made
-    made.close()
 
 
 def _state(speed: float) -> dict[str, Any]:

@@ -10,7 +10,6 @@ import shutil
 import subprocess
 import sysconfig
 import threading
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -26,17 +25,11 @@ from analysis.run import Case, Inputs
 from analysis.studio import PAGE, opening_state, page_address, page_state
 
 from ..scripts import script_of_docs
-from .test_studio import _drag, _given, _load, _opened, _pin, _saved, _settled, in_browser
+from .conftest import opened
+from .test_studio import _drag, _given, _load, _pin, _saved, _settled, in_browser
 
 ROOT = Path(__file__).parents[2]
 WIDE, PHONE = {"width": 1400, "height": 1000}, {"width": 390, "height": 844}
-
-
-@pytest.fixture(scope="module")
-def page(browser: Any) -> Iterator[Any]:
-    made = _opened(browser, PAGE)
-    yield made
-    made.close()
 
 
 def _spatial() -> dict[str, Any]:
@@ -89,7 +82,7 @@ def test_start_values_for_the_fmu_are_parameter_values_of_ssp(page: Any, state: 
 
 @in_browser
 def test_a_link_holds_the_view_and_a_bad_one_is_said(browser: Any) -> None:
-    page = _opened(browser, PAGE)
+    page = opened(browser, PAGE)
     _load(page, _spatial())
     page.keyboard.press("2")
     page.keyboard.press("+")
@@ -370,7 +363,7 @@ def test_links_are_told_apart_without_colour_vision() -> None:
 @in_browser
 def test_what_the_documentation_links_to_opens(browser: Any) -> None:
     openings = script_of_docs("openings")
-    page = _opened(browser, PAGE)
+    page = opened(browser, PAGE)
     for name, state in openings.states().items():
         with _settled(page):
             page.evaluate("address => { location.href = address }", page_address(state, PAGE.as_uri()))

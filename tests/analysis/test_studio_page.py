@@ -10,14 +10,15 @@ import pytest
 
 from analysis.studio import PAGE, opening_state, page_address
 
-from .test_studio import _drag, _given, _load, _opened, _pin, in_browser
+from .conftest import opened
+from .test_studio import _drag, _given, _load, _pin, in_browser
 
 UNDO = "!document.getElementById('undo').disabled"
 
 
 @pytest.fixture
 def page(browser: Any) -> Iterator[Any]:
-    made = _opened(browser, PAGE)
+    made = opened(browser, PAGE)
     yield made
     made.close()
 

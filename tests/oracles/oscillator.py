@@ -138,17 +138,23 @@ def series(p: Constants, w: float, start: Vector, directions: Vector, turns: int
     return run.y[:, -1].reshape(2, size)
 
 
+def _in_eigenvectors(
+    p: Constants, w: float, start: Vector, turns: int, scale: Vector, multiplier: float
+) -> NDArray[np.float64]:
+    """Return the series of the map in the coordinates along its eigenvectors, first the one whose eigenvalue is nearest."""
+    linear = series(p, w, start, np.diag(scale), turns)[:, [POWERS.index(k) for k in ((1, 0), (0, 1))]] / scale[:, None]
+    values, vectors = np.linalg.eig(linear)
+    basis = vectors.real[:, np.argsort(np.abs(values.real - multiplier))]
+    return np.linalg.solve(basis, series(p, w, start, scale[:, None] * basis, turns) / scale[:, None])
+
+
 def cubic_coefficient(p: Constants, w: float, start: Vector, turns: int, scale: Vector) -> float:
     """Return the coefficient c of the normal form s -> -s + c s^3 of the map at a period doubling, with s scaled by ``scale``.
 
     The map is reduced to its centre manifold, the graph s -> s q + h s^2 r over the eigenvectors q of -1 and r of the other
     multiplier. The condition that the map takes the manifold to itself determines h and c.
     """
-    linear = series(p, w, start, np.diag(scale), turns)[:, [POWERS.index(k) for k in ((1, 0), (0, 1))]] / scale[:, None]
-    values, vectors = np.linalg.eig(linear)
-    order = np.argsort(np.abs(values.real + 1.0))
-    basis = vectors.real[:, order]
-    after = np.linalg.solve(basis, series(p, w, start, scale[:, None] * basis, turns) / scale[:, None])
+    after = _in_eigenvectors(p, w, start, turns, scale, -1.0)
 
     def part(row: int, i: int, j: int) -> float:
         return float(after[row, POWERS.index((i, j))])
@@ -165,8 +171,5 @@ def curvature_at_fold(p: Constants, w: float, start: Vector, turns: int, scale: 
 
     Its sign depends on the sign of the eigenvector.
     """
-    linear = series(p, w, start, np.diag(scale), turns)[:, [POWERS.index(k) for k in ((1, 0), (0, 1))]] / scale[:, None]
-    values, vectors = np.linalg.eig(linear)
-    basis = vectors.real[:, np.argsort(np.abs(values.real - 1.0))]
-    after = np.linalg.solve(basis, series(p, w, start, scale[:, None] * basis, turns) / scale[:, None])
+    after = _in_eigenvectors(p, w, start, turns, scale, 1.0)
     return float(after[0, POWERS.index((2, 0))])

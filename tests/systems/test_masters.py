@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 import re
-import subprocess
 import sys
 from collections.abc import Callable
 from pathlib import Path
@@ -19,6 +18,7 @@ from benchmarks.masters import RESULTS, RUNS, find, read
 
 from ..fmu.runner import run_in_process
 from ..fmu.test_masters import PAGE, SLOW, need
+from ..scripts import called
 from . import masters
 from .conftest import started_in_its_modes, system_of, wiring_of
 
@@ -100,12 +100,9 @@ def test_the_code_of_the_page_on_systems_runs(tmp_path: Path) -> None:
     speeds = []
     for run in runs:
         need(next((name for name in ("libcosimpy", "ecospy") if name in run[-1]), "fmpy"))
-        done = subprocess.run(
-            [sys.executable, *run], cwd=tmp_path, capture_output=True, text=True, timeout=120, check=False
-        )
-        assert done.returncode == 0, done.stderr
+        printed = called(sys.executable, *run, cwd=tmp_path, timeout=120)
         # the last number of a line of nothing but numbers: masters log beside it
-        speeds += re.findall(r"^[^a-zA-Z:]*?([\d.]+)[\])]*$", done.stdout, re.MULTILINE)
+        speeds += re.findall(r"^[^a-zA-Z:]*?([\d.]+)[\])]*$", printed, re.MULTILINE)
     ours = run_system(wiring_of("motor-crank"), step=5e-4, stop_time=0.1)["linkage.crank.speed"][-1]
     fmpy, fixed, ecco, ecos = map(float, speeds)
     assert [fmpy, fixed, ecos] == pytest.approx([float(ours)] * 3, rel=1e-5)

@@ -20,6 +20,7 @@ from analysis.systems.wiring import End
 from benchmarks.realtime import PERCENTILES, RATES, run_host
 from linkwork.errors import ParameterError
 
+from ..scripts import called
 from .conftest import system_of, wiring_of
 
 pytestmark = [
@@ -113,8 +114,7 @@ def test_harmonics_loads_and_the_integral_are_the_same_in_c(tmp_path: Path) -> N
 
 def test_there_is_no_heap_in_the_program(tracking: Path) -> None:
     """Not one allocator of the C library is linked, and the pool does not grow in the steps."""
-    symbols = subprocess.run(["nm", tracking], capture_output=True, text=True, check=True).stdout
-    names = {line.split()[-1] for line in symbols.splitlines()}
+    names = {line.split()[-1] for line in called("nm", tracking).splitlines()}
     assert {"main", "allocate", "InductionMotor_native_fmi2DoStep", "FiveBarSlider_native_fmi2DoStep"} <= names
     assert (
         names & {"malloc", "calloc", "realloc", "free", "aligned_alloc", "__libc_malloc", "mmap", "brk", "sbrk"}
@@ -134,10 +134,10 @@ def test_another_compiler_has_no_warnings_and_without_no_heap_would_need_one(tmp
     assert {"-std=c11", "-Wall", "-Wextra", "-Werror", "-DNO_HEAP"} <= set(options)
 
     def needed(*given: str) -> set[str]:
-        subprocess.run(["gcc", *given, "-c", *files], cwd=tmp_path, check=True)
+        called("gcc", *given, "-c", *files, cwd=tmp_path)
         objects = [Path(name).with_suffix(".o") for name in files]
-        done = subprocess.run(["nm", "-u", *objects], cwd=tmp_path, capture_output=True, text=True, check=True)
-        return {line.split()[-1] for line in done.stdout.splitlines() if line.startswith(" ")}
+        printed = called("nm", "-u", *objects, cwd=tmp_path)
+        return {line.split()[-1] for line in printed.splitlines() if line.startswith(" ")}
 
     heap = {"malloc", "calloc", "realloc", "free"}
     assert needed(*options) & heap == set()

@@ -7,6 +7,7 @@ import zipfile
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pyssp_standard
@@ -15,7 +16,18 @@ import xmlschema
 from click.testing import Result
 
 from analysis import figures
-from analysis.systems import End, System, WiringError, library, load_system, read_ssp, run_system, ssp, write_ssp
+from analysis.systems import (
+    End,
+    System,
+    Wiring,
+    WiringError,
+    library,
+    load_system,
+    read_ssp,
+    run_system,
+    ssp,
+    write_ssp,
+)
 from analysis.systems.description import RunTable
 from linkwork.errors import InputError, LinkworkError, ParameterError, UnknownNameError
 
@@ -117,22 +129,35 @@ def test_efforts_and_flows_between_two_parts_are_power_bonds(name: str, count: i
         assert (wiring.port(bond.effort).unit, wiring.port(bond.flow).unit) in (("N.m", "rad/s"), ("N", "m/s"))
 
 
+def unpacked(path: Path) -> Path:
+    """The folder into which an archive is unpacked."""
+    with zipfile.ZipFile(path) as archive:
+        archive.extractall(path.with_name("there"))
+    return path.with_name("there")
+
+
+def entries_of(path: Path) -> dict[str, bytes]:
+    with zipfile.ZipFile(path) as archive:
+        return {name: archive.read(name) for name in archive.namelist()}
+
+
+def values_of(wiring: Wiring) -> dict[str, dict[str, Any]]:
+    return {name: dict(part.values) for name, part in wiring.parts.items()}
+
+
 @pytest.mark.parametrize("name", sorted(library()))
 def test_an_archive_comes_back_as_it_was_and_keeps_to_the_schemas(name: str, tmp_path: Path) -> None:
     wiring = wiring_of(name)
     path = write_ssp(wiring, tmp_path / f"{name}.ssp")
-    with zipfile.ZipFile(path) as archive:
-        archive.extractall(tmp_path / "there")
-    xmlschema.XMLSchema10(SCHEMAS / "SystemStructureDescription.xsd").validate(
-        tmp_path / "there" / "SystemStructure.ssd"
-    )
+    there = unpacked(path)
+    xmlschema.XMLSchema10(SCHEMAS / "SystemStructureDescription.xsd").validate(there / "SystemStructure.ssd")
     values = xmlschema.XMLSchema10(SCHEMAS / "SystemStructureParameterValues.xsd")
     for part in wiring.parts:
-        values.validate(tmp_path / "there" / "resources" / f"{part}.ssv")
+        values.validate(there / "resources" / f"{part}.ssv")
     again = read_ssp(path)
     assert again.connections == wiring.connections
     assert (again.stop_time, again.step) == (wiring.stop_time, wiring.step)
-    assert {n: dict(p.values) for n, p in again.parts.items()} == {n: dict(p.values) for n, p in wiring.parts.items()}
+    assert values_of(again) == values_of(wiring)
     one, other = (run_system(each, stop_time=20.0 * wiring.step, step=wiring.step) for each in (wiring, again))
     assert all(np.array_equal(one[output], other[output]) for output in one.values)
 
@@ -141,12 +166,10 @@ def test_fmi_3_goes_into_an_archive_of_ssp_2(tmp_path: Path) -> None:
     wiring = system_of("motor-crank").wiring(fmi=3)
     assert {part.description.fmiVersion for part in wiring.parts.values()} == {"3.0"}
     path = write_ssp(wiring, tmp_path / "made.ssp")
-    with zipfile.ZipFile(path) as archive:
-        archive.extractall(tmp_path / "there")
     schema = xmlschema.XMLSchema10(SCHEMAS / "ssp2" / "SystemStructureDescription.xsd")
-    schema.validate(tmp_path / "there" / "SystemStructure.ssd")
+    schema.validate(unpacked(path) / "SystemStructure.ssd")
     again = read_ssp(path)
-    assert {n: dict(p.values) for n, p in again.parts.items()} == {n: dict(p.values) for n, p in wiring.parts.items()}
+    assert values_of(again) == values_of(wiring)
     one, other = (run_system(each, stop_time=0.02) for each in (again, wiring_of("motor-crank")))
     for name in map(str, wiring.connections.values()):
         np.testing.assert_allclose(one[name], other[name], rtol=1e-7, atol=1e-9)
@@ -161,9 +184,7 @@ def test_enumerations_are_written_by_the_names_of_their_items(tmp_path: Path) ->
     )
     part = replace(part, ports={**part.ports, "drive.mode": mode}, values={**part.values, "drive.mode": 1.0})
     path = write_ssp(replace(wiring, parts={**wiring.parts, "linkage": part}), tmp_path / "made.ssp")
-    with zipfile.ZipFile(path) as archive:
-        archive.extractall(tmp_path / "there")
-    values = tmp_path / "there" / "resources" / "linkage.ssv"
+    values = unpacked(path) / "resources" / "linkage.ssv"
     xmlschema.XMLSchema10(SCHEMAS / "SystemStructureParameterValues.xsd").validate(values)
     assert '<ssv:Enumeration value="speed" name="Drive"' in values.read_text(encoding="utf-8")
     assert ssp._as_number("speed", mode, "drive.mode") == 1.0
@@ -179,9 +200,7 @@ def test_a_part_that_nothing_is_connected_to_is_kept(tmp_path: Path) -> None:
 
 
 def test_what_would_be_read_past_is_refused(tmp_path: Path) -> None:
-    path = write_ssp(wiring_of("motor-crank"), tmp_path / "made.ssp")
-    with zipfile.ZipFile(path) as archive:
-        entries = {name: archive.read(name) for name in archive.namelist()}
+    entries = entries_of(write_ssp(wiring_of("motor-crank"), tmp_path / "made.ssp"))
     text = entries["SystemStructure.ssd"].decode()
     start = text.index("<ssd:Connection ")
     end = text.index("/>", start)
@@ -206,9 +225,7 @@ def test_what_would_be_read_past_is_refused(tmp_path: Path) -> None:
 
 
 def test_start_values_of_the_whole_system_through_a_mapping(tmp_path: Path) -> None:
-    path = write_ssp(wiring_of("motor-crank"), tmp_path / "made.ssp")
-    with zipfile.ZipFile(path) as archive:
-        entries = {name: archive.read(name) for name in archive.namelist()}
+    entries = entries_of(write_ssp(wiring_of("motor-crank"), tmp_path / "made.ssp"))
     binding = (
         '<ssd:ParameterBindings><ssd:ParameterBinding source="resources/all.ssv"><ssd:ParameterMapping '
         'source="resources/all.ssm"/></ssd:ParameterBinding></ssd:ParameterBindings>'
