@@ -22,7 +22,6 @@ from linkwork.errors import AssemblyError, InputError
 from linkwork.five_bar import dynamics, kinematics
 from linkwork.five_bar.assembly import check_assembly
 from linkwork.five_bar.parameters import Constants, FiveBarParameters
-from linkwork.five_bar.variables import OUTPUT_NAMES
 
 from ..files import unknown_name
 from ..mechanisms import FIVE_BAR, output_units
@@ -36,8 +35,9 @@ FloatArray = NDArray[np.float64]
 Load = tuple[float, float] | Callable[[float], tuple[float, float]]
 
 #: Names of the outputs of a prescribed motion: all except the energies, which are counted from the start of a run.
-NAMES = tuple(name for name in OUTPUT_NAMES if name not in ("energy.dissipated", "energy.supplied", "energy.residual"))
-_KEPT = [OUTPUT_NAMES.index(name) for name in NAMES]
+_LEFT_OUT = ("energy.dissipated", "energy.supplied", "energy.residual")
+NAMES = tuple(name for name in FIVE_BAR.output_names if name not in _LEFT_OUT)
+_KEPT = [FIVE_BAR.output_names.index(name) for name in NAMES]
 LEAST_SAMPLES = 16
 
 

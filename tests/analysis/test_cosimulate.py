@@ -27,10 +27,10 @@ from analysis import (
     steps,
     table,
 )
+from analysis.mechanisms import FIVE_BAR
 from analysis.units import CM_PER_METRE
 from linkwork.errors import InputError
 from linkwork.five_bar.published import SETS, TABLE_3_1
-from linkwork.five_bar.variables import OUTPUT_NAMES
 from tests import published
 from tests.fmu.runner import run_in_process
 
@@ -378,7 +378,7 @@ def base() -> Trajectory:
 
 def changed(name: str, change: Any) -> Trajectory:
     values = base().values.copy()
-    values[:, OUTPUT_NAMES.index(name)] += change
+    values[:, FIVE_BAR.output_names.index(name)] += change
     return replace(base(), values=values)
 
 
@@ -386,10 +386,10 @@ def test_equal_runs_agree() -> None:
     result = compare(base(), base())
     assert result.agrees
     assert result.worst.relative == 0.0
-    assert [d.name for d in result.differences] == list(OUTPUT_NAMES)
+    assert [d.name for d in result.differences] == list(FIVE_BAR.output_names)
 
 
-@pytest.mark.parametrize("name", OUTPUT_NAMES)
+@pytest.mark.parametrize("name", FIVE_BAR.output_names)
 def test_difference_in_one_output_is_found_with_its_size(name: str) -> None:
     change = np.zeros(11)
     change[3], change[7] = 0.03, -0.04

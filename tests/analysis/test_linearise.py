@@ -35,7 +35,6 @@ from linkwork import friction
 from linkwork.errors import AssemblyError, InputError, UnknownNameError
 from linkwork.five_bar import dynamics, kinematics
 from linkwork.five_bar.published import SETS, TABLE_3_1
-from linkwork.five_bar.variables import OUTPUT_NAMES
 from tests.strategies import rough, seeded
 
 pytest.importorskip("casadi")
@@ -139,7 +138,7 @@ def by_inputs(f: Any, x: Any, i: Any, p: Any) -> dict[str, np.ndarray]:
 FUNCTIONS = {
     "derivative": lambda x, i, p: plain().derivative(x, i, p)[:4],
     "outputs": lambda x, i, p: [
-        value for name, value in zip(OUTPUT_NAMES, plain().outputs(x, i, 0.0, p)) if name in LINEAR_OUTPUTS
+        value for name, value in zip(FIVE_BAR.output_names, plain().outputs(x, i, 0.0, p)) if name in LINEAR_OUTPUTS
     ],
 }
 
@@ -176,7 +175,7 @@ def test_the_outputs_at_the_point_are_the_plants() -> None:
     case = seeded(3)
     model = linearise(case.parameters, case.state, as_inputs(case.state, case.torque_inputs))
     exact = dynamics.outputs(case.state, case.torque_inputs, 0.0, case.parameters.constants())
-    named = dict(zip(OUTPUT_NAMES, exact))
+    named = dict(zip(FIVE_BAR.output_names, exact))
     assert model.outputs == pytest.approx([named[name] for name in LINEAR_OUTPUTS], rel=1e-11)
     assert model.acceleration == pytest.approx([named["crank.acceleration"], named["slider.acceleration"]], rel=1e-11)
 

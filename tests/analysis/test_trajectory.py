@@ -10,10 +10,11 @@ import numpy as np
 import pytest
 
 from analysis import Inputs, Trajectory, figures, simulate
+from analysis.mechanisms import FIVE_BAR
 from linkwork.errors import InputError
 from linkwork.five_bar import dynamics
 from linkwork.five_bar.published import SETS, TABLE_3_1
-from linkwork.five_bar.variables import OUTPUT_NAMES, OUTPUTS
+from linkwork.five_bar.variables import OUTPUTS
 
 
 @pytest.fixture(scope="module")
@@ -22,10 +23,10 @@ def trajectory() -> Trajectory:
 
 
 def test_every_output_of_the_contract_is_there_by_name_with_its_unit(trajectory: Trajectory) -> None:
-    assert trajectory.names == OUTPUT_NAMES
+    assert trajectory.names == FIVE_BAR.output_names
     assert trajectory.values.shape == (101, 27)
     assert len(trajectory) == 101
-    for i, name in enumerate(OUTPUT_NAMES):
+    for i, name in enumerate(FIVE_BAR.output_names):
         assert np.array_equal(trajectory[name], trajectory.values[:, i])
         assert trajectory.column(name) == i
     assert dict(trajectory.units) == {v.name: v.unit for v in OUTPUTS if v.kind == "Real"}
@@ -88,7 +89,7 @@ def test_csv_has_names_and_units_and_every_digit(trajectory: Trajectory, tmp_pat
 def test_data_frame(trajectory: Trajectory) -> None:
     pytest.importorskip("pandas")
     frame = trajectory.to_dataframe()
-    assert list(frame.columns) == list(OUTPUT_NAMES)
+    assert list(frame.columns) == list(FIVE_BAR.output_names)
     assert frame.index.name == "time"
     assert np.array_equal(frame.index.to_numpy(), trajectory.time)
     assert np.array_equal(frame["pin.B.fy"].to_numpy(), trajectory["pin.B.fy"])

@@ -185,9 +185,6 @@ OUTPUTS = (
 
 VARIABLES = PARAMETERS + INPUTS + OUTPUTS
 
-#: Names of the real outputs, in the order of `dynamics.Outputs`.
-OUTPUT_NAMES = tuple(v.name for v in OUTPUTS if v.kind == "Real")
-
 #: Parameters that set the configuration at the start, for the dependencies of the initial outputs.
 POSITION_PARAMETERS = (
     "crank.length",
