@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import lru_cache
 from math import pi
 from typing import Any
 
@@ -67,6 +68,13 @@ def is_too_slow(steps: Any, passed: Any, span: float, most: int) -> Any:
     return (steps >= _PATIENCE) & (steps * span >= _SHARE * most * passed)
 
 
+@lru_cache(maxsize=64)
+def _energies(names: tuple[str, ...]) -> NDArray[np.int64]:
+    """Return the indices of the outputs that are energies, first that of the residual of their balance."""
+    first = names.index("energy.residual")
+    return np.array([first, *(n for n, name in enumerate(names) if name.startswith("energy.") and n != first)])
+
+
 def energy_balance(names: Sequence[str], values: NDArray[np.float64], tolerance: float) -> str:
     """Return a caution if the residual of the energy balance is larger than the tolerance promises; else an empty text.
 
@@ -74,10 +82,8 @@ def energy_balance(names: Sequence[str], values: NDArray[np.float64], tolerance:
     """
     if "energy.residual" not in names or not len(values):
         return ""
-    places = [n for n, name in enumerate(names) if name.startswith("energy.")]
-    greatest = dict(zip([names[n] for n in places], np.abs(values[:, places]).max(axis=0).tolist()))
-    residual = greatest.pop("energy.residual")
-    size = max(greatest.values(), default=0.0)
+    residual, *energies = np.abs(values.take(_energies(tuple(names)), axis=1)).max(axis=0).tolist()
+    size = max(energies, default=0.0)
     if residual <= min(_RESIDUAL * tolerance, _MOST) * size:
         return ""
     return (

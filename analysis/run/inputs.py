@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
-from functools import lru_cache
+from functools import cached_property, lru_cache
 from itertools import chain
 from typing import Any, NoReturn
 
@@ -60,8 +60,10 @@ class Inputs:
     >>> drive = Inputs(speed="420 rpm", force=(1.0, ramp(0.0, 2.0, 0.0, 0.5)))
     """
 
-    __slots__ = ("_given", "_text_units")
+    __slots__ = ("_encoded", "_given", "_text_units")
     _given: dict[str, Any]
+    #: See `encode_once`.
+    _encoded: dict[Mechanism, Encoded]
     #: Units of the inputs that were given as texts.
     _text_units: dict[str, str]
 
@@ -92,8 +94,7 @@ class Inputs:
                 if isinstance(part, Function) and part.rate is None:
                     unit = "rad/s2" if name == "speed" else "m/s2"
                     raise InputError(f"a {name} given as a Function needs its rate, the acceleration ({unit})")
-        object.__setattr__(self, "_given", given)
-        object.__setattr__(self, "_text_units", text_units)
+        _fill(self, given, text_units)
 
     def __setattr__(self, name: str, value: Any) -> None:
         raise AttributeError(f"inputs do not change: Inputs.replace({name}=...) makes new ones")
@@ -158,9 +159,12 @@ class Inputs:
 
 def _restore(given: dict[str, Any], text_units: dict[str, str]) -> Inputs:
     """Restore pickled inputs without checks, because the reading process may not know their mechanism."""
-    inputs = object.__new__(Inputs)
-    object.__setattr__(inputs, "_given", given)
-    object.__setattr__(inputs, "_text_units", text_units)
+    return _fill(object.__new__(Inputs), given, text_units)
+
+
+def _fill(inputs: Inputs, given: dict[str, Any], text_units: dict[str, str]) -> Inputs:
+    for name, value in (("_given", given), ("_text_units", text_units), ("_encoded", {})):
+        object.__setattr__(inputs, name, value)
     return inputs
 
 
@@ -314,7 +318,7 @@ def check_run(mechanism: Mechanism, inputs: Inputs | None, initial: InitialState
     return inputs, initial
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Encoded:
     """`Inputs` of a mechanism as arrays, all signals with the same breaks.
 
@@ -338,7 +342,15 @@ class Encoded:
     commands: NDArray[np.int64]
     functions: tuple[tuple[StateFunction | None, StateFunction | None], ...]
 
-    @property
+    @cached_property
+    def constant(self) -> NDArray[np.float64] | None:
+        """Return the values of all channels if these do not change during a run, else None."""
+        u = np.zeros(len(self.mechanism.channels))
+        u[self.source.places[:, 0]] = self.source.coefficients[0, :, 0]
+        changes = not self.source.is_constant or any(chain.from_iterable(self.functions))
+        return None if changes or not np.isfinite(u).all() else u
+
+    @cached_property
     def steady(self) -> bool:
         """Return whether all channels except the torsion bar are constant between the breaks.
 
@@ -427,6 +439,16 @@ def encode(inputs: Inputs, mechanism: Mechanism) -> Encoded:
     return Encoded(mechanism, modes, source, np.array(commanded, dtype=np.int64).reshape(-1, 3), tuple(functions))
 
 
+def encode_once(inputs: Inputs, mechanism: Mechanism) -> Encoded:
+    """Return `encode` of inputs; the arrays of numbers and of torque laws, which cannot change, are kept with the inputs."""
+    if mechanism not in inputs._encoded:
+        encoded = encode(inputs, mechanism)
+        if not all(isinstance(p, (*NUMBER, TorsionBar, InductionMotor)) for name in inputs for p in inputs.parts(name)):
+            return encoded
+        inputs._encoded[mechanism] = encoded
+    return inputs._encoded[mechanism]
+
+
 def _refine_breaks(part: Piecewise, breaks: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return the polynomial coefficients of a signal on finer breaks, shape (n, 4).
 
@@ -492,7 +514,8 @@ def _reason(error: Exception) -> str:
 
 def compile_source(encoded: Encoded) -> tuple[Source, list[Any]]:
     """Return the inputs for the compiled code, with a copy of the torque laws, and the objects to keep while it is in use."""
-    freedoms = len(encoded.mechanism.freedoms)
+    freedoms, source = len(encoded.mechanism.freedoms), encoded.source._replace(laws=encoded.source.laws.copy())
+    if not any(chain.from_iterable(encoded.functions)):
+        return source, []
     kept = [[f and compile_function(f, freedoms) for f in row] for row in encoded.functions]
-    addresses = np.array([[f.address if f else 0 for f in row] for row in kept], dtype=np.int64).reshape(-1, 2)
-    return encoded.source._replace(laws=encoded.source.laws.copy(), functions=addresses), kept
+    return source._replace(functions=np.array([[f.address if f else 0 for f in row] for row in kept])), kept

@@ -21,7 +21,7 @@ from .angles import WholeTurns
 from .cautions import MANY_STEPS, disturbance_rates, energy_balance, is_too_slow, stiffness
 from .equations import OUTPUTS, compile_outputs, machine
 from .events import Event, RunInterrupted, show_progress
-from .inputs import Encoded, Inputs, align, check_run, compile_function, compile_source, encode
+from .inputs import Encoded, Inputs, align, check_run, compile_function, compile_source, encode_once
 from .sampling import NotFiniteError, sample
 from .trajectory import Occurrence, Trajectory
 
@@ -80,7 +80,7 @@ class Run:
     def __post_init__(self) -> None:
         self.mechanism = find_mechanism(self.parameters)
         self.inputs, self.initial = check_run(self.mechanism, self.inputs, self.initial)
-        self.encoded = align(encode(self.inputs, self.mechanism), self.settings.times)
+        self.encoded = align(encode_once(self.inputs, self.mechanism), self.settings.times)
         self.p = self.parameters.constants()
         self.modes = tuple(float(value) for value in self.encoded.modes.values())
 
@@ -98,18 +98,14 @@ class Run:
         u = sample(self.encoded, float(self.settings.times[0]), x, self.encoded.source.laws)
         for channel, place, _ in self.encoded.commands:
             x[place] = u[channel]
-        state = self.mechanism.equations.start(tuple(x.tolist()), self.apply_inputs(u), self.p)
-        self.mechanism.check_state(self.parameters, state, self.apply_inputs(u), self.p)
+        acting = self.apply_inputs(u)
+        state = self.mechanism.equations.start(tuple(x.tolist()), acting, self.p)
+        self.mechanism.check_state(self.parameters, state, acting, self.p)
         scale = np.array(self.mechanism.error_scale(self.parameters, state))
         energy = self.mechanism.equations.energy(state, self.p)
         # only such large values may overflow
-        great = not (abs(energy) < _GREAT and np.abs(u).max(initial=0.0) < _GREAT)
-        if (
-            great
-            and not np.isfinite(
-                [energy, *self.mechanism.equations.derivative(state, self.apply_inputs(u), self.p)]
-            ).all()
-        ):
+        great = not (abs(energy) < _GREAT and max(map(abs, u.tolist()), default=0.0) < _GREAT)
+        if great and not np.isfinite([energy, *self.mechanism.equations.derivative(state, acting, self.p)]).all():
             names = [name for freedom in self.mechanism.freedoms for name in (freedom.coordinate, freedom.rate)]
             values = dict(zip([*names[::2], *names[1::2]], state))
             name = max(values, key=lambda name: abs(values[name]))
@@ -148,8 +144,8 @@ class Run:
         """Return arrays for samples at the given times, and the solver's records at the start of the run from the state x."""
         from . import records as k
 
-        size, channels = self.mechanism.size, len(self.mechanism.channels)
-        samples = k.Samples(times, np.full((1, len(times), size), np.nan), np.full((1, len(times), channels), np.nan))
+        n, channels = len(times), len(self.mechanism.channels)
+        samples = k.Samples(times, np.empty((1, n, self.mechanism.size)), np.empty((1, n, channels)))
         state = k.State(np.zeros(1, dtype=k.CARRY), x[None].copy(), np.zeros((1, channels)))
         state.carries["begin"] = times[0]
         return samples, state
@@ -189,10 +185,11 @@ class Run:
                     entered = clock.perf_counter()
                     compiled.run(problem, source, batch, watch, state, samples, status, most, STEPS_PER_CALL)
                     integrating += clock.perf_counter() - entered
-                    found = watch.found[: carry["found"]]
-                    found[:, 2:] += turns.taken
-                    occurrences += found.tolist()
-                    carry["found"] = 0
+                    if carry["found"]:
+                        found = watch.found[: carry["found"]]
+                        found[:, 2:] += turns.taken
+                        occurrences += found.tolist()
+                        carry["found"] = 0
                     passed, steps = float(carry["begin"] + carry["elapsed"] - times[0]), float(carry["steps"])
                     show(passed)
                     stiff = self.stiffness_caution(x, u, steps, passed)
@@ -323,6 +320,8 @@ def verdict(
     """
     from . import records as k
 
+    if status not in (k.LIMIT, k.NO_STEP, k.RUNNING):
+        return 0, ""
     # a microsecond, at any time
     at = f"t = {t:.9g} s" if abs(t) < 1e3 else f"t = {t:.6f} s"
     if status == k.LIMIT:
@@ -331,9 +330,7 @@ def verdict(
         return 4, f"the step size fell below what {at} can resolve, {mechanism.describe_state(x.tolist())}"
     if status == k.RUNNING and needed:
         return 4, f"stopped at {at}, as about {needed:.2g} steps would be needed"
-    if status == k.RUNNING:
-        return 4, f"{settings.max_steps} steps did not suffice: stopped at {at}, {mechanism.describe_state(x.tolist())}"
-    return 0, ""
+    return 4, f"{settings.max_steps} steps did not suffice: stopped at {at}, {mechanism.describe_state(x.tolist())}"
 
 
 def compute_outputs(
