@@ -413,6 +413,7 @@ class Kernel:
         self.__doc__ = function.__doc__
         self.__name__ = function.__name__
         self._compiled: Any = None
+        self._entry: Any = None
 
     @property
     def compiled(self) -> Any:
@@ -479,7 +480,13 @@ class Kernel:
         return CARRIED / f"{self.__name__}-{self._fingerprint()}-{kind}"
 
     def __call__(self, *arguments: Any) -> Any:
-        return (self._compiled or self.compiled)(*arguments)
+        if self._entry is None:
+            # Numba's dispatcher compares the types of the arguments with the signature, and takes 7 us for it
+            (made,) = self.compiled.overloads.values()
+            found = self._compiled(*arguments)
+            self._entry = made.entry_point
+            return found
+        return self._entry(*arguments)
 
 
 class _Announcer(event.Listener):
