@@ -50,14 +50,15 @@ def time_in_process(case: Case) -> tuple[list[Timing], str]:
     The timings are of the integration alone and of the whole call of `simulate`.
     """
     inputs = Inputs(speed=case.crank_speed) if case.crank_speed else Inputs(torque=TorsionBar(torque=case.torque))
+    initial, times = InitialState(crank_speed=case.start_speed), case.times
 
     def run(tolerance: float) -> Any:
         return simulate(
             case.parameters,
             inputs,
-            initial=InitialState(crank_speed=case.start_speed),
+            initial=initial,
             stop_time=case.duration,
-            samples=case.times,
+            samples=times,
             tolerance=tolerance,
         )
 

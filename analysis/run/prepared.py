@@ -142,11 +142,11 @@ class Run:
 
     def _records(self, times: NDArray[np.float64], x: NDArray[np.float64]) -> tuple[Any, Any]:
         """Return arrays for samples at the given times, and the solver's records at the start of the run from the state x."""
-        from . import records as k
+        from .records import CARRY, Samples, State
 
         n, channels = len(times), len(self.mechanism.channels)
-        samples = k.Samples(times, np.empty((1, n, self.mechanism.size)), np.empty((1, n, channels)))
-        state = k.State(np.zeros(1, dtype=k.CARRY), x[None].copy(), np.zeros((1, channels)))
+        samples = Samples(times, np.empty((1, n, self.mechanism.size)), np.empty((1, n, channels)))
+        state = State(np.zeros(1, dtype=CARRY), x[None].copy(), np.zeros((1, channels)))
         state.carries["begin"] = times[0]
         return samples, state
 
@@ -158,8 +158,8 @@ class Run:
         InputError
             As for `start`; or if ``balanced`` is not possible.
         """
-        from . import compiled
-        from . import records as k
+        from .compiled import run, single_batch
+        from .records import BAD_INPUT, NO_STEP, RUNNING
 
         begun = clock.perf_counter()
         turns = WholeTurns(self.mechanism, self.p, self.modes, self.encoded, self.events)
@@ -170,20 +170,20 @@ class Run:
             start = replace(start, energy=self.mechanism.equations.energy(tuple(start.x.tolist()), self.p))
         problem = make_problem(self.encoded, self.settings, self.mechanism.is_switched_on(self.p))
         source, kept = compile_source(self.encoded)
-        batch = compiled.single_batch(source, np.array([*self.p, start.energy]), start.scale, self.encoded.steady)
+        batch = single_batch(source, np.array([*self.p, start.energy]), start.scale, self.encoded.steady)
         watch, watching = self._watch(self._balance() if balanced else ())
         kept += watching
         times, most = self.settings.times, self.settings.max_steps
         samples, state = self._records(times, start.x)
         carry, x, u = state.carries[0], state.x[0], state.u[0]
-        status, integrating = np.full(1, k.RUNNING), 0.0
+        status, integrating = np.full(1, RUNNING), 0.0
         occurrences: list[list[float]] = []
         stiff, needed, span = "", 0.0, times[-1] - times[0]
         with record_interrupts() as interrupted, show_progress(progress, span) as show:
             try:
-                while status[0] == k.RUNNING and carry["steps"] < most and not needed and not interrupted:
+                while status[0] == RUNNING and carry["steps"] < most and not needed and not interrupted:
                     entered = clock.perf_counter()
-                    compiled.run(problem, source, batch, watch, state, samples, status, most, STEPS_PER_CALL)
+                    run(problem, source, batch, watch, state, samples, status, most, STEPS_PER_CALL)
                     integrating += clock.perf_counter() - entered
                     if carry["found"]:
                         found = watch.found[: carry["found"]]
@@ -194,12 +194,12 @@ class Run:
                     show(passed)
                     stiff = self.stiffness_caution(x, u, steps, passed)
                     needed = steps * span / passed if stiff and is_too_slow(steps, passed, span, most) else 0.0
-                    if status[0] == k.RUNNING:
+                    if status[0] == RUNNING:
                         turns.take(x, u, source.laws, int(carry["sample"]), watch)
             except KeyboardInterrupt:  # raised by the caller's code
                 interrupted.append(True)
         t = float(carry["begin"] + carry["elapsed"])
-        if status[0] == k.BAD_INPUT:
+        if status[0] == BAD_INPUT:
             raise self.not_finite_error(int(carry["lost"]), t, x + turns.taken)
         done = int(carry["sample"])
         times, states, forces = times[:done], samples.states[0, :done], samples.forces[0, :done]
@@ -207,7 +207,7 @@ class Run:
             # the run ended between two samples: its last configuration is recorded too
             times, states, forces = np.append(times, t), np.vstack([states, x]), np.vstack([forces, u])
         code, message = verdict(self.mechanism, self.settings, int(status[0]), t, x + turns.taken, self.limit, needed)
-        if status[0] == k.NO_STEP:
+        if status[0] == NO_STEP:
             message += self.describe_undefined_forces(x)
         values = turns.put_back(compute_outputs(self.mechanism, problem.modes, batch.p[0], states, forces))
         balance = "" if code else energy_balance(self.mechanism.output_names, values, self.settings.tolerance)
@@ -318,17 +318,17 @@ def verdict(
     ``limit`` returns the message for a limit of the motion; by default it is the limit of assembly. ``needed`` is zero, or the
     number of steps that the run would have needed if it was given up as stiff.
     """
-    from . import records as k
+    from .records import LIMIT, NO_STEP, RUNNING
 
-    if status not in (k.LIMIT, k.NO_STEP, k.RUNNING):
+    if status not in (LIMIT, NO_STEP, RUNNING):
         return 0, ""
     # a microsecond, at any time
     at = f"t = {t:.9g} s" if abs(t) < 1e3 else f"t = {t:.6f} s"
-    if status == k.LIMIT:
+    if status == LIMIT:
         return 3, f"{limit(x) if limit else ASSEMBLY} at {at}, {mechanism.describe_state(x.tolist())}"
-    if status == k.NO_STEP:
+    if status == NO_STEP:
         return 4, f"the step size fell below what {at} can resolve, {mechanism.describe_state(x.tolist())}"
-    if status == k.RUNNING and needed:
+    if status == RUNNING and needed:
         return 4, f"stopped at {at}, as about {needed:.2g} steps would be needed"
     return 4, f"{settings.max_steps} steps did not suffice: stopped at {at}, {mechanism.describe_state(x.tolist())}"
 
