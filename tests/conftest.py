@@ -14,6 +14,7 @@ from hypothesis import settings
 
 from analysis import cli
 from analysis.export import NATIVE, NATIVE_FMI3, build, build_native
+from analysis.numerics.codegen import Kernel
 from benchmarks.studio import chromium
 from build_fmu import FMUS
 
@@ -25,6 +26,11 @@ if TYPE_CHECKING:
 # examples drawn by hypothesis have no time limit: the first one loads libraries, and the computer may be busy
 settings.register_profile("unhurried", settings.default, deadline=None)
 settings.load_profile("unhurried")
+
+#: The call of a kernel's machine code without its check of types.
+UNCHECKED = Kernel.unchecked
+# in the tests the types of all arguments are checked
+Kernel.unchecked = property(lambda kernel: kernel)
 
 #: Units of work that are sent to workers: patterns of the tests' names, and the name of the unit. A unit is a file, whose tests
 #: share results, or the test of one page of the documentation.

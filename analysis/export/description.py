@@ -217,7 +217,7 @@ def _unit_definitions(entries: Iterable[Entry]) -> Element:
 
 
 #: Names of the types of variables in each version of FMI. Modes are integers, not enumerations: of the masters in the tests,
-#: libcosim, ecos and PathSim can set no enumeration.
+#: libcosim, ecos, CoFMUPy and PathSim can set no enumeration.
 _TYPES = {
     2: {"Real": "Real", "Integer": "Integer", "String": "String"},
     3: {"Real": "Float64", "Integer": "Int32", "String": "String"},

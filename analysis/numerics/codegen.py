@@ -378,7 +378,7 @@ def copy(source, target):
         target[i] = source[i]
 
 
-def kernel(*signature: Any, purpose: str) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
+def kernel(*signature: Any, purpose: str) -> Callable[[Callable[..., Any]], Kernel]:
     """Return a decorator that compiles a function when it is first called, and keeps the machine code on disk.
 
     Parameters
@@ -389,7 +389,7 @@ def kernel(*signature: Any, purpose: str) -> Callable[[Callable[..., Any]], Call
         End of the message "compiling ...", printed once on standard error when the function is not found on disk.
     """
 
-    def decorate(function: Callable[..., Any]) -> Callable[..., Any]:
+    def decorate(function: Callable[..., Any]) -> Kernel:
         return Kernel(function, signature, purpose)
 
     return decorate
@@ -413,7 +413,6 @@ class Kernel:
         self.__doc__ = function.__doc__
         self.__name__ = function.__name__
         self._compiled: Any = None
-        self._entry: Any = None
 
     @property
     def compiled(self) -> Any:
@@ -480,13 +479,16 @@ class Kernel:
         return CARRIED / f"{self.__name__}-{self._fingerprint()}-{kind}"
 
     def __call__(self, *arguments: Any) -> Any:
-        if self._entry is None:
-            # Numba's dispatcher compares the types of the arguments with the signature, and takes 7 us for it
-            (made,) = self.compiled.overloads.values()
-            found = self._compiled(*arguments)
-            self._entry = made.entry_point
-            return found
-        return self._entry(*arguments)
+        return (self._compiled or self.compiled)(*arguments)
+
+    @property
+    def unchecked(self) -> Callable[..., Any]:
+        """Return the machine code, which takes arguments of other types for what they are not.
+
+        Numba compares the types of the arguments with the signature, which takes 7 us. In the tests that is done here, too.
+        """
+        (made,) = self.compiled.overloads.values()
+        return made.entry_point  # type: ignore[no-any-return]
 
 
 class _Announcer(event.Listener):

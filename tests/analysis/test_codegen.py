@@ -39,6 +39,7 @@ from analysis.run.prepared import compute_outputs
 from linkwork.errors import LinkworkError
 from linkwork.mechanism import Mechanism
 from tests import slider_cranks, strategies
+from tests.conftest import UNCHECKED
 from tests.fmu.runner import run_in_process
 
 casadi = pytest.importorskip("casadi")
@@ -327,6 +328,13 @@ def test_code_for_any_processor_that_cannot_be_read_is_not_used(
     with pytest.warns(RuntimeWarning, match=f"{carried} is not used"):
         assert _made()(0.7) == 3.0 * 1.7 + math.sin(0.7)
     assert "compiling an example" in capsys.readouterr().err
+
+
+def test_an_unchecked_call_is_that_of_the_machine_code() -> None:
+    kernel = _made()
+    assert UNCHECKED.__get__(kernel)(0.7) == kernel(0.7)
+    with pytest.raises(TypeError, match="No matching definition"):
+        kernel("0.7")
 
 
 def test_an_installation_carries_every_kernel() -> None:
