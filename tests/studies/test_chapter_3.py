@@ -115,7 +115,7 @@ class TestSteadyMotion:
             crank, u = np.radians(turn.angle_deg[i]), turn.slider_cm[i] / 100.0
             weight = (potential(crank + 1e-5, u) - potential(crank - 1e-5, u)) / 2e-5
             assert found.gravity[i] == pytest.approx(weight, abs=1e-8)
-            w = formulation.solved(*formulation.closed(crank, u, formulation.OMEGA, rate[i]))
+            w = formulation.solve_multipliers(*formulation.closed(crank, u, formulation.OMEGA, rate[i]))
             assert found.whole[i] == pytest.approx(w[0], abs=1e-3)
 
     def test_distance_on_a_graph_is_square_to_the_curve(self) -> None:
@@ -217,7 +217,7 @@ class TestFormulation:
     """Chapter II and section 3.1."""
 
     def test_start_is_that_of_the_independent_derivation(self) -> None:
-        w = formulation.solved(*formulation.closed(0.0, 0.0, formulation.OMEGA, 0.0))
+        w = formulation.solve_multipliers(*formulation.closed(0.0, 0.0, formulation.OMEGA, 0.0))
         assert w[0] == pytest.approx(published.CRANK_TORQUE_AT_START_DYN_CM * published.DYN_CM, rel=1e-9)
 
     def test_closure_shows_nothing_where_kinematics_close_the_loop(self) -> None:

@@ -20,8 +20,8 @@ from analysis.studies.youssef.regions import (
     equation,
     first_order,
     hill,
+    orbit_region,
     removing_estimate,
-    right,
 )
 from analysis.youssef import (
     Form,
@@ -50,7 +50,7 @@ def test_verdicts_plot_and_data(number: str) -> None:
 def test_first_region(inertia_ratio: float) -> None:
     mechanism = chapter_4(inertia_ratio)
     for region, ends, tolerance in (
-        (right(mechanism), published.FIRST_REGION[inertia_ratio], 5.5e-7),
+        (orbit_region(mechanism), published.FIRST_REGION[inertia_ratio], 5.5e-7),
         (appendix_3(mechanism), published.FIRST_REGION_THESIS[inertia_ratio], 5.5e-6),
     ):
         assert (region.low, region.high) == pytest.approx(ends, abs=tolerance)
@@ -59,13 +59,13 @@ def test_first_region(inertia_ratio: float) -> None:
 @pytest.mark.parametrize(("inertia_ratio", "known"), [(0.5, 2.71), (1.0, 2.59), (1.5, 2.48), (2.0, 2.36)])
 def test_listing_makes_the_region_about_two_and_a_half_times_too_wide(inertia_ratio: float, known: float) -> None:
     mechanism = chapter_4(inertia_ratio)
-    assert appendix_3(mechanism).width / right(mechanism).width == pytest.approx(known, abs=0.0051)
+    assert appendix_3(mechanism).width / orbit_region(mechanism).width == pytest.approx(known, abs=0.0051)
 
 
 def test_the_printed_coefficients_make_the_region_four_times_too_wide() -> None:
     mechanism = chapter_4(1.0)
     printed = first_order(mechanism, Variant.PRINTED)
-    assert printed.width / right(mechanism).width == pytest.approx(4.1, abs=0.1)
+    assert printed.width / orbit_region(mechanism).width == pytest.approx(4.1, abs=0.1)
     # (5.16) against the determinant
     by_hill = hill(mechanism, variant=Variant.PRINTED)
     assert (printed.low, printed.high) == pytest.approx((by_hill.low, by_hill.high), abs=3e-5)
@@ -81,7 +81,7 @@ def test_without_the_rate_of_the_mass_the_region_is_four_times_too_wide(inertia_
 
 
 def test_both_couplers_are_the_same_at_equal_links() -> None:
-    one, other = (right(mechanism(1.0)) for mechanism in (held, closed))
+    one, other = (orbit_region(mechanism(1.0)) for mechanism in (held, closed))
     assert (one.low, one.high) == pytest.approx((other.low, other.high), abs=1e-9)
 
 
@@ -104,13 +104,13 @@ def test_width_of_a_region_starts_with_its_power_of_the_crank(number: int, power
     [(0.01, 1.0, False, 1.936), (0.01, 0.5, False, 1.9674), (0.01, 0.5, True, 1.9638)],
 )
 def test_axis_of_a_short_crank(sigma2: float, inertia_ratio: float, by_listing: bool, known: float) -> None:
-    of = appendix_3 if by_listing else right
+    of = appendix_3 if by_listing else orbit_region
     assert axis(of(with_crank(sigma2, inertia_ratio))) == pytest.approx(known, abs=5e-4 if known == 1.936 else 5e-5)
 
 
 @pytest.mark.parametrize(("inertia_ratio", "listed", "true"), [(2.0, 1.8697, 1.8727), (0.5, 1.9649, 1.9655)])
 def test_axis_of_a_short_coupler_by_the_listing(inertia_ratio: float, listed: float, true: float) -> None:
-    for of, known in ((appendix_3, listed), (right, true)):
+    for of, known in ((appendix_3, listed), (orbit_region, true)):
         assert axis(of(held(0.8, inertia_ratio))) == pytest.approx(known, abs=5.1e-5)
 
 
@@ -119,7 +119,7 @@ def test_held_angles_need_another_ground_link() -> None:
 
 
 def test_linear_equation_and_true_orbit_at_unit_inertia() -> None:
-    one, other = hill(chapter_4(1.0)), right(chapter_4(1.0))
+    one, other = hill(chapter_4(1.0)), orbit_region(chapter_4(1.0))
     assert (one.low, one.high) == pytest.approx((0.266630, 0.268436), abs=5.1e-7)
     assert (other.low, other.high) == pytest.approx((0.266540, 0.268367), abs=5.1e-7)
 

@@ -36,7 +36,7 @@ from ..rules import ABOUT, ALIKE, SMALL
 from ..statements import Case, Statement, at_least, at_most, listing, near, text
 from ..study import Study, StudyResult
 from .linearised import with_crank
-from .regions import LOOKS, WAYS, appendix_3, axis, equation, hill, right
+from .regions import LOOKS, WAYS, appendix_3, axis, equation, hill, orbit_region
 from .runs import SIGN
 
 FINDINGS = """\
@@ -91,7 +91,7 @@ def regions(name: str) -> dict[str, list[Region]]:
     sweep = SWEEPS[name]
     found = {way: [of(sweep.mechanism(x)) for x in sweep.values] for way, of in WAYS.items()}
     for way, mechanism in (sweep.further or {}).items():
-        found[way] = [right(mechanism(x)) for x in sweep.values]
+        found[way] = [orbit_region(mechanism(x)) for x in sweep.values]
     return found
 
 
@@ -279,7 +279,7 @@ def widest_by_inertia() -> dict[float, float]:
 def judge_crank(found: Mapping[str, Sequence[Region]]) -> tuple[Statement, ...]:
     """Judge the statements on Fig 5.2."""
     true = found["true orbit"]
-    at_half = axis(right(with_crank(0.01, 0.5)))
+    at_half = axis(orbit_region(with_crank(0.01, 0.5)))
     over = {most: widths(true).max() / x for most, x in widest_by_inertia().items()}
     return (
         Statement(
@@ -332,7 +332,7 @@ def judge_coupler(found: Mapping[str, Sequence[Region]]) -> tuple[Statement, ...
     """Judge the statements on Fig 5.3, with constant angles as in the thesis, and with a constant ground link."""
     widest = float(widths(found["true orbit"]).max())
     over_crank = widest / float(widths(regions("5.2")["true orbit"]).max())
-    at_half = axis(right(held(0.8, 0.5)))
+    at_half = axis(orbit_region(held(0.8, 0.5)))
     both = {"angles held": found["true orbit"], "same ground link": found[SAME_GROUND]}
     seconds = {
         number: max(hill(p, 2).width / hill(p).width for p in map(sweep.mechanism, sweep.values))

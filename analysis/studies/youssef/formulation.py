@@ -41,7 +41,7 @@ STEP = 1e-3
 START_ERROR, UNIT = 1e-5, 1e-6
 
 
-def solved(q: ArrayLike, qd: ArrayLike, torque: float | None = None) -> NDArray[np.float64]:
+def solve_multipliers(q: ArrayLike, qd: ArrayLike, torque: float | None = None) -> NDArray[np.float64]:
     """Solve A W = B, eqs (3.1), (3.8), (3.10), for W at q = (th2, th3, th4, u) and q' = ``qd`` (SI).
 
     W = (lambda3, lambda2, lambda1, u'', th4'', th3''). If a torque acts on the crank, th2'' takes the place of lambda3 (3.2.2).
@@ -89,13 +89,13 @@ def closed(crank: float, u: float, speed: float, velocity: float) -> tuple[NDArr
 
 def all_derivatives(t: float, y: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return y' of y = (th3, th4, u, th3', th4', u') at constant crank speed: the first approach of section 3.1."""
-    w = solved((OMEGA * t, *y[:3]), (OMEGA, *y[3:]))
+    w = solve_multipliers((OMEGA * t, *y[:3]), (OMEGA, *y[3:]))
     return np.array([*y[3:], w[5], w[4], w[3]])
 
 
 def slider_alone(t: float, y: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return y' of y = (u, u'), with th3 and th4 from the closure of the loop: the second approach of section 3.1."""
-    return np.array([y[1], solved(*closed(OMEGA * t, y[0], OMEGA, y[1]))[3]])
+    return np.array([y[1], solve_multipliers(*closed(OMEGA * t, y[0], OMEGA, y[1]))[3]])
 
 
 class Integrated(NamedTuple):
@@ -136,13 +136,13 @@ def bar_torque(crank: float) -> float:
 
 def launch_all(t: float, y: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return y' of y = (q, q') in a launch: the first approach of 3.1."""
-    w = solved(y[:4], y[4:], bar_torque(y[0]))
+    w = solve_multipliers(y[:4], y[4:], bar_torque(y[0]))
     return np.array([*y[4:], w[0], *w[:2:-1]])
 
 
 def launch_reduced(t: float, y: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return y' of y = (th2, u, th2', u') in a launch with the loop closed by its kinematics: the second approach."""
-    w = solved(*closed(*y), bar_torque(y[0]))
+    w = solve_multipliers(*closed(*y), bar_torque(y[0]))
     return np.array([*y[2:], w[0], w[3]])
 
 
@@ -368,7 +368,7 @@ def multipliers() -> tuple[Case, ...]:
             where = closed(
                 *(run[name][i] for name in ("crank.angle", "slider.position", "crank.speed", "slider.velocity"))
             )
-            w = solved(*where, None if inputs.speed is not None else run["drive.applied_torque"][i])
+            w = solve_multipliers(*where, None if inputs.speed is not None else run["drive.applied_torque"][i])
             for words, (name, place) in compared.items():
                 label, scale = f"{words}; {drive}", np.abs(run[name]).max()
                 worst[label] = max(worst.get(label, 0.0), abs(w[place] - run[name][i]) / scale)

@@ -53,7 +53,7 @@ def hill(parameters: FiveBarParameters, number: int = 1, variant: Variant = Vari
 
 
 @cache
-def right(parameters: FiveBarParameters) -> Region:
+def orbit_region(parameters: FiveBarParameters) -> Region:
     """Return the first region of the true periodic orbit; the search starts near the region of the linear equation."""
     test = orbit_test(lambda lambda_k2, _: (parameters, Drive(speed=crank_speed(lambda_k2))), -1)
     linear = hill(parameters)
@@ -79,7 +79,7 @@ def appendix_3(parameters: FiveBarParameters) -> Region:
 
 #: Methods that compute the first region, by their names in columns and legends.
 WAYS: Mapping[str, Callable[[FiveBarParameters], Region]] = {
-    "true orbit": right,
+    "true orbit": orbit_region,
     "linear equation": hill,
     "(4.21) as printed": partial(first_order, variant=Variant.PRINTED),
     "listing of appendix 3": appendix_3,
