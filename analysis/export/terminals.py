@@ -32,8 +32,8 @@ def terminals(mechanism: Mechanism) -> bytes:
     """Return ``terminalsAndIcons.xml`` with the terminals of shafts, sliders and loaded points.
 
     Each degree of freedom has a terminal with coordinate, rate, acceleration, inputs, and the torque or force applied. Each
-    loaded point has a terminal with its load inputs and its displacement. Forces and torques are inflows; all other variables
-    are signals.
+    loaded point has a terminal with its load inputs, its displacement and the angle of its body. Forces and torques are
+    inflows; all other variables are signals.
     """
     root = Element("fmiTerminalsAndIcons", {"fmiVersion": "3.0"})
     picture = SubElement(root, "GraphicalRepresentation")
@@ -88,6 +88,9 @@ def _terminals(mechanism: Mechanism) -> dict[str, tuple[str, dict[str, str]]]:
             _, members = found.setdefault(table(channel.name), ("Load, and motion of the point that it acts on", {}))
             members[leaf(channel.name)] = channel.name
             members |= motion(channel.displacement) if channel.displacement else {}
+            # of the body on which the point lies, where the point's name has it
+            angle = f"{table(table(channel.displacement))}.angle"
+            members |= {"angle": angle} if angle in mechanism.output_names else {}
     return found
 
 

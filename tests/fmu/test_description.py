@@ -389,7 +389,11 @@ TERMINALS = {
     "FiveBarSlider": {
         "crank": CRANK,
         "slider": {**{name: f"slider.{name}" for name in MOTION}, "force": "slider.force"},
-        "load": {"fx": "load.fx", "fy": "load.fy", "x": "coupler.point.x", "y": "coupler.point.y"},
+        "load": {
+            **{f"f{axis}": f"load.f{axis}" for axis in "xy"},
+            **{axis: f"coupler.point.{axis}" for axis in "xy"},
+            "angle": "coupler.angle",
+        },
     },
     "SliderCrank": {
         "crank": CRANK,
