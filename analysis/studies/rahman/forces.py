@@ -50,8 +50,6 @@ from .method import (
 from .printed import (
     CRANK_AT_SPEED,
     GENERAL,
-    ROD_X_SQUARE,
-    SLIDER_SQUARE,
     STEP_DEG,
     Bodies,
     Crank,
@@ -105,13 +103,18 @@ def planar_forces(case: Case = PLANE, *, erratum_5: bool, erratum_6: bool, share
     return found
 
 
-def _binors() -> tuple[Binor, Binor, Binor]:
-    """Return the inertia binors of eqs 46 to 48 for the bodies of section 3.1, in lb.s2 and inches."""
-    b = bodies(parameters())
-    squares = ((0.0, b.crank_square), (ROD_X_SQUARE, b.rod_square), (SLIDER_SQUARE, SLIDER_SQUARE))
+def _unequal() -> Bodies:
+    """Return the bodies of section 3.1 with unequal radii of gyration, so that an error in their indices shows."""
+    return bodies(parameters())._replace(rod_squares=(0.5, 600.0, 900.0), slider_squares=(1.0, 1.5, 2.0))
+
+
+def _binors(b: Bodies) -> tuple[Binor, Binor, Binor]:
+    """Return the inertia binors of eqs 46 to 48 with g3 = 0, in lb.s2 and inches."""
     first, second, third = (
-        Binor(mass=m, moment=m * np.array([g, 0.0, 0.0]), inertia=m * np.diag([x, yz, yz]))
-        for m, g, (x, yz) in zip(b.masses, (b.g1, b.g2, 0.0), squares)
+        Binor(mass=m, moment=m * np.array([g, 0.0, 0.0]), inertia=m * np.diag(squares))
+        for m, g, squares in zip(
+            b.masses, (b.g1, b.g2, 0.0), ((0.0, 0.0, b.crank_square), b.rod_squares, b.slider_squares)
+        )
     )
     return first, second, third
 
@@ -205,8 +208,8 @@ def _roundoffs() -> list[Judged]:
 
 def _momenta() -> tuple[Statement, ...]:
     """Judge eqs 49a to 53a in a general position by comparison with the momenta by the binors of eqs 46 to 48."""
-    b, r = bodies(parameters()), joint_rates(MOVING, GENERAL)
-    of_crank, of_rod, of_slider = _binors()
+    b, r = _unequal(), joint_rates(MOVING, GENERAL)
+    of_crank, of_rod, of_slider = _binors(b)
     at_g3 = Binor(mass=of_slider.mass, moment=of_slider.mass * np.array([G3, 0.0, 0.0]), inertia=of_slider.inertia)
     moving = velocities(MOVING, GENERAL, r)
     rod = forward_rod_momentum(MOVING, b, GENERAL, r)
@@ -223,7 +226,7 @@ def _momenta() -> tuple[Statement, ...]:
             "dual-number matrix equations as shown below",
             text("section 2.8, eqs 49a to 51a, L700-728"),
             "difference from the binors of eqs 46 to 48 times the velocities of eqs 33, 35 and 45, in a general position with "
-            f"S1' = 1.3 in/s and g3 = {G3:g} in",
+            f"unequal radii of gyration, S1' = 1.3 in/s and g3 = {G3:g} in",
             ROUNDING,
             (
                 nothing("eq 49a", difference(crank_momentum(MOVING, b), of_crank.momentum(moving[0])), "lb.s"),
@@ -271,7 +274,7 @@ def _rate(h: Dual) -> Dual:
 
 def _momentum_rates() -> tuple[Statement, ...]:
     """Judge eqs 54 to 58 as rates of momenta, and the accuracy of the two paths."""
-    b, still = bodies(parameters()), CRANK_AT_SPEED
+    b, still = _unequal(), CRANK_AT_SPEED
     r, unmoved = joint_rates(MOVING, GENERAL), joint_rates(still, GENERAL)
     # the rates of eqs 54 to 56, and the momenta whose rates they should be, a moment later
     seconds = joint_accelerations(MOVING, GENERAL, r)
@@ -321,7 +324,7 @@ def _momentum_rates() -> tuple[Statement, ...]:
 
 def _inertia() -> tuple[Statement, ...]:
     """Judge the inertia forces of eqs 59 to 61, and the balances of eqs 62 to 64 that they enter."""
-    b, still = bodies(parameters()), CRANK_AT_SPEED
+    b, still = _unequal(), CRANK_AT_SPEED
     r = joint_rates(still, GENERAL)
     a = joint_accelerations(still, GENERAL, r)
     _, *moved = later(still, GENERAL, r, a)
@@ -329,7 +332,7 @@ def _inertia() -> tuple[Statement, ...]:
     printed = zip(velocities(still, GENERAL, r), momenta(still, b, GENERAL, r), momentum_rates(b, GENERAL, r, a))
     inertia = [
         difference(inertia_force(*of), binor.rate(of[0], acceleration))
-        for of, binor, acceleration in zip(printed, _binors(), accelerations)
+        for of, binor, acceleration in zip(printed, _binors(b), accelerations)
     ]
     return (
         Statement(
@@ -426,9 +429,10 @@ def _expansion(general: dict[str, FloatArray]) -> tuple[Statement, ...]:
             "There are eighteen equations out of which one does not give any solution (equation (63b)), since it is "
             "of the form 0=0; confirmation of this was done by evaluating it in the computer program.",
             text("section 2.8, eq 63b, L923, L945"),
-            "f2xd by eqs 52a, with g2 for g3 (erratum 9), 57 and 60 in a general position",
+            "f2xd by eqs 52a, with g2 for g3 (erratum 9), 57 and 60 in a general position with K2y = K2z (L1105)",
             ROUNDING,
             (nothing("f2xd", general["f2xd"], "lb.in"),),
+            "were they unequal, it would not be 0",
         ),
         Statement(
             "The details of the solution procedure are as follows:",

@@ -26,8 +26,6 @@ FloatArray = NDArray[np.float64]
 STEP_DEG, MAX_STEPS = 5.0, 200
 #: Largest change of an angle (rad) or of S4 (in) in a small step: our choice too.
 STEP = 1e-6
-#: Squared radii of gyration (in2): K2x2 of the rod, used in eqs 50a and 55 only, and those of the slider, in 51a and 56 only.
-ROD_X_SQUARE, SLIDER_SQUARE = 0.5, 3.0**2 / 6.0
 #: Crank angles of the continuation (deg).
 GRID_DEG = np.arange(0.0, 360.0, STEP_DEG)
 
@@ -277,16 +275,17 @@ def mended_row(p: SliderCrankParameters, angle: FloatArray, shift: FloatArray, q
 
 
 class Bodies(NamedTuple):
-    """Masses (lb.s2/in), distances g1 and g2 of the centres of mass from the distal joints (in), K1z2 and K2z2 (in2).
+    """Masses (lb.s2/in), distances g1 and g2 of the centres of mass from the distal joints (in), squared radii of gyration.
 
-    K1z2 and K2z2 are squared radii of gyration.
+    The radii (in2) are K1z2 of the crank, and those about x, y and z of rod and slider.
     """
 
     masses: tuple[float, ...]
     g1: float
     g2: float
     crank_square: float
-    rod_square: float
+    rod_squares: tuple[float, float, float]
+    slider_squares: tuple[float, float, float]
 
 
 def bodies(p: SliderCrankParameters, *, erratum_6: bool = False) -> Bodies:
@@ -294,7 +293,8 @@ def bodies(p: SliderCrankParameters, *, erratum_6: bool = False) -> Bodies:
     side = -1.0 if erratum_6 else 1.0
     a1, a2 = p.crank_length / INCH, p.rod_length / INCH
     masses = [mass * INCH / POUND_FORCE for mass in (p.crank_mass, p.rod_mass, p.slider_mass)]
-    return Bodies(tuple(masses), side * a1 / 2.0, side * a2 / 2.0, 1.5**2 / 4.0 + a1**2 / 3.0, 1.0 / 4.0 + a2**2 / 3.0)
+    crank, rod, slider = 1.5**2 / 4.0 + a1**2 / 3.0, 1.0 / 4.0 + a2**2 / 3.0, 3.0**2 / 6.0
+    return Bodies(tuple(masses), side * a1 / 2.0, side * a2 / 2.0, crank, (0.5, rod, rod), (slider, slider, slider))
 
 
 def _dual(real: list[ArrayLike], dual: list[ArrayLike]) -> Dual:
@@ -369,32 +369,32 @@ def forward_slider_velocity(c: Crank, q: Joints, r: Joints) -> Dual:
     return Dual(*(np.einsum("ij...,...j->...i", rotation, x) for x in (rod.real + joint, rod.dual)))
 
 
-def _slider_momentum(v: Dual, mass: float, g3: float) -> Dual:
-    """Return the slider's dual momentum by eq 51a, if ``v`` is the velocity of eq 45.
-
-    If ``v`` is the rate of that velocity, the result is the rate of the momentum by eq 56.
-    """
-    (x, y, z), (xd, yd, zd) = np.moveaxis(v.real, -1, 0), np.moveaxis(v.dual, -1, 0)
-    square = SLIDER_SQUARE
-    found = _dual([xd, yd + g3 * z, zd - g3 * y], [square * x, square * y - g3 * zd, square * z + g3 * yd])
-    return cast(Dual, mass * found)
-
-
 def forward_slider_momentum(c: Crank, b: Bodies, q: Joints, r: Joints, g3: float, *, slip: bool = False) -> Dual:
     """Return the slider's dual momentum by eq 51a; ``slip`` keeps the printed cos theta3 instead of cos eta3 (erratum 9)."""
-    mass, across = b.masses[2], forward_rod_velocity(c, q, r).dual[..., 2]
-    wrong = mass * (np.cos(q.th3) - np.cos(q.eta3)) * across if slip else 0.0
-    found = _slider_momentum(forward_slider_velocity(c, q, r), mass, g3) + _dual([0.0, wrong, 0.0], [0.0, 0.0, 0.0])
-    return cast(Dual, found)
+    (s2, se, s3, sh), (c2, ce, c3, ch) = (f([q.th2, q.eta2, q.th3, q.eta3]) for f in (np.sin, np.cos))
+    w, v, turning, (k3x, k3y, k3z) = c.speed, c.shift_rate, c.speed + r.th2, b.slider_squares
+    # the six brackets of eq 51a, which has each of them several times
+    x, y, z = r.eta2 * s2 * ce - turning * se, r.eta2 * c2 + r.eta3, turning * ce + r.eta2 * s2 * se + r.th3
+    xd, yd = c.a1 * w * s2 * ce - v * se, c.a1 * w * c2 + c.a2 * r.eta2 * s2 * se + turning * c.a2 * ce
+    zd = v * ce + c.a1 * w * s2 * se - c.a2 * r.eta2 * c2
+    found = _dual(
+        [
+            c3 * ch * xd + s3 * ch * yd - sh * zd,
+            g3 * (s3 * x - c3 * y) + (c3 * sh * xd + s3 * sh * yd + (c3 if slip else ch) * zd),
+            -g3 * (c3 * sh * x + s3 * sh * y + ch * z) + (s3 * xd - c3 * yd),
+        ],
+        [
+            k3x * (c3 * ch * x + s3 * ch * y - sh * z),
+            k3y * (c3 * sh * x + s3 * sh * y + ch * z) - g3 * (s3 * xd - c3 * yd),
+            k3z * (s3 * x - c3 * y) + g3 * (c3 * sh * xd + s3 * sh * yd + ch * zd),
+        ],
+    )
+    return cast(Dual, b.masses[2] * found)
 
 
 def forward_momentum_rates(c: Crank, b: Bodies, q: Joints, r: Joints, a: Joints, g3: float) -> tuple[Dual, Dual]:
     """Return the rates of the dual momenta of rod and slider by eqs 55 and 56, with terms collected and cos eta3 in eq 56."""
-    (_, m2, m3), square, rod = b.masses, b.rod_square, _forward_rod_rate(c, q, r, a)
-    (x, y, z), (xd, yd, zd) = rod.real, rod.dual
-    of_rod = _dual(
-        [xd, yd + b.g2 * z, zd - b.g2 * y], [ROD_X_SQUARE * x, square * y - b.g2 * zd, square * z + b.g2 * yd]
-    )
+    (_, m2, m3), rod = b.masses, _forward_rod_rate(c, q, r, a)
     (s3, sh), (c3, ch) = np.sin([q.th3, q.eta3]), np.cos([q.th3, q.eta3])
     turned = np.array(
         [
@@ -405,7 +405,14 @@ def forward_momentum_rates(c: Crank, b: Bodies, q: Joints, r: Joints, a: Joints,
     )
     now, rotation = forward_rod_velocity(c, q, r), _slider_rotation(q)
     real = rotation @ (rod.real + np.array([0.0, a.eta3, a.th3])) + turned @ (now.real + np.array([0.0, r.eta3, r.th3]))
-    return m2 * of_rod, _slider_momentum(Dual(real, rotation @ rod.dual + turned @ now.dual), m3, g3)
+    slider = Dual(real, rotation @ rod.dual + turned @ now.dual)
+    return m2 * _collected(rod, b.g2, b.rod_squares), m3 * _collected(slider, g3, b.slider_squares)
+
+
+def _collected(v: Dual, g: float, squares: tuple[float, float, float]) -> Dual:
+    """Return the momentum's rate over the mass, for the rate ``v`` of the dual velocity, centre of mass g, squared radii."""
+    (x, y, z), (xd, yd, zd), (kx, ky, kz) = v.real, v.dual, squares
+    return _dual([xd, yd + g * z, zd - g * y], [kx * x, ky * y - g * zd, kz * z + g * yd])
 
 
 def crank_momentum(c: Crank, b: Bodies) -> Dual:
@@ -419,8 +426,7 @@ def crank_momentum(c: Crank, b: Bodies) -> Dual:
 def forward_rod_momentum(c: Crank, b: Bodies, q: Joints, r: Joints) -> Dual:
     """Return the rod's dual momentum by eq 50a, divided by its mass."""
     (s2, se), (c2, ce), turning = np.sin([q.th2, q.eta2]), np.cos([q.th2, q.eta2]), c.speed + r.th2
-    g2, square, twice = b.g2, b.rod_square, b.rod_square + b.g2 * c.a2
-    w, v = c.speed, c.shift_rate
+    w, v, g2, (k2x, k2y, k2z) = c.speed, c.shift_rate, b.g2, b.rod_squares
     return _dual(
         [
             c.a1 * w * s2 * ce - v * se,
@@ -428,21 +434,21 @@ def forward_rod_momentum(c: Crank, b: Bodies, q: Joints, r: Joints) -> Dual:
             v * ce + c.a1 * w * s2 * se - (c.a2 + g2) * r.eta2 * c2,
         ],
         [
-            ROD_X_SQUARE * r.eta2 * s2 * ce - ROD_X_SQUARE * turning * se,
-            twice * r.eta2 * c2 - g2 * v * ce - g2 * c.a1 * w * s2 * se,
-            (square * ce + g2 * c.a2 * ce) * turning + twice * r.eta2 * s2 * se + c.a1 * g2 * w * c2,
+            k2x * r.eta2 * s2 * ce - k2x * turning * se,
+            (k2y + g2 * c.a2) * r.eta2 * c2 - g2 * v * ce - g2 * c.a1 * w * s2 * se,
+            (k2z * ce + g2 * c.a2 * ce) * turning + (k2z + g2 * c.a2) * r.eta2 * s2 * se + c.a1 * g2 * w * c2,
         ],
     )
 
 
 def momenta(c: Crank, b: Bodies, q: Joints, r: Joints, *, slip: bool = False) -> tuple[Dual, Dual, Dual]:
     """Return the dual momenta by eqs 49a, 52a and 53a with g3 = 0; ``slip`` keeps the printed g3 for g2 in 52a (erratum 9)."""
-    (_, m2, m3), c3 = b.masses, np.cos(q.th3)
+    (_, m2, m3), (_, k2y, k2z), c3 = b.masses, b.rod_squares, np.cos(q.th3)
     return (
         crank_momentum(c, b),
         _dual(
             [-m2 * r.s4 * np.sin(q.th3), m2 * (r.s4 * c3 - b.g2 * r.th3), 0.0 if slip else m2 * b.g2 * r.eta3],
-            [0.0, -m2 * b.rod_square * r.eta3, m2 * (b.g2 * r.s4 * c3 - b.rod_square * r.th3)],
+            [0.0, -m2 * k2y * r.eta3, m2 * (b.g2 * r.s4 * c3 - k2z * r.th3)],
         ),
         _dual([0.0, 0.0, -m3 * r.s4], [0.0, 0.0, 0.0]),
     )
@@ -450,13 +456,13 @@ def momenta(c: Crank, b: Bodies, q: Joints, r: Joints, *, slip: bool = False) ->
 
 def momentum_rates(b: Bodies, q: Joints, r: Joints, a: Joints) -> tuple[Dual, Dual, Dual]:
     """Return the rates of the dual momenta by eqs 54, 57 and 58, for constant speed and shift."""
-    (_, m2, m3), s3, c3 = b.masses, np.sin(q.th3), np.cos(q.th3)
+    (_, m2, m3), (_, k2y, k2z), s3, c3 = b.masses, b.rod_squares, np.sin(q.th3), np.cos(q.th3)
     turned = a.s4 * c3 - r.s4 * s3 * r.th3
     return (
         _dual([0.0, 0.0, 0.0], [0.0, 0.0, 0.0]),
         _dual(
             [-m2 * (a.s4 * s3 + r.s4 * c3 * r.th3), m2 * (turned - b.g2 * a.th3), m2 * b.g2 * a.eta3],
-            [0.0, -m2 * b.rod_square * a.eta3, m2 * (b.g2 * turned - b.rod_square * a.th3)],
+            [0.0, -m2 * k2y * a.eta3, m2 * (b.g2 * turned - k2z * a.th3)],
         ),
         _dual([0.0, 0.0, -m3 * a.s4], [0.0, 0.0, 0.0]),
     )
