@@ -480,8 +480,8 @@ def _shape_statements() -> list[Statement]:
             "takes a constant value between the maximum and minimum values of the oscillation on the portions of the "
             "curve below the zero degree crank angle positions.",
             text("3.2.1, L1976-1986"),
-            "distance of u from a line, from the greatest to the least u, which comes before 360 deg with these springs, ours; "
-            "relative to its range",
+            "distance of u from the best line parallel to the chord from the greatest to the least u, which comes before 360 "
+            "deg with these springs, ours; relative to its range",
             ALIKE_WORDS,
             tuple(at_most(_k(k), ALIKE, x) for k, x in varies.items()),
             "the slider swings on the spring several times a turn; in the limit u is the inertia force over k",

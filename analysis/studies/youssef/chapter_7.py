@@ -218,7 +218,8 @@ def family() -> StudyResult:
     return StudyResult(
         number="7.2",
         claim="With the slider free P reaches any point on or within the outer boundaries of the family of coupler curves.",
-        assignment="The values of U are lost: 0.6 to 1.4 are our choice; the crank turns fully from -1.5 to 1.5 but at +-0.5.",
+        assignment="Links of series 1 (L5720): l2 = r = 0.5, l3 = l4 = 1. The values of U are lost: 0.6 to 1.4 are our choice; "
+        "the crank turns fully from -1.5 to 1.5 but at +-0.5.",
         columns=padded(columns),
         statements=(
             Statement(
