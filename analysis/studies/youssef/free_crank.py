@@ -870,13 +870,14 @@ def stiff_phase_plane() -> StudyResult:
             "rad/sec.",
             text("3.3, L2297-2301"),
             "second harmonic of u over the first, ours, at a mean crank speed of 27 rad/s, relative to that with k = 5e5 "
-            "dyn/cm; speed at which it is greatest, the motion followed beyond the plot, down to "
-            f"{stiff.speed[-1]:.1f} rad/s",
+            "dyn/cm; speed at which it, and the second harmonic over the speed squared, is greatest, the motion followed "
+            f"beyond the plot, down to {stiff.speed[-1]:.1f} rad/s",
             f"{SIGN}; {100 * ABOUT:g} %, the rule for *around*",
             (
                 at_least("at 27 rad/s", 1.0, seen[0] / seen[1]),
+                near("speed, over the speed squared", "27", resonance, ABOUT * HARMONIC_SPEED, "rad/s"),
                 near(
-                    "speed",
+                    "speed, over the first",
                     "27",
                     most,
                     ABOUT * HARMONIC_SPEED,
