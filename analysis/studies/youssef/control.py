@@ -29,12 +29,14 @@ from ...numerics.fourier import FourierSeries
 from ...slider import TrackingController, TrackingResult, best_spring, inverse_dynamics, motion_of_plant, track
 from ...synthesis import Linkage, turn
 from ...units import CM_PER_METRE
-from ..rules import ALIKE, SEEN_FALL
+from ..rules import ALIKE, READ, SEEN_FALL
 from ..statements import Case, Statement, at_least, at_most, text
 from ..study import Study, StudyResult, padded
 from .chapter_6 import over_least
 from .chapter_7 import slider
 from .problems import PROBLEMS
+from .runs import SPEED as TURN_RPM
+from .runs import steady_turn, table_3_1
 from .series_2 import PATH, ROCKER, linkage_error, mended, path_motion, readings, rocker_motion
 
 NUMBER = "control"
@@ -231,7 +233,14 @@ def off_line(open_loop: TrackingResult, cams: Mapping[str, Cam]) -> tuple[Statem
             "pre-determined load or on inertia or other forces transmitted through the mechanism. The mode could be "
             "continuous or intermittent and its advantages and disadvantages are similar to the preceding option ...",
             text("7.1.1 (b), L5311-5319"),
-            why="no example is given, and there is no measure of its advantages",
+            "range of u over a steady turn of Table 3.1, k = 1e6 dyn/cm, at 420 rpm, where the slider has no drive but spring, "
+            "damper and the forces of the links, over l4",
+            f"more than {READ:g}, what a graph can be read to",
+            (
+                at_least("spring, continuous", READ, on_a_spring()),
+                Case(label="latch, intermittent", computed=None, why="no example is given"),
+                Case(label="advantages and disadvantages", computed=None, why="there is no measure of them"),
+            ),
         ),
         Statement(
             "An independent drive of the appropriate periodic [form] maintained in correct phase with the primary input "
@@ -247,6 +256,12 @@ def off_line(open_loop: TrackingResult, cams: Mapping[str, Cam]) -> tuple[Statem
             ),
         ),
     )
+
+
+def on_a_spring() -> float:
+    """Return the range of u over l4 in the steady turn of chapter III, whose slider moves on a spring alone."""
+    mechanism = table_3_1(1e6)
+    return float(np.ptp(steady_turn(mechanism, TURN_RPM).slider_cm)) / (CM_PER_METRE * mechanism.rocker_length)
 
 
 def relative_deviation(found: TrackingResult) -> float:

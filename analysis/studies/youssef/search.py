@@ -292,6 +292,7 @@ def judge_located(found: Mapping[str, tuple[Found, ...]]) -> tuple[Statement, ..
     """Judge what the searches locate, and whether located minima help a fresh search."""
     plain = found[PLAIN]
     ends, bottoms = np.array([end.error for end in plain]), np.array([bottom(end) for end in plain])
+    usual = np.median([end.evaluations for end in plain])
     return (
         Statement(
             "The method stops when a convergence criterion is satisfied and is [said then] to have located a minimum[.]",
@@ -318,11 +319,14 @@ def judge_located(found: Mapping[str, tuple[Found, ...]]) -> tuple[Statement, ..
             "It is found that the global optimum is always reached quickly if some of the minima already located are "
             "included as initial values in a fresh optimisation cycle.",
             text("6.3.1, L4341-4345"),
-            f"share of {SEARCHES} fresh searches that reach the best of these ends, the thesis's global optimum (L4338), with "
-            f"no more evaluations than the median from random sets; {INCLUDED} of the ends, drawn at random, are among the "
-            "sets of each",
+            f"share of {SEARCHES} fresh searches that reach the best of these ends, the thesis's global optimum (L4338); share "
+            f"with no more evaluations than the median from random sets; {INCLUDED} of the ends (ours), drawn at random, are "
+            "among the sets of each",
             ALL,
-            (near(KNOWN, 1.0, reached(found[KNOWN], plain, quickly=True).mean(), 0.0),),
+            (
+                near("reached", 1.0, reached(found[KNOWN], plain, quickly=False).mean(), 0.0),
+                near("quickly", 1.0, np.mean([end.evaluations <= usual for end in found[KNOWN]]), 0.0),
+            ),
             "the ends included need not be near the best",
         ),
     )
