@@ -334,10 +334,15 @@ def judge_coupler(found: Mapping[str, Sequence[Region]]) -> tuple[Statement, ...
     over_crank = widest / float(widths(regions("5.2")["true orbit"]).max())
     at_half = axis(orbit_region(held(0.8, 0.5)))
     both = {"angles held": found["true orbit"], "same ground link": found[SAME_GROUND]}
-    seconds = {
-        number: max(hill(p, 2).width / hill(p).width for p in map(sweep.mechanism, sweep.values))
-        for number, sweep in SWEEPS.items()
-    }
+    seconds, listed = (
+        {
+            number: max(
+                hill(p, 2, variant).width / hill(p, 1, variant).width for p in map(sweep.mechanism, sweep.values)
+            )
+            for number, sweep in SWEEPS.items()
+        }
+        for variant in (Variant.EXACT, Variant.FORTRAN)
+    )
     return (
         Statement(
             "The width of the region decreases with increase of [sigma3].",
@@ -381,9 +386,10 @@ def judge_coupler(found: Mapping[str, Sequence[Region]]) -> tuple[Statement, ...
             text("5.3.1, L3902-3906"),
             "width of the second region in lambda_k^2 over that of the first, the greatest of each figure, in Fig 5.3 with the "
             "angles held; right linear equation",
-            f"{SMALL:g}, the rule for *negligible*",
+            f"{SMALL:g}, the rule for *negligible*, of the first: of its own middle even the first would be negligible",
             tuple(at_most(f"Fig {number}", SMALL, x) for number, x in seconds.items()),
-            "in the width of the first the terms of first order largely cancel",
+            "in the width of the first the terms of first order largely cancel; by the listing of appendix 4 they do not, and "
+            f"it is at most {max(listed.values()):.3f} (errata 2, 16, 17, 20)",
         ),
     )
 

@@ -273,7 +273,8 @@ def on_line(closed: TrackingResult) -> tuple[Statement, ...]:
     """Judge the statements on drives with feedback and on those that adapt (7.1.2 to 7.3.1), given a run with feedback."""
     at_rest, least = searched()
     changes = ((CHANGED, SPEED), (LOAD, 0.5 * SPEED), (LOAD, 2.0 * SPEED))
-    changed = min(error_on_machine(machine().motion, *change) for change in changes)
+    before = error_on_machine(machine().motion)
+    loaded, slower, faster = (error_on_machine(machine().motion, *change) / before for change in changes)
     return (
         Statement(
             "The required motion of the input is determined as previously. This is stored as a [reference] model to which "
@@ -321,16 +322,18 @@ def on_line(closed: TrackingResult) -> tuple[Statement, ...]:
             "conditions.",
             text("7.3.1, L5871-5873"),
             "*operating conditions* is read as load and speed: error as in the row before, with feedback to the stored motion "
-            "of Fig 7.11, over that before the change; the least of three: three times the load, half and twice the speed",
+            "of Fig 7.11, in place of a variational one (L5915), over that before the change; the least of three: three times "
+            "the load, half and twice the speed",
             f"more than {1.0 + ALIKE:g}, the rule for *the same*; one change that requires none is enough against *any*",
-            (at_least("the least", 1.0 + ALIKE, changed / error_on_machine(machine().motion)),),
-            "a motion calculated again would be the same, as no equation of the method has load or speed",
+            (at_least("the least", 1.0 + ALIKE, min(loaded, slower, faster)),),
+            f"at half the speed {slower:.3f}, at twice {faster:.3f}; a motion calculated again would be the same, as no "
+            "equation of the method has load or speed",
         ),
         Statement(
             "The direct search merely experiments with a number of cycles, after which the controller adjusts itself, "
             "in an optimum manner, to the changes.",
             text("7.3.1, L5873-5879"),
-            why="neither the change nor the number of cycles is stated",
+            why="there is no measure of *merely* and *in an optimum manner*; a search on the machine is judged at L5853",
         ),
     )
 

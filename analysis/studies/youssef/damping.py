@@ -12,6 +12,7 @@ from math import pi
 
 import numpy as np
 
+from linkwork.five_bar.parameters import FiveBarParameters
 from linkwork.five_bar.published import chapter_4
 
 from ...figures import COLOURS, Curve, Figure, Panel, plot_curves
@@ -20,6 +21,7 @@ from ...numerics.fourier import FourierSeries
 from ...periodic import Drive, Operation, Plane, RemovingDamping, orbit_test, removing_damping
 from ...youssef import (
     PeriodicEquation,
+    Region,
     Variant,
     boundary_stiffnesses,
     hill_multipliers,
@@ -32,7 +34,7 @@ from ..statements import Case, Statement, at_least, at_most, listing, near, text
 from ..study import Study, StudyResult, padded
 from .chapter_5 import COMPARED, SWEEPS, closed, held
 from .linearised import with_crank
-from .regions import crank_speed, equation, first_order, hill, removing_estimate
+from .regions import appendix_3, crank_speed, equation, first_order, hill, removing_estimate
 from .runs import ALIKE_WORDS, SIGN
 
 #: omega_c (1/s) that removes the region up to I4 = 1.5, as stated.
@@ -253,11 +255,17 @@ def judge_damper(charts: Mapping[float, Chart]) -> tuple[Statement, ...]:
 def judge_determinant() -> tuple[Statement, ...]:
     """Judge the statements on the method (5.31) to (5.35) and on its program."""
     dampers = {f"omega_c = {DAMPERS[2]:g} 1/s": DAMPERS[2], "without a damper, as in 5.3.3 e": 0.0}
+    ways: dict[str, tuple[Variant, Callable[[FiveBarParameters], Region]]] = {
+        "right equation": (Variant.EXACT, partial(first_order, variant=Variant.EXACT)),
+        "listings": (Variant.FORTRAN, appendix_3),
+    }
     apart = {
-        end: max(
-            abs(getattr(hill(p), end) - getattr(first_order(p, Variant.EXACT), end)) / hill(p).width
+        f"{name}; {end}": max(
+            abs(getattr(region, end) - getattr(perturbed(p), end)) / region.width
             for p in map(chapter_4, COMPARED)
+            for region in (hill(p, variant=variant),)
         )
+        for name, (variant, perturbed) in ways.items()
         for end in ("low", "high")
     }
     return (
@@ -290,10 +298,12 @@ def judge_determinant() -> tuple[Statement, ...]:
             "The computer orientated method gave results which are in good agreement with the perturbation method; "
             "see the outer boundary of fig. (5.4) and fig. (5.1).",
             text("5.3.3 e, L3964-3968"),
-            "boundaries of the first region without a damper, the outer ones, by (5.35) less those by (5.16), over its width; "
-            "right linear equation, the greatest of I4 = 0.5, 1 and 1.5",
+            "boundaries of the first region without a damper, the outer ones, by (5.35) less those by (5.16), over its width "
+            "by (5.35); right linear equation, and listings of appendices 4 and 3; the greatest of I4 = 0.5, 1 "
+            "and 1.5",
             f"{SMALL:g}, the rule for *small*: the next order",
-            tuple(at_most(end, SMALL, x) for end, x in apart.items()),
+            tuple(at_most(name, SMALL, x) for name, x in apart.items()),
+            "the listings have different coefficients (errata 17, 18)",
         ),
         Statement(
             "THIS PROG. INV[E]STIGATES STABILITY IN PRESENCE [O]F DAMPING",
