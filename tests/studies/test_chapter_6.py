@@ -7,7 +7,6 @@ from itertools import product
 
 import numpy as np
 import pytest
-from scipy.stats import mannwhitneyu
 
 from analysis.studies.statements import near
 from analysis.studies.youssef import search
@@ -184,15 +183,3 @@ class TestSearch:
             begun = v.copy()
             begun[k] += 0.05 - 2.0 * np.pi * np.sign(begun[k])
             assert search.descended(begun, side)[1] == pytest.approx(search.error(v), rel=1e-3)
-
-    @pytest.mark.long
-    def test_half_of_the_points_first_lower_the_errors_for_no_less_work(self, monkeypatch: pytest.MonkeyPatch) -> None:
-        monkeypatch.setattr(search, "FEWER_POINTS", 36)
-        search.ranked.cache_clear()
-        plain, points, *_ = search.ranked()
-        search.ranked.cache_clear()
-        lower, fewer = (
-            mannwhitneyu(*([getattr(end, of) for end in ends] for ends in (points, plain)), alternative="less").pvalue
-            for of in ("error", "evaluations")
-        )
-        assert lower < search.CHANCE < fewer
