@@ -5,6 +5,7 @@ from __future__ import annotations
 import sys
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
+from math import degrees
 from pathlib import Path
 from typing import Any, TypedDict, Unpack
 
@@ -171,17 +172,25 @@ def _bare_speeds(file: str | None, settings: Sequence[str], case: Any) -> list[s
 
 
 def _print_extremes(title: str, result: Any) -> None:
-    """Print least, greatest and last value of each output of a run, and the events of the run."""
-    headings = ("output", "unit", "least", "greatest", "at the end")
-    columns = [(name, si, (x.min(), x.max(), x[-1])) for name, x, si in _with_magnitudes(result)]
+    """Print least, greatest and last value of each output of a run, where the extremes are, and the events of the run."""
+    from ..mechanisms import residual_outputs
+
+    at, places = _places(result)
+    headings = ("output", "unit", "least", at, "greatest", at, "at the end")
+    columns = list(_with_magnitudes(result))
     largest: dict[str, float] = {}
-    for _, si, values in columns:
-        largest[si] = max(largest.get(si, 0.0), *map(abs, values))
-    rows = []
-    for name, si, values in columns:
+    for _, x, si in columns:
+        largest[si] = max(largest.get(si, 0.0), float(abs(x).max()))
+    residuals, rows = residual_outputs(), []
+    for name, x, si in columns:
         unit, factor = display_scale(si)
-        numbers = (factor * v if abs(v) > _ROUNDING * largest[si] else 0.0 for v in values)
-        rows.append((name, unit, *(f"{number:.6g}" for number in numbers)))
+        digits = 2 if name in residuals else 6
+        numbers = [
+            f"{factor * v if abs(v) > _ROUNDING * largest[si] else 0.0:.{digits}g}" for v in (x.min(), x.max(), x[-1])
+        ]
+        varies = x.max() - x.min() > _ROUNDING * largest[si]
+        least, greatest = (places[x.argmin()], places[x.argmax()]) if varies else ("", "")
+        rows.append((name, unit, numbers[0], least, numbers[1], greatest, numbers[2]))
     show_table(
         f"{title}  ({result.source}, {len(result)} samples to t = {result.time[-1]:.6g} s)",
         headings,
@@ -190,6 +199,22 @@ def _print_extremes(title: str, result: Any) -> None:
     )
     for event in result.events:
         console.print(f"{event.name} at t = {event.time:.9g} s", highlight=False)
+
+
+def _places(result: Any) -> tuple[str, list[str]]:
+    """Return what tells the samples of a run apart, with its unit, and this of each sample, as texts.
+
+    It is the crank angle, within a turn, of a mechanism with one crank that moves; else the time.
+    """
+    from ..mechanisms import find_mechanism
+
+    mechanism = None if result.parameters is None else find_mechanism(result.parameters)
+    if mechanism is not None and len(mechanism.cyclic_freedoms) == 1:
+        crank = mechanism.freedoms[mechanism.cyclic_freedoms[0]]
+        angle = result[crank.coordinate]
+        if angle.max() > angle.min():
+            return "at [deg]", [f"{round(degrees(value), 1) % degrees(crank.period):.1f}" for value in angle]
+    return "at [s]", [f"{time:.4g}" for time in result.time]
 
 
 def _with_magnitudes(result: Any) -> Iterator[tuple[str, Any, str]]:
@@ -201,7 +226,7 @@ def _with_magnitudes(result: Any) -> Iterator[tuple[str, Any, str]]:
     joints = {} if result.parameters is None else find_mechanism(result.parameters).joints
     last = {names[-1]: (joint, names) for joint, names in joints.items() if set(names) <= set(result.names)}
     for name in result.names:
-        yield name, result[name], result.units[name]
+        yield name, result.unwrapped(name), result.units[name]
         if name in last:
             joint, names = last[name]
             yield f"{joint} force", np.sqrt(sum(result[one] ** 2 for one in names)), result.units[name]

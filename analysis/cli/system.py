@@ -138,7 +138,7 @@ def run(
     rows = []
     for name in found.connected:
         unit, factor = display_scale(found.units[name])
-        values = factor * found[name]
+        values = factor * found.unwrapped(name)
         rows.append((name, unit, f"{values.min():.6g}", f"{values.max():.6g}", f"{values[-1]:.6g}"))
     title = f"{found.title}  ({len(found)} communication points to t = {found.time[-1]:g} s, coupling: {coupling})"
     show_table(title, ("output", "unit", "least", "greatest", "at the end"), rows, words=("output", "unit"))

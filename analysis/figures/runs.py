@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from math import ceil
+from math import ceil, pi
 from typing import Any, TypeAlias
 
 import numpy as np
@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from linkwork.mechanism import Mechanism
 from linkwork.variables import UNITS, Variable
 
-from ..mechanisms import MECHANISMS, find_mechanism
+from ..mechanisms import MECHANISMS, find_mechanism, wrapping_outputs
 from ..run import Trajectory
 from .dispatch import draw_mechanism, has_picture, plot
 from .style import (
@@ -206,7 +206,7 @@ def display_unit(variable: Variable) -> tuple[str, float]:
 
 
 def _output_row(run: Trajectory, table: Mapping[str, Variable], name: str) -> _Rows:
-    values = run[name]  # raises an error for an unknown name
+    values = run.unwrapped(name)  # raises an error for an unknown name
     unit, factor = display_unit(table[name])
     return _Rows(name=name_in_words(name), unit=unit, curves={"": factor * values})
 
@@ -288,7 +288,9 @@ def plot_comparison(
     n = min(len(first), len(second))
     time, table = first.time[:n], _variables(first)
     units = [display_unit(table[name]) for name in names]
-    pairs = [(factor * first[name][:n], factor * second[name][:n]) for name, (_, factor) in zip(names, units)]
+    pairs = [
+        [factor * values for values in _side_by_side(first, second, name, n)] for name, (_, factor) in zip(names, units)
+    ]
     said = [_rounding_text(a, b, unit) for (a, b), (unit, _) in zip(pairs, units)]
     beside = not all(said)
     with figure_style():
@@ -312,6 +314,12 @@ def plot_comparison(
         write_title(figure, title)
         figure.align_ylabels()
         return finish(figure)
+
+
+def _side_by_side(first: Trajectory, second: Trajectory, name: str, n: int) -> tuple[FloatArray, FloatArray]:
+    """Return the first n values of an output of two runs; unwrapped angles begin within half a turn of each other."""
+    a, b = first.unwrapped(name)[:n], second.unwrapped(name)[:n]
+    return a, b + 2.0 * pi * np.rint((a[:1] - b[:1]) / (2.0 * pi)) if name in wrapping_outputs() else b
 
 
 def _rounding_text(a: FloatArray, b: FloatArray, unit: str) -> str:

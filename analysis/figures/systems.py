@@ -106,7 +106,7 @@ def plot_system_run(run: SystemRun, names: Sequence[str] = (), *, title: str = "
         axes = np.atleast_1d(figure.subplots(rows, sharex=True))
         for place, name in zip(axes, names):
             unit, factor = display_scale(run.units[name])
-            draw_over_time(place, run.time, factor * run[name])
+            draw_over_time(place, run.time, factor * run.unwrapped(name))
             of, _, output = name.rpartition(".")
             place.set_ylabel(f"{name_in_words(of)}\n{name_in_words(output)}\n[{unit}]", fontsize=SMALL)
         for name, power in run.powers.items():

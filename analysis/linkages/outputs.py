@@ -31,6 +31,8 @@ class Output(NamedTuple):
 
 
 _DEGREES = 'display="deg"'
+#: Arguments of the variable of an angle that leaps from pi to -pi: its bounds say so.
+_WRAPPED = f"*POSITION, minimum=-pi, maximum=pi, {_DEGREES}"
 
 
 class Outputs:
@@ -73,9 +75,8 @@ class Outputs:
         taken = {drive.coordinate for drive in self.interface.drives}
         for body in self.description.bodies:
             if f"{body}.angle" not in taken:
-                rest = f"*POSITION, minimum=-pi, maximum=pi, {_DEGREES}"
                 value = f"turn_angle(b.{body}_frame.turn)"
-                yield Output(f"{body}.angle", "rad", f"Direction of the {body}", rest, value)
+                yield Output(f"{body}.angle", "rad", f"Direction of the {body}", _WRAPPED, value)
         moving = {own for body in self.description.bodies for own in self.interface.points[body]}
         for own in sorted(moving - set(self.description.ground)):
             for axis in "xy":
@@ -92,10 +93,10 @@ class Outputs:
                 yield Output(f"{name}.length", "m", f"Length of {name}", "*POSITION", f"s.{name}_stretch{free}")
             elif spring.at and name not in self.motion.along and self.motion.twisted_bodies(spring):
                 text = f"Angle of {spring.at} from that at which {name} is free"
-                yield Output(spring_angle_name(self.description, name), "rad", text, "*POSITION", f"s.{name}_stretch")
+                yield Output(spring_angle_name(self.description, name), "rad", text, _WRAPPED, f"s.{name}_stretch")
             elif spring.bodies:
                 text = f"Angle by which {name} is twisted"
-                yield Output(f"{name}.turn", "rad", text, "*POSITION", f"s.{name}_stretch")
+                yield Output(f"{name}.turn", "rad", text, _WRAPPED, f"s.{name}_stretch")
         for dyad in self.structure.dyads:
             rest = f'*POSITION, minimum=0.0, maximum=pi, {_DEGREES}, role="transmission"'
             text, value = self._transmission(dyad)

@@ -85,3 +85,4 @@ from .simulation import sample_times as sample_times
 from .simulation import simulate as simulate
 from .trajectory import Occurrence as Occurrence
 from .trajectory import Trajectory as Trajectory
+from .trajectory import unwrap as unwrap

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from math import pi
 from pathlib import Path
 from types import MappingProxyType
 from typing import TYPE_CHECKING
@@ -16,11 +17,14 @@ from linkwork.errors import InputError
 from ..display import NotebookResult, format_count, format_range
 from ..files import unknown_name
 from ..libraries import require
-from ..mechanisms import MECHANISMS, Parameters, output_units
+from ..mechanisms import MECHANISMS, Parameters, output_units, wrapping_outputs
 from .masses import describe_masses, trace_masses
 
 if TYPE_CHECKING:
     import pandas
+
+#: Greatest change of an angle from one sample to the next with which its turns are counted (rad).
+_DENSE = 0.5 * pi
 
 
 @dataclass(frozen=True, slots=True)
@@ -129,6 +133,14 @@ class Trajectory(NotebookResult):
         except ValueError:
             raise unknown_name(name, self.names, f"output {name!r}") from None
 
+    def unwrapped(self, name: str) -> NDArray[np.float64]:
+        """Return the column of an output; an angle that leaps by a full turn goes on instead, as of an arm that swings past pi.
+
+        The samples must be so dense that the angle changes by less than a quarter of a turn from each to the next. If it does
+        not, its turns cannot be counted, and it is returned as it is. The first value is the same.
+        """
+        return unwrap(name, self[name])
+
     def to_csv(self, path: str | Path) -> Path:
         """Write time and all outputs to a CSV file, in an existing folder; the header has names and units.
 
@@ -146,3 +158,11 @@ class Trajectory(NotebookResult):
         import pandas
 
         return pandas.DataFrame(self.values, index=pandas.Index(self.time, name="time"), columns=list(self.names))
+
+
+def unwrap(name: str, values: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the values over time of the output of that name without leaps by a full turn; see `Trajectory.unwrapped`."""
+    if name not in wrapping_outputs():
+        return values
+    followed = np.unwrap(values)
+    return followed if bool((np.abs(np.diff(followed)) < _DENSE).all()) else values

@@ -20,7 +20,7 @@ from linkwork.errors import InputError
 
 from ..files import unknown_name
 from ..numerics.workers import record_interrupts
-from ..run import CosimulationError, RunInterrupted, show_progress
+from ..run import CosimulationError, RunInterrupted, show_progress, unwrap
 from .instances import Floats, make_instance
 from .wiring import Bond, End, Wiring
 
@@ -86,6 +86,10 @@ class SystemRun:
 
     def __len__(self) -> int:
         return len(self.time)
+
+    def unwrapped(self, name: str) -> Floats:
+        """Return an output without leaps by a full turn, if it is an angle of a link; see `Trajectory.unwrapped`."""
+        return unwrap(name.partition(".")[2], self[name])
 
     def added_work(self) -> float:
         """Return the work that the coupling added, as a fraction of the work that all bonds transmitted; 0 without bonds.

@@ -8,6 +8,7 @@ import shlex
 import shutil
 import subprocess
 import sys
+from dataclasses import replace
 from io import StringIO
 from pathlib import Path
 from zipfile import ZipFile
@@ -16,8 +17,9 @@ import numpy as np
 import pytest
 from rich.console import Console
 
-from analysis import Inputs, cli, export
+from analysis import Inputs, cli, export, figures, simulate
 from analysis.cli import common
+from analysis.cli.runs import _places
 from analysis.export.description import KINDS, description
 from analysis.files import tables
 from analysis.mechanisms import FIVE_BAR
@@ -68,6 +70,70 @@ def test_run_a_case_file_with_a_change(linkwork, tmp_path):
     second = np.loadtxt(tmp_path / "out" / "case.csv", delimiter=",", skiprows=1)
     assert first.shape == second.shape == (361, 28)
     assert not np.allclose(first[:, 6], second[:, 6])
+
+
+def cells(output):
+    """Cells of the rows of the printed tables, by the first one."""
+    lines = ([cell.strip() for cell in line.strip("│").split("│")] for line in output.splitlines() if "│" in line)
+    return {first: rest for first, *rest in lines}
+
+
+WIPER = """
+[linkage]
+name = "wiper-arm"
+ground = { A = [0, 0], E = ["420 mm", "40 mm"] }
+bodies.crank = { bar = ["A", "B"], length = "40 mm", mass = 0.15 }
+bodies.rod = { bar = ["B", "F"], length = "410 mm", mass = 0.25 }
+bodies.arm = { bar = ["E", "F"], length = "52 mm", mass = 0.5 }
+springs.blade = { at = "E", damping = 0.1 }
+freedoms.crank = { joint = "A", speed = "45 rpm" }
+assembly.F = 1
+[run]
+revolutions = 2
+"""
+
+
+def test_an_arm_that_swings_through_the_negative_x_axis_has_its_swing_in_the_table(linkwork, own_linkages, tmp_path):
+    """The arm turns back where crank and rod are in line: there its angle to the ground follows from three sides."""
+    (tmp_path / "wiper.toml").write_text(WIPER)
+    result = linkwork("run", "wiper.toml", "--no-plot")
+    assert result.exit_code == 0, result.stderr
+    ground = np.hypot(420.0, 40.0)
+    ends = [np.degrees(np.arccos((ground**2 + 52**2 - way**2) / (2 * ground * 52))) for way in (410 + 40, 410 - 40)]
+    found = cells(result.output)
+    for name in ("arm.angle", "E.turn"):
+        least, greatest = float(found[name][1]), float(found[name][3])
+        assert greatest - least == pytest.approx(ends[0] - ends[1], abs=0.02)
+        assert least < 180.0 < greatest
+    # the outputs stay between -pi and pi
+    run = simulate("wiper-arm")
+    assert np.ptp(run["arm.angle"]) > 6.2
+    assert (
+        np.ptp(np.loadtxt(tmp_path / "out" / "wiper.csv", delimiter=",", skiprows=1)[:, 1 + run.column("E.turn")]) > 6.2
+    )
+    for figure, axis in (
+        (figures.plot(run, ["arm.angle"]), 0),
+        (figures.plot_comparison(run, replace(run, values=run.values + 1e-3), ["E.turn"]), 1),
+    ):
+        assert np.ptp(figure.axes[axis].lines[0].get_ydata()) < 120.0
+
+
+def test_the_table_of_a_run_says_where_the_extremes_are(linkwork, tmp_path):
+    """At crank angles of one crank, else at times; what does not change has none, and all fits into 100 columns."""
+    result = linkwork("run", "--published", "table-3.1", "--no-plot")
+    found = cells(result.output)
+    assert found["crank.speed"] == ["rpm", "420", "", "420", "", "420"]
+    assert max(map(len, result.output.splitlines()[:10])) <= 100
+    run = simulate("table-3.1")
+    force = np.hypot(run["pin.A.fx"], run["pin.A.fy"])
+    for place, index in ((2, force.argmin()), (4, force.argmax())):
+        angle = np.degrees(run["crank.angle"][index]) % 360.0
+        assert float(found["pin.A force"][place]) == pytest.approx(angle, abs=0.051)
+    heading, places = _places(replace(run, parameters=None))
+    assert (heading, float(places[int(force.argmax())])) == (
+        "at [s]",
+        pytest.approx(run.time[force.argmax()], rel=1e-3),
+    )
 
 
 def test_a_run_that_ends_early_keeps_its_data_and_exits_with_3(linkwork, tmp_path):

@@ -114,6 +114,20 @@ def test_plot_shows_the_outputs_with_their_units(trajectory: Trajectory) -> None
     assert np.allclose(line.get_ydata(), 1e3 * trajectory["slider.position"], rtol=1e-15)
 
 
+def test_angles_are_unwrapped_where_their_turns_can_be_counted() -> None:
+    """An angle that wraps goes on past pi; one that is sampled too rarely, a counted angle and all else stay as they are."""
+    turned = np.linspace(3.0, -8.0, 12)
+    wrapped = np.remainder(turned + np.pi, 2.0 * np.pi) - np.pi
+    run = Trajectory(
+        time=np.arange(12.0),
+        values=np.column_stack([wrapped, 2.0 * np.arange(12.0), wrapped]),
+        names=("coupler.angle", "rocker.angle", "slider.position"),
+    )
+    np.testing.assert_allclose(run.unwrapped("coupler.angle"), turned, atol=1e-12)
+    for name in ("rocker.angle", "slider.position"):
+        assert np.array_equal(run.unwrapped(name), run[name])
+
+
 def test_run_cannot_be_changed(trajectory: Trajectory) -> None:
     with pytest.raises(AttributeError):
         trajectory.status = 3  # type: ignore[misc]
