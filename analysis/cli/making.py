@@ -5,10 +5,14 @@ from __future__ import annotations
 import shutil
 from collections.abc import Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import click
 
-from .common import check_place, console, report_errors, say
+from .common import check_place, console, print_error, report_errors, say
+
+if TYPE_CHECKING:
+    from linkwork.mechanism import Mechanism
 
 PACKAGE = Path(__file__).resolve().parents[1]
 #: Folders of the examples: beside the package in a checkout, inside the package if Linkwork is installed as a wheel.
@@ -66,11 +70,31 @@ def build(
     from ..export import build_all
     from ..linkages import load_linkage
 
-    models = [load_linkage(name).fmu if Path(name).suffix in (".toml", ".json") else name for name in models]
+    described = {name: load_linkage(name) for name in models if Path(name).suffix in (".toml", ".json")}
+    models = [described[name].fmu if name in described else name for name in models]
     with console.status("building"):
         for fmu, for_platforms in build_all(models, dest, kinds, platforms, publish_to=publish):
             made = f", {' '.join(for_platforms)}" if for_platforms else ""
             say(f"{fmu}: valid, {fmu.stat().st_size / 1024:.0f} KiB{made}")
+    for name, mechanism in described.items():
+        if entries := _entries_of_runs(name, mechanism):
+            print_error(
+                f"note: {mechanism.fmu} starts as [linkage] of {name} says; {', '.join(entries)} beside it "
+                f"{'is' if len(entries) == 1 else 'are'} of the file's runs. Set such values in the master, or in [linkage]: "
+                "start and speed of each of its freedoms"
+            )
+
+
+def _entries_of_runs(file: str, mechanism: Mechanism) -> list[str]:
+    """Return the parameters, start values and inputs that a file gives beside the linkage that it describes or names."""
+    from ..files import flatten, read_tables
+    from ..linkages import with_linkage
+    from ..run import case_inputs
+
+    tables = with_linkage(read_tables(file), Path(file).parent)
+    known = {name.partition(".")[0] for name in (*(v.name for v in mechanism.variables), *case_inputs(mechanism))}
+    entries = [name.split(".") for name in flatten(tables) if name.partition(".")[0] in known]
+    return list(dict.fromkeys(".".join(parts[:2]) for parts in entries))
 
 
 @click.command()

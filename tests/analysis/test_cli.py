@@ -371,6 +371,21 @@ def test_build_builds(linkwork, tmp_path):
     assert result.output.count("valid") == len(FMUS)
 
 
+def test_build_of_a_linkage_names_what_its_file_says_of_runs_alone(linkwork, own_linkages, tmp_path, monkeypatch):
+    """Start values and inputs beside [linkage] are not in the FMU; what stands in the file that this one names counts, too."""
+    monkeypatch.setattr(export, "build_all", lambda *given, **others: [])
+    (tmp_path / "wiper.toml").write_text(WIPER)
+    assert linkwork("build", "wiper.toml").stderr == ""
+    (tmp_path / "first.toml").write_text(f'{WIPER}[initial]\ncrank_angle = "100 deg"\n')
+    (tmp_path / "second.toml").write_text('linkage = "first.toml"\ncrank.length = "35 mm"\ndrive.torque = 0\n')
+    for file, entries in (
+        ("first.toml", "initial.crank_angle beside it is of"),
+        ("second.toml", "initial.crank_angle, crank.length, drive.torque beside it are of"),
+    ):
+        said = " ".join(linkwork("build", file).stderr.split())
+        assert f"WiperArm starts as [linkage] of {file} says; {entries} the file's runs." in said
+
+
 def test_examples_are_copied_once(linkwork, tmp_path):
     assert linkwork("examples", "--dest", "mine").exit_code == 0
     (tmp_path / "mine" / "run-up.toml").write_text("changed")
