@@ -74,8 +74,9 @@ class Drive:
     ----------
     speed : float or None
         Prescribed crank speed (rad/s), above zero; None for a drive by torque.
-    torque : float
-        Constant torque on the crank (N.m): the mean torque.
+    torque : float or None
+        Constant torque on the crank (N.m): the mean torque, without that of a motor; 0 where force laws of the mechanism drive
+        the crank. None at a prescribed speed.
     motor : InductionMotor or None
         Motor on the crank; its torque is added to ``torque``.
     forces : mapping of str to float
@@ -109,7 +110,7 @@ class Drive:
     """
 
     speed: Amount = None
-    torque: Amount = 0.0
+    torque: Amount = None
     motor: InductionMotor | None = None
     forces: Mapping[str, Amount] = field(default_factory=dict)
     held: Mapping[str, Amount] = field(default_factory=dict)
@@ -142,13 +143,19 @@ class Drive:
         if self.speed is not None and not (isfinite(self.speed) and self.speed > 0.0):
             mirror = _MIRROR if self.speed < 0.0 else ""
             raise InputError(f"speed is {self.speed} rad/s: it must be a finite number above zero{mirror}")
-        for name, value in {"torque": self.torque, **self.forces, **self.held}.items():
+        torque = {} if self.torque is None else {"torque": self.torque}
+        for name, value in {**torque, **self.forces, **self.held}.items():
             if not isfinite(value):
                 raise InputError(f"{name} is {value}: it must be a finite number")
-        if self.speed is not None and (self.torque != 0.0 or self.motor is not None):
+        if self.speed is not None and (torque or self.motor is not None):
             raise InputError("both a speed and a torque are given: an orbit has either")
-        if self.speed is None and self.torque == 0.0 and self.motor is None:
-            raise InputError("neither a speed nor a torque is given: an orbit needs one of them")
+        if self.speed is None and not torque:
+            if self.motor is None:
+                raise InputError(
+                    "neither a speed nor a torque is given: an orbit needs one of them; where a force law drives the crank, "
+                    "torque = 0"
+                )
+            object.__setattr__(self, "torque", 0.0)
 
     @property
     def speed_drive(self) -> bool:
@@ -454,9 +461,13 @@ def steady_drive(
     angle = float(getattr(initial, mechanism.freedoms[crank.freedom].initial[0]))
     coordinate = {n: f.coordinate for n, f in enumerate(mechanism.freedoms)}
     several = len(mechanism.cyclic_freedoms) > 1
+    torques = [
+        *(constant[name] for name in named[1:] if name in constant),
+        *(float(part) for part in parts if not isinstance(part, InductionMotor)),
+    ]
     return Drive(
         speed=constant.get(named[0] or "") if speed is None else speed,
-        torque=constant.get(named[1] or "", 0.0) + sum(float(p) for p in parts if not isinstance(p, InductionMotor)),
+        torque=sum(torques) if torques else None,
         motor=motors[0] if motors else None,
         forces={name: constant[name] for name in force_inputs(mechanism) if name in constant and name != named[1]},
         held={f.coordinate: float(getattr(initial, f.initial[0])) - ratios.get(n, 0) * angle for n, f in other.items()},
