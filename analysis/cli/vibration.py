@@ -339,20 +339,28 @@ def stability(
     parameters, drive = chosen.case.parameters, chosen.drive()
     start = chosen.start(drive)
     mechanism = find_mechanism(parameters)
-    names = (x or default_variable(mechanism, drive), y or damping_name(mechanism))
     for name in (x, y):
         if name is not None:
             require_variable(parameters, drive, name)
+    names: list[str] = []
     ranges, missing = [], None
     if charted:
-        for name, own, texts, option in ((names[0], x, x_range, "--x"), (names[1], y, y_range, "--y")):
+        axes = (
+            (x, x_range, "--x", lambda: default_variable(mechanism, drive)),
+            (y, y_range, "--y", lambda: damping_name(mechanism)),
+        )
+        for own, texts, option, default in axes:
+            name = own or ""
             try:
+                name = own or default()
+                names.append(name)
                 ranges.append(_axis_range(parameters, drive, name, texts, f"{option}-range"))
             except LinkworkError as error:
                 if own is not None or texts is not None:
                     raise
                 # the user chose nothing on this axis, and the verdict does not need a range
-                missing = InputError(f"no chart over {name}, as {option} is not given: {error}")
+                over = name and f" over {name}"
+                missing = InputError(f"no chart{over}, as {option} is not given: {error}")
     _report_verdict(chosen.case.title, parameters, drive, start)
     if missing is not None:
         raise missing
@@ -368,11 +376,13 @@ def stability(
     found = stability_chart(
         parameters,
         drive,
-        names,
+        (names[0], names[1]),
         (ranges[0], ranges[1]),
         points=points,
         start=start,
-        beside=linear_motion(parameters, drive, names) if find_mechanism(parameters) is FIVE_BAR else None,
+        beside=linear_motion(parameters, drive, (names[0], names[1]))
+        if find_mechanism(parameters) is FIVE_BAR
+        else None,
         coexisting=coexisting,
         n_jobs=jobs,
         progress=console.is_terminal,

@@ -296,9 +296,8 @@ def stability_chart(
     common: dict[str, Any] = {"start": start, "n_jobs": n_jobs, "progress": progress}
     steps = _steps(coexisting)
     found = grid(operation, x, y, what=next(steps), **common)
-    survey = _Survey(
-        operation, (_axis(mechanism, names[0]), _axis(mechanism, names[1])), box, found, start, damping_name(mechanism)
-    )
+    damping = damping_name(mechanism) if mechanism.names("damping") else ""
+    survey = _Survey(operation, (_axis(mechanism, names[0]), _axis(mechanism, names[1])), box, found, start, damping)
     around = coexistence(operation, x, y, what=next(steps), **common) if coexisting else None
     survey.note_missing_orbits()
     if first is not None:
