@@ -21,6 +21,9 @@ from linkwork.errors import InputError, LinkworkError
 
 #: Correction, relative to the scales, at which a point counts as on the curve.
 TOLERANCE = 1e-10
+#: Correction, relative to the scales, below which Newton's method converges at once: corrections that small that do not fall to
+#: a half are errors of the values of G, and the point counts as on the curve.
+NOISE = 1e-7
 #: Largest number of corrections in a step; smallest number that makes a step hard: the next step is then not longer.
 MOST_CORRECTIONS, HARD = 10, 5
 #: Distance of a point from the end of the tangent, relative to the step, beyond which the point may lie on another curve.
@@ -329,10 +332,14 @@ class Follower:
                     return Curve(tuple(points), tuple(steps), taken.reason, stalled, message)
                 continue
             point, count = taken
-            point, length = self._find_outer_turn(last, point, length)
             end = None
-            if self.is_beyond(point):
-                point, length = self._find_bound_point(last, point, length)
+            try:
+                point, length = self._find_outer_turn(last, point, length)
+                if out := self.is_beyond(point):
+                    point, length = self._find_bound_point(last, point, length)
+            except ContinuationError as error:
+                return Curve(tuple(points), tuple(steps), Reason.TIP, f"no next point is found: {error}")
+            if out:
                 if length <= TOLERANCE:
                     return Curve(tuple(points), tuple(steps), Reason.BOX, Reason.BOX.value)
                 end = Reason.BOX, Reason.BOX.value
@@ -378,8 +385,8 @@ class Follower:
         bend = 2.0 * (self._scale_point(beyond) - self._scale_point(point) - length * point.tangent) / length**2
 
         def at(s: float) -> Point:
-            if s == 0.0:
-                return point
+            if s in (0.0, length):
+                return beyond if s else point
             found = self._step(point, s, bend)
             if isinstance(found, _Failure):
                 raise ContinuationError(
@@ -433,10 +440,10 @@ class Follower:
                     value = new
                 change = -np.linalg.solve(matrix, np.append(value, normal @ (z - plane)))
                 size = float(np.abs(change).max())
-                if not np.isfinite(size) or (count > 3 and size > before):
+                if not np.isfinite(size) or (count > 3 and size > max(before, NOISE)):
                     break
-                z, before = z + change, size
-                if size < TOLERANCE:
+                stalled, z, before = size > 0.5 * before, z + change, size
+                if size < (NOISE if stalled else TOLERANCE):
                     return _Landing(z, self._evaluate(z) if secant else evaluation, count)
             except LinkworkError as error:
                 return _Failure(Reason.NO_VALUE, str(error))

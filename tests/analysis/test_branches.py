@@ -11,7 +11,7 @@ from matplotlib.axes import Axes
 from numpy.typing import NDArray
 
 from analysis import figures
-from analysis.numerics.continuation import ContinuationError
+from analysis.numerics.continuation import ContinuationError, Follower
 from analysis.periodic import (
     Branch,
     Crossing,
@@ -80,6 +80,24 @@ def test_fold_has_a_multiplier_of_one_and_no_orbit_beyond(softened: Branch) -> N
     words = softened.stability()
     assert set(words[: fold.after]) == {Stability.STABLE}
     assert set(words[fold.after + 2 :]) == {Stability.UNSTABLE}
+
+
+def test_a_branch_is_kept_without_a_special_point_that_cannot_be_located(
+    softened: Branch, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def lose(*_: object) -> None:
+        raise ContinuationError("no point there")
+
+    monkeypatch.setattr(Follower, "locate", lose)
+    orbit = softened.orbits[softened.special[0].after - 1]
+    value = float(softened.parameter[softened.special[0].after - 1])
+    branch = follow(softened.family, orbit, value, low=220.0, high=240.0, direction=-1)
+    assert len(branch) > 5
+    assert branch.special == ()
+    (problem,) = [
+        problem for problem in branch.problems if problem.startswith("the fold between slider.stiffness = 23")
+    ]
+    assert problem.endswith("is not located: no point there")
 
 
 def test_the_unstable_motion_with_a_multiplier_of_1_154(softened: Branch) -> None:

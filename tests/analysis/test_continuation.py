@@ -154,3 +154,31 @@ def test_a_point_that_is_not_on_the_curve_is_refused() -> None:
 def test_bad_settings_are_refused(bad: dict[str, float]) -> None:
     with pytest.raises(InputError):
         Settings(**bad)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("size", [1e-9, 2e-8])
+def test_a_curve_is_followed_whose_values_are_no_more_accurate_than_its_noise(size: float) -> None:
+    calls = 0
+
+    def noisy(y: np.ndarray, parameter: float) -> Evaluation:
+        nonlocal calls
+        calls += 1
+        found = CUBIC(y, parameter)
+        return found._replace(residual=found.residual + size * (-1.0) ** calls)
+
+    f = follower(noisy, -1.0, 1.0)
+    result = f.follow(f.start([-1.3], -1.0, 1))
+    assert result.reached
+    assert all(abs(p.y[0] ** 3 - p.y[0] - p.parameter) < 10.0 * size for p in result.points)
+
+
+def test_a_curve_that_is_lost_at_the_end_of_the_range_is_kept_so_far() -> None:
+    class Lost(Follower):
+        def _find_bound_point(self, last: Point, beyond: Point, length: float) -> tuple[Point, float]:
+            raise ContinuationError("no point there")
+
+    f = Lost(CUBIC, [1.0], Settings(low=-1.0, high=1.0))
+    result = f.follow(f.start([-1.3], -1.0, 1))
+    assert result.end is Reason.TIP
+    assert result.reason == "no next point is found: no point there"
+    assert result.points[-1].parameter > 0.9

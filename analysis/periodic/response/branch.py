@@ -62,6 +62,8 @@ class Branch(NotebookResult):
         Whether the branch came back to its own beginning.
     reason : str
         Reason why the branch ended. If the branch was lost, its last point is the last for which an orbit was found.
+    problems : tuple of str
+        One sentence for each special point that could not be located between two points of the branch, and is missing.
     """
 
     family: Family
@@ -72,6 +74,7 @@ class Branch(NotebookResult):
     reached: bool
     closed: bool
     reason: str
+    problems: tuple[str, ...] = ()
     # cache of `columns`
     _table: dict[str, NDArray[np.float64]] = field(default_factory=dict, init=False, repr=False)
 
@@ -294,6 +297,7 @@ def follow_both(family: Family, orbit: PeriodicOrbit, value: float, *, low: floa
         reached=down.reached and up.reached,
         closed=False,
         reason=up.reason if down.reached else down.reason,
+        problems=(*down.problems, *up.problems),
     )
 
 
@@ -397,7 +401,12 @@ def _branch(
             follower, first = _divide_period(family, last, settings)
         except OrbitError:
             break
-    special = [s for part, (own, curve) in enumerate(pieces) for s in _special_points(curve, own, pieces[:part])]
+    problems: list[str] = []
+    special = [
+        s
+        for part, (own, curve) in enumerate(pieces)
+        for s in _special_points(family, curve, own, pieces[:part], problems)
+    ]
     # the first point of a piece is the last of the one before
     points = [p for part, (_, curve) in enumerate(pieces) for p in curve.points[min(part, 1) :]]
     return Branch(
@@ -409,6 +418,7 @@ def _branch(
         reached=curve.reached or merged,
         closed=curve.closed,
         reason=curve.reason,
+        problems=tuple(problems),
     )
 
 
@@ -438,9 +448,12 @@ def _tests(point: Point) -> dict[Crossing, float]:
 
 
 def _special_points(
-    curve: Curve, follower: Follower, pieces: Sequence[tuple[Follower, Curve]] = ()
+    family: Family, curve: Curve, follower: Follower, pieces: Sequence[tuple[Follower, Curve]], problems: list[str]
 ) -> list[SpecialPoint]:
-    """Locate the special points on one part of a branch, ``curve``; ``pieces`` are the parts of the branch before this part."""
+    """Locate the special points on one part of a branch, ``curve``; ``pieces`` are the parts of the branch before this part.
+
+    A sentence on each point that cannot be located is added to ``problems``.
+    """
     passed = sum(len(piece.points) - 1 for _, piece in pieces)
     found: list[tuple[int, float, SpecialPoint]] = []
     values = [_tests(point) for point in curve.points]
@@ -456,7 +469,12 @@ def _special_points(
             if not values[i][kind] * values[i + 1][kind] < 0.0:
                 continue
             before, after = curve.points[i : i + 2]
-            point, s = follower.locate(before, length, after, lambda p, kind=kind: _tests(p)[kind])  # type: ignore[misc]
+            try:
+                point, s = follower.locate(before, length, after, lambda p, kind=kind: _tests(p)[kind])  # type: ignore[misc]
+            except ContinuationError as error:
+                span = " and ".join(family.format_value(p.parameter) for p in (before, after))
+                problems.append(f"the {kind.value} between {span} is not located: {error}")
+                continue
             # two real multipliers with the product 1 are no torus point
             if kind is Crossing.TORUS and abs(point.data.multipliers[0].imag) < 1e-6:
                 continue

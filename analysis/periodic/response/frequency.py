@@ -351,7 +351,7 @@ class _Search:
     stop: Callable[[], bool]
     branches: list[Branch] = field(default_factory=list)
     problems: list[str] = field(default_factory=list)
-    failures: list[OrbitError] = field(default_factory=list)
+    failures: list[OrbitError | ContinuationError] = field(default_factory=list)
 
     def follow_from_both_ends(self, start: ArrayLike | None, most_points: int, show: Callable[[float], None]) -> None:
         """Follow the branch from the low end of the range, and the branch from the high end if it is a different branch.
@@ -367,19 +367,14 @@ class _Search:
 
         for value, direction, guess in ((self.low, 1, start), (self.high, -1, None)):
             at, driven = self.family.operation(value)
-            if direction < 0 and not driven.speed_drive and self.branches:
-                # under a torque there is no guess of the speed at the high end
+            if direction < 0 and not driven.speed_drive and (self.branches or driven.motor is None):
+                # under a torque there is no guess of the speed at the high end, or only the motor's
                 break
             try:
                 orbit = newton_orbit(at, driven, start=guess)
-            except OrbitError as error:
-                self.failures.append(error)
-                self.problems.append(f"at {self.family.format_value(value)}: {error}")
-                continue
-            if any(_passes(branch, value, orbit) for branch in self.branches):
-                continue
-            self._keep(
-                follow(
+                if any(_passes(branch, value, orbit) for branch in self.branches):
+                    continue
+                branch = follow(
                     self.family.with_ratios(orbit.drive.ratios),
                     orbit,
                     value,
@@ -391,7 +386,11 @@ class _Search:
                     watch=watch,
                     stop=lambda _: self.stop(),
                 )
-            )
+            except (OrbitError, ContinuationError) as error:
+                self.failures.append(error)
+                self.problems.append(f"at {self.family.format_value(value)}: {error}")
+                continue
+            self._keep(branch)
             if self.stop():
                 break
 
@@ -452,16 +451,22 @@ class _Search:
         for orbit in search_orbits(parameters, drive, turns=turns, start=start).orbits:
             if self.stop() or orbit.largest > limit or self._knows(orbit, value):
                 continue
-            branch = follow_both(
-                self.family.with_ratios(orbit.drive.ratios),
-                orbit,
-                value,
-                low=self.low,
-                high=self.high,
-                greatest=self.greatest,
-                stop=lambda orbit: self.stop() or (turns > 1 and orbit.largest > limit),
-            )
+            try:
+                branch = follow_both(
+                    self.family.with_ratios(orbit.drive.ratios),
+                    orbit,
+                    value,
+                    low=self.low,
+                    high=self.high,
+                    greatest=self.greatest,
+                    stop=lambda orbit: self.stop() or (turns > 1 and orbit.largest > limit),
+                )
+            except ContinuationError as error:
+                place = self.family.format_value(value)
+                self.problems.append(f"the branch through a further motion at {place} is not followed: {error}")
+                continue
             self.branches.append(branch)
+            self.problems += branch.problems
             strayed = turns > 1 and max(branch.orbits[end].largest for end in (0, -1)) > limit
             if not (branch.reached or strayed):
                 self.problems.append(describe_end(branch))
@@ -474,6 +479,7 @@ class _Search:
 
     def _keep(self, branch: Branch, largest: float = GREATEST_MULTIPLIER) -> None:
         self.branches.append(branch)
+        self.problems += branch.problems
         left = largest < GREATEST_MULTIPLIER and branch.orbits[-1].largest > largest
         if not (branch.reached or left):
             self.problems.append(describe_end(branch))
