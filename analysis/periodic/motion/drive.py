@@ -74,9 +74,9 @@ class Drive:
     ----------
     speed : float or None
         Prescribed crank speed (rad/s), above zero; None for a drive by torque.
-    torque : float or None
-        Constant torque on the crank (N.m): the mean torque, without that of a motor; 0 where force laws of the mechanism drive
-        the crank. None at a prescribed speed.
+    torque : float
+        Constant torque on the crank (N.m): the mean torque, without that of a motor; given as 0 where a force law of the
+        mechanism drives the crank. It is 0 at a prescribed speed.
     motor : InductionMotor or None
         Motor on the crank; its torque is added to ``torque``.
     forces : mapping of str to float
@@ -143,19 +143,18 @@ class Drive:
         if self.speed is not None and not (isfinite(self.speed) and self.speed > 0.0):
             mirror = _MIRROR if self.speed < 0.0 else ""
             raise InputError(f"speed is {self.speed} rad/s: it must be a finite number above zero{mirror}")
-        torque = {} if self.torque is None else {"torque": self.torque}
-        for name, value in {**torque, **self.forces, **self.held}.items():
-            if not isfinite(value):
-                raise InputError(f"{name} is {value}: it must be a finite number")
-        if self.speed is not None and (torque or self.motor is not None):
-            raise InputError("both a speed and a torque are given: an orbit has either")
-        if self.speed is None and not torque:
-            if self.motor is None:
+        if self.torque is None:
+            if self.speed is None and self.motor is None:
                 raise InputError(
                     "neither a speed nor a torque is given: an orbit needs one of them; where a force law drives the crank, "
                     "torque = 0"
                 )
             object.__setattr__(self, "torque", 0.0)
+        for name, value in {"torque": self.torque, **self.forces, **self.held}.items():
+            if not isfinite(value):
+                raise InputError(f"{name} is {value}: it must be a finite number")
+        if self.speed is not None and (self.torque != 0.0 or self.motor is not None):
+            raise InputError("both a speed and a torque are given: an orbit has either")
 
     @property
     def speed_drive(self) -> bool:

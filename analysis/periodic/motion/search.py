@@ -188,7 +188,7 @@ def _with_speed(drive: Drive, speed: float) -> Drive:
     """Return the drive with another prescribed speed; if the drive has a motor, with another synchronous speed of the motor."""
     if drive.speed is None and drive.motor is not None:
         return replace(drive, motor=replace(drive.motor, synchronous_speed=speed))
-    return replace(drive, speed=speed, torque=None, motor=None)
+    return replace(drive, speed=speed, torque=0.0, motor=None)
 
 
 def _speed_of_drive(drive: Drive) -> float | None:

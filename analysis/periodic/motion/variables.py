@@ -155,7 +155,7 @@ def parameter_value(parameters: Parameters, drive: Drive, name: str) -> float:
     if what == "speed":
         return float("nan") if drive.speed is None else float(drive.speed) * _crank_ratio(mechanism, drive, freedom)
     if what == "torque" and freedom == drive.reference(mechanism).freedom:
-        return float(drive.torque or 0.0)
+        return float(drive.torque)
     if name in motor_parameters(mechanism):
         return float(getattr(_find_motor(mechanism, drive, name), motor_parameters(mechanism)[name][0], np.nan))
     if name in force_inputs(mechanism):
