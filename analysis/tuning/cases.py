@@ -17,7 +17,7 @@ from ..periodic import default_variable, parameter_unit, rest_guess, steady_driv
 from ..run import case_mechanism, read_case, with_case_file_names
 from ..units import with_unit
 from .result import Tuned
-from .wishes import Limit, Wish
+from .wishes import Limit, Wish, require_free
 
 #: The default objective, and the first word of an objective that names a parameter.
 _LEAST_CHANGE, _LEAST = "least change", "least "
@@ -120,6 +120,7 @@ def read_tuning_case(
         overrides[default_variable(case_mechanism(linked))] = with_unit(wanted.speeds[0], "rad/s")
     case = read_case(linked, folder=folder, title=title, overrides=overrides)
     drive = steady_drive(case.parameters, case.inputs, case.initial)
+    require_free(find_mechanism(case.parameters), drive)
     wish = Wish(
         parameters=case.parameters,
         drive=drive,

@@ -18,6 +18,7 @@ from ..files import Quantity, Range, check_names, unknown_name
 from ..mechanisms import Parameters, find_mechanism
 from ..periodic import (
     Drive,
+    NothingFreeError,
     Operation,
     PeriodicOrbit,
     driving_names,
@@ -170,6 +171,7 @@ class Wish:
         put("between", _span(mechanism, self.over, self.between if self.speeds is None else self.speeds))
         drive = self.drive or steady_drive(given, speed=self.span[0])
         require_variable(self.parameters, drive, self.over)
+        require_free(mechanism, drive)
         alone = (
             not drive.speed_drive
             and drive.motor is None
@@ -318,6 +320,20 @@ class Wish:
         assert self.drive is not None
         values = np.clip(self.present + x * self.tolerance, self.low, self.high).tolist()
         return with_values(self.parameters, self.drive, {**dict(zip(self.names, values)), self.over: level})
+
+
+def require_free(mechanism: Mechanism, drive: Drive) -> None:
+    """Raise InputError if no degree of freedom is free: the motion is then prescribed, and there is none to be followed."""
+    try:
+        drive.flow(mechanism)
+    except NothingFreeError as error:
+        free = error.force and f", or free a freedom by a force, such as {error.force} = 0"
+        raise InputError(
+            f"the speed prescribes all that moves in a {mechanism.name}, so that nothing can vibrate: tuning needs a free "
+            "freedom. Peaks of outputs then follow from runs alone: compare the values that may be changed by simulate_many "
+            "with vary, or by linkwork run --set; or drive the crank by a torque or a motor, with over and between instead of "
+            f"speeds{free}"
+        ) from None
 
 
 def _span(mechanism: Mechanism, over: str, given: Any) -> tuple[float, float]:

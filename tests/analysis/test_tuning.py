@@ -334,6 +334,17 @@ def test_what_is_met_already_is_not_changed():
     assert tuned.x.tolist() == [0.0, 0.0]
 
 
+def test_a_motion_that_the_speed_prescribes_is_refused_with_what_works_instead():
+    said = r"the speed prescribes all that moves in a slider-crank.* simulate_many .* axial\.force = 0"
+    limit = {"output": "drive.applied_torque", "below": "1 N*m"}
+    with pytest.raises(InputError, match=said):
+        Wish(parameters=SPRUNG, speeds=(10.0, 12.0), change={"crank.length": "5 %"}, limits=[Limit(**limit)])
+    name = next(iter(rahman.SETS))
+    wanted = {"speeds": ["100 rpm", "110 rpm"], "change": {"crank.length": "5 %"}, "peak": limit}
+    with pytest.raises(InputError, match=said):
+        read_tuning_case({"published": name, "tune": wanted}, folder=Path())
+
+
 # What is wished
 
 
