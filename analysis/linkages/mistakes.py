@@ -69,11 +69,15 @@ def _names(d: Description, owners: Mapping[str, set[str]]) -> Found:
 
 
 def _bodies_without_length(d: Description, owners: Mapping[str, set[str]]) -> Found:
-    """Yield bodies whose pins all coincide, except blocks and guides: a sliding block may carry several rods on one axis."""
+    """Yield bodies whose pins all coincide, except blocks and guides, and bodies all of whose pins are freedoms.
+
+    A sliding block may carry several rods on one axis, and a shaft a second one by an elastic coupling.
+    """
+    freed = {freedom.joint for freedom in d.freedoms.values()}
     sliding = {body for slide in d.slides.values() for body in (slide.body, slide.on)}
     for name, body in d.bodies.items():
         pins = {own: place for own, place in body.all_points.items() if len(owners[own]) > 1}
-        if len(pins) > 1 and len(set(pins.values())) == 1 and name not in sliding:
+        if len(pins) > 1 and len(set(pins.values())) == 1 and name not in sliding and not pins.keys() <= freed:
             one, other = list(pins)[:2]
             yield f"bodies.{name}.points.{other}", f"is where {one} is", "the body must have a length between its pins"
 

@@ -349,12 +349,27 @@ def analyse(description: Description) -> Structure:
         others = [" and ".join(some) for some in islice(_choices(description, found, count), 3)]
         driven = "a driven spring drives another joint"
         hint = f"; these joints as freedoms would do: {' or '.join(others)}; {driven}" if others else ""
+        why = _teeth_hint(description, left) or "are no dyads: they do not follow one pair after the other"
         raise LinkageError(
-            f"with {', '.join(f.joint for f in freedoms.values())} as freedoms the bodies {', '.join(left)} are no dyads: they "
-            f"do not follow one pair after the other{hint or ', nor with any other joints as freedoms'}"
+            f"with {', '.join(f.joint for f in freedoms.values())} as freedoms the bodies {', '.join(left)} {why}"
+            f"{hint or ', nor with any other joints as freedoms'}"
         )
     names = (*description.bodies, *description.slots)
     return Structure(names, found, freedoms, tuple(steps))
+
+
+def _teeth_hint(description: Description, left: list[str]) -> str:
+    """Return why the first gear or rack does not follow although the pose of its mate is known; else an empty text."""
+    pairs = {f"linkage.gears.{name}": gear.bodies for name, gear in description.gears.items()}
+    pairs |= {f"linkage.racks.{name}": (rack.gear, rack.rack) for name, rack in description.racks.items()}
+    for where, pair in pairs.items():
+        for body, mate in (pair, pair[::-1]):
+            if body in left and mate not in left:
+                return (
+                    f"cannot follow: by {where} {body} is in the teeth of {mate}, whose angle must follow from the freedoms "
+                    "alone, as that of a crank or of a gear on one, and not through a dyad, as that of a rocker"
+                )
+    return ""
 
 
 def _choices(description: Description, found: Mapping[str, Joint], count: int) -> Iterator[tuple[str, ...]]:
