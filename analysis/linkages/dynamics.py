@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from itertools import chain, count
 from typing import NamedTuple
 
 from .description import BODY, GROUND, Description, Spring, is_given
+from .equations import Twist
 from .laws import expression, with_constants
 from .parameters import Interface
 from .structure import Dyad, FreedomStep, GearStep, Joint, Pin, RackStep, Side, Step, sliders
@@ -31,10 +32,11 @@ def springs_by_freedom(description: Description, interface: Interface) -> dict[s
 class Motion:
     """Writer of the functions that compute forces and motion of one linkage."""
 
-    def __init__(self, interface: Interface) -> None:
+    def __init__(self, interface: Interface, counted: Mapping[str, Twist]) -> None:
         self.description, self.structure, self.interface = interface.description, interface.structure, interface
         self.n = len(interface.drives)
         self.along = springs_by_freedom(self.description, interface)
+        self.counted = counted
         self.bodies = self.structure.bodies
         self.reactions: list[Reaction] = []
         #: steps with racks, in the order in which their forces are computed
@@ -64,11 +66,15 @@ class Motion:
                 rows.append(f"{stretch} = {name}_length{f'{free}_length' if free else ''}")
                 fields += [f"{name}_x", f"{name}_y"]
             else:
-                if turned := self.twisted_bodies(spring):
+                if turned := self.interface.twisted_bodies(spring):
                     first, second = turned
-                    angle = f"p.{name}_COS, p.{name}_SIN" if free else "1.0, 0.0"
                     one, other = self.interface.turn(first, "b."), self.interface.turn(second, "b.")
-                    rows.append(f"{stretch} = turn_difference({one}, {other}, {angle})")
+                    if name in self.counted:
+                        rows.append(f"{stretch} = {self.counted[name].angle}{f'{free}_angle' if free else ''}")
+                    else:
+                        middle = f"p.{name}_MIDDLE + " if name in self.interface.middled(self.counted) else ""
+                        angle = f"p.{name}_COS, p.{name}_SIN" if free or middle else "1.0, 0.0"
+                        rows.append(f"{stretch} = {middle}turn_difference({one}, {other}, {angle})")
                     rows.append(f"{rate} = {other}.w - {one}.w")
                 else:
                     slide = sliders(self.structure)[spring.at]
@@ -82,11 +88,6 @@ class Motion:
             signature, "Compute the stretches of all springs.", [*rows, f"return Springs({', '.join(fields)})"]
         )
 
-    def twisted_bodies(self, spring: Spring) -> tuple[str, ...]:
-        """Return the two bodies between which a spring is twisted; empty if it is no torsion spring."""
-        joint = self.structure.joints.get(spring.at)
-        return spring.bodies or (joint.bodies if isinstance(joint, Pin) else ())
-
     def _kind(self, spring: Spring) -> str:
         return "angle" if isinstance(self.structure.joints[spring.at], Pin) else "position"
 
@@ -96,7 +97,7 @@ class Motion:
         if is_given(spring.damping):
             words.append(f"p.{name}_damping * s.{name}_rate")
         if is_given(spring.friction):
-            about = self.twisted_bodies(spring)
+            about = self.interface.twisted_bodies(spring)
             words.append(f"p.{name}_friction * tanh(s.{name}_rate / {'FRICTION_RATE' if about else 'FRICTION_SPEED'})")
         if spring.law:
             words.append(f"{name}_law(s.{name}_stretch, s.{name}_rate{', p' if spring.constants else ''})")
@@ -115,7 +116,7 @@ class Motion:
             if spring.law:
                 doc = f"Return the force of {name} at a stretch and its rate (N, N.m)."
                 p = ", p: Constants" if spring.constants else ""
-                law = expression(spring.law, bool(self.twisted_bodies(spring)), f"linkage.springs.{name}.law")
+                law = expression(spring.law, bool(self.interface.twisted_bodies(spring)), f"linkage.springs.{name}.law")
                 text = with_constants(law, spring.constants, name)
                 yield function(f"{name}_law(x: float, v: float{p}) -> float", doc, [f"return {text}"])
 
@@ -136,7 +137,7 @@ class Motion:
                 lost.append(f"{name}_resistance * s.{name}_rate")
             total = " + ".join(filter(None, (pulls, f"{name}_resistance" if resists else ""))) or "0.0"
             if spring.driven:
-                named = f"{name}.{'torque' if self.twisted_bodies(spring) else 'force'}"
+                named = f"{name}.{'torque' if self.interface.twisted_bodies(spring) else 'force'}"
                 drive = next(load for load in self.interface.loads if load.name == named)
                 total += f" - i.{drive.field}"
                 gained.append(f"i.{drive.field} * s.{name}_rate")
@@ -151,7 +152,7 @@ class Motion:
                         f = f"{sign}{name}_force * s."
                         on[self.owner(own)].append(f"force_wrench({f}{name}_x, {f}{name}_y, b.at_{own})")
                 continue
-            turned = self.twisted_bodies(spring)
+            turned = self.interface.twisted_bodies(spring)
             first, second = turned or self.structure.joints[spring.at].bodies
             for body, sign in ((second, "-"), (first, "")):
                 if body == GROUND:

@@ -7,6 +7,7 @@ of the angle, with its derivatives. The methods below write lines of the generat
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
+from typing import NamedTuple
 
 from .description import GROUND
 from .parameters import Interface
@@ -394,6 +395,42 @@ class PoseWriter:
         )
         doc = "Compute the places of all bodies, freedom after freedom and dyad after dyad."
         yield function("places(x: tuple[float, ...], p: Constants) -> Places", doc, self.lines)
+
+
+class Twist(NamedTuple):
+    """The angle between two bodies, linear in the coordinates, as an expression, and the freedoms on which it depends."""
+
+    angle: str
+    freedoms: tuple[int, ...]
+
+
+def counted_twists(interface: Interface) -> dict[str, Twist]:
+    """Return, by its name, the twist of each torsion spring about a freedom's pin, or between two bodies whose turns count.
+
+    The turns count of bodies whose angles are linear in the coordinates: the ground, bodies that freedoms turn, and gears.
+    """
+    poses = PoseWriter(interface)
+    _ = list(poses.blocks())
+    found = {}
+    freed = {drive.joint: n for n, drive in enumerate(interface.drives) if drive.turns}
+    for name, spring in interface.description.springs.items():
+        bodies = interface.twisted_bodies(spring)
+        if spring.at in freed:
+            found[name] = Twist(f"x[{freed[spring.at]}]", (freed[spring.at],))
+        elif bodies and set(bodies) <= poses.angles.keys():
+            (first, start), (second, end) = (poses.angles[body] for body in bodies)
+            words, freedoms = [], []
+            for n in sorted(first.keys() | second.keys()):
+                one, other = first.get(n, "0.0"), second.get(n, "0.0")
+                if one != other:
+                    freedoms.append(n)
+                    share = _difference(other, one).replace("--", "")
+                    signs = {"1.0": f"x[{n}]", "-1.0": f"-x[{n}]"}
+                    words.append(signs.get(share, f"({share}) * x[{n}]"))
+            if start != end:
+                words += [f"{sign}({' + '.join(own)})" for sign, own in (("", end), ("-", start)) if own]
+            found[name] = Twist((" + ".join(words) or "0.0").replace("+ -", "- "), tuple(freedoms))
+    return found
 
 
 def _difference(a: str, b: str) -> str:

@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 from .description import is_given
 from .dynamics import Motion
-from .parameters import spring_angle_name
+from .parameters import needs_turns, spring_angle_name
 from .structure import Dyad, Pin, Slider, sliders
 from .symbols import symbol
 from .variables import display_argument
@@ -87,16 +87,21 @@ class Outputs:
             yield Output(f"{name}.position", "m", text, "*POSITION", f"{name}_position")
             rest = f'*RATE, rate_of="{name}.position"'
             yield Output(f"{name}.velocity", "m/s", "Its rate", rest, f"{name}_velocity")
+        middled = self.interface.middled(self.motion.counted)
         for name, spring in self.description.springs.items():
+            shown = f"*POSITION, {_DEGREES}"
+            if name not in self.motion.counted:
+                shown = shown if name in middled else _WRAPPED
+                shown += f', role="twist", of="{name}"' if needs_turns(spring) else ""
             if spring.between:
                 free = f" + p.{name}_free_length" if is_given(spring.free) else ""
                 yield Output(f"{name}.length", "m", f"Length of {name}", "*POSITION", f"s.{name}_stretch{free}")
-            elif spring.at and name not in self.motion.along and self.motion.twisted_bodies(spring):
+            elif spring.at and name not in self.motion.along and self.interface.twisted_bodies(spring):
                 text = f"Angle of {spring.at} from that at which {name} is free"
-                yield Output(spring_angle_name(self.description, name), "rad", text, _WRAPPED, f"s.{name}_stretch")
+                yield Output(spring_angle_name(self.description, name), "rad", text, shown, f"s.{name}_stretch")
             elif spring.bodies:
                 text = f"Angle by which {name} is twisted"
-                yield Output(f"{name}.turn", "rad", text, _WRAPPED, f"s.{name}_stretch")
+                yield Output(f"{name}.turn", "rad", text, shown, f"s.{name}_stretch")
         for dyad in self.structure.dyads:
             rest = f'*POSITION, minimum=0.0, maximum=pi, {_DEGREES}, role="transmission"'
             text, value = self._transmission(dyad)
@@ -108,7 +113,7 @@ class Outputs:
             yield Output("assembly.clearance", "1", text, "*POSITION", "b.clearance")
         for name, spring in self.description.springs.items():
             if not spring.driven:
-                turned = self.motion.twisted_bodies(spring)
+                turned = self.interface.twisted_bodies(spring)
                 what, unit = ("torque", "N.m") if turned else ("force", "N")
                 of = f", on the {turned[0]}" if turned else ""
                 text = f"{what.title()} of {name} against its stretch{of}"

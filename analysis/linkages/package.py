@@ -6,9 +6,11 @@ import hashlib
 import importlib
 import re
 import sys
-from math import degrees, isfinite, pi, remainder, sqrt, tau
+from math import cos, degrees, hypot, isfinite, pi, remainder, sin, sqrt, tau
 from pathlib import Path
 from traceback import extract_tb, walk_tb
+from types import SimpleNamespace
+from typing import Any
 
 from linkwork import planar
 from linkwork.errors import AssemblyError, LinkworkError
@@ -20,7 +22,7 @@ from .contacts import Contacts
 from .description import GROUND, Description, LinkageError, is_given
 from .drawing import Picture
 from .dynamics import Motion
-from .equations import PoseWriter
+from .equations import PoseWriter, counted_twists
 from .laws import WRITTEN
 from .mistakes import check_entries
 from .outputs import Outputs
@@ -177,10 +179,12 @@ class Package:
         check_entries(description)
         self.structure: Structure = analyse(description)
         self.interface = interface(description, self.structure)
-        self.motion = Motion(self.interface)
+        counted = counted_twists(self.interface)
+        self.motion = Motion(self.interface, counted)
         self.picture = Picture(self.interface)
-        self.variables = Variables(self.interface)
+        self.variables = Variables(self.interface, counted)
         equations = self._equations()
+        self.variables.middles |= self._described_angles(equations)
         self.files = {"equations.py": equations, "__init__.py": self._mechanism()}
         digest = hashlib.sha256("\0".join(self.files.values()).encode()).hexdigest()
         self.name = f"{re.sub(r'[^a-z0-9]', '_', description.name.lower())}_{digest[:12]}"
@@ -229,6 +233,7 @@ class Package:
             raise LinkageError(
                 f"{error}{self._unreachable(made)}: the start in linkage.freedoms{signs} or the lengths must be others"
             ) from None
+        self._check_lines(made)
         self._check_motion(made)
         self._check_twists(made)
         MECHANISMS.pop(name, None)
@@ -259,6 +264,21 @@ class Package:
                     bodies = " and ".join(f"linkage.{t}.{side.body}" for t, side in zip(tables, dyad.sides))
                     return f", {bodies}, joined at {dyad.inner.name}{sizes}"
         return ""
+
+    def _check_lines(self, made: Mechanism) -> None:
+        """Raise LinkageError if at the start the two pins that give a line its direction coincide."""
+        start = made.published[made.name]
+        places = made.modules[-1].places(made.state(start.initial), start.parameters.constants())
+        for dyad in self.structure.dyads:
+            if dyad.kind == "RPR":
+                one, other = (getattr(places, f"at_{side.joint.name}") for side in dyad.sides)
+                if hypot(one.x - other.x, one.y - other.y) <= 1e-6 * length_and_mass(self.interface)[0]:
+                    name, pins = dyad.inner.name, " and ".join(side.joint.name for side in dyad.sides)
+                    table = "slots" if name in self.description.slots else "slides"
+                    raise LinkageError(
+                        f"linkage.{table}.{name} has no direction at the start: the pins {pins} are at one place; the start in "
+                        "linkage.freedoms, linkage.assembly or the lengths must be others"
+                    )
 
     def _check_motion(self, made: Mechanism) -> None:
         """Raise LinkageError if the accelerations at the start are not finite."""
@@ -301,12 +321,12 @@ class Package:
     def _check_twists(self, made: Mechanism) -> None:
         """Raise LinkageError if a torsion spring is twisted by more than half a turn at the start.
 
-        Springs about a pin whose angle is a freedom are not checked: there the freedom counts the turns.
+        Springs between bodies whose turns the freedoms count are not checked.
         """
         start = made.published[made.name]
         places = made.modules[-1].places(made.state(start.initial), start.parameters.constants())
         for name, spring in self.description.springs.items():
-            bodies = () if name in self.motion.along else self.motion.twisted_bodies(spring)
+            bodies = () if name in self.motion.counted else self.interface.twisted_bodies(spring)
             if not bodies or not is_given(spring.free):
                 continue
             one, other = (0.0 if b == GROUND else planar.turn_angle(getattr(places, f"{b}_frame").turn) for b in bodies)
@@ -319,6 +339,27 @@ class Package:
                     f"{degrees(angle):.6g} deg: where no freedom counts the turns a spring is twisted the shorter way, here by "
                     f"{degrees(shorter):.6g} deg; it must be {degrees(angle - shorter):.6g} deg, or the pin a freedom"
                 )
+
+    def _described_angles(self, equations: str) -> dict[str, float]:
+        """Return the angles of the springs of `Interface.middled` in the described pose (rad); empty if there is none."""
+        names = self.interface.middled(self.motion.counted)
+        if not names:
+            return {}
+        module: dict[str, Any] = {"__name__": self.description.name}
+        exec(equations, module)
+        known = {
+            "cos": cos,
+            "sin": sin,
+            "self": SimpleNamespace(**{p.field: p.value for p in self.interface.parameters}),
+        }
+        p = module["Constants"](**{name: eval(text, known) for name, text in self.variables.constants().items()})
+        x = (*(start.value for start in self.variables.starts), 0.0, 0.0)
+        try:
+            springs = module["springs"](module["places"](x, p), x, p)
+        except (ValueError, ArithmeticError):
+            return {}
+        # rounded, so that the text of the package is the same on every machine
+        return {name: round(getattr(springs, f"{name}_stretch"), 6) for name in names}
 
     def _equations(self) -> str:
         motion = self.motion

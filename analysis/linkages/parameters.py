@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Container, Iterator, Mapping
 from dataclasses import dataclass
 from fractions import Fraction
 from math import lcm
@@ -12,7 +12,7 @@ from linkwork.errors import ParameterError
 from linkwork.parameters import field_name
 
 from ..files import Quantity, unknown_name
-from .description import BODY, GROUND, Body, Description, LinkageError, is_given
+from .description import BODY, GROUND, Body, Description, LinkageError, Spring, is_given
 from .laws import is_periodic
 from .structure import Dyad, FreedomStep, GearStep, Pin, RackStep, Slider, Structure
 
@@ -126,6 +126,23 @@ class Interface:
         """Return the source text for the direction of a body; for ``of`` see `frame`."""
         return f"{of}{body}_frame.turn" if body != GROUND else f"fixed_direction(1.0, 0.0, {len(self.drives)})"
 
+    def twisted_bodies(self, spring: Spring) -> tuple[str, ...]:
+        """Return the two bodies between which a spring is twisted; empty if it is no torsion spring."""
+        joint = self.structure.joints.get(spring.at)
+        return spring.bodies or (joint.bodies if isinstance(joint, Pin) else ())
+
+    def middled(self, counted: Container[str]) -> list[str]:
+        """Return the torsion springs whose law is of an angle that nothing counts, and that have no free angle.
+
+        The angle is within half a turn of that in the description, so that the torque does not jump at 180 deg.
+        """
+        return [
+            name
+            for name, spring in self.description.springs.items()
+            if self.twisted_bodies(spring) and name not in counted and not is_given(spring.free)
+            if spring.law and needs_turns(spring)
+        ]
+
     def travel(self, slide: Slider) -> str:
         """Return the source text for position and velocity of a block along its line; in it the variable of poses is b."""
         (holder, block), (x, y) = slide.bodies, self.coordinates(slide.bodies[0], slide.through)
@@ -155,21 +172,15 @@ def freedoms(description: Description, structure: Structure) -> tuple[Drive, ...
                 Quantity(rate_unit)(table.speed, f"{where}.speed"),
                 inputs,
                 bool(inputs) and is_given(table.speed),
-                _returning_turns(description, structure, len(found))
-                if turns and not _is_wound(description, table.joint)
-                else 0,
+                _returning_turns(description, structure, len(found)) if turns else 0,
             )
         )
     return tuple(found)
 
 
-def _is_wound(description: Description, pin: str) -> bool:
-    """Return whether a spring about a pin is wound up further by every turn, so that its force is not periodic."""
-    springs = [spring for spring in description.springs.values() if spring.at == pin]
-    return any(
-        is_given(spring.stiffness) or (spring.law and not is_periodic(spring.law, spring.constants))
-        for spring in springs
-    )
+def needs_turns(spring: Spring) -> bool:
+    """Return whether the torque of a torsion spring changes if it is twisted by a further whole turn."""
+    return is_given(spring.stiffness) or bool(spring.law and not is_periodic(spring.law, spring.constants))
 
 
 def _returning_turns(description: Description, structure: Structure, freedom: int) -> int:
@@ -298,7 +309,16 @@ def _friction(description: Description, structure: Structure) -> Iterator[Parame
         joint = structure.joints.get(name)
         if joint is None or len(joint.bodies) != 2 or (isinstance(joint, Pin) and slots.keys() & set(joint.bodies)):
             names = ", ".join(n for n, j in structure.joints.items() if len(j.bodies) == 2 and n not in slots)
-            raise LinkageError(f"linkage.friction has {name}: it must be a slot, or a joint of two bodies: {names}")
+            of = joint or structure.joints.get(name.rstrip("0123456789"))
+            shared = (
+                f"; {of.name} is of {', '.join(of.bodies)}: give the {of.bodies[-1]} a point of its own at the same place, "
+                f"such as {of.name}x"
+                if of and len(of.bodies) > 2
+                else ""
+            )
+            raise LinkageError(
+                f"linkage.friction has {name}: it must be a slot, or a joint of two bodies: {names}{shared}"
+            )
         if isinstance(joint, Pin):
             own, unit, text = "friction_radius", "m", f"Friction radius of the pin {name}: coefficient times its radius"
         else:

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from typing import NamedTuple
 
 from .description import is_given
-from .parameters import Drive, Interface
-from .structure import Pin, sliders
+from .equations import Twist
+from .parameters import Drive, Interface, needs_turns
+from .structure import sliders
 from .symbols import symbol
 from .writing import quote
 
@@ -30,8 +31,11 @@ def display_argument(unit: str) -> str:
 class Variables:
     """Writer of the variables of one linkage, except its outputs."""
 
-    def __init__(self, interface: Interface) -> None:
+    def __init__(self, interface: Interface, counted: Mapping[str, Twist]) -> None:
         self.description, self.structure, self.interface = interface.description, interface.structure, interface
+        self.counted = counted
+        #: the angle in the description of each torsion spring of `Interface.middled` (rad)
+        self.middles = dict.fromkeys(interface.middled(counted), 0.0)
         drives = interface.drives
         self.starts = [Start(_last(d, d.coordinate), d.unit, d.start, d.start) for d in drives]
         self.starts += [Start(_last(d, d.rate), f"{d.unit}/s", d.speed, 0.0) for d in drives]
@@ -42,18 +46,18 @@ class Variables:
     def constants(self) -> dict[str, str]:
         """Return the constants of the equations by name, each as an expression in the parameters ``self``.
 
-        Names of constants of force laws have no capitals, so that no such name can end in ``COS`` or ``SIN``.
+        Names of constants of force laws have no capitals, so that no such name can end in ``COS``, ``SIN`` or ``MIDDLE``.
         """
         found = {p.field: f"self.{p.field}" for p in self.interface.parameters}
         for name, joint in sliders(self.structure).items():
             if joint.inclined:
                 found |= {f"{name}_COS": f"cos(self.{name}_direction)", f"{name}_SIN": f"sin(self.{name}_direction)"}
-        freed = {drive.joint for drive in self.interface.drives}
         for name, spring in self.description.springs.items():
-            pinned = spring.at and spring.at not in freed and isinstance(self.structure.joints[spring.at], Pin)
-            about = spring.bodies or pinned
-            if about and is_given(spring.free):
+            wraps = self.interface.twisted_bodies(spring) and name not in self.counted
+            if wraps and is_given(spring.free):
                 found |= {f"{name}_COS": f"cos(self.{name}_free_angle)", f"{name}_SIN": f"sin(self.{name}_free_angle)"}
+        for name, angle in self.middles.items():
+            found |= {f"{name}_COS": f"cos({angle!r})", f"{name}_SIN": f"sin({angle!r})", f"{name}_MIDDLE": repr(angle)}
         if self.description.gravity:
             direction = "self.ground_gravity_direction"
             found |= {"gx": f"self.gravity * cos({direction})", "gy": f"self.gravity * sin({direction})"}
@@ -139,14 +143,19 @@ class Variables:
 
     def freedoms(self) -> Iterator[str]:
         """Yield the source of each `Freedom`."""
-        for d in self.interface.drives:
-            mode, period = "None", f"{2.0 * d.turns_back} * pi" if d.turns_back else "0.0"
+        springs = self.description.springs
+        wound = [twist.freedoms for name, twist in self.counted.items() if needs_turns(springs[name])]
+        alone = {freedoms[0] for freedoms in wound if len(freedoms) == 1}
+        for n, d in enumerate(self.interface.drives):
+            back = 0 if n in alone else d.turns_back
+            mode, period = "None", f"{2.0 * back} * pi" if back else "0.0"
             if d.table:
                 arguments = f'("{self._argument(d, d.load)}", "{self._argument(d, "speed")}")'
                 mode = f'Mode("{d.table}.mode", ("{d.load}", "speed"), {arguments}, {int(d.commanded)})'
             start = f'("{_last(d, d.coordinate)}", "{_last(d, d.rate)}")'
-            swings = ", swings=True" if d.turns_back and not d.table else ""
-            yield f'Freedom("{d.coordinate}", "{d.rate}", {start}, {mode}, {period}{swings})'
+            swings = ", swings=True" if back and not d.table else ""
+            coupled = ", coupled=True" if back and any(n in freedoms for freedoms in wound) else ""
+            yield f'Freedom("{d.coordinate}", "{d.rate}", {start}, {mode}, {period}{swings}{coupled})'
 
     def channels(self) -> Iterator[str]:
         """Yield the source of each `Channel`."""

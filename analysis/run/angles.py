@@ -54,8 +54,8 @@ class WholeTurns:
         period = np.zeros(len(x))
         period[: len(self._periods)] = self._periods
         for way in (period, TURNS * period):
-            less = np.fmod(x, way, out=x.copy(), where=way > 0.0)
-            if repeats(self._mechanism, self._p, self._modes, less, u, way):
+            less = self._without_turns(x, u, way)
+            if less is not None:
                 break
         else:
             self._never = True
@@ -68,6 +68,27 @@ class WholeTurns:
             for column, angle in zip(self._columns, off):
                 # columns of the table of events: output, level
                 watch.table[(watch.table[:, 0] == column), 1] -= angle
+
+    def _without_turns(self, x: NDArray[np.float64], u: NDArray[np.float64], way: NDArray[np.float64]) -> Any:
+        """Return the state x less multiples of ``way``; None if the mechanism does not behave the same there.
+
+        Where a spring between turning bodies is twisted by the difference of their turns, the same multiple is taken of all.
+        """
+        turning = way > 0.0
+
+        def are_equal(y: NDArray[np.float64], off: NDArray[np.float64]) -> bool:
+            return repeats(self._mechanism, self._p, self._modes, y, u, off)
+
+        less = np.fmod(x, way, out=x.copy(), where=turning)
+        if not are_equal(less, way):
+            return None
+        turns = np.trunc(np.divide(x, way, out=np.zeros(len(x)), where=turning))
+        most = turns[np.abs(turns).argmax()]
+        apart = np.where(turning, np.clip(turns - most, -TURNS, TURNS), 0.0)
+        if not apart.any() or are_equal(less, apart * way):
+            return less
+        less = x - most * way
+        return less if np.abs(less[turning] / way[turning]).max() < abs(most) else None
 
     def put_back(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
         """Add the subtracted turns back to the outputs at the samples, in place, and return the outputs."""

@@ -1,4 +1,4 @@
-"""Cautions about a run: it is stiff, or the residual of its energy balance is larger than the tolerance promises."""
+"""Cautions about a run: it is stiff, its energy balance misses more than the tolerance promises, or a spring slips a turn."""
 
 from __future__ import annotations
 
@@ -66,6 +66,31 @@ def is_too_slow(steps: Any, passed: Any, span: float, most: int) -> Any:
     several runs. ``most`` is the largest number of steps.
     """
     return (steps >= _PATIENCE) & (steps * span >= _SHARE * most * passed)
+
+
+@lru_cache(maxsize=64)
+def _twists(mechanism: Mechanism) -> dict[str, int]:
+    """Return the index of the output that is the twist of each spring whose whole turns nothing counts, by spring."""
+    names = mechanism.output_names
+    return {v.of: names.index(v.name) for v in mechanism.variables if v.role == "twist"}
+
+
+def twists(mechanism: Mechanism, time: NDArray[np.float64], values: NDArray[np.float64]) -> str:
+    """Return a caution that names springs whose torque jumps as their twist passes half a turn; else an empty text.
+
+    ``values`` are the outputs at the samples, shape (n, outputs), and ``time`` the times of the samples (s).
+    """
+    found = []
+    for name, column in _twists(mechanism).items():
+        jumps = np.flatnonzero(np.abs(np.diff(values[:, column])) > pi)
+        if len(jumps):
+            found.append(f"{name} at t = {time[jumps[0] + 1]:.4g} s")
+    return (
+        f"the torque of {' and '.join(found)} jumps, where its angle passes half a turn either way: nothing counts the whole "
+        "turns there, as a freedom at the pin would"
+        if found
+        else ""
+    )
 
 
 @lru_cache(maxsize=64)

@@ -14,7 +14,7 @@ from scipy.integrate import BDF, LSODA, OdeSolver, Radau, solve_ivp
 from linkwork.limits import LIMIT_SINE, NEAR_LIMIT
 
 from . import records as k
-from .cautions import energy_balance
+from .cautions import energy_balance, twists
 from .events import Event, RunInterrupted, show_progress
 from .locating import SAME
 from .prepared import Run, verdict
@@ -50,8 +50,10 @@ def solve(run: Run, method: str | type[OdeSolver], options: dict[str, Any], prog
     table = np.array(values).reshape(-1, len(names))
     if not code:
         message = energy_balance(names, table, run.settings.tolerance)
+    time = np.array([t for t, _, _ in rows])
+    message = "; ".join(filter(None, (message, twists(run.mechanism, time, table))))
     trajectory = Trajectory(
-        time=np.array([t for t, _, _ in rows]),
+        time=time,
         values=table,
         names=names,
         status=code,

@@ -18,7 +18,7 @@ from linkwork.mechanism import Mechanism
 from ..mechanisms import InitialState, Parameters, find_mechanism
 from ..numerics.workers import record_interrupts
 from .angles import WholeTurns
-from .cautions import MANY_STEPS, disturbance_rates, energy_balance, is_too_slow, stiffness
+from .cautions import MANY_STEPS, disturbance_rates, energy_balance, is_too_slow, stiffness, twists
 from .equations import OUTPUTS, compile_outputs, machine
 from .events import Event, RunInterrupted, show_progress
 from .inputs import Encoded, Inputs, align, check_run, compile_function, compile_source, encode_once
@@ -212,7 +212,7 @@ class Run:
             message += self.describe_undefined_forces(x)
         values = turns.put_back(compute_outputs(self.mechanism, problem.modes, batch.p[0], states, forces))
         balance = "" if code else energy_balance(self.mechanism.output_names, values, self.settings.tolerance)
-        message = "; ".join(filter(None, (message, stiff, balance)))
+        message = "; ".join(filter(None, (message, stiff, balance, twists(self.mechanism, times, values))))
         trajectory = Trajectory(
             time=times,
             values=values,

@@ -54,6 +54,8 @@ class Freedom(NamedTuple):
         Increase of the coordinate after which the mechanism is in the same configuration; 0 if there is none.
     swings : bool
         Whether the degree of freedom is a rotation that nothing drives, as of a pendulum, and therefore no crank.
+    coupled : bool
+        Whether a spring joins the rotation to others: a whole turn of it alone winds the spring up.
     """
 
     coordinate: str
@@ -62,6 +64,7 @@ class Freedom(NamedTuple):
     mode: Mode | None = None
     period: float = 0.0
     swings: bool = False
+    coupled: bool = False
 
 
 class Channel(NamedTuple):

@@ -63,6 +63,10 @@ ROLES = {
     "joint force": ("output", "component of the force in a joint, in the order of the axes"),
     "guide force": ("output", "force of a guide across it"),
     "transmission": ("output", "transmission angle: the links lock where its sine is zero"),
+    "twist": (
+        "output",
+        "angle of a spring whose whole turns nothing counts: its torque jumps where it passes half a turn",
+    ),
     "residual": ("output", "zero but for error"),
 }
 
@@ -129,8 +133,9 @@ class Variable(NamedTuple):
 
     @property
     def wraps(self) -> bool:
-        """Return whether the variable is the angle of a link, which may jump by 2 pi."""
-        return self.minimum is not None and self.minimum in (-pi, -2.0 * pi) and self.maximum == -self.minimum
+        """Return whether the variable is the angle of a link or of a spring, which may jump by 2 pi."""
+        bounded = self.minimum is not None and self.minimum in (-pi, -2.0 * pi) and self.maximum == -self.minimum
+        return bounded or self.role == "twist"
 
 
 def parameter(

@@ -14,6 +14,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from scipy import integrate
 
 from analysis.files import entry_names
 from analysis.linear import linearise
@@ -22,7 +23,7 @@ from analysis.linkages.builder import Builder
 from analysis.linkages.description import Body, FreedomTable, Gear, Rack, Slide, Slot, Spring
 from analysis.linkages.structure import Pin, Slider
 from analysis.mechanisms import check
-from analysis.periodic import find_orbit
+from analysis.periodic import Drive, find_orbit, newton_orbit
 from analysis.run import Inputs, Trajectory, load_case, simulate
 from linkwork.errors import InputError, LinkworkError, ParameterError
 from linkwork.plant import Plant
@@ -838,3 +839,146 @@ def test_a_spring_near_half_a_turn_is_twisted_little() -> None:
             zip(made.output_names, made.equations.outputs(made.state(known.initial), made.idle_inputs(p), 0.0, p))
         )
         assert abs(found["tie.turn"]) == pytest.approx(np.deg2rad(4.0))
+
+
+def coupled(name: str, **values: Any) -> Any:
+    """A rotor on an elastic coupling to a drum with a brake of 220 N.m, more than the coupling holds at half a turn."""
+    built = linkage(name, ground={"A": (0, 0), "K": (0, 0)}).body("rotor", points={"A": (0, 0)}, mass=1, inertia=0.3)
+    built.body("drum", points={"K": (0, 0)}, mass=1, inertia=2.0)
+    built.spring("coupling", bodies=("rotor", "drum"), stiffness="60 N*m/rad", damping="3 N*m*s/rad", **values)
+    built.spring("brake", at="K", law="220*tanh(v/0.05)")
+    return built.freedom("rotor", "A", speed="60 rpm").freedom("drum", "K", driven=False)
+
+
+def test_a_coupling_of_two_counted_bodies_winds_up_beyond_half_a_turn() -> None:
+    made = coupled("wound-coupling", free="20 deg").mechanism()
+    run = simulate(made.first_set.parameters, Inputs(speed=2.0 * math.pi), stop_time=2.0, step=0.01, tolerance=1e-10)
+
+    def rates(t: float, y: Any) -> Any:
+        torque = 60.0 * (y[0] - 2.0 * math.pi * t - math.radians(20.0)) + 3.0 * (y[1] - 2.0 * math.pi)
+        return y[1], -(torque + 220.0 * math.tanh(y[1] / 0.05)) / 2.0
+
+    wanted = integrate.solve_ivp(rates, (0.0, 2.0), (0.0, 0.0), "Radau", run.time, rtol=1e-9, atol=1e-10)
+    assert np.abs(run["coupling.turn"]).max() > 1.3 * math.pi
+    np.testing.assert_allclose(run["drum.angle"], wanted.y[0], atol=1e-6)
+    # without whole turns, which are taken of both angles alike although one is short of them
+    turns = 3000.0 * math.pi
+    at = {"rotor_angle": turns + 0.05, "drum_angle": turns - 0.05}
+    late, early = (
+        simulate(made.first_set.parameters, Inputs(speed=2.0 * math.pi), initial=made.initial(**initial), stop_time=0.5)
+        for initial in (at, {"rotor_angle": 0.05, "drum_angle": -0.05})
+    )
+    np.testing.assert_allclose(late["coupling.turn"], early["coupling.turn"], atol=1e-6)
+    np.testing.assert_allclose(late["drum.angle"], turns + early["drum.angle"], atol=1e-6)
+
+
+def test_a_coupling_of_gears_counts_their_turns() -> None:
+    """A shaft from a crank to a wheel that its own pinion turns twice as fast the other way."""
+    built = linkage("geared-shaft", ground={"A": (0, 0), "B": ("0.1 m", 0)})
+    built.body("pinion", points={"A": (0, 0)}, mass=1, inertia=0.1).body(
+        "wheel", points={"B": (0, 0)}, mass=1, inertia=0.1
+    )
+    built.gear("teeth", bodies=("pinion", "wheel"), ratio=-2.0, phase="30 deg")
+    built.spring("shaft", bodies=("pinion", "wheel"), stiffness="2 N*m/rad", free="10 deg")
+    made = built.freedom("pinion", "A", speed="60 rpm").mechanism()
+    run = simulate(made.first_set.parameters, Inputs(speed=2.0 * math.pi), stop_time=1.0, step=0.01)
+    wanted = -3.0 * run["pinion.angle"] + math.radians(20.0)
+    np.testing.assert_allclose(run["shaft.turn"], wanted, atol=1e-9)
+    np.testing.assert_allclose(run["energy.potential"], wanted**2, atol=1e-6)
+    assert not made.cyclic_freedoms
+
+
+def test_a_coupling_has_periodic_motions_in_which_both_its_ends_turn() -> None:
+    made = coupled("periodic-coupling").mechanism()
+    with pytest.raises(InputError, match=r"a spring joins rotor\.angle and drum\.angle.*ratios = \{'drum\.angle': 1\}"):
+        newton_orbit(made.first_set.parameters, Drive(speed=2.0 * math.pi))
+    orbit = newton_orbit(made.first_set.parameters, Drive(speed=2.0 * math.pi, ratios={"drum.angle": 1}))
+    assert orbit.start[0] == pytest.approx(-220.0 / 60.0, rel=1e-9)
+
+
+def arm(name: str, **spring: Any) -> Any:
+    """A crank that swings an arm from 66 to 182 deg, with a spring at the arm's bearing E."""
+    built = linkage(name, ground={"A": (0, 0), "E": ("420 mm", "40 mm")}).body("crank", bar=("A", "B"), length="40 mm")
+    built.body("rod", bar=("B", "F"), length="410 mm", mass=0.3, inertia=3e-3)
+    built.body("arm", bar=("E", "F"), length="52 mm", mass=0.5, inertia=1e-2)
+    return built.spring("blade", at="E", **spring).freedom("crank", "A", speed="45 rpm")
+
+
+@pytest.mark.parametrize(
+    "law",
+    [
+        {"law": "c*(x - x0)", "constants": {"c": "1 N*m/rad", "x0": "130 deg"}},
+        {"law": [["40 deg", -math.pi / 2.0], ["220 deg", math.pi / 2.0]]},
+    ],
+)
+def test_a_law_of_an_angle_that_passes_half_a_turn_is_that_of_a_spring(law: Any) -> None:
+    runs = []
+    for n, spring in enumerate(({"stiffness": "1 N*m/rad", "free": "130 deg"}, law)):
+        arm(f"swung-{n}-{len(law)}", **spring).mechanism()
+        runs.append(simulate(f"swung-{n}-{len(law)}", stop_time="1.3 s"))
+    assert np.degrees(runs[1]["E.turn"]).max() > 181.0
+    np.testing.assert_allclose(runs[1]["blade.exerted_torque"], runs[0]["blade.exerted_torque"], atol=1e-9)
+    assert not runs[1].message
+
+
+@pytest.mark.parametrize("method", ["compiled", "DOP853"])
+def test_a_spring_whose_turns_nothing_counts_is_named_where_its_torque_jumps(method: str) -> None:
+    """At the bearing of the follower of a drag link, which goes round."""
+    built = linkage("drag-link", ground={"A": (0, 0), "D": ("50 mm", 0)}).body("crank", bar=("A", "B"), length="100 mm")
+    built.body("rod", bar=("B", "C"), length="110 mm", mass=1.0, inertia=1e-3)
+    built.body("follower", bar=("D", "C"), length="120 mm", mass=1.0, inertia=1e-3)
+    built.spring("hair", at="D", stiffness="0.1 N*m/rad").freedom("crank", "A", speed="60 rpm").mechanism()
+    run = simulate("drag-link", stop_time=1.0, **({} if method == "compiled" else {"method": method}))
+    assert "hair at t = 0." in run.message
+    assert "nothing counts the whole turns" in run.message
+
+
+def test_two_shafts_on_one_axis_are_joined_by_a_freedom_or_by_bodies() -> None:
+    """A rotor and a crank on one axis: joined at a pin K of both, or each in a bearing of its own."""
+    angles = []
+    for name, own in (("coaxial", "rotor"), ("coaxial-bearings", "ground")):
+        built = linkage(name, ground={"A": (0, 0), **({"K": (0, 0)} if own == "ground" else {})})
+        built.body("rotor", points={"A": (0, 0), **({"K": (0, 0)} if own == "rotor" else {})}, mass=1.0, inertia=0.3)
+        built.body("crank", bar=("K", "B"), length="35 mm", mass=4.0, cog=(0, 0), inertia=0.012)
+        built.body("rod", bar=("B", "C"), length="140 mm", mass=0.7, inertia=2e-3).body(
+            "piston", points={"C": (0, 0)}, mass=2
+        )
+        built.slide("G", body="piston", through="A").freedom("rotor", "A", speed="600 rpm")
+        place = {"at": "K"} if own == "rotor" else {"bodies": ("rotor", "crank")}
+        built.spring("coupling", stiffness="400 N*m/rad", **place)
+        built.freedom("twist", "K", driven=False, **({} if own == "rotor" else {"speed": "600 rpm"})).mechanism()
+        run = simulate(name, stop_time=0.2, tolerance=1e-11)
+        angles.append(run["twist.angle"] + (run["rotor.angle"] if own == "rotor" else 0.0))
+    np.testing.assert_allclose(angles[0], angles[1], atol=1e-7)
+
+
+def test_a_gear_on_a_rocker_is_refused_with_the_reason() -> None:
+    built = linkage("sector", ground={"A": (0, 0), "D": (0.15, 0), "H": (0.3, 0)})
+    built.body("crank", bar=("A", "B"), length=0.05).body("coupler", bar=("B", "C"), length=0.15)
+    built.body("rocker", bar=("D", "C"), length=0.12, mass=1.0).body("pinion", points={"H": (0, 0)}, mass=1.0)
+    built.gear("Z", bodies=("rocker", "pinion"), ratio=-2.0).freedom("crank", "A")
+    with pytest.raises(
+        LinkworkError, match=r"by linkage\.gears\.Z pinion is in the teeth of rocker, whose angle must follow"
+    ):
+        built.mechanism()
+
+
+def test_friction_at_a_pin_of_three_bodies_says_what_to_do() -> None:
+    built = linkage("rubbed", ground={"A": (0, 0), "D": (0.15, 0), "H": (0.3, 0)}, friction={"B2": "1 mm"})
+    built.body("crank", bar=("A", "B"), length=0.05).body("rocker", bar=("D", "C"), length=0.12, mass=1.0)
+    built.body("coupler", bar=("B", "C"), length=0.15).body("other", bar=("B", "G"), length=0.3)
+    built.body("lever", bar=("H", "G"), length=0.1).freedom("crank", "A")
+    with pytest.raises(
+        LinkworkError, match="B is of crank, coupler, other: give the other a point of its own at the same"
+    ):
+        built.mechanism()
+
+
+def test_a_slot_whose_two_pins_coincide_has_no_direction() -> None:
+    built = linkage("folded", ground={"A": (0, 0), "D": ("100 mm", 0)}).body("crank", bar=("A", "B"), length="100 mm")
+    built.body("lever", points={"D": (0, 0)}, mass=1.0, inertia=0.01).slot("S", pin="B", on="lever", through="D")
+    built.freedom("crank", "A", start="1e-9 rad")
+    with pytest.raises(
+        LinkworkError, match=r"linkage\.slots\.S has no direction at the start: the pins . and . are at one"
+    ):
+        built.mechanism()

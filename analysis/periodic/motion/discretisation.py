@@ -216,6 +216,7 @@ def operating_point(parameters: Parameters, drive: Drive) -> OperatingPoint:
     mechanism = find_mechanism(parameters)
     constants = np.array(parameters.constants())
     point = OperatingPoint(parameters, drive, mechanism, drive.flow(mechanism), drive.vector(mechanism), constants)
+    coupled = [freedom.coordinate for freedom in mechanism.freedoms if freedom.coupled]
     known, names = mechanism.first_set.parameters, (*mechanism.names("ratio"), *mechanism.names("law"))
     changed = [name for name in names if getattr(parameters, field_name(name)) != getattr(known, field_name(name))]
     if changed and not _repeats(point):
@@ -224,11 +225,16 @@ def operating_point(parameters: Parameters, drive: Drive) -> OperatingPoint:
             f"{values}: the period of a {mechanism.name} is that of its description, after which this one is not the same; "
             "describe it with its own values"
         )
+    if coupled and not _repeats(point):
+        raise InputError(
+            f"a spring joins {' and '.join(coupled)}, which every common period of this drive winds up further: say how often "
+            f"each turns for each turn of the crank, as in ratios = {{{coupled[-1]!r}: 1}}"
+        )
     return point
 
 
 def _repeats(point: OperatingPoint) -> bool:
-    """Return whether the equations of motion repeat after a common period, and after a whole turn of each free angle.
+    """Return whether the equations repeat after a common period, and after a whole turn of each free angle that is not coupled.
 
     The result is also True if the links can be joined at none of the angles tried.
     """
@@ -237,9 +243,7 @@ def _repeats(point: OperatingPoint) -> bool:
     way = np.zeros(mechanism.size)
     way[flow.crank] = flow.period
     way[list(flow.others)] = flow.period * point.vector[flow.held + rates :]
-    turned = [
-        np.eye(mechanism.size)[n] * mechanism.freedoms[n].period for n in flow.free if mechanism.freedoms[n].period
-    ]
+    turned = [np.eye(mechanism.size)[n] * period for n, period in zip(flow.free, flow.ways[: len(flow.free)]) if period]
     x, found = np.array(mechanism.state(mechanism.first_set.initial)), []
     for share in (0.1234, 0.3719, 0.6283, 0.8871):
         for own in (way, *turned):

@@ -135,7 +135,8 @@ class Flow:
     rest : ndarray, shape (n,)
         y with the coordinates at which the mechanism starts by default, and rates of zero.
     ways : ndarray, shape (n,)
-        Period of each component of y: for an angle the rotation after which the mechanism is the same, otherwise 0.
+        Period of each component of y: for an angle the rotation after which the mechanism is the same, otherwise 0. It is 0
+        for an angle that a spring couples to others, too: a whole turn of it alone winds the spring up.
     swinging : dict of str to int
         Indices in y of the coordinates of undriven links that may go round, by FMI name.
     """
@@ -177,7 +178,7 @@ class Flow:
         initial = mechanism.state(mechanism.initial())
         self.rest, self.ways = np.zeros(self.size), np.zeros(self.size)
         self.rest[:free] = [initial[n] for n in self.free]
-        self.ways[:free] = [freedom.period for freedom in freedoms]
+        self.ways[:free] = [0.0 if freedom.coupled else freedom.period for freedom in freedoms]
         self.swinging = {freedom.coordinate: place for place, freedom in enumerate(freedoms) if freedom.swings}
         self.inputs = self.motors = len(mechanism.channels)
         self.held = self.motors + len(MOTOR) * len(mechanism.torques)
@@ -197,6 +198,10 @@ class Flow:
     def turns(self) -> int:
         """Return the number of turns of the crank in the common period: more than one if other cranks or gears need several."""
         return max(1, round(self.period / (2.0 * pi)))
+
+    def turn(self, place: int) -> float:
+        """Return the rotation (rad) after which the freedom whose coordinate is component ``place`` of y is back."""
+        return self.mechanism.freedoms[self.free[place]].period
 
     def addresses(self, *which: int, switched: bool = False) -> NDArray[np.int64]:
         """Return the addresses of all functions of the flow, ordered by index; 0 for a function that is not compiled.

@@ -279,7 +279,7 @@ class PeriodicOrbit(NotebookResult):
         """Number of whole turns per period of each undriven link that goes round, by the FMI name of its coordinate."""
         flow, paces = self.flow, self.flow.paces(self.point.vector)
         way = flow.period * self.turns
-        return {name: round(paces[name] * way / flow.ways[i]) for name, i in flow.swinging.items() if name in paces}
+        return {name: round(paces[name] * way / flow.turn(i)) for name, i in flow.swinging.items() if name in paces}
 
     @property
     def swing(self) -> tuple[str, str]:
@@ -491,7 +491,7 @@ def _count_rounds(point: OperatingPoint, start: FloatArray, turns: int) -> dict[
     if not swinging:
         return {}
     shift = point.period(start, turns).shift
-    return {name: times for name, i in swinging.items() if (times := round(shift[i] / flow.ways[i]))}
+    return {name: times for name, i in swinging.items() if (times := round(shift[i] / flow.turn(i)))}
 
 
 def approach_orbit(
