@@ -64,8 +64,9 @@ def check_ending(path: Path, known: Sequence[str]) -> str:
 @contextmanager
 def write_completely(path: Path) -> Iterator[Path]:
     """Yield a temporary path as `written_whole`; create the folder, and raise WritingError if the file cannot be written."""
+    prepare(path)
     try:
-        with written_whole(prepare(path)) as part:
+        with written_whole(path) as part:
             yield part
     except OSError as error:
         raise WritingError(f"{path} cannot be written: {error.strerror or error}") from error

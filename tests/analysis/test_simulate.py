@@ -10,6 +10,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import replace
 from math import nan, pi, radians
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -478,7 +479,7 @@ def test_a_run_cut_into_small_calls_is_the_same_run(case: str, monkeypatch: pyte
         calls.append(1)
         original(*arguments)
 
-    monkeypatch.setattr(compiled, "run", counted)
+    monkeypatch.setattr(compiled, "run", SimpleNamespace(unchecked=counted))
     for steps_per_call in (1, 3):
         monkeypatch.setattr(solver, "STEPS_PER_CALL", steps_per_call)
         # room for the events of one step only
@@ -660,7 +661,7 @@ def test_right_hand_side_that_the_step_size_cannot_resolve() -> None:
     assert np.all(np.isfinite(ours.values))
 
 
-def _interrupting(after: int) -> Callable[..., None]:
+def _interrupting(after: int) -> SimpleNamespace:
     original = compiled.run
     calls = []
 
@@ -670,7 +671,7 @@ def _interrupting(after: int) -> Callable[..., None]:
             raise KeyboardInterrupt
         original(*arguments)
 
-    return run
+    return SimpleNamespace(unchecked=run)
 
 
 def test_interrupt_keeps_the_data(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -701,7 +702,7 @@ def test_interrupt_in_the_last_call_is_not_forgotten(monkeypatch: pytest.MonkeyP
         original(*arguments)
 
     before = signal.getsignal(signal.SIGINT)
-    monkeypatch.setattr(compiled, "run", run)
+    monkeypatch.setattr(compiled, "run", SimpleNamespace(unchecked=run))
     with pytest.raises(RunInterrupted, match=r"interrupted at t = 0\.12 s") as caught:
         table_3_1()
     monkeypatch.undo()

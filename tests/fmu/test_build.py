@@ -99,7 +99,7 @@ def test_two_builds_are_the_same_archive(tmp_path: Path, model: Model, monkeypat
 
 def changes_of(folder: str, text: str, other: str) -> dict[str, tuple[Changes, bool]]:
     """Return changes of a mechanism's sources by name, and whether each keeps the GUID, which follows the interface alone."""
-    variables, residual = f"linkwork/{folder}/variables.py", '"closure.residual", "m"'
+    variables, shared, residual = f"linkwork/{folder}/variables.py", "linkwork/variables.py", '"closure.residual", "m"'
     return {
         "nothing": ({}, True),
         "constant": ({"linkwork/friction.py": ("FRICTION_SPEED = 1e-3", "FRICTION_SPEED = 2e-3")}, True),
@@ -108,8 +108,8 @@ def changes_of(folder: str, text: str, other: str) -> dict[str, tuple[Changes, b
             True,
         ),
         "description": ({variables: (text, other)}, True),
-        "name": ({variables: (residual, '"closure.gap", "m"')}, False),
-        "unit": ({variables: (residual, '"closure.residual", "1"')}, False),
+        "name": ({shared: (residual, '"closure.gap", "m"')}, False),
+        "unit": ({shared: (residual, '"closure.residual", "1"')}, False),
     }
 
 
@@ -163,8 +163,7 @@ def test_failed_build_leaves_the_old_fmu(tmp_path: Path, fmu: Path, model: Model
     dest.mkdir()
     shutil.copy2(fmu, dest)
     # a name that the naming convention does not allow: what is built would not be valid
-    variables = f"linkwork/{model.plant}/variables.py"
-    broken = changed_sources(tmp_path, {variables: ('"closure.residual"', '"closure residual"')})
+    broken = changed_sources(tmp_path, {"linkwork/variables.py": ('"closure.residual"', '"closure residual"')})
     with pytest.raises(BuildError):
         build(FMUS[model.name], dest, broken)
     assert [path.name for path in dest.iterdir()] == [fmu.name]
