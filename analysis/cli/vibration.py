@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from typing import Any
 
 import click
@@ -346,8 +347,8 @@ def stability(
     ranges, missing = [], None
     if charted:
         axes = (
-            (x, x_range, "--x", lambda: default_variable(mechanism, drive)),
-            (y, y_range, "--y", lambda: damping_name(mechanism)),
+            (x, x_range, "--x", partial(default_variable, mechanism, drive)),
+            (y, y_range, "--y", partial(damping_name, mechanism)),
         )
         for own, texts, option, default in axes:
             name = own or ""
