@@ -21,6 +21,7 @@ from analysis.linear import linearise
 from analysis.linkages import Dyad, Package, RackStep, laws, linkage, load_linkage, reach, read_description
 from analysis.linkages.builder import Builder
 from analysis.linkages.description import Body, FreedomTable, Gear, Rack, Slide, Slot, Spring
+from analysis.linkages.parameters import spring_angle_name
 from analysis.linkages.structure import Pin, Slider
 from analysis.mechanisms import check
 from analysis.periodic import Drive, find_orbit, newton_orbit
@@ -77,6 +78,13 @@ def assembled(
     raise AssertionError("no assembly gives the places")
 
 
+def whole_turns(package: Package, outputs: dict[str, float]) -> dict[str, int]:
+    """Whole turns in the angle of each torsion spring, which the places of the bodies do not tell."""
+    d = package.description
+    names = {name: f"{name}.turn" if s.bodies else spring_angle_name(d, name) for name, s in d.springs.items()}
+    return {name: round(outputs[of] / math.tau) for name, of in names.items() if of in outputs}
+
+
 def compared(
     seed: int, folder: Path, kinds: tuple[str, ...] = KINDS, dyads: tuple[int, int] = (1, 4), **changes: Any
 ) -> Package:
@@ -107,13 +115,14 @@ def compared(
         points = {own: (values[f"{own}.load_x"], values[f"{own}.load_y"]) for own in (load.point for load in d.loads)}
         if made.equations.clearance(x, i, p) < 0.0:  # friction may jam the linkage
             continue
+        out = dict(zip(made.output_names, made.equations.outputs(x, i, 0.0, p)))
+        oracle.turns = whole_turns(package, out)
         wanted = oracle.solve(q, rates, loads, commanded, points, forces)
         m = equations.motion(x, i, p)
         # near the limit of assembly both lose digits alike
         near = 1e-9 / min(1.0, equations.places(x, p).clearance) ** 3
         np.testing.assert_allclose(m.accelerations, wanted.accelerations, rtol=near, atol=near * 10)
         np.testing.assert_allclose(m.loads, wanted.loads, rtol=near, atol=near * 10)
-        out = dict(zip(made.output_names, made.equations.outputs(x, i, 0.0, p)))
         assert out["energy.kinetic"] == pytest.approx(wanted.kinetic, rel=1e-9)
         scale = 1.0 + max(float(np.abs(f).max()) for f in wanted.forces.values())
         for r in package.motion.reactions:

@@ -64,6 +64,8 @@ class Multipliers:
         self.owners = owners
         self.rows: dict[str, tuple[int, int]] = {}
         self._functions: dict[Any, Any] = {}
+        #: Whole turns in the angles of torsion springs, where the linkage counts them.
+        self.turns: dict[str, int] = {}
         rows: list[Any] = []
 
         def closed(name: str, *equations: Any) -> None:
@@ -253,7 +255,7 @@ class Multipliers:
             about = s.bodies or s.at in self.owners
             if about and s.at not in freed:
                 # an angle that is no freedom's coordinate is known only up to whole turns
-                x = casadi.atan2(casadi.sin(x), casadi.cos(x))
+                x = casadi.atan2(casadi.sin(x), casadi.cos(x)) + 2.0 * np.pi * self.turns.get(name, 0)
             known = {own: value for own, (value, _) in s.constants.items()}
             functions = {"fabs": casadi.fabs, "tanh": casadi.tanh}
             if isinstance(s.law, tuple):
