@@ -202,7 +202,7 @@ def run_page(name, tmp_path):
 @pytest.mark.long
 def test_the_page_from_a_hand_drawn_curve_to_an_fmu_runs_and_says_what_is_so(tmp_path):
     commands, checked, printed = run_page("hand-drawn-to-fmu.md", tmp_path)
-    assert (commands, checked) == (9, 43)
+    assert (commands, checked) == (9, 45)
     # what the prose says
     rows = {tuple(words[:3]): words for words in printed if words[:1] == ["slider,"]}
     three = float(rows["slider,", "3", "harmonics"][3])
