@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from math import degrees
 from pathlib import Path
@@ -175,7 +175,7 @@ def _print_extremes(title: str, result: Any) -> None:
     """Print least, greatest and last value of each output of a run, where the extremes are, and the events of the run."""
     from ..mechanisms import residual_outputs
 
-    at, places = _places(result)
+    at, place = _places(result)
     headings = ("output", "unit", "least", at, "greatest", at, "at the end")
     columns = list(_with_magnitudes(result))
     largest: dict[str, float] = {}
@@ -189,7 +189,7 @@ def _print_extremes(title: str, result: Any) -> None:
             f"{factor * v if abs(v) > _ROUNDING * largest[si] else 0.0:.{digits}g}" for v in (x.min(), x.max(), x[-1])
         ]
         varies = x.max() - x.min() > _ROUNDING * largest[si]
-        least, greatest = (places[x.argmin()], places[x.argmax()]) if varies else ("", "")
+        least, greatest = (place(x.argmin()), place(x.argmax())) if varies else ("", "")
         rows.append((name, unit, numbers[0], least, numbers[1], greatest, numbers[2]))
     show_table(
         f"{title}  ({result.source}, {len(result)} samples to t = {result.time[-1]:.6g} s)",
@@ -201,8 +201,8 @@ def _print_extremes(title: str, result: Any) -> None:
         console.print(f"{event.name} at t = {event.time:.9g} s", highlight=False)
 
 
-def _places(result: Any) -> tuple[str, list[str]]:
-    """Return what tells the samples of a run apart, with its unit, and this of each sample, as texts.
+def _places(result: Any) -> tuple[str, Callable[[Any], str]]:
+    """Return what tells the samples of a run apart, with its unit, and a function that returns it of a sample, as text.
 
     It is the crank angle, within a turn, of a mechanism with one crank that moves; else the time.
     """
@@ -213,8 +213,8 @@ def _places(result: Any) -> tuple[str, list[str]]:
         crank = mechanism.freedoms[mechanism.cyclic_freedoms[0]]
         angle = result[crank.coordinate]
         if angle.max() > angle.min():
-            return "at [deg]", [f"{round(degrees(value), 1) % degrees(crank.period):.1f}" for value in angle]
-    return "at [s]", [f"{time:.4g}" for time in result.time]
+            return "at [deg]", lambda n: f"{round(degrees(angle[n]), 1) % degrees(crank.period):.1f}"
+    return "at [s]", lambda n: f"{result.time[n]:.4g}"
 
 
 def _with_magnitudes(result: Any) -> Iterator[tuple[str, Any, str]]:

@@ -374,16 +374,15 @@ def stability(
         print_paths(save_picture(figures.picture(found, title=chosen.case.title), stem, html=html))
         say("its boundaries follow; after Ctrl-C the picture stays without them")
 
+    axis_names = (names[0], names[1])
     found = stability_chart(
         parameters,
         drive,
-        (names[0], names[1]),
+        axis_names,
         (ranges[0], ranges[1]),
         points=points,
         start=start,
-        beside=linear_motion(parameters, drive, (names[0], names[1]))
-        if find_mechanism(parameters) is FIVE_BAR
-        else None,
+        beside=linear_motion(parameters, drive, axis_names) if mechanism is FIVE_BAR else None,
         coexisting=coexisting,
         n_jobs=jobs,
         progress=console.is_terminal,

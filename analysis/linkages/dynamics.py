@@ -36,7 +36,7 @@ class Motion:
         self.description, self.structure, self.interface = interface.description, interface.structure, interface
         self.n = len(interface.drives)
         self.along = springs_by_freedom(self.description, interface)
-        self.counted = counted
+        self.counted, self.middled = counted, interface.middled(counted)
         self.bodies = self.structure.bodies
         self.reactions: list[Reaction] = []
         #: steps with racks, in the order in which their forces are computed
@@ -72,7 +72,7 @@ class Motion:
                     if name in self.counted:
                         rows.append(f"{stretch} = {self.counted[name].angle}{f'{free}_angle' if free else ''}")
                     else:
-                        middle = f"p.{name}_MIDDLE + " if name in self.interface.middled(self.counted) else ""
+                        middle = f"p.{name}_MIDDLE + " if name in self.middled else ""
                         angle = f"p.{name}_COS, p.{name}_SIN" if free or middle else "1.0, 0.0"
                         rows.append(f"{stretch} = {middle}turn_difference({one}, {other}, {angle})")
                     rows.append(f"{rate} = {other}.w - {one}.w")

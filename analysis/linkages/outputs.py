@@ -87,11 +87,10 @@ class Outputs:
             yield Output(f"{name}.position", "m", text, "*POSITION", f"{name}_position")
             rest = f'*RATE, rate_of="{name}.position"'
             yield Output(f"{name}.velocity", "m/s", "Its rate", rest, f"{name}_velocity")
-        middled = self.interface.middled(self.motion.counted)
         for name, spring in self.description.springs.items():
             shown = f"*POSITION, {_DEGREES}"
             if name not in self.motion.counted:
-                shown = shown if name in middled else _WRAPPED
+                shown = shown if name in self.motion.middled else _WRAPPED
                 shown += f', role="twist", of="{name}"' if needs_turns(spring) else ""
             if spring.between:
                 free = f" + p.{name}_free_length" if is_given(spring.free) else ""

@@ -342,7 +342,7 @@ class Package:
 
     def _described_angles(self, equations: str) -> dict[str, float]:
         """Return the angles of the springs of `Interface.middled` in the described pose (rad); empty if there is none."""
-        names = self.interface.middled(self.motion.counted)
+        names = self.motion.middled
         if not names:
             return {}
         module: dict[str, Any] = {"__name__": self.description.name}
