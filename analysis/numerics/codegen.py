@@ -95,14 +95,14 @@ class MachineCode:
         triple, cpu = binding.get_default_triple(), binding.get_host_cpu_name()
         features = binding.get_host_cpu_features().flatten()
         digest = hashlib.sha256(
-            f"{llvmlite.__version__} {triple} {cpu} {features} {lanes} {rows} {shared}".encode() + _own_source()
+            f"{llvmlite.__version__} {triple} {cpu} {features} {lanes} {rows} {shared}".encode() + own_source()
         )
         digest.update(" ".join(function.serialize() for function in functions).encode())
         self.fingerprint = digest.hexdigest()
         machine = binding.Target.from_default_triple().create_target_machine(
             opt=3, jit=True, cpu=cpu, features=features
         )
-        code = _load_or_make(self.fingerprint, lambda: _compile(functions, lanes, rows, shared, triple, machine))
+        code = load_or_make(self.fingerprint, lambda: _compile(functions, lanes, rows, shared, triple, machine))
         engine = binding.create_mcjit_compiler(binding.parse_assembly(f'target triple = "{triple}"'), machine)
         engine.add_object_file(binding.ObjectFileRef.from_data(code))
         engine.finalize_object()
@@ -117,7 +117,7 @@ def _compile(
     module = ir.Module("linkwork")
     module.triple = triple
     for function in functions:
-        _Writer(module, function, lanes, function.name() in rows, shared).write()
+        Writer(module, function, lanes, function.name() in rows, shared).write()
     parsed = binding.parse_assembly(str(module))
     passes = binding.create_pass_builder(machine, binding.create_pipeline_tuning_options(speed_level=2))
     passes.getModulePassManager().run(parsed, passes)
@@ -126,11 +126,12 @@ def _compile(
 
 
 @cache
-def _own_source() -> bytes:
+def own_source() -> bytes:
+    """Return the sources of this module and of `lanes`, on which machine code depends."""
     return Path(__file__).read_bytes() + Path(vectors.__file__).read_bytes()
 
 
-def _load_or_make(key: str, make: Callable[[], bytes]) -> bytes:
+def load_or_make(key: str, make: Callable[[], bytes]) -> bytes:
     """Return the object file for a key, from disk or newly made; its hash is checked, as LLVM crashes on a damaged file."""
     path = code_folder("llvm") / key
     with suppress(OSError):
@@ -185,15 +186,29 @@ def _prepare() -> None:
         binding.add_symbol(name, address)
 
 
-class _Writer:
-    """Translator of one CasADi function into LLVM code, added to a module."""
+class Writer:
+    """Translator of one CasADi function into LLVM code, added to a module.
 
-    def __init__(self, module: ir.Module, function: Any, lanes: int, in_rows: bool, shared: bool) -> None:
+    The arguments are those of `MachineCode`; ``own`` is true if the functions of `lanes` replace those of the C library for one
+    lane, too.
+    """
+
+    def __init__(
+        self,
+        module: ir.Module,
+        function: Any,
+        lanes: int = 1,
+        in_rows: bool = False,
+        shared: bool = False,
+        *,
+        own: bool = False,
+    ) -> None:
         self.module = module
         self.source = function
         self.lanes = lanes
         self.in_rows = in_rows and lanes > 1
         self.shared = shared and lanes > 1
+        self.own = own or lanes > 1
         self.kind = vectors.vector(lanes)
         self.reciprocals: dict[int, tuple[Any, Any]] = {}
         target = ir.Function(module, ir.FunctionType(ir.VoidType(), _ARGUMENTS), function.name())
@@ -264,7 +279,7 @@ class _Writer:
         return vectors.repeat_number(self.build, number, self.lanes)
 
     def _constant(self, value: float) -> Any:
-        return ir.Constant(self.kind, float(value) if self.lanes == 1 else [float(value)] * self.lanes)
+        return vectors.constant(self.kind, float(value))
 
     def _operation(self, code: int, operands: list[Any]) -> Any:
         operation = _operations().get(code, str(code))
@@ -276,13 +291,13 @@ class _Writer:
                 f"{self.source.name()}: CasADi's operation {operation} cannot be compiled; equations consist of "
                 "arithmetic and functions such as sin, sqrt, exp"
             )
-        if self.lanes > 1:
+        if self.own:
             return vectors.FUNCTIONS[name](*(vectors.Vector(self.build, value) for value in operands)).value
         name = _INTRINSICS.get(name, name)
         return self.build.call(vectors.declare_function(self.module, name, self.kind, len(operands)), operands)
 
     def _quotient(self, a: Any, b: Any) -> Any:
-        if self.lanes == 1:
+        if not self.own:
             return self.build.fdiv(a, b)
         # a division takes as long as sixteen products, and equations often divide by the same value again
         return self.build.fmul(a, self._reciprocal(b))

@@ -75,6 +75,11 @@ def vector(lanes: int, of: Any = DOUBLE) -> Any:
     return ir.VectorType(of, lanes) if lanes > 1 else of
 
 
+def constant(kind: Any, number: float) -> Any:
+    """Return a constant of an LLVM type: a number, or a vector with the same number in each lane."""
+    return ir.Constant(kind, [number] * kind.count if isinstance(kind, ir.VectorType) else number)
+
+
 def repeat_number(build: Any, number: Any, lanes: int) -> Any:
     """Return a vector with the same number in each lane; for one lane, the number itself."""
     if lanes == 1:
@@ -84,7 +89,7 @@ def repeat_number(build: Any, number: Any, lanes: int) -> Any:
 
 
 class Vector:
-    """An LLVM vector whose Python operators write LLVM instructions; the other operand may be a number."""
+    """An LLVM vector, or number, whose Python operators write LLVM instructions; the other operand may be a Python number."""
 
     def __init__(self, build: Any, value: Any) -> None:
         self.build = build
@@ -92,12 +97,12 @@ class Vector:
 
     @property
     def lanes(self) -> int:
-        count: int = self.value.type.count
+        count: int = getattr(self.value.type, "count", 1)
         return count
 
     def as_vector(self, other: Any) -> Any:
         """Return an operand as an LLVM vector: a number is repeated in all lanes."""
-        return other.value if isinstance(other, Vector) else ir.Constant(self.value.type, [float(other)] * self.lanes)
+        return other.value if isinstance(other, Vector) else constant(self.value.type, float(other))
 
     def _make(self, value: Any) -> Vector:
         return Vector(self.build, value)
@@ -143,7 +148,8 @@ class Vector:
     def intrinsic(self, name: str, *others: Any) -> Vector:
         """Call one of LLVM's intrinsic functions with this vector and others as arguments."""
         kind = self.value.type
-        function = declare_function(self.build.module, f"llvm.{name}.v{kind.count}f64", kind, 1 + len(others))
+        full = f"llvm.{name}.{f'v{self.lanes}' * (self.lanes > 1)}f64"
+        function = declare_function(self.build.module, full, kind, 1 + len(others))
         return self._make(self.build.call(function, [self.value, *map(self.as_vector, others)]))
 
     def multiply_add(self, factor: Any, summand: Any) -> Vector:
@@ -168,7 +174,7 @@ class Vector:
 
     def longs(self, number: int) -> Any:
         """Return a vector with the same integer in each lane."""
-        return ir.Constant(vector(self.lanes, _LONG), [number] * self.lanes)
+        return constant(vector(self.lanes, _LONG), number)
 
     def polynomial(self, coefficients: tuple[float, ...]) -> Vector:
         """Evaluate a polynomial in this vector; the constant is the first coefficient."""
@@ -190,6 +196,8 @@ def lane_by_lane(name: str, *arguments: Vector) -> Vector:
     """Call a function of the C library for each lane; return the vector of its values."""
     build = arguments[0].build
     function = declare_function(build.module, name, DOUBLE, len(arguments))
+    if arguments[0].lanes == 1:
+        return Vector(build, build.call(function, [a.value for a in arguments]))
     result = ir.Constant(arguments[0].value.type, ir.Undefined)
     for place in range(arguments[0].lanes):
         lane = ir.Constant(ir.IntType(32), place)
@@ -330,6 +338,17 @@ def _log(x: Vector) -> Vector:
     result = x._make(x.as_vector(-inf)).where(x.equals(0.0), result)
     result = x._make(x.as_vector(nan)).where(x < 0.0, result)
     return result.where(x < inf, x + x).where(build.or_(x < inf, x.equals(inf)), x)
+
+
+def power(x: Vector, y: Vector) -> Vector:
+    """Return x to the power of y without the C library; the error in units in the last place is 2 more than 3 abs(y log(x))."""
+    build, one = x.build, x._make(x.as_vector(1.0))
+    shifted = y + _ROUNDER
+    odd = build.icmp_unsigned("!=", build.and_(shifted.bits(), x.longs(1)), x.longs(0))
+    result = _exp(y * _log(x.absolute()))
+    # of negative numbers there are whole powers
+    whole = (-result).where(odd, result).where((shifted - _ROUNDER).equals(y), x._make(x.as_vector(nan)))
+    return one.where(y.equals(0.0), whole.where(x < 0.0, result))
 
 
 # Inverses of circular functions

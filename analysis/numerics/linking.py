@@ -121,6 +121,26 @@ class NotingCompiler(KernelCompiler):
         super().__init__(typing_context, context, library, *rest)
 
 
+class _Unmade(_Part):
+    """Code of a kernel for another device, kept in its form before optimisation; no machine code of this processor is made."""
+
+    def _optimize_final_module(self) -> None:
+        self.noted = self._final_module.as_bitcode()
+
+
+class UnmadeCompiler(KernelCompiler):
+    """Compiler of kernels for another device."""
+
+    def __init__(self, typing_context: Any, context: Any, library: Any, *rest: Any) -> None:
+        super().__init__(typing_context, context, _Unmade(context.codegen(), "kernel"), *rest)
+
+
+def unmade_code(dispatcher: Any) -> tuple[bytes, str]:
+    """Return the LLVM code of a kernel that `UnmadeCompiler` has compiled, and the name of its function there."""
+    (result,) = dispatcher.overloads.values()
+    return result.library.noted, result.fndesc.llvm_func_name
+
+
 def portable_code(dispatcher: Any) -> bytes:
     """Return the code for any processor of a kernel that `NotingCompiler` has compiled."""
     (result,) = dispatcher.overloads.values()

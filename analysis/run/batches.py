@@ -53,6 +53,8 @@ class Task:
         Folder in which the result is saved.
     code : str
         Hash of all code that the result depends on.
+    device : str or None
+        "cuda" to solve the runs on a graphics processor.
     """
 
     mechanism: Mechanism
@@ -64,6 +66,7 @@ class Task:
     outputs: tuple[int, ...] | None
     folder: Path | None
     code: str
+    device: str | None = None
 
     def run(self, i: int) -> Run:
         """Return run i of the batch as a single `Run`."""
@@ -112,7 +115,7 @@ class PreparedBatch(NamedTuple):
     def digest(self, task: Task) -> str:
         """Return a hash of everything on which the result depends."""
         settings, e = task.settings, self.encoded
-        numbers = [settings.hold, settings.tolerance, settings.max_steps, *e.modes.values()]
+        numbers = [settings.hold, settings.tolerance, settings.max_steps, task.device, *e.modes.values()]
         digest = hashlib.sha256(
             f"{task.code} {task.mechanism.name} {task.outputs} {numbers} {sorted(self.failures)}".encode()
         )
@@ -212,7 +215,7 @@ def _integrate(
     ``samples`` receive states and channels, or the chosen outputs, at the sample times; NaN after the end of a run.
     """
     from ..numerics.vectors import LANES
-    from . import compiled, lanes
+    from . import compiled, lanes, on_device
     from . import records as k
     from .equations import machine
 
@@ -237,12 +240,14 @@ def _integrate(
     todo, steps, span = status == k.RUNNING, carries["steps"], np.ptp(settings.times)
     fits = _fits(batch, settings)
     code = machine(mechanism, switched, LANES).addresses
+    advance = partial(lanes.run_in_lanes, code, fits)
+    if task.device is not None:
+        advance = partial(on_device.run_on_device, on_device.solver(mechanism, switched))
     while todo.any() and not interrupts:
-        arguments = problem, source, own, watch, state, recorded, status, settings.max_steps, STEPS_PER_CALL
-        if (todo & fits).any():
-            lanes.run_in_lanes(code, fits, *arguments)
-        else:
-            compiled.run(*arguments)
+        one_by_one = task.device is None and not (todo & fits).any()
+        (compiled.run if one_by_one else advance)(
+            problem, source, own, watch, state, recorded, status, settings.max_steps, STEPS_PER_CALL
+        )
         todo = (status == k.RUNNING) & (steps < settings.max_steps)
         passed = carries["begin"] + carries["elapsed"] - settings.times[0]
         for i in np.flatnonzero(todo & is_too_slow(steps, passed, span, settings.max_steps)).tolist():

@@ -300,7 +300,7 @@ def make_room(states, outputs, inputs):
 
 
 @inner
-def _advance(motion, most):
+def advance(motion, most):
     """Integrate interval by interval until the run ends or pauses; return the status."""
     carry, watch = motion.carry, motion.watch
     full = watch.found.shape[0] - (1 + EVENTS_PER_STEP) * watch.table.shape[0]
@@ -418,7 +418,7 @@ def run(problem, source, batch, watch, state, samples, status, most, budget):
         if budget <= 0:
             return
         motion = lane_motion(i, problem, source, batch, watch, samples, room, state)
-        status[i] = _advance(motion, min(most, before + budget))
+        status[i] = advance(motion, min(most, before + budget))
         budget -= carry.steps - before
 
 

@@ -40,6 +40,8 @@ from .varied import vary as varied_sets
 
 #: Largest number of samples in a batch, if the caller does not choose the size of batches.
 _SAMPLES_OF_BATCH = 1 << 16
+#: The same for a graphics processor, which is busy with thousands of runs only.
+_SAMPLES_ON_DEVICE = 1 << 22
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -157,6 +159,7 @@ class EnsembleOptions(RunOptions, total=False):
     """Less common options of `simulate_many`."""
 
     batch: int | None
+    device: str | None
 
 
 @takes_published(inputs=complete_inputs, initial=complete_initial_state)
@@ -203,7 +206,11 @@ def simulate_many(
     ----------------
     batch : int, optional
         Number of runs that are prepared and solved together: by default a quarter of all runs, at most 128, or a sixteenth, at
-        most 256, whichever is more. It is smaller if the runs have many samples, but at least 16.
+        most 256, whichever is more. It is smaller if the runs have many samples, but at least 16. On a device it is as large
+        as 4 million samples allow.
+    device : str, optional
+        "cuda" to integrate all runs on a graphics processor of NVIDIA (extra ``cuda``), each in a thread of its own; inputs
+        that are functions of Python cannot be evaluated there.
     start_time, max_steps, progress
         As for `simulate`, like all arguments that are not described here.
 
@@ -256,6 +263,8 @@ def simulate_many(
     # what cannot be compiled is reported here, and not by a worker
     encoded = encode(all_inputs[0], mechanism)
     compile_source(encoded)
+    if on_device := _check_device(options.get("device"), n_jobs, any(chain.from_iterable(encoded.functions))):
+        n_jobs, batch = 1, batch or max(16, _SAMPLES_ON_DEVICE // len(settings.times))
     usual = max(min(128, len(parameters) // 4), min(256, len(parameters) // 16))
     # a multiple of 8 fills whole vectors
     batch = batch or max(16, min(usual, _SAMPLES_OF_BATCH // len(settings.times)) // 8 * 8)
@@ -271,6 +280,7 @@ def simulate_many(
             outputs=None if outputs is None else columns,
             folder=where,
             code=code,
+            device=on_device,
         )
         for k in range(0, len(parameters), batch)
     ]
@@ -389,6 +399,21 @@ def _hash_code(mechanism: Mechanism, parameters: Sequence[Parameters], functions
         *map(fingerprint, kernels),
     ]
     return " ".join([*ours, *(fingerprint(f) if f else "" for f in functions)])
+
+
+def _check_device(device: str | None, n_jobs: int | None, functions: bool) -> str | None:
+    """Check the options of an ensemble on a device, and whether its inputs have Python functions; return the device."""
+    if device is None:
+        return None
+    if device != "cuda":
+        raise InputError(f"device is {device!r}: it must be 'cuda', or left out")
+    if n_jobs not in (None, 1):
+        raise InputError(f"n_jobs is {n_jobs}: with a device the batches are solved one after the other, leave it out")
+    if functions:
+        raise InputError(
+            "inputs that are Python functions cannot be evaluated on a device: tabulate them, or leave out device"
+        )
+    return device
 
 
 def _check_runs(

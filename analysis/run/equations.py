@@ -179,11 +179,20 @@ def _compile(traces: TracedEquations, functions: Mapping[str, Any], lanes: int =
     """Compile the named expressions ``functions`` of the symbols of ``traces``; several lanes write outputs row by row."""
     from ..numerics.codegen import MachineCode
 
+    return MachineCode(_functions(traces, functions), lanes, _IN_ROWS)
+
+
+def _functions(traces: TracedEquations, expressions: Mapping[str, Any]) -> list[Any]:
+    """Return CasADi functions of the time and the symbols of ``traces``, by name, for `codegen.MachineCode`."""
     casadi = symbolic.library()
     arguments = [casadi.SX.sym("t"), *traces.symbols]
-    return MachineCode(
-        [casadi.Function(name, arguments, [e], {"cse": True}) for name, e in functions.items()], lanes, _IN_ROWS
-    )
+    return [casadi.Function(name, arguments, [e], {"cse": True}) for name, e in expressions.items()]
+
+
+def run_functions(mechanism: Mechanism, switched: bool = False) -> list[Any]:
+    """Return the equations that a run needs, as CasADi functions in the order of the indices DERIVATIVE to JUMP."""
+    traces = expressions(mechanism, switched)
+    return _functions(traces, {name: getattr(traces, name) for name in _NAMES})
 
 
 class Machine:

@@ -414,8 +414,8 @@ def test_machine_code_of_functions_is_kept_and_checked(tmp_path: Path, monkeypat
         written.append("")
         original(self, *arguments)
 
-    original = codegen._Writer.__init__
-    monkeypatch.setattr(codegen._Writer, "__init__", noted)
+    original = codegen.Writer.__init__
+    monkeypatch.setattr(codegen.Writer, "__init__", noted)
 
     def value(factor: float) -> float:
         code = MachineCode([function_of(lambda t, a, *_: factor * a[0])])

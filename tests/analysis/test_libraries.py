@@ -27,7 +27,7 @@ DEVELOPMENT = {"masters", "docs", "bench", "continuation", "mutation", "dev", "a
 
 def libraries(requirements: list[str]) -> set[str]:
     """Names of the modules of some requirements."""
-    modules = {"pillow": "PIL"}
+    modules = {"pillow": "PIL", "cupy-cuda12x": "cupy"}
     names = {re.match(r"[\w-]+", requirement)[0] for requirement in requirements}  # type: ignore[index]
     return {modules.get(name, name.replace("-", "_")) for name in names} - {"linkwork"}
 
@@ -56,7 +56,8 @@ def test_every_library_that_is_imported_is_declared_and_no_other() -> None:
 
 def test_the_extra_all_has_the_others() -> None:
     (everything,) = PROJECT["optional-dependencies"]["all"]
-    assert set(re.findall(r"\w+", everything)) - {"linkwork"} == set(EXTRAS)
+    # of use with a graphics processor only
+    assert set(re.findall(r"\w+", everything)) - {"linkwork"} == set(EXTRAS) - {"cuda"}
 
 
 BLOCKED = """
