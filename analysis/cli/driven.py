@@ -119,8 +119,8 @@ def add_case_options(command: Callable[..., None]) -> Callable[..., None]:
     return run_with_case
 
 
-def swing_unit(orbit: Any) -> tuple[str, float, str]:
-    """Return the name of the coordinate whose amplitude is printed, the factor from SI to its printed unit, and this unit."""
-    what, si = orbit.swing
+def swing_unit(orbit: Any, coordinate: int = 0) -> tuple[str, float, str]:
+    """Return the name of a free coordinate whose amplitude is printed, its printed unit's factor from SI, and this unit."""
+    what, si = orbit.swings[coordinate]
     unit, factor = display_scale(si)
     return what, factor, unit

@@ -42,7 +42,8 @@ def report_sensitivity(response: Any, factor: float, unit: str, path: str) -> li
     names = [
         name for name in gradient_names(*operation) if name != family.vary and parameter_value(*operation, name) != 0.0
     ]
-    what, size, length = swing_unit(response.branches[0].orbits[0])
+    orbit = response.branches[0].orbits[0]
+    alone = len(orbit.swings) == 1
     rows, shown = [], []
     for word, point in _response_points(response):
         try:
@@ -51,15 +52,23 @@ def report_sensitivity(response: Any, factor: float, unit: str, path: str) -> li
             print_error(f"note: the {word} at {family.format_value(point.parameter)} has no gradient: {error}")
             continue
         place, amplitude = found.place, found.amplitude
-        rows.append([factor * place.value, size * amplitude.value, *_elasticities(place), *_elasticities(amplitude)])
-        shown.append((word, f"{rows[-1][0]:.2f}", _movers_text(place), f"{rows[-1][1]:.3f}", _movers_text(amplitude)))
+        number = getattr(point, "coordinate", 0)
+        what, size, length = swing_unit(orbit, number)
+        at, high = factor * place.value, size * amplitude.value
+        sizes = [high] if alone else [float(number + 1), amplitude.value]
+        rows.append([at, *sizes, *_elasticities(place), *_elasticities(amplitude)])
+        of_text = f"{high:.3f}" if alone else f"{high:.4g} {length} of {what}"
+        shown.append((word, f"{at:.2f}", _movers_text(place), of_text, _movers_text(amplitude)))
     if not rows:
         console.print("no special point of which one could say what moves it", highlight=False)
         return []
-    headings = ["", f"at [{unit}]", f"its place: {family.name}", f"amplitude [{length}]", f"amplitude of {what} there"]
+    what, _, length = swing_unit(orbit)
+    last = (f"amplitude [{length}]", f"amplitude of {what} there") if alone else ("amplitude", "the amplitude there")
+    headings = ["", f"at [{unit}]", f"its place: {family.name}", *last]
     title = "what moves it most: percent for a percent of a parameter"
-    show_table(title, headings, shown, words=headings[::2])
-    headings = [f"at [{unit}]", f"amplitude of {what} [{length}]"]
+    show_table(title, headings, shown, words=headings[::2] if alone else headings[2:])
+    first = [f"amplitude of {what} [{length}]"] if alone else ["number of the free coordinate [1]", "amplitude [SI]"]
+    headings = [f"at [{unit}]", *first]
     headings += [f"{of} by {name} [%/%]" for of in ("place", "amplitude") for name in names]
     return [write_csv(path, dict(zip(headings, np.array(rows).T)))]
 

@@ -239,9 +239,12 @@ def _print_extrema(response: Any, factor: float, unit: str, table: Any) -> None:
             "no maximum or minimum of the amplitude inside the range stands out by a thousandth", highlight=False
         )
         return
-    what, size, length = swing_unit(response.branches[0].orbits[0])
+    orbit = response.branches[0].orbits[0]
+    what, size, length = swing_unit(orbit)
     names = () if table is None else tuple(table.amplitudes)
-    headings = ("", f"at [{unit}]", f"amplitude [{length}]", "motion", *(f"{name} [{length}]" for name in names))
+    alone = len(orbit.swings) == 1
+    amplitude = (f"amplitude [{length}]",) if alone else ("of", "amplitude")
+    headings = ("", f"at [{unit}]", *amplitude, "motion", *(f"{name} [{length}]" for name in names))
     if table is not None and _has_dry_friction(response.family.parameters):
         console.print("the approximations are of the mechanism without its Coulomb friction", highlight=False)
     entries.sort(key=lambda entry: entry[1].parameter)
@@ -250,17 +253,26 @@ def _print_extrema(response: Any, factor: float, unit: str, table: Any) -> None:
         (
             word,
             f"{factor * extremum.parameter:.2f}",
-            f"{size * extremum.amplitude:.3f}",
+            *([f"{size * extremum.amplitude:.3f}"] if alone else _coordinate_and_amplitude(extremum)),
             extremum.stability.value,
             *(f"{size * values[number]:.3f}" for values in beside),
         )
         for number, (word, extremum) in enumerate(entries)
     ]
-    show_table(f"where the amplitude of {what} is largest and least", headings, rows, words=("", "motion"))
+    title = f"where the amplitude of {what} is largest and least" if alone else "where amplitudes are largest and least"
+    show_table(title, headings, rows, words=("", "of", "motion"))
+
+
+def _coordinate_and_amplitude(extremum: Any) -> list[str]:
+    """Return the name of the coordinate of an extremum, and its amplitude with the unit."""
+    what, size, unit = swing_unit(extremum.orbit, extremum.coordinate)
+    return [what, f"{size * extremum.amplitude:.4g} {unit}"]
 
 
 def _print_ranges_to_avoid(response: Any, factor: float, unit: str) -> None:
     """Print the ranges to avoid, of the speed or another parameter, and the jumps at folds."""
+    from ..periodic import greatest_amplitudes
+
     ranges = response.speeds_to_avoid
     words = "speeds" if response.family.unit == "rad/s" else f"values of {response.family.name}"
     if response.caution:
@@ -269,17 +281,18 @@ def _print_ranges_to_avoid(response: Any, factor: float, unit: str) -> None:
         say(f"all motions were sought at {response.sought_values} only: more --places may find more")
     what, size, length = swing_unit(response.branches[0].orbits[0])
     if not ranges:
-        largest = max(response.branches, key=lambda branch: float(branch.amplitude.max()))
-        place = int(largest.amplitude.argmax())
-        peak = (
-            "at no maximum does the amplitude fall to 0.71 of it on both sides"
-            if response.maxima()
-            else f"the amplitude has no peak; it is greatest, {size * largest.amplitude[place]:.4g} {length}, at "
-            f"{factor * largest.parameter[place]:.6g} {unit}"
-        )
+        tops = greatest_amplitudes(response.branches)
+        peak = "at no maximum does the amplitude fall to 0.71 of it on both sides"
+        if not response.maxima():
+            shown = [swing_unit(response.branches[0].orbits[0], n) for n in range(len(tops))]
+            places = [
+                f"{scale * value:.4g} {of}{f' of {name}' * (len(tops) > 1)}, at {factor * place:.6g} {unit}"
+                for (name, scale, of), (value, place) in zip(shown, tops)
+            ]
+            peak = f"the amplitude has no peak; it is greatest, {'; '.join(places)}"
         say(f"no {words} to avoid: one stable motion throughout, and {peak}")
     else:
-        rows = [(f"{factor * a.low:.6g}", f"{factor * a.high:.6g}", a.risk.value) for a in ranges]
+        rows = [(f"{factor * a.low:.6g}", f"{factor * a.high:.6g}", a.words) for a in ranges]
         show_table(f"{words} to avoid", (f"from [{unit}]", f"to [{unit}]", "because"), rows, words=("because",))
     for jump in response.jumps:
         side, way = ("below", "rises") if jump.direction > 0 else ("above", "falls")

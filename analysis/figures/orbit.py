@@ -56,7 +56,7 @@ def plot_orbit(orbit: PeriodicOrbit, *, title: str = "") -> Figure:
             Panel(x_label="crank angle [deg]", y_label=label, curves=[Curve(x=angle, y=values)], x_ticks=ticks)
         )
     if free:
-        (x, x_label), (y, y_label) = output_over_period(turn.swing), output_over_period(rates[turn.swing])
+        (x, x_label), (y, y_label) = output_over_period(turn.swings[0]), output_over_period(rates[turn.swings[0]])
         begin = Curve(x=x[:1], y=y[:1], line="", marker="o")
         caption = "point at the crank angle 0"
         panels.append(Panel(x_label=x_label, y_label=y_label, curves=[Curve(x=x, y=y), begin], title=caption))
@@ -104,14 +104,14 @@ def plot_orbits(found: Orbits, *, title: str = "") -> Figure:
     curves, label = [], "first free coordinate"
     for orbit in found.orbits:
         turn = orbit.turn(_SAMPLES)
-        variable = next(v for v in find_mechanism(orbit.parameters).variables if v.name == turn.swing)
+        variable = next(v for v in find_mechanism(orbit.parameters).variables if v.name == turn.swings[0])
         unit, factor = display_unit(variable)
-        label = f"{name_in_words(turn.swing)} [{unit}]"
+        label = f"{name_in_words(turn.swings[0])} [{unit}]"
         stable = orbit in found.stable
         curves.append(
             Curve(
                 x=np.degrees(np.append(turn.angle, orbit.flow.period * orbit.turns)),
-                y=factor * _output_over_turn(turn, turn.swing),
+                y=factor * _output_over_turn(turn, turn.swings[0]),
                 line="-" if stable else "--",
                 label=f"{orbit.verdict().stability.value}, largest multiplier {orbit.largest:.3g}",
             )

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, TypeAlias
 
@@ -46,6 +46,8 @@ _COMPARED, _BESIDE = 240, 60
 _HIDDEN = 1.5 * LINE
 #: Relative error (%) that counts as zero; harmonic, relative to the greatest one, that counts as zero.
 _NONE, _SMALL = 1e-3, 2e-5
+#: Distance, as a share of the ranges of a panel, up to which a point lies on a line.
+_ON = 2e-3
 #: Least prominence of a peak that gets a text, relative to the height of the axis.
 _STANDS_OUT = 0.005
 #: Crossings closer than this share of the axis have one common text.
@@ -67,7 +69,8 @@ class _Scale:
     """Units and names with which parameter and amplitude are shown.
 
     ``factor`` converts the parameter from SI to its display ``unit``. ``scale`` converts the amplitude from SI to its display
-    unit ``shown``; ``what`` is the short name of the amplitude, ``name`` the long name.
+    unit ``shown``; ``what`` is the short name of the amplitude, ``name`` the long name, ``column`` that in the
+    columns of a branch.
     """
 
     family: Family
@@ -77,6 +80,7 @@ class _Scale:
     shown: str
     what: str
     name: str
+    column: str
 
     @property
     def axis(self) -> str:
@@ -137,7 +141,9 @@ def describe_branches(
     shown, scale = display_scale(si)
     outputs = (v for v in find_mechanism(family.parameters).variables if v.causality == "output")
     name = next((name_in_words(v.name) for v in outputs if v.symbol == what), name_in_words(what))
-    look = _Scale(family=family, factor=factor, unit=unit, scale=scale, shown=shown, what=what, name=name)
+    look = _Scale(
+        family=family, factor=factor, unit=unit, scale=scale, shown=shown, what=what, name=name, column=f"{what} [{si}]"
+    )
     others = [] if beside is None else _evaluate_approximations(branches, beside)
     shades = [
         Shade(low=factor * a.low, high=factor * a.high, label=f"avoid: {a.risk.value}", number=_RISKS.index(a.risk))
@@ -145,11 +151,13 @@ def describe_branches(
     ]
     bare = [Shade(low=shade.low, high=shade.high, label="", number=shade.number) for shade in shades]
     amplitudes = replace(_amplitudes(branches, look, others, shades), legend=caution)
-    panels = [amplitudes, _harmonics(branches, look, bare)]
+    panels = [amplitudes, *_other_amplitudes(branches, look, bare)]
+    heights = [_MAIN, *[1.0] * (len(panels) - 1), _HARMONICS]
+    panels.append(_harmonics(branches, look, bare))
     if others:
         panels.append(_errors(others, look, bare))
     panels += _loads(branches, look, bare)
-    heights = [_MAIN, _HARMONICS, *[1.0] * (len(panels) - 2)]
+    heights += [1.0] * (len(panels) - len(heights))
     return Picture(parts=panels, title=title, size=_SIZE, heights=heights)
 
 
@@ -160,11 +168,9 @@ def _amplitudes(
     # the scale is that of the true motion, as linear approximations have unbounded resonances
     top = 1.15 * max(look.scale * float(branch.amplitude.max()) for branch in branches)
     found = fold_jumps(branches)
-    curves = [
-        curve
-        for n, branch in enumerate(branches)
-        for curve in _stability_curves(branch, n, look, look.scale * branch.amplitude, hover=_hover_values(branch, n))
-    ]
+    curves = _branch_curves(
+        enumerate(branches), look, lambda branch: look.scale * branch.amplitude, hover=_hover_values
+    )
     for branch in branches:
         if branch.periods > 1:
             colour = COLOURS[(branch.periods.bit_length() - 1) % len(COLOURS)]
@@ -192,6 +198,20 @@ def _amplitudes(
             for after in jump.after
         ],
     )
+
+
+def _other_amplitudes(branches: Sequence[Branch], look: _Scale, shades: Sequence[Shade]) -> list[Panel]:
+    """Return the panels of the amplitudes of the other free coordinates, if there are any."""
+    panels = []
+    for number, (what, si) in enumerate(branches[0].orbits[0].swings[1:], start=1):
+        unit, scale = display_scale(si)
+        curves = _branch_curves(enumerate(branches), look, lambda b, n=number, s=scale: s * b.amplitudes[:, n])  # type: ignore[misc]
+        panels.append(
+            Panel(
+                x_label=look.axis, y_label=f"amplitude\nof {name_in_words(what)} [{unit}]", curves=curves, shades=shades
+            )
+        )
+    return panels
 
 
 def _jump(jump: FoldJump, look: _Scale) -> str:
@@ -252,6 +272,41 @@ def _crossings(branches: Sequence[Branch], look: _Scale, top: float) -> list[Lab
 def _is_reachable(branch: Branch, special: SpecialPoint) -> bool:
     """Return whether a motion beside a special point is stable, so that a machine reaches it."""
     return any(orbit.largest <= 1.0 + TOLERANCE for orbit in branch.orbits[special.after : special.after + 2])
+
+
+def _branch_curves(
+    numbered: Iterable[tuple[int, Branch]],
+    look: _Scale,
+    of: Callable[[Branch], FloatArray],
+    hover: Callable[[Branch, int], Mapping[str, ArrayLike]] | None = None,
+    **options: Any,
+) -> list[Curve]:
+    """Return the curves of a quantity (display units) along branches with their numbers.
+
+    Where two unstable branches coincide only the first is drawn: two dashed lines would fill each other's gaps.
+    """
+    curves: list[Curve] = []
+    numbers, branches = zip(*numbered)
+    values = [of(branch) for branch in branches]
+    places = [look.factor * branch.parameter for branch in branches]
+    found = [v[np.isfinite(v)] for v in map(np.concatenate, (places, values))]
+    sizes = [float(np.ptp(v)) or 1.0 if len(v) else 1.0 for v in found]
+    drawn: list[LineString] = []
+    for number, branch, y in zip(numbers, branches, values):
+        if hover is not None:
+            options["hover"] = hover(branch, number)
+        for curve in _stability_curves(branch, number, look, y, **options):
+            if curve.line == _STABLE[Stability.UNSTABLE]:
+                shown = np.array(curve.y)
+                points = np.column_stack([curve.x, shown]) / sizes
+                finite = np.isfinite(shown)
+                for line in drawn:
+                    shown[finite] = np.where(distance(make_points(points[finite]), line) < _ON, np.nan, shown[finite])
+                runs = np.ma.clump_unmasked(np.ma.masked_invalid(shown))  # type: ignore[no-untyped-call]
+                drawn += [LineString(points[run]) for run in runs if run.stop - run.start > 1]
+                curve = replace(curve, y=shown)
+            curves.append(curve)
+    return curves
 
 
 def _stability_curves(branch: Branch, number: int, look: _Scale, y: FloatArray, **options: Any) -> list[Curve]:
@@ -442,7 +497,7 @@ def _visible_approximations(
 def _harmonics(branches: Sequence[Branch], look: _Scale, shades: Sequence[Shade]) -> Panel:
     """Return the panel of the lowest harmonics of motions with a period of one crank turn, with the orders along the curves."""
     single = [(n, branch) for n, branch in enumerate(branches) if branch.periods == 1] or list(enumerate(branches))
-    names = [name for name in branches[0].columns() if name.startswith("harmonic ")]
+    names = [n for n in branches[0].columns() if n.startswith("harmonic ") and n.endswith(f" of {look.column}")]
     tops = [float(np.nanmax(branch.columns()[name], initial=0.0)) for _, branch in single for name in names]
     top = look.scale * max(tops, default=0.0)
     least = top
@@ -451,12 +506,16 @@ def _harmonics(branches: Sequence[Branch], look: _Scale, shades: Sequence[Shade]
     for order, name in enumerate(names):
         options: dict[str, Any] = {"colour": COLOURS[order % len(COLOURS)], "width": THIN}
         label = f"harmonic {order + 1}"
-        for n, branch in single:
+
+        def size(branch: Branch, name: str = name) -> FloatArray:
             y = look.scale * branch.columns()[name]
             # smaller harmonics are rounding
-            y = np.where(y > _SMALL * top, y, np.nan)
+            return np.where(y > _SMALL * top, y, np.nan)
+
+        curves += _branch_curves(single, look, size, **options)
+        for _, branch in single:
+            y = size(branch)
             least = min(least, float(np.nanmin(y, initial=np.inf)))
-            curves += _stability_curves(branch, n, look, y, **options)
             x = look.factor * branch.parameter
             # the letters of different harmonics are shifted, as their curves may be near each other
             shift = (order + 1.0) / (len(names) + 1.0) - 0.5
@@ -535,9 +594,7 @@ def _loads(branches: Sequence[Branch], look: _Scale, shades: Sequence[Shade]) ->
         Panel(
             x_label=look.axis,
             y_label=label,
-            curves=[
-                curve for n, branch in enumerate(branches) for curve in _stability_curves(branch, n, look, of(branch))
-            ],
+            curves=_branch_curves(enumerate(branches), look, of),
             logarithmic="y",
             shades=shades,
         )

@@ -22,16 +22,19 @@ _GREATEST = 2.0
 def plot_tuned(tuned: Tuned, *, title: str = "") -> Figure:
     """Plot amplitude and largest Floquet multiplier over the speed before and after the change, unstable motions dashed."""
     orbit = tuned.after.response.branches[0].orbits[0]
-    what, si = orbit.flow.components[0]
-    unit, factor = display_scale(si)
     family = tuned.after.response.family
     scale, of_x = (RAD_S_PER_RPM, "rpm") if family.unit == "rad/s" else (1.0, family.unit)
     low, high = (level / scale for level in tuned.wish.span)
     span = [level / scale for level in (tuned.after.response.low, tuned.after.response.high)]
     branches = [branch for survey in (tuned.before, tuned.after) for branch in survey.response.branches]
     cut = max(float(branch.largest_multiplier.max()) for branch in branches) > _GREATEST
+    amplitudes = []
+    for n, (what, si) in enumerate(orbit.flow.components[: orbit.flow.amplitudes]):
+        unit, factor = display_scale(si)
+        label = f"amplitude of {name_in_words(what)} [{unit}]"
+        amplitudes.append((label, lambda b, n=n, factor=factor: factor * b.amplitudes[:, n]))
     rows = (
-        (f"amplitude of {name_in_words(what)} [{unit}]", lambda b: factor * b.amplitude),
+        *amplitudes,
         (
             "largest Floquet multiplier,\nunstable above 1" + (f" (cut at {_GREATEST:g})" if cut else ""),
             lambda b: np.minimum(b.largest_multiplier, _GREATEST),
@@ -46,7 +49,7 @@ def plot_tuned(tuned: Tuned, *, title: str = "") -> Figure:
             (COLOURS[0], LINE, "" if number else "after", tuned.after),
         ):
             curves += _curves(survey, value, colour, width, when, scale)
-        if number:
+        if number == len(amplitudes):
             curves.append(Curve(x=span, y=[1.0, 1.0], colour="0.6", line=":"))
         panels.append(
             Panel(

@@ -94,6 +94,7 @@ from .response.branch import GREATEST as GREATEST
 from .response.branch import Branch as Branch
 from .response.branch import follow as follow
 from .response.branch import follow_both as follow_both
+from .response.branch import greatest_amplitudes as greatest_amplitudes
 from .response.branch import passes as passes
 from .response.branch import switch as switch
 from .response.frequency import Response as Response

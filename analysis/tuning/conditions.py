@@ -98,11 +98,12 @@ class Spot(NamedTuple):
     level: float
     turns: int  # number of common periods in the period
     ratios: Mapping[str, Any]  # ratios of the drive
+    coordinate: int = 0  # free coordinate whose amplitude is greatest there, of a resonance
 
 
-def known_spot(wish: Wish, x: FloatArray, orbit: PeriodicOrbit) -> Spot:
+def known_spot(wish: Wish, x: FloatArray, orbit: PeriodicOrbit, coordinate: int = 0) -> Spot:
     """Return the `Spot` of a motion that was found with the changes x of the parameters."""
-    return Spot(x, orbit.start, wish.level(orbit), orbit.turns, orbit.drive.ratios)
+    return Spot(x, orbit.start, wish.level(orbit), orbit.turns, orbit.drive.ratios, coordinate)
 
 
 def motion(wish: Wish, spot: Spot) -> PeriodicOrbit:
@@ -485,8 +486,8 @@ def find_resonance(wish: Wish, x: FloatArray, near: Spot) -> tuple[Gradient, Spo
     Raises LinkworkError if there is no resonance near the motion.
     """
     orbit = TrackedMotion(wish, CrossPlane.level_plane(wish, near, near.level), near).find(x).orbit
-    found = extremum_gradient(orbit, wish.over, wish.names)
-    return found.place, known_spot(wish, x, found.orbit)
+    found = extremum_gradient(orbit, wish.over, wish.names, near.coordinate)
+    return found.place, known_spot(wish, x, found.orbit, near.coordinate)
 
 
 class OutputBelow:

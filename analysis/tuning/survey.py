@@ -428,7 +428,7 @@ def _peaks(wish: Wish, x: FloatArray, response: Response) -> Iterator[Spot]:
     """Yield the resonances in the range and within the margin beside the range."""
     for top in response.maxima():
         if _overlap(wish, top.parameter, top.parameter, wish.range_with_margin):
-            yield known_spot(wish, x, top.orbit)
+            yield known_spot(wish, x, top.orbit, top.coordinate)
 
 
 def _output_maxima(

@@ -123,7 +123,7 @@ class Wish:
     turns : int
         Greatest number of turns of the crank in a period that is examined.
     no_resonance : bool
-        No maximum of the amplitude of a motion of one turn lies in the range, or within ``resonance_margin`` of it.
+        No maximum of an amplitude of a motion of one turn lies in the range, or within ``resonance_margin`` of it.
     resonance_margin : float
         Distance of a resonance from either end of the range, as a share of the value at that end; 0.02 by default.
     no_jump : bool

@@ -24,9 +24,11 @@ def orbit(
     """Return a stand-in for an orbit, with the attributes that branches read."""
     return SimpleNamespace(
         amplitude=amplitude,
+        amplitudes=np.array([amplitude]),
         largest=largest,
         start=np.array([amplitude if start is None else start, 0.0]),
         swing=("u", "m"),
+        swings=(("u", "m"),),
         periods=periods,
         crank_turns=crank_turns,
     )

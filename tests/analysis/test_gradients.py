@@ -97,7 +97,7 @@ def greatest(*parts: FloatArray) -> float:
 def amplitude(orbit: PeriodicOrbit) -> float:
     """Half the range of the first free coordinate: both extremes as those of a function above zero."""
     turn = orbit.turn(512 * orbit.turns)
-    values = turn[turn.swing]
+    values = turn[turn.swings[0]]
     low, high = values.min(), values.max()
     far = 3.0 * (high - low)
     return 0.5 * (greatest(values - low + far) + greatest(high + far - values) - 2.0 * far - (high - low))

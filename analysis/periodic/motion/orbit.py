@@ -89,11 +89,11 @@ class Turn:
     modes : tuple of int
         Values of the mechanism's modes.
     names : tuple of str
-    swing : str
-        Output whose amplitude is returned by default: the first free coordinate, such as ``slider.position``, or the
-        crank's speed if nothing else is free.
-    rounding : float
-        Amplitudes of ``swing`` up to this size count as rounding errors.
+    swings : tuple of str
+        Outputs of which there are `amplitudes`: the free coordinates, such as ``slider.position``, or the crank's speed if
+        nothing else is free.
+    roundings : tuple of float
+        Amplitudes of ``swings`` up to these sizes count as rounding errors.
     angles : frozenset of str
         Outputs that are angles.
 
@@ -111,8 +111,8 @@ class Turn:
     turns: int
     modes: tuple[int, ...]
     names: tuple[str, ...]
-    swing: str
-    rounding: float
+    swings: tuple[str, ...]
+    roundings: tuple[float, ...]
     angles: frozenset[str]
 
     def __getitem__(self, name: str) -> FloatArray:
@@ -122,15 +122,25 @@ class Turn:
 
     @property
     def amplitude(self) -> float:
-        """Half the distance between the least and the greatest value of ``swing``, such as a slider position (m).
+        """The first of the `amplitudes`."""
+        return self.amplitude_of(self.swings[0])
 
-        For a coordinate that goes round, the deviation from a uniform rotation is taken. The amplitude is zero if it is no more
+    @property
+    def amplitudes(self) -> FloatArray:
+        """The amplitude of each of ``swings``."""
+        return np.array([self.amplitude_of(name) for name in self.swings])
+
+    def amplitude_of(self, name: str) -> float:
+        """Return half the distance between the least and the greatest value of one of ``swings``, such as a position (m).
+
+        For a coordinate that goes round, the deviation from a uniform rotation is taken. An amplitude is zero if it is no more
         than a rounding error, as for a pendulum that hangs still.
 
-        The Fourier series of ``swing`` is evaluated on a grid eight times as fine, and parabolas are laid through the greatest
-        and the least values. The relative error of the amplitude is about 1e-6 if there are enough samples for the series.
+        The Fourier series of the coordinate is evaluated on a grid eight times as fine, and parabolas are laid through the
+        greatest and the least values. The relative error of an amplitude is about 1e-6 if there are enough samples for the
+        series.
         """
-        u = self.oscillation(self.swing)
+        u = self.oscillation(name)
         n = 8 * len(u)
         fine = np.fft.irfft(np.fft.rfft(u), n) * (n / len(u))
         top = np.array([fine.argmax(), fine.argmin()])
@@ -138,7 +148,7 @@ class Turn:
         bend = before - 2.0 * at + after
         beyond = np.divide((after - before) ** 2, -8.0 * bend, out=np.zeros(2), where=bend != 0.0)
         size = 0.5 * float(np.ptp(at + beyond))
-        return size if size > self.rounding else 0.0
+        return size if size > self.roundings[self.swings.index(name)] else 0.0
 
     def oscillation(self, name: str) -> FloatArray:
         """Return an output, shape (n,); for an angle that goes round, return the deviation from a uniform rotation."""
@@ -223,7 +233,7 @@ class PeriodicOrbit(NotebookResult):
     stations: Stations | None = None
     others: int | None = None
     least_clearance: float | None = None
-    # cached values of `point`, `scale`, `multipliers` and `amplitude`
+    # cached values of `point`, `scale`, `multipliers` and `amplitudes`
     _kept: dict[str, Any] = field(default_factory=dict, init=False)
 
     def __post_init__(self) -> None:
@@ -235,7 +245,7 @@ class PeriodicOrbit(NotebookResult):
             turn, unit = self.turn(), self.swing[1]
             speed = self.flow.period * self.turns / turn.period
             said = f" at {speed:.4g} rad/s ({speed / RAD_S_PER_RPM:.4g} rpm), {self.verdict().stability.value}"
-            swing = f"; amplitude of {turn.swing} {turn.amplitude:.4g} {unit}"
+            swing = f"; amplitude of {turn.swings[0]} {turn.amplitude:.4g} {unit}"
         except LinkworkError as error:
             said, swing = f" that cannot be followed ({error})", ""
         turns = format_count(self.crank_turns, "turn")
@@ -284,7 +294,13 @@ class PeriodicOrbit(NotebookResult):
     @property
     def swing(self) -> tuple[str, str]:
         """Short name and unit of the coordinate to which `amplitude` refers: ``("u", "m")`` for a five-bar."""
-        return self.flow.labels[0], self.flow.components[0][1]
+        return self.swings[0]
+
+    @property
+    def swings(self) -> tuple[tuple[str, str], ...]:
+        """Short names and units of the coordinates to which `amplitudes` refer: all that are free."""
+        flow = self.flow
+        return tuple((flow.labels[n], flow.components[n][1]) for n in range(flow.amplitudes))
 
     @property
     def multipliers(self) -> NDArray[np.complex128]:
@@ -338,17 +354,23 @@ class PeriodicOrbit(NotebookResult):
             turns=self.crank_turns,
             modes=flow.modes,
             names=tuple(mechanism.output_names[n] for n in keep),
-            swing=flow.components[0][0],
-            rounding=_ROUNDING * float(self.scale[0]),
+            swings=tuple(name for name, _ in flow.components[: flow.amplitudes]),
+            roundings=tuple((_ROUNDING * self.scale[: flow.amplitudes]).tolist()),
             angles=frozenset(v.name for v in mechanism.variables if v.unit == "rad"),
         )
 
     @property
     def amplitude(self) -> float:
-        """Half the range of the first free coordinate over a period, such as a slider position (m); see `Turn.amplitude`."""
-        if "amplitude" not in self._kept:
-            self._kept["amplitude"] = self.turn().amplitude
-        return float(self._kept["amplitude"])
+        """Half the range of the first free coordinate over a period, such as a slider position (m)."""
+        return float(self.amplitudes[0])
+
+    @property
+    def amplitudes(self) -> FloatArray:
+        """Half the range of each free coordinate over a period, in the order of `swings`; see `Turn.amplitudes`."""
+        if "amplitudes" not in self._kept:
+            self._kept["amplitudes"] = self.turn().amplitudes
+        amplitudes: FloatArray = self._kept["amplitudes"]
+        return amplitudes
 
     def clearance(self, samples: int = SAMPLES) -> float:
         """Return the least clearance to the limit of assembly over a period, as `linkwork.limits.LIMIT_SINE` measures it."""

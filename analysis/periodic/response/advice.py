@@ -52,11 +52,20 @@ class Risk(Enum):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Avoided:
-    """A range of the parameter (rad/s if it is a speed) that a machine should avoid, and the reason."""
+    """A range of the parameter (rad/s if it is a speed) that a machine should avoid, and the reason.
+
+    ``of`` is the short name of the coordinate whose resonance it is, if several are free.
+    """
 
     low: float
     high: float
     risk: Risk
+    of: str = ""
+
+    @property
+    def words(self) -> str:
+        """The reason in words."""
+        return self.risk.value.replace("resonance", f"resonance of {self.of}") if self.of else self.risk.value
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -91,8 +100,10 @@ class Arc:
         Number of common periods in a period of the motion: see `Branch.periods`.
     stable : bool
         Whether the motions on the arc are stable.
-    parameter, amplitude : ndarray, shape (m,)
-        Values along the arc, in the order of rising parameter.
+    parameter : ndarray, shape (m,)
+        Values along the arc, rising.
+    amplitudes : ndarray, shape (m, k)
+        Amplitudes of the k free coordinates.
     start : ndarray, shape (m, n)
         Starts of the orbits.
     cut : (bool, bool)
@@ -102,9 +113,14 @@ class Arc:
     turns: int
     stable: bool
     parameter: FloatArray
-    amplitude: FloatArray
+    amplitudes: FloatArray
     start: FloatArray
     cut: tuple[bool, bool]
+
+    @property
+    def amplitude(self) -> FloatArray:
+        """Amplitude of the first free coordinate, shape (m,)."""
+        return self.amplitudes[:, 0]
 
     @property
     def span(self) -> Interval:
@@ -118,7 +134,7 @@ class Arc:
             return False
         places = np.linspace(low, high, 7)[1:-1]
         # a period of several turns may begin with any turn: compare amplitudes
-        own, others = (a.start if a.turns == 1 else a.amplitude[:, None] for a in (self, other))
+        own, others = (a.start if a.turns == 1 else a.amplitudes for a in (self, other))
         size = np.abs(own).max(axis=0) + 1e-300
         apart = [
             np.abs(np.interp(places, self.parameter, a) - np.interp(places, other.parameter, b)) / s
@@ -136,7 +152,9 @@ def _branch_arcs(branch: Branch) -> list[Arc]:
     places = [special.after + 1 for special in branch.special]
     special = [special.orbit for special in branch.special]
     parameter = np.insert(branch.parameter, places, [s.parameter for s in branch.special])
-    amplitude = np.insert(branch.amplitude, places, [orbit.amplitude for orbit in special])
+    amplitudes = branch.amplitudes
+    if special:
+        amplitudes = np.insert(amplitudes, places, [orbit.amplitudes for orbit in special], axis=0)
     start = np.array([orbit.start for orbit in branch.orbits])
     start = np.insert(start, places, [orbit.start for orbit in special], axis=0) if special else start
     # at a special point a multiplier is on the unit circle: stability is taken from the neighbouring points
@@ -160,7 +178,7 @@ def _branch_arcs(branch: Branch) -> list[Arc]:
                 turns=branch.periods,
                 stable=bool(stable[first]),
                 parameter=parameter[way][::order],
-                amplitude=amplitude[way][::order],
+                amplitudes=amplitudes[way][::order],
                 start=start[way][::order],
                 cut=cut if order > 0 else (cut[1], cut[0]),
             )
@@ -208,12 +226,22 @@ def ranges_to_avoid(branches: Sequence[Branch], low: float, high: float) -> tupl
     several = _union((arc.span for arc in stable if arc.turns > 1), least)
     doubled = [part for gap in without for part in _clip_intervals(several, *gap)]
     found = {
-        Risk.RESONANCE: _union((band for arc in stable for band in _resonances(arc)), least),
-        Risk.SEVERAL: _union((_overlap(a, b) for a, b in combinations(stable, 2) if not a.is_same_curve(b)), least),
-        Risk.DOUBLED: doubled,
-        Risk.UNSTABLE: [part for gap in without for part in _gaps(several, *gap)],
+        (Risk.SEVERAL, ""): _union(
+            (_overlap(a, b) for a, b in combinations(stable, 2) if not a.is_same_curve(b)), least
+        ),
+        (Risk.DOUBLED, ""): doubled,
+        (Risk.UNSTABLE, ""): [part for gap in without for part in _gaps(several, *gap)],
     }
-    ranges = [Avoided(low=a, high=b, risk=risk) for risk, parts in found.items() for a, b in parts if b - a > least]
+    swings = branches[0].orbits[0].swings
+    for n, (name, _) in enumerate(swings):
+        bands = (band for arc in stable for band in _resonances(arc, n))
+        found[Risk.RESONANCE, name if len(swings) > 1 else ""] = _union(bands, least)
+    ranges = [
+        Avoided(low=a, high=b, risk=risk, of=of)
+        for (risk, of), parts in found.items()
+        for a, b in parts
+        if b - a > least
+    ]
     return tuple(sorted(ranges, key=lambda avoided: (avoided.low, avoided.high)))
 
 
@@ -222,28 +250,27 @@ def _overlap(a: Arc, b: Arc) -> Interval:
     return max(a.span[0], b.span[0]), min(a.span[1], b.span[1])
 
 
-def _resonances(arc: Arc) -> list[Interval]:
-    """Return the half-power bands of the peaks of an arc, as ranges of the parameter.
+def _resonances(arc: Arc, coordinate: int) -> list[Interval]:
+    """Return the half-power bands of the peaks of a coordinate's amplitude along an arc, as ranges of the parameter.
 
     An end of the arc also counts as a peak if the amplitude is greatest there and the branch continues on another arc.
     """
-    a = arc.amplitude
+    a = arc.amplitudes[:, coordinate]
     tops = [top for top, prominence in peaks(a) if prominence > _PROMINENCE * a[top]]
-    bands = [tuple(_band_end(arc, top, way) for way in (-1, 1)) for top in tops]
+    bands = [tuple(_band_end(arc.parameter, a, top, way) for way in (-1, 1)) for top in tops]
     # an end counts only if the amplitude falls below half power on the arc; otherwise it may be a point on a slope
     for end, cut, way in ((0, arc.cut[0], 1), (len(a) - 1, arc.cut[1], -1)):
         if arc.turns == 1 and cut and a[end] == a.max() and a.min() < HALF_POWER * a[end]:
-            bands.append(tuple(sorted((float(arc.parameter[end]), _band_end(arc, end, way)))))
+            bands.append(tuple(sorted((float(arc.parameter[end]), _band_end(arc.parameter, a, end, way)))))
     return [(low, high) for low, high in bands if isfinite(low) and isfinite(high)]
 
 
-def _band_end(arc: Arc, top: int, way: int) -> float:
+def _band_end(x: FloatArray, a: FloatArray, top: int, way: int) -> float:
     """Return the parameter at the half-power point on one side of a peak, or at the end of the arc.
 
-    The result is infinite if the amplitude exceeds the peak before it falls to half power. ``top`` is the index of the peak;
-    ``way`` is -1 for the side of lower parameters, +1 for the side of higher parameters.
+    The result is infinite if the amplitude exceeds the peak before it falls to half power. Along the arc ``x`` is the parameter
+    and ``a`` the amplitude; ``top`` is the index of the peak; ``way`` is -1 for the side of lower parameters, +1 for the other.
     """
-    a, x = arc.amplitude, arc.parameter
     level, i = HALF_POWER * a[top], top
     while 0 <= i + way < len(a):
         i += way
@@ -293,57 +320,68 @@ class Extremum:
     parameter : float
         Value of the parameter at the extremum, such as the speed (rad/s).
     amplitude : float
-        Amplitude (m for a slider).
+        Amplitude of the coordinate (m for a slider).
     stability : Stability
         Stability of the motion at the extremum.
     orbit : PeriodicOrbit
         The motion at the extremum.
+    coordinate : int
+        Index of the free coordinate in `PeriodicOrbit.swings`.
     """
 
     parameter: float
     amplitude: float
     stability: Stability
     orbit: PeriodicOrbit
+    coordinate: int = 0
 
 
 def extrema(branch: Branch, sign: int = 1) -> tuple[Extremum, ...]:
-    """Find the local maxima (sign +1) or minima (-1) of the amplitude along a branch.
+    """Find the local maxima (sign +1) or minima (-1) of the amplitude of each free coordinate along a branch.
 
     `extremum_orbit` locates each extremum: there the exact derivative of the amplitude with respect to the parameter is zero.
     If the parameter of the family is not an FMI name but a function, or if the amplitude has a kink, Brent's method locates the
     extremum with a relative error of 1e-4 of the parameter.
     """
-    amplitude = sign * branch.amplitude
     found = []
-    for i, prominence in peaks(amplitude):
-        if prominence < _PROMINENCE * abs(amplitude[i]):
-            continue
-        a, c = sorted((float(branch.parameter[i - 1]), float(branch.parameter[i + 1])))
-        # at a fold the parameter turns back: this is no extremum over the parameter
-        if not a < branch.parameter[i] < c:
-            continue
-        place, orbit = _locate_extremum(branch.family, branch.orbits[i], a, float(branch.parameter[i]), c, sign)
-        found.append(
-            Extremum(parameter=place, amplitude=orbit.amplitude, stability=orbit.verdict().stability, orbit=orbit)
-        )
+    for number, amplitude in enumerate(sign * branch.amplitudes.T):
+        for i, prominence in peaks(amplitude):
+            if prominence < _PROMINENCE * abs(amplitude[i]):
+                continue
+            a, c = sorted((float(branch.parameter[i - 1]), float(branch.parameter[i + 1])))
+            # at a fold the parameter turns back: this is no extremum over the parameter
+            if not a < branch.parameter[i] < c:
+                continue
+            place, orbit = _locate_extremum(branch, i, a, c, sign, number)
+            found.append(
+                Extremum(
+                    parameter=place,
+                    amplitude=float(orbit.amplitudes[number]),
+                    stability=orbit.verdict().stability,
+                    orbit=orbit,
+                    coordinate=number,
+                )
+            )
     return tuple(found)
 
 
 def _locate_extremum(
-    family: Family, orbit: PeriodicOrbit, a: float, begin: float, c: float, sign: int
+    branch: Branch, point: int, a: float, c: float, sign: int, coordinate: int
 ) -> tuple[float, PeriodicOrbit]:
-    """Return the parameter of the extremum between a and c, and the motion there.
+    """Return the parameter of the extremum between a and c of a coordinate's amplitude, and the motion there.
 
-    ``orbit`` is the motion at the parameter ``begin``, from which the search starts; ``sign`` is +1 for a maximum.
+    ``point`` is the index of the motion on the branch from which the search starts; ``sign`` is +1 for a maximum.
     """
+    family, orbit, begin = branch.family, branch.orbits[point], float(branch.parameter[point])
     if isinstance(family.vary, str):
         try:
-            rested = extremum_orbit(orbit, family.vary)
+            rested = extremum_orbit(orbit, family.vary, coordinate)
         except LinkworkError:
             pass
         else:
             place = parameter_value(rested.parameters, rested.drive, family.vary)
-            if a < place < c and sign * (rested.amplitude - orbit.amplitude) > -_SAMPLED * orbit.amplitude:
+            was, now = orbit.amplitudes[coordinate], rested.amplitudes[coordinate]
+            if a < place < c and sign * (now - was) > -_SAMPLED * was:
                 return place, rested
 
     def near(value: float) -> PeriodicOrbit:
@@ -352,7 +390,7 @@ def _locate_extremum(
 
     try:
         best = scipy.optimize.minimize_scalar(
-            lambda value: -sign * near(value).amplitude,
+            lambda value: -sign * float(near(value).amplitudes[coordinate]),
             bounds=(a, c),
             method="bounded",
             options={"xatol": 1e-6 * (c - a)},
@@ -387,4 +425,4 @@ def special_gradient(
         raise InputError(f"{family.name} is a function: gradients are along a parameter with an FMI name")
     if isinstance(point, SpecialPoint):
         return crossing_gradient(point.orbit, point.kind, family.vary, names)
-    return extremum_gradient(point.orbit, family.vary, names)
+    return extremum_gradient(point.orbit, family.vary, names, point.coordinate)

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from functools import reduce
+from functools import partial, reduce
 from pathlib import Path
 from typing import Any
 
@@ -99,8 +99,13 @@ class Branch(NotebookResult):
     @property
     def amplitude(self) -> NDArray[np.float64]:
         """Half the range of the first free coordinate at each point, such as a slider position (m); shape (m,)."""
-        label, unit = self.orbits[0].swing
-        return self.columns()[f"amplitude of {label} [{unit}]"]
+        return self.amplitudes[:, 0]
+
+    @property
+    def amplitudes(self) -> NDArray[np.float64]:
+        """Half the range of each free coordinate at each point, shape (m, k), in the order of `PeriodicOrbit.swings`."""
+        columns = self.columns()
+        return np.column_stack([columns[f"amplitude of {label} [{unit}]"] for label, unit in self.orbits[0].swings])
 
     @property
     def largest_multiplier(self) -> NDArray[np.float64]:
@@ -115,7 +120,7 @@ class Branch(NotebookResult):
         """Return the quantities along the branch, by name with unit, each of shape (m,).
 
         The quantities are the parameter, the mean speed and the turns in a period; amplitude, mean and first three harmonics of
-        the first free coordinate (u of a five-bar); largest multiplier and stability; and, if the mechanism has these outputs,
+        each free coordinate (u of a five-bar); largest multiplier and stability; and, if the mechanism has these outputs,
         mean and greatest crank torque, greatest forces in pins, guide and bearings, and least sine of the transmission angle.
         """
         if not self._table:
@@ -149,14 +154,15 @@ def _turn_columns(orbit: PeriodicOrbit, first: Turn) -> dict[str, Callable[[Turn
     """
     mechanism = find_mechanism(orbit.parameters)
     rate = next(v for v in mechanism.variables if v.name == mechanism.freedoms[orbit.flow.crank].rate)
-    swing, what = first.swing, "{} [{}]".format(*orbit.swing)
     columns: dict[str, Callable[[Turn], float]] = {
-        f"mean {label(rate)} [rad/s]": lambda turn: orbit.flow.period * orbit.turns / turn.period,
-        f"amplitude of {what}": lambda turn: turn.amplitude,
-        f"mean of {what}": lambda turn: float(turn.oscillation(swing).mean()),
+        f"mean {label(rate)} [rad/s]": lambda turn: orbit.flow.period * orbit.turns / turn.period
     }
-    for order in (1, 2, 3):
-        columns[f"harmonic {order} of {what}"] = lambda turn, order=order: turn.harmonic(swing, order)  # type: ignore[misc]
+    for swing, (name, unit) in zip(first.swings, orbit.swings):
+        what = f"{name} [{unit}]"
+        columns[f"amplitude of {what}"] = partial(Turn.amplitude_of, name=swing)
+        columns[f"mean of {what}"] = lambda turn, swing=swing: float(turn.oscillation(swing).mean())  # type: ignore[misc]
+        for order in (1, 2, 3):
+            columns[f"harmonic {order} of {what}"] = partial(Turn.harmonic, name=swing, order=order)
     for number in mechanism.cyclic_freedoms:
         freedom = mechanism.freedoms[number].coordinate
         what = "crank torque" if len(mechanism.cyclic_freedoms) == 1 else f"torque on {freedom.partition('.')[0]}"
@@ -483,17 +489,23 @@ def _special_points(
 
 
 def describe(branches: Sequence[Branch]) -> str:
-    """Describe branches of a family in one line: range, number of orbits, stability, and where the amplitude is greatest."""
-    family, (name, unit) = branches[0].family, branches[0].orbits[0].flow.components[0]
+    """Describe branches of a family in one line: range, number of orbits, stability, and where amplitudes are greatest."""
+    family, components = branches[0].family, branches[0].orbits[0].flow.components
     span = format_range(np.concatenate([branch.parameter for branch in branches]), family.unit)
     words = dict.fromkeys(word.value for branch in branches for word in branch.stability())
-    largest = max(branches, key=lambda branch: float(branch.amplitude.max()))
-    place = int(largest.amplitude.argmax())
-    return (
-        f"{family.name} {span}, {format_count(sum(len(branch) for branch in branches), 'orbit')}, {' and '.join(words)}; "
-        f"greatest amplitude of {name} {largest.amplitude[place]:.4g} {unit} at "
-        f"{family.format_value(float(largest.parameter[place]))}"
-    )
+    found = [
+        f"greatest amplitude of {name} {value:.4g} {unit} at {family.format_value(place)}"
+        for (name, unit), (value, place) in zip(components, greatest_amplitudes(branches))
+    ]
+    count = format_count(sum(len(branch) for branch in branches), "orbit")
+    return f"{family.name} {span}, {count}, {' and '.join(words)}; {', '.join(found)}"
+
+
+def greatest_amplitudes(branches: Sequence[Branch]) -> list[tuple[float, float]]:
+    """Return, for each free coordinate, the greatest amplitude on branches and the value of the parameter there."""
+    amplitudes = np.concatenate([branch.amplitudes for branch in branches])
+    parameter = np.concatenate([branch.parameter for branch in branches])
+    return [(float(amplitudes[n, k]), float(parameter[n])) for k, n in enumerate(amplitudes.argmax(axis=0).tolist())]
 
 
 #: Greatest modulus of the multipliers up to which a motion is followed.

@@ -215,25 +215,30 @@ class Response(NotebookResult):
         return fold_jumps(self.branches)
 
     def maxima(self) -> tuple[Extremum, ...]:
-        """Return the local maxima of the amplitude, sorted by parameter; motions with a multiplied period are left out."""
+        """Return the local maxima of the amplitudes of all free coordinates, sorted by parameter.
+
+        Motions with a multiplied period are left out.
+        """
         return self._extrema(1)
 
     def minima(self) -> tuple[Extremum, ...]:
-        """Return the local minima of the amplitude, sorted by parameter; motions with a multiplied period are left out."""
+        """Return the local minima of the amplitudes of all free coordinates, as `maxima` does the maxima."""
         return self._extrema(-1)
 
     def _extrema(self, sign: int) -> tuple[Extremum, ...]:
         found = [e for branch in self.branches if branch.periods == 1 for e in extrema(branch, sign)]
-        found.sort(key=lambda e: (e.parameter, e.amplitude))
+        found.sort(key=lambda e: (e.coordinate, e.parameter, e.amplitude))
         # if a curve was followed from both ends and did not reach the other end, both branches have the same extrema
         reach = 1e-5 * (self.high - self.low)
-        return tuple(
+        once = (
             e
             for before, e in zip([None, *found], found)
             if before is None
+            or e.coordinate != before.coordinate
             or abs(e.parameter - before.parameter) > reach
             or abs(e.amplitude - before.amplitude) > 1e-6 * abs(e.amplitude)
         )
+        return tuple(sorted(once, key=lambda e: (e.parameter, e.coordinate, e.amplitude)))
 
     def to_csv(self, path: str | Path) -> Path:
         """Write all branches as one CSV table: the number of the branch, then the columns of `Branch.columns`."""

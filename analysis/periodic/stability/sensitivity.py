@@ -122,11 +122,14 @@ class MotionGradient:
         Values of the parameters.
     along : ndarray, shape (c, m)
         Derivatives of the drive vector and, below them, of the constants of the equations, with respect to the parameters.
+    coordinate : int
+        Index of the free coordinate to whose amplitude `amplitude` refers.
     """
 
-    def __init__(self, orbit: PeriodicOrbit, names: Sequence[str] | None = None) -> None:
+    def __init__(self, orbit: PeriodicOrbit, names: Sequence[str] | None = None, coordinate: int = 0) -> None:
         parameters, drive = orbit.parameters, orbit.drive
         self.orbit = orbit
+        self.coordinate = coordinate
         self.names = gradient_names(parameters, drive) if names is None else tuple(names)
         for name in self.names:
             require_variable(parameters, drive, name)
@@ -182,27 +185,28 @@ class MotionGradient:
 
     @cached_property
     def _swing(self) -> tuple[tuple[float, float, Place], ...]:
-        """The greatest and the least value of the first component of y, each as (sign, which is +1 or -1; value; place)."""
+        """The greatest and the least value of the coordinate, each as (sign, which is +1 or -1; value; place)."""
         found = []
         for sign in (1.0, -1.0):
-            value, place = self.variations.greatest_value(sign * self.variations.y[..., 0])
+            value, place = self.variations.greatest_value(sign * self.variations.y[..., self.coordinate])
             found.append((sign, sign * value, place))
         return tuple(found)
 
     @cached_property
     def amplitude(self) -> Gradient:
-        """Gradient of `PeriodicOrbit.amplitude`, half the range of the first free coordinate."""
+        """Gradient of the coordinate's amplitude, one of `PeriodicOrbit.amplitudes`."""
         return self.gradient_for_motion(self._solution[0])
 
     def gradient_for_motion(self, solution: FloatArray) -> Gradient:
         """Return the gradient of the amplitude for given derivatives of the motion, shape (k, s, n, m)."""
         # to first order the value of an extremum does not depend on its place
-        by = [0.5 * sign * place.weights @ solution[place.panel, :, 0, :] for sign, _, place in self._swing]
+        own = solution[:, :, self.coordinate, :]
+        by = [0.5 * sign * place.weights @ own[place.panel] for sign, _, place in self._swing]
         return self._gradient(0.5 * (self._swing[0][1] - self._swing[1][1]), by[0] + by[1])
 
     def amplitude_curvature(self, along: str) -> Gradient:
         """Return the gradient of the derivative of the amplitude with respect to the parameter ``along``."""
-        v, solution = self.variations, self._solution[0]
+        v, solution, own = self.variations, self._solution[0], self.coordinate
         number = self.names.index(along)
         by_y, by_constant = v.second_derivatives(solution[..., number], self.along[:, number])
         twice = differentiate_constants(self.orbit.parameters, self.names, along).p_along
@@ -215,9 +219,9 @@ class MotionGradient:
         total = np.zeros(len(self.names))
         for sign, _, place in self._swing:
             # the place of the extremum moves so that the rate there stays zero
-            curvature = v.slope(place.panel, v.rates[place.panel, :, 0], place.position)
-            rate = place.weights @ rates[place.panel, :, 0, :]
-            total += 0.5 * sign * (place.weights @ second[place.panel, :, 0, :] - rate[number] * rate / curvature)
+            curvature = v.slope(place.panel, v.rates[place.panel, :, own], place.position)
+            rate = place.weights @ rates[place.panel, :, own, :]
+            total += 0.5 * sign * (place.weights @ second[place.panel, :, own, :] - rate[number] * rate / curvature)
         return self._gradient(self.amplitude[along], total)
 
     # Outputs
@@ -349,15 +353,17 @@ def motion_gradient(orbit: PeriodicOrbit, names: Sequence[str] | None = None) ->
     return MotionGradient(orbit, names)
 
 
-def extremum_orbit(orbit: PeriodicOrbit, along: str) -> PeriodicOrbit:
+def extremum_orbit(orbit: PeriodicOrbit, along: str, coordinate: int = 0) -> PeriodicOrbit:
     """Return the motion at an extremum of the amplitude over a parameter, starting from a motion near the extremum.
 
     See `extremum_gradient`.
     """
-    return _locate_motion(orbit, along, _extremum_step, "extremum of the amplitude")
+    return _locate_motion(orbit, along, _extremum_step, "extremum of the amplitude", coordinate)
 
 
-def extremum_gradient(orbit: PeriodicOrbit, along: str, names: Sequence[str] | None = None) -> PointGradient:
+def extremum_gradient(
+    orbit: PeriodicOrbit, along: str, names: Sequence[str] | None = None, coordinate: int = 0
+) -> PointGradient:
     """Compute how a resonance, or another extremum of the amplitude over a parameter, moves with the other parameters.
 
     Parameters
@@ -368,6 +374,8 @@ def extremum_gradient(orbit: PeriodicOrbit, along: str, names: Sequence[str] | N
         FMI name of the parameter, such as ``drive.speed``.
     names : sequence of str, optional
         FMI names of the other parameters; by default all, see `gradient_names`.
+    coordinate : int
+        Index of the free coordinate whose amplitude it is.
 
     Raises
     ------
@@ -375,7 +383,7 @@ def extremum_gradient(orbit: PeriodicOrbit, along: str, names: Sequence[str] | N
         If there is no extremum near the motion.
     """
     others = _other_names(orbit, along, names)
-    motion = MotionGradient(extremum_orbit(orbit, along), (*others, along))
+    motion = MotionGradient(extremum_orbit(orbit, along, coordinate), (*others, along), coordinate)
     slopes = motion.amplitude_curvature(along).by
     # at the extremum the amplitude does not change with the parameter ``along``
     amplitude, at = motion.amplitude, motion.values[:-1]
@@ -459,7 +467,9 @@ def _other_names(orbit: PeriodicOrbit, along: str, names: Sequence[str] | None) 
 _Step = Callable[[MotionGradient], tuple[FloatArray, float]]
 
 
-def _locate_motion(orbit: PeriodicOrbit, along: str, newton_step: _Step, what: str) -> PeriodicOrbit:
+def _locate_motion(
+    orbit: PeriodicOrbit, along: str, newton_step: _Step, what: str, coordinate: int = 0
+) -> PeriodicOrbit:
     """Find the special point near a motion by Newton's method, and return the motion at this point.
 
     Raises LinkworkError if Newton's method does not converge to a point near the motion; ``what`` names the point in the
@@ -467,7 +477,7 @@ def _locate_motion(orbit: PeriodicOrbit, along: str, newton_step: _Step, what: s
     """
     begun = parameter_value(orbit.parameters, orbit.drive, along)
     for _ in range(_STEPS):
-        motion = MotionGradient(orbit, (along,))
+        motion = MotionGradient(orbit, (along,), coordinate)
         try:
             change, step = newton_step(motion)
         except (np.linalg.LinAlgError, ZeroDivisionError):
