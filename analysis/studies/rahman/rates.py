@@ -334,8 +334,8 @@ def _denominators() -> Statement:
         "crank, i.e. near 100 degrees and 300 degrees.",
         text("section 3.2, L1115"),
         "sines and cosines in the denominators of what is printed as 69a to 69g and 69i to 69q, counted; crank angles at which "
-        "sin theta2, which divides in 40a and 41a, vanishes in the plane; there the least distance of theta3, whose sine "
-        "divides in all five, from 0 or half a turn",
+        "sin theta2, which divides in 40a and 41a, vanishes in the plane; least distance of theta3, whose sine divides in all "
+        "five, from 0 or half a turn, over the whole turn in the plane",
         f"none of a count; {ABOUT_DEG:g} deg, the rule for *near*; {VERY_CLOSE_DEG:g} deg, the rule for *very close*",
         (
             near("sines and cosines in denominators", 0.0, 0, 0.0),

@@ -55,9 +55,10 @@ region up to I4 = 1.5 is 0.167 1/s, where the listing needs 0.459. The second re
 wide as the first, and with the longest crank wider. The axes of Fig 5.2 and 5.3 are not those of I4 = 1 and 2, which the
 text has, but nearly those of I4 = 0.5, which the listing has. Fig 5.3 varies the coupler with the angles held, to which
 another ground link belongs at each length; on the same ground link the region widens beyond about equal links. Nor is the
-region of Fig 5.3 narrower than that of Fig 5.2. Cut after nine terms, the determinant does not give all regions, and without
-a damper (5.35) is met at every stable speed, not at the boundaries alone. The zeroth boundary does not part two stable
-regions: at higher speeds the slider falls away, and a damper only slows it."""
+region of Fig 5.3 narrower than that of Fig 5.2. With two harmonics of the coefficients the determinant does not give the
+third region, and with nine terms not the fourth; without a damper (5.35) is met at every stable speed, not at the boundaries
+alone. The zeroth boundary does not part two stable regions: at higher speeds the slider falls away, and a damper only slows
+it."""
 
 #: Inertia ratios of appendix 3 whose regions are compared.
 COMPARED = (0.5, 1.0, 1.5)
@@ -267,13 +268,14 @@ def formulas() -> tuple[Case, ...]:
     return tuple(at_most(name, SMALL, max(values)) for name, values in errors.items())
 
 
-def widest_by_inertia() -> dict[float, float]:
-    """Return the greatest width (in lambda_k^2) of the regions of Fig 5.1, for two upper limits of I4.
+#: Upper limits of I4 that Fig 5.1 may have, in words: the text does not say which range it means.
+RANGES = {1.5: "I4 = 1.5, the end of Fig 5.4 (L3919)", 2.0: "I4 = 2, the value of Fig 5.3"}
 
-    The limits are the keys: 1.5, as in Fig 5.4, and 2. The text does not say which range it means.
-    """
+
+def widest_by_inertia() -> dict[float, float]:
+    """Return the greatest width (in lambda_k^2) of the regions of Fig 5.1 for the upper limits of I4 of `RANGES`."""
     found = widths(regions("5.1")["true orbit"])
-    return {most: float(found[np.array(SWEEPS["5.1"].values) <= most].max()) for most in (1.5, 2.0)}
+    return {most: float(found[np.array(SWEEPS["5.1"].values) <= most].max()) for most in RANGES}
 
 
 def judge_crank(found: Mapping[str, Sequence[Region]]) -> tuple[Statement, ...]:
@@ -305,8 +307,8 @@ def judge_crank(found: Mapping[str, Sequence[Region]]) -> tuple[Statement, ...]:
         Statement(
             "The[ ]region is narrower than that of Fig. (5.1).",
             text("5.3.1, L3882-3884"),
-            why="the range of I4 in Fig 5.1 is not said: the greatest width is "
-            + ", ".join(f"{x:.2f} of that up to I4 = {most:g}" for most, x in over.items()),
+            why="the range of I4 in Fig 5.1 is not said: in the true periodic motion the greatest width, up to sigma2 = 0.1 "
+            "(L3927), is " + ", ".join(f"{x:.2f} of that up to {RANGES[most]}" for most, x in over.items()),
         ),
     )
 
@@ -332,6 +334,7 @@ def judge_coupler(found: Mapping[str, Sequence[Region]]) -> tuple[Statement, ...
     """Judge the statements on Fig 5.3, with constant angles as in the thesis, and with a constant ground link."""
     widest = float(widths(found["true orbit"]).max())
     over_crank = widest / float(widths(regions("5.2")["true orbit"]).max())
+    over_narrow, over_wide = (widest / x for x in widest_by_inertia().values())
     at_half = axis(orbit_region(held(0.8, 0.5)))
     both = {"angles held": found["true orbit"], "same ground link": found[SAME_GROUND]}
     seconds, listed = (
@@ -376,7 +379,12 @@ def judge_coupler(found: Mapping[str, Sequence[Region]]) -> tuple[Statement, ...
             "greatest width of the region, angles held, over that of each; true periodic motion",
             SIGN,
             (
-                Case(label="Fig 5.1", computed=None, why="the range of I4 there is not said"),
+                Case(
+                    label="Fig 5.1",
+                    computed=None,
+                    why=f"the range of I4 there is not said; it is {over_narrow:.2f} of that up to I4 = 1.5, "
+                    f"{over_wide:.2f} of that up to 2",
+                ),
                 at_most("Fig 5.2", 1.0, over_crank, why="I4 is 2 here and 1 there, and widens the region"),
             ),
         ),

@@ -244,7 +244,7 @@ def _bounded() -> tuple[Statement, ...]:
             "If, however, the link dimensions are constrained to have [values] within a defined range a different linkage is "
             "obtained. Let us illustrate this by requiring that output (a) be generated from a four bar linkage with the "
             "following constraints [10 < l1, l3, l4 < 30, 10 > l2].",
-            text("6.4.2 A, L4905-4909"),
+            text("6.4.2 A, L4905-4917"),
             "lengths of the printed linkage, and of that of Fig 6.4, that are out of these bounds",
             "none of a count; one is enough for *different*",
             (

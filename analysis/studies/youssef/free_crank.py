@@ -57,8 +57,8 @@ CRANK_SPEED: Quantity = ("crank speed", "crank.speed", 1.0, "rad/s")
 TIME = "time [s]"
 #: Our choices in the launches.
 UNSAID = (
-    "The text gives neither the damper of the launches nor, with three torques, the spring: here the damper of Fig "
-    "3.4 and the middle one of its springs."
+    "The text gives neither the damper of the launches, nor how long they are followed, nor, with three torques, the spring: "
+    "here the damper of Fig 3.4, 1 s, and the middle one of its springs."
 )
 
 
@@ -494,7 +494,7 @@ def launch_positions() -> StudyResult:
                         f"greatest u; {label}",
                         ALIKE,
                         run["slider.position"].max() / largest,
-                        why="it swings to both sides",
+                        why="after the weakest launch it swings to both sides of its start",
                     )
                     for label, run in runs.items()
                 ),
@@ -559,7 +559,7 @@ def launch_positions_by_spring() -> StudyResult:
     apart = np.ptp([accelerated(1e8, k)["slider.position"] for k in STIFFNESSES], axis=0).max()
     apart /= np.ptp([accelerated(1e8, k)["slider.position"] for k in STIFFNESSES])
     settled, by_torque = [settling(1e8, k) for k in STIFFNESSES], [settling(torque, 1e6) for torque in TORQUES]
-    counts = {name: [x.turns for x in of] for name, of in (("springs", settled), ("torques", by_torque))}
+    times = {name: [x.time for x in of] for name, of in (("springs", settled), ("torques", by_torque))}
     return _launch_result(
         "3.10",
         "The slider moves alike with all springs while the torque acts; a transient follows, whose duration depends "
@@ -599,10 +599,10 @@ def launch_positions_by_spring() -> StudyResult:
             "The duration of the transient free motion stage depends on the stiffness k and the initial input torque "
             "values.",
             text("3.2.2, L2201-2205"),
-            f"turns from the end of the torque until u stays within {ALIKE:g} of the steady decay, as in the row before; most "
-            "over fewest",
+            f"time from the end of the torque until u stays within {ALIKE:g} of the steady decay, as in the row before; the "
+            "longest over the shortest",
             f"more than {1.0 + ALIKE:g}, the rule for *the same*",
-            tuple(at_least(f"of the three {name}", 1.0 + ALIKE, max(x) / min(x)) for name, x in counts.items()),
+            tuple(at_least(f"of the three {name}", 1.0 + ALIKE, max(x) / min(x)) for name, x in times.items()),
         ),
     )
 

@@ -307,8 +307,9 @@ def judge_located(found: Mapping[str, tuple[Found, ...]]) -> tuple[Statement, ..
             "they stop before they are there",
         ),
         Statement(
-            "It is therefore necessary to begin the optimisation from as many initial points as possible.",
-            text("6.3.1, L4332"),
+            "It must be recognised, as in all optimisation methods, that this located minimum may not be a global minimum. It "
+            "is therefore necessary to begin the optimisation from as many initial points as possible.",
+            text("6.3.1, L4328-4334"),
             "greatest over least error of the ends of these searches, which the thesis calls located minima, and of the minima "
             "to which descents from them lead, the angles free",
             f"{1.0 + ALIKE:g}, the rule for *the same*",
@@ -414,10 +415,10 @@ def judge_sets() -> Statement:
     random = np.random.default_rng(611)
     sets = np.array([drawn(random) for _ in range(SETS)])
     return Statement(
-        "The remaining sets are then obtained using the following equation [(6.11)]. This generates quickly and "
-        "efficiently all the sets of required initial values and ensures that they satisfy all the explicit "
-        "externally imposed constraints described in equation (6.10).",
-        text("6.3.1, L4377"),
+        "The remaining sets are then obtained using the following equation [(6.11)] where ... X is any real random number. "
+        "This generates quickly and efficiently all the sets of required initial values and ensures that they satisfy all "
+        "the explicit externally imposed constraints described in equation (6.10).",
+        text("6.3.1, L4377-4394"),
         f"parameters outside their bounds in {SETS} sets by (6.11), X uniform over a turn (ours)",
         "none of a count",
         (
