@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from analysis.numerics.fourier import FourierSeries
 from analysis.periodic import Drive, Stability, confirm
 from analysis.studies.youssef.chapter_5 import SAME_GROUND, closed, held, to_the_letter
-from analysis.studies.youssef.damping import nine_terms, removing, without_factor
+from analysis.studies.youssef.damping import by_determinant, removing, without_factor
 from analysis.studies.youssef.linearised import with_crank
 from analysis.studies.youssef.regions import (
     appendix_3,
@@ -169,15 +169,19 @@ def test_cut_after_the_ninth_term() -> None:
         assert galerkin(ratio, 2)[:2] == pytest.approx([whole.low, whole.high], abs=1e-6)
 
 
-def test_nine_terms_of_the_divided_equation() -> None:
-    """The third region needs the third harmonic of the coefficients."""
-    ends, wholes = galerkin(1.0, 2).reshape(2, 2), hill_regions(equation(chapter_4(1.0)), 3)
-    errors = nine_terms()
-    for number, found, known in ((1, ends[0], 4.88e-5), (3, ends[1], 0.479)):
-        whole = wholes[number]
-        error = np.abs(found - (whole.low, whole.high)).max() / whole.width
-        assert error == pytest.approx(known, rel=2e-3)
-        assert errors[number] == pytest.approx(error, rel=1e-4)
+def test_by_determinant_of_the_divided_equation() -> None:
+    """The third region needs the third harmonic of the coefficients, the fourth more terms."""
+    wholes = hill_regions(equation(chapter_4(1.0)), 3)
+    for harmonics, first, third in ((2, 4.88e-5, 0.479), (64, 4.89e-5, 0.0281)):
+        ends, errors = galerkin(1.0, harmonics).reshape(2, 2), by_determinant(harmonics)
+        for number, found, known in ((1, ends[0], first), (3, ends[1], third)):
+            whole = wholes[number]
+            error = np.abs(found - (whole.low, whole.high)).max() / whole.width
+            assert error == pytest.approx(known, rel=2e-3)
+            assert errors[number] == pytest.approx(error, rel=1e-4)
+    assert by_determinant(64)[4] > 1.0
+    assert by_determinant(64, order=3)[4] < 0.01
+    assert by_determinant(2, order=8)[3] > 0.4
 
 
 def test_equation_without_the_factor_has_the_same_multipliers_but_for_the_factor() -> None:

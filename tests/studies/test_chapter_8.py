@@ -220,6 +220,9 @@ class TestFriction:
         assert (np.diff(places) >= 0.0).all()
         assert places[0] == pytest.approx(296.0, abs=2.5)
 
+    def test_decrease_by_constant_friction_varies_with_the_speed_as_much(self) -> None:
+        assert rig_1.spread_beyond_constant(0.05) == pytest.approx(1.0, abs=0.05)
+
     def test_lag(self) -> None:
         """About that of the peaks themselves."""
         smooth, rough = (rigs.slider(rigs.turn("A", 450.0, slider_friction_coefficient=c)) for c in (0.0, 0.2))

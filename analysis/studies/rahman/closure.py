@@ -266,7 +266,7 @@ def _mechanism_limits() -> tuple[Statement, Statement]:
                 at_least(f"a4 = {before:g} to {after:g} in", 0.0, shifts[after] - shifts[before], "in")
                 for before, after in pairwise(shifts)
             ),
-            "the mechanism works up to S1 = sqrt(a2^2 - (a1 + a4)^2); the stated limits are the iteration's alone",
+            "the mechanism works up to S1 = sqrt(a2^2 - (a1 + a4)^2); the limits of the thesis's iteration are not its own",
         ),
         Statement(
             "In the case of mechanism failure, it will either lose closure, i.e. one link or more will get detached "
@@ -435,7 +435,7 @@ def _matrices() -> tuple[Statement, ...]:
             "Fig. 3 is the generalized slider crank in which joint 1 is cylindrical with one translational and one "
             "rotational degrees of freedom, joints 2 and 3 are ball joints, each of which has three rotational "
             "degrees of freedom, and joint 4 is prismatic, exactly the same as in the planar case.",
-            text("section 2.3, L213; eqs 1 to 5"),
+            text("section 2.3, L213; eqs 1 to 4"),
             "freedoms that the matrices of eqs 1 to 4 give each joint: the rank of their derivatives by its variables, in a "
             "general position",
             "none of a count",

@@ -547,6 +547,8 @@ def _unweighted() -> tuple[Statement, ...]:
                 Case(label="effort", computed=None, why="that of neither method is stated"),
                 Case(label="direct search required", computed=None, why="no such case is given"),
             ),
+            "one of the five, (7.10c), is linear, lambda1 = 0, and the thesis then solves them one after another (L5607-5640); "
+            "*non-linear* is read as said of the set",
         ),
     )
 

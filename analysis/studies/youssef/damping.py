@@ -161,20 +161,20 @@ def outside(omega_c: float) -> float:
     return float(np.log(max(sizes)) / (2.0 * pi))
 
 
-def nine_terms() -> dict[int, float]:
-    """Return the errors of regions 1 to 3 by nine terms of the determinant at I4 = 1, relative to the regions' widths.
+def by_determinant(harmonics: int, order: int = 2) -> dict[int, float]:
+    """Return the errors of regions 1 to 4 by the determinant (5.35) at I4 = 1, relative to the regions' widths.
 
-    The coefficients of the divided equation (5.27) are cut after `LISTED_HARMONICS`. Each error is the greater of the region's
-    two boundaries.
+    The coefficients of the divided equation (5.27) are cut after the given number of harmonics, and the solution (5.31) after
+    the harmonic ``order``: nine terms at 2. Each error is the greater of the region's two boundaries.
     """
     exact = equation(chapter_4(1.0))
-    cut = divided(exact, LISTED_HARMONICS)
+    cut = divided(exact, harmonics)
     # the first boundary with the multiplier 1 is the zeroth
-    even, odd = (boundary_stiffnesses(cut, m, count=c, order=2).real for m, c in ((1, 3), (-1, 4)))
-    ends = {1: odd[:2], 2: even[1:], 3: odd[2:]}
+    even, odd = (boundary_stiffnesses(cut, m, count=c, order=order).real for m, c in ((1, 5), (-1, 4)))
+    ends = {1: odd[:2], 2: even[1:3], 3: odd[2:], 4: even[3:]}
     return {
         n: max(abs(ends[n][0] - whole.low), abs(ends[n][1] - whole.high)) / whole.width
-        for n, whole in hill_regions(exact, 3).items()
+        for n, whole in hill_regions(exact, 4).items()
     }
 
 
@@ -282,12 +282,16 @@ def judge_determinant() -> tuple[Statement, ...]:
             "For a particular mechanism the method is capable of giving all the boundaries of the unstable regions without "
             "any extra work.",
             text("5.2.2, L3730-3734"),
-            "boundaries by (5.35) cut after the ninth term (L3930), its coefficients after the second harmonic as in (4.29), "
-            "less those with more of both, over the region's width; right linear equation, divided by M as (5.27), I4 = 1, "
-            "without a damper",
+            "boundaries by (5.35) cut after the ninth term (L3930), with the coefficients to their second harmonic, as in "
+            "(4.29), and with all harmonics, less those without any cut, over the region's width; the four regions that nine "
+            "terms have; right linear equation, divided by M as (5.27), I4 = 1, without a damper",
             f"{SMALL:g}, the rule for *small*",
-            tuple(at_most(f"region {n}", SMALL, x) for n, x in nine_terms().items()),
-            "the third region needs more harmonics, which is extra work",
+            tuple(
+                at_most(f"region {n}; {name}", SMALL, x)
+                for name, harmonics in (("as in (4.29)", LISTED_HARMONICS), ("all harmonics", ALL_HARMONICS))
+                for n, x in by_determinant(harmonics).items()
+            ),
+            "to derive more harmonics, which the third region needs, or more terms, which the fourth does, is extra work",
         ),
         Statement(
             "The computer orientated method provided a fast method for solving the stability problem.",
