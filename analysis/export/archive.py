@@ -10,13 +10,12 @@ import zipfile
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
-from fmpy.validation import validate_fmu
-
 import linkwork
 from linkwork.errors import LinkworkError
 from linkwork.mechanism import Mechanism
 from linkwork.variables import Variable
 
+from ..files import find_problems
 from .accuracy import to_html
 from .experiments import experiments
 
@@ -62,7 +61,7 @@ def write(entries: Mapping[str, bytes], target: Path) -> Path:
                 info.compress_type = zipfile.ZIP_DEFLATED
                 info.external_attr, info.create_system = 0o644 << 16, 3  # attributes of Unix, on Windows too
                 archive.writestr(info, entries[name])
-        problems = validate_fmu(str(part))
+        problems = find_problems(part)
         if problems:
             raise BuildError(f"{target.name} is not valid: " + "; ".join(problems))
         os.replace(part, target)

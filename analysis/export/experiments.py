@@ -6,20 +6,27 @@ The files are those of the layered standard FMI-LS-REF; `analysis.run.experiment
 from __future__ import annotations
 
 import csv
+import hashlib
 import io
+import json
+import sys
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict
 from functools import cache
+from importlib import import_module
 from math import ceil, floor, inf, log2, log10
+from pathlib import Path
 from typing import Any
 from xml.etree.ElementTree import Element, SubElement
 
+import linkwork
 from linkwork.errors import AssemblyError
 from linkwork.mechanism import Mechanism
 from linkwork.parameters import fmi_name
 from linkwork.plant import Plant
 
 from ..mechanisms import MECHANISMS
+from ..numerics.cache import code_folder, load_or_make
 from ..run import ALLOWED, EXPERIMENTS, MANIFEST, STANDARD, Case, input_sampler, standard_cases
 from .bill import BILL, TYPE
 from .description import layered_standard, to_xml_bytes
@@ -42,7 +49,26 @@ def experiments(mechanism: Mechanism) -> dict[str, bytes]:
 
     A mechanism that is not registered or has no cases has only its default experiment. The duration of this experiment is
     halved until the motion does not reach the limit of assembly and the solver takes at most `LONGEST` steps.
+
+    The files of Linkwork's own mechanisms, whose references take many seconds in plain Python, are kept in the cache under a
+    hash of all sources that they depend on.
     """
+    package = str(mechanism.modules[-1].__package__)
+    if not package.startswith("linkwork.") or import_module(package).MECHANISM is not mechanism:
+        return _make_experiments(mechanism)
+    digest = hashlib.sha256(f"{sys.version} {package} {MECHANISMS.get(mechanism.name) is mechanism}".encode())
+    for root in (Path(linkwork.__file__).parent, *(Path(__file__).parents[1] / name for name in ("run", "export"))):
+        for path in sorted(root.rglob("*.py")):
+            digest.update(path.read_bytes())
+    made = load_or_make(
+        code_folder("experiments") / digest.hexdigest(),
+        lambda: json.dumps({name: text.decode() for name, text in _make_experiments(mechanism).items()}).encode(),
+    )
+    return {name: text.encode() for name, text in json.loads(made).items()}
+
+
+def _make_experiments(mechanism: Mechanism) -> dict[str, bytes]:
+    """Return the files of `experiments`, newly made."""
     cases = standard_cases(mechanism) if mechanism.cases and mechanism.name in MECHANISMS else {}
     root = Element("Experiments", {"name": mechanism.fmu, "description": "Standard cases of Linkwork"})
     files: dict[str, bytes] = {}

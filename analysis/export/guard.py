@@ -56,8 +56,8 @@ def add_guard(entries: Mapping[str, bytes], model: str, source: bytes) -> dict[s
 
 
 @cache
-def compile_guard(source: bytes) -> dict[str, bytes]:
-    """Compile the guard for every platform of PythonFMU and return the libraries by folder."""
+def compile_guard(source: bytes, *, kept: bool = True) -> dict[str, bytes]:
+    """Compile the guard for every platform of PythonFMU, or take what is ``kept``; return the libraries by folder."""
     headers = resources.files("fmpy") / "c-code"
     made = {}
     with tempfile.TemporaryDirectory(prefix="linkwork-guard-") as folder:
@@ -69,6 +69,7 @@ def compile_guard(source: bytes) -> dict[str, bytes]:
         for platform in PLATFORMS.values():
             if (place := platform.folder_fmi2) in PYTHONFMU:
                 library = f"guard.{platform.suffix}"
-                compile_library(folder, ["guard.c"], library, platform.target, (*OPTIONS, *_OPTIONS[place]))
+                options = (*OPTIONS, *_OPTIONS[place])
+                compile_library(folder, ["guard.c"], library, platform.target, options, kept=kept)
                 made[place] = (Path(folder) / library).read_bytes()
     return made

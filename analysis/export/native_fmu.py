@@ -5,6 +5,7 @@ One archive has model exchange and co-simulation, of FMI 2.0 or 3.0, and the sou
 
 from __future__ import annotations
 
+import hashlib
 import os
 import platform as machine
 import shutil
@@ -13,7 +14,8 @@ import subprocess
 import sys
 import tempfile
 from collections.abc import Sequence
-from importlib import resources
+from importlib import metadata, resources
+from itertools import pairwise
 from pathlib import Path
 from typing import NamedTuple
 
@@ -22,7 +24,7 @@ from linkwork.mechanism import Mechanism
 from ..files import unknown_name
 from ..libraries import require
 from ..mechanisms import check
-from ..numerics.cache import code_folder, hashes_below, keep_hashes, lock_folder, read_hashes
+from ..numerics.cache import code_folder, hashes_below, keep_hashes, load_or_make, lock_folder, read_hashes
 from ..run import show_progress
 from .archive import SOURCES, BuildError, common_files, write
 from .bill import add_bill
@@ -185,11 +187,12 @@ def _with_prefix(fmi2: str, fmi3: str) -> str:
 
 
 def compile_binaries(
-    identifier: str, kind: Kind, sources: dict[str, str], platforms: Sequence[str]
+    identifier: str, kind: Kind, sources: dict[str, str], platforms: Sequence[str], *, kept: bool = True
 ) -> dict[str, bytes]:
     """Compile the library for each platform; return the libraries by path in the archive.
 
-    The libraries for two architectures of macOS are in one file.
+    The libraries for two architectures of macOS are in one file. With ``kept`` a library that was compiled before is not
+    compiled again; see `compile_library`.
     """
     found: dict[str, list[bytes]] = {}
     with tempfile.TemporaryDirectory(prefix="linkwork-native-") as folder:
@@ -202,19 +205,41 @@ def compile_binaries(
             with show_progress(False, float(len(platforms)), f"compiling for {name}") as show:
                 show(float(number))
                 options = (*WASM_OPTIONS, *MEMORY) if name == WASM else (*OPTIONS, *platform.options)
-                compile_library(folder, COMPILED, library, platform.target, options)
+                compile_library(folder, COMPILED, library, platform.target, options, kept=kept)
             made = (Path(folder) / library).read_bytes()
             found.setdefault(f"binaries/{place}/{library}", []).append(component(made) if name == WASM else made)
     return {place: parts[0] if len(parts) == 1 else _join_macos_libraries(parts) for place, parts in found.items()}
 
 
 def compile_library(
-    folder: Path | str, files: Sequence[str], library: str, target: str, options: Sequence[str] = OPTIONS
+    folder: Path | str,
+    files: Sequence[str],
+    library: str,
+    target: str,
+    options: Sequence[str] = OPTIONS,
+    *,
+    kept: bool = False,
 ) -> None:
     """Compile C files of a folder to a library in the same folder.
 
     What Zig compiles for its own use, such as the C library, is cached with hashes and compiled again if a cached file has
     changed.
+
+    Parameters
+    ----------
+    folder : path
+    files : sequence of str
+        Paths of the C files, in the folder or elsewhere.
+    library : str
+        Name of the library.
+    target : str
+        Platform by its name in Zig.
+    options : sequence of str
+        Options of the compiler.
+    kept : bool
+        Whether the library is kept in the cache, and taken from there if it was compiled before by the same version of Zig
+        with the same options from the same files. The files are then all sources: those of the folder, ``files``, and the
+        folders of headers after an option ``-I``.
 
     Raises
     ------
@@ -224,6 +249,37 @@ def compile_library(
         If Zig is not installed.
     """
     require("ziglang")
+    if not kept:
+        _run_compiler(folder, files, library, target, options)
+        return
+    path = Path(folder) / library
+
+    def compiled() -> bytes:
+        _run_compiler(folder, files, library, target, options)
+        return path.read_bytes()
+
+    content = load_or_make(
+        code_folder("libraries") / _fingerprint(Path(folder), files, library, target, options), compiled
+    )
+    path.write_bytes(content)
+    path.chmod(0o755)
+
+
+def _fingerprint(folder: Path, files: Sequence[str], library: str, target: str, options: Sequence[str]) -> str:
+    """Return a hash of all that a library depends on: the compiler, its options, and what it may read."""
+    headers = [Path(after) for before, after in pairwise(options) if before == "-I"]
+    plain = [option for option in options if Path(option) not in headers]
+    sources = [path for place in (folder, *headers) for path in sorted(place.rglob("*.[ch]"))]
+    sources += [folder / name for name in files]
+    digest = hashlib.sha256(repr((metadata.version("ziglang"), library, target, plain)).encode())
+    for path in sources:
+        content = path.read_bytes()
+        digest.update(f"{path.name} {len(content)} ".encode() + content)
+    return digest.hexdigest()
+
+
+def _run_compiler(folder: Path | str, files: Sequence[str], library: str, target: str, options: Sequence[str]) -> None:
+    """Compile C files of a folder with Zig, whose own objects are kept in the cache."""
     libraries = () if "-nostdlib" in options else ("-lm",)
     cache = code_folder(f"zig-{target}")
     known = cache / "hashes"

@@ -95,7 +95,7 @@ def _compare_libraries(files: dict[str, bytes], tools: dict[str, str]) -> Iterat
         if not wanted:
             yield Comparison(place, False, "is for none of the platforms that Linkwork compiles for")
             continue
-        made = compile_binaries(identifier, kind, sources, wanted)
+        made = compile_binaries(identifier, kind, sources, wanted, kept=False)
         yield Comparison(place, made.get(place) == files[place], _versions(tools, "ziglang"))
 
 
@@ -106,7 +106,7 @@ def _compare_pythonfmu(files: dict[str, bytes], tools: dict[str, str]) -> Iterat
         content = (package / "resources" / "binaries" / folder / name).read_bytes()
         place = f"binaries/{folder}/{name}"
         yield Comparison(place, files.get(place) == content, _versions(tools, "pythonfmu"))
-    guards = compile_guard(files[GUARD]) if GUARD in files else {}
+    guards = compile_guard(files[GUARD], kept=False) if GUARD in files else {}
     for place in (p for p in files if p.startswith("binaries/") and Path(p).name not in PYTHONFMU.values()):
         yield Comparison(place, files[place] == guards.get(place.split("/")[1]), _versions(tools, "ziglang"))
     prefix = "resources/pythonfmu/"

@@ -17,6 +17,7 @@ from .outputs import record_output as record_output
 from .outputs import write_text as write_text
 from .paths import WritingError as WritingError
 from .paths import check_fmu as check_fmu
+from .paths import find_problems as find_problems
 from .paths import first_line as first_line
 from .paths import limit as limit
 from .reader import Choice as Choice

@@ -6,7 +6,7 @@ import hashlib
 import os
 import sys
 import tempfile
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from functools import cache
 from pathlib import Path
@@ -68,6 +68,17 @@ def keep(path: Path, content: bytes) -> None:
     """Write a file of the cache as `store_file` does; do nothing if the disk is full or read-only."""
     with suppress(OSError):
         store_file(path, content)
+
+
+def load_or_make(path: Path, make: Callable[[], bytes]) -> bytes:
+    """Return the content kept at a path of the cache, or newly made; its hash is checked, as code that is damaged crashes."""
+    with suppress(OSError):
+        digest, content = (kept := path.read_bytes())[:32], kept[32:]
+        if hashlib.sha256(content).digest() == digest:
+            return content
+    content = make()
+    keep(path, hashlib.sha256(content).digest() + content)
+    return content
 
 
 def hashes_below(folder: Path) -> dict[str, str]:

@@ -22,7 +22,7 @@ import sys
 import sysconfig
 import warnings
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from functools import cache
 from pathlib import Path
 from threading import RLock
@@ -42,7 +42,7 @@ from linkwork.errors import LinkworkError
 
 from . import lanes as vectors
 from . import linking
-from .cache import code_folder, keep, lock_folder, store_file
+from .cache import code_folder, load_or_make, lock_folder, store_file
 
 VECTOR = float64[::1]
 MATRIX = float64[:, ::1]
@@ -102,7 +102,10 @@ class MachineCode:
         machine = binding.Target.from_default_triple().create_target_machine(
             opt=3, jit=True, cpu=cpu, features=features
         )
-        code = load_or_make(self.fingerprint, lambda: _compile(functions, lanes, rows, shared, triple, machine))
+        code = load_or_make(
+            code_folder("llvm") / self.fingerprint,
+            lambda: _compile(functions, lanes, rows, shared, triple, machine),
+        )
         engine = binding.create_mcjit_compiler(binding.parse_assembly(f'target triple = "{triple}"'), machine)
         engine.add_object_file(binding.ObjectFileRef.from_data(code))
         engine.finalize_object()
@@ -129,18 +132,6 @@ def _compile(
 def own_source() -> bytes:
     """Return the sources of this module and of `lanes`, on which machine code depends."""
     return Path(__file__).read_bytes() + Path(vectors.__file__).read_bytes()
-
-
-def load_or_make(key: str, make: Callable[[], bytes]) -> bytes:
-    """Return the object file for a key, from disk or newly made; its hash is checked, as LLVM crashes on a damaged file."""
-    path = code_folder("llvm") / key
-    with suppress(OSError):
-        digest, code = (text := path.read_bytes())[:32], text[32:]
-        if hashlib.sha256(code).digest() == digest:
-            return code
-    code = make()
-    keep(path, hashlib.sha256(code).digest() + code)
-    return code
 
 
 #: Functions of the C library by CasADi's operations.

@@ -30,7 +30,8 @@ from numpy.typing import NDArray
 from linkwork.errors import LinkworkError
 
 from . import lanes, linking
-from .codegen import MAKING, Writer, fingerprint, load_or_make, own_source
+from .cache import code_folder, load_or_make
+from .codegen import MAKING, Writer, fingerprint, own_source
 from .lanes import DOUBLE, Vector
 
 _LONG = ir.IntType(64)
@@ -130,7 +131,7 @@ def compile_kernel(function: Any) -> tuple[bytes, str]:
         return pickle.dumps(linking.unmade_code(made))
 
     with MAKING:
-        code, name = pickle.loads(load_or_make(f"device-{fingerprint(function, signature)}", make))
+        code, name = pickle.loads(load_or_make(code_folder("llvm") / f"device-{fingerprint(function, signature)}", make))
     return code, name
 
 
@@ -248,7 +249,7 @@ def compile_to_ptx(kernel: tuple[bytes, str], functions: Sequence[Any]) -> bytes
     sources = own_source() + Path(__file__).read_bytes() + kernel[0]
     digest = hashlib.sha256(f"{llvmlite.__version__} {[f.serialize() for f in functions]}".encode() + sources)
     with MAKING:
-        return load_or_make(f"ptx-{digest.hexdigest()}", make)
+        return load_or_make(code_folder("llvm") / f"ptx-{digest.hexdigest()}", make)
 
 
 class Cuda:

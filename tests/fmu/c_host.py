@@ -32,7 +32,7 @@ def compile_host(folder: Path, platform: str | None = None) -> Path:
     headers = str(resources.files("fmpy") / "c-code")
     libraries = () if "windows" in platform else ("-lpthread", "-ldl")
     options = ("-std=c11", "-O2", "-D_GNU_SOURCE", "-Wall", "-Wextra", "-Werror", "-I", headers)
-    compile_library(folder, [str(SOURCE)], name, PLATFORMS[platform].target, (*options, *libraries))
+    compile_library(folder, [str(SOURCE)], name, PLATFORMS[platform].target, (*options, *libraries), kept=True)
     return folder / name
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 import os
+import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -16,15 +17,21 @@ from click.testing import CliRunner
 from analysis import cli
 from analysis.export import BuildError, rebuild
 from analysis.export.bill import BILL
-from analysis.numerics.cache import cache_root
+from analysis.numerics.cache import cache_root, lock_folder
 
 ROOT = Path(__file__).parents[2]
 
 
 def built_by(user: Path, platforms: str, **variables: str) -> dict[str, bytes]:
-    """Build the FMUs of a mechanism as another user would: other folders, another time zone, language, mask, hash seed."""
+    """Build the FMUs of a mechanism as another user would: other folders, another time zone, language, mask, hash seed.
+
+    Of what is in the cache a user has only what Zig compiles for its own use.
+    """
     (user / "tmp").mkdir(parents=True)
-    changed = {"HOME": str(user), "TMPDIR": str(user / "tmp"), "LINKWORK_CACHE_DIR": str(cache_root())}
+    for kept in cache_root().glob("zig-*/"):
+        with lock_folder(kept):
+            shutil.copytree(kept, user / "cache" / kept.name)
+    changed = {"HOME": str(user), "TMPDIR": str(user / "tmp"), "LINKWORK_CACHE_DIR": str(user / "cache")}
     done = subprocess.run(
         [
             sys.executable,
