@@ -32,7 +32,9 @@ def compile_host(folder: Path, platform: str | None = None) -> Path:
     headers = str(resources.files("fmpy") / "c-code")
     libraries = () if "windows" in platform else ("-lpthread", "-ldl")
     options = ("-std=c11", "-O2", "-D_GNU_SOURCE", "-Wall", "-Wextra", "-Werror", "-I", headers)
-    compile_library(folder, [str(SOURCE)], name, PLATFORMS[platform].target, (*options, *libraries), kept=True)
+    # optimised as FMUs are: otherwise Zig compiles the C library again, which takes more than a minute for Windows
+    options = (*options, *libraries, *PLATFORMS[platform].options)
+    compile_library(folder, [str(SOURCE)], name, PLATFORMS[platform].target, options, kept=True)
     return folder / name
 
 
