@@ -1,11 +1,14 @@
 """Run the cases of one check in a separate process: ``python -m analysis.probe.child JOB``.
 
-The process may crash; the parent process then reads the journal and the findings that this process has written.
+The process may crash; the parent process then reads the journal and the findings that this process has written. Without JOB
+the program reads the paths of jobs from standard input and forks a process for each of them, which then need not load the
+modules again.
 """
 
 from __future__ import annotations
 
 import json
+import os
 import sys
 import time
 import traceback
@@ -71,9 +74,31 @@ def _no_core_dump() -> None:
     resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
 
 
+def _fork_for_jobs() -> str:
+    """Fork a process for each path of a job on standard input; return the path in the new process.
+
+    Standard output gets the number of each process, then its exit code, negative for a signal. This process itself ends with
+    the input.
+    """
+    from . import checks as _checks  # noqa: F401  what every job needs is loaded once
+
+    for line in iter(sys.stdin.readline, ""):
+        path = str(line).removesuffix("\n")
+        number = os.fork()
+        if number == 0:
+            for descriptor, place in enumerate((os.devnull, os.devnull, str(Path(path).with_name("stderr")))):
+                file = os.open(place, os.O_RDONLY if descriptor == 0 else os.O_WRONLY | os.O_CREAT | os.O_TRUNC, 0o600)
+                os.dup2(file, descriptor)
+                os.close(file)
+            return path
+        os.write(1, f"{number}\n".encode())
+        os.write(1, f"{os.waitstatus_to_exitcode(os.waitpid(number, 0)[1])}\n".encode())
+    sys.exit(0)
+
+
 if __name__ == "__main__":
     try:
-        code = main(sys.argv[1])
+        code = main(sys.argv[1] if len(sys.argv) > 1 else _fork_for_jobs())
     except Exception:  # the exit code distinguishes this from a crash of the FMU
         traceback.print_exc()
         code = FAILED

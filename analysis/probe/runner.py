@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import json
 import os
+import select
 import signal
 import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -17,7 +19,7 @@ from zipfile import BadZipFile
 
 from linkwork.errors import InputError
 
-from ..files import check_fmu, unknown_name
+from ..files import check_fmu, find_problems, unknown_name
 from . import journal
 from .context import AFTER_FATAL, FAILED
 from .findings import CRASH, WRONG, Finding, Outcome, Report
@@ -40,6 +42,7 @@ class _Job:
     calls: int
     seconds: float
     hang: float
+    parent: subprocess.Popen[bytes] | None
     first: int = 0
     last: int = sys.maxsize
     done: int = 0
@@ -92,18 +95,16 @@ def probe(
     -------
     Report
     """
-    from fmpy.validation import validate_fmu
-
     from .checks import CHECKS
 
     for check in checks:
         if check not in CHECKS:
             raise unknown_name(check, CHECKS, f"check {check!r}")
-    with tempfile.TemporaryDirectory(prefix="probe-") as temporary:
+    with tempfile.TemporaryDirectory(prefix="probe-") as temporary, _parent_of_jobs(Path(temporary)) as parent:
         work = Path(temporary)
         description = _extract(Path(fmu), work / "fmu")
         report = Report(fmu=Path(fmu).name, fmi_version=description.fmiVersion, seed=seed)
-        for problem in validate_fmu(str(fmu)):
+        for problem in find_problems(fmu):
             text = f"model description: {problem}"
             report.add(Finding(severity=WRONG, key=f"static: {problem}", text=text, calls=[], replay=""))
         until = time.monotonic() + seconds
@@ -118,6 +119,7 @@ def probe(
                 job = _Job(
                     check=check, interface=name, folder=work / "fmu", work=work, seed=seed, calls=share,
                     seconds=max(0.0, until - time.monotonic()) if about.share else 1e9, hang=hang,
+                    parent=parent,
                 )  # fmt: skip
                 if not _run(job, report):
                     break
@@ -131,7 +133,7 @@ def replay(fmu: str | Path, case: str, *, hang: float = 10.0) -> tuple[list[str]
     seed, interface, check, number = (case.split("/") + [""] * 4)[:4]
     if check not in CHECKS or not number.isdigit() or not seed.lstrip("-").isdigit() or interface not in ("cs", "me"):
         raise InputError(f"there is no case {case!r}: it must be as in a report, such as 0/cs/forbidden/12")
-    with tempfile.TemporaryDirectory(prefix="probe-") as temporary:
+    with tempfile.TemporaryDirectory(prefix="probe-") as temporary, _parent_of_jobs(Path(temporary)) as parent:
         work = Path(temporary)
         description = _extract(Path(fmu), work / "fmu")
         _select_interfaces(interface, interfaces(description))
@@ -139,7 +141,7 @@ def replay(fmu: str | Path, case: str, *, hang: float = 10.0) -> tuple[list[str]
         for name in [*(["serialize"] if check == "deserialize" else []), check]:
             job = _Job(
                 check=name, interface=interface, folder=work / "fmu", work=work, seed=int(seed), calls=sys.maxsize,
-                seconds=1e9, hang=hang, first=int(number), last=int(number) + 1,
+                seconds=1e9, hang=hang, parent=parent, first=int(number), last=int(number) + 1,
             )  # fmt: skip
             _run(job, report)
         return journal.read(job.journal).lines, report.findings
@@ -219,36 +221,91 @@ def _one_process(job: _Job, report: Report, begun: float) -> bool:
     return True
 
 
+class _Forked:
+    """A process that `child` has forked for a job; its methods are those of `subprocess.Popen`."""
+
+    def __init__(self, parent: subprocess.Popen[bytes], job: Path) -> None:
+        assert parent.stdin is not None
+        assert parent.stdout is not None
+        self._output = parent.stdout
+        parent.stdin.write(f"{job}\n".encode())
+        self._number = self._read()
+        self.returncode: int | None = None
+
+    def _read(self) -> int:
+        if not (line := self._output.readline()):
+            raise ProbeError("the process from which those of the jobs are forked has ended")
+        return int(line)
+
+    def wait(self, timeout: float | None = None) -> int:
+        if self.returncode is None:
+            if not select.select([self._output], [], [], timeout)[0]:
+                raise subprocess.TimeoutExpired("fork", timeout or 0.0)
+            self.returncode = self._read()
+        return self.returncode
+
+    def poll(self) -> int | None:
+        return self.returncode
+
+    def kill(self) -> None:
+        os.kill(self._number, signal.SIGKILL)
+
+
+def _command(work: Path, *words: str) -> dict[str, Any]:
+    """Return the arguments of a process that runs `child` in the folder of a probe."""
+    paths = os.pathsep.join(dict.fromkeys([*(path or os.getcwd() for path in sys.path)]))
+    # freed and uninitialised memory is filled with a pattern, so that reading it has a visible effect
+    environment = {**os.environ, "PYTHONPATH": paths, "MALLOC_PERTURB_": "165"}
+    return {"args": [sys.executable, "-m", f"{__package__}.child", *words], "env": environment, "cwd": work}
+
+
+@contextmanager
+def _parent_of_jobs(work: Path) -> Iterator[subprocess.Popen[bytes] | None]:
+    """Yield a process that forks the processes of jobs; None where a process with libraries of the system cannot be forked."""
+    if sys.platform != "linux":
+        yield None
+        return
+    with (
+        (work / "stderr").open("wb") as errors,
+        subprocess.Popen(
+            **_command(work), stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=errors, bufsize=0
+        ) as parent,
+    ):
+        yield parent
+
+
 def _watch(job: _Job) -> tuple[int, bool, str]:
     """Start the process of a job and wait until it ends; end the process if a call does not return.
 
     Return the exit code of the process, whether a call did not return, and the last part of the standard error.
     """
-    paths = os.pathsep.join(dict.fromkeys([*(path or os.getcwd() for path in sys.path)]))
-    # freed and uninitialised memory is filled with a pattern, so that reading it has a visible effect
-    environment = {**os.environ, "PYTHONPATH": paths, "MALLOC_PERTURB_": "165"}
-    stderr = job.work / "stderr"
-    with stderr.open("wb") as errors:
-        command = [sys.executable, "-m", f"{__package__}.child", str(job.work / "job.json")]
-        process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=errors, env=environment, cwd=job.work)
-        calls, since, hangs = -1, time.monotonic(), False
-        try:
-            while True:
-                try:
-                    process.wait(timeout=0.5)
-                    break
-                except subprocess.TimeoutExpired:
-                    made = journal.read(job.journal).calls
-                    if made != calls:
-                        calls, since = made, time.monotonic()
-                    elif time.monotonic() - since > job.hang:
-                        hangs = True
-                        process.kill()
-        finally:
-            if process.poll() is None:
-                process.kill()
-                process.wait()
-    return process.returncode, hangs, stderr.read_text(encoding="utf-8", errors="replace")[-2000:]
+    stderr, path = job.work / "stderr", job.work / "job.json"
+    process: _Forked | subprocess.Popen[bytes]
+    if job.parent is not None:
+        process = _Forked(job.parent, path)
+    else:
+        with stderr.open("wb") as errors:
+            process = subprocess.Popen(**_command(job.work, str(path)), stdout=subprocess.DEVNULL, stderr=errors)
+    calls, since, hangs = -1, time.monotonic(), False
+    try:
+        while True:
+            try:
+                process.wait(timeout=0.5)
+                break
+            except subprocess.TimeoutExpired:
+                made = journal.read(job.journal).calls
+                if made != calls:
+                    calls, since = made, time.monotonic()
+                elif time.monotonic() - since > job.hang:
+                    hangs = True
+                    process.kill()
+    finally:
+        if process.poll() is None:
+            process.kill()
+            process.wait()
+    code = process.returncode
+    assert code is not None
+    return code, hangs, stderr.read_text(encoding="utf-8", errors="replace")[-2000:]
 
 
 def _records(path: Path) -> list[dict[str, Any]]:
