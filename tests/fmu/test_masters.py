@@ -158,12 +158,19 @@ each_row = pytest.mark.parametrize(
 )
 
 
-def need(master: str) -> None:
-    """Skip where a master cannot be imported, or fail where all have to be."""
+@cache
+def missing(master: str) -> str:
+    """Why a master cannot be imported; empty if it can."""
     what, attempt = NEEDS[master]
     done = subprocess.run([sys.executable, "-c", attempt], capture_output=True, text=True, timeout=60, check=False)
-    if done.returncode != 0:
-        message = f"{master} cannot be imported; it needs {what}: {done.stderr.strip().splitlines()[-1]}"
+    if done.returncode == 0:
+        return ""
+    return f"{master} cannot be imported; it needs {what}: {done.stderr.strip().splitlines()[-1]}"
+
+
+def need(master: str) -> None:
+    """Skip where a master cannot be imported, or fail where all have to be."""
+    if message := missing(master):
         if os.environ.get("LINKWORK_ALL_MASTERS"):
             pytest.fail(message)
         pytest.skip(message)
