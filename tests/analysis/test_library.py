@@ -40,6 +40,8 @@ FILES = sorted(FOLDER.glob("*.toml"))
 #: Slots, gears, racks, friction and two cranks: what takes long is tested with these, with the others by `make test-long`.
 FIRST = ("elastic-bearing", "geared-five-bar", "hybrid-press", "rack-and-pinion", "shaper")
 EVERY = [path if path.stem in FIRST else pytest.param(path, marks=pytest.mark.long) for path in FILES]
+#: Their FMUs are probed: slots, and two cranks; the C shell that a probe tries is that of all linkages.
+PROBED = ("hybrid-press", "shaper")
 pytestmark = pytest.mark.usefixtures("own_linkages")
 
 
@@ -247,7 +249,7 @@ def test_a_law_that_ends_a_run_next_to_the_limit_of_assembly_is_named_alone():
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("path", FILES, ids=lambda path: path.stem)
+@pytest.mark.parametrize("path", EVERY, ids=lambda path: path.stem)
 def test_a_linkage_of_the_library_runs_as_with_multipliers(path):
     """The oracle's own run, by SciPy in all coordinates of all bodies, at its end; what is driven under constant torques."""
     time = np.linspace(0.0, 0.2, 3)
@@ -512,7 +514,11 @@ def test_two_commanded_cranks_are_driven_by_the_torques_of_the_multipliers(ratio
 
 @pytest.mark.slow
 @pytest.mark.fmu
-@pytest.mark.parametrize("path", EVERY, ids=lambda path: path.stem)
+@pytest.mark.parametrize(
+    "path",
+    [path if path.stem in PROBED else pytest.param(path, marks=pytest.mark.long) for path in FILES],
+    ids=lambda path: path.stem,
+)
 def test_the_fmu_of_a_linkage_probes_clean(path, tmp_path):
     assert probe(build_native(load_linkage(path), NATIVE_FMI3, tmp_path), calls=150, seconds=1.5).findings == []
 

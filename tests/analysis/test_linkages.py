@@ -191,8 +191,11 @@ def test_random_friction_is_that_of_multipliers(tmp_path):
 
 
 @pytest.mark.slow
-def test_many_random_linkages_of_all_kinds_with_friction(tmp_path):
-    for seed in range(400, 460):
+@pytest.mark.parametrize(
+    "first", [400, pytest.param(420, marks=pytest.mark.long), pytest.param(440, marks=pytest.mark.long)]
+)
+def test_many_random_linkages_of_all_kinds_with_friction(tmp_path, first):
+    for seed in range(first, first + 20):
         package, _ = assembled(seed, tmp_path, (*KINDS, "rack", "rack"))
         compared(seed, tmp_path, (*KINDS, "rack", "rack"), friction=rough(package))
 
@@ -219,7 +222,9 @@ def test_period_of_a_crank_brings_gears_and_racks_back(tmp_path, change, turns):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("first", range(16, 316, 50))
+@pytest.mark.parametrize(
+    "first", [16, 66, *(pytest.param(first, marks=pytest.mark.long) for first in range(116, 316, 50))]
+)
 def test_many_random_linkages_move_as_with_multipliers(tmp_path, first):
     """And energy gained and lost is that supplied, over steps of the plant from rest."""
     for seed in range(first, first + 50):

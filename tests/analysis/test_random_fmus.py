@@ -37,7 +37,10 @@ def made(seed: int, folder: Any) -> Mechanism:
     return package.mechanism(folder)
 
 
-@pytest.mark.parametrize("first", range(400, 700, 50))
+#: The first two parts of the draws are of all kinds; the others are for `make test-long`.
+@pytest.mark.parametrize(
+    "first", [400, 450, *(pytest.param(first, marks=pytest.mark.long) for first in range(500, 700, 50))]
+)
 def test_the_python_fmus_are_the_plants(first, tmp_path, monkeypatch):
     """And energy gained and lost is that supplied. Every tenth is built whole, with experiments, and validated by FMPy."""
     wanted, cases = [], []
@@ -64,7 +67,10 @@ def test_the_python_fmus_are_the_plants(first, tmp_path, monkeypatch):
         assert one == expected, seed
 
 
-@pytest.mark.parametrize("seed", range(424, 432))
+#: The first four have racks, friction, many dyads, and none of these; others are for `make test-long`.
+@pytest.mark.parametrize(
+    "seed", [*range(424, 428), *(pytest.param(seed, marks=pytest.mark.long) for seed in range(428, 432))]
+)
 def test_the_native_fmu_is_the_plant_within_its_tolerance(seed, tmp_path):
     """And energy gained and lost is that supplied."""
     mechanism = made(seed, tmp_path)

@@ -256,7 +256,14 @@ def drawn_task(seed: int) -> syn.Task:
     return syn.SliderFunction(rotation=rotation, position=0.1 * share + sum(bends))
 
 
-@pytest.mark.parametrize("seed", [*range(4), *(pytest.param(n, marks=pytest.mark.slow) for n in range(4, 24))])
+@pytest.mark.parametrize(
+    "seed",
+    [
+        *range(4),
+        *(pytest.param(n, marks=pytest.mark.slow) for n in range(4, 8)),
+        *(pytest.param(n, marks=pytest.mark.long) for n in range(8, 24)),
+    ],
+)
 def test_a_looser_constraint_is_no_worse(seed: int) -> None:
     errors = []
     for constraints in NESTED:

@@ -417,7 +417,15 @@ class TestPrecisionPoints:
         assert np.all(np.diff(rotation) > 0.0) or np.all(np.diff(rotation) < 0.0)
 
     @pytest.mark.slow
-    @pytest.mark.parametrize(("seed", "span"), [(1, 2.0), (2, 3.5), (3, 3.5), (4, 5.5), (5, 5.5), (6, 5.5)])
+    @pytest.mark.parametrize(
+        ("seed", "span"),  # one of each span, the others by `make test-long`
+        [
+            (1, 2.0),
+            (3, 3.5),
+            (4, 5.5),
+            *(pytest.param(seed, span, marks=pytest.mark.long) for seed, span in ((2, 3.5), (5, 5.5), (6, 5.5))),
+        ],
+    )
     def test_nine_points_of_a_hidden_crank_rocker(self, seed: int, span: float) -> None:
         random = np.random.default_rng([9, seed])
         points = drawn(random, least=0.75).path(np.sort(random.uniform(0.0, span, 9)))
@@ -458,7 +466,8 @@ class TestPrecisionPoints:
 
 
 @pytest.mark.slow
-def test_an_aerofoil_is_drawn_as_well_from_any_seed() -> None:
+@pytest.mark.parametrize("seeds", [2, pytest.param(4, marks=pytest.mark.long)])
+def test_an_aerofoil_is_drawn_as_well_from_any_seed(seeds: int) -> None:
     """NACA 4415, by the formulas of NACA report 460."""
     x = 0.5 * (1.0 - np.cos(np.linspace(0.0, np.pi, 60)))
     half = 0.75 * (0.2969 * np.sqrt(x) - 0.126 * x - 0.3516 * x**2 + 0.2843 * x**3 - 0.1036 * x**4)
@@ -468,7 +477,7 @@ def test_an_aerofoil_is_drawn_as_well_from_any_seed() -> None:
     middle, off = np.column_stack([x, camber]), half[:, None] * np.column_stack([-np.sin(slope), np.cos(slope)])
     path = syn.TargetPath(points=np.vstack([(middle + off)[::-1], (middle - off)[1:-1]]), closed=True)
     task = syn.UntimedPath(path=path)
-    errors = [syn.synthesize(task, search=syn.Search(seed=seed)).best.error for seed in range(4)]
+    errors = [syn.synthesize(task, search=syn.Search(seed=seed)).best.error for seed in range(seeds)]
     assert max(errors) < 1.02 * min(errors)
     assert max(errors) < 0.00115
 

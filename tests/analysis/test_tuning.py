@@ -308,7 +308,7 @@ def test_nothing_is_met_where_the_motion_is_unstable():
     assert any(region.low < high and low < region.high for region in _unwanted_regions(found))
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_an_answer_far_from_the_present_values_is_found_and_what_lies_beside_the_range_does_not_make_it_unmet():
     """Between the values at which all ways end lies a narrow window of stiffness; a branch beyond 250 rpm is lost there."""
     tuned = tune(on_a_soft_spring())

@@ -116,12 +116,12 @@ def files_of(fmu: str, fmus: dict[str, Path], natives: dict[str, Path]) -> dict[
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    "fmu", [pytest.param(fmu, marks=[] if fmu == "FiveBarSlider" else pytest.mark.long) for fmu in MECHANISMS]
+    ("fmu", "draws"), [("FiveBarSlider", 15), *(pytest.param(fmu, 50, marks=pytest.mark.long) for fmu in MECHANISMS)]
 )
-def test_random_mechanisms(fmu: str, fmus: dict[str, Path], natives: dict[str, Path]) -> None:
+def test_random_mechanisms(fmu: str, draws: int, fmus: dict[str, Path], natives: dict[str, Path]) -> None:
     files = {kind: str(path) for kind, path in files_of(fmu, fmus, natives).items()}
-    found = run_in_process(run_random, ROOT, fmu, files, list(range(50)), timeout=900.0)
-    assert {row[0] for row in found} == set(range(50))
+    found = run_in_process(run_random, ROOT, fmu, files, list(range(draws)), timeout=900.0)
+    assert {row[0] for row in found} == set(range(draws))
     for seed, kind, interface, name, relative, status, status_fmu, end in found:
         exchange = interface == "model-exchange"
         assert status == status_fmu, (seed, kind, interface)
