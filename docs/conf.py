@@ -7,13 +7,19 @@ import sys
 from pathlib import Path
 from typing import Any
 
+from jinja2.sandbox import SandboxedEnvironment
 from latex2mathml.converter import convert
+from numpydoc import docscrape_sphinx
 
 from analysis.cli import COMMANDS
 from linkwork import __version__
 
 sys.path.insert(0, str(Path(__file__).parent))
 import openings
+
+# numpydoc makes an environment, and compiles its template, for every docstring anew: the first one serves them all
+_FIRST: dict[str, Any] = {}
+docscrape_sphinx.SandboxedEnvironment = lambda loader: _FIRST.setdefault("", SandboxedEnvironment(loader=loader))
 
 project = "Linkwork"
 author = copyright = "The Linkwork developers"

@@ -61,6 +61,9 @@ def pytest_xdist_make_scheduler(config: pytest.Config, log: Any) -> Any:
     return Units(config, log)
 
 
+#: Files that workers begin with: the longest, and long ones that would otherwise come last.
+LONGEST = ("test_docs.py", "test_chapter_8.py", "test_coupling.py", "test_realtime.py", "test_wheel.py")
+
 #: A test is long from this number of seconds on; the file lists the tests that were long when ``make durations`` last ran.
 SECONDS, LONGER = 1.5, Path(__file__).parent / "seconds.txt"
 
@@ -85,7 +88,7 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
     """Mark tests that take longer, build or run an FMU, or are slow because they are long; the longest go to workers first."""
     longer = frozenset(LONGER.read_text(encoding="utf-8").splitlines())
     if hasattr(config, "workerinput"):
-        items.sort(key=lambda item: item.path.name not in ("test_docs.py", "test_chapter_8.py"))
+        items.sort(key=lambda item: item.path.name not in LONGEST)
     for item in items:
         if item.nodeid in longer:
             item.add_marker(pytest.mark.seconds)
