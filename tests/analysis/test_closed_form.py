@@ -50,7 +50,14 @@ def test_a_search_has_the_sound_answers_of_the_closed_form(n: int, seed: int) ->
     assert_met(syn.PrecisionPoints(points=random.uniform(-1.0, 1.0, (n, 2)), angle=random.uniform(-1.0, 1.0, n)))
 
 
-@pytest.mark.parametrize("seed", [1, 4, *(pytest.param(n, marks=pytest.mark.slow) for n in ONE_WAY)])
+@pytest.mark.parametrize(
+    "seed",
+    [
+        *(1, 4),
+        *(pytest.param(n, marks=pytest.mark.slow) for n in ONE_WAY[:6]),
+        *(pytest.param(n, marks=pytest.mark.long) for n in ONE_WAY[6:]),
+    ],
+)
 def test_so_has_a_search_for_poses_that_turn_one_way(seed: int) -> None:
     """The one linkage known for the first two comes to 0.08 and 0.03 deg from the limit of assembly."""
     random = np.random.default_rng([4, seed, 7])

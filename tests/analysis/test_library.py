@@ -397,6 +397,10 @@ VIBRATING = {
     "watt-1": on_a_spring("watt-1", "D"),
     "stephenson-3": on_a_spring("stephenson-3", "D"),
 }
+#: Watt's linkage is for `make test-long`: Stephenson's has as many links and its spring at the same place.
+each_vibrating = pytest.mark.parametrize(
+    "name", [pytest.param(name, marks=pytest.mark.long if name == "watt-1" else ()) for name in VIBRATING]
+)
 
 
 class Vibration:
@@ -424,7 +428,7 @@ class Vibration:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", VIBRATING)
+@each_vibrating
 def test_multipliers_are_those_of_the_multipliers_of_lagrange(name):
     """The monodromy matrix by finite differences of runs of the oracle, which knows nothing of freedoms in closed form."""
     of = Vibration(name)
@@ -443,7 +447,7 @@ def test_multipliers_are_those_of_the_multipliers_of_lagrange(name):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", VIBRATING)
+@each_vibrating
 def test_a_resonance_curve_is_that_of_the_oracle(name):
     """At its ends and its greatest amplitude the oracle's motion closes after a turn too, with the same amplitude."""
     of = Vibration(name)
