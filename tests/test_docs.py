@@ -241,7 +241,13 @@ def test_the_page_from_a_hand_drawn_curve_to_an_fmu_runs_and_says_what_is_so(tmp
         ),
         ("linkages.md", 8, 3, ("out/four-bar-linkage.png", "out/MyLinkage-native.fmu", "out/motor.png")),
         ("capture.md", 3, 4, ("out/capture.png", "out/capture-resonance.png")),
-        ("systems.md", 17, 6, ("out/motor-crank.ssp", "out/press-check.png", "motor-crank.ssp", "runs/samples.npy")),
+        pytest.param(
+            "systems.md",
+            17,
+            6,
+            ("out/motor-crank.ssp", "out/press-check.png", "motor-crank.ssp", "runs/samples.npy"),
+            marks=pytest.mark.long,
+        ),
         ("real-time.md", 2, 0, ("out/motor-tracking-host/system.h", "out/motor-tracking-host/host")),
     ],
 )

@@ -9,12 +9,12 @@ from typing import Any, TypeAlias
 import numpy as np
 from matplotlib.figure import Figure
 from numpy.typing import ArrayLike, NDArray
-from scipy.signal import find_peaks
 from shapely import LineString, distance
 from shapely import points as make_points
 
 from ..display import format_turns
 from ..mechanisms import find_mechanism
+from ..numerics.peaks import peaks
 from ..periodic import (
     FORCE,
     TOLERANCE,
@@ -227,7 +227,7 @@ def _jump(jump: FoldJump, look: _Scale) -> str:
 def _peaks(branch: Branch, look: _Scale, top: float) -> list[Label]:
     """Return labels with speed and amplitude for the prominent stable peaks of a branch."""
     x, y = branch.parameter, look.scale * branch.amplitude
-    found, _ = find_peaks(y, prominence=_STANDS_OUT * top)
+    found = [n for n, prominence in peaks(y) if prominence >= _STANDS_OUT * top]
     labels = []
     for n in (n for n in found if not _unstable_mask(branch)[n]):
         # the vertex of the parabola through three points

@@ -24,7 +24,7 @@ LONG = {
     *("rig-1-resonance", "rig-1-friction", "rig-2-forces", "rahman-closure", "rahman-rates"),
 }
 #: Studies of `LONG` that take half a minute and more.
-LONGEST = {"8.16", "8.19", "8.21", "rig-1-resonance", "rig-1-friction", "rahman-closure"}
+LONGEST = {"6.2", "8.16", "8.19", "8.21", "rig-1-resonance", "rig-1-friction", "rahman-closure"}
 
 
 @cache
