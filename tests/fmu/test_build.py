@@ -218,6 +218,35 @@ def test_a_changed_file_of_the_compilers_cache_is_made_again(
     assert capsys.readouterr().err.count("all are compiled again") == 1
 
 
+def test_a_library_is_compiled_again_if_a_source_an_option_or_its_kept_file_has_changed(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The compiler is a stand-in that writes how often it was called."""
+    calls = 0
+
+    def compiler(*_: Any, cwd: Path, **__: Any) -> subprocess.CompletedProcess[str]:
+        nonlocal calls
+        calls += 1
+        (cwd / "a.so").write_text(str(calls))
+        return subprocess.CompletedProcess([], 0)
+
+    def made(options: tuple[str, ...] = ("-O2",)) -> str:
+        compile_library(tmp_path / "sources", ["a.c"], "a.so", "a-machine", options, kept=True)
+        return (tmp_path / "sources" / "a.so").read_text()
+
+    monkeypatch.setenv("LINKWORK_CACHE_DIR", str(tmp_path / "cache"))
+    monkeypatch.setattr(subprocess, "run", compiler)
+    (tmp_path / "sources").mkdir()
+    for name in ("a.c", "a.h"):
+        (tmp_path / "sources" / name).write_text("int a;")
+    assert [made(), made(), made(("-Os",)), made()] == ["1", "1", "2", "1"]
+    (tmp_path / "sources" / "a.h").write_text("int b;")
+    assert [made(), made()] == ["3", "3"]
+    for path in (tmp_path / "cache" / "libraries").iterdir():
+        path.write_bytes(path.read_bytes()[:-1] + b"x")
+    assert [made(), made()] == ["4", "4"]
+
+
 @pytest.mark.long
 def test_processes_that_compile_at_the_same_time_wait_for_each_other(tmp_path: Path) -> None:
     """What Zig compiles for itself is there for none of them; the hash of a file that is half written would not hold."""
