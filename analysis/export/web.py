@@ -43,7 +43,7 @@ def build_web(mechanism: Mechanism) -> bytes:
         for name, text in sources.items():
             (Path(folder) / name).write_text(text, encoding="utf-8")
         files = [name for name in sources if name.endswith(".c")]
-        compile_library(folder, files, "module.wasm", EVERYWHERE[WASM].target, WASM_OPTIONS, kept=True)
+        compile_library(folder, files, "module.wasm", EVERYWHERE[WASM].target, WASM_OPTIONS)
         return (Path(folder) / "module.wasm").read_bytes()
 
 
