@@ -12,6 +12,7 @@ from .linear import design_pi as design_pi
 from .linear import design_pid as design_pid
 from .linear import find_equilibrium as find_equilibrium
 from .linear import linearise as linearise
+from .linear import natural_modes as natural_modes
 from .linkages import linkage as linkage
 from .mechanisms import PUBLISHED as PUBLISHED
 from .mechanisms import FiveBarParameters as FiveBarParameters

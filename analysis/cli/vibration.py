@@ -8,7 +8,7 @@ from typing import Any
 import click
 import numpy as np
 
-from linkwork.errors import InputError, LinkworkError, ParameterError
+from linkwork.errors import InputError, LinkworkError
 from linkwork.parameters import field_name
 
 from ..display import format_rounds
@@ -30,7 +30,8 @@ from .common import (
 from .driven import CaseChoice, add_case_options, swing_unit
 from .sensitivity import report_sensitivity
 
-#: Default range of speeds relative to the natural frequency; it contains 2, near which parametric resonance begins.
+#: Default range of speeds relative to the least and to the greatest natural frequency; it contains 2, near which parametric
+#: resonance begins.
 _RANGE = (0.15, 2.3)
 
 
@@ -93,7 +94,7 @@ def resonance(
 ) -> None:
     """Follow the periodic motions of a CASE file or a published set over the speed, or over another parameter.
 
-    The command writes amplitude, harmonics, crank torque and pin forces along the branches. It reports natural frequency,
+    The command writes amplitude, harmonics, crank torque and pin forces along the branches. It reports natural frequencies,
     maxima, folds, period doublings, the speeds to avoid, and the classical approximations next to the true motion.
 
     An isola is a closed branch that is not connected with any other branch; in the table its end reads "closed".
@@ -127,10 +128,11 @@ def resonance(
         raise click.UsageError(
             "--speed prescribes a speed, but it is the speed that varies: give --from and --to, or --vary"
         )
-    natural = _natural_frequency(parameters) if over_speed else None
-    ends = _range_ends(parameters, vary, low, high, natural)
+    natural, modes = _natural_frequency(parameters), _find_modes(chosen.case, over_speed)
+    ends = _range_ends(parameters, vary, low, high, natural, modes)
     drive = chosen.drive(f"{ends[0]} rad/s" if over_speed else None)
     start = chosen.start(drive)
+    _print_natural_frequencies(natural, modes)
     interrupted = False
     try:
         response = frequency_response(
@@ -141,12 +143,6 @@ def resonance(
     except ResponseInterrupted as stopped:
         response, interrupted = stopped.response, True
     unit, factor = display_scale(parameter_unit(mechanism, vary))
-    if natural is not None:
-        console.print(
-            f"natural frequency of the spring alone on the mean effective mass: {natural / RAD_S_PER_RPM:.2f} rpm, "
-            f"{natural:.5g} rad/s",
-            highlight=False,
-        )
     _print_branches(title, response, factor, unit)
     stem = output_folder(chosen.folder) / f"{chosen.stem}-resonance"
     written = [response.to_csv(f"{stem}.csv")]
@@ -164,29 +160,79 @@ def resonance(
 
 
 def _natural_frequency(parameters: Any) -> float | None:
-    """Return the natural frequency (rad/s); None if the mechanism has no spring."""
+    """Return the natural frequency (rad/s) of the spring alone; None if this means nothing for the mechanism."""
     from ..periodic import natural_frequency
 
     try:
         return natural_frequency(parameters)
-    except ParameterError:
+    except LinkworkError:
         return None
 
 
+def _find_modes(case: Any, over_speed: bool) -> Any:
+    """Return the natural modes of a case about its equilibrium, or the LinkworkError that says why there are none.
+
+    If the speed varies, the drive of the crank in the case does not matter.
+    """
+    from ..linear import natural_modes
+    from ..periodic import steady_drive
+
+    try:
+        drive = steady_drive(case.parameters, case.inputs, case.initial, speed=1.0 if over_speed else None)
+        inputs = drive.inputs(find_mechanism(case.parameters))
+        return natural_modes(case.parameters, inputs, initial=case.initial)
+    except LinkworkError as error:
+        return error
+
+
+def _print_natural_frequencies(natural: float | None, modes: Any) -> None:
+    """Print the natural frequency of the spring alone (rad/s), if there is one, and a table of the natural modes."""
+    if natural is not None:
+        console.print(
+            f"natural frequency of the spring alone on the mean effective mass: {natural / RAD_S_PER_RPM:.2f} rpm, "
+            f"{natural:.5g} rad/s",
+            highlight=False,
+        )
+    if isinstance(modes, LinkworkError):
+        say(f"no natural frequencies about the equilibrium: {modes}")
+        return
+    if not len(modes.frequency_ranges):
+        say("no free coordinate vibrates about the equilibrium")
+    else:
+        rows = [
+            (name, *(f"{value / RAD_S_PER_RPM:.2f}" for value in frequencies), f"{damping[0]:.4f} to {damping[2]:.4f}")
+            for name, frequencies, damping in zip(modes.coordinates, modes.frequency_ranges, modes.damping_ranges)
+        ]
+        title = "natural frequencies of small vibrations about the equilibrium, the crank held, over its turn"
+        headings = ("mostly of", "least [rpm]", "mean [rpm]", "greatest [rpm]", "damping ratio")
+        show_table(title, headings, rows, words=headings[:1])
+    if modes.unstable:
+        say(f"the equilibrium is unstable at {modes.unstable} of {len(modes.equilibria)} crank positions")
+
+
 def _range_ends(
-    parameters: Any, vary: str, low: str | None, high: str | None, natural: float | None
+    parameters: Any, vary: str, low: str | None, high: str | None, natural: float | None, modes: Any
 ) -> tuple[float, float]:
-    """Return the ends of the range to follow, in SI; by default a range around the natural frequency (rad/s)."""
+    """Return the ends of the range to follow, in SI; by default a range of speeds around the natural frequencies (rad/s).
+
+    These are the frequency of the spring alone, if there is one, or else those of ``modes``, in the mean over a turn.
+    """
     from ..periodic import parameter_unit, speed_names
 
     unit = parameter_unit(find_mechanism(parameters), vary)
-    if natural is None and (low is None or high is None):
-        speed = vary in speed_names(find_mechanism(parameters))
-        why = "without a spring there is no natural frequency to begin with" if speed else "it has no range of its own"
+    about, why = [natural] if natural else [], "it has no range of its own"
+    if vary not in speed_names(find_mechanism(parameters)):
+        about = []
+    elif isinstance(modes, LinkworkError):
+        why = f"there is no natural frequency to begin with, {modes}"
+    else:
+        about = about or list(modes.frequency_ranges[:, 1])
+        why = "nothing vibrates about the equilibrium, and there is no natural frequency to begin with"
+    if not about and (low is None or high is None):
         raise click.UsageError(f"--from and --to are needed for {vary}: {why}")
     ends = [
-        quantity(text, unit, option) if text is not None else factor * (natural or 0.0)
-        for text, option, factor in zip((low, high), ("--from", "--to"), _RANGE)
+        quantity(text, unit, option) if text is not None else factor * choose(about)
+        for text, option, factor, choose in zip((low, high), ("--from", "--to"), _RANGE, (min, max))
     ]
     _require_range(parameters, ends[0], ends[1], vary, "--from", "--to")
     return ends[0], ends[1]

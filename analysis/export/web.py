@@ -151,7 +151,9 @@ def _motor_functions(mechanism: Mechanism) -> list[tuple[Any, ...]]:
     changes = [sx.sym(f"d{n}", *v.shape) for n, v in enumerate(of)]
     angle, k = sx.sym("angle"), sx.sym("k", len(mechanism.constants._fields))
     resting = (
-        inertia_and_stiffness(mechanism, (crank,), other)(angle, k) if min(crank, other) >= 0 else (sx(0.0), sx(0.0))
+        inertia_and_stiffness(mechanism, (crank,), other)(angle, 0.0, k)
+        if min(crank, other) >= 0
+        else (sx(0.0), sx(0.0))
     )
     d_torque = casadi.jtimes(torque, join(motor, speed), join(d_motor, d_speed))
     return [

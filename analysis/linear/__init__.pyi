@@ -25,6 +25,8 @@ from .model import linear_outputs as linear_outputs
 from .model import linearise as linearise
 from .model import missing_outputs as missing_outputs
 from .model import signal_name as signal_name
+from .modes import NaturalModes as NaturalModes
+from .modes import natural_modes as natural_modes
 from .periodic import LEAST_SAMPLES as LEAST_SAMPLES
 from .periodic import Orbit as Orbit
 from .periodic import PeriodicModel as PeriodicModel

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, fields
 from fractions import Fraction
 from math import isfinite, lcm, pi
@@ -294,6 +294,23 @@ def _resample(mechanism: Mechanism, turn: Turn) -> tuple[FloatArray, FloatArray]
     return full_states(mechanism, found[:, : 2 * count]), found[:, 2 * count :]
 
 
+def common_period(mechanism: Mechanism, speeds: Mapping[int, float]) -> float:
+    """Return the time (s) after which all turning cranks have made whole turns; 0 if none turns.
+
+    ``speeds`` has the commanded speeds (rad/s) by the indices of their degrees of freedom.
+    """
+    turning = [k for k, speed in speeds.items() if speed and mechanism.freedoms[k].period]
+    if not turning:
+        return 0.0
+    names = {channel.freedom: channel.argument for channel in mechanism.channels if channel.kind == "command"}
+    first, *others = turning
+    period, whole = mechanism.freedoms[first].period, [1]
+    for k in others:
+        ratio = speed_ratio(names[k], speeds[k], names[first], speeds[first])
+        whole.append((ratio * Fraction(period / mechanism.freedoms[k].period).limit_denominator()).denominator)
+    return lcm(*whole) * period / abs(speeds[first])
+
+
 @takes_published(inputs=complete_inputs, initial=complete_initial_state)
 def settled_motion(
     parameters: Parameters,
@@ -344,14 +361,7 @@ def settled_motion(
     channel, speed = speeds[crank]
     if not speed:
         raise InputError(f"{channel.argument} is {speed}: it must be a finite number that is not zero")
-    whole, period = [1], mechanism.freedoms[crank].period
-    for k in its.commanded:
-        (other, value), own = speeds[k], mechanism.freedoms[k].period
-        if own and value:
-            ratio = speed_ratio(other.argument, value, channel.argument, speed)
-            whole.append((ratio * Fraction(period / own).limit_denominator()).denominator)
-    # the common period, after which all cranks have made whole turns
-    turn = lcm(*whole) * period / abs(speed)
+    turn = common_period(mechanism, {k: speeds[k][1] or 0.0 for k in its.commanded})
     last = turn * (turns - 2 + np.arange(2 * samples + 1) / samples)
     run = simulate(
         parameters,

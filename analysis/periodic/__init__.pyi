@@ -100,6 +100,7 @@ from .response.branch import switch as switch
 from .response.frequency import Response as Response
 from .response.frequency import ResponseInterrupted as ResponseInterrupted
 from .response.frequency import describe_end as describe_end
+from .response.frequency import free_position_name as free_position_name
 from .response.frequency import frequency_response as frequency_response
 from .response.frequency import mean_effective_mass as mean_effective_mass
 from .response.frequency import natural_frequency as natural_frequency

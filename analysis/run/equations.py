@@ -51,10 +51,11 @@ def constants(mechanism: Mechanism, switched: bool = False) -> tuple[Any, Any]:
 
 @cache
 def inertia_and_stiffness(mechanism: Mechanism, cranks: tuple[int, ...], freedom: int) -> Any:
-    """Return a CasADi function that computes inertia and stiffness of a degree of freedom, at rest and at the coordinate 0.
+    """Return a CasADi function that computes inertia and stiffness of a degree of freedom at rest.
 
     Inertia and stiffness are the second derivatives of the energy with respect to the rate and to the coordinate of the
-    degree of freedom. The arguments of the function are the angle of each of ``cranks``, and the constants as a column.
+    degree of freedom. The arguments of the function are the angle of each of ``cranks``, the coordinate of the degree of
+    freedom, and the constants as a column.
     """
     casadi = symbolic.library()
     s, v, *angles = (casadi.SX.sym(name) for name in ("s", "v", *(f"angle{n}" for n in cranks)))
@@ -65,8 +66,8 @@ def inertia_and_stiffness(mechanism: Mechanism, cranks: tuple[int, ...], freedom
         x[crank] = angle
     energy = symbolic_equations(mechanism).find(mechanism.equations.energy)(tuple(x), k)
     seconds = [casadi.densify(casadi.jacobian(casadi.jacobian(energy, z), z)) for z in (v, s)]
-    resting = casadi.substitute(seconds, [s, v], [casadi.SX(0.0)] * 2)
-    return casadi.Function("at_rest", [*angles, p], resting)
+    resting = casadi.substitute(seconds, [v], [casadi.SX(0.0)])
+    return casadi.Function("at_rest", [*angles, s, p], resting)
 
 
 class ParameterSymbols(NamedTuple):

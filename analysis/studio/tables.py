@@ -13,7 +13,7 @@ from linkwork.variables import UNITS, Variable
 
 from ..export import Entry, build_web, crank_index, interface
 from ..mechanisms import name_in_files
-from ..periodic import damping_name, find_crank, motor_parameters, stiffness_name
+from ..periodic import damping_name, find_crank, free_position_name, motor_parameters, stiffness_name
 
 #: Sections of parameters by role, and by unit; all others are dimensions.
 _SECTIONS = {
@@ -163,14 +163,15 @@ def _motor(mechanism: Mechanism, crank: int) -> list[dict[str, Any]]:
 
 
 def _stiffness_reference(mechanism: Mechanism, reference: dict[str, int], crank: int) -> int | None:
-    """Return the value reference of the stiffness from which the page computes the natural frequency.
+    """Return the value reference of the stiffness from which the page computes the natural frequency, at the coordinate 0.
 
-    The result is -1 if no single parameter is this stiffness: the page then computes the stiffness from the energy. The
-    result is None if the mechanism has no such frequency.
+    The result is None if the mechanism has no such frequency: see `analysis.periodic.natural_frequency`.
     """
-    if crank < 0 or len(mechanism.cyclic_freedoms) == len(mechanism.freedoms):
+    own, variables = stiffness_name(mechanism), mechanism.mechanism_variables
+    others = {*mechanism.names("stiffness"), free_position_name(mechanism, own)} - {own, ""}
+    if crank < 0 or any(variables[name].start for name in others):
         return None
-    return reference.get(stiffness_name(mechanism), -1)
+    return reference.get(own)
 
 
 def _section(mechanism: Mechanism, variable: Variable) -> str:

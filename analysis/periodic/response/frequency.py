@@ -69,22 +69,41 @@ def first_freedom(mechanism: Mechanism) -> int:
 
 
 def stiffness_name(mechanism: Mechanism) -> str:
-    """Return the FMI name of the stiffness of the spring of the first degree of freedom that is not a crank.
+    """Return the FMI name of the stiffness of the spring of the only degree of freedom that is not a crank.
 
-    The name is, for example, ``slider.stiffness``; it is empty without a spring.
+    The name is, for example, ``slider.stiffness``. It is empty if there is no such spring, or if the mechanism has several
+    oscillating degrees of freedom or springs with laws, so that no natural frequency is that of this spring alone.
     """
-    return next(iter(mechanism.names("stiffness", mechanism.freedoms[first_freedom(mechanism)].coordinate)), "")
+    others = oscillating_freedoms(mechanism)
+    if len(others) != 1 or mechanism.names("law"):
+        return ""
+    return next(iter(mechanism.names("stiffness", mechanism.freedoms[others[0]].coordinate)), "")
 
 
-def _mean_mass_and_stiffness(parameters: Parameters) -> tuple[float, float]:
-    """Return mean effective mass (kg) and mean stiffness (N/m) of the first degree of freedom that is not a crank.
+def free_position_name(mechanism: Mechanism, stiffness: str) -> str:
+    """Return the FMI name of the position at which the spring with the named stiffness is free; empty if this is always 0."""
+    owner = stiffness.rpartition(".")[0] + "."
+    return next((name for name in mechanism.names("spring") if name.startswith(owner)), "")
 
-    Both are averaged over a crank turn, with the degree of freedom held at its zero position.
+
+@takes_published()
+def mean_effective_mass(parameters: Parameters) -> float:
+    """Return the effective mass (kg) of the first degree of freedom that is not a crank, averaged over a crank turn.
+
+    This degree of freedom is held where its spring is free, or at 0 if it has none. For a five-bar it is the mean of m22.
+
+    Raises
+    ------
+    AssemblyError
+        If the links cannot be joined over the whole turn with this degree of freedom held.
     """
     mechanism = find_mechanism(parameters)
     cranks, freedom = find_cranks(mechanism), first_freedom(mechanism)
     if not cranks:
         raise InputError(f"a {mechanism.name} has no freedom that turns: it has no mean over a turn")
+    own = stiffness_name(mechanism)
+    free = free_position_name(mechanism, own) if own else ""
+    position = float(getattr(parameters, field_name(free))) if free else 0.0
     # for several cranks: the points of a lattice, which fill all combinations of angles evenly
     turn = np.linspace(0.0, 1.0, MASS_SAMPLES, endpoint=False)
     angles = [
@@ -93,41 +112,30 @@ def _mean_mass_and_stiffness(parameters: Parameters) -> tuple[float, float]:
     ]
     for at in zip(*(each.tolist() for each in angles)):
         x = [0.0] * mechanism.size
+        x[freedom] = position
         for crank, angle in zip(cranks, at):
             x[crank.freedom] = angle
         mechanism.check_assembly(parameters, x)
     resting = inertia_and_stiffness(mechanism, tuple(crank.freedom for crank in cranks), freedom)
-    mass, stiffness = symbolic.evaluate_arrays(resting, *angles, list(parameters.constants()))
-    return float(mass.mean()), float(stiffness.mean())
-
-
-@takes_published()
-def mean_effective_mass(parameters: Parameters) -> float:
-    """Return the effective mass (kg) of the first degree of freedom that is not a crank, averaged over a crank turn.
-
-    For a five-bar it is the mean of m22.
-
-    Raises
-    ------
-    AssemblyError
-        If the links cannot be joined over the whole turn with this degree of freedom at its zero position.
-    """
-    return _mean_mass_and_stiffness(parameters)[0]
+    held = np.full(MASS_SAMPLES, position)
+    mass, _ = symbolic.evaluate_arrays(resting, *angles, held, list(parameters.constants()))
+    return float(mass.mean())
 
 
 @takes_published()
 def natural_frequency(parameters: Parameters) -> float:
-    """Compute the natural frequency (rad/s) of the first degree of freedom that is not a crank, from its mean effective mass.
+    """Compute the natural frequency (rad/s) of the only degree of freedom that is not a crank, from its mean effective mass.
 
-    The stiffness is the parameter of its spring, such as ``slider.stiffness``. If there is no such parameter, it is
-    the second derivative of the potential energy, averaged over a crank turn.
+    It is that of its spring alone, such as ``slider.stiffness``, with the degree of freedom held where this spring is free; it
+    leaves out gravity and all forces. `analysis.linear.natural_modes` has the natural frequencies of every mechanism, about its
+    equilibrium.
 
     Raises
     ------
     ParameterError
-        If there is no spring.
+        If there is no spring; or if there are other springs or further degrees of freedom, on which the frequency depends.
     AssemblyError
-        If the crank cannot make a turn with this degree of freedom held at its zero position.
+        If the crank cannot make a turn with this degree of freedom held there.
 
     Examples
     --------
@@ -137,15 +145,27 @@ def natural_frequency(parameters: Parameters) -> float:
     591.9
     """
     mechanism = find_mechanism(parameters)
+    first_freedom(mechanism)
     name = stiffness_name(mechanism)
-    spring = getattr(parameters, field_name(name), None)
-    if spring is not None and spring <= 0.0:
+    if not name:
+        raise ParameterError(
+            "mechanism",
+            mechanism.name,
+            "have one freedom beside its cranks, with one spring along it, for the natural frequency of this spring alone: "
+            "natural_modes has those of all freedoms and springs",
+        )
+    others = {n: getattr(parameters, field_name(n)) for n in mechanism.names("stiffness") if n != name}
+    for other, stiffness in others.items():
+        if stiffness:
+            raise ParameterError(
+                other,
+                stiffness,
+                f"be 0 for the natural frequency of {name} alone: natural_modes has that of all springs",
+            )
+    spring = getattr(parameters, field_name(name))
+    if spring <= 0.0:
         raise ParameterError(name, spring, "be above zero for a natural frequency")
-    mass, stiffness = _mean_mass_and_stiffness(parameters)
-    stiffness = stiffness if spring is None else spring
-    if stiffness <= 0.0:
-        raise ParameterError(name or "stiffness", stiffness, "be above zero for a natural frequency")
-    return sqrt(stiffness / mass)
+    return sqrt(spring / mean_effective_mass(parameters))
 
 
 #: A branch of at least four times the period ends when its largest multiplier passes this value. By then there was another

@@ -1,0 +1,185 @@
+"""Find the natural frequencies and damping ratios of small vibrations about the equilibrium, with the cranks held.
+
+The mass matrix, and with it every natural frequency, changes with the angles of the cranks. `natural_modes` holds the cranks at
+evenly spaced positions of a turn, finds the equilibrium of all free coordinates at each of them, and linearises there.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from linkwork.errors import InputError
+from linkwork.mechanism import Mechanism
+from linkwork.parameters import field_name
+
+from ..mechanisms import InitialState, Parameters, find_mechanism
+from ..run import Inputs, check_run, complete_initial_state, complete_inputs, takes_published
+from ..units import RAD_S_PER_RPM
+from .equilibrium import Equilibrium, find_equilibrium
+from .model import FloatArray, Matrices, evaluate, layout, sample_channels
+from .periodic import common_period
+
+#: Least imaginary part of a pole that oscillates, relative to the largest pole: a neutral coordinate has a double pole at zero,
+#: which rounding splits.
+OSCILLATES = 1e-7
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class NaturalModes:
+    """Natural frequencies and damping ratios of a mechanism, at s positions of its held cranks over a turn.
+
+    Attributes
+    ----------
+    equilibria : tuple of Equilibrium
+        The equilibrium at each position, dry friction left out.
+    matrices : Matrices
+        The linear models about them, stacked.
+    poles : ndarray, shape (s, 2 n)
+        Eigenvalues (1/s) of the n free coordinates, by magnitude.
+    frequencies : ndarray, shape (s, k)
+        Natural frequencies (rad/s), in rising order: magnitudes of the poles that oscillate. nan at positions at which fewer of
+        them do.
+    damping_ratios : ndarray, shape (s, k)
+        Damping ratios: the negative real part of the pole over its magnitude.
+    shares : ndarray, shape (k, n)
+        Share of each free coordinate in the kinetic energy of each mode, averaged over the positions.
+    """
+
+    equilibria: tuple[Equilibrium, ...]
+    matrices: Matrices
+    poles: NDArray[np.complex128]
+    frequencies: FloatArray
+    damping_ratios: FloatArray
+    shares: FloatArray
+
+    def __repr__(self) -> str:
+        spans = (
+            f"{column.min():.6g} to {column.max():.6g}" for column in self._per_mode(self.frequencies / RAD_S_PER_RPM)
+        )
+        words = f"natural frequencies [rpm] {', '.join(spans)}" if self.frequencies.shape[1] else "nothing vibrates"
+        return (
+            f"<NaturalModes of {self.matrices.mechanism.name}: {words}; {len(self.equilibria)} positions of the cranks>"
+        )
+
+    @property
+    def coordinates(self) -> tuple[str, ...]:
+        """FMI name of the coordinate with the greatest share in the kinetic energy of each mode."""
+        return tuple(self.matrices.state_names[place] for place in self.shares.argmax(axis=1))
+
+    @property
+    def frequency_ranges(self) -> FloatArray:
+        """Least, mean and greatest natural frequency (rad/s) over the positions, for each mode, shape (k, 3)."""
+        return self._ranges(self.frequencies)
+
+    @property
+    def damping_ranges(self) -> FloatArray:
+        """Least, mean and greatest damping ratio over the positions, for each mode, shape (k, 3)."""
+        return self._ranges(self.damping_ratios)
+
+    @property
+    def unstable(self) -> int:
+        """Number of positions of the cranks at which the equilibrium is unstable: a pole has a positive real part."""
+        return int(np.sum(self.poles.real.max(axis=1) > OSCILLATES * np.abs(self.poles).max(axis=1)))
+
+    @staticmethod
+    def _per_mode(values: FloatArray) -> list[FloatArray]:
+        return [column[np.isfinite(column)] for column in values.T]
+
+    def _ranges(self, values: FloatArray) -> FloatArray:
+        return np.array([[v.min(), v.mean(), v.max()] for v in self._per_mode(values)]).reshape(-1, 3)
+
+
+@takes_published(inputs=complete_inputs, initial=complete_initial_state)
+def natural_modes(
+    parameters: Parameters, inputs: Inputs | None = None, *, initial: InitialState | None = None, samples: int = 36
+) -> NaturalModes:
+    """Find the natural frequencies of all free coordinates about their equilibrium, over a turn of the held cranks.
+
+    Parameters
+    ----------
+    parameters
+        Parameters of a mechanism, or a published set or its name. Dry friction is left out: at rest it would hold everything.
+    inputs : Inputs, optional
+        Constant inputs of the motion. Degrees of freedom with a commanded rate are held; cranks among them pass through the
+        positions of their common period. If no crank is commanded, the first one is held, and its torque left out.
+    initial : initial state, optional
+        Position of the held degrees of freedom at the beginning, and guess of the equilibrium there.
+    samples : int
+        Number of positions of the cranks.
+
+    Raises
+    ------
+    InputError
+        If an input is not constant, or no degree of freedom is free.
+    AssemblyError, EquilibriumError
+        If the links cannot be joined at a position, or no equilibrium is found there.
+
+    Examples
+    --------
+    >>> from math import pi
+    >>> from analysis import natural_modes
+    >>> modes = natural_modes("rig-2-spring-c")
+    >>> modes.coordinates, [f"{speed * 30.0 / pi:.1f} rpm" for speed in modes.frequency_ranges[0]]
+    (('slider.position',), ['580.5 rpm', '585.5 rpm', '590.6 rpm'])
+    """
+    mechanism = find_mechanism(parameters)
+    inputs, initial = check_run(mechanism, inputs, initial)
+    if samples < 1:
+        raise InputError(f"samples is {samples}: it must be at least 1")
+    parameters = replace(parameters, **{field_name(name): 0.0 for name in mechanism.names("friction")})
+    speeds = _held_speeds(mechanism, inputs)
+    # a force on a held degree of freedom does not act
+    still = inputs.replace(
+        **{c.argument: None for c in mechanism.channels if c.freedom in speeds and c.kind in ("force", "command")}
+    )
+    start = np.array(mechanism.state(initial)[: len(mechanism.freedoms)])
+    period = common_period(mechanism, speeds)
+    found: list[Equilibrium] = []
+    for time in period * np.arange(samples if period else 1) / samples:
+        held = {mechanism.freedoms[n].coordinate: start[n] + speed * time for n, speed in speeds.items()}
+        guess = found[-1].coordinates if found else start
+        found.append(find_equilibrium(parameters, still, held=held, guess=guess))
+    states = np.array([one.state for one in found])
+    modes, channels = sample_channels(mechanism, found[0].inputs, np.zeros(len(found)), states)
+    matrices = Matrices(parameters=parameters, modes=modes, **evaluate(parameters, modes, states, channels))
+    return _decompose(tuple(found), matrices)
+
+
+def _held_speeds(mechanism: Mechanism, inputs: Inputs) -> dict[int, float]:
+    """Return the speeds of the held degrees of freedom by index; zero for those that do not turn."""
+    speeds = {}
+    for n in layout(mechanism, tuple(inputs.modes(mechanism).values())).commanded:
+        command = mechanism.channel_index(n, "command")
+        constant = inputs.constants([mechanism.channels[command].argument]) if command is not None else [0.0]
+        if constant is None:
+            raise InputError(f"{inputs}: natural frequencies need constant speeds")
+        speeds[n] = constant[0] if mechanism.freedoms[n].period else 0.0
+    cranks = [n for n in mechanism.cyclic_freedoms if mechanism.channel_index(n, "command") is not None]
+    if cranks and not any(speeds.values()):
+        first = next((n for n in cranks if n in speeds), cranks[0])
+        speeds[first] = 1.0
+    return speeds
+
+
+def _decompose(equilibria: tuple[Equilibrium, ...], matrices: Matrices) -> NaturalModes:
+    values, vectors = np.linalg.eig(matrices.A)
+    size, shape = matrices.M.shape[-1], matrices.M.shape[:2]
+    frequencies, ratios, shares = np.full(shape, np.nan), np.full(shape, np.nan), np.full((*shape, size), np.nan)
+    for j, poles in enumerate(values):
+        oscillating = np.flatnonzero(poles.imag > OSCILLATES * np.abs(poles).max())
+        for k, place in enumerate(oscillating[np.argsort(np.abs(poles[oscillating]))]):
+            pole, shape_of_mode = poles[place], vectors[j, :size, place]
+            energy = (shape_of_mode.conj() * (matrices.M[j] @ shape_of_mode)).real
+            frequencies[j, k], ratios[j, k], shares[j, k] = abs(pole), -pole.real / abs(pole), energy / energy.sum()
+    count = int(np.isfinite(frequencies).any(axis=0).sum())
+    return NaturalModes(
+        equilibria=equilibria,
+        matrices=matrices,
+        poles=np.take_along_axis(values.astype(complex), np.argsort(np.abs(values), axis=1), axis=1),
+        frequencies=frequencies[:, :count],
+        damping_ratios=ratios[:, :count],
+        shares=np.nanmean(shares[:, :count], axis=0),
+    )
