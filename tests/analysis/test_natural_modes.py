@@ -131,6 +131,8 @@ def test_all_free_coordinates_are_in_the_equilibrium_of_their_start(tmp_path: Pa
     np.testing.assert_allclose(found.frequency_ranges, [[swing] * 3, [lift] * 3], rtol=1e-9)
     ratios = [[0.008 / (2.0 * arm * swing)] * 3, [10.0 / (2.0 * mass * lift)] * 3]
     np.testing.assert_allclose(found.damping_ranges, ratios, rtol=1e-9)
+    with pytest.raises(ParameterError, match="one freedom beside its cranks"):
+        natural_frequency(case.parameters)
     upright = natural_modes(case.parameters, case.inputs, initial={"swing_angle": 0.0})
     assert upright.unstable == len(upright.equilibria) == 36
     assert upright.coordinates == ("lift.position",)
