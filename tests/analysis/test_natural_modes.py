@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 from collections.abc import Callable
+from dataclasses import replace
 from math import pi, sqrt
 from pathlib import Path
 from typing import Any
@@ -14,8 +15,9 @@ from scipy.optimize import minimize_scalar
 
 from analysis import Inputs, natural_frequency, natural_modes, ramp
 from analysis.linear import linearise
+from analysis.periodic import Drive, default_range
 from analysis.run import load_case
-from linkwork.errors import InputError, ParameterError
+from linkwork.errors import AssemblyError, InputError, ParameterError
 from linkwork.five_bar.published import SETS
 
 pytest.importorskip("casadi")
@@ -169,3 +171,11 @@ def test_resonance_prints_them_and_covers_them(tmp_path: Path, linkwork: Callabl
     with (tmp_path / "machine-resonance.csv").open(encoding="utf-8", newline="") as file:
         speeds = [float(row["drive.speed [rad/s]"]) for row in csv.DictReader(file)]
     assert [min(speeds), max(speeds)] == pytest.approx([0.15 * mean, 2.3 * mean])
+
+
+def test_a_chart_has_a_range_of_speeds_without_a_natural_frequency() -> None:
+    # the slider cannot be held where this spring is free while the crank turns
+    locked = replace(SETS["rig-2-spring-c"].parameters, slider_spring_free_position=1.0)
+    with pytest.raises(AssemblyError):
+        natural_frequency(locked)
+    assert default_range(locked, Drive(speed=30.0), "drive.speed") == pytest.approx((3.0, 60.0))

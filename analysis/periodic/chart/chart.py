@@ -15,7 +15,7 @@ import numpy as np
 import scipy
 from numpy.typing import ArrayLike, NDArray
 
-from linkwork.errors import InputError, LinkworkError, ParameterError
+from linkwork.errors import AssemblyError, InputError, LinkworkError, ParameterError
 from linkwork.mechanism import Mechanism
 
 from ...display import NotebookResult, format_count, format_range
@@ -574,7 +574,8 @@ def _belongs(found: Grid, orbit: PeriodicOrbit, place: Sequence[float]) -> bool:
 def default_range(parameters: Parameters, drive: Drive, name: str) -> tuple[float, float]:
     """Return the default range of the parameter ``name`` on an axis of a chart, in SI.
 
-    The range of a crank speed lies around the natural frequency, the range of another parameter around its present value.
+    The range of a crank speed lies around the natural frequency of the only spring, if there is one (`natural_frequency`). The
+    range of another parameter, or of the speed of another mechanism, lies around the present value.
 
     Raises
     ------
@@ -585,7 +586,7 @@ def default_range(parameters: Parameters, drive: Drive, name: str) -> tuple[floa
     if name in speed_names(find_mechanism(parameters)):
         try:
             natural = natural_frequency(parameters)
-        except ParameterError:
+        except (AssemblyError, ParameterError):
             pass
         else:
             return (_SPEEDS[0] * natural, _SPEEDS[1] * natural)
