@@ -26,8 +26,11 @@ if TYPE_CHECKING:
 )
 @click.option("--points", default=200, type=click.IntRange(2, 4000), help="Number of starts along each axis.")
 @click.option(
-    "--position", nargs=2, metavar="FROM TO", help="Range of the first free coordinate, such as '-5 cm' '5 cm'."
+    "--coordinate",
+    metavar="NAME",
+    help="Free coordinate whose plane is drawn; by default that in which the motions differ most, or the first with a range.",
 )
+@click.option("--position", nargs=2, metavar="FROM TO", help="Range of the coordinate, such as '-5 cm' '5 cm'.")
 @click.option("--rate", nargs=2, metavar="FROM TO", help="Range of the rate of this coordinate.")
 @workers_options(default=-1)
 @html_option
@@ -35,6 +38,7 @@ def basins(
     chosen: CaseChoice,
     turns: int,
     points: int,
+    coordinate: str | None,
     position: tuple[str, str] | None,
     rate: tuple[str, str] | None,
     jobs: int,
@@ -42,8 +46,9 @@ def basins(
 ) -> None:
     """Report all periodic motions of a CASE file or a published set at one speed, and on which of them each start settles.
 
-    A start is an initial state at crank angle 0. The axes of the picture are position and rate of the first free coordinate
-    (the slider of a five-bar). Computed rows are kept, so that after an interruption the same command continues.
+    A start is an initial state at crank angle 0. The axes of the picture are position and rate of a free coordinate (the slider
+    of a five-bar); all other coordinates and rates are those of motion 1. Computed rows are kept, so that after an interruption
+    the same command continues.
 
     \b
     Examples:
@@ -52,12 +57,13 @@ def basins(
     """
     from .. import figures
     from ..periodic import basins as find_basins
-    from ..periodic import describe_turns, join_orbits, search_orbits
+    from ..periodic import describe_turns, find_coordinate, join_orbits, search_orbits
 
     parameters, drive = chosen.case.parameters, chosen.drive()
     start = chosen.start(drive)
     flow = drive.flow(find_mechanism(parameters))
-    units = (flow.components[0][1], flow.components[flow.size // 2][1])
+    place = find_coordinate(flow, coordinate)
+    units = (flow.components[place][1], flow.components[flow.size // 2 + place][1])
     spans: list[Any] = [
         None if texts is None else tuple(quantity(text, unit, option) for text in texts)
         for texts, unit, option in zip((position, rate), units, ("--position", "--rate"))
@@ -69,6 +75,7 @@ def basins(
         drive,
         turns=turns,
         points=points,
+        coordinate=coordinate,
         position=spans[0],
         rate=spans[1],
         found=join_orbits(found),
@@ -82,6 +89,12 @@ def basins(
         highlight=False,
         soft_wrap=True,
     )
+    if picture.held:
+        varied = " and ".join(label.partition(" [")[0] for label in picture.labels)
+        say(
+            f"the starts differ in {varied}; {', '.join(picture.held)} are those of motion 1, "
+            "and a motion that differs from it only there may be out of reach (--coordinate NAME: another plane)"
+        )
     stem = output_folder(chosen.folder) / f"{chosen.stem}-basins"
     drawn = figures.picture(picture, title=chosen.case.title)
     chosen.finish([picture.to_csv(f"{stem}.csv"), *save_picture(drawn, stem, html=html)], ())

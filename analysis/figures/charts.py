@@ -277,18 +277,19 @@ def _coexistence_picture(chart: StabilityChart, beside: Coexistence, panel: Pane
 @register_picture
 def plot_basins(found: Basins, *, title: str = "") -> Picture:
     """Plot each initial condition in the colour of the motion it settles to, and mark the motions at crank angle 0."""
-    name, _, position_unit = found.labels[0].removesuffix("]").partition(" [")
-    drawn, scale = display_scale(position_unit)
-    half = len(found.motions[0].start) // 2
+    flow, place = found.motions[0].flow, found.place
+    half = flow.size // 2
+    drawn, scale = display_scale(flow.components[place][1])
     shown, factor = display_scale(found.motions[0].swing[1])
+    name, varied = flow.components[0][0], name_in_words(flow.components[place][0])
     curves = []
     for stable, marker in ((True, "o"), (False, "x")):
         those = [orbit for orbit in found.found.orbits if (orbit in found.motions) == stable]
         if those:
             curves.append(
                 Curve(
-                    x=[scale * orbit.start[0] for orbit in those],
-                    y=[orbit.start[half] for orbit in those],
+                    x=[scale * _within(found, orbit.start[place]) for orbit in those],
+                    y=[orbit.start[half + place] for orbit in those],
                     line="",
                     marker=marker,
                     colour="0.05",
@@ -300,7 +301,7 @@ def plot_basins(found: Basins, *, title: str = "") -> Picture:
                 )
             )
     panel = Panel(
-        x_label=f"{name_in_words(name)} at crank angle 0 [{drawn}]",
+        x_label=f"{varied} at crank angle 0{', all else as in motion 1' if found.held else ''} [{drawn}]",
         y_label=label_in_words(found.labels[1]),
         curves=curves,
         legend_at="above",
@@ -332,3 +333,9 @@ def plot_basins(found: Basins, *, title: str = "") -> Picture:
         hover={"it": np.array(names)[numbers]},
     )
     return Picture(parts=[map_], title=title, size=_SIZE)
+
+
+def _within(found: Basins, position: float) -> float:
+    """Return a coordinate of a motion at crank angle 0; for an angle, within half a turn of the middle of the plane."""
+    way, middle = found.motions[0].flow.ways[found.place], 0.5 * (found.position[0] + found.position[-1])
+    return float(position - way * np.round((position - middle) / way) if way else position)

@@ -21,6 +21,7 @@ from .chart.coexistence import Coexistence as Coexistence
 from .chart.coexistence import basins as basins
 from .chart.coexistence import coexistence as coexistence
 from .chart.coexistence import describe_turns as describe_turns
+from .chart.coexistence import find_coordinate as find_coordinate
 from .chart.grid import Grid as Grid
 from .chart.grid import GridInterrupted as GridInterrupted
 from .chart.grid import grid as grid

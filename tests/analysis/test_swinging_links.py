@@ -14,6 +14,7 @@ import pytest
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
+from analysis.figures import plot
 from analysis.linear import find_equilibria, find_equilibrium, linearise_orbit
 from analysis.linkages import linkage, load_linkage
 from analysis.mechanisms import PUBLISHED
@@ -26,6 +27,7 @@ from analysis.periodic import (
     find_orbit,
     find_orbits,
     frequency_response,
+    join_orbits,
     newton_orbit,
     sweep,
     unsought_hint,
@@ -99,6 +101,46 @@ def test_what_hangs_and_what_stands_are_two_motions_however_often_the_pin_has_tu
     angles = [found.coordinates[1] for found in find_equilibria(parameters)]
     assert sorted(abs(angle) for angle in angles) == pytest.approx([0.0, pi], abs=1e-9)
     assert abs(find_equilibrium(parameters).coordinates[1]) == pytest.approx(pi)
+
+
+def test_basins_are_in_the_plane_that_the_motions_span() -> None:
+    """A pendulum absorber on a spring, at rest in one motion and swinging at half the crank's speed in the other."""
+    built = linkage("absorber", ground={"O": (0, 0), "A": (0, 0.5)}, gravity=GRAVITY)
+    built.body("crank", bar=("A", "B"), length=0.008, mass=1.0, cog=(0, 0), inertia=0.01)
+    built.body("yoke", points={"N": (0, 0)}, mass=0.5)
+    built.body("table", points={"P": (0, 0), "T": (0, 0)}, mass=10.0)
+    built.body("pendulum", points={"P": (0, 0)}, mass=1.2, cog=(0.25, 0), inertia=0.002)
+    built.slide("Y", body="table", through="O", direction=0.5 * pi)
+    built.slide("V", body="yoke", through="A", direction=0.5 * pi)
+    built.slot("S", pin="B", on="yoke", through="N", direction=0.5 * pi)
+    built.spring("foot", at="Y", stiffness=1600.0, free=0.084, damping=10.0)
+    built.spring("exciter", between=("T", "N"), stiffness=300.0, free=0.58)
+    built.spring("hinge", at="P", damping=0.008)
+    built.freedom("crank", "A", speed="112 rpm").freedom("lift", "Y").freedom("swing", "P", start=-pi)
+    built.mechanism()
+    parameters, drive = PUBLISHED["absorber"].parameters, Drive(speed="112 rpm")
+    found = join_orbits([find_orbits(parameters, speed="112 rpm", turns=turns) for turns in (1, 2)])
+    swings = basins(parameters, drive, points=6, found=found)
+    assert swings.labels == ("swing.angle [rad]", "swing.speed [rad/s]")
+    assert swings.held == ("lift.position", "lift.velocity")
+    assert min(swings.share(0), swings.share(1)) > 0.1
+    # the pendulum also stands, unstable: a whole turn of it, and speeds such as those of the motions
+    assert np.ptp(swings.position) == pytest.approx(2.0 * pi)
+    rates = max(np.abs(orbit.turn()["swing.speed"]).max() for orbit in found.orbits)
+    assert swings.rate[[0, -1]] == pytest.approx([-1.5 * rates, 1.5 * rates], rel=1e-2)
+    # from a pendulum at rest the lift alone does not reach the motion in which it swings
+    lifts = basins(parameters, drive, points=6, found=found, coordinate="lift.position")
+    assert (lifts.ends == 0).all()
+    size = max(np.ptp(orbit.turn()["lift.position"]) for orbit in found.orbits)
+    assert size < np.ptp(lifts.position) < 2.0 * size
+    same = basins(parameters, drive, points=2, found=found, position=("-10 mm", "10 mm"))
+    assert same.labels[0] == "lift.position [m]"
+    axis = plot(swings).axes[0]
+    assert axis.get_xlabel() == "swing angle at crank angle 0, all else as in motion 1 [deg]"
+    for marks in axis.lines[:2]:
+        assert all(axis.get_xlim()[0] <= x <= axis.get_xlim()[1] for x in np.asarray(marks.get_xdata()))
+    with pytest.raises(InputError, match=r"free coordinate 'swing\.speed'"):
+        basins(parameters, drive, points=2, found=found, coordinate="swing.speed")
 
 
 def test_a_branch_is_the_same_after_whole_turns() -> None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 from linkwork.errors import InputError
 
 from ...display import NotebookResult, format_count, format_turns
-from ...files import Whole, write_csv
+from ...files import Whole, unknown_name, write_csv
 from ...mechanisms import Parameters, find_mechanism
 from ...run import takes_published
 from ...units import Amount, pair
@@ -38,6 +38,9 @@ SAMPLES = 64
 #: For basins: bound of the integrator's local error, distance from a motion, relative to the scale, below which a start has
 #: settled on it, and turns at most.
 _TOLERANCE, _NEAR, _TURNS = 1e-6, 1e-2, 3000
+#: Default plane of basins: its width relative to the range of the motions, and the range relative to the scale below which a
+#: coordinate counts as at rest.
+_WIDTH, _REST = 1.5, 1e-9
 # Functions of the flow for a search and for a basin, in addition to GAP
 _SEARCHED = PLAIN, IN_LANES + VARIATIONAL, IN_LANES + GAP
 _FOLLOWED = IN_LANES + PLAIN, IN_LANES + GAP
@@ -204,8 +207,8 @@ class Basins(NotebookResult):
     Attributes
     ----------
     position, rate : ndarray, shapes (nx,) and (ny,)
-        Initial values of the first free coordinate (m for a slider) and of its rate (m/s); the other components of the initial
-        state y are those of the first motion.
+        Initial values of a free coordinate (m for a slider) and of its rate (m/s); the other components of the initial state y
+        are those of the first motion, see ``held``.
     ends : ndarray of int, shape (ny, nx)
         Index of the stable motion in ``motions``; -1 if the links reach the limit of assembly, -2 if the mechanism settles on
         no motion within the computed number of turns.
@@ -213,6 +216,8 @@ class Basins(NotebookResult):
         All motions found, also the unstable motions, which lie on the boundaries of the basins.
     computed : int
         Number of rows that were not in the cache.
+    place : int
+        Index of the coordinate in y.
     """
 
     position: FloatArray
@@ -220,6 +225,7 @@ class Basins(NotebookResult):
     ends: NDArray[np.int64]
     found: Orbits
     computed: int
+    place: int = 0
 
     def __repr__(self) -> str:
         shares = [f"{self.share(number):.1%} to motion {number + 1}" for number in range(len(self.motions))]
@@ -247,13 +253,23 @@ class Basins(NotebookResult):
         }
         return write_csv(path, columns)
 
+    @property
+    def held(self) -> tuple[str, ...]:
+        """FMI names of the coordinates and rates that all starts have from the first motion.
+
+        A motion that differs from the first one only in these may be out of reach: a pendulum that hangs exactly still does not
+        begin to swing, but by rounding.
+        """
+        plane = [name for name, _ in self._components()]
+        return tuple(name for name, _ in self.motions[0].flow.components if name not in plane)
+
     def _components(self) -> tuple[tuple[str, str], tuple[str, str]]:
         flow = self.motions[0].flow
-        return flow.components[0], flow.components[flow.size // 2]
+        return flow.components[self.place], flow.components[flow.size // 2 + self.place]
 
     @property
     def labels(self) -> tuple[str, str]:
-        """Names of the two axes, the first free coordinate and its rate, with units."""
+        """Names of the two axes, the coordinate and its rate, with units."""
         (name, unit), (rate, rate_unit) = self._components()
         return f"{name} [{unit}]", f"{rate} [{rate_unit}]"
 
@@ -265,6 +281,7 @@ def basins(
     *,
     turns: int = 1,
     points: int = 200,
+    coordinate: str | None = None,
     position: tuple[Amount, Amount] | None = None,
     rate: tuple[Amount, Amount] | None = None,
     start: ArrayLike | None = None,
@@ -283,9 +300,12 @@ def basins(
         Greatest number of turns in the period of the motions that are sought.
     points : int
         Number of initial states along each axis.
+    coordinate : str, optional
+        FMI name of the free coordinate that varies with its rate, such as "swing.angle"; all other components of y are those of
+        the first motion. By default that in which the stable motions differ most; the first one if a range is given.
     position, rate : (float, float), optional
-        Ranges of the first free coordinate and of its rate at crank angle 0, in SI or as text such as "5 mm"; by default as
-        wide as the assembly of the mechanism permits.
+        Ranges of the coordinate and of its rate at crank angle 0, in SI or as text such as "5 mm"; by default one and a half
+        times the range in which the motions found move, as far as the links can be joined.
     start : array_like, shape (n,), optional
         A guess of y that includes the crank speed, for a crank driven by a torque; see `find_orbits`.
     found : Orbits, optional
@@ -296,7 +316,8 @@ def basins(
     Raises
     ------
     InputError
-        If the drive is no `Drive`, there is no stable motion, a range does not increase, or there are no cores.
+        If the drive is no `Drive`, there is no stable motion or no such coordinate, a range does not increase, or there are no
+        cores.
     ParameterError
         If a range is not two quantities, or ``points`` is no whole number.
     GridInterrupted
@@ -311,24 +332,21 @@ def basins(
     """
     require_turns(turns)
     points, flow = Whole(least=1)(points, "points"), operating_point(parameters, drive).flow
+    half, place = flow.size // 2, find_coordinate(flow, coordinate)
     if position is not None:
-        position = pair(position, flow.components[0][1], "position")
+        position = pair(position, flow.components[place][1], "position")
     if rate is not None:
-        rate = pair(rate, flow.components[flow.size // 2][1], "rate")
+        rate = pair(rate, flow.components[half + place][1], "rate")
     if found is None:
         found = search_orbits(parameters, drive, turns=range(1, turns + 1), start=start)
     motions = found.stable
     if not motions:
         of, also = describe_turns(drive.flow(find_mechanism(parameters)), turns), unsought_hint(parameters, drive)
         raise InputError(f"there is no stable motion of {of} here: no start ends in one{also}")
-    first = motions[0].start
-    low, high = (side[0] for side in assembly_ranges(parameters, drive, first))
-    rest, scale, half = float(motions[0].flow.rest[0]), motions[0].scale, len(first) // 2
-    extent = min(rest - low, high - rest)
-    spans = (
-        position or (rest - extent, rest + extent),
-        rate or tuple(scale[half] / scale[0] * extent * s for s in (-1.0, 1.0)),
-    )
+    if coordinate is None and position is None and rate is None:
+        place = _most_different([_path(orbit) for orbit in motions], motions[0].scale)
+    default = _default_plane(parameters, drive, motions[0], np.vstack([_path(orbit) for orbit in found.orbits]), place)
+    spans = position or default[0], rate or default[1]
     for name, (low, high) in zip(("position", "rate"), spans):
         if not (np.isfinite(low) and np.isfinite(high) and low < high):
             raise InputError(f"the range of the {name} is {low} to {high}: it must be finite and increasing")
@@ -339,14 +357,61 @@ def basins(
     point, code = operating_point(parameters, drive), row_code(kernels.settle_starts)
     row = point_row([point], known[0])
     ends, computed = RowComputation(folder, n_jobs, progress, "starts", kernels.settle_starts).rows(
-        partial(_ends, point, known, across),
+        partial(_ends, point, known, place, across),
         up.tolist(),
-        [row_name(row, known, (*_FOLLOWED, GAP), code, *across, value) for value in up.tolist()],
+        [row_name(row, known, (*_FOLLOWED, GAP), code, place, *across, value) for value in up.tolist()],
         (points,),
     )
     met = ends.astype(np.int64)
     met[met >= 0] = owner[met[met >= 0]]
-    return Basins(position=across, rate=up, ends=met, found=found, computed=computed)
+    return Basins(position=across, rate=up, ends=met, found=found, computed=computed, place=place)
+
+
+def find_coordinate(flow: Flow, name: str | None) -> int:
+    """Return the index in y of a free coordinate by its FMI name, by default of the first."""
+    free = [component for component, _ in flow.components[: flow.size // 2]]
+    if name is not None and name not in free:
+        raise unknown_name(name, free, f"free coordinate {name!r}")
+    return 0 if name is None else free.index(name)
+
+
+def _path(orbit: PeriodicOrbit) -> FloatArray:
+    """Return samples of y over the period, shape (m, n); angles begin at most half a turn from where the mechanism starts."""
+    flow, n = orbit.flow, SAMPLES * orbit.turns
+    y = orbit.sample(np.linspace(0.0, flow.period * orbit.turns, n, endpoint=False))[:, list(flow.places)]
+    whole = np.divide(y[0] - flow.rest, flow.ways, out=np.zeros(flow.size), where=flow.ways > 0.0)
+    return np.asarray(y - flow.ways * np.round(whole))
+
+
+def _most_different(moved: Sequence[FloatArray], scale: FloatArray) -> int:
+    """Return the index of the coordinate in which motions differ most, it or its rate.
+
+    The measure is the range of all motions together over that of the one that moves least: beyond all bounds for a pendulum
+    that hangs still in one motion and swings in another, which a start with the pendulum at rest does not reach.
+    """
+    least = np.min([np.ptp(y, axis=0) for y in moved], axis=0)
+    ratio, half = (np.ptp(np.vstack(moved), axis=0) + _REST * scale) / (least + _REST * scale), len(scale) // 2
+    return int(np.argmax(np.maximum(ratio[:half], ratio[half : 2 * half])))
+
+
+def _default_plane(
+    parameters: Parameters, drive: Drive, first: PeriodicOrbit, moved: FloatArray, place: int
+) -> tuple[tuple[float, float], tuple[float, float]]:
+    """Return the ranges of a coordinate and of its rate: `_WIDTH` times those in which the motions move.
+
+    The coordinate stays where the links can be joined. An angle that goes beyond half a turn has the whole turn, and what is at
+    rest in all motions the range of the assembly; its rate has that of an oscillation with this amplitude at the crank's speed.
+    """
+    lowest, highest = (float(side[place]) for side in assembly_ranges(parameters, drive, first.start))
+    rest, scale, rates = float(first.flow.rest[place]), first.scale, place + len(first.start) // 2
+    middle, half = 0.5 * (moved.max(axis=0) + moved.min(axis=0)), 0.5 * _WIDTH * np.ptp(moved, axis=0)
+    still = half <= _REST * scale
+    low, high = max(lowest, middle[place] - half[place]), min(highest, middle[place] + half[place])
+    if still[place] or (first.flow.ways[place] > 0.0 and (low == lowest or high == highest)):
+        extent = min(rest - lowest, highest - rest)
+        low, high = rest - extent, rest + extent
+    reach = scale[rates] / scale[place] * 0.5 * (high - low) if still[rates] else half[rates]
+    return (float(low), float(high)), (float(middle[rates] - reach), float(middle[rates] + reach))
 
 
 def describe_turns(flow: Flow, turns: int) -> str:
@@ -354,13 +419,13 @@ def describe_turns(flow: Flow, turns: int) -> str:
     return ("" if turns == 1 else "up to ") + format_turns(turns * flow.turns)
 
 
-def _ends(point: OperatingPoint, known: FloatArray, across: FloatArray, rate: float) -> FloatArray:
+def _ends(point: OperatingPoint, known: FloatArray, place: int, across: FloatArray, rate: float) -> FloatArray:
     """Return for each start of a row an index into ``known``: the motion on which the mechanism settles; or LOST or UNSETTLED.
 
-    A start has an initial coordinate from ``across``, shape (points,), and the initial rate ``rate``.
+    A start has from ``across``, shape (points,), the coordinate with the index ``place`` in y, and the initial rate ``rate``.
     """
     starts = np.tile(known[0], (len(across), 1))
-    starts[:, 0], starts[:, point.flow.size // 2] = across, rate
+    starts[:, place], starts[:, point.flow.size // 2 + place] = across, rate
     ends = np.zeros(len(across), dtype=np.int64)
     section = point.section(known[0], *_FOLLOWED, tolerance=_TOLERANCE)
     kernels.settle_starts(section, point.flow.period, _NEAR, _TURNS, starts, known, ends)
