@@ -24,7 +24,7 @@ from linkwork.errors import InputError, LinkworkError
 
 from ..files import unknown_name
 from ..libraries import lazy
-from ..run import Function
+from ..run import Function, require_kind
 from ..units import Amount, in_si
 from .model import FloatArray, LinearModel, LinearModelError, signal_name, sort_by_magnitude
 
@@ -32,6 +32,10 @@ if TYPE_CHECKING:
     import control
 else:
     control = lazy("control")
+
+
+#: What a design is of, in messages.
+_MODEL = "a LinearModel, as linearise('table-3.1', rest.state, rest.inputs) with rest = find_equilibrium('table-3.1')"
 
 
 class DesignError(LinkworkError):
@@ -277,6 +281,8 @@ def design_lqr(
     ------
     UnknownNameError
         If a weight is for a state that the model does not have.
+    InputError
+        If ``model`` is no `LinearModel`.
     DesignError
         If a weight is not usable, or the force cannot stabilise the model.
 
@@ -288,6 +294,7 @@ def design_lqr(
     >>> bool((law.poles.real < 0.0).all())
     True
     """
+    require_kind(model, LinearModel, "model", _MODEL)
     names = model.state_names
     if isinstance(q, Mapping):
         for name in q:
@@ -345,6 +352,8 @@ def design_pid(
 
     Raises
     ------
+    InputError
+        If ``model`` is no `LinearModel`.
     DesignError
         If the model has more than one degree of freedom that is not commanded, or the poles are not usable.
 
@@ -356,6 +365,7 @@ def design_pid(
     >>> law.poles.round(2).tolist()
     [(-42-42.85j), (-42+42.85j), (-60+0j)]
     """
+    require_kind(model, LinearModel, "model", _MODEL)
     if len(model.layout.free) != 1:
         raise DesignError(
             f"a PID places the three poles of one freedom: with {len(model.layout.free)} free ones use design_lqr"
@@ -403,6 +413,8 @@ def design_pi(
 
     Raises
     ------
+    InputError
+        If ``model`` is no `LinearModel`.
     DesignError
         If no PI controller meets the requirements: a PI controller gives no phase lead, which a sprung mass needs near its
         resonance and above.
@@ -415,6 +427,7 @@ def design_pi(
     >>> law.phase_margin > 1.04
     True
     """
+    require_kind(model, LinearModel, "model", _MODEL)
     _check_positive("bandwidth", bandwidth, "rad/s")
     if not 0.0 < phase_margin < pi:
         raise DesignError(f"phase margin is {phase_margin} rad: it must be between 0 and pi")

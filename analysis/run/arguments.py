@@ -80,6 +80,13 @@ def takes_published(**fills: Fill) -> Callable[[_Function], _Function]:
     return decorate
 
 
+def require_kind(value: Any, kind: type | tuple[type, ...], name: str, wanted: str) -> None:
+    """Raise InputError if an argument is not of the kind; ``wanted`` says in the message what to give instead."""
+    if not isinstance(value, kind):
+        shown = repr(value) if value is None or isinstance(value, (str, int, float)) else type(value).__name__
+        raise InputError(f"{name} is {shown}: give {wanted}")
+
+
 def takes_options(kind: type) -> Callable[[_Function], _Function]:
     """Decorate a function to reject keywords that are neither arguments of the function nor keys of the TypedDict ``kind``.
 

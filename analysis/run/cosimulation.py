@@ -19,7 +19,7 @@ from ..files import unknown_name
 from ..mechanisms import InitialState, Parameters, output_units, residual_outputs, wrapping_outputs
 from ..numerics.workers import record_interrupts
 from ..units import Amount, in_si
-from .arguments import complete_initial_state, complete_inputs, takes_published, usual_times
+from .arguments import complete_initial_state, complete_inputs, require_kind, takes_published, usual_times
 from .case import Case
 from .events import RunInterrupted, show_progress
 from .fmu import CosimulationError, FmuModel, FmuRun
@@ -327,7 +327,7 @@ def compare(a: Trajectory, b: Trajectory, *, tolerance: float = 1e-6) -> Compari
     Raises
     ------
     InputError
-        If the times or the outputs of the runs differ.
+        If ``a`` or ``b`` is no run, or the times or the outputs of the runs differ.
 
     Examples
     --------
@@ -336,6 +336,8 @@ def compare(a: Trajectory, b: Trajectory, *, tolerance: float = 1e-6) -> Compari
     >>> compare(one, other).agrees
     True
     """
+    for name, run in (("a", a), ("b", b)):
+        require_kind(run, Trajectory, name, "a run, as simulate('table-3.1')")
     if a.names != b.names:
         raise InputError("the runs cannot be compared: they have not the same outputs, and are of different mechanisms")
     n = int(np.count_nonzero(np.isin(a.time, b.time)))

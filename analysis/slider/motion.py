@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from linkwork.errors import InputError
 
 from ..numerics.fourier import FourierSeries
+from ..run import require_kind
 from ..synthesis import (
     UNITS,
     USUAL_SEARCH,
@@ -90,6 +91,7 @@ def slider_motion(
     >>> moved.best.evaluation.worst < 0.01
     True
     """
+    require_kind(linkage, (Linkage, Solution), "linkage", "a Linkage or Solution of analysis.synthesis")
     given = linkage.linkage if isinstance(linkage, Solution) else linkage
     free = dict(bounds or {})
     kept = {name: value for name, value in given.values().items() if name != "branch" and name not in free}

@@ -32,7 +32,7 @@ from linkwork.slider_crank.kinematics import Position
 from linkwork.slider_crank.parameters import Constants, SliderCrankParameters
 from linkwork.slider_crank.vectors import Vector
 
-from ..run import complete_speed, takes_published
+from ..run import complete_speed, require_kind, takes_published
 from ..units import Amount, in_si
 from . import mobility
 from .mobility import DeadCentre
@@ -345,7 +345,8 @@ class ForceTurn:
 
 @takes_published(
     crank_speed=complete_speed,
-    shift=lambda known, shift: ConstantShift(known.initial.shift_position) if shift is None else shift,
+    # a set of another mechanism, which has no shift, is refused below
+    shift=lambda known, shift: ConstantShift(getattr(known.initial, "shift_position", 0.0)) if shift is None else shift,
 )
 @in_si(crank_speed="rad/s", crank_acceleration="rad/s2", angles="rad", load="N", torque="N.m")
 def force_turn(
@@ -382,7 +383,8 @@ def force_turn(
     Raises
     ------
     InputError
-        If both ``load`` and ``torque`` are given, a value is not finite or has the wrong shape, or ``shift`` is no `ShiftLaw`.
+        If the parameters are not those of a slider-crank, both ``load`` and ``torque`` are given, a value is not finite or has
+        the wrong shape, or ``shift`` is no `ShiftLaw`.
     AssemblyError
         If the rod does not reach the guide at some angle; the message gives the ranges in which it does. With ``partial`` only
         if it reaches the guide at no angle.
@@ -394,6 +396,12 @@ def force_turn(
     >>> f"{turn.torque.max():.2f} N.m"
     '45.93 N.m'
     """
+    require_kind(
+        parameters,
+        SliderCrankParameters,
+        "parameters",
+        "SliderCrankParameters or a set of them, as 'rahman-ideal'; simulate has the joint forces of any mechanism",
+    )
     if crank_speed is None:
         raise InputError("the crank speed is missing: only a published set brings its own")
     if load is not None and torque is not None:

@@ -17,6 +17,7 @@ from linkwork.limits import LIMIT_SINE
 from linkwork.parameters import POSITIVE, field_name
 from linkwork.slider_crank.parameters import SliderCrankParameters
 
+from ..files import Whole
 from ..numerics.workers import check_jobs, run_in_parallel, worker_count
 from .forces import NO_LEVER, SLIDER_FORCE, ForceTurn
 from .quantities import DEAD_CENTRE, FloatArray, MaskedArray, masked_array, shown_units
@@ -31,6 +32,7 @@ from .tolerances import (
     check_names,
     check_tolerances,
     perturb,
+    require_turn,
     tolerance_effects,
 )
 
@@ -249,10 +251,10 @@ def monte_carlo(
     Raises
     ------
     InputError
-        If there is no tolerance, or two of the same name, or fewer than two samples; if samples are invalid: a length not above
-        zero, or a crank inertia below the least that its mass allows.
+        If ``turn`` is no `ForceTurn`; if there is no tolerance, or two of the same name; if samples are invalid: a length not
+        above zero, or a crank inertia below the least that its mass allows.
     ParameterError
-        If there is no such quantity.
+        If there is no such quantity, or ``samples`` is no whole number of at least two.
 
     Examples
     --------
@@ -262,10 +264,10 @@ def monte_carlo(
     >>> sampled.spreads["slider.position"].deviation.round(6).tolist()
     [0.000179, 0.000167]
     """
+    require_turn(turn)
     check_tolerances(tolerances)
     check_names(quantities, QUANTITIES, "quantity")
-    if samples < 2:
-        raise InputError(f"{samples} samples: there must be at least two")
+    samples = Whole(least=2)(samples, "samples")
     check_jobs(n_jobs)
     linear = tolerance_effects(turn, tolerances, quantities)
     cores = worker_count(n_jobs)

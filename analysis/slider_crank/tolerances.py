@@ -30,6 +30,7 @@ from ..files import unknown_name
 from ..numerics.dual import Dual, dual
 from ..numerics.dual import variables as independent
 from ..numerics.tracing import rebind_functions
+from ..run import require_kind
 from ..units import Amount, si
 from .forces import SLIDER_FORCE, ForceTurn, solve
 from .quantities import JOINTS, FloatArray, MaskedArray, masked_array
@@ -137,6 +138,7 @@ def sensitivities(
     ParameterError
         If an error or a quantity does not exist.
     """
+    require_turn(turn)
     check_names(errors, ERRORS, "error")
     check_names(quantities, QUANTITIES, "quantity")
     n, m = len(turn), len(errors)
@@ -364,7 +366,7 @@ def tolerance_effects(
     Raises
     ------
     InputError
-        If there is no tolerance, or two of the same name.
+        If ``turn`` is no `ForceTurn`, or there is no tolerance, or two of the same name.
     ParameterError
         If there is no such quantity.
 
@@ -376,6 +378,7 @@ def tolerance_effects(
     >>> [f"{1e3 * value:.3f} mm" for value in effect.worst]
     ['0.549 mm', '0.512 mm']
     """
+    require_turn(turn)
     names = check_tolerances(tolerances)
     first = sensitivities(turn, names, quantities)
     deviations = np.array([t.deviation for t in tolerances])
@@ -413,8 +416,18 @@ def tolerance_effects(
     return result
 
 
+def require_turn(turn: ForceTurn) -> None:
+    """Raise InputError unless ``turn`` is a slider-crank over a turn, the only mechanism with tolerances."""
+    wanted = "what force_turn returns, as force_turn('rahman-ideal'): only SliderCrankParameters have tolerances"
+    require_kind(turn, ForceTurn, "turn", wanted)
+
+
 def check_tolerances(tolerances: Sequence[Tolerance]) -> tuple[str, ...]:
     """Return the names of the tolerances; raise InputError if there is none, or two have the same name."""
+    wanted = "a list of Tolerance, as [Tolerance('rod.length', half_width='0.5 mm')]"
+    require_kind(tolerances, Sequence, "tolerances", wanted)
+    for number, one in enumerate(tolerances, start=1):
+        require_kind(one, Tolerance, f"tolerance {number}", wanted)
     names = tuple(t.name for t in tolerances)
     if not names:
         raise InputError("there is no tolerance: give at least one")

@@ -15,7 +15,7 @@ from linkwork.errors import LinkworkError
 
 from ..numerics import symbolic
 from ..periodic import Crossing, SpecialPoint, describe_end
-from ..run import show_progress
+from ..run import require_kind, show_progress
 from .conditions import (
     Condition,
     CrossPlane,
@@ -264,6 +264,8 @@ def tune(wish: Wish, *, progress: bool = False) -> Tuned:
 
     Raises
     ------
+    InputError
+        If ``wish`` is no `Wish`.
     OrbitError
         If there is no periodic motion to begin with at either end of the range.
 
@@ -277,6 +279,7 @@ def tune(wish: Wish, *, progress: bool = False) -> Tuned:
     >>> tuned.met, f"{tuned.values[0]:.1f} N/m"
     (True, '4153.3 N/m')
     """
+    require_kind(wish, Wish, "wish", "a Wish, as Wish(parameters='rig-2-spring-c', speeds=..., change=...)")
     search = _Search(wish)
     zero = np.zeros(len(wish.names))
     start = np.clip(zero, wish.scale_changes(wish.low), wish.scale_changes(wish.high))

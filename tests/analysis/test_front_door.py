@@ -28,25 +28,35 @@ from analysis import (
     Tolerance,
     TorsionBar,
     Trajectory,
+    compare,
+    design_lqr,
+    design_pi,
+    design_pid,
     figures,
     find_orbit,
     force_turn,
     frequency_response,
+    monte_carlo,
     ramp,
     simulate,
     simulate_many,
+    slider_motion,
     stability_chart,
     steps,
     synthesis,
     synthesize,
     table,
+    tolerance_effects,
+    tune,
     variant,
+    with_isolas,
 )
 from analysis.display import format_count
 from analysis.periodic import basins
 from analysis.run import published_case, save_parameters
+from analysis.slider_crank import sensitivities
 from analysis.units import _registry, quantity
-from linkwork.errors import InputError, MissingParameterError, ParameterError, UnknownNameError
+from linkwork.errors import InputError, LinkworkError, MissingParameterError, ParameterError, UnknownNameError
 
 FUNCTIONS = [name for name in dir(analysis) if inspect.isfunction(getattr(analysis, name))]
 #: Constructors of signals, whose sentence is example enough.
@@ -207,6 +217,41 @@ def test_what_is_no_such_quantity_is_refused_by_its_name(
     ask: Callable[[], object], kind: type[Exception], said: str
 ) -> None:
     with pytest.raises(kind, match=said):
+        ask()
+
+
+_ROD = [Tolerance("rod.length", half_width="1 mm")]
+
+
+@pytest.mark.parametrize(
+    ("ask", "said"),
+    [
+        (
+            lambda: tolerance_effects("hanging-arm", _ROD),
+            "turn is 'hanging-arm': give what force_turn returns.*SliderCrank",
+        ),
+        (
+            lambda: tolerance_effects(PUBLISHED["table-3.1"].parameters, _ROD),
+            "turn is FiveBarParameters: give what force_turn",
+        ),
+        (lambda: monte_carlo("rahman-ideal", _ROD), "turn is 'rahman-ideal': give what force_turn returns"),
+        (lambda: monte_carlo(force_turn("rahman-ideal"), _ROD, samples="many"), "samples is 'many'"),
+        (lambda: sensitivities(None), "turn is None: give what force_turn returns"),
+        (lambda: tolerance_effects(force_turn("rahman-ideal"), _ROD[0]), "tolerances is Tolerance: give a list"),
+        (lambda: tolerance_effects(force_turn("rahman-ideal"), "rod.length"), "tolerance 1 is 'r': give a list"),
+        (lambda: force_turn("table-3.1"), "parameters is FiveBarParameters: give SliderCrankParameters or a set"),
+        (lambda: force_turn(PUBLISHED["table-3.1"].parameters), "parameters is FiveBarParameters: give SliderCrank"),
+        (lambda: compare("table-3.1", "table-3.1"), "a is 'table-3.1': give a run"),
+        (lambda: with_isolas("table-3.1"), "response is 'table-3.1': give what frequency_response returns"),
+        (lambda: tune("table-3.1"), "wish is 'table-3.1': give a Wish"),
+        (lambda: slider_motion("table-3.1", "table-3.1", None), "linkage is 'table-3.1': give a Linkage"),
+        (lambda: design_lqr("table-3.1", [1.0]), "model is 'table-3.1': give a LinearModel"),
+        (lambda: design_pi("table-3.1", bandwidth=1.0), "model is 'table-3.1': give a LinearModel"),
+        (lambda: design_pid("table-3.1", bandwidth=1.0), "model is 'table-3.1': give a LinearModel"),
+    ],
+)
+def test_an_argument_of_another_kind_is_refused_with_what_to_give(ask: Callable[[], object], said: str) -> None:
+    with pytest.raises(LinkworkError, match=said):
         ask()
 
 

@@ -455,7 +455,7 @@ def test_wrong_input_is_reported() -> None:
         monte_carlo(turn, [])
     with pytest.raises(InputError, match=r"2 tolerances of rod\.length"):
         tolerance_effects(turn, [Tolerance("rod.length", 1.0), Tolerance("rod.length", 2.0)])
-    with pytest.raises(InputError, match="1 samples"):
+    with pytest.raises(ParameterError, match="samples is 1: it must be at least 2"):
         monte_carlo(turn, TOLERANCES, samples=1)
     with pytest.raises(ParameterError, match=r"crank_pin\.fx"):
         monte_carlo(turn, TOLERANCES, samples=10).place("crank_pin.fx", 0.3)

@@ -27,7 +27,7 @@ from ...mechanisms import Parameters, find_mechanism
 from ...numerics import symbolic
 from ...numerics.continuation import ContinuationError
 from ...numerics.workers import record_interrupts
-from ...run import inertia_and_stiffness, show_progress, takes_published
+from ...run import inertia_and_stiffness, require_kind, show_progress, takes_published
 from ...units import Amount, si
 from ..motion import (
     SAME,
@@ -556,7 +556,7 @@ def with_isolas(
     Raises
     ------
     InputError
-        If ``places`` or ``turns`` is less than one.
+        If ``response`` is no `Response`, or ``places`` or ``turns`` is less than one.
     ResponseInterrupted
         On Ctrl-C, with the branches followed so far.
 
@@ -567,6 +567,7 @@ def with_isolas(
     >>> len(with_isolas(response, places=2).branches)
     1
     """
+    require_kind(response, Response, "response", "what frequency_response returns")
     if places < 1:
         raise InputError(f"places is {places}: motions must be sought at one value of the parameter at least")
     require_turns(turns)
