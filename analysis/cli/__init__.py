@@ -46,15 +46,31 @@ COMMANDS = {
 }
 
 
+#: Likeness of an unknown command to a name of the Python interface beyond which this name is suggested.
+_ALIKE = 0.85
+
+
 class Commands(click.Group):
-    """A group of commands that reports errors as sentences, and suggests the most similar command for an unknown name."""
+    """A group of commands that reports errors as sentences, and suggests the most similar name for an unknown command."""
 
     def resolve_command(
         self, ctx: click.Context, args: list[str]
     ) -> tuple[str | None, click.Command | None, list[str]]:
         if not args[0].startswith("-") and self.get_command(ctx, args[0]) is None:
+            from difflib import get_close_matches
+
             from ..files import unknown_name
 
+            functions = [
+                name
+                for name in dir(import_module("..", __name__))
+                if name.islower() and name.replace("_", "-") not in COMMANDS
+            ]
+            known = [*functions, *(name.replace("-", "_") for name in self.list_commands(ctx))]
+            name = next(iter(get_close_matches(args[0].replace("-", "_"), known, 1, _ALIKE)), "")
+            if name in functions:
+                words = f"there is no command {args[0]!r}; Python has it: from linkwork import {name}"
+                raise click.UsageError(words, ctx)
             raise click.UsageError(str(unknown_name(args[0], self.list_commands(ctx), f"command {args[0]!r}")), ctx)
         return super().resolve_command(ctx, args)
 

@@ -191,7 +191,7 @@ def test_a_chart_under_a_torque_has_its_doublings_and_tori() -> None:
 
 @pytest.mark.slow
 @pytest.mark.usefixtures("coarse")
-def test_a_chart_of_mechanisms_that_cannot_turn_says_so_and_keeps_the_rest() -> None:
+def test_a_chart_of_mechanisms_that_cannot_turn_says_so_and_keeps_the_rest(tmp_path: Path) -> None:
     chart = stability_chart(
         TABLE_3_1,
         Drive(speed=SETS["table-3.1"].crank_speed),
@@ -217,6 +217,14 @@ def test_a_chart_of_mechanisms_that_cannot_turn_says_so_and_keeps_the_rest() -> 
     # what is confirmed is where there is a motion
     assert [run.confirmation.agrees for run in chart.runs] == [True, True]
     assert all(run.x == 0.05 for run in chart.runs)
+    # lengths are in mm in the picture and the text, in m in the file
+    axis = figures.plot(chart).axes[0]
+    assert (axis.get_xlabel(), axis.get_ylabel()) == ("crank length [mm]", "rocker length [mm]")
+    assert axis.get_xlim() == pytest.approx((50.0, 500.0))
+    assert "crank.length 50 to 500 mm" in repr(chart)
+    head, first = chart.to_csv(tmp_path / "chart.csv").read_text(encoding="utf-8").splitlines()[:2]
+    assert head.startswith("crank.length [m],rocker.length [m]")
+    assert [float(value) for value in first.split(",")[:2]] == pytest.approx([0.05, 0.14])
 
 
 def test_default_ranges() -> None:

@@ -24,7 +24,7 @@ from ...mechanisms import Parameters, find_mechanism
 from ...numerics.boundaries import Box, chart
 from ...numerics.continuation import ContinuationError, End, Reason
 from ...run import show_progress, takes_published
-from ...units import RAD_S_PER_RPM, Amount, pair
+from ...units import Amount, display_scale, pair
 from ..motion import (
     Crossing,
     Drive,
@@ -73,7 +73,7 @@ _MULTIPLIER = {Crossing.FOLD: 1.0, Crossing.PERIOD_DOUBLING: -1.0, Crossing.TORU
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Axis:
-    """An axis of a chart as it is printed and drawn: speeds in rpm, all other quantities in SI.
+    """An axis of a chart as it is printed and drawn: in the units of the tables, such as rpm and mm.
 
     Attributes
     ----------
@@ -96,6 +96,11 @@ class Axis:
     def label(self) -> str:
         """Name of the parameter with its unit."""
         return f"{self.name} [{self.unit}]"
+
+    @property
+    def column(self) -> tuple[str, float]:
+        """Name with unit, and factor from SI, in a CSV file: speeds in rpm, all other quantities in SI."""
+        return (self.label, self.factor) if self.si == "rad/s" else (f"{self.name} [{self.si}]", 1.0)
 
     def format_value(self, value: float) -> str:
         """Return a value, given in SI, as text with the parameter's name and unit."""
@@ -190,10 +195,10 @@ class StabilityChart(NotebookResult):
 
     def to_csv(self, path: str | Path) -> Path:
         """Write the grid as a CSV table with one row per point, and return its path."""
-        x, y = self.axes
+        (x, x_factor), (y, y_factor) = (axis.column for axis in self.axes)
         columns = {
-            x.label: x.factor * np.tile(self.grid.x, len(self.grid.y)),
-            y.label: y.factor * np.repeat(self.grid.y, len(self.grid.x)),
+            x: x_factor * np.tile(self.grid.x, len(self.grid.y)),
+            y: y_factor * np.repeat(self.grid.y, len(self.grid.x)),
             "largest multiplier [1]": self.grid.largest.filled(np.nan).ravel(),
             "status (0: orbit found)": self.grid.status.ravel().astype(float),
         }
@@ -203,14 +208,14 @@ class StabilityChart(NotebookResult):
         """Write the boundaries as a CSV table with one row per point; the first column is the boundary's number."""
         rows = [np.empty((0, 5))]
         for number, traced in enumerate(self.boundaries, start=1):
-            points = traced.points * [axis.factor for axis in self.axes]
+            points = traced.points * [axis.column[1] for axis in self.axes]
             head = [number, _MOTION.get(traced.motion, 0.0), _MULTIPLIER[traced.kind]]
             rows.append(np.column_stack([np.tile(head, (len(points), 1)), points]))
         names = (
             "boundary",
             "true orbit (1), another motion (2) or linear equation (0)",
             "multiplier (+1; -1; 0: a complex pair)",
-            *(a.label for a in self.axes),
+            *(axis.column[0] for axis in self.axes),
         )
         return write_csv(path, dict(zip(names, np.concatenate(rows).T)))
 
@@ -614,7 +619,6 @@ def damping_name(mechanism: Mechanism) -> str:
 
 
 def _axis(mechanism: Mechanism, name: str) -> Axis:
-    unit = parameter_unit(mechanism, name)
-    if unit == "rad/s":
-        return Axis(name=name, unit="rpm", factor=1.0 / RAD_S_PER_RPM, si=unit)
-    return Axis(name=name, unit=unit, factor=1.0, si=unit)
+    si = parameter_unit(mechanism, name)
+    unit, factor = display_scale(si)
+    return Axis(name=name, unit=unit, factor=factor, si=si)
