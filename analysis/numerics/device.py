@@ -30,7 +30,7 @@ from numpy.typing import NDArray
 from linkwork.errors import LinkworkError
 
 from . import lanes, linking
-from .cache import code_folder, load_or_make
+from .cache import code_folder, load_or_make, store_file
 from .codegen import MAKING, Writer, fingerprint, own_source
 from .lanes import DOUBLE, Vector
 
@@ -131,7 +131,9 @@ def compile_kernel(function: Any) -> tuple[bytes, str]:
         return pickle.dumps(linking.unmade_code(made))
 
     with MAKING:
-        code, name = pickle.loads(load_or_make(code_folder("llvm") / f"device-{fingerprint(function, signature)}", make))
+        code, name = pickle.loads(
+            load_or_make(code_folder("llvm") / f"device-{fingerprint(function, signature)}", make)
+        )
     return code, name
 
 
@@ -271,7 +273,7 @@ class Cuda:
         self._cupy = cupy
         with TemporaryDirectory() as folder:
             path = Path(folder, "kernel.ptx")
-            path.write_bytes(compile_to_ptx(kernel, functions))
+            store_file(path, compile_to_ptx(kernel, functions))
             self._run = cupy.RawModule(path=str(path)).get_function(ENTRY)
 
     def run(self, threads: int, kind: Any, arguments: Any, changed: Sequence[NDArray[Any]]) -> None:
