@@ -57,6 +57,7 @@ from .fmu import FmuRun as FmuRun
 from .fmu import list_interfaces as list_interfaces
 from .fmu import read_description as read_description
 from .hamming import Hamming as Hamming
+from .inputs import MOST_TURNS as MOST_TURNS
 from .inputs import Inputs as Inputs
 from .inputs import align as align
 from .inputs import check_run as check_run

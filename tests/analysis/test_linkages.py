@@ -9,6 +9,7 @@ import math
 import re
 import sys
 from dataclasses import replace
+from fractions import Fraction
 from pathlib import Path
 from typing import Any
 
@@ -24,7 +25,7 @@ from analysis.linkages.description import Body, FreedomTable, Gear, Rack, Slide,
 from analysis.linkages.parameters import spring_angle_name
 from analysis.linkages.structure import Pin, Slider
 from analysis.mechanisms import check
-from analysis.periodic import Drive, find_orbit, newton_orbit
+from analysis.periodic import Drive, find_orbit, newton_orbit, search_orbits, steady_drive
 from analysis.run import Inputs, Trajectory, load_case, simulate
 from linkwork.errors import InputError, LinkworkError, ParameterError
 from linkwork.plant import Plant
@@ -904,10 +905,49 @@ def test_a_coupling_of_gears_counts_their_turns() -> None:
 
 def test_a_coupling_has_periodic_motions_in_which_both_its_ends_turn() -> None:
     made = coupled("periodic-coupling").mechanism()
+    speed = 2.0 * math.pi
     with pytest.raises(InputError, match=r"a spring joins rotor\.angle and drum\.angle.*ratios = \{'drum\.angle': 1\}"):
-        newton_orbit(made.first_set.parameters, Drive(speed=2.0 * math.pi))
-    orbit = newton_orbit(made.first_set.parameters, Drive(speed=2.0 * math.pi, ratios={"drum.angle": 1}))
-    assert orbit.start[0] == pytest.approx(-220.0 / 60.0, rel=1e-9)
+        newton_orbit(made.first_set.parameters, Drive(speed=speed, ratios={"drum.angle": 2}))
+    for drive in (Drive(speed=speed, ratios={"drum.angle": 1}), Drive(speed=speed)):
+        orbit = newton_orbit(made.first_set.parameters, drive)
+        assert orbit.start[0] == pytest.approx(-220.0 / 60.0, rel=1e-9)
+    assert [found.rounds for found in search_orbits(made.first_set.parameters, Drive(speed=speed)).orbits] == [
+        {"drum.angle": 1}
+    ]
+
+
+def test_the_turns_of_bodies_on_elastic_couplings_follow_from_the_couplings() -> None:
+    """A motor, by a gear of ratio -1/2 and a coupling with backlash, turns a drum, and by a coupling to the drum a fan."""
+    built = linkage("coupled-train", ground={"A": (0, 0), "B": ("0.3 m", 0), "K": (0, 0), "L": (0, 0)})
+    for body, point in {"motor": "A", "wheel": "B", "drum": "K", "fan": "L"}.items():
+        built.body(body, points={point: (0, 0)}, mass=1, inertia=0.2)
+    built.gear("teeth", bodies=("motor", "wheel"), ratio=-0.5)
+    backlash = "300*(max(x - 0.1, 0) + min(x + 0.1, 0)) + 2*v"
+    built.spring("first", bodies=("wheel", "drum"), law=backlash)
+    built.spring("second", bodies=("drum", "fan"), stiffness="50 N*m/rad", damping="1 N*m*s/rad")
+    built.spring("brake", at="L", damping="0.5 N*m*s/rad")
+    built.freedom("motor", "A", speed="60 rpm").freedom("drum", "K", driven=False).freedom("fan", "L", driven=False)
+    made = built.mechanism()
+    drive = steady_drive(made.first_set, None)
+    half = Fraction(-1, 2)
+    assert drive.ratios_by_freedom(made) == {1: half, 2: half}
+    orbit = newton_orbit(made.first_set.parameters, drive)
+    # the brake's torque twists the couplings, the first beyond its backlash
+    torque = 0.5 * math.pi
+    assert orbit.start[0] == pytest.approx(torque / 300.0 + 0.1, rel=1e-7)
+    assert orbit.start[1] - orbit.start[0] == pytest.approx(torque / 50.0, rel=1e-7)
+
+
+def test_a_driven_crank_that_a_load_frees_turns_with_its_coupling() -> None:
+    built = linkage("coupled-cranks", ground={"A": (0, 0), "K": (0, 0)})
+    for body, point in {"motor": "A", "pump": "K"}.items():
+        built.body(body, points={point: (0, 0)}, mass=1, inertia=0.2)
+    built.spring("coupling", bodies=("motor", "pump"), stiffness="50 N*m/rad", damping="1 N*m*s/rad")
+    built.freedom("motor", "A", speed="60 rpm").freedom("pump", "K", driven=True)
+    made = built.mechanism()
+    drive = steady_drive(made.first_set, Inputs(motor_speed=2.0 * math.pi, pump_torque=-5.0))
+    assert not drive.ratios
+    assert newton_orbit(made.first_set.parameters, drive).start[0] == pytest.approx(-5.0 / 50.0, rel=1e-9)
 
 
 def arm(name: str, **spring: Any) -> Any:

@@ -227,8 +227,10 @@ def operating_point(parameters: Parameters, drive: Drive) -> OperatingPoint:
         )
     if coupled and not _repeats(point):
         raise InputError(
-            f"a spring joins {' and '.join(coupled)}, which every common period of this drive winds up further: say how often "
-            f"each turns for each turn of the crank, as in ratios = {{{coupled[-1]!r}: 1}}"
+            f"a spring joins {' and '.join(coupled)}, which every common period of this drive winds up further: give commanded "
+            "cranks speeds that do not wind it up; if one of them is free, describe the coupling at a pin, at = NAME, whose "
+            f"freedom is the twist, or in Python say how often each turns for each turn of the crank, as in ratios = "
+            f"{{{coupled[-1]!r}: 1}}"
         )
     return point
 
@@ -295,10 +297,9 @@ def collocation_serves(drives: Iterable[Drive], mechanisms: Iterable[Parameters]
     mechanisms = list(dict.fromkeys(mechanisms))
 
     def follows(drive: Drive) -> bool:
-        if not (drive.speed_drive and drive.ratios):
-            return drive.speed_drive
         mechanism = find_mechanism(mechanisms[0])
-        return not {*drive.flow(mechanism).free} & {*drive.ratios_by_freedom(mechanism)}
+        ratios = drive.ratios_by_freedom(mechanism)
+        return drive.speed_drive and not (ratios and {*drive.flow(mechanism).free} & {*ratios})
 
     return all(map(follows, drives)) and all(map(is_smooth, mechanisms))
 

@@ -19,6 +19,7 @@ from linkwork.parameters import field_name
 from ...files import unknown_name
 from ...mechanisms import InitialState, Parameters, find_mechanism, variable_units
 from ...run import (
+    MOST_TURNS,
     InductionMotor,
     Inputs,
     check_run,
@@ -30,6 +31,8 @@ from ...run import (
 from ...units import Amount, in_si
 from .flow import Crank, Flow, find_crank, find_turning_freedom, flow
 
+#: Relative size of changes of the accelerations by a turn, and size of errors of a ratio of turns, that are rounding.
+_NO_SPRING = 1e-7
 #: Advice in messages about a negative speed.
 _MIRROR = (
     "; for a crank that turns the other way describe the mirror image: y and angles, that of gravity too, with the opposite "
@@ -95,7 +98,8 @@ class Drive:
     ratios : mapping of str to Fraction
         Turns of the other cranks per turn of the crank, by FMI name; they follow from ``speeds``. A crank that is not free and
         has no ratio is held. An undriven link that makes full turns has a ratio, too, by the name of its coordinate, such as
-        ``{"swing.angle": 1}``; a link without a ratio only swings.
+        ``{"swing.angle": 1}``; a link without a ratio only swings. If a spring couples a link or a free crank to the crank, the
+        ratio follows.
     motors : mapping of str to InductionMotor
         Motors on other cranks by the FMI names of the torques.
     speeds : mapping of str to float, optional
@@ -174,9 +178,20 @@ class Drive:
     def ratios_by_freedom(self, mechanism: Mechanism) -> dict[int, Fraction]:
         """Return the turns, per turn of the crank, of the other cranks and of the links that make full turns.
 
-        The keys are the indices of their degrees of freedom.
+        The keys are the indices of their degrees of freedom. A free rotation without a given ratio that a spring couples to the
+        crank, to another crank or to a link with a ratio has the ratio that does not wind this spring up.
         """
-        return {find_turning_freedom(mechanism, name): ratio for name, ratio in self.ratios.items()}
+        given = {find_turning_freedom(mechanism, name): ratio for name, ratio in self.ratios.items()}
+        if not any(freedom.coupled for freedom in mechanism.freedoms):
+            return given
+        turning, acting = {self.reference(mechanism).freedom: Fraction(1)} | given, {*self.forces, *self.motors}
+        loaded = {c.freedom for c in mechanism.channels if c.kind == "force" and c.name in acting}
+        coupled = tuple(
+            n
+            for n, freedom in enumerate(mechanism.freedoms)
+            if freedom.coupled and n not in turning and (freedom.swings or n in loaded)
+        )
+        return given | _coupled_ratios(mechanism, coupled, tuple(turning.items()))
 
     def arguments(self, mechanism: Mechanism) -> Mapping[str, str]:
         """Return how each degree of freedom that has a mode is driven: one of `Mode.arguments`, by the name of the mode.
@@ -224,7 +239,8 @@ class Drive:
             name = mechanism.freedoms[number].coordinate
             if number in made.free and number not in ratios and not mechanism.freedoms[number].swings:
                 raise InputError(
-                    f"{name} is free: say how often it turns for each turn of the crank, ratios = {{{name!r}: 1}}"
+                    f"{name} is free: say how often it turns for each turn of the crank, in Python ratios = {{{name!r}: 1}}, "
+                    f"in a case by the speeds at the start, such as initial.{freedoms[number].initial[1]}"
                 )
             if number in ratios and number not in (*made.free, *made.commanded):
                 raise InputError(f"{name} has a ratio, but is neither commanded nor free")
@@ -322,6 +338,40 @@ class Drive:
 def _whole_turns(freedom: Freedom) -> int:
     """Return the number of turns of a link after which the mechanism is in the same configuration again."""
     return round(freedom.period / (2.0 * pi))
+
+
+@cache
+def _coupled_ratios(
+    mechanism: Mechanism, coupled: tuple[int, ...], turning: tuple[tuple[int, Fraction], ...]
+) -> dict[int, Fraction]:
+    """Return the turns of coupled rotations, per turn of the crank, that do not wind up the springs that couple them.
+
+    A whole turn of one of these rotations changes the accelerations by the spring alone. ``turning`` are the other rotations
+    with their ratios, the crank included; keys are indices of degrees of freedom. What does not turn is left out.
+    """
+    if not coupled:
+        return {}
+    known, size = mechanism.first_set, len(mechanism.freedoms)
+    p = known.parameters.constants()
+    x, i = np.array(mechanism.state(known.initial)), mechanism.idle_inputs(p)
+
+    def accelerations(number: int, turns: float) -> NDArray[np.float64]:
+        state = x.copy()
+        state[number] += turns * mechanism.freedoms[number].period
+        return np.array(mechanism.equations.derivative(tuple(state.tolist()), i, p))[size : 2 * size]
+
+    def winding(number: int) -> NDArray[np.float64]:
+        """Return the change of the accelerations by one turn of a degree of freedom."""
+        return (accelerations(number, 1.0) - accelerations(number, 0.0)) / _whole_turns(mechanism.freedoms[number])
+
+    try:
+        wound = sum((float(ratio) * winding(number) for number, ratio in turning), np.zeros(size))
+        columns = np.column_stack([winding(number) for number in coupled])
+        found = np.linalg.lstsq(columns, -wound, rcond=_NO_SPRING)[0].tolist()
+        fractions = [Fraction(ratio).limit_denominator(MOST_TURNS) for ratio in found]
+    except (ArithmeticError, ValueError, np.linalg.LinAlgError):
+        return {}
+    return {n: ratio for n, ratio, value in zip(coupled, fractions, found) if ratio and abs(ratio - value) < _NO_SPRING}
 
 
 def require_drive(drive: object) -> Drive:
@@ -484,7 +534,7 @@ def _choose_crank(
 
     This crank is the first crank that is commanded at a positive speed, or else the first crank. The ratios, by index of the
     degree of freedom, are those of the commanded speeds; a free crank has the ratio of the initial speeds, rounded to a whole
-    number.
+    number, unless it begins at rest and a spring couples it, see `Drive.ratios_by_freedom`.
     """
     if len(mechanism.cyclic_freedoms) < 2:
         return find_crank(mechanism), {}
@@ -504,7 +554,7 @@ def _choose_crank(
                 if first in speeds
                 else Fraction(0)
             )
-        elif n != first and speed != 0.0:
+        elif n != first and speed != 0.0 and (start[n] != 0.0 or not mechanism.freedoms[n].coupled):
             ratios[n] = Fraction(round(start[n] / speed))
     return crank, ratios
 

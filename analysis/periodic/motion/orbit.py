@@ -508,8 +508,8 @@ def _count_rounds(point: OperatingPoint, start: FloatArray, turns: int) -> dict[
     dict of str to int
         Number of full turns by FMI name of the coordinate; links that only swing are left out.
     """
-    flow = point.flow
-    swinging = {name: i for name, i in flow.swinging.items() if name not in point.drive.ratios}
+    flow, ratios = point.flow, point.drive.ratios_by_freedom(point.mechanism)
+    swinging = {name: i for name, i in flow.swinging.items() if flow.free[i] not in ratios}
     if not swinging:
         return {}
     shift = point.period(start, turns).shift

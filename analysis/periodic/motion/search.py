@@ -467,12 +467,12 @@ def search_orbits(
             [search_orbits(parameters, drive, turns=number, start=start) for number in sorted(set(turns))]
         )
     mechanism, known = find_mechanism(parameters), list(known)
-    flow = drive.flow(mechanism)
+    flow, ratios = drive.flow(mechanism), drive.ratios_by_freedom(mechanism)
     drives = [(drive, turns), *((orbit.drive, orbit.turns) for orbit in known)]
     drives += [
         drive.with_rounds(mechanism, {name: sign * times}, turns)
-        for name in flow.swinging
-        if name not in drive.ratios
+        for name, place in flow.swinging.items()
+        if flow.free[place] not in ratios
         for times in range(1, turns * flow.turns + 1)
         for sign in (1, -1)
     ]
