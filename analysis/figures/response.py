@@ -581,7 +581,7 @@ def _errors(others: Sequence[_Approximation], look: _Scale, shades: Sequence[Sha
 
 
 def _loads(branches: Sequence[Branch], look: _Scale, shades: Sequence[Shade]) -> list[Panel]:
-    """Return the panels of crank torque and joint forces along the branches, if the mechanism has them."""
+    """Return the panels of crank torque and joint forces along the branches, if there are any and they are not all zero."""
     names = list(branches[0].columns())
     torque, forces = "greatest crank torque [N.m]", [name for name in names if name.startswith(FORCE)]
     rows: dict[str, Callable[[Branch], FloatArray]] = {}
@@ -599,6 +599,7 @@ def _loads(branches: Sequence[Branch], look: _Scale, shades: Sequence[Shade]) ->
             shades=shades,
         )
         for label, of in rows.items()
+        if any(np.any(of(branch) > 0.0) for branch in branches)
     ]
 
 

@@ -112,8 +112,8 @@ class Wish:
     speeds : (float, float), optional
         Range of the crank's prescribed speed: rad/s, or texts such as "900 rpm".
     over : str
-        FMI name of another drive quantity whose range is tuned, such as ``drive.torque`` or ``slider.force``, or of a motor's
-        parameter, such as ``drive.torque.synchronous_speed``.
+        FMI name of another drive quantity whose range is tuned, such as ``drive.torque`` or ``slider.force``, of a motor's
+        parameter, such as ``drive.torque.synchronous_speed``, or of a constant of a spring's force law, such as ``motor.w``.
     between : (float, float), optional
         Range of the quantity ``over``: numbers in SI, or texts with units.
     drive : Drive, optional
@@ -175,6 +175,7 @@ class Wish:
         alone = (
             not drive.speed_drive
             and drive.motor is None
+            and self.over in driving_names(mechanism)
             and parameter_value(self.parameters, drive, self.over) == drive.torque
         )
         if alone and self.span[0] <= 0.0 <= self.span[1]:
@@ -235,7 +236,7 @@ class Wish:
             raise InputError(
                 f"the crank has no range of speeds: {why}; give over and between instead, over one of {names}, ..."
             )
-        known = driving_names(self.mechanism)
+        known = (*driving_names(self.mechanism), *self.mechanism.names("law"))
         if self.over and self.over not in known:
             raise unknown_name(self.over, known)
         if self.between is not None and self.drive is None and self.over != speed:

@@ -17,6 +17,7 @@ import numpy as np
 import pytest
 from scipy import integrate
 
+from analysis import figures
 from analysis.files import entry_names
 from analysis.linear import linearise
 from analysis.linkages import Dyad, Package, RackStep, laws, linkage, load_linkage, reach, read_description
@@ -25,9 +26,10 @@ from analysis.linkages.description import Body, FreedomTable, Gear, Rack, Slide,
 from analysis.linkages.parameters import spring_angle_name
 from analysis.linkages.structure import Pin, Slider
 from analysis.mechanisms import check
-from analysis.periodic import Drive, find_orbit, newton_orbit, search_orbits, steady_drive
+from analysis.periodic import Drive, find_orbit, frequency_response, newton_orbit, search_orbits, steady_drive
 from analysis.run import Inputs, Trajectory, load_case, simulate
-from linkwork.errors import InputError, LinkworkError, ParameterError
+from analysis.tuning import Wish, tune
+from linkwork.errors import InputError, LinkworkError, ParameterError, UnknownNameError
 from linkwork.plant import Plant
 from tests.oracles.planar import Multipliers
 from tests.random_linkages import KINDS, random_linkage
@@ -948,6 +950,53 @@ def test_a_driven_crank_that_a_load_frees_turns_with_its_coupling() -> None:
     drive = steady_drive(made.first_set, Inputs(motor_speed=2.0 * math.pi, pump_torque=-5.0))
     assert not drive.ratios
     assert newton_orbit(made.first_set.parameters, drive).start[0] == pytest.approx(-5.0 / 50.0, rel=1e-9)
+
+
+def shaker(name: str) -> Any:
+    """An unbalanced crank on a sprung frame that moves along x, with a motor's line as a force law; natural frequency 302 rpm."""
+    built = linkage(name, ground={"O": (0, 0)}).body("frame", points={"A": (0, 0)}, mass=10)
+    built.body("crank", bar=("A", "B"), length="40 mm", mass=2, inertia=0.02, cog=("10 mm", 0))
+    built.slide("X", body="frame", through="O")
+    built.spring("feet", at="X", stiffness="12 N/mm", damping="60 N*s/m")
+    built.spring("motor", at="A", law="c*(v - w)", constants={"c": "2 N*m*s/rad", "w": "300 rpm"})
+    return built.freedom("crank", "A").freedom("x", "X").mechanism().first_set.parameters
+
+
+@pytest.mark.filterwarnings("error")
+def test_a_response_over_a_constant_of_a_law_has_plain_names_and_no_empty_panels() -> None:
+    response = frequency_response(
+        shaker("shaker"), 30.0, 34.0, drive=Drive(torque=0.0), vary="motor.w", start=(0.0, 0.0, 30.0)
+    )
+    assert {"amplitude of x position [m]", "harmonic 3 of x position [m]"} <= response.branches[0].columns().keys()
+    assert response.branches[0].orbits[0].flow.labels == ("x position", "x velocity", "crank speed")
+    labels = [axes.get_ylabel() for axes in figures.plot_branches(response.branches).axes]
+    # nothing but the law drives the crank: no panel of its torque
+    assert labels == ["amplitude of x position [mm]", "harmonics of x position\n[mm]", "greatest\njoint force [N]"]
+
+
+def test_a_range_of_a_constant_of_a_law_is_freed_of_resonance() -> None:
+    parameters = shaker("shaker-tuned")
+    of: dict[str, Any] = {
+        "drive": Drive(torque=0.0),
+        "start": (0.0, 0.0, 24.0),
+        "over": "motor.w",
+        "no_resonance": True,
+    }
+    change = {"feet.stiffness": "40 %"}
+    tuned = tune(Wish(parameters=parameters, between=("290 rpm", "330 rpm"), change=change, **of))
+    assert tuned.met
+    # the peak of the unbalanced machine is near its natural frequency, and left of the range and its margin
+    (stiffness,) = tuned.values
+    assert 0.97 * 0.98 * 290.0 < math.sqrt(stiffness / 12.0) * 30.0 / math.pi < 0.98 * 290.0
+    with pytest.raises(
+        UnknownNameError, match=r"there is no feet\.stiffness \(the names are drive\.torque, .*motor\.w"
+    ):
+        Wish(
+            parameters=parameters,
+            between=(1e4, 2e4),
+            change={"feet.damping": "40 %"},
+            **of | {"over": "feet.stiffness"},
+        )
 
 
 def arm(name: str, **spring: Any) -> Any:

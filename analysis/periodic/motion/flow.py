@@ -389,7 +389,7 @@ class Flow:
 def label(variable: Variable) -> str:
     """Return the label of a variable in messages and tables: its symbol if short, else its name with spaces."""
     symbol = variable.symbol
-    return symbol if symbol and "\\" not in symbol else variable.name.replace(".", " ")
+    return symbol if symbol and not {*"\\{"} & {*symbol} else variable.name.replace(".", " ")
 
 
 @cache
