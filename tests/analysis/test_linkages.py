@@ -953,7 +953,7 @@ def test_a_driven_crank_that_a_load_frees_turns_with_its_coupling() -> None:
 
 
 def shaker(name: str) -> Any:
-    """An unbalanced crank on a sprung frame that moves along x, with a motor's line as a force law; natural frequency 302 rpm."""
+    """An unbalanced crank on a sprung frame that moves along x, with the law of a motor; natural frequency 302 rpm."""
     built = linkage(name, ground={"O": (0, 0)}).body("frame", points={"A": (0, 0)}, mass=10)
     built.body("crank", bar=("A", "B"), length="40 mm", mass=2, inertia=0.02, cog=("10 mm", 0))
     built.slide("X", body="frame", through="O")
