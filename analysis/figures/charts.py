@@ -288,7 +288,7 @@ def plot_basins(found: Basins, *, title: str = "") -> Picture:
         if those:
             curves.append(
                 Curve(
-                    x=[scale * _within(found, orbit.start[place]) for orbit in those],
+                    x=[scale * _nearest_turn(found, orbit.start[place]) for orbit in those],
                     y=[orbit.start[half + place] for orbit in those],
                     line="",
                     marker=marker,
@@ -335,7 +335,7 @@ def plot_basins(found: Basins, *, title: str = "") -> Picture:
     return Picture(parts=[map_], title=title, size=_SIZE)
 
 
-def _within(found: Basins, position: float) -> float:
+def _nearest_turn(found: Basins, position: float) -> float:
     """Return a coordinate of a motion at crank angle 0; for an angle, within half a turn of the middle of the plane."""
     way, middle = found.motions[0].flow.ways[found.place], 0.5 * (found.position[0] + found.position[-1])
     return float(position - way * np.round((position - middle) / way) if way else position)

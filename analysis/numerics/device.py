@@ -4,9 +4,8 @@ A kernel for a device is a Numba function f(i, table). The number of a thread is
 addresses of arrays, as `pack` writes them; a function of `reader` reads the kernel's arguments from it.
 
 Numba's code of the kernel, before LLVM optimises it, is linked with the equations, which are written for one lane without
-calls of the C library (`lanes`), since a device has none. LLVM compiles both together, so that the equations are called
-directly and not by their addresses. The arithmetic is that of IEEE 754 on each device, so the same code compiled for this
-processor has the same results: the tests do that.
+calls of the C library (`lanes`), since a device has none. LLVM compiles both together. The arithmetic is that of IEEE 754 on
+each device, so the same code compiled for this processor has the same results: the tests do that.
 """
 
 from __future__ import annotations
@@ -14,7 +13,8 @@ from __future__ import annotations
 import hashlib
 import pickle
 import struct
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
@@ -36,8 +36,9 @@ from .lanes import DOUBLE, Vector
 
 _LONG = ir.IntType(64)
 _TABLE = _LONG.as_pointer()
-#: The oldest devices for which code is made: those with CUDA 12 or 13 (Turing, 2018).
-ARCHITECTURE = "sm_75"
+#: The oldest devices for which code is made, those that CUDA 13 still has (Turing), and their year.
+ARCHITECTURE, _YEAR = "sm_75", 2018
+_MEMORY = "if it lacks memory, a smaller batch may fit"
 _TRIPLE = "nvptx64-nvidia-cuda"
 #: Threads of a block; the registers of a device suffice for few, as a run needs many.
 _THREADS = 64
@@ -257,15 +258,21 @@ def compile_to_ptx(kernel: tuple[bytes, str], functions: Sequence[Any]) -> bytes
 class Cuda:
     """A kernel with equations on a graphics processor, which CuPy drives.
 
+    Parameters
+    ----------
+    function
+        The kernel, as for `compile_kernel`.
+    equations : sequence of casadi.Function
+
     Raises
     ------
     ImportError
         If CuPy is not installed.
     LinkworkError
-        If there is no device.
+        If there is no device, or the device does not take the code.
     """
 
-    def __init__(self, kernel: tuple[bytes, str], functions: Sequence[Any]) -> None:
+    def __init__(self, function: Any, equations: Sequence[Any]) -> None:
         import cupy
 
         if not cupy.cuda.is_available():
@@ -273,35 +280,55 @@ class Cuda:
         self._cupy = cupy
         with TemporaryDirectory() as folder:
             path = Path(folder, "kernel.ptx")
-            store_file(path, compile_to_ptx(kernel, functions))
-            self._run = cupy.RawModule(path=str(path)).get_function(ENTRY)
+            store_file(path, compile_to_ptx(compile_kernel(function), equations))
+            with _errors(cupy, f"it must be of {_YEAR} or later, with a driver of its time"):
+                self._run = cupy.RawModule(path=str(path)).get_function(ENTRY)
 
-    def run(self, threads: int, kind: Any, arguments: Any, changed: Sequence[NDArray[Any]]) -> None:
-        """Run ``threads`` threads of the kernel, and copy the arrays that it changes back into ``changed``.
+    def load(self, kind: Any, arguments: Any) -> LoadedKernel:
+        """Copy the arguments, which have the Numba type ``kind``, to the device."""
+        with _errors(self._cupy, _MEMORY):
+            return LoadedKernel(self._cupy, self._run, kind, arguments)
 
-        ``kind`` is the Numba type of the arguments.
 
-        Raises
-        ------
-        LinkworkError
-            If the device has too little memory, or its driver reports an error.
-        """
-        cuda = self._cupy.cuda
-        copies: dict[int, Any] = {}
+class LoadedKernel:
+    """A kernel with its arguments on the device, where the arrays stay; its methods raise LinkworkError if the device fails."""
+
+    def __init__(self, cupy: Any, run: Any, kind: Any, arguments: Any) -> None:
+        self._cupy, self._run = cupy, run
+        self._copies: dict[int, Any] = {}
 
         def place(array: NDArray[Any]) -> int:
-            copies[id(array)] = self._cupy.asarray(_as_bytes(array))
-            return int(copies[id(array)].data.ptr)
+            self._copies[id(array)] = cupy.asarray(_as_bytes(array))
+            return int(self._copies[id(array)].data.ptr)
 
-        try:
-            table = self._cupy.asarray(np.array(pack(kind, arguments, place), dtype=np.int64))
-            self._run((-(-threads // _THREADS),), (_THREADS,), (table,))
-            for array in changed:
-                _as_bytes(array)[:] = copies[id(array)].get()
-        except (cuda.runtime.CUDARuntimeError, cuda.driver.CUDADriverError, cuda.memory.OutOfMemoryError) as error:
-            raise LinkworkError(
-                f"the graphics processor failed ({error}): if it lacks memory, a smaller batch may fit"
-            ) from error
+        # the addresses in it are those of the copies, and arrays are told apart by their ids: all must stay alive
+        self._table, self._arguments = cupy.asarray(np.array(pack(kind, arguments, place), dtype=np.int64)), arguments
+
+    def run(self, threads: int) -> None:
+        """Run ``threads`` threads of the kernel."""
+        with _errors(self._cupy, _MEMORY):
+            self._run((-(-threads // _THREADS),), (_THREADS,), (self._table,))
+
+    def send(self, array: NDArray[Any]) -> None:
+        """Copy an array of the arguments to the device again."""
+        with _errors(self._cupy, _MEMORY):
+            self._copies[id(array)].set(_as_bytes(array))
+
+    def fetch(self, *arrays: NDArray[Any]) -> None:
+        """Copy arrays of the arguments from the device into themselves."""
+        with _errors(self._cupy, _MEMORY):
+            for array in arrays:
+                _as_bytes(array)[:] = self._copies[id(array)].get()
+
+
+@contextmanager
+def _errors(cupy: Any, advice: str) -> Iterator[None]:
+    """Raise LinkworkError for errors of CUDA."""
+    cuda = cupy.cuda
+    try:
+        yield
+    except (cuda.runtime.CUDARuntimeError, cuda.driver.CUDADriverError, cuda.memory.OutOfMemoryError) as error:
+        raise LinkworkError(f"the graphics processor failed ({error}): {advice}") from error
 
 
 def _as_bytes(array: NDArray[Any]) -> NDArray[np.uint8]:

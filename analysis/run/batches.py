@@ -240,19 +240,24 @@ def _integrate(
     todo, steps, span = status == k.RUNNING, carries["steps"], np.ptp(settings.times)
     fits = _fits(batch, settings)
     code = machine(mechanism, switched, LANES).addresses
-    advance = partial(lanes.run_in_lanes, code, fits)
-    if task.device is not None:
-        advance = partial(on_device.run_on_device, on_device.solver(mechanism, switched))
+    runs = problem, source, own, watch, state, recorded, status, settings.max_steps
+    there = None
+    if task.device is not None and todo.any():
+        there = on_device.DeviceBatch(on_device.solver(mechanism, switched), *runs)
     while todo.any() and not interrupts:
-        one_by_one = task.device is None and not (todo & fits).any()
-        (compiled.run if one_by_one else advance)(
-            problem, source, own, watch, state, recorded, status, settings.max_steps, STEPS_PER_CALL
-        )
+        if there is not None:
+            there.advance()
+        elif (todo & fits).any():
+            lanes.run_in_lanes(code, fits, *runs, STEPS_PER_CALL)
+        else:
+            compiled.run(*runs, STEPS_PER_CALL)
         todo = (status == k.RUNNING) & (steps < settings.max_steps)
         passed = carries["begin"] + carries["elapsed"] - settings.times[0]
         for i in np.flatnonzero(todo & is_too_slow(steps, passed, span, settings.max_steps)).tolist():
             if task.run(i).stiffness_caution(state.x[i], state.u[i], float(steps[i]), float(passed[i])):
                 status[i], todo[i] = _GIVEN_UP, False
+    if there is not None:
+        there.fetch_samples()
     status[todo] = _PAUSED
     counts = carries["sample"]
     if task.outputs is not None:

@@ -388,9 +388,11 @@ def _hash_code(mechanism: Mechanism, parameters: Sequence[Parameters], functions
     """Return hashes of the code on which results depend: equations, solver, users' functions."""
     from ..numerics.codegen import fingerprint
     from ..numerics.vectors import LANES
-    from . import batches, compiled, lanes
+    from . import batches, compiled, lanes, on_device
 
-    kernels = (compiled.run, lanes.run_in_lanes, compiled.channels_of_many, compiled.rows)
+    kernels = (
+        compiled.run, lanes.run_in_lanes, compiled.channels_of_many, compiled.rows, on_device.run_thread, on_device.DeviceBatch,
+    )  # fmt: skip
     switch = mechanism.switch and getattr(varied_constants(mechanism, parameters)[1], mechanism.switch)
     switched = bool(np.any(switch)) if mechanism.switch else False
     ours = [

@@ -19,6 +19,8 @@ from .records import PROBLEM, RUNNING, SAMPLES, STATE, WATCH, Problem, Room, Sam
 from .signals import Source
 from .sources import SOURCE
 
+#: Steps of each run in a launch: the driver may end a launch of seconds on a device that also draws the screen.
+STEPS_PER_LAUNCH = 1000
 #: Types of the arguments of `run_thread`; the last is the `Room` of all threads.
 _ARGUMENTS = types.Tuple((
     PROBLEM, SOURCE, BATCH, WATCH, STATE, SAMPLES, int64[::1], int64, int64,
@@ -49,35 +51,47 @@ def solver(mechanism: Mechanism, switched: bool) -> device.Cuda:
     MissingLibraryError
         If CuPy is not installed.
     """
-    kernel, functions = device.compile_kernel(run_thread), run_functions(mechanism, switched)
     try:
-        return device.Cuda(kernel, functions)
+        return device.Cuda(run_thread, run_functions(mechanism, switched))
     except ImportError:
         # CuPy has a distribution for each version of CUDA
         raise MissingLibraryError("cupy_cuda12x") from None
 
 
-def run_on_device(
-    on: device.Cuda,
-    problem: Problem,
-    source: Source,
-    batch: Batch,
-    watch: Watch,
-    state: State,
-    samples: Samples,
-    status: Any,
-    most: int,
-    budget: int,
-) -> None:
-    """Integrate the runs of a batch whose status is RUNNING on a device, up to ``budget`` steps of each.
+class DeviceBatch:
+    """The runs of a batch on a device, which keeps their arrays until they are fetched.
 
     ``on`` is a `solver`; the other arguments are those of `compiled.run`.
     """
-    runs, n = state.x.shape
-    inputs = state.u.shape[1]
-    room = Room(
-        np.empty((runs, 16, n)), np.empty((runs, n)), np.empty((runs, n)), np.empty((runs, 7, n)), np.empty((runs, inputs)),
-        np.empty((runs, problem.outputs)),
-    )  # fmt: skip
-    arguments = problem, source, batch, watch, state, samples, status, most, budget, room
-    on.run(runs, _ARGUMENTS, arguments, (batch.laws, *state, samples.states, samples.forces, status))
+
+    def __init__(
+        self,
+        on: device.Cuda,
+        problem: Problem,
+        source: Source,
+        batch: Batch,
+        watch: Watch,
+        state: State,
+        samples: Samples,
+        status: Any,
+        most: int,
+    ) -> None:
+        runs, n = state.x.shape
+        inputs = state.u.shape[1]
+        room = Room(
+            np.empty((runs, 16, n)), np.empty((runs, n)), np.empty((runs, n)), np.empty((runs, 7, n)),
+            np.empty((runs, inputs)), np.empty((runs, problem.outputs)),
+        )  # fmt: skip
+        arguments = problem, source, batch, watch, state, samples, status, most, STEPS_PER_LAUNCH, room
+        self._state, self._samples, self._status = state, samples, status
+        self._loaded = on.load(_ARGUMENTS, arguments)
+
+    def advance(self) -> None:
+        """Integrate the runs whose status is RUNNING, up to `STEPS_PER_LAUNCH` steps of each."""
+        self._loaded.send(self._status)
+        self._loaded.run(len(self._status))
+        self._loaded.fetch(*self._state, self._status)
+
+    def fetch_samples(self) -> None:
+        """Copy the samples from the device."""
+        self._loaded.fetch(self._samples.states, self._samples.forces)

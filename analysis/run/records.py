@@ -96,7 +96,8 @@ CARRY = np.dtype(
         ("known", "i8"),
         ("started", "i8"),
         ("lost", "i8"),
-    ]
+    ],
+    align=True,
 )
 
 

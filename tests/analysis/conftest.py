@@ -11,6 +11,7 @@ import pytest
 
 from analysis.mechanisms import MECHANISMS, register
 from analysis.studio import PAGE
+from build_fmu import FMUS
 from tests.mechanisms import pendulum, rotor_on_cart, torsion
 
 if TYPE_CHECKING:
@@ -38,6 +39,17 @@ def registered() -> Iterator[None]:
 def own_linkages() -> Iterator[None]:
     """Remove the linkages that a test has described after the test."""
     before = dict(MECHANISMS)
+    yield
+    MECHANISMS.clear()
+    MECHANISMS.update(before)
+
+
+@pytest.fixture
+def plain_mechanisms() -> Iterator[None]:
+    """Leave out linkages that other tests have described during the test."""
+    before = dict(MECHANISMS)
+    MECHANISMS.clear()
+    MECHANISMS.update({mechanism.name: mechanism for mechanism in FMUS.values()})
     yield
     MECHANISMS.clear()
     MECHANISMS.update(before)

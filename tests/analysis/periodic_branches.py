@@ -29,6 +29,7 @@ def orbit(
         start=np.array([amplitude if start is None else start, 0.0]),
         swing=("u", "m"),
         swings=(("u", "m"),),
+        scale=np.ones(2),
         periods=periods,
         crank_turns=crank_turns,
     )

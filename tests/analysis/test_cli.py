@@ -223,6 +223,7 @@ def test_every_summary_is_a_sentence_that_is_not_cut(linkwork):
         assert all(" ".join(line.split()).endswith(".") and "..." not in line for line in listed)
 
 
+@pytest.mark.usefixtures("plain_mechanisms")
 def test_info_lists_the_published_sets_and_one_of_them(linkwork):
     result = linkwork("info")
     assert result.exit_code == 0
@@ -362,6 +363,7 @@ def test_a_run_through_the_fmu_says_that_its_inputs_are_held(fmu, tmp_path):
 
 
 @pytest.mark.fmu
+@pytest.mark.usefixtures("plain_mechanisms")
 def test_build_builds(linkwork, tmp_path):
     result = linkwork("build", "--dest", tmp_path / "fmus", "--kinds", "python")
     assert result.exit_code == 0

@@ -82,9 +82,10 @@ def without_device(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
     on_device.solver.cache_clear()
     cuda = device.Cuda
 
-    def make(kernel: Any, functions: Any) -> device.Cuda:
-        monkeypatch.setitem(sys.modules, "cupy", none.cupy(none.Processor(kernel, functions)))
-        return cuda(kernel, functions)
+    def make(function: Any, equations: Any) -> device.Cuda:
+        made = none.Processor(device.compile_kernel(function), equations)
+        monkeypatch.setitem(sys.modules, "cupy", none.cupy(made))
+        return cuda(function, equations)
 
     monkeypatch.setattr(device, "Cuda", make)
     yield
@@ -139,7 +140,7 @@ def test_runs_are_those_of_the_processor(case: str) -> None:
 @pytest.mark.usefixtures("without_device")
 def test_runs_of_many_steps_go_on_and_those_that_cannot_start_are_left(monkeypatch: pytest.MonkeyPatch) -> None:
     whole = simulate_many(TABLE_3_1, vary=SOFTER, stop_time=0.3, device="cuda")
-    monkeypatch.setattr("analysis.run.batches.STEPS_PER_CALL", 3)
+    monkeypatch.setattr(on_device, "STEPS_PER_LAUNCH", 3)
     parts = simulate_many(TABLE_3_1, vary=SOFTER, stop_time=0.3, device="cuda", batch=2)
     assert np.array_equal(whole.states, parts.states)
     apart = replace(TABLE_3_1, rocker_length=0.01)
@@ -182,6 +183,12 @@ def test_no_library_no_device_and_its_errors_are_told(monkeypatch: pytest.Monkey
     monkeypatch.setattr(without_memory, "asarray", lambda array: (_ for _ in ()).throw(none.Error("out of memory")))
     monkeypatch.setitem(sys.modules, "cupy", without_memory)
     with pytest.raises(LinkworkError, match=r"failed \(out of memory\): .* a smaller batch"):
+        simulate_many(TABLE_3_1, vary=SOFTER, stop_time=0.1, device="cuda")
+    on_device.solver.cache_clear()
+    old = none.cupy(None)
+    monkeypatch.setattr(old, "RawModule", lambda path: (_ for _ in ()).throw(none.Error("no kernel image")))
+    monkeypatch.setitem(sys.modules, "cupy", old)
+    with pytest.raises(LinkworkError, match=r"failed \(no kernel image\): it must be of 2018 or later"):
         simulate_many(TABLE_3_1, vary=SOFTER, stop_time=0.1, device="cuda")
     on_device.solver.cache_clear()
 

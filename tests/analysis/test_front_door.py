@@ -380,4 +380,4 @@ def test_the_top_offers_what_one_asks_for() -> None:
     # results and errors of a run are there, but not offered
     assert not {"Trajectory", "RunInterrupted", "sample_times"} & {*dir(analysis)}
     assert isinstance(simulate("table-3.1"), Trajectory)
-    assert len(dir(analysis)) < 52
+    assert len(dir(analysis)) < 53

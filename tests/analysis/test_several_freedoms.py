@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from analysis import figures
+from analysis.linkages import linkage
 from analysis.periodic import Branch, Drive, Response, Risk, frequency_response, special_gradient
 from analysis.run import load_case
 from analysis.run.case import Case
@@ -157,3 +158,16 @@ def test_tuning_leads_the_second_resonance_out_of_the_range(shaker: Case) -> Non
     # the nearer end of the range, less the margin of 2 %
     assert peak(stiffness, *UPRIGHT[1:]) == pytest.approx(0.98 * 440.0 * pi / 30.0, rel=1e-6)
     assert len(figures.plot(tuned).axes) == 3
+
+
+def test_a_coordinate_that_does_not_move_has_no_resonance() -> None:
+    """A braked drum behind an elastic coupling turns evenly with the crank: what moves is the error of the solution."""
+    train = linkage("train", ground={"A": (0, 0), "K": (0, 0)})
+    train.body("crank", points={"A": (0, 0)}, mass=1.0, inertia=0.2)
+    train.body("drum", points={"K": (0, 0)}, mass=1.0, inertia=0.2)
+    train.spring("coupling", bodies=("crank", "drum"), stiffness="50 N*m/rad", damping="1 N*m*s/rad")
+    train.spring("brake", at="K", damping="0.5 N*m*s/rad")
+    made = train.freedom("crank", "A", speed="60 rpm").freedom("drum", "K", driven=False).mechanism()
+    response = frequency_response(made.first_set.parameters, 5.0, 30.0)
+    assert not response.branches[0].amplitudes.any()
+    assert response.maxima() == response.speeds_to_avoid == ()

@@ -40,6 +40,9 @@ class _Array:
     def get(self) -> np.ndarray:
         return self.own.copy()
 
+    def set(self, array: np.ndarray) -> None:
+        self.own[:] = array
+
 
 class Error(Exception):
     """An error of the driver."""

@@ -62,8 +62,8 @@ MOST_ITERATIONS = 40
 SETTLING_TURNS, SETTLED = 200, 1e-4
 #: Samples of a turn for amplitudes and harmonics.
 SAMPLES = 256
-#: Rounding of an amplitude, relative to the scale of the coordinate.
-_ROUNDING = 1e-12
+#: Error of an amplitude, relative to the scale of the coordinate: a little more than that of the orbits.
+_ROUNDING = 10.0 * ORBIT_TOLERANCE
 #: Outputs that an orbit does not have: they count from the start of a run.
 _OF_A_RUN = ("energy.dissipated", "energy.supplied", "energy.residual")
 
@@ -123,14 +123,14 @@ class Turn:
     @property
     def amplitude(self) -> float:
         """The first of the `amplitudes`."""
-        return self.amplitude_of(self.swings[0])
+        return self.swing_amplitude(self.swings[0])
 
     @property
     def amplitudes(self) -> FloatArray:
         """The amplitude of each of ``swings``."""
-        return np.array([self.amplitude_of(name) for name in self.swings])
+        return np.array([self.swing_amplitude(name) for name in self.swings])
 
-    def amplitude_of(self, name: str) -> float:
+    def swing_amplitude(self, name: str) -> float:
         """Return half the distance between the least and the greatest value of one of ``swings``, such as a position (m).
 
         For a coordinate that goes round, the deviation from a uniform rotation is taken. An amplitude is zero if it is no more
@@ -140,6 +140,8 @@ class Turn:
         greatest and the least values. The relative error of an amplitude is about 1e-6 if there are enough samples for the
         series.
         """
+        if name not in self.swings:
+            raise unknown_name(name, self.swings, f"free coordinate {name!r}")
         u = self.oscillation(name)
         n = 8 * len(u)
         fine = np.fft.irfft(np.fft.rfft(u), n) * (n / len(u))

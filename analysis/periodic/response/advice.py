@@ -32,8 +32,8 @@ from .branch import Branch
 HALF_POWER = 1.0 / sqrt(2.0)
 #: Least prominence, relative to the height, at which a peak counts.
 _PROMINENCE = 1e-3
-#: Relative difference up to which two arcs are one curve that was followed twice.
-_SAME = 1e-2
+#: Relative difference up to which two arcs are one curve, followed twice; share of the scale up to which a value is an error.
+_SAME, _NOISE = 1e-2, 1e-7
 #: Relative rounding error of the parameter; share of the range below which an interval does not count: such a short interval
 #: arises because a doubled branch begins a step beyond its doubling.
 _ROUNDING, _SLIVER = 1e-6, 1e-4
@@ -106,6 +106,8 @@ class Arc:
         Amplitudes of the k free coordinates.
     start : ndarray, shape (m, n)
         Starts of the orbits.
+    scale : ndarray, shape (n,)
+        Typical magnitudes of a start: `PeriodicOrbit.scale`.
     cut : (bool, bool)
         Whether the branch continues on another arc beyond the low end, and beyond the high end.
     """
@@ -115,6 +117,7 @@ class Arc:
     parameter: FloatArray
     amplitudes: FloatArray
     start: FloatArray
+    scale: FloatArray
     cut: tuple[bool, bool]
 
     @property
@@ -135,7 +138,7 @@ class Arc:
         places = np.linspace(low, high, 7)[1:-1]
         # a period of several turns may begin with any turn: compare amplitudes
         own, others = (a.start if a.turns == 1 else a.amplitudes for a in (self, other))
-        size = np.abs(own).max(axis=0) + 1e-300
+        size = np.maximum(np.abs(own).max(axis=0), _NOISE * self.scale[: own.shape[1]])
         apart = [
             np.abs(np.interp(places, self.parameter, a) - np.interp(places, other.parameter, b)) / s
             for a, b, s in zip(own.T, others.T, size)
@@ -180,6 +183,7 @@ def _branch_arcs(branch: Branch) -> list[Arc]:
                 parameter=parameter[way][::order],
                 amplitudes=amplitudes[way][::order],
                 start=start[way][::order],
+                scale=branch.orbits[0].scale,
                 cut=cut if order > 0 else (cut[1], cut[0]),
             )
         )

@@ -159,7 +159,7 @@ def _turn_columns(orbit: PeriodicOrbit, first: Turn) -> dict[str, Callable[[Turn
     }
     for swing, (name, unit) in zip(first.swings, orbit.swings):
         what = f"{name} [{unit}]"
-        columns[f"amplitude of {what}"] = partial(Turn.amplitude_of, name=swing)
+        columns[f"amplitude of {what}"] = partial(Turn.swing_amplitude, name=swing)
         columns[f"mean of {what}"] = lambda turn, swing=swing: float(turn.oscillation(swing).mean())  # type: ignore[misc]
         for order in (1, 2, 3):
             columns[f"harmonic {order} of {what}"] = partial(Turn.harmonic, name=swing, order=order)
