@@ -29,7 +29,7 @@ def plot_tuned(tuned: Tuned, *, title: str = "") -> Figure:
     branches = [branch for survey in (tuned.before, tuned.after) for branch in survey.response.branches]
     cut = max(float(branch.largest_multiplier.max()) for branch in branches) > _GREATEST
     amplitudes = []
-    for n, (what, si) in enumerate(orbit.flow.components[: orbit.flow.amplitudes]):
+    for n, (what, si) in enumerate(orbit.flow.components[: orbit.flow.swing_count]):
         unit, factor = display_scale(si)
         label = f"amplitude of {name_in_words(what)} [{unit}]"
         amplitudes.append((label, lambda b, n=n, factor=factor: factor * b.amplitudes[:, n]))

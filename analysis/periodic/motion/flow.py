@@ -132,7 +132,7 @@ class Flow:
         Index of each component of y in the state of a run.
     size : int
         Number of components of y.
-    amplitudes : int
+    swing_count : int
         Number of the first components of y whose amplitudes tell how the mechanism moves: the free coordinates, or the
         crank's speed if there are none.
     rest : ndarray, shape (n,)
@@ -178,7 +178,7 @@ class Flow:
         self.labels = (*labels, *[label(variables[crank_rate])] * self.torque)
         self.components = tuple((name, variables[name].unit) for name in names)
         self.size, free = len(names), len(freedoms)
-        self.amplitudes = free or self.size
+        self.swing_count = free or self.size
         initial = mechanism.state(mechanism.initial())
         self.rest, self.ways = np.zeros(self.size), np.zeros(self.size)
         self.rest[:free] = [initial[n] for n in self.free]

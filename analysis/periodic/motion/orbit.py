@@ -302,7 +302,7 @@ class PeriodicOrbit(NotebookResult):
     def swings(self) -> tuple[tuple[str, str], ...]:
         """Short names and units of the coordinates to which `amplitudes` refer: all that are free."""
         flow = self.flow
-        return tuple((flow.labels[n], flow.components[n][1]) for n in range(flow.amplitudes))
+        return tuple((flow.labels[n], flow.components[n][1]) for n in range(flow.swing_count))
 
     @property
     def multipliers(self) -> NDArray[np.complex128]:
@@ -356,8 +356,8 @@ class PeriodicOrbit(NotebookResult):
             turns=self.crank_turns,
             modes=flow.modes,
             names=tuple(mechanism.output_names[n] for n in keep),
-            swings=tuple(name for name, _ in flow.components[: flow.amplitudes]),
-            roundings=tuple((_ROUNDING * self.scale[: flow.amplitudes]).tolist()),
+            swings=tuple(name for name, _ in flow.components[: flow.swing_count]),
+            roundings=tuple((_ROUNDING * self.scale[: flow.swing_count]).tolist()),
             angles=frozenset(v.name for v in mechanism.variables if v.unit == "rad"),
         )
 
