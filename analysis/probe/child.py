@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import json
 import os
+import signal
 import sys
 import time
 import traceback
@@ -78,14 +79,16 @@ def _fork_for_jobs() -> str:
     """Fork a process for each path of a job on standard input; return the path in the new process.
 
     Standard output gets the number of each process, then its exit code, negative for a signal. This process itself ends with
-    the input.
+    the input, not with Ctrl-C: whoever reads its output ends the processes of jobs and waits for their exit codes.
     """
+    interrupted = signal.signal(signal.SIGINT, signal.SIG_IGN)
     from . import checks as _checks  # noqa: F401  what every job needs is loaded once
 
     for line in iter(sys.stdin.readline, ""):
         path = str(line).removesuffix("\n")
         number = os.fork()
         if number == 0:
+            signal.signal(signal.SIGINT, interrupted)
             for descriptor, place in enumerate((os.devnull, os.devnull, str(Path(path).with_name("stderr")))):
                 file = os.open(place, os.O_RDONLY if descriptor == 0 else os.O_WRONLY | os.O_CREAT | os.O_TRUNC, 0o600)
                 os.dup2(file, descriptor)

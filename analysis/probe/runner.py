@@ -11,7 +11,7 @@ import sys
 import tempfile
 import time
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -248,7 +248,8 @@ class _Forked:
         return self.returncode
 
     def kill(self) -> None:
-        os.kill(self._number, signal.SIGKILL)
+        with suppress(ProcessLookupError):  # it may have ended just before
+            os.kill(self._number, signal.SIGKILL)
 
 
 def _command(work: Path, *words: str) -> dict[str, Any]:

@@ -28,7 +28,7 @@ def status_name(status: int) -> str:
 
 
 class ProbeError(LinkworkError):
-    """A check could not be made, because the FMU refused a call that the check needs."""
+    """A check could not be made: the FMU refused a call that the check needs, or a process of the probe failed."""
 
 
 _LOGGER = ctypes.CFUNCTYPE(

@@ -2,10 +2,17 @@
 
 from __future__ import annotations
 
+import io
 import json
+import os
+import signal
+import subprocess
 import sys
 import tarfile
+import time
 import zipfile
+from collections.abc import Callable
+from contextlib import suppress
 from importlib.util import find_spec
 from pathlib import Path
 from types import SimpleNamespace
@@ -14,7 +21,8 @@ import pytest
 from click.testing import CliRunner
 
 from analysis import probe
-from analysis.cli import main
+from analysis.cli import INTERRUPTED, main
+from analysis.probe import journal, runner
 from analysis.probe.walk import Walk
 from linkwork.errors import InputError
 from tests.scripts import called
@@ -205,6 +213,51 @@ def test_the_command_reports_and_replays(fmu, tmp_path, monkeypatch):
     monkeypatch.setenv("PROBE_FAULT", "euler")
     assert run(fmu, "--check", "split")[0] == 0
     assert run(fmu, "--check", "split", "--strict")[0] == 4
+
+
+def until(reached: Callable[[], bool]) -> None:
+    end = time.monotonic() + 100.0
+    while not reached():
+        assert time.monotonic() < end
+        time.sleep(0.1)
+
+
+def group_lives(group: int) -> bool:
+    try:
+        os.killpg(group, 0)
+    except ProcessLookupError:
+        return False
+    return True
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="jobs are forked")
+def test_ctrl_c_during_a_call_that_hangs_is_clean(fmu, tmp_path):
+    """The signal reaches every process of the group, as in a terminal."""
+    code = (
+        "import signal, sys; from analysis.cli import main; signal.signal(signal.SIGINT, signal.default_int_handler); "
+        "main(['probe', sys.argv[1], '--interface', 'cs', '--check', 'forbidden', '--hang', '100'])"
+    )
+    process = subprocess.Popen(
+        [sys.executable, "-c", code, fmu], cwd=Path(__file__).parents[2], start_new_session=True, text=True,
+        env={**os.environ, "PROBE_FAULT": "hang", "TMPDIR": str(tmp_path)}, stderr=subprocess.PIPE,
+    )  # fmt: skip
+    try:
+        until(lambda: any("DoStep" in "".join(journal.read(path).lines[-1:]) for path in tmp_path.glob("*/journal")))
+        os.killpg(process.pid, signal.SIGINT)
+        assert process.communicate(timeout=50.0)[1].strip() == "interrupted"
+        assert process.returncode == INTERRUPTED
+        until(lambda: not group_lives(process.pid))
+    finally:
+        with suppress(ProcessLookupError):
+            os.killpg(process.pid, signal.SIGKILL)
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="jobs are forked")
+def test_a_job_that_has_just_ended_may_be_killed():
+    ended = subprocess.Popen([sys.executable, "-c", ""])
+    ended.wait()
+    parent = SimpleNamespace(stdin=io.BytesIO(), stdout=io.BytesIO(f"{ended.pid}\n".encode()))
+    runner._Forked(parent, Path("job.json")).kill()
 
 
 @pytest.mark.parametrize(
