@@ -238,8 +238,8 @@ def compile_library(
         Options of the compiler.
     kept : bool
         Whether the library is kept in the cache, and taken from there if it was compiled before by the same version of Zig
-        with the same options from the same files. The files are then all sources: those of the folder, ``files``, and the
-        folders of headers after an option ``-I``.
+        and of this module with the same options from the same files. The files are then all sources: those of the folder,
+        ``files``, and the folders of headers after an option ``-I``.
 
     Raises
     ------
@@ -266,11 +266,11 @@ def compile_library(
 
 
 def _fingerprint(folder: Path, files: Sequence[str], library: str, target: str, options: Sequence[str]) -> str:
-    """Return a hash of all that a library depends on: the compiler, its options, and what it may read."""
+    """Return a hash of all that a library depends on: the compiler, how this module calls it, and what it may read."""
     headers = [Path(after) for before, after in pairwise(options) if before == "-I"]
     plain = [option for option in options if Path(option) not in headers]
     sources = [path for place in (folder, *headers) for path in sorted(place.rglob("*.[ch]"))]
-    sources += [folder / name for name in files]
+    sources += [*(folder / name for name in files), Path(__file__)]
     digest = hashlib.sha256(repr((metadata.version("ziglang"), library, target, plain)).encode())
     for path in sources:
         content = path.read_bytes()

@@ -15,7 +15,7 @@ from zipfile import ZIP_DEFLATED, ZipFile
 import pytest
 
 import build_fmu
-from analysis.export import PLATFORMS, BuildError, build, compile_library
+from analysis.export import PLATFORMS, BuildError, build, compile_library, native_fmu
 from build_fmu import FMUS
 
 from .conftest import changed_sources, model_description
@@ -218,7 +218,7 @@ def test_a_changed_file_of_the_compilers_cache_is_made_again(
     assert capsys.readouterr().err.count("all are compiled again") == 1
 
 
-def test_a_library_is_compiled_again_if_a_source_an_option_or_its_kept_file_has_changed(
+def test_a_library_is_compiled_again_if_a_source_an_option_the_command_or_its_kept_file_has_changed(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """The compiler is a stand-in that writes how often it was called."""
@@ -245,6 +245,11 @@ def test_a_library_is_compiled_again_if_a_source_an_option_or_its_kept_file_has_
     for path in (tmp_path / "cache" / "libraries").iterdir():
         path.write_bytes(path.read_bytes()[:-1] + b"x")
     assert [made(), made()] == ["4", "4"]
+    # the command is written in the module
+    changed = tmp_path / "native_fmu.py"
+    changed.write_bytes(Path(native_fmu.__file__).read_bytes() + b"\n")
+    monkeypatch.setattr(native_fmu, "__file__", str(changed))
+    assert [made(), made()] == ["5", "5"]
 
 
 @pytest.mark.long
