@@ -51,13 +51,13 @@ def experiments(mechanism: Mechanism) -> dict[str, bytes]:
     halved until the motion does not reach the limit of assembly and the solver takes at most `LONGEST` steps.
 
     The files of Linkwork's own mechanisms, whose references take many seconds in plain Python, are kept in the cache under a
-    hash of all sources that they depend on.
+    hash of all sources of Linkwork.
     """
     package = str(mechanism.modules[-1].__package__)
     if not package.startswith("linkwork.") or import_module(package).MECHANISM is not mechanism:
         return _make_experiments(mechanism)
     digest = hashlib.sha256(f"{sys.version} {package} {MECHANISMS.get(mechanism.name) is mechanism}".encode())
-    for root in (Path(linkwork.__file__).parent, *(Path(__file__).parents[1] / name for name in ("run", "export"))):
+    for root in (Path(linkwork.__file__).parent, Path(__file__).parents[1]):
         for path in sorted(root.rglob("*.py")):
             digest.update(path.read_bytes())
     made = load_or_make(

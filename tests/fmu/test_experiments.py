@@ -16,6 +16,7 @@ from analysis.cli import CHECK_FAILED
 from analysis.export.experiments import experiments
 from analysis.mechanisms import MECHANISMS
 from analysis.run import EXPERIMENTS, MANIFEST, ExperimentError, verify
+from linkwork.mechanism import Mechanism
 from tests.mechanisms import pendulum
 
 from .models import MODELS, Changes, Model
@@ -87,6 +88,25 @@ def test_an_experiment_of_many_steps_is_shortened(monkeypatch: pytest.MonkeyPatc
     whole = pendulum.MECHANISM.experiment[1]
     assert end(1e6) == whole
     assert end(60.0) == whole * 0.5**9
+
+
+def test_kept_references_are_made_again_if_any_source_has_changed(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    made: list[str] = []
+
+    def make(mechanism: Mechanism) -> dict[str, bytes]:
+        made.append(mechanism.name)
+        return {"a.csv": str(len(made)).encode()}
+
+    source = tmp_path / "analysis" / "units.py"
+    source.parent.mkdir()
+    monkeypatch.setenv("LINKWORK_CACHE_DIR", str(tmp_path / "cache"))
+    monkeypatch.setattr("analysis.export.experiments._make_experiments", make)
+    monkeypatch.setattr("analysis.export.experiments.__file__", str(source.parent / "export" / "experiments.py"))
+    for text, content in (("INCH = 25.4e-3", b"1"), ("INCH = 25.4e-3", b"1"), ("INCH = 0.0254", b"2")):
+        source.write_text(text, encoding="utf-8")
+        assert experiments.__wrapped__(MECHANISMS["slider-crank"]) == {"a.csv": content}
 
 
 @pytest.mark.slow
