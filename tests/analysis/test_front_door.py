@@ -203,6 +203,8 @@ def test_a_range_is_in_the_unit_of_what_varies() -> None:
         (lambda: basins("table-3.1", Drive(speed=50.0), rate=("0 m/s", "1 m")), ParameterError, "rate is '1 m'"),
         (lambda: basins("table-3.1", Drive(speed=50.0), points=1.5), ParameterError, "points is 1.5: .* whole number"),
         (lambda: Drive(speed="-300 rpm"), InputError, "above zero; for a crank that turns the other way"),
+        (lambda: Drive(speed=5.0, ratios={"x": "-1/2"}), InputError, r"ratio of x is '-1/2': .* Fraction\(-1, 2\)"),
+        (lambda: Drive(speed=5.0, ratios={"x": np.nan}), InputError, "ratio of x is nan: .* finite"),
         (lambda: Drive(speeds={"left.speed": -5.0}), InputError, "above zero; for a crank that turns the other way"),
         (lambda: save_parameters("never.toml", variant("table-3.1")), InputError, r"variant\(\.\.\.\)\.parameters"),
         (lambda: variant("table-3.1", slider_stifness=1.0), UnknownNameError, "did you mean slider_stiffness"),

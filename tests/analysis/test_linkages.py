@@ -940,6 +940,18 @@ def test_the_turns_of_bodies_on_elastic_couplings_follow_from_the_couplings() ->
     assert orbit.start[1] - orbit.start[0] == pytest.approx(torque / 50.0, rel=1e-7)
 
 
+def test_a_nonlinear_coupling_twisted_at_the_start_turns_both_its_ends_alike() -> None:
+    built = linkage("cubic-coupling", ground={"A": (0, 0), "K": (0, 0)})
+    for body, point in {"rotor": "A", "drum": "K"}.items():
+        built.body(body, points={point: (0, 0)}, mass=1, inertia=0.3)
+    built.spring("coupling", bodies=("rotor", "drum"), law="200*x**3 + 50*x + 1*v").spring("brake", at="K", damping=1.0)
+    made = built.freedom("rotor", "A", speed="60 rpm").freedom("drum", "K", driven=False, start=0.3).mechanism()
+    drive = Drive(speed=6.0)
+    assert drive.ratios_by_freedom(made) == {1: 1}
+    twist = newton_orbit(made.first_set.parameters, drive).start[0]
+    assert 200.0 * twist**3 + 50.0 * twist == pytest.approx(-6.0, rel=1e-9)
+
+
 def test_a_driven_crank_that_a_load_frees_turns_with_its_coupling() -> None:
     built = linkage("coupled-cranks", ground={"A": (0, 0), "K": (0, 0)})
     for body, point in {"motor": "A", "pump": "K"}.items():

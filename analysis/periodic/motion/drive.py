@@ -7,7 +7,7 @@ from dataclasses import InitVar, dataclass, field, replace
 from fractions import Fraction
 from functools import cache
 from math import inf, isfinite, lcm, pi
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, SupportsFloat
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -139,11 +139,7 @@ class Drive:
             for name, value in (("speed", speeds[first]), ("crank", first), ("ratios", {**self.ratios, **ratios})):
                 object.__setattr__(self, name, value)
         if self.ratios:
-            ratios = {
-                n: r if isinstance(r, Fraction) else speed_ratio(n, float(r), "crank", 1.0)
-                for n, r in self.ratios.items()
-            }
-            object.__setattr__(self, "ratios", ratios)
+            object.__setattr__(self, "ratios", {name: _read_ratio(name, value) for name, value in self.ratios.items()})
         if self.speed is not None and not (isfinite(self.speed) and self.speed > 0.0):
             mirror = _MIRROR if self.speed < 0.0 else ""
             raise InputError(f"speed is {self.speed} rad/s: it must be a finite number above zero{mirror}")
@@ -335,6 +331,18 @@ class Drive:
         return Inputs(**acting)
 
 
+def _read_ratio(name: str, value: object) -> Fraction:
+    """Return the ratio of turns of ``name`` as a fraction; raise InputError if it is no finite number."""
+    if isinstance(value, Fraction):
+        return value
+    if isinstance(value, (bool, str)) or not isinstance(value, SupportsFloat) or not isfinite(value):
+        raise InputError(
+            f"the ratio of {name} is {value!r}: it must be a finite number of turns per turn of the crank, such as -0.5 or "
+            "Fraction(-1, 2)"
+        )
+    return speed_ratio(name, float(value), "crank", 1.0)
+
+
 def _whole_turns(freedom: Freedom) -> int:
     """Return the number of turns of a link after which the mechanism is in the same configuration again."""
     return round(freedom.period / (2.0 * pi))
@@ -347,7 +355,8 @@ def _coupled_ratios(
     """Return the turns of coupled rotations, per turn of the crank, that do not wind up the springs that couple them.
 
     A whole turn of one of these rotations changes the accelerations by the spring alone. ``turning`` are the other rotations
-    with their ratios, the crank included; keys are indices of degrees of freedom. What does not turn is left out.
+    with their ratios, the crank included; keys are indices of degrees of freedom. What does not turn is left out. The values
+    are those of the first published set; under a nonlinear law both ends of the spring must turn equally often.
     """
     if not coupled:
         return {}
@@ -361,8 +370,13 @@ def _coupled_ratios(
         return np.array(mechanism.equations.derivative(tuple(state.tolist()), i, p))[size : 2 * size]
 
     def winding(number: int) -> NDArray[np.float64]:
-        """Return the change of the accelerations by one turn of a degree of freedom."""
-        return (accelerations(number, 1.0) - accelerations(number, 0.0)) / _whole_turns(mechanism.freedoms[number])
+        """Return the change of the accelerations by one turn of a degree of freedom: half of that from -1 to 1 periods.
+
+        So two bodies that turn alike wind up a spring oppositely under any law, also if it is twisted at the start.
+        """
+        return (accelerations(number, 1.0) - accelerations(number, -1.0)) / (
+            2.0 * _whole_turns(mechanism.freedoms[number])
+        )
 
     try:
         wound = sum((float(ratio) * winding(number) for number, ratio in turning), np.zeros(size))
