@@ -25,6 +25,8 @@ from .periodic import common_period
 #: Least imaginary part of a pole that oscillates, relative to the largest pole: a neutral coordinate has a double pole at zero,
 #: which rounding splits.
 OSCILLATES = 1e-7
+#: Likeness to a mode that has not oscillated yet; a shape less like all known modes begins a new one.
+_NEW = 0.5
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -40,8 +42,9 @@ class NaturalModes:
     poles : ndarray, shape (s, 2 n)
         Eigenvalues (1/s) of the n free coordinates, by magnitude.
     frequencies : ndarray, shape (s, k)
-        Natural frequencies (rad/s), in rising order: magnitudes of the poles that oscillate. nan at positions at which fewer of
-        them do.
+        Natural frequencies (rad/s) of the k modes, in rising order of their means: magnitudes of the poles that oscillate. A
+        mode is followed from position to position by its shape, also where its frequency crosses that of another mode; nan
+        at positions at which it does not oscillate.
     damping_ratios : ndarray, shape (s, k)
         Damping ratios: the negative real part of the pole over its magnitude.
     shares : ndarray, shape (k, n)
@@ -113,7 +116,7 @@ def natural_modes(
     Raises
     ------
     InputError
-        If an input is not constant, or no degree of freedom is free.
+        If an input is not constant, or no coordinate is free beside the held crank.
     AssemblyError, EquilibriumError
         If the links cannot be joined at a position, or no equilibrium is found there.
 
@@ -131,6 +134,12 @@ def natural_modes(
         raise InputError(f"samples is {samples}: it must be at least 1")
     parameters = replace(parameters, **{field_name(name): 0.0 for name in mechanism.names("friction")})
     speeds = _held_speeds(mechanism, inputs)
+    if set(layout(mechanism, tuple(inputs.modes(mechanism).values())).free) <= speeds.keys():
+        forces = [c.argument for c in mechanism.channels if c.kind == "force" and speeds.get(c.freedom) == 0.0]
+        raise InputError(
+            f"no coordinate of the {mechanism.name} is free beside the held crank, to vibrate"
+            + "".join(f"; a force, such as {force} = 0, frees one" for force in forces[:1])
+        )
     # a force on a held degree of freedom does not act
     still = inputs.replace(
         **{c.argument: None for c in mechanism.channels if c.freedom in speeds and c.kind in ("force", "command")}
@@ -165,21 +174,32 @@ def _held_speeds(mechanism: Mechanism, inputs: Inputs) -> dict[int, float]:
 
 
 def _decompose(equilibria: tuple[Equilibrium, ...], matrices: Matrices) -> NaturalModes:
+    from scipy.optimize import linear_sum_assignment
+
     values, vectors = np.linalg.eig(matrices.A)
     size, shape = matrices.M.shape[-1], matrices.M.shape[:2]
     frequencies, ratios, shares = np.full(shape, np.nan), np.full(shape, np.nan), np.full((*shape, size), np.nan)
-    for j, poles in enumerate(values):
+    known = np.zeros((size, size), dtype=complex)  # column k: the shape in which mode k oscillated last, or zeros
+    for j, (poles, mass) in enumerate(zip(values, matrices.M)):
         oscillating = np.flatnonzero(poles.imag > OSCILLATES * np.abs(poles).max())
-        for k, place in enumerate(oscillating[np.argsort(np.abs(poles[oscillating]))]):
-            pole, shape_of_mode = poles[place], vectors[j, :size, place]
-            energy = (shape_of_mode.conj() * (matrices.M[j] @ shape_of_mode)).real
-            frequencies[j, k], ratios[j, k], shares[j, k] = abs(pole), -pole.real / abs(pole), energy / energy.sum()
-    count = int(np.isfinite(frequencies).any(axis=0).sum())
+        oscillating = oscillating[np.argsort(np.abs(poles[oscillating]))]
+        shapes = vectors[j, :size, oscillating].T
+        energies = (shapes.conj() * (mass @ shapes)).real
+        # modal assurance: the share of the kinetic energy of one shape that the other one has
+        products = np.outer((known.conj() * (mass @ known)).real.sum(axis=0), energies.sum(axis=0))
+        likeness = np.full(products.shape, _NEW)
+        np.divide(np.abs(known.conj().T @ mass @ shapes) ** 2, products, out=likeness, where=products > 0.0)
+        for k, own in zip(*linear_sum_assignment(likeness, maximize=True)):
+            pole, known[:, k] = poles[oscillating[own]], shapes[:, own]
+            shares[j, k] = energies[:, own] / energies[:, own].sum()
+            frequencies[j, k], ratios[j, k] = abs(pole), -pole.real / abs(pole)
+    found = np.flatnonzero(np.isfinite(frequencies).any(axis=0))
+    found = found[np.argsort(np.nanmean(frequencies[:, found], axis=0))]
     return NaturalModes(
         equilibria=equilibria,
         matrices=matrices,
         poles=np.take_along_axis(values.astype(complex), np.argsort(np.abs(values), axis=1), axis=1),
-        frequencies=frequencies[:, :count],
-        damping_ratios=ratios[:, :count],
-        shares=np.nanmean(shares[:, :count], axis=0),
+        frequencies=frequencies[:, found],
+        damping_ratios=ratios[:, found],
+        shares=np.nanmean(shares[:, found], axis=0),
     )

@@ -15,7 +15,7 @@ from scipy.optimize import minimize_scalar
 
 from analysis import Inputs, natural_frequency, natural_modes, ramp
 from analysis.linear import linearise
-from analysis.periodic import Drive, default_range
+from analysis.periodic import Drive, basins, default_range
 from analysis.run import load_case
 from linkwork.errors import AssemblyError, InputError, ParameterError
 from linkwork.five_bar.published import SETS
@@ -91,6 +91,18 @@ leaf = { joint = "E", start = "115 deg" }
 [linkage.assembly]
 K = -1
 """
+#: A crank alone.
+CRANK = """
+[linkage]
+name = "one-crank"
+ground = { A = [0, 0] }
+[linkage.bodies]
+crank = { points = { A = [0, 0] }, mass = 1, cog = [0.02, 0], inertia = 0.01 }
+[linkage.springs]
+bearing = { at = "A", damping = 0.02 }
+[linkage.freedoms]
+crank = { joint = "A", speed = "300 rpm" }
+"""
 
 
 def write(folder: Path, text: str) -> Path:
@@ -138,6 +150,39 @@ def test_all_free_coordinates_are_in_the_equilibrium_of_their_start(tmp_path: Pa
     upright = natural_modes(case.parameters, case.inputs, initial={"swing_angle": 0.0})
     assert upright.unstable == len(upright.equilibria) == 36
     assert upright.coordinates == ("lift.position",)
+
+
+def test_modes_are_followed_where_their_frequencies_cross_and_one_is_overdamped_in_part(tmp_path: Path) -> None:
+    """Beside the lever, whose frequency varies over the turn, a block on a spring of its own."""
+    text = LEVER
+    for table, more in (
+        ("slides.S", "block = { points = { P = [0, 0] }, mass = 2 }"),
+        ("springs", '[linkage.slides.Y]\nbody = "block"\nthrough = "E"\ndirection = "90 deg"'),
+        ("freedoms", 'foot = { at = "Y", stiffness = 16020, damping = 4 }'),
+    ):
+        text = text.replace(f"[linkage.{table}]", f"{more}\n[linkage.{table}]")
+    case = load_case(write(tmp_path, text + 'block = "Y"\n'))
+    block = sqrt(16020.0 / 2.0)
+    for damping in (40.0, 790.0):
+        parameters = replace(case.parameters, rodspring_damping=damping)
+        found = natural_modes(parameters, case.inputs, initial=case.initial)
+        of_block = found.coordinates.index("block.position")
+        np.testing.assert_allclose(found.frequencies[:, of_block], block, rtol=1e-9)
+        np.testing.assert_allclose(found.damping_ratios[:, of_block], 1.0 / block, rtol=1e-9)
+        lever = found.frequencies[:, 1 - of_block]
+        assert found.coordinates[1 - of_block] == "lever.angle"
+        assert np.nanmin(lever) < block < np.nanmax(lever)
+        assert bool(np.isnan(lever).any()) == (damping > 40.0)
+
+
+def test_a_crank_alone_has_no_natural_frequency_and_no_basins(tmp_path: Path) -> None:
+    case = load_case(write(tmp_path, CRANK))
+    for inputs in (case.inputs, Inputs(torque=0.0)):
+        with pytest.raises(InputError, match="no coordinate of the one-crank is free beside the held crank"):
+            natural_modes(case.parameters, inputs)
+    for name in (None, "crank.angle"):
+        with pytest.raises(InputError, match="no coordinate of the one-crank is free beside the crank, so that starts"):
+            basins(case.parameters, Drive(torque=0.1), start=(5.0,), coordinate=name)
 
 
 def test_the_spring_alone_where_it_is_free(tmp_path: Path) -> None:

@@ -368,8 +368,16 @@ def basins(
 
 
 def find_coordinate(flow: Flow, name: str | None) -> int:
-    """Return the index in y of a free coordinate by its FMI name, by default of the first."""
+    """Return the index in y of a free coordinate by its FMI name, by default of the first.
+
+    Raises InputError if there is none of this name, or none at all beside the crank.
+    """
     free = [component for component, _ in flow.components[: flow.size // 2]]
+    if not free:
+        raise InputError(
+            f"no coordinate of the {flow.mechanism.name} is free beside the crank, so that starts differ in the crank speed "
+            "alone: find_orbits finds its motions from a start"
+        )
     if name is not None and name not in free:
         raise unknown_name(name, free, f"free coordinate {name!r}")
     return 0 if name is None else free.index(name)
