@@ -215,7 +215,7 @@ def _integrate(
     ``samples`` receive states and channels, or the chosen outputs, at the sample times; NaN after the end of a run.
     """
     from ..numerics.vectors import LANES
-    from . import compiled, lanes, on_device
+    from . import compiled, lanes
     from . import records as k
     from .equations import machine
 
@@ -243,6 +243,8 @@ def _integrate(
     runs = problem, source, own, watch, state, recorded, status, settings.max_steps
     there = None
     if task.device is not None and todo.any():
+        from . import on_device
+
         there = on_device.DeviceBatch(on_device.solver(mechanism, switched), *runs)
     while todo.any() and not interrupts:
         if there is not None:
