@@ -14,6 +14,7 @@ from hypothesis import settings
 
 from analysis import cli
 from analysis.export import NATIVE, NATIVE_FMI3, build, build_native
+from analysis.mechanisms import MECHANISMS
 from analysis.numerics.codegen import Kernel
 from benchmarks.studio import chromium
 from build_fmu import FMUS
@@ -96,6 +97,25 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
             item.add_marker(pytest.mark.slow)
         if {"fmus", "natives"} & set(getattr(item, "fixturenames", ())) or item.path.parent.name == "fmu":
             item.add_marker(pytest.mark.fmu)
+
+
+def _linkages_kept() -> Iterator[None]:
+    before = dict(MECHANISMS)
+    yield
+    MECHANISMS.clear()
+    MECHANISMS.update(before)
+
+
+@pytest.fixture(autouse=True)
+def linkages_of_the_test() -> Iterator[None]:
+    """Forget the linkages that a test has described after the test."""
+    yield from _linkages_kept()
+
+
+@pytest.fixture(autouse=True, scope="module")
+def linkages_of_the_module() -> Iterator[None]:
+    """Forget the linkages that fixtures of a module have described after the module."""
+    yield from _linkages_kept()
 
 
 @pytest.fixture(scope="session")

@@ -9,9 +9,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pytest
 
-from analysis.mechanisms import MECHANISMS, register
+from analysis.mechanisms import register
 from analysis.studio import PAGE
-from build_fmu import FMUS
 from tests.mechanisms import pendulum, rotor_on_cart, torsion
 
 if TYPE_CHECKING:
@@ -25,34 +24,10 @@ def fmu(fmus: dict[str, Path]) -> Path:
 
 
 @pytest.fixture(scope="module")
-def registered() -> Iterator[None]:
+def registered() -> None:
     """Register the mechanisms of the tests for a module."""
-    mechanisms = [module.MECHANISM for module in (pendulum, rotor_on_cart, torsion)]
-    for mechanism in mechanisms:
-        register(mechanism)
-    yield
-    for mechanism in mechanisms:
-        del MECHANISMS[mechanism.name]
-
-
-@pytest.fixture
-def own_linkages() -> Iterator[None]:
-    """Remove the linkages that a test has described after the test."""
-    before = dict(MECHANISMS)
-    yield
-    MECHANISMS.clear()
-    MECHANISMS.update(before)
-
-
-@pytest.fixture
-def plain_mechanisms() -> Iterator[None]:
-    """Leave out linkages that other tests have described during the test."""
-    before = dict(MECHANISMS)
-    MECHANISMS.clear()
-    MECHANISMS.update({mechanism.name: mechanism for mechanism in FMUS.values()})
-    yield
-    MECHANISMS.clear()
-    MECHANISMS.update(before)
+    for module in (pendulum, rotor_on_cart, torsion):
+        register(module.MECHANISM)
 
 
 def opened(browser: Browser, path: Path) -> Page:

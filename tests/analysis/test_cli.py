@@ -93,7 +93,7 @@ revolutions = 2
 """
 
 
-def test_an_arm_that_swings_through_the_negative_x_axis_has_its_swing_in_the_table(linkwork, own_linkages, tmp_path):
+def test_an_arm_that_swings_through_the_negative_x_axis_has_its_swing_in_the_table(linkwork, tmp_path):
     """The arm turns back where crank and rod are in line: there its angle to the ground follows from three sides."""
     (tmp_path / "wiper.toml").write_text(WIPER)
     result = linkwork("run", "wiper.toml", "--no-plot")
@@ -223,7 +223,6 @@ def test_every_summary_is_a_sentence_that_is_not_cut(linkwork):
         assert all(" ".join(line.split()).endswith(".") and "..." not in line for line in listed)
 
 
-@pytest.mark.usefixtures("plain_mechanisms")
 def test_info_lists_the_published_sets_and_one_of_them(linkwork):
     result = linkwork("info")
     assert result.exit_code == 0
@@ -363,7 +362,6 @@ def test_a_run_through_the_fmu_says_that_its_inputs_are_held(fmu, tmp_path):
 
 
 @pytest.mark.fmu
-@pytest.mark.usefixtures("plain_mechanisms")
 def test_build_builds(linkwork, tmp_path):
     result = linkwork("build", "--dest", tmp_path / "fmus", "--kinds", "python")
     assert result.exit_code == 0
@@ -371,7 +369,7 @@ def test_build_builds(linkwork, tmp_path):
     assert result.output.count("valid") == len(FMUS)
 
 
-def test_build_of_a_linkage_names_what_its_file_says_of_runs_alone(linkwork, own_linkages, tmp_path, monkeypatch):
+def test_build_of_a_linkage_names_what_its_file_says_of_runs_alone(linkwork, tmp_path, monkeypatch):
     """Start values and inputs beside [linkage] are not in the FMU; what stands in the file that this one names counts, too."""
     monkeypatch.setattr(export, "build_all", lambda *given, **others: [])
     (tmp_path / "wiper.toml").write_text(WIPER)

@@ -109,7 +109,6 @@ def test_a_new_run_runs_as_it_is(linkwork, tmp_path, kind):
     assert (tmp_path / "out" / f"{kind}.csv").is_file()
 
 
-@pytest.mark.usefixtures("own_linkages")
 def test_a_new_linkage_is_drawn_runs_and_holds_every_entry_there_is(linkwork, tmp_path):
     assert linkwork("new", LINKAGE).output == "wrote linkage.toml; next: linkwork linkage linkage.toml\n"
     assert "coupler, rocker" in linkwork("linkage", "linkage.toml").output

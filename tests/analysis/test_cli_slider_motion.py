@@ -107,7 +107,6 @@ def test_the_motion_that_made_the_path_is_found(linkwork, tmp_path) -> None:
     assert "wrote out/motion.csv" in result.output
 
 
-@pytest.mark.usefixtures("own_linkages")
 def test_what_is_written_runs_and_reproduces_the_motion(linkwork, tmp_path) -> None:
     """The control force as a table over time, on the plant in process, through one turn: slider and coupler point."""
     load = {"fx": "2 N", "fy": "-3 N"}

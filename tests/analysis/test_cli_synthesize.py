@@ -161,7 +161,7 @@ def test_a_crank_that_swings_backwards_is_run_over_its_task_alone(tmp_path) -> N
 @pytest.mark.parametrize(
     ("point", "given"), [((0.1, 0.5), {}), ((0.1, 0.5), {"coupler_mass": 0.6}), ((0.3, 0.0), {"load": (0.0, 0.0)})]
 )
-def test_both_files_of_a_linkage_have_the_same_masses_and_load(own_linkages, tmp_path, point, given) -> None:
+def test_both_files_of_a_linkage_have_the_same_masses_and_load(tmp_path, point, given) -> None:
     linkage = syn.Linkage(
         ground_length=0.3, crank_length=0.08, coupler_length=0.25, rocker_length=0.2,
         point_distance=point[0], point_angle=point[1], ground_angle=0.3,

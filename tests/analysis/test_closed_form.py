@@ -410,7 +410,6 @@ def linkwork(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[..., R
     return lambda *arguments: CliRunner().invoke(cli.main, ["exact", *map(str, arguments)], catch_exceptions=False)
 
 
-@pytest.mark.usefixtures("own_linkages")
 def test_command_of_five_poses(linkwork: Callable[..., Result], tmp_path: Path) -> None:
     result = linkwork(EXAMPLES / "five-poses.toml", "--no-plots")
     assert result.exit_code == 0

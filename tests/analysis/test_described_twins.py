@@ -19,8 +19,6 @@ from analysis.run import Inputs, cosimulate
 from linkwork.mechanism import Mechanism
 from tests import slider_cranks, strategies
 
-pytestmark = pytest.mark.usefixtures("own_linkages")
-
 
 def polar(distance: float, angle: float) -> list[float]:
     return [distance * math.cos(angle) or 0, distance * math.sin(angle) or 0]

@@ -118,7 +118,7 @@ CASES: dict[str, dict[str, Any]] = {
 }
 
 
-@pytest.mark.usefixtures("without_device", "own_linkages")
+@pytest.mark.usefixtures("without_device")
 @pytest.mark.parametrize("case", CASES)
 def test_runs_are_those_of_the_processor(case: str) -> None:
     """The steps are the same, and differences are those of rounding; where friction sticks, rounding may decide on a step."""

@@ -339,7 +339,6 @@ def test_event_state_is_a_state_of_the_motion() -> None:
         assert values.drive_applied_torque == pytest.approx(0.5, abs=1e-9)
 
 
-@pytest.mark.usefixtures("own_linkages")
 @pytest.mark.parametrize(("method", "allowed"), [("compiled", 1e-6), ("Radau", 1e-8)])
 def test_contacts_of_a_ball_that_bounces_on_a_stop_are_scipys(method: str, allowed: float) -> None:
     """36 events by a law of contact with a kink, each of which hands its error on to the next; SciPy at 1e-12."""

@@ -69,7 +69,6 @@ def run_example(name: str) -> None:
     assert doctest.DocTestRunner().run(example).failed == 0
 
 
-@pytest.mark.usefixtures("own_linkages")
 @pytest.mark.parametrize("name", sorted({*FUNCTIONS, "Inputs"} - SIGNALS - {"cosimulate"}))
 def test_the_example_of_a_function_runs(name: str) -> None:
     run_example(name)

@@ -42,7 +42,6 @@ FIRST = ("elastic-bearing", "geared-five-bar", "hybrid-press", "rack-and-pinion"
 EVERY = [path if path.stem in FIRST else pytest.param(path, marks=pytest.mark.long) for path in FILES]
 #: Their FMUs are probed: slots, and two cranks; the C shell that a probe tries is that of all linkages.
 PROBED = ("hybrid-press", "shaper")
-pytestmark = pytest.mark.usefixtures("own_linkages")
 
 
 def run(name: str, **changes: Any) -> Trajectory:

@@ -34,9 +34,6 @@ from linkwork.plant import Plant
 from tests.oracles.planar import Multipliers
 from tests.random_linkages import KINDS, random_linkage
 
-pytestmark = pytest.mark.usefixtures("own_linkages")
-
-
 GROUPS = ("group", "RRP", "slot", "RPR")
 RACKS = ("rack", "RRP", "RPR", "PRP")
 #: Whether the gear follows from the rack, and the travel is linear.

@@ -104,7 +104,6 @@ def test_origins_of_masses_and_lengths_that_leave_them():
     assert not any(mass.stale for mass in _case(coupler=given).masses)
 
 
-@pytest.mark.usefixtures("own_linkages")
 def test_masses_of_a_described_linkage_are_those_of_its_sections(tmp_path):
     rod = 'section = { kind = "rod", diameter = "12 mm", material = "steel" }'
     text = linkages.TEXT.format(file="own.toml").replace('mass = "0.4 kg" ', f'mass = "0.4 kg"\n{rod}')

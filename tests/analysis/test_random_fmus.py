@@ -18,7 +18,7 @@ from tests.random_linkages import KINDS
 
 from .test_linkages import assembled, rough
 
-pytestmark = [pytest.mark.usefixtures("own_linkages"), pytest.mark.slow, pytest.mark.fmu]
+pytestmark = [pytest.mark.slow, pytest.mark.fmu]
 
 #: Steps of a run (s), no two alike.
 SIZES = [1e-6, 1.2345e-5, 3e-4, 1e-3, 2.5e-3]

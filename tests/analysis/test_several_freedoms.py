@@ -15,8 +15,6 @@ from analysis.run import load_case
 from analysis.run.case import Case
 from analysis.tuning import Wish, tune
 
-pytestmark = pytest.mark.usefixtures("own_linkages")
-
 SHAKER = """
 [linkage]
 name = "shaker"

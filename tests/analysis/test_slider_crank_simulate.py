@@ -277,7 +277,6 @@ def test_a_case_is_of_one_mechanism() -> None:
     assert isinstance(Case(title="own", parameters=PARAMETERS, stop_time=1.0).initial, InitialState)
 
 
-@pytest.mark.usefixtures("plain_mechanisms")
 def test_outputs_of_one_name_have_one_unit() -> None:
     for mechanism in MECHANISMS.values():
         units = {v.name: v.unit for v in mechanism.variables if v.causality == "output" and v.kind == "Real"}

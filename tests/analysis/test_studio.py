@@ -403,18 +403,15 @@ def test_a_link_holds_the_state(page: Page, browser: Browser) -> None:
 @in_browser
 def test_a_mechanism_of_ones_own_opens_in_the_page(browser: Browser, tmp_path: Path) -> None:
     register(pendulum.MECHANISM)
-    try:
-        known = PUBLISHED["pendulum-demo"]
-        case = Case(
-            title="own", parameters=known.parameters, initial=known.initial, inputs=Inputs(torque=0.3), stop_time=0.02
-        )
-        path = tmp_path / "own.html"
-        path.write_text(make_page(page_state(case) | {"source": "run"}), encoding="utf-8")
-        page = opened(browser, path)
-        found = _shown(page)["columns"]
-        wanted = simulate(case.parameters, case.inputs, initial=case.initial, stop_time=0.02, **_HELD)
-        _near(found["pendulum.angle"], wanted["pendulum.angle"])
-        _near(found["Bx"], np.cos(wanted["pendulum.angle"]))
-        page.close()
-    finally:
-        del MECHANISMS[pendulum.MECHANISM.name]
+    known = PUBLISHED["pendulum-demo"]
+    case = Case(
+        title="own", parameters=known.parameters, initial=known.initial, inputs=Inputs(torque=0.3), stop_time=0.02
+    )
+    path = tmp_path / "own.html"
+    path.write_text(make_page(page_state(case) | {"source": "run"}), encoding="utf-8")
+    page = opened(browser, path)
+    found = _shown(page)["columns"]
+    wanted = simulate(case.parameters, case.inputs, initial=case.initial, stop_time=0.02, **_HELD)
+    _near(found["pendulum.angle"], wanted["pendulum.angle"])
+    _near(found["Bx"], np.cos(wanted["pendulum.angle"]))
+    page.close()

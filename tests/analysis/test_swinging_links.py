@@ -39,8 +39,6 @@ from analysis.units import RAD_S_PER_RPM
 from linkwork.errors import InputError, ParameterError
 from linkwork.mechanism import PublishedSet
 
-pytestmark = pytest.mark.usefixtures("own_linkages")
-
 EXAMPLES = Path(__file__).parents[2] / "examples"
 STROKE, ARM, MASS, INERTIA, GRAVITY, DAMPING = 0.02, 0.15, 0.5, 4e-3, 9.81, 0.01
 

@@ -6,7 +6,7 @@ known in closed form.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from fractions import Fraction
 from math import pi, sqrt
 from pathlib import Path
@@ -33,7 +33,7 @@ from analysis import (
 from analysis.cli.vibration import _report_verdict
 from analysis.export import NATIVE, NATIVE_FMI3, build, build_native
 from analysis.linear import find_equilibrium, linearise, linearise_orbit, settled_motion
-from analysis.mechanisms import MECHANISMS, register
+from analysis.mechanisms import register
 from analysis.periodic import (
     Drive,
     Family,
@@ -62,10 +62,8 @@ RATIOS = [Fraction(1), Fraction(2), Fraction(3, 2), Fraction(-1)]
 
 
 @pytest.fixture(scope="module", autouse=True)
-def _registered() -> Iterator[None]:
+def _registered() -> None:
     register(MECHANISM)
-    yield
-    del MECHANISMS[MECHANISM.name]
 
 
 def _drive(speed: float, ratio: Fraction, phase: float = 0.0) -> Drive:
