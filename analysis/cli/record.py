@@ -2,35 +2,53 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
 import click
 import numpy as np
 
+from linkwork.errors import InputError, ParameterError
+
 from ..units import RAD_S_PER_RPM
-from .common import console, out_option, output_folder, plot_option, print_paths, quantity, report_errors, show_table
+from .common import (
+    console,
+    out_option,
+    output_folder,
+    plot_option,
+    print_error,
+    print_paths,
+    quantity,
+    report_errors,
+    show_table,
+)
 
 
 @click.command()
 @click.argument("record", type=click.Path(exists=True, dir_okay=False))
 @click.option("--time", "time", metavar="NAME", help="Column of the times; by default the first.")
 @click.option("--position", metavar="NAME", help="Column of the positions; by default the second.")
-@click.option("--time-unit", default="s", help="Unit of the times.")
-@click.option("--unit", default="m", help="Unit of the positions, needed for the force of friction.")
+@click.option("--time-unit", help="Unit of the times; by default that in the column's heading, or s.")
+@click.option(
+    "--unit",
+    help="Unit of the positions, a length or an angle; by default that in the column's heading, or m. It matters for the force "
+    "of friction alone.",
+)
 @click.option("--from", "first", metavar="TIME", help="Ignore samples before this time, such as '0.2 s': the impulse.")
 @click.option("--to", "last", metavar="TIME", help="Ignore samples after this time.")
 @click.option(
-    "--mass", metavar="MASS", help="Moving mass, such as '600 g': gives the damping coefficient and the stiffness."
+    "--mass",
+    metavar="MASS",
+    help="Moving mass, such as '600 g', or of an angle the moment of inertia, such as '2e-3 kg*m^2': gives the damping "
+    "coefficient and the stiffness.",
 )
 @click.option("--friction", is_flag=True, help="Fit dry friction in addition to the damper.")
 @click.option("--least-swing", type=float, help="Smallest swing that is used, relative to the range; 0.1 by default.")
 @plot_option
 @out_option()
 @report_errors
-def decrement(
-    record: str, time: str | None, position: str | None, mass: str | None, out: str, plot: bool, **options: Any
-) -> None:
+def decrement(record: str, time: str | None, position: str | None, out: str, plot: bool, **options: Any) -> None:
     """Find damping and natural frequency from the decaying record of a freedom on its spring, by the logarithmic decrement.
 
     RECORD is a CSV file of times and positions after an impulse or a release. A decaying vibration with an offset is fitted to
@@ -43,55 +61,98 @@ def decrement(
       linkwork decrement record.csv --time 't [s]' --position 'u [mm]' --unit mm --from '0.1 s' --friction
     """
     from .. import figures
-    from ..files import read_columns, save_figure, write_csv
+    from ..files import read_record, save_figure, write_csv
     from ..numerics.decay import LEAST_SWING, fit_decay
 
-    units = (("time_unit", "s", "--time-unit"), ("unit", "m", "--unit"))
-    second, metre = (quantity(f"1 {options[name]}", si, option) for name, si, option in units)
-    t, x = read_columns(record, (time, position))
+    (heading, own), (t, x) = read_record(record, (time, position))
+    _, _, second = _column_unit(heading, options["time_unit"], "--time-unit", ("s",))
+    unit, kind, size = _column_unit(own, options["unit"], "--unit", ("m", "rad"))
     t = t * second
     first = quantity(options["first"], "s", "--from") if options["first"] else -np.inf
     last = quantity(options["last"], "s", "--to") if options["last"] else np.inf
     kept = ~((t < first) | (t > last))
-    decay = fit_decay(
-        t[kept],
-        x[kept],
-        friction=options["friction"],
-        least_swing=LEAST_SWING if options["least_swing"] is None else options["least_swing"],
-    )
-    kg = None if mass is None else quantity(mass, "kg", "--mass")
-    if kg is not None and kg <= 0.0:
-        raise click.UsageError(f"--mass {mass}: it must be above zero")
+    least = LEAST_SWING if options["least_swing"] is None else options["least_swing"]
+    decay = fit_decay(t[kept], x[kept], friction=options["friction"], least_swing=least)
+    si = _UNITS[kind or "m"]
+    moving = None if options["mass"] is None else quantity(options["mass"], si[0], "--mass")
+    if moving is not None and moving <= 0.0:
+        raise click.UsageError(f"--mass {options['mass']}: it must be above zero")
     show_table(
         f"{Path(record).name}: {len(decay.time)} turning points from {decay.time[0]:.6g} to {decay.time[-1]:.6g} s",
         ("", "value", "+-", "unit"),
         [
-            (name, f"{value:.6g}", f"{error:.2g}", unit)
-            for name, value, error, unit in _result_rows(
-                decay, kg, metre if options["friction"] else None, options["unit"]
-            )
+            (name, f"{value:.6g}", f"{error:.2g}", of)
+            for name, value, error, of in _result_rows(decay, moving, unit, size, si, options["friction"])
         ],
         words=("", "unit"),
     )
     console.print(f"the fit is within {decay.residual:.2g} of the first amplitude (root mean square)", highlight=False)
+    if not options["friction"]:
+        with suppress(InputError):
+            dry = fit_decay(t[kept], x[kept], friction=True, least_swing=least)
+            # beyond what noise, and parabolas in the place of the motion, do
+            if dry.friction > 5.0 * dry.friction_error and dry.residual < 0.5 * decay.residual:
+                print_error(
+                    "note: the decrement grows from cycle to cycle, as with dry friction: with --friction the damping ratio is "
+                    f"{dry.damping_ratio:.3g}, and the fit within {dry.residual:.2g}"
+                )
     stem = output_folder(out) / f"{Path(record).stem}-decrement"
     columns = {
         "time [s]": decay.time,
-        f"position [{options['unit']}]": decay.position,
-        f"fit [{options['unit']}]": decay.fitted,
+        f"position [{unit}]": decay.position,
+        f"fit [{unit}]": decay.fitted,
     }
     written = [write_csv(f"{stem}.csv", columns)]
     if plot:
-        drawn = figures.plot(decay, (t[kept], x[kept]), unit=options["unit"], title=Path(record).name)
+        drawn = figures.plot(decay, (t[kept], x[kept]), unit=unit, title=Path(record).name)
         written.append(save_figure(drawn, f"{stem}.png"))
     print_paths(written)
 
 
-def _result_rows(decay: Any, kg: float | None, metre: float | None, unit: str) -> list[tuple[str, float, float, str]]:
+#: By the kind of a position, the SI units of what moves, its damping coefficient, its stiffness and its friction.
+_UNITS = {"m": ("kg", "N.s/m", "N/m", "N"), "rad": ("kg.m2", "N.m.s/rad", "N.m/rad", "N.m")}
+
+
+def _column_unit(own: str, given: str | None, option: str, kinds: tuple[str, ...]) -> tuple[str, str, float]:
+    """Return the unit of a column, the one of the SI units ``kinds`` that fits it, and the factor to that one.
+
+    ``own`` is the unit in the column's heading. One of none of the kinds, as V of a gauge, has the kind "" and the factor NaN.
+    """
+
+    def convert(unit: str) -> tuple[str, str, float]:
+        errors = []
+        for kind in kinds:
+            try:
+                return unit, kind, quantity(f"1 {unit}", kind, option)
+            except ParameterError as error:
+                errors.append(error)
+        raise errors[0]
+
+    chosen = convert(given) if given else (kinds[0], kinds[0], 1.0)
+    if not own:
+        return chosen
+    try:
+        found = convert(own)
+    except ParameterError:
+        if given:
+            return chosen
+        if len(kinds) == 1:
+            raise InputError(
+                f"the times are in {own!r} by their heading, which is no unit of time: give {option}"
+            ) from None
+        return own, "", np.nan
+    if given and found[1:] != chosen[1:]:
+        raise click.UsageError(f"{option} {given}: the column's heading says {own}")
+    return found
+
+
+def _result_rows(
+    decay: Any, moving: float | None, unit: str, size: float, si: tuple[str, ...], friction: bool
+) -> list[tuple[str, float, float, str]]:
     """Return the results of a fitted decay as rows (name, value, standard error, unit).
 
-    With a mass ``kg`` there are rows of damping and stiffness. With ``metre``, the length of ``unit`` in m, there are rows of
-    dry friction.
+    With a mass or moment of inertia ``moving`` there are rows of damping and stiffness, in the units ``si``. With ``friction``
+    there are rows of dry friction; of its force only if ``size``, the size of ``unit`` in SI, is known.
     """
     natural, error = decay.natural_frequency, decay.natural_frequency_error
     rows = [
@@ -100,12 +161,12 @@ def _result_rows(decay: Any, kg: float | None, metre: float | None, unit: str) -
         ("natural frequency", natural, error, "rad/s"),
         ("", natural / RAD_S_PER_RPM, error / RAD_S_PER_RPM, "rpm"),
     ]
-    if metre is not None:
+    if friction:
         rows.append(("dry friction over the stiffness", decay.friction, decay.friction_error, unit))
-    if kg is not None:
-        stiffness = decay.stiffness(kg)
-        rows += [("damping coefficient", *decay.damping(kg), "N.s/m"), ("stiffness", *stiffness, "N/m")]
-        if metre is not None:
-            newton = stiffness[0] * metre
-            rows.append(("dry friction", newton * decay.friction, newton * decay.friction_error, "N"))
+    if moving is not None:
+        stiffness = decay.stiffness(moving)
+        rows += [("damping coefficient", *decay.damping(moving), si[1]), ("stiffness", *stiffness, si[2])]
+        if friction and np.isfinite(size):
+            newton = stiffness[0] * size
+            rows.append(("dry friction", newton * decay.friction, newton * decay.friction_error, si[3]))
     return rows

@@ -16,6 +16,7 @@ from ..libraries import require
 from ..units import INCH, LENGTHS, quantity
 from .paths import check_ending, first_line, is_number, read_text
 from .reader import unknown_name
+from .tables import heading_unit
 
 #: Lengths of SVG in m (CSS: an inch has 96 px, 72 pt, 6 pc).
 _CSS = {**LENGTHS, "": INCH / 96, "px": INCH / 96, "pt": INCH / 72, "pc": INCH / 6}
@@ -34,12 +35,13 @@ _TRANSFORMS = {
 
 
 def read_points(
-    path: str | Path, *, unit: str | None = None, name: str | None = None
+    path: str | Path, *, unit: str | None = None, name: str | None = None, si: str = "m"
 ) -> tuple[NDArray[np.float64], bool]:
     """Read the points of a curve from a CSV or SVG file.
 
-    CSV (also ``.txt``): two columns, x and y, separated by commas, semicolons, tabs or spaces; a header line, empty lines and
-    lines that start with # are ignored. If the last point repeats the first point, it is omitted and the curve is closed.
+    CSV (also ``.txt``): two columns, x and y, separated by commas, semicolons, tabs or spaces; they may have a header line such
+    as ``x [mm],y [mm]``. Empty lines and lines that start with # are ignored. If the last point repeats the first point, it is
+    omitted and the curve is closed.
 
     SVG: the first path is read; if there is no path, the first ellipse, circle, polygon, polyline, rectangle or line. ``name``
     selects an element by its ``id``; if the element is a group, the first path or shape in the group is read. Transforms are
@@ -51,30 +53,33 @@ def read_points(
     ----------
     path : path
     unit : str, optional
-        Unit of the file's numbers, such as ``"mm"``. The default for CSV is m. The default for SVG is the scale of the file,
-        from ``width``, ``height`` and ``viewBox``; if the file has no scale, pixels of 1/96 inch.
+        Unit of the file's numbers, such as ``"mm"``. The default for CSV is the unit in the header line, or else ``si``. The
+        default for SVG is the scale of the file, from ``width``, ``height`` and ``viewBox``; if the file has no scale, pixels
+        of 1/96 inch.
     name : str, optional
         ``id`` of the element or group of an SVG file.
+    si : str
+        SI unit of the two columns of a CSV file, such as ``"rad"``.
 
     Returns
     -------
     points : ndarray, shape (n, 2)
-        Points of the curve (m).
+        Points of the curve, in ``si``.
     closed : bool
         Whether the last point is joined to the first.
 
     Raises
     ------
     InputError
-        If the file cannot be read or is not valid; for CSV the message gives the line.
+        If the file cannot be read or is not valid, or its header line contradicts ``unit``; for CSV the message gives the line.
     UnknownNameError
         If no element of the SVG file has this ``id``.
     ParameterError
-        If the unit is not a unit of length.
+        If the unit is not of the kind of ``si``.
     """
     path = Path(path)
     ending = check_ending(path, (".csv", ".txt", ".svg"))
-    scale = None if unit is None else quantity(f"1 {unit}", "m", "unit")
+    scale = None if unit is None else quantity(f"1 {unit}", si, "unit")
     text = read_text(path)
     if ending == ".svg":
         try:
@@ -90,24 +95,30 @@ def read_points(
         return points, closed
     if name is not None:
         raise InputError(f"{path.name} has one curve without a name: {name!r} cannot be looked up in it")
-    rows = _two_columns(path, text)
+    rows, units = _two_columns(path, text)
+    for own in units:
+        found = quantity(f"1 {own}", si, f"{path.name} in {own!r}")
+        if scale is not None and scale != found:
+            raise InputError(f"{path.name} is in {own} by its header line, which is not the unit {unit or units[0]}")
+        scale = found
     closed = len(rows) > 2 and bool((rows[0] == rows[-1]).all())
     return (1.0 if scale is None else scale) * (rows[:-1] if closed else rows), closed
 
 
-def _two_columns(path: Path, text: str) -> NDArray[np.float64]:
-    """Return the columns x and y of a CSV file's text, shape (n, 2)."""
+def _two_columns(path: Path, text: str) -> tuple[NDArray[np.float64], list[str]]:
+    """Return the columns x and y of a CSV file's text, shape (n, 2), and the units in its header line."""
     rows: list[tuple[float, float]] = []
-    header = False
+    header = comment = ""
     for number, line in enumerate(text.splitlines(), start=1):
         cells = re.split(r"\s*[,;]\s*|\s+", line.strip())
         if cells == [""] or line.lstrip().startswith("#"):
+            comment = line if not rows and line.strip() else comment
             continue
         try:
             x, y = (float(cell) for cell in cells)
         except ValueError:
             if not rows and not header and not any(is_number(cell) for cell in cells):
-                header = True
+                header = line
                 continue
             raise InputError(f"{path}, line {number}: {line.strip()[:100]!r} is not two numbers, x and y") from None
         if not (isfinite(x) and isfinite(y)):
@@ -115,7 +126,11 @@ def _two_columns(path: Path, text: str) -> NDArray[np.float64]:
         rows.append((x, y))
     if not rows:
         raise InputError(f"{path} has no points: it must have two columns of numbers, x and y")
-    return np.array(rows)
+    # NumPy writes headings as a comment
+    units = [heading_unit(heading) for heading in re.split(r"[,;\t]", header or comment)]
+    if not header and (len(units) != 2 or not all(units)):
+        units = []
+    return np.array(rows), [unit for unit in units if unit]
 
 
 def _svg_points(path: Path, text: str, scale: float | None, name: str | None) -> tuple[NDArray[np.float64], bool]:

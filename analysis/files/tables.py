@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import hashlib
 import io
+import re
 import sys
 import warnings
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -121,14 +122,31 @@ def read_csv(path: str | Path) -> NDArray[np.float64]:
 
 
 def read_columns(path: str | Path, names: Sequence[str | None]) -> list[NDArray[np.float64]]:
-    """Read columns of numbers from a CSV file, separated by commas, semicolons or tabs.
+    """Read columns of numbers from a CSV file as they are; see `read_record`."""
+    return read_record(path, names)[1]
+
+
+def read_record(
+    path: str | Path, names: Sequence[str | None] | None = None
+) -> tuple[list[str], list[NDArray[np.float64]]]:
+    """Read columns of numbers, and the units in their headings, from a CSV file with commas, semicolons or tabs between cells.
+
+    Where semicolons or tabs are between the cells, numbers may have a decimal comma. Headings are those of a header line, or
+    of a comment, ``# t [ms],x [mm]``, directly above the numbers.
 
     Parameters
     ----------
     path : str or Path
-    names : sequence of str or None
-        Name of each wanted column in the header line, with or without its unit in brackets. None stands for the column of the
-        file at the same position. In a file without a header line all columns are taken by position.
+    names : sequence of str or None, optional
+        Name of each wanted column in the header line, with or without its unit in brackets; by default all columns. None stands
+        for the column of the file at the same position. In a file without a header line all columns are taken by position.
+
+    Returns
+    -------
+    units : list of str
+        `heading_unit` of each column.
+    columns : list of ndarray
+        Numbers as they are in the file.
 
     Raises
     ------
@@ -138,27 +156,54 @@ def read_columns(path: str | Path, names: Sequence[str | None]) -> list[NDArray[
         If the file has no column of a given name.
     """
     path = Path(path)
-    lines = [(i, line) for i, line in enumerate(read_text(path).splitlines(), 1) if line.partition("#")[0].strip()]
+    text = read_text(path).splitlines()
+    lines = [(i, line) for i, line in enumerate(text, 1) if line.partition("#")[0].strip()]
     first = lines[0][1] if lines else ""
     separator = next((mark for mark in ";\t" if mark in first), ",")
     rows = [(number, next(csv.reader([line], delimiter=separator))) for number, line in lines]
-    if not rows or (len(rows) == 1 and not is_number(rows[0][1][0])):
+
+    def as_number(cell: str) -> str:
+        return cell.strip() if separator == "," else cell.strip().replace(",", ".")
+
+    if not rows or (len(rows) == 1 and not is_number(as_number(rows[0][1][0]))):
         raise InputError(f"{path} has no numbers: it must have rows of numbers, and may have a header line above them")
-    header = [] if is_number(rows[0][1][0]) else [name.strip() for name in rows.pop(0)[1]]
+    header = []
+    if not is_number(as_number(rows[0][1][0])):
+        header = rows.pop(0)[1]
+    elif lines[0][0] > 1:
+        # the comment above the numbers, as NumPy writes headings
+        comment = next(csv.reader([text[lines[0][0] - 2].lstrip("# ")], delimiter=separator), [])
+        header = comment if len(comment) == len(rows[0][1]) else []
+    header = [name.strip() for name in header]
+    if header and any(cell.strip() for cell in rows[0][1][len(header) :]):
+        raise InputError(
+            f"{path}, line {rows[0][0]}: {len(rows[0][1])} cells below {len(header)} headings; numbers with a decimal comma "
+            "need semicolons or tabs between them"
+        )
+    short = [_UNIT.sub("", known).strip() for known in header]
     places = []
-    for place, name in enumerate(names):
-        short = [known.partition("[")[0].strip() for known in header]
+    for place, name in enumerate([None] * len(header or rows[0][1]) if names is None else names):
         if name is not None and name not in header and short.count(name) != 1:
             raise unknown_name(name, header, f"column {name!r} in {path.name}")
         places.append(place if name is None else header.index(name) if name in header else short.index(name))
     columns = np.empty((len(places), len(rows)))
     for i, (number, cells) in enumerate(rows):
         for column, place in zip(columns, places):
-            text = cells[place].strip() if place < len(cells) else ""
-            if not is_number(text):
-                raise InputError(f"{path}, line {number}, column {place + 1}: {text[:40]!r} is not a number")
-            column[i] = float(text)
-    return list(columns)
+            own = cells[place].strip() if place < len(cells) else ""
+            if not is_number(as_number(own)):
+                raise InputError(f"{path}, line {number}, column {place + 1}: {own[:40]!r} is not a number")
+            column[i] = float(as_number(own))
+    return [heading_unit(header[place]) if header else "" for place in places], list(columns)
+
+
+#: A unit in brackets at the end of a heading.
+_UNIT = re.compile(r"[\[(]([^\[\]()]*)[\])]\s*$")
+
+
+def heading_unit(heading: str) -> str:
+    """Return the unit in brackets at the end of a heading, as of ``time [ms]`` or ``x (mm)``; empty if there is none."""
+    found = _UNIT.search(heading)
+    return found[1].strip() if found else ""
 
 
 def read_rows(path: str | Path) -> list[dict[str, str]]:

@@ -6,7 +6,8 @@ A mass m on a spring k with a damper c and dry friction F has its turning points
 
 every half period T/2 = pi / omega_d, where q = exp(-delta / 2) and delta = pi c / (m omega_d) is the logarithmic decrement of
 a whole cycle. Dry friction shortens each swing by the same length, the damper by the same percentage; friction does not change
-the period.
+the period. It does change the acceleration at a turning point: at the distance x from b it is that of the spring times
+1 + r / x before, and 1 - r / x after it.
 """
 
 from __future__ import annotations
@@ -24,6 +25,8 @@ from linkwork.errors import InputError
 LEAST_SWING = 0.1
 #: Half width of the parabola fitted at a turning point, as a fraction of half a period: a cosine is a parabola to 0.03 % there.
 _WINDOW = 1.0 / 6.0
+#: Rounds in which parabolas with a jump of their curvature, and the friction that makes it, are found from each other.
+_ROUNDS = 4
 #: Largest deviation of the time between turning points from half a period, as a fraction of half a period.
 _UNEVEN = 0.5
 
@@ -148,16 +151,32 @@ def fit_decay(
         raise InputError(
             f"the record has {len(turns)} turning points with swings above {least_swing:g} of its range: "
             f"{needed} are needed{' with friction' if friction else ''}; a longer record, or a smaller least swing, has more"
+            + ("; is it the right column?" if not turns else "")
         )
     spaces = np.diff(t[turns])
     half = float(np.median(spaces))
     if np.abs(spaces / half - 1.0).max() > _UNEVEN:
+        gap = int(np.argmax(np.diff(t)))
         raise InputError(
             f"the record's turning points lie {spaces.min():.3g} to {spaces.max():.3g} s apart, which is no free oscillation: "
             "begin after the impulse, and where noise makes turning points of its own, ask for a greater least swing"
+            + (
+                f"; there is no sample from {t[gap]:.6g} to {t[gap + 1]:.6g} s"
+                if t[gap + 1] - t[gap] > 0.5 * half
+                else ""
+            )
         )
-    tops = np.array([_vertex(t, x, turn, half * _WINDOW) for turn in turns])
-    return _fit(tops, friction)
+
+    def fit(jumps: ArrayLike) -> Decay:
+        tops = [
+            _vertex(t, x, turn, half * _WINDOW, jump) for turn, jump in zip(turns, np.broadcast_to(jumps, len(turns)))
+        ]
+        return _fit(np.array(tops), friction)
+
+    found = fit(0.0)
+    for _ in range(_ROUNDS if friction else 0):
+        found = fit(np.clip(found.friction / np.abs(found.position - found.offset), -1.0, 1.0))
+    return found
 
 
 def _check_record(time: ArrayLike, position: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
@@ -195,17 +214,25 @@ def _turning_points(x: NDArray[np.float64], swing: float) -> list[int]:
     return found
 
 
-def _vertex(t: NDArray[np.float64], x: NDArray[np.float64], turn: int, reach: float) -> tuple[float, float]:
+def _vertex(
+    t: NDArray[np.float64], x: NDArray[np.float64], turn: int, reach: float, jump: float
+) -> tuple[float, float]:
     """Return the vertex (time, position) of a parabola fitted to the samples within ``reach`` of a turning point.
 
-    The parabola is fitted to at least three samples.
+    The parabola is fitted to at least three samples. Its curvature is 1 + ``jump`` times the mean one before the vertex, and
+    1 - ``jump`` times the mean one after it.
     """
     first, last = np.searchsorted(t, (t[turn] - reach, t[turn] + reach))
     near = slice(max(min(int(first), turn - 1), 0), max(int(last), turn + 2))
     middle, scale = t[turn], t[turn + 1] - t[turn - 1]
-    a, b, c = np.polyfit((t[near] - middle) / scale, x[near], 2)
-    place = float(np.clip(-0.5 * b / a, -reach / scale - 1.0, reach / scale + 1.0)) if a else 0.0
-    return middle + scale * place, (a * place + b) * place + c
+    width, place, height = reach / scale + 1.0, 0.0, 0.0
+    for _ in range(_ROUNDS):
+        s = (t[near] - middle) / scale - place
+        columns = np.column_stack([s * s * (1.0 - jump * np.sign(s)), s, np.ones_like(s)])
+        a, b, height = np.linalg.lstsq(columns, x[near])[0].tolist()
+        step = float(np.clip(place - 0.5 * b / a, -width, width)) - place if a else 0.0
+        place, height = place + step, height + (a * step + b) * step
+    return middle + scale * place, height
 
 
 def _fit(tops: NDArray[np.float64], friction: bool) -> Decay:

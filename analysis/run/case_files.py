@@ -21,7 +21,7 @@ from .. import files
 from ..files import Choice, Kinds, Many, Quantity, Reader, Table, entry
 from ..linkages import with_linkage
 from ..mechanisms import MECHANISMS, PUBLISHED, Parameters, find_mechanism, name_in_files
-from ..units import with_unit
+from ..units import quantity, with_unit
 from .arguments import complete_inputs, turn_durations
 from .case import Case
 from .inputs import Inputs, parameter_readers, read_start
@@ -417,7 +417,13 @@ def _make_table(
 ) -> Piecewise:
     if file is None:
         return table(times, values, interpolation)
-    rows = files.read_csv(folder / file)
-    if rows.shape[1] < 2:
-        raise InputError(f"{folder / file} must have two columns, time in s and value in {unit}")
-    return table(rows[:, 0], rows[:, 1], interpolation)
+    path = folder / file
+    found, columns = files.read_record(path)
+    if len(columns) != 2:
+        raise InputError(f"{path} has {len(columns)} columns: it must have two, time in s and value in {unit}")
+    # the unit in a heading, else SI
+    t, y = (
+        column * (1.0 if own in ("", si) else quantity(f"1 {own}", si, f"{path.name}, column {place} in {own!r}"))
+        for place, (column, own, si) in enumerate(zip(columns, found, ("s", unit)), start=1)
+    )
+    return table(t, y, interpolation)

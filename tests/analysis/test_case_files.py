@@ -167,6 +167,38 @@ step = "1 ms"
 
 
 @pytest.mark.parametrize(
+    "text",
+    [
+        "time,fy\n0,1\n0.5,2\n1,3\n",
+        "0,1\n0.5,2\n1,3\n",
+        "t [ms],fy [kN]\n0,0.001\n500,0.002\n1000,0.003\n",
+        "# t (s); fy (N)\n0;1\n0,5;2\n1;3\n",
+    ],
+)
+def test_a_table_file_is_read_in_the_units_of_its_headings(tmp_path, text):
+    (tmp_path / "fy.csv").write_text(text)
+    force = case(tmp_path, 'published = "table-3.1"\nforce = { kind = "table", file = "fy.csv" }').inputs.force
+    assert force.breaks[1:-1] == pytest.approx([0.0, 0.5, 1.0])
+    assert force.coefficients[:, 0] == pytest.approx([1.0, 1.0, 2.0, 3.0])
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("t,angle,force\n0,0,1\n1,0,2\n", "has 3 columns: it must have two, time in s and value in N"),
+        ("t [ms],force [kg]\n0,1\n1,2\n", "column 2 in 'kg'"),
+        ("t [mm],force [N]\n0,1\n1,2\n", "column 1 in 'mm'"),
+        ("t,force\n0,1\n1,\n", "line 3, column 2: '' is not a number"),
+        ("t,force\n0,0,1,5\n0,5,2,5\n", "line 2: 4 cells below 2 headings; numbers with a decimal comma"),
+    ],
+)
+def test_a_table_file_that_is_none(tmp_path, text, said):
+    (tmp_path / "fy.csv").write_text(text)
+    with pytest.raises((InputError, ParameterError), match=said):
+        case(tmp_path, 'published = "table-3.1"\nforce = { kind = "table", file = "fy.csv" }')
+
+
+@pytest.mark.parametrize(
     ("text", "said"),
     [
         ('published = "table-3.2"', r"did you mean table-3\.1"),

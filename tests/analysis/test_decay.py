@@ -91,6 +91,14 @@ def test_dry_friction(friction: float, sign: float) -> None:
     assert (np.diff(alone.cycle_decrements) > 0.0).all()
 
 
+@pytest.mark.parametrize(("friction", "dt"), [(0.5, 2e-4), (1.5, 2e-4), (1.5, 1e-3)])
+def test_dry_friction_does_not_move_the_frequency(friction: float, dt: float) -> None:
+    """The acceleration jumps at each turning point, the more, the smaller the swing: the frequency does not follow that."""
+    t = np.arange(0.0, 0.8, dt)
+    found = fit_decay(t, free(t, 4.0, friction), friction=True)
+    assert found.stiffness(MASS)[0] == pytest.approx(STIFFNESS, rel=1e-4)
+
+
 def test_no_friction_is_found_where_there_is_none() -> None:
     found = fit_decay(*noisy(0.005), friction=True)
     assert abs(found.friction) < 3.0 * found.friction_error
@@ -163,6 +171,64 @@ class TestCommand:
         assert Path("out/record-decrement.csv").read_text().startswith("time [s],position [mm],fit [mm]\n")
         assert Path("out/record-decrement.png").exists()
 
+    @pytest.mark.parametrize(
+        ("header", "separator", "options"),
+        [
+            ("t [ms],u [mm]", ",", ()),
+            ("t (ms),u (mm)", ",", ("--unit", "mm")),
+            ("# t [ms],u [V]", ",", ()),
+            ("t [ticks];u [mm]", ";", ("--time-unit", "ms")),
+        ],
+    )
+    def test_the_units_of_the_headings_hold(self, header: str, separator: str, options: tuple[str, ...]) -> None:
+        self.write("record.csv", header, separator)
+        if separator == ";":
+            Path("record.csv").write_text(Path("record.csv").read_text().replace(".", ","))
+        code, output = self.run("record.csv", "--mass", "600 g", "--friction", "--no-plot", *options)
+        assert code == 0, output
+        rows = {c[0].strip(): c[1:] for line in output.splitlines() if len(c := line.strip("│ ").split("│")) == 4}
+        assert float(rows["stiffness"][0]) == pytest.approx(STIFFNESS, rel=1e-3)
+        assert float(rows["natural frequency"][0]) == pytest.approx(sqrt(STIFFNESS / MASS), rel=1e-3)
+        # what the volts of a gauge are in metres is not known
+        assert ("dry friction" in rows) == ("[V]" not in header)
+
+    @pytest.mark.parametrize(
+        ("header", "options", "words"),
+        [
+            ("t [ms],u [mm]", ("--time-unit", "s"), "--time-unit s: the column's heading says ms"),
+            ("t [ms],u [mm]", ("--unit", "m"), "--unit m: the column's heading says mm"),
+            ("t [mm],u [mm]", (), "the times are in 'mm' by their heading, which is no unit of time: give --time-unit"),
+        ],
+    )
+    def test_headings_that_contradict(self, header: str, options: tuple[str, ...], words: str) -> None:
+        self.write("record.csv", header)
+        code, output = self.run("record.csv", *options)
+        assert code in (1, 2)
+        assert words in " ".join(output.split())
+
+    def test_an_angle_and_its_moment_of_inertia(self) -> None:
+        t = np.linspace(0.0, 0.8, 4001)
+        np.savetxt(
+            "record.csv",
+            np.column_stack([t, np.degrees(free(t, 4.0, 1.0))]),
+            "%g",
+            ",",
+            header="t,a [deg]",
+            comments="",
+        )
+        code, output = self.run("record.csv", "--mass", "0.6 kg*m^2", "--friction", "--no-plot")
+        assert code == 0, output
+        (line,) = (line for line in output.splitlines() if "dry friction  " in line)
+        assert float(line.split("│")[2]) == pytest.approx(1.0, rel=0.02)
+        assert "N.m.s/rad" in output
+
+    def test_friction_that_was_not_fitted_is_said(self) -> None:
+        t = np.linspace(0.0, 0.8, 4001)
+        for friction in (0.0, 1.0):
+            np.savetxt("record.csv", np.column_stack([t, free(t, 4.0, friction)]), delimiter=",")
+            _, output = self.run("record.csv", "--no-plot")
+            assert ("as with dry friction" in output) == bool(friction)
+
     def test_friction_in_newtons(self) -> None:
         t = np.linspace(0.0, 0.8, 4001)
         np.savetxt("record.csv", np.column_stack([t, 1e3 * free(t, 4.0, 1.0)]), delimiter=",")
@@ -179,6 +245,7 @@ class TestCommand:
             (("--from", "700 s"), "turning points"),
             (("--from", "9000 s"), "no times"),
             (("--unit", "kg"), "--unit"),
+            (("--time-unit", "mm"), "--time-unit"),
             (("--mass", "600 mm"), "--mass"),
             (("--mass", "0"), "above zero"),
             (("--least-swing", "0"), "least swing"),

@@ -116,7 +116,7 @@ def good(name: str, folder: Path) -> bytes:
         with zipfile.ZipFile(folder / "good.fmu", "w") as archive:
             archive.writestr("modelDescription.xml", "<fmiModelDescription/>")
         return (folder / "good.fmu").read_bytes()
-    return b"time [s],value [m]\n0,1\n1,2.5\n2,3\n"
+    return (b"x [mm],y [mm]" if name == "curve.csv" else b"time [s],value [m]") + b"\n0,1\n1,2.5\n2,3\n"
 
 
 @pytest.mark.parametrize("name", READERS)

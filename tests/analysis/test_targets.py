@@ -409,6 +409,35 @@ def test_points_from_csv(tmp_path: Path, text: str) -> None:
     assert not closed
 
 
+@pytest.mark.parametrize(
+    ("header", "unit", "factor"),
+    [
+        ("x [mm],y [mm]", None, 1e-3),
+        ("x (cm),y (cm)", None, 1e-2),
+        ("# x [mm],y [mm]", None, 1e-3),
+        ("x [mm],y [mm]", "mm", 1e-3),
+        ("x,y", "in", 0.0254),
+        ("# drawn by hand (again)", None, 1.0),
+    ],
+)
+def test_the_unit_in_the_header_line_holds(tmp_path: Path, header: str, unit: str | None, factor: float) -> None:
+    points, _ = read_points(save(tmp_path, "a.csv", f"{header}\n0,0\n1,0\n1,2.5\n"), unit=unit)
+    assert points == pytest.approx(factor * np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 2.5]]))
+
+
+@pytest.mark.parametrize(
+    ("header", "unit", "si", "message"),
+    [
+        ("x [mm],y [mm]", "cm", "m", "in mm by its header line, which is not the unit cm"),
+        ("x [mm],y [m]", None, "m", "in m by its header line, which is not the unit mm"),
+        ("x [mm],y [mm]", None, "rad", "a.csv in 'mm'"),
+    ],
+)
+def test_units_that_contradict_each_other(tmp_path: Path, header: str, unit: str, si: str, message: str) -> None:
+    with pytest.raises((InputError, ParameterError), match=message):
+        read_points(save(tmp_path, "a.csv", f"{header}\n0,0\n1,0\n"), unit=unit, si=si)
+
+
 def test_a_csv_that_ends_where_it_began_is_closed(tmp_path: Path) -> None:
     path = write_csv(tmp_path / "a.csv", {"x": [0.0, 1.0, 1.0, 0.0], "y": [0.0, 0.0, 1.0, 0.0]})
     target = TargetPath.from_file(path)

@@ -323,8 +323,7 @@ class RockerFunctionTable(_ObjectiveAndRange):
         if written:
             rotation, angle = function_from_formula(self.angle, unit=unit, spacing=self.spacing, **self._range())
         elif self.file is not None:
-            columns, _ = read_points(folder / self.file)
-            rotation, angle = (quantity(f"1 {unit}", "rad", "task.angle_unit") * columns).T
+            rotation, angle = read_points(folder / self.file, unit=self.angle_unit, si="rad")[0].T
         else:
             angle = np.array(Many(Quantity("rad", bare=self.angle_unit))(self.angle, "task.angle"))
             rotation = _rotation(self.rotation, len(angle))
