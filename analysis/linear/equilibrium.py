@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, fields
 from functools import cache
-from math import isfinite
+from math import isfinite, tau
 from typing import Any
 
 import numpy as np
@@ -27,8 +27,10 @@ from ..run import Inputs, check_run, expressions, takes_published
 from ..units import Amount, in_si
 from .model import FloatArray, Layout, Modes, layout, sample_channels
 
-#: Grid points of the search for equilibria: over a turn of a cyclic freedom, and over the reach of any other freedom.
+#: Grid points of the search for equilibria: over a turn of a cyclic freedom, and over the reach of any other freedom. The reach
+#: of an angle that a spring winds up is a turn to either side. With four free coordinates the grid is coarser.
 GRID = (48, 81)
+MOST_POINTS = 600_000
 #: Largest imbalance of an equilibrium, relative to the forces that balance each other.
 BALANCE = 1e-12
 MOST_ITERATIONS = 60
@@ -276,16 +278,16 @@ class _Balance:
 
     def starts(self, held: FloatArray) -> list[FloatArray]:
         """Return starting points for Newton's method: the points of a grid at which the imbalance has a local minimum."""
-        lengths = [
-            abs(getattr(self.parameters, field.name))
-            for field in fields(self.parameters)
-            if self.mechanism.mechanism_variables[fmi_name(field.name)].unit == "m"
-        ]
+        units = {variable.name: variable.unit for variable in self.mechanism.variables}
+        names = [field.name for field in fields(self.parameters)]
+        lengths = [abs(getattr(self.parameters, name)) for name in names if units[fmi_name(name)] == "m"]
+        turn, other = (min(most, int(MOST_POINTS ** (1.0 / len(self.free)))) for most in GRID)
         axes, ends = [], []
         for k in self.free:
-            period = self.mechanism.freedoms[self.its.free[k]].period
-            reach = max(sum(lengths), self.scale[k])
-            axes.append(period * np.arange(GRID[0]) / GRID[0] if period else np.linspace(-reach, reach, GRID[1]))
+            freedom = self.mechanism.freedoms[self.its.free[k]]
+            period, is_angle = freedom.period, units[freedom.coordinate] == "rad"
+            reach = tau if is_angle else max(sum(lengths), self.scale[k])
+            axes.append(period * np.arange(turn) / turn if period else np.linspace(-reach, reach, other))
             ends.append("wrap" if period else "constant")
         points = np.meshgrid(*axes, indexing="ij")
         columns = np.tile(held[:, None], points[0].size)

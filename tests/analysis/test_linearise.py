@@ -5,6 +5,7 @@ from __future__ import annotations
 import cmath
 from dataclasses import replace
 from functools import cache
+from itertools import product
 from math import pi
 from types import SimpleNamespace
 from typing import Any
@@ -14,6 +15,7 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 from scipy.linalg import eigh
+from scipy.optimize import fsolve
 
 from analysis import Harmonics, InductionMotor, Inputs, figures, ramp, simulate
 from analysis.linear import (
@@ -28,6 +30,7 @@ from analysis.linear import (
     linearise_orbit,
     settled_motion,
 )
+from analysis.linkages import linkage
 from analysis.mechanisms import FIVE_BAR
 from analysis.numerics.tracing import rebind_functions
 from analysis.periodic import find_orbit
@@ -213,6 +216,32 @@ def test_equilibria_of_table_3_1() -> None:
     for d2, du in ((1e-3, 0.0), (-1e-3, 0.0), (0.0, 1e-4), (0.0, -1e-4)):
         moved = replace(hanging, coordinates=hanging.coordinates + np.array([d2, du]))
         assert moved.potential > hanging.potential
+
+
+@pytest.mark.parametrize(("lower", "upper"), [(20.0, 10.0), (2.0, 3.0), (0.5, 0.5)])
+def test_all_equilibria_of_two_bars_that_stand_on_torsion_springs(lower: float, upper: float) -> None:
+    """They lean to either side; soft springs let them hang and wind up, more than a radian. Against roots of the moments."""
+    column = linkage("column", ground={"A": (0, 0)}, gravity=9.81)
+    for name, bar, mass in (("lower", ("A", "B"), 2.0), ("upper", ("B", "C"), 3.0)):
+        column.body(name, bar=bar, length=0.5, mass=mass, cog=(0.25, 0), inertia=mass * 0.5**2 / 12.0)
+    for name, at, stiffness, free in (("first", "A", lower, 0.5 * pi), ("second", "B", upper, 0.0)):
+        column.freedom(name, at, start=free)
+        column.spring(f"{name}Spring", at=at, stiffness=stiffness, free=free)
+    column.mechanism()
+
+    def moments(q: np.ndarray) -> list[float]:
+        second = 3.0 * 9.81 * 0.25 * np.cos(q[0] + q[1])
+        first = 9.81 * (2.0 * 0.25 + 3.0 * 0.5) * np.cos(q[0])
+        return [first + second + lower * (q[0] - 0.5 * pi), second + upper * q[1]]
+
+    turn = np.linspace(-2.0 * pi, 2.0 * pi, 17)
+    roots = [fsolve(moments, start, full_output=True)[::2] for start in product(turn, turn)]
+    wanted = [q for q, code in roots if code == 1 and np.abs(q).max() < 2.0 * pi and np.abs(moments(q)).max() < 1e-8]
+    found = find_equilibria("column")
+    assert np.abs([moments(one.coordinates) for one in found]).max() < 1e-8
+    assert len(wanted) > 2
+    for q in wanted:
+        assert min(np.abs(one.coordinates - q).max() for one in found) < 1e-6
 
 
 def test_equilibrium_with_the_crank_held() -> None:
