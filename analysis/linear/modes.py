@@ -63,8 +63,10 @@ class NaturalModes:
             f"{column.min():.6g} to {column.max():.6g}" for column in self._per_mode(self.frequencies / RAD_S_PER_RPM)
         )
         words = f"natural frequencies [rpm] {', '.join(spans)}" if self.frequencies.shape[1] else "nothing vibrates"
+        unstable = f", {self.unstable} of them unstable" if self.unstable else ""
         return (
-            f"<NaturalModes of {self.matrices.mechanism.name}: {words}; {len(self.equilibria)} positions of the cranks>"
+            f"<NaturalModes of {self.matrices.mechanism.name}: {words}; "
+            f"{len(self.equilibria)} positions of the cranks{unstable}>"
         )
 
     @property

@@ -149,6 +149,7 @@ def test_all_free_coordinates_are_in_the_equilibrium_of_their_start(tmp_path: Pa
         natural_frequency(case.parameters)
     upright = natural_modes(case.parameters, case.inputs, initial={"swing_angle": 0.0})
     assert upright.unstable == len(upright.equilibria) == 36
+    assert "36 of them unstable" in repr(upright)
     assert upright.coordinates == ("lift.position",)
 
 
