@@ -7,6 +7,7 @@ from collections.abc import Callable
 import pytest
 
 from analysis.studies.statements import HOLDS, Statement
+from analysis.studies.youssef.conclusions import decay
 from analysis.studies.youssef.conclusions_linear import introduction, linearised
 
 from .results import check, expected
@@ -25,3 +26,10 @@ def test_verdicts_on_the_linear_equation(part: Callable[[], tuple[Statement, ...
             HOLDS
         ]
         assert s.outcome == outcome, s.quote
+
+
+def test_the_transient_of_a_launch_is_no_decay() -> None:
+    """The ranges of u (cm) in the turns from the third on, by Lagrange's equation derived automatically and LSODA."""
+    earlier = (1.100, 1.100, 1.097, 1.097, 1.097, 1.097, 1.097, 1.097, 1.096, 1.095, 1.093)
+    later = (1.090, 1.085, 1.079, 1.069, 1.058, 1.043, 1.024, 1.002, 0.976, 0.948, 0.916)
+    assert decay(1e8, 1e6, 3e4) == pytest.approx(sum(later) / sum(earlier), abs=1e-3)

@@ -170,8 +170,11 @@ def _independent() -> tuple[int, float]:
     return int(np.linalg.matrix_rank(left)), float(np.log2(wide / narrow))
 
 
-def _joint_freedoms() -> tuple[int, ...]:
-    """Return the degrees of freedom of each joint 1 to 4 by eqs 1 to 4: the rank of the derivatives of the joint's matrix."""
+def _joint_freedoms() -> tuple[tuple[int, int], ...]:
+    """Return the rotations and translations of each joint 1 to 4 by eqs 1 to 4.
+
+    The rank of the derivatives of the joint's matrix counts both, that of the real parts the rotations alone.
+    """
 
     def ball(th: float, eta: float) -> Dual:
         return cast(Dual, about_k(th) @ about_j(eta))
@@ -185,7 +188,11 @@ def _joint_freedoms() -> tuple[int, ...]:
     ):
         ways = H * np.eye(len(at))
         slopes = [(joint(*(at + way)) - joint(*(at - way))) / (2.0 * H) for way in ways]
-        ranks.append(int(np.linalg.matrix_rank([np.append(x.real, x.dual) for x in slopes], tol=1e-6)))
+        rotations, both = (
+            int(np.linalg.matrix_rank(rows, tol=1e-6))
+            for rows in ([x.real.ravel() for x in slopes], [np.append(x.real, x.dual) for x in slopes])
+        )
+        ranks.append((rotations, both - rotations))
     return tuple(ranks)
 
 
@@ -428,18 +435,24 @@ def _detection() -> Statement:
 
 def _matrices() -> tuple[Statement, ...]:
     """Judge the freedoms of the joints, the matrices of eqs 1 to 4, and the operators of eqs 2a to 4a."""
-    words, counts = ("one and one", "three", "three", "one"), (2.0, 3.0, 3.0, 1.0)
-    joints = enumerate(zip(words, counts, _joint_freedoms()), start=1)
+    (turning, sliding), (before, _), (after, _), (_, guided) = _joint_freedoms()
+    joints = (
+        ("joint 1, rotations", "one", 1.0, turning),
+        ("joint 1, translations", "one", 1.0, sliding),
+        ("joint 2, rotations", "three", 3.0, before),
+        ("joint 3, rotations", "three", 3.0, after),
+        ("joint 4, translations", "one", 1.0, guided),
+    )
     return (
         Statement(
             "Fig. 3 is the generalized slider crank in which joint 1 is cylindrical with one translational and one "
             "rotational degrees of freedom, joints 2 and 3 are ball joints, each of which has three rotational "
             "degrees of freedom, and joint 4 is prismatic, exactly the same as in the planar case.",
             text("section 2.3, L213; eqs 1 to 4"),
-            "freedoms that the matrices of eqs 1 to 4 give each joint: the rank of their derivatives by its variables, in a "
-            "general position",
+            "freedoms that the matrices of eqs 1 to 4 give each joint: rotations, the rank of the derivatives of their real "
+            "parts by its variables, in a general position; translations, what the dual parts add to this rank",
             "none of a count",
-            tuple(replace(near(f"joint {n}", count, found, 0.0), stated=word) for n, (word, count, found) in joints),
+            tuple(replace(near(label, count, found, 0.0), stated=word) for label, word, count, found in joints),
             "erratum 1: eqs 2 and 3 give each ball joint two rotations",
         ),
         Statement(

@@ -182,7 +182,9 @@ def replacements() -> list[Judged]:
         for q in map(Joints._make, zip(*_clear_joints(case))):
             r = joint_rates(CRANK_AT_SPEED, q)
             a = joint_accelerations(CRANK_AT_SPEED, q, r)
-            pairs = zip(forward_momentum_rates(CRANK_AT_SPEED, b, q, r, a, 0.0), momentum_rates(b, q, r, a)[1:])
+            pairs = zip(
+                forward_momentum_rates(CRANK_AT_SPEED, b, q, r, a, 0.0), momentum_rates(CRANK_AT_SPEED, b, q, r, a)[1:]
+            )
             apart += [float(np.abs(forward.real - mixed.real).max()) for forward, mixed in pairs]
         found.append(nothing(f"57, 58 less 55, 56; {case.name}", max(apart), "lb"))
     return found
@@ -274,8 +276,7 @@ def _rate(h: Dual) -> Dual:
 
 def _momentum_rates() -> tuple[Statement, ...]:
     """Judge eqs 54 to 58 as rates of momenta, and the accuracy of the two paths."""
-    b, still = _unequal(), CRANK_AT_SPEED
-    r, unmoved = joint_rates(MOVING, GENERAL), joint_rates(still, GENERAL)
+    b, r = _unequal(), joint_rates(MOVING, GENERAL)
     # the rates of eqs 54 to 56, and the momenta whose rates they should be, a moment later
     seconds = joint_accelerations(MOVING, GENERAL, r)
     of_rates = Crank(CRANK, ROD, MOVING.acceleration, MOVING.shift_acceleration)
@@ -286,9 +287,9 @@ def _momentum_rates() -> tuple[Statement, ...]:
         "eq 55": (rod_rate, b.masses[1] * forward_rod_momentum(crank, b, q, rate)),
         "eq 56": (slider_rate, forward_slider_momentum(crank, b, q, rate, G3)),
     }
-    a = joint_accelerations(still, GENERAL, unmoved)
-    _, *moved = later(still, GENERAL, unmoved, a)
-    backward = zip(("eq 57", "eq 58"), momentum_rates(b, GENERAL, unmoved, a)[1:], momenta(still, b, *moved)[1:])
+    backward = zip(
+        ("eq 57", "eq 58"), momentum_rates(MOVING, b, GENERAL, r, seconds)[1:], momenta(crank, b, q, rate)[1:]
+    )
     return (
         Statement(
             "Differentiating forward path equations (49a), (50a) and (51a) with respect to time the following "
@@ -303,9 +304,9 @@ def _momentum_rates() -> tuple[Statement, ...]:
             "Now, backward path equations (52a) and (53a) are differentiated with respect to time. The following "
             "equations are replacements for equations (55) and (56) respectively.",
             text("section 2.8, eqs 57, 58, L848-857"),
-            "difference from the rates of eqs 52a, erratum 9 mended, and 53a in a general position, speed and shift constant, "
-            "g3 = 0; greatest difference of the force parts of 57 from 55 and of 58 from 56, where the momenta of the two "
-            f"paths are compared above; {DOTS}",
+            f"difference from the rates of eqs 52a, erratum 9 mended, and 53a in a general position {AT_RATES}, g3 = 0; "
+            "greatest difference of the force parts of 57 from 55 and of 58 from 56, where the momenta of the two paths are "
+            f"compared above; {DOTS}",
             ROUNDING,
             (*(nothing(label, difference(found, _rate(h)), "lb") for label, found, h in backward), *replacements()),
             PATHS,
@@ -324,12 +325,12 @@ def _momentum_rates() -> tuple[Statement, ...]:
 
 def _inertia() -> tuple[Statement, ...]:
     """Judge the inertia forces of eqs 59 to 61, and the balances of eqs 62 to 64 that they enter."""
-    b, still = _unequal(), CRANK_AT_SPEED
-    r = joint_rates(still, GENERAL)
-    a = joint_accelerations(still, GENERAL, r)
-    _, *moved = later(still, GENERAL, r, a)
-    accelerations = map(_rate, velocities(still, *moved))
-    printed = zip(velocities(still, GENERAL, r), momenta(still, b, GENERAL, r), momentum_rates(b, GENERAL, r, a))
+    b, r = _unequal(), joint_rates(MOVING, GENERAL)
+    a = joint_accelerations(MOVING, GENERAL, r)
+    accelerations = map(_rate, velocities(*later(MOVING, GENERAL, r, a)))
+    printed = zip(
+        velocities(MOVING, GENERAL, r), momenta(MOVING, b, GENERAL, r), momentum_rates(MOVING, b, GENERAL, r, a)
+    )
     inertia = [
         difference(inertia_force(*of), binor.rate(of[0], acceleration))
         for of, binor, acceleration in zip(printed, _binors(b), accelerations)
@@ -340,8 +341,8 @@ def _inertia() -> tuple[Statement, ...]:
             "link 2 (i.e. the connecting rod) relative to frame {3} and for link 3 (i.e. the slider) relative to "
             "frame {4} are derived.",
             text("section 2.8, eqs 59 to 61, L863-881"),
-            "difference from the rate of momentum in a frame at rest, by the binors, in a general position at constant speed "
-            "and shift, g3 = 0, by 52a with g2 for g3",
+            f"difference from the rate of momentum in a frame at rest, by the binors, in a general position {AT_RATES}, "
+            "g3 = 0, by 52a with g2 for g3",
             ROUNDING,
             tuple(nothing(label, size, "lb") for label, size in zip(("eq 59", "eq 60", "eq 61"), inertia)),
             "their sign is judged in the next row",

@@ -454,12 +454,12 @@ def momenta(c: Crank, b: Bodies, q: Joints, r: Joints, *, slip: bool = False) ->
     )
 
 
-def momentum_rates(b: Bodies, q: Joints, r: Joints, a: Joints) -> tuple[Dual, Dual, Dual]:
-    """Return the rates of the dual momenta by eqs 54, 57 and 58, for constant speed and shift."""
+def momentum_rates(c: Crank, b: Bodies, q: Joints, r: Joints, a: Joints) -> tuple[Dual, Dual, Dual]:
+    """Return the rates of the dual momenta by eqs 54, 57 and 58, with g3 = 0."""
     (_, m2, m3), (_, k2y, k2z), s3, c3 = b.masses, b.rod_squares, np.sin(q.th3), np.cos(q.th3)
     turned = a.s4 * c3 - r.s4 * s3 * r.th3
     return (
-        _dual([0.0, 0.0, 0.0], [0.0, 0.0, 0.0]),
+        crank_momentum(Crank(c.a1, c.a2, c.acceleration, c.shift_acceleration), b),
         _dual(
             [-m2 * (a.s4 * s3 + r.s4 * c3 * r.th3), m2 * (turned - b.g2 * a.th3), m2 * b.g2 * a.eta3],
             [0.0, -m2 * k2y * a.eta3, m2 * (b.g2 * turned - k2z * a.th3)],
@@ -478,8 +478,8 @@ def inertia_force(velocity: Dual, momentum: Dual, rate: Dual) -> Dual:
 
 
 def inertia_forces(c: Crank, b: Bodies, q: Joints, r: Joints, a: Joints) -> list[Dual]:
-    """Return the inertia forces f1, f2 and f3 by eqs 49a, 52a, 53a, 54 and 57 to 61, at constant speed and shift."""
-    return [inertia_force(*of) for of in zip(velocities(c, q, r), momenta(c, b, q, r), momentum_rates(b, q, r, a))]
+    """Return the inertia forces f1, f2 and f3 by eqs 49a, 52a, 53a, 54 and 57 to 61."""
+    return [inertia_force(*of) for of in zip(velocities(c, q, r), momenta(c, b, q, r), momentum_rates(c, b, q, r, a))]
 
 
 def joint_forces(

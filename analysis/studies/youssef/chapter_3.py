@@ -50,7 +50,7 @@ planes, and half the natural frequency near 27 rad/s are as described.
 
 **What does not.** Without a spring the slider does not drift along a line: the mean of the inertia forces pushes it
 towards the crank, the harder the nearer it comes, so that only with the two strongest dampers ten turns look straight;
-with these the transient is over in the first, and with the others the motion never gets steady. Gravity holds the drift
+with these there is no transient to be seen, and with the others the motion never gets steady. Gravity holds the drift
 back: without it, M is with these two greater by a quarter in size, and so not slightly reduced. With the softer springs
 the transient outlasts the first cycle. With the stiffest the least position comes at 5 deg, not at 0, u rises in the
 mean 1.6 times as steeply as with the softest, and the inertia force is greater than the spring's; a spring stiffer
@@ -160,12 +160,12 @@ class Drift:
 
     @property
     def transient(self) -> float:
-        """Number of turns until the motion is steady.
+        """Number of turns before the first that is like the next.
 
         If the motion never becomes steady, the turn at which the links become collinear, or else `DRAWN_TURNS`.
         """
         end = float(np.nan_to_num(self.collinear_turn, nan=DRAWN_TURNS))
-        return next((n for n in range(1, int(end)) if self.unsteadiness(n) <= ALIKE), end)
+        return next((n - 1 for n in range(1, int(end)) if self.unsteadiness(n) <= ALIKE), end)
 
 
 @cache
@@ -220,11 +220,12 @@ def drift_result() -> StudyResult:
             Statement(
                 "The first of these is a transient region of duration approximately two cycles.",
                 text("3.2.1, L1905-1907"),
-                "cycles until the motion, less the line from end to end of a cycle, changes to the next by at most "
-                f"{ALIKE:g} of its range, the rule for *steady*; if it never does, until {collinear}",
+                "cycles before the first whose motion, less the line from end to end of the cycle, changes to the next by at "
+                f"most {ALIKE:g} of its range, the rule for *steady*; if there is none, until {collinear}",
                 "half a cycle, the rule where whole cycles are counted",
                 tuple(near(_mu(mu), "2", run.transient, unit="cycles") for mu, run in runs.items()),
-                "with the two strongest dampers the second cycle is like the first, with the others it never gets steady",
+                "with the two strongest dampers the first cycle is already like the second, with the others it never gets "
+                "steady",
             ),
             Statement(
                 "The second consists of a steady periodic motion superimposed upon a drift.",

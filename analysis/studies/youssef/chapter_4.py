@@ -204,7 +204,8 @@ def compute_first() -> StudyResult:
                 text("4.5.1, L3139-3143"),
                 "distance below omega_k = 31.623 rad/s of the resonance by the right equation, the lower of the two "
                 "neighbouring roots of the determinant of (4.33); I4 of Figs 4.6 and 4.7",
-                f"above 0, and {100 * ABOUT:g} % of d, the rule for *in the region of*",
+                f"above 0, and {100 * ABOUT:g} % of d, the rule for *in the region of*; the one digit of d would allow more, "
+                "0.5",
                 (
                     *(
                         Case(
@@ -219,6 +220,7 @@ def compute_first() -> StudyResult:
                     ),
                     Case(label="third ratio", computed=None, why="the text does not name the third ratio"),
                 ),
+                f"at 1.5, which is ours, it would be {below[1.5]:.2f} rad/s",
             ),
             Statement(
                 "[T]heir deviation from the idealised spring-mass system accounts for the oscillating inertia of the rocker.",
@@ -241,8 +243,9 @@ def compute_first() -> StudyResult:
             Statement(
                 "THIS PROG. INV[E]STIG[A]TES RESONANCE IN PRES[EN]CE OF DAMPING",
                 listing("appendix 2, L8398"),
-                "speed and height of the peak of the first harmonic and height of the second's, by the listing and by the "
-                f"right equation; omega_c = {DAMPERS[0]:g} 1/s, the listing's first damper, its I4 = 1 and, for Fig 4.7, 0.5",
+                "*investigates* is read as finds right: speed and height of the peak of the first harmonic and height of the "
+                f"second's, by the listing and by the right equation; omega_c = {DAMPERS[0]:g} 1/s, the listing's first "
+                "damper, its I4 = 1 and, for Fig 4.7, 0.5",
                 f"{HALF_STEP:g} rad/s, half the step of the listing in speed; {ABOUT:g} of the amplitude, the rule for *about*",
                 listed_cases(),
                 "the force of the listing lacks most of its second harmonic (erratum 21)",

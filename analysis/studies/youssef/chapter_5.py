@@ -205,8 +205,8 @@ def judge_inertia(found: Mapping[str, Sequence[Region]]) -> tuple[Statement, ...
         Statement(
             "THIS PROG. INV[E]STIGATES STABILITY IN ABSENCE [O]F DAMPING",
             listing("appendix 3, L8638"),
-            "boundaries in lambda_k^2 by the listing to the letter, I4 = 0.5, at sigma3 = 1 of its 0.8 to 1.2, and by the "
-            "right linear equation",
+            "*investigates* is read as finds right: boundaries in lambda_k^2 by the listing to the letter, I4 = 0.5, at "
+            "sigma3 = 1 of its 0.8 to 1.2, and by the right linear equation",
             f"{SMALL:g} of the width by the latter, the rule for *small*: the next order, which (5.16) leaves out",
             tuple(
                 near(side, f"{stated:.6f}", computed, SMALL * linear.width)

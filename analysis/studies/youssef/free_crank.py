@@ -896,9 +896,9 @@ def stiff_phase_plane() -> StudyResult:
         Statement(
             "This suggests that the non-linearity is a second subharmonic resonance.",
             text("3.3, L2305-2307"),
-            "mean crank speed at which the second harmonic over the speed squared, with which its force grows, is greatest, "
-            "relative to half the natural frequency of the row before; higher harmonics relative to those by the equation "
-            "linear in u, as at Fig 3.13",
+            "*subharmonic* is read as a resonance of the second harmonic at half the natural frequency: mean crank speed at "
+            "which this harmonic over the speed squared, with which its force grows, is greatest, relative to that of the row "
+            "before; higher harmonics relative to those by the equation linear in u, as at Fig 3.13",
             f"{lowered:.3f} below 1, by which the damper of the thesis lowers the peak of an oscillator; more than "
             f"{1.0 + ALIKE:g}, the rule for *the same*, for a non-linearity",
             (

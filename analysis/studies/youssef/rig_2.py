@@ -296,7 +296,7 @@ def compute_harmonics() -> StudyResult:
                     for n, part in ((4, "quarter"), (3, "third"), (2, "half"))
                 ),
                 f"of these places only half with D, {natural_speed('D') / 2.0:.0f} rpm, lies within the range that was run "
-                "(L6808)",
+                "(L6808); how far the first harmonic is the motion is judged at L6814",
             ),
             Statement(
                 "The theoretical resonance curves corresponding to the second harmonic for both springs C and D are shown in "
