@@ -19,7 +19,7 @@ from numpy.typing import ArrayLike, NDArray
 from linkwork.errors import InputError, Interrupted
 
 from .outputs import output
-from .paths import first_line, is_number, read_text, write_completely
+from .paths import is_number, read_text, write_completely
 from .reader import unknown_name
 
 #: Count of numbers that are written in one block; Ctrl-C takes effect between blocks.
@@ -102,25 +102,6 @@ _FORMULA = tuple("=+-@")
 _SPLITTING = ',;\t"'
 
 
-def read_csv(path: str | Path) -> NDArray[np.float64]:
-    """Read the numbers of a CSV file below its header line, shape (rows, columns).
-
-    Raises
-    ------
-    InputError
-        If the file cannot be read, or has no numbers.
-    """
-    path = Path(path)
-    lines = [line.partition("#")[0] for line in read_text(path).splitlines()[1:]]
-    if not any(line.strip() for line in lines):
-        raise InputError(f"{path} has no numbers: it must have a header line and rows of numbers below it")
-    try:
-        rows: NDArray[np.float64] = np.loadtxt(lines, delimiter=",", ndmin=2)
-    except ValueError as error:
-        raise InputError(f"{path} cannot be read as CSV: {first_line(error)}") from error
-    return rows
-
-
 def read_columns(path: str | Path, names: Sequence[str | None]) -> list[NDArray[np.float64]]:
     """Read columns of numbers from a CSV file as they are; see `read_record`."""
     return read_record(path, names)[1]
@@ -158,9 +139,12 @@ def read_record(
     path = Path(path)
     text = read_text(path).splitlines()
     lines = [(i, line) for i, line in enumerate(text, 1) if line.partition("#")[0].strip()]
-    first = lines[0][1] if lines else ""
-    separator = next((mark for mark in ";\t" if mark in first), ",")
-    rows = [(number, next(csv.reader([line], delimiter=separator))) for number, line in lines]
+    unquoted = re.sub('"[^"]*"', "", lines[0][1]) if lines else ""
+    separator = next((mark for mark in ";\t" if mark in unquoted), ",")
+    try:
+        rows = [(number, next(csv.reader([line], delimiter=separator))) for number, line in lines]
+    except csv.Error as error:
+        raise InputError(f"{path} cannot be read: {error}") from error
 
     def as_number(cell: str) -> str:
         return cell.strip() if separator == "," else cell.strip().replace(",", ".")
@@ -189,7 +173,7 @@ def read_record(
     columns = np.empty((len(places), len(rows)))
     for i, (number, cells) in enumerate(rows):
         for column, place in zip(columns, places):
-            own = cells[place].strip() if place < len(cells) else ""
+            own = cells[place].partition("#")[0].strip() if place < len(cells) else ""
             if not is_number(as_number(own)):
                 raise InputError(f"{path}, line {number}, column {place + 1}: {own[:40]!r} is not a number")
             column[i] = float(as_number(own))

@@ -33,7 +33,6 @@ from analysis.files import (
     override,
     read,
     read_columns,
-    read_csv,
     read_rows,
     reader,
     save_array,
@@ -309,15 +308,13 @@ def test_a_file_that_was_there_stays_where_writing_is_interrupted(tmp_path, monk
     monkeypatch.setattr(tables, "_progress_bar", interrupted)
     with pytest.raises(Interrupted):
         write_csv(tmp_path / "x.csv", {"a": [1.0, 2.0]})
-    assert read_csv(tmp_path / "x.csv").tolist() == [[1.0]]
+    assert (tmp_path / "x.csv").read_text() == "a\n1\n"
     assert [path.name for path in tmp_path.iterdir()] == ["x.csv"]
 
 
 @pytest.mark.parametrize("text", ["", "t\n", "t,x\n", "t,x\n\n# 1,2\n"])
 def test_an_empty_csv_is_refused_in_a_sentence(tmp_path, text):
     (tmp_path / "x.csv").write_text(text)
-    with pytest.raises(InputError, match=r"x\.csv has no numbers: it must have a header line and rows"):
-        read_csv(tmp_path / "x.csv")
     with pytest.raises(InputError, match=r"x\.csv has no numbers: it must have rows of numbers"):
         read_columns(tmp_path / "x.csv", ("t",))
 
@@ -383,13 +380,24 @@ def test_csv_columns_of_different_length_are_refused(tmp_path):
 
 def test_csv_and_arrays_are_read_back(tmp_path):
     path = write_csv(tmp_path / "x.csv", {"a [m]": [0.1, 2.0], "fx, fy": [1.0, 1 / 3]})
-    assert read_csv(path).tolist() == [[0.1, 1.0], [2.0, 1 / 3]]
+    assert np.column_stack(read_columns(path, (None, None))).tolist() == [[0.1, 1.0], [2.0, 1 / 3]]
     assert float(read_rows(path)[1]["fx, fy"]) == 1 / 3
     assert np.array_equal(load_array(save_array(tmp_path / "deep" / "x.npy", [[1.0, 2.0]])), [[1.0, 2.0]])
     assert load_array(tmp_path / "none.npy") is load_array(tmp_path) is None
-    for unreadable in (read_csv, read_rows):
-        with pytest.raises(InputError, match="cannot be read"):
-            unreadable(tmp_path / "none.csv")
+    with pytest.raises(InputError, match="cannot be read"):
+        read_rows(tmp_path / "none.csv")
+
+
+@pytest.mark.parametrize("head", ["", "t,x # seconds\n", "# t,x\n"])
+def test_columns_need_no_header_line_and_may_have_comments(tmp_path, head):
+    (tmp_path / "x.csv").write_text(f"{head}0,1 # start\n\n# later\n2,3\n")
+    assert np.column_stack(read_columns(tmp_path / "x.csv", (None, None))).tolist() == [[0.0, 1.0], [2.0, 3.0]]
+
+
+def test_a_cell_of_any_length_is_a_sentence(tmp_path):
+    (tmp_path / "x.csv").write_text(f"t\n{'1' * 200_000}\n")
+    with pytest.raises(InputError, match=r"x\.csv cannot be read: field larger than field limit"):
+        read_columns(tmp_path / "x.csv", ("t",))
 
 
 def test_an_unknown_name_of_any_length_is_cut_in_the_message() -> None:
