@@ -17,14 +17,7 @@ from scipy.integrate import solve_ivp
 from analysis import Inputs, Trajectory, simulate
 from analysis.cli.common import say, show_table
 from analysis.slider_crank import QUANTITIES, ConstantShift, Tolerance, close, force_turn, joint_loads, monte_carlo
-from benchmarks.accuracy import (
-    ACCURACY,
-    SCIPY_METHODS,
-    TOLERANCES,
-    loosest_setting,
-    right_hand_side_time,
-    shortest_time,
-)
+from benchmarks import accuracy
 from benchmarks.ensembles import integration_time
 from linkwork.slider_crank import dynamics, published
 from linkwork.slider_crank.kinematics import coefficients, position
@@ -72,19 +65,19 @@ def error(position: np.ndarray) -> float:
 
 def runs() -> None:
     """Measure and print the runs in time."""
-    tolerance, off, _ = loosest_setting(
-        lambda tolerance: error(run_in_process(tolerance)["slider.position"]), TOLERANCES
+    tolerance, off, _ = accuracy.loosest_setting(
+        lambda tolerance: error(run_in_process(tolerance)["slider.position"]), accuracy.TOLERANCES
     )
-    whole = shortest_time(partial(run_in_process, tolerance), 30)
+    whole = accuracy.shortest_time(partial(run_in_process, tolerance), 30)
     inner = integration_time(partial(run_in_process, tolerance), 30)
     steps = int(run_in_process(tolerance).statistics["steps"])
     others = []
-    for method in SCIPY_METHODS:
-        choice = loosest_setting(lambda setting, m=method: error(run_scipy(m, setting)), TOLERANCES)
-        others.append((shortest_time(partial(run_scipy, method, choice.setting), 3), choice.error, method))
+    for method in accuracy.SCIPY_METHODS:
+        choice = accuracy.loosest_setting(lambda setting, m=method: error(run_scipy(m, setting)), accuracy.TOLERANCES)
+        others.append((accuracy.shortest_time(partial(run_scipy, method, choice.setting), 3), choice.error, method))
     best = min(others)
     show_table(
-        f"{STOP} s under {TORQUE:g} N.m, error at most {ACCURACY:g} of the stroke",
+        f"{STOP} s under {TORQUE:g} N.m, error at most {accuracy.ACCURACY:g} of the stroke",
         ("solver", "error", "time [ms]", "times the integration"),
         [
             (name, f"{e:.1e}", f"{1e3 * seconds:.3f}", f"{seconds / inner:.1f}")
@@ -115,11 +108,13 @@ def _dual_turn() -> None:
 def forces() -> None:
     """Measure all joint forces over a turn of 361 points by each method, and print the times."""
     shift = ConstantShift(INITIAL.shift_position)
-    arrays = shortest_time(lambda: force_turn(PARAMETERS, crank_speed=INITIAL.crank_speed, shift=shift, angles=ANGLES))
+    arrays = accuracy.shortest_time(
+        lambda: force_turn(PARAMETERS, crank_speed=INITIAL.crank_speed, shift=shift, angles=ANGLES)
+    )
     times = {
         "vector mechanics on arrays, force_turn": arrays,
-        "vector mechanics, the plant in plain Python": shortest_time(_scalar_turn),
-        "dual numbers: closure by Newton-Raphson, 17 equations": shortest_time(_dual_turn),
+        "vector mechanics, the plant in plain Python": accuracy.shortest_time(_scalar_turn),
+        "dual numbers: closure by Newton-Raphson, 17 equations": accuracy.shortest_time(_dual_turn),
     }
     show_table(
         "all joint forces at 361 angles",
@@ -151,7 +146,9 @@ def tolerances() -> None:
         ("motion of the slider, torque and every joint force", tuple(QUANTITIES)),
     ):
         found = []
-        seconds = shortest_time(lambda q=quantities, f=found: f.append(monte_carlo(turn, off, quantities=q)), 3)
+        seconds = accuracy.shortest_time(
+            lambda q=quantities, f=found: f.append(monte_carlo(turn, off, quantities=q)), 3
+        )
         spread, linear = found[0].spreads["slider.position"], found[0].estimates["slider.position"]
         ratio = float(spread.deviation[0] / linear.deviation[0])
         rows.append((name, f"{seconds:.2f}", f"{ratio:.5f}"))
@@ -164,8 +161,8 @@ def main() -> None:
     runs()
     x = (1.0, INITIAL.shift_position, INITIAL.crank_speed, 0.0, 0.0, 0.0)
     p, inputs = PARAMETERS.constants(), constant_torque(TORQUE)
-    fast = right_hand_side_time(PARAMETERS, Inputs(torque=TORQUE), np.tile(x, (20_000, 1)))
-    plain = shortest_time(lambda: [dynamics.derivative(x, inputs, p) for _ in range(1000)]) / 1000
+    fast = accuracy.right_hand_side_time(PARAMETERS, Inputs(torque=TORQUE), np.tile(x, (20_000, 1)))
+    plain = accuracy.shortest_time(lambda: [dynamics.derivative(x, inputs, p) for _ in range(1000)]) / 1000
     say(f"a right-hand side takes {1e9 * fast:.0f} ns compiled, {1e6 * plain:.1f} microseconds in plain Python")
     forces()
     tolerances()

@@ -13,23 +13,7 @@ import click
 from linkwork.errors import Interrupted
 
 from ..display import format_count
-from .common import (
-    INTERRUPTED,
-    SYNTHESIS,
-    changes,
-    check_kind,
-    console,
-    out_option,
-    output_folder,
-    plots_option,
-    print_error,
-    print_paths,
-    report_errors,
-    save_plot,
-    set_option,
-    show_table,
-    workers_options,
-)
+from . import common
 
 if TYPE_CHECKING:
     from ..synthesis import Assessment, MachineSpec, PinForces, Solution, TradeOff
@@ -47,22 +31,22 @@ def read_settings(settings: Sequence[str]) -> dict[str, Any]:
         except (ValueError, RecursionError):
             return text
 
-    return changes(settings, value, "constraints.largest_link='300 mm'")
+    return common.changes(settings, value, "constraints.largest_link='300 mm'")
 
 
 def leave_if_stopped(stopped: Interrupted | None, kept: str) -> None:
     """Exit with the code for an interruption, unless ``stopped`` is None; the sentence ``kept`` says what results are kept."""
     if stopped is not None:
-        print_error(f"{stopped}; {kept}")
-        sys.exit(INTERRUPTED)
+        common.print_error(f"{stopped}; {kept}")
+        sys.exit(common.INTERRUPTED)
 
 
 def search_options(command: Callable[..., Any]) -> Callable[..., Any]:
     """Add to a command the options that all commands with a search have: plots, folder, workers, seed, objective."""
     for option in (
-        plots_option,
-        out_option(help="Folder for the results."),
-        workers_options(),
+        common.plots_option,
+        common.out_option(help="Folder for the results."),
+        common.workers_options(),
         click.option(
             "--seed", type=click.IntRange(0), help="Seed of the search: the same seed gives the same linkages."
         ),
@@ -115,14 +99,14 @@ def print_solutions(
             for row, cell in zip(rows, cells):
                 row.append(cell)
     styles = [None if s.verdicts.sound and not what else "yellow" for s, what in zip(solutions, broken)]
-    show_table(title, headings, rows, words=("verdict", "also found", "violates"), styles=styles)
+    common.show_table(title, headings, rows, words=("verdict", "also found", "violates"), styles=styles)
 
 
 def print_best(best: Assessment) -> None:
     """Print the dimensions of a solution, and the effect of an error in each dimension."""
     head, *rows = best.dimensions
-    show_table("the first of them", head, rows, words=head[:1])
-    console.print(best.rounding, highlight=False, soft_wrap=True)
+    common.show_table("the first of them", head, rows, words=head[:1])
+    common.console.print(best.rounding, highlight=False, soft_wrap=True)
 
 
 def write_description_files(
@@ -174,13 +158,13 @@ def write_solution(
         written.append(write_tables(case, solution.run_case(make, title), head=make.describe_masses()))
     cut = plates(solution, width=make.width, thickness=make.thickness, pin=make.hole, title=title)
     written += [save_drawing(folder / f"best-plates.{ending}", cut) for ending in ("dxf", "svg")]
-    written += save_plot(plots, solution, folder / "best-linkage.png", title=title)
+    written += common.save_plot(plots, solution, folder / "best-linkage.png", title=title)
     if plots:
         forces = _forces(solution, make)
         sheet = figures.plot_sheet(best, forces, title=title, made=make.describe(forces=forces is not None))
         written.append(save_figure(sheet, folder / "best-sheet.pdf"))
     if animate:
-        with console.status("animating"):
+        with common.console.status("animating"):
             written.append(figures.animate(solution, folder / "best.gif", title=title))
     return written
 
@@ -199,10 +183,10 @@ def _forces(solution: Solution, make: MachineSpec) -> PinForces | None:
 
 @click.command()
 @click.argument("case", type=click.Path(exists=True, dir_okay=False))
-@set_option("constraints.largest_link='300 mm' or task.n=36; lists as in TOML")
+@common.set_option("constraints.largest_link='300 mm' or task.n=36; lists as in TOML")
 @search_options
 @click.option("--animate", is_flag=True, help="Write also a GIF of the first linkage over a turn.")
-@report_errors
+@common.report_errors
 def synthesize(
     case: str,
     settings: Sequence[str],
@@ -238,11 +222,11 @@ def synthesize(
     )
 
     overrides = read_overrides(settings, task__objective=objective, search__seed=seed, search__jobs=jobs)
-    check_kind(case, SYNTHESIS)
+    common.check_kind(case, common.SYNTHESIS)
     chosen = load_synthesis_case(case, overrides)
     stopped: Interrupted | None = None
     try:
-        result = chosen.solve(progress=console.is_terminal)
+        result = chosen.solve(progress=common.console.is_terminal)
     except SynthesisInterrupted as error:
         if error.synthesis is None:
             raise
@@ -252,7 +236,7 @@ def synthesize(
     print_solutions(title, result.solutions, forces)
     best = assess(result.best, chosen.worst_violation)
     print_best(best)
-    folder = output_folder(out)
+    folder = common.output_folder(out)
     carried = {"greatest pin force [N]": [force.greatest for force in forces]} if forces else {}
     written = [write_csv(folder / "solutions.csv", result.columns() | carried)]
     if has_cognates(result.best):
@@ -263,19 +247,19 @@ def synthesize(
         written.append(write_csv(folder / "cognates.csv", solution_columns(others)))
     written += write_solution(best, folder, chosen.title, make=chosen.make, plots=plots, animate=animate)
     written += write_linkages(result.solutions, folder, chosen.title, make=chosen.make)
-    written += save_plot(plots, result, folder / "alternatives.png", title=chosen.title)
-    print_paths(written)
+    written += common.save_plot(plots, result, folder / "alternatives.png", title=chosen.title)
+    common.print_paths(written)
     if best.poor:
-        print_error(f"note: {best.poor}")
+        common.print_error(f"note: {best.poor}")
     if not result.best.verdicts.sound:
-        print_error(f"note: none of them is free of defects: the first has {result.best.verdicts}")
+        common.print_error(f"note: none of them is free of defects: the first has {result.best.verdicts}")
     leave_if_stopped(stopped, "the best so far is kept")
     try:
-        traded = chosen.trade(progress=console.is_terminal)
+        traded = chosen.trade(progress=common.console.is_terminal)
     except TradeOffInterrupted as error:
         traded, stopped = error.trade_off, error
     if traded is not None:
-        print_paths(_trade_off(traded, chosen.title, folder, plots))
+        common.print_paths(_trade_off(traded, chosen.title, folder, plots))
     leave_if_stopped(stopped, "what there is is kept")
 
 
@@ -285,13 +269,13 @@ def _trade_off(traded: TradeOff, title: str, folder: Path, plots: bool) -> list[
     task = next((s.task for s in traded.solutions if s is not None), None)
     what = OVER[traded.over].name
     if task is None:
-        print_error(f"note: no linkage keeps any of the limits of the {what}")
+        common.print_error(f"note: no linkage keeps any of the limits of the {what}")
         return []
     headings = ("limit", *quality_headings(task)[::2])
     rows = [
         (format_limit(traded.over, float(limit)), *(("no linkage", "") if s is None else quality_cells(s)[::2]))
         for limit, s in zip(traded.limit, traded.solutions)
     ]
-    show_table(f"{title}: error against the {what}", headings, rows)
+    common.show_table(f"{title}: error against the {what}", headings, rows)
     written = [traded.to_csv(folder / "trade-off.csv")]
-    return written + save_plot(plots, traded, folder / "trade-off.png", title=title)
+    return written + common.save_plot(plots, traded, folder / "trade-off.png", title=title)

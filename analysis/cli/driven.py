@@ -15,17 +15,7 @@ from linkwork.errors import InputError
 
 from ..mechanisms import PUBLISHED, find_mechanism
 from ..units import display_scale
-from .common import (
-    ENDED_EARLY,
-    INTERRUPTED,
-    case_options,
-    chosen_case,
-    out_option,
-    print_error,
-    print_paths,
-    quantity,
-    report_errors,
-)
+from . import common
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -50,9 +40,9 @@ class CaseChoice:
         from ..periodic import NothingFreeError, VaryingInputError, steady_drive
 
         speed = speed or self.speed
-        value = None if speed is None else quantity(speed, "rad/s", "--speed")
+        value = None if speed is None else common.quantity(speed, "rad/s", "--speed")
         if value is not None and self.case.inputs.torque is not None:
-            print_error("note: the speed is prescribed; the case's torque is left out")
+            common.print_error("note: the speed is prescribed; the case's torque is left out")
         try:
             drive = steady_drive(self.case.parameters, self.case.inputs, self.case.initial, speed=value)
             # raises an error if no degree of freedom is free
@@ -76,7 +66,7 @@ class CaseChoice:
         """
         from ..periodic import rest_guess
 
-        speed = None if self.guess_speed is None else quantity(self.guess_speed, "rad/s", "--guess-speed")
+        speed = None if self.guess_speed is None else common.quantity(self.guess_speed, "rad/s", "--guess-speed")
         if drive.speed_drive and speed is not None:
             raise click.UsageError("--guess-speed is for a case driven by a torque: here the speed is prescribed")
         other = ", or --guess-speed '300 rpm'"
@@ -84,17 +74,17 @@ class CaseChoice:
 
     def finish(self, written: Sequence[Path], problems: Sequence[str], *, interrupted: bool = False) -> None:
         """Print written files and problems; exit with an error code if there are problems or the command was interrupted."""
-        print_paths(written)
+        common.print_paths(written)
         for problem in problems:
-            print_error(f"note: {problem}")
+            common.print_error(f"note: {problem}")
         if interrupted or problems:
-            sys.exit(INTERRUPTED if interrupted else ENDED_EARLY)
+            sys.exit(common.INTERRUPTED if interrupted else common.ENDED_EARLY)
 
 
 def add_case_options(command: Callable[..., None]) -> Callable[..., None]:
     """Add to a command the options that select a case and its drive; the command receives them as one `CaseChoice`."""
 
-    @report_errors
+    @common.report_errors
     @wraps(command)
     def run_with_case(
         case: str | None,
@@ -105,15 +95,15 @@ def add_case_options(command: Callable[..., None]) -> Callable[..., None]:
         out: str,
         **options: Any,
     ) -> None:
-        chosen = chosen_case(case, published, settings)
+        chosen = common.chosen_case(case, published, settings)
         stem = Path(case).stem if case else str(published)
         command(CaseChoice(case=chosen, stem=stem, speed=speed, guess_speed=guess_speed, folder=Path(out)), **options)
 
     for option in (
-        out_option(help="Folder for the results."),
+        common.out_option(help="Folder for the results."),
         click.option("--guess-speed", metavar="SPEED", help="Guess of the crank speed, for a case driven by a torque."),
         click.option("--speed", metavar="SPEED", help="Prescribe this crank speed instead of the case's drive."),
-        case_options(PUBLISHED),
+        common.case_options(PUBLISHED),
     ):
         run_with_case = option(run_with_case)
     return run_with_case

@@ -7,33 +7,21 @@ from collections.abc import Sequence
 
 import click
 
+from . import common
 from .codes import ENDED_EARLY
-from .common import (
-    SYNTHESIS,
-    check_kind,
-    console,
-    out_option,
-    output_folder,
-    plots_option,
-    print_error,
-    print_paths,
-    report_errors,
-    save_plot,
-    set_option,
-)
 from .design import print_best, print_solutions, read_overrides, write_description_files, write_linkages
 
 
 @click.command()
 @click.argument("case", type=click.Path(exists=True, dir_okay=False))
-@set_option("task.n=4")
+@common.set_option("task.n=4")
 @click.option(
     "--crank-phase", metavar="ANGLE", help="For a function: the crank's angle from the ground link at rotation 0."
 )
 @click.option("--count", type=click.IntRange(1), default=6, help="Number of linkages to report for four poses.")
-@plots_option
-@out_option(help="Folder for the results.")
-@report_errors
+@common.plots_option
+@common.out_option(help="Folder for the results.")
+@common.report_errors
 def exact(case: str, settings: Sequence[str], crank_phase: str | None, count: int, plots: bool, out: str) -> None:
     """Find every four-bar that does exactly what a CASE file (TOML or JSON) asks for at a few points.
 
@@ -60,15 +48,15 @@ def exact(case: str, settings: Sequence[str], crank_phase: str | None, count: in
         solution_columns,
     )
 
-    check_kind(case, SYNTHESIS)
+    common.check_kind(case, common.SYNTHESIS)
     chosen = load_synthesis_case(case, read_overrides(settings))
     found: Generators | Guidance | GuidanceMap
     if isinstance(chosen.task, RockerFunction):
         found = function_generators(chosen.task, crank_phase=crank_phase)
     else:
         found = guidance(chosen.task, count)
-    console.print(f"{chosen.title}: {found.describe()}", highlight=False, soft_wrap=True)
-    folder = output_folder(out)
+    common.console.print(f"{chosen.title}: {found.describe()}", highlight=False, soft_wrap=True)
+    folder = common.output_folder(out)
     written = []
     if found.solutions:
         print_solutions(f"{chosen.title}: in closed form", found.solutions)
@@ -82,10 +70,10 @@ def exact(case: str, settings: Sequence[str], crank_phase: str | None, count: in
             )
             written += write_linkages(found.solutions, folder, chosen.title, make=chosen.make)
     if not isinstance(found, Generators):
-        written += save_plot(plots, found, folder / "poses.png", title=chosen.title)
+        written += common.save_plot(plots, found, folder / "poses.png", title=chosen.title)
     if found.solutions:
-        written += save_plot(plots, found.solutions[0], folder / "best-linkage.png", title=chosen.title)
-    print_paths(written)
+        written += common.save_plot(plots, found.solutions[0], folder / "best-linkage.png", title=chosen.title)
+    common.print_paths(written)
     if not any(s.verdicts.sound for s in found.solutions):
-        print_error(f"note: {found.describe()}")
+        common.print_error(f"note: {found.describe()}")
         sys.exit(ENDED_EARLY)

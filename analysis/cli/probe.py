@@ -11,17 +11,7 @@ import click
 from ..files import write_tables, write_text
 from ..probe import CRASH, SEVERITIES, WRONG, Finding, Report, replay
 from ..probe import probe as probe_fmu
-from .common import (
-    CHECK_FAILED,
-    check_place,
-    console,
-    force_option,
-    print_error,
-    print_paths,
-    report_errors,
-    say,
-    show_table,
-)
+from . import common
 
 
 @click.command()
@@ -46,8 +36,10 @@ from .common import (
 @click.option(
     "--check", "checks", multiple=True, metavar="CHECK", help="Run only this check; can be given several times."
 )
-@click.option("--out", type=click.Path(dir_okay=False), callback=check_place, help="File for the report: .md or .json.")
-@force_option
+@click.option(
+    "--out", type=click.Path(dir_okay=False), callback=common.check_place, help="File for the report: .md or .json."
+)
+@common.force_option
 @click.option("--strict", is_flag=True, help="Fail also on questionable findings.")
 @click.option(
     "--replay",
@@ -55,7 +47,7 @@ from .common import (
     metavar="CASE",
     help="Run one case of a report again and show its calls, such as 0/cs/forbidden/12.",
 )
-@report_errors
+@common.report_errors
 def probe(
     fmu: str,
     calls: int,
@@ -82,18 +74,18 @@ def probe(
     if case is not None:
         lines, findings = replay(fmu, case, hang=hang)
         for line in lines:
-            say(line)
+            common.say(line)
     else:
-        with console.status("probing") as status:
+        with common.console.status("probing") as status:
             report = probe_fmu(
                 fmu, calls=calls, seed=seed, seconds=seconds, interface=interface, hang=hang, checks=checks,
                 progress=lambda what: status.update(f"probing {what}"),
             )  # fmt: skip
         findings = report.findings
         if out is not None:
-            print_paths([_write(report, Path(out))])
+            common.print_paths([_write(report, Path(out))])
         rows = [(o.check, o.interface, str(o.cases), str(o.calls), f"{o.seconds:.1f}", o.said) for o in report.outcomes]
-        show_table(
+        common.show_table(
             f"Probe of {report.fmu}",
             ("check", "interface", "cases", "calls", "s", "result"),
             rows,
@@ -103,9 +95,9 @@ def probe(
     failing = SEVERITIES if strict else (CRASH, WRONG)
     failed = [finding for finding in findings if finding.severity in failing]
     if failed:
-        print_error(f"probe failed: {len(failed)} findings", "red")
-        sys.exit(CHECK_FAILED)
-    say("no finding" if not findings else f"{len(findings)} questionable findings, nothing wrong")
+        common.print_error(f"probe failed: {len(failed)} findings", "red")
+        sys.exit(common.CHECK_FAILED)
+    common.say("no finding" if not findings else f"{len(findings)} questionable findings, nothing wrong")
 
 
 def _write(report: Report, path: Path) -> Path:
@@ -127,4 +119,6 @@ def _show(findings: Sequence[Finding]) -> None:
         )
         rows.append((severity, str(len(members)), about, members[0].replay))
     if rows:
-        show_table("Findings", ("severity", "kinds", "what", "replay"), rows, words=("severity", "what", "replay"))
+        common.show_table(
+            "Findings", ("severity", "kinds", "what", "replay"), rows, words=("severity", "what", "replay")
+        )

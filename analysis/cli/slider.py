@@ -14,18 +14,7 @@ from rich.table import Table
 
 from linkwork.errors import Interrupted
 
-from .common import (
-    SLIDER_MOTION,
-    check_kind,
-    console,
-    output_folder,
-    print_error,
-    print_paths,
-    report_errors,
-    save_plot,
-    set_option,
-    show_table,
-)
+from . import common
 from .design import leave_if_stopped, read_overrides, search_options, write_description_files, write_linkages
 
 if TYPE_CHECKING:
@@ -36,12 +25,12 @@ if TYPE_CHECKING:
 
 @click.command("slider-motion")
 @click.argument("case", type=click.Path(exists=True, dir_okay=False))
-@set_option("slider.stroke='30 mm' or slider.harmonics='[1, 2, 3]'")
+@common.set_option("slider.stroke='30 mm' or slider.harmonics='[1, 2, 3]'")
 @click.option(
     "--harmonics", type=click.IntRange(0), help="Number of harmonics of the slider's motion, instead of the case's."
 )
 @search_options
-@report_errors
+@common.report_errors
 def slider_motion(
     case: str,
     settings: Sequence[str],
@@ -71,21 +60,23 @@ def slider_motion(
     overrides = read_overrides(
         settings, slider__harmonics=harmonics, task__objective=objective, search__seed=seed, search__jobs=jobs
     )
-    check_kind(case, SLIDER_MOTION, settings=overrides)
+    common.check_kind(case, common.SLIDER_MOTION, settings=overrides)
     chosen = load_slider_case(case, overrides)
     solution, stopped = _find_motion(chosen) if chosen.strategy is None else _find_strategy(chosen)
-    folder = output_folder(out)
+    folder = common.output_folder(out)
     written = _write_solution(solution, folder, chosen, plots)
     pivot = solution.linkage.pivot
     if stopped is None and chosen.drive is not None:
         if isinstance(pivot, SecondCrank):
-            print_error("note: no forces are computed of a five-bar with a geared second crank: run its linkage.toml")
+            common.print_error(
+                "note: no forces are computed of a five-bar with a geared second crank: run its linkage.toml"
+            )
         else:
             written += _dynamics(chosen, solution, folder, plots)
     elif isinstance(pivot, SliderMotion):
         turn = np.linspace(0.0, 2.0 * np.pi, 720, endpoint=False)
         written.append(write_csv(folder / "motion.csv", _motion_columns(pivot.series, turn)))
-    print_paths(written)
+    common.print_paths(written)
     leave_if_stopped(stopped, "the best so far is kept")
 
 
@@ -95,7 +86,7 @@ def _find_strategy(chosen: SliderCase) -> tuple[Any, Interrupted | None]:
 
     stopped = None
     try:
-        found = chosen.find_simplest(progress=console.is_terminal)
+        found = chosen.find_simplest(progress=common.console.is_terminal)
     except StrategyInterrupted as error:
         if error.strategy is None:
             raise
@@ -103,9 +94,11 @@ def _find_strategy(chosen: SliderCase) -> tuple[Any, Interrupted | None]:
     headings = ("mechanism", "what came of it")
     rows = [(step.mechanism, step.reason) for step in found.steps]
     styles = ["green" if found.met and step is found.chosen else None for step in found.steps]
-    show_table(f"{chosen.synthesis.title}: the simplest mechanism", headings, rows, words=headings, styles=styles)
+    common.show_table(
+        f"{chosen.synthesis.title}: the simplest mechanism", headings, rows, words=headings, styles=styles
+    )
     if not found.met:
-        print_error(f"note: none meets the tolerance; the nearest is kept: {found.chosen.mechanism}")
+        common.print_error(f"note: none meets the tolerance; the nearest is kept: {found.chosen.mechanism}")
     return found.chosen.solution, stopped
 
 
@@ -114,11 +107,11 @@ def _find_motion(chosen: SliderCase) -> tuple[Any, Interrupted | None]:
     from ..synthesis import SynthesisInterrupted
 
     stopped = None
-    four_bar = chosen.find_four_bar(progress=console.is_terminal)
+    four_bar = chosen.find_four_bar(progress=common.console.is_terminal)
     found = [four_bar]
     for harmonics in chosen.slider.harmonics:
         try:
-            result = chosen.find_motion(four_bar, harmonics, tuple(found[1:]), progress=console.is_terminal)
+            result = chosen.find_motion(four_bar, harmonics, tuple(found[1:]), progress=common.console.is_terminal)
         except SynthesisInterrupted as error:
             stopped = error
             if error.synthesis is None:
@@ -163,7 +156,7 @@ def _print_motions(title: str, solutions: Sequence[Solution]) -> None:
         rows.append((words, *quality_cells(s)[::2], *motion, format_transmission(s.verdicts)))
     styles = [None if s.verdicts.sound else "yellow" for s in solutions]
     title = f"{title}: {quality_name(task)}"
-    show_table(title, headings, rows, words=("pivot",), unwrapped=(headings[0], headings[-1]), styles=styles)
+    common.show_table(title, headings, rows, words=("pivot",), unwrapped=(headings[0], headings[-1]), styles=styles)
 
 
 def _write_solution(solution: Solution, folder: Path, case: SliderCase, plots: bool) -> list[Path]:
@@ -174,7 +167,7 @@ def _write_solution(solution: Solution, folder: Path, case: SliderCase, plots: b
         make = replace(make, speed=case.drive.speed)
     written = write_description_files(assess(solution), folder, title, curve="curve", text="report", drawn="linkage")
     written += write_linkages([solution], folder, title, make=make)
-    return written + save_plot(plots, solution, folder / "linkage.png", title=title)
+    return written + common.save_plot(plots, solution, folder / "linkage.png", title=title)
 
 
 def _motion_columns(series: FourierSeries, rotation: Any) -> dict[str, Any]:
@@ -217,20 +210,20 @@ def _dynamics(chosen: SliderCase, solution: Solution, folder: Path, plots: bool)
             head="a controller lets the slider follow its motion: linkwork system run system.toml",
         ),
     ]
-    written += save_plot(plots, drive, folder / "motion.png", title=title)
+    written += common.save_plot(plots, drive, folder / "motion.png", title=title)
     if chosen.tracking is not None:
         written += _tracking(chosen, drive, folder, plots)
     return written
 
 
 def _print_rows(title: str, rows: Sequence[tuple[str, str]]) -> None:
-    console.print(title, style="italic", highlight=False, markup=False, soft_wrap=True)
+    common.console.print(title, style="italic", highlight=False, markup=False, soft_wrap=True)
     grid = Table(show_header=False)
     grid.add_column()
     grid.add_column(justify="right")
     for row in rows:
         grid.add_row(*row)
-    console.print(grid)
+    common.console.print(grid)
 
 
 def _print_drive(title: str, drive: SliderDrive) -> None:
@@ -256,7 +249,7 @@ def _tracking(chosen: SliderCase, drive: SliderDrive, folder: Path, plots: bool)
     run = chosen.run_tracking(drive)
     loop = run.loop
     if loop.status:
-        print_error(f"note: the run under control ended early: {loop.message}")
+        common.print_error(f"note: the run under control ended early: {loop.message}")
     else:
         m = run.metrics()
         rows = [
@@ -281,4 +274,4 @@ def _tracking(chosen: SliderCase, drive: SliderDrive, folder: Path, plots: bool)
         "power [W]": run.power,
     }
     written = [write_csv(folder / "tracking.csv", columns)]
-    return written + save_plot(plots, run, folder / "tracking.png")
+    return written + common.save_plot(plots, run, folder / "tracking.png")

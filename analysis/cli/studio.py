@@ -14,19 +14,7 @@ from typing import Any
 import click
 
 from ..mechanisms import PUBLISHED
-from .common import (
-    PARAMETERS,
-    RUN,
-    changes,
-    check_kind,
-    check_place,
-    force_option,
-    number_or_text,
-    print_error,
-    report_errors,
-    say,
-    set_option,
-)
+from . import common
 
 #: Environment variables; one of them is set if there is a screen or if the user has chosen a browser.
 _SCREENS = ("DISPLAY", "WAYLAND_DISPLAY", "BROWSER")
@@ -37,7 +25,7 @@ _SCREENS = ("DISPLAY", "WAYLAND_DISPLAY", "BROWSER")
 @click.option(
     "--out",
     type=click.Path(dir_okay=False),
-    callback=check_place,
+    callback=common.check_place,
     help="Write the page to this file, and serve nothing.",
 )
 @click.option("--browser/--no-browser", default=True, help="Whether to open a browser.")
@@ -48,9 +36,9 @@ _SCREENS = ("DISPLAY", "WAYLAND_DISPLAY", "BROWSER")
     show_default=False,
     help="Port on which the page is served; by default a free one.",
 )
-@set_option("slider.stiffness='2e6 dyn/cm' or drive.speed='300 rpm'; bare numbers are in SI")
-@force_option
-@report_errors
+@common.set_option("slider.stiffness='2e6 dyn/cm' or drive.speed='300 rpm'; bare numbers are in SI")
+@common.force_option
+@common.report_errors
 def studio(what: str | None, out: str | None, browser: bool, port: int, settings: Sequence[str]) -> None:
     """Open the web page on which a mechanism moves and can be dragged.
 
@@ -68,22 +56,22 @@ def studio(what: str | None, out: str | None, browser: bool, port: int, settings
     from ..files import write_text
     from ..studio import make_page
 
-    page = make_page(_state(what, changes(settings, number_or_text, "slider.stiffness='2e6 dyn/cm'")))
+    page = make_page(_state(what, common.changes(settings, common.number_or_text, "slider.stiffness='2e6 dyn/cm'")))
     if out is not None:
-        say(f"wrote {write_text(out, page)}")
+        common.say(f"wrote {write_text(out, page)}")
         return
     from ..server import Server
 
     server = Server(page, port)
     signal.signal(signal.SIGTERM, lambda *_: sys.exit(0))
     server.worker.start()
-    say(f"the studio is at {server.address}")
-    print_error("it is served to this machine alone; Ctrl-C stops it")
+    common.say(f"the studio is at {server.address}")
+    common.print_error("it is served to this machine alone; Ctrl-C stops it")
     if browser:
         # a browser in a terminal returns only when the user closes it, and the page must be served until then
         threading.Thread(target=_open, args=(server.address,), daemon=True).start()
     server.run()
-    print_error("the studio is closed")
+    common.print_error("the studio is closed")
 
 
 def _open(address: str) -> None:
@@ -93,7 +81,9 @@ def _open(address: str) -> None:
     """
     screen = sys.platform in ("win32", "darwin") or any(os.environ.get(name) for name in _SCREENS)
     if not (screen and webbrowser.open(address)):
-        print_error("note: there is no browser here: open the address in one, or write the page as a file with --out")
+        common.print_error(
+            "note: there is no browser here: open the address in one, or write the page as a file with --out"
+        )
 
 
 def _state(what: str | None, overrides: dict[str, Any]) -> dict[str, Any]:
@@ -109,7 +99,7 @@ def _state(what: str | None, overrides: dict[str, Any]) -> dict[str, Any]:
         return page_state(read_case({"published": what}, folder=Path.cwd(), title=what, overrides=overrides))
     if not Path(what).is_file():
         raise unknown_name(what, PUBLISHED, f"file or published set {what!r}")
-    check_kind(what, RUN, PARAMETERS)
+    common.check_kind(what, common.RUN, common.PARAMETERS)
     tables = read_tables(what)
     if "run" not in tables and not any(name.startswith("run.") for name in overrides):
         # a file of parameters does not say how long a run is

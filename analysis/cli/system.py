@@ -7,20 +7,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from . import Commands
-from .common import (
-    ENDED_EARLY,
-    out_option,
-    output_folder,
-    plot_option,
-    print_error,
-    print_paths,
-    quantity,
-    report_errors,
-    save_plot,
-    say,
-    show_table,
-)
+from . import Commands, common
 
 if TYPE_CHECKING:
     from ..systems import Wiring
@@ -63,7 +50,7 @@ def _wiring(file: str, fmi: str = "2") -> Wiring:
 @system.command()
 @click.argument("name", required=False)
 @click.argument("file", required=False, type=click.Path(dir_okay=False))
-@report_errors
+@common.report_errors
 def new(name: str | None, file: str | None) -> None:
     """Write the description of the example system NAME; without NAME list the example systems."""
     from ..files import read_tables, unknown_name, write_text
@@ -71,7 +58,7 @@ def new(name: str | None, file: str | None) -> None:
 
     known = library()
     if name is None:
-        show_table(
+        common.show_table(
             "systems",
             ("name", "what"),
             [(n, read_tables(p)["title"]) for n, p in known.items()],
@@ -81,19 +68,19 @@ def new(name: str | None, file: str | None) -> None:
     if name not in known:
         raise unknown_name(name, known, f"system {name!r}")
     path = write_text(file or f"{name}.toml", known[name].read_text(encoding="utf-8"))
-    say(f"wrote {path}: linkwork system run {path}")
+    common.say(f"wrote {path}: linkwork system run {path}")
 
 
 @system.command()
 @_FILE
 @_FMI
-@out_option(help="Folder for the archive.")
-@report_errors
+@common.out_option(help="Folder for the archive.")
+@common.report_errors
 def build(file: str, fmi: str, out: str) -> None:
     """Build the FMUs of a system and write it as an SSP 1.0 archive; with --fmi 3 as SSP 2.0."""
     from ..systems import write_ssp
 
-    say(f"wrote {write_ssp(_wiring(file, fmi), output_folder(out) / f'{Path(file).stem}.ssp')}")
+    common.say(f"wrote {write_ssp(_wiring(file, fmi), common.output_folder(out) / f'{Path(file).stem}.ssp')}")
 
 
 @system.command()
@@ -109,9 +96,9 @@ def build(file: str, fmi: str, out: str) -> None:
     help="Choose the steps so that the coupling brings in about this share of the power, such as 1e-3.",
 )
 @_FMI
-@out_option()
-@plot_option
-@report_errors
+@common.out_option()
+@common.plot_option
+@common.report_errors
 def run(
     file: str,
     step: str | None,
@@ -131,8 +118,8 @@ def run(
         _wiring(file, fmi),
         coupling=coupling,
         share=share,
-        step=None if step is None else quantity(step, "s", "--step"),
-        stop_time=None if stop is None else quantity(stop, "s", "--stop"),
+        step=None if step is None else common.quantity(step, "s", "--step"),
+        stop_time=None if stop is None else common.quantity(stop, "s", "--stop"),
         progress=True,
     )
     rows = []
@@ -141,32 +128,32 @@ def run(
         values = factor * found.unwrapped(name)
         rows.append((name, unit, f"{values.min():.6g}", f"{values.max():.6g}", f"{values[-1]:.6g}"))
     title = f"{found.title}  ({len(found)} communication points to t = {found.time[-1]:g} s, coupling: {coupling})"
-    show_table(title, ("output", "unit", "least", "greatest", "at the end"), rows, words=("output", "unit"))
+    common.show_table(title, ("output", "unit", "least", "greatest", "at the end"), rows, words=("output", "unit"))
     for note in found.notes:
-        print_error(f"note: {note}")
+        common.print_error(f"note: {note}")
     if found.powers:
         advice = found.suggested_step(1e-3)
         then = f"; 0.1 % takes steps of about {1e3 * advice:.2g} ms" if advice is not None and share is None else ""
-        say(
+        common.say(
             f"work that the coupling brought in: {100.0 * found.added_work():.2g} % of what went through the power "
             f"bonds{then}"
         )
-    folder, stem = output_folder(out), Path(file).stem
+    folder, stem = common.output_folder(out), Path(file).stem
     residuals = {f"power residual of {name}": power for name, power in found.powers.items()}
-    say(f"wrote {write_csv(folder / f'{stem}.csv', {'time': found.time, **found.values, **residuals})}")
-    print_paths(save_plot(plot, found, folder / f"{stem}.png"))
+    common.say(f"wrote {write_csv(folder / f'{stem}.csv', {'time': found.time, **found.values, **residuals})}")
+    common.print_paths(common.save_plot(plot, found, folder / f"{stem}.png"))
     if found.status:
-        print_error(found.message)
-        raise SystemExit(ENDED_EARLY)
+        common.print_error(found.message)
+        raise SystemExit(common.ENDED_EARLY)
 
 
 @system.command()
 @_FILE
 @click.option("--stop", help="End of the runs, such as '0.2 s'.")
 @click.option("--decades", type=click.IntRange(1, 4), default=2, help="Decades of communication steps.")
-@out_option(help="Folder for the plot.")
-@plot_option
-@report_errors
+@common.out_option(help="Folder for the plot.")
+@common.plot_option
+@common.report_errors
 def check(file: str, stop: str | None, decades: int, out: str, plot: bool) -> None:
     """Check the connections of a system. For a description also measure how the error of each coupling depends on the step.
 
@@ -177,20 +164,20 @@ def check(file: str, stop: str | None, decades: int, out: str, plot: bool) -> No
 
     wiring = _wiring(file)
     bonds = wiring.bonds()
-    say(
+    common.say(
         f"{wiring.title}: {len(wiring.parts)} parts, {len(wiring.connections)} connections, {len(bonds)} power "
         f"bond{'' if len(bonds) == 1 else 's'}; all match"
     )
     for bond in bonds:
-        say(f"power bond {bond.effort} -> {bond.effort_to}, back {bond.flow} -> {bond.flow_to}")
+        common.say(f"power bond {bond.effort} -> {bond.effort_to}, back {bond.flow} -> {bond.flow_to}")
     for note in wiring.notes():
-        print_error(f"note: {note}")
+        common.print_error(f"note: {note}")
     if Path(file).suffix == ".ssp":
         return
     found = convergence(
         load_system(file),
         decades=decades,
-        stop_time=None if stop is None else quantity(stop, "s", "--stop"),
+        stop_time=None if stop is None else common.quantity(stop, "s", "--stop"),
         progress=True,
     )
     rows = [
@@ -198,32 +185,34 @@ def check(file: str, stop: str | None, decades: int, out: str, plot: bool) -> No
         for n, step in enumerate(found.steps)
     ]
     rows.append(("order", *(f"{found.order(way):.2f}" for way in found.errors)))
-    show_table("greatest relative error of the connected outputs", ("step [ms]", *found.errors), rows)
+    common.show_table("greatest relative error of the connected outputs", ("step [ms]", *found.errors), rows)
     if bonds:
         rows = [
             (f"{1e3 * step:.4g}", *(f"{100.0 * powers[n]:.2g}" for powers in found.powers.values()))
             for n, step in enumerate(found.steps)
         ]
-        show_table("work that the coupling brought in, of what went through the power bonds [%]",
+        common.show_table("work that the coupling brought in, of what went through the power bonds [%]",
                    ("step [ms]", *found.powers), rows)  # fmt: skip
     for when, message in found.messages.items():
-        print_error(f"note: {when}: {message}")
-    print_paths(save_plot(plot, found, output_folder(out) / f"{Path(file).stem}-check.png"))
+        common.print_error(f"note: {when}: {message}")
+    common.print_paths(common.save_plot(plot, found, common.output_folder(out) / f"{Path(file).stem}-check.png"))
 
 
 @system.command()
 @_FILE
-@out_option(help="Folder for the picture.")
-@report_errors
+@common.out_option(help="Folder for the picture.")
+@common.report_errors
 def draw(file: str, out: str) -> None:
     """Draw the parts of a system and their connections."""
-    print_paths(save_plot(True, _wiring(file), output_folder(out) / f"{Path(file).stem}-diagram.png"))
+    common.print_paths(
+        common.save_plot(True, _wiring(file), common.output_folder(out) / f"{Path(file).stem}-diagram.png")
+    )
 
 
 @system.command()
 @_FILE
-@out_option(help="Folder in which the host's folder is made.")
-@report_errors
+@common.out_option(help="Folder in which the host's folder is made.")
+@common.report_errors
 def host(file: str, out: str) -> None:
     """Build a system as one C program for real-time targets, without heap and without Python.
 
@@ -231,5 +220,5 @@ def host(file: str, out: str) -> None:
     """
     from ..systems import build_host
 
-    made = build_host(_wiring(file), output_folder(out) / f"{Path(file).stem}-host")
-    say(f"wrote {made} with its sources: {made} STEPS [RATE]")
+    made = build_host(_wiring(file), common.output_folder(out) / f"{Path(file).stem}-host")
+    common.say(f"wrote {made} with its sources: {made} STEPS [RATE]")

@@ -9,32 +9,17 @@ from typing import Any
 
 import click
 
-from .common import (
-    CHECK_FAILED,
-    TUNING,
-    check_kind,
-    console,
-    out_option,
-    output_folder,
-    plot_option,
-    print_error,
-    print_paths,
-    report_errors,
-    save_plot,
-    say,
-    set_option,
-    show_table,
-)
+from . import common
 from .design import read_settings
 
 
 @click.command()
 @click.argument("case", type=click.Path(exists=True, dir_okay=False))
-@set_option("slider.damping='2 N*s/m' or tune.least_margin=0.1; lists as in TOML")
+@common.set_option("slider.damping='2 N*s/m' or tune.least_margin=0.1; lists as in TOML")
 @click.option("--json", "as_json", is_flag=True, help="Print the result as JSON instead of tables.")
-@plot_option
-@out_option()
-@report_errors
+@common.plot_option
+@common.out_option()
+@common.report_errors
 def tune(case: str, settings: Sequence[str], as_json: bool, plot: bool, out: str) -> None:
     """Find the least change of parameters of a CASE file (TOML or JSON) that gives a range of speeds the properties in [tune].
 
@@ -55,27 +40,27 @@ def tune(case: str, settings: Sequence[str], as_json: bool, plot: bool, out: str
     from ..tuning import tune as find
 
     overrides = read_settings(settings)
-    check_kind(case, TUNING, settings=overrides)
+    common.check_kind(case, common.TUNING, settings=overrides)
     chosen = load_tuning_case(case, overrides)
-    tuned = find(chosen.wish, progress=console.is_terminal)
+    tuned = find(chosen.wish, progress=common.console.is_terminal)
     tables = tuned.tables()
     if as_json:
         click.echo(json.dumps(tables, indent=2))
     else:
         _print(chosen.title, tuned)
-    folder = output_folder(out)
+    folder = common.output_folder(out)
     stem = folder / f"{Path(case).stem}-tuned"
     written = [
         write_tables(f"{stem}.toml", chosen.tuned_tables(tuned, folder)),
         write_tables(f"{stem}.json", tables),
     ]
-    written += save_plot(plot, tuned, f"{stem}.png", title=chosen.title)
+    written += common.save_plot(plot, tuned, f"{stem}.png", title=chosen.title)
     if not as_json:
-        print_paths(written)
+        common.print_paths(written)
     for sentence in tuned.missed:
-        print_error(f"note: {sentence}")
+        common.print_error(f"note: {sentence}")
     if not tuned.met:
-        sys.exit(CHECK_FAILED)
+        sys.exit(common.CHECK_FAILED)
 
 
 def _print(title: str, tuned: Any) -> None:
@@ -92,9 +77,9 @@ def _print(title: str, tuned: Any) -> None:
         changed = change if after != before else "none"
         rows.append((name, unit, f"{factor * before:.7g}", f"{factor * after:.7g}", changed))
     headings = ("parameter", "unit", "before", "after", "change")
-    show_table(f"{title}: the least change", headings, rows, words=headings[:2])
+    common.show_table(f"{title}: the least change", headings, rows, words=headings[:2])
     headings = ("requirement", "wished", "before", "after", "")
     rows = [(r.name, r.wished, r.before.text, r.after.text, "met" if r.met else "not met") for r in tuned.requirements]
     styles = [None if r.met else "yellow" for r in tuned.requirements]
-    show_table("what was wished", headings, rows, words=headings, styles=styles)
-    say(f"verified: {tuned.verification}" if tuned.met else f"computed anew: {tuned.verification}")
+    common.show_table("what was wished", headings, rows, words=headings, styles=styles)
+    common.say(f"verified: {tuned.verification}" if tuned.met else f"computed anew: {tuned.verification}")

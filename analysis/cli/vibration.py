@@ -14,19 +14,7 @@ from linkwork.parameters import field_name
 from ..display import format_rounds
 from ..mechanisms import FIVE_BAR, find_mechanism
 from ..units import RAD_S_PER_RPM, display_scale
-from .common import (
-    console,
-    html_option,
-    output_folder,
-    plot_option,
-    print_error,
-    print_paths,
-    quantity,
-    save_picture,
-    say,
-    show_table,
-    workers_options,
-)
+from . import common
 from .driven import CaseChoice, add_case_options, swing_unit
 from .sensitivity import report_sensitivity
 
@@ -77,8 +65,8 @@ def _require_range(parameters: Any, low: float, high: float, name: str, first: s
     type=click.IntRange(1, 16),
     help="Greatest number of turns, or common periods, of the motions sought there; for more than one take some 24 places.",
 )
-@plot_option
-@html_option
+@common.plot_option
+@common.html_option
 @click.option("--sensitivity", is_flag=True, help="Report the parameters that move each maximum, fold and so on most.")
 def resonance(
     chosen: CaseChoice,
@@ -136,15 +124,21 @@ def resonance(
     interrupted = False
     try:
         response = frequency_response(
-            parameters, *ends, drive=drive, vary=vary, start=start, doublings=doublings, progress=console.is_terminal
+            parameters,
+            *ends,
+            drive=drive,
+            vary=vary,
+            start=start,
+            doublings=doublings,
+            progress=common.console.is_terminal,
         )
         if places:
-            response = with_isolas(response, places=places, turns=turns, progress=console.is_terminal)
+            response = with_isolas(response, places=places, turns=turns, progress=common.console.is_terminal)
     except ResponseInterrupted as stopped:
         response, interrupted = stopped.response, True
     unit, factor = display_scale(parameter_unit(mechanism, vary))
     _print_branches(title, response, factor, unit)
-    stem = output_folder(chosen.folder) / f"{chosen.stem}-resonance"
+    stem = common.output_folder(chosen.folder) / f"{chosen.stem}-resonance"
     written = [response.to_csv(f"{stem}.csv")]
     table = approximations(response) if over_speed and mechanism is FIVE_BAR else None
     _print_extrema(response, factor, unit, table)
@@ -155,7 +149,7 @@ def resonance(
         written += report_sensitivity(response, factor, unit, f"{stem}-sensitivity.csv")
     if plot:
         picture = figures.picture(response, title=title, beside=table)
-        written += save_picture(picture, stem, html=html)
+        written += common.save_picture(picture, stem, html=html)
     chosen.finish(written, response.problems, interrupted=interrupted)
 
 
@@ -188,16 +182,16 @@ def _find_modes(case: Any, over_speed: bool) -> Any:
 def _print_natural_frequencies(natural: float | None, modes: Any) -> None:
     """Print the natural frequency of the spring alone (rad/s), if there is one, and a table of the natural modes."""
     if natural is not None:
-        console.print(
+        common.console.print(
             f"natural frequency of the spring alone on the mean effective mass: {natural / RAD_S_PER_RPM:.2f} rpm, "
             f"{natural:.5g} rad/s",
             highlight=False,
         )
     if isinstance(modes, LinkworkError):
-        say(f"no natural frequencies about the equilibrium: {modes}")
+        common.say(f"no natural frequencies about the equilibrium: {modes}")
         return
     if not len(modes.frequency_ranges):
-        say("no free coordinate vibrates about the equilibrium")
+        common.say("no free coordinate vibrates about the equilibrium")
     else:
         rows = [
             (name, *(f"{value / RAD_S_PER_RPM:.2f}" for value in frequencies), f"{damping[0]:.4f} to {damping[2]:.4f}")
@@ -205,9 +199,9 @@ def _print_natural_frequencies(natural: float | None, modes: Any) -> None:
         ]
         title = "natural frequencies of small vibrations about the equilibrium, the crank held, over its turn"
         headings = ("mostly of", "least [rpm]", "mean [rpm]", "greatest [rpm]", "damping ratio")
-        show_table(title, headings, rows, words=headings[:1])
+        common.show_table(title, headings, rows, words=headings[:1])
     if modes.unstable:
-        say(f"the equilibrium is unstable at {modes.unstable} of {len(modes.equilibria)} crank positions")
+        common.say(f"the equilibrium is unstable at {modes.unstable} of {len(modes.equilibria)} crank positions")
 
 
 def _range_ends(
@@ -231,7 +225,7 @@ def _range_ends(
     if not about and (low is None or high is None):
         raise click.UsageError(f"--from and --to are needed for {vary}: {why}")
     ends = [
-        quantity(text, unit, option) if text is not None else factor * choose(about)
+        common.quantity(text, unit, option) if text is not None else factor * choose(about)
         for text, option, factor, choose in zip((low, high), ("--from", "--to"), _RANGE, (min, max))
     ]
     _require_range(parameters, ends[0], ends[1], vary, "--from", "--to")
@@ -260,7 +254,7 @@ def _print_branches(title: str, response: Any, factor: float, unit: str) -> None
     table = (
         f"{title}: how it moves at each {over}, and where that jumps or becomes unstable (branches of periodic motions)"
     )
-    show_table(table, headings, rows, words=headings[-1:])
+    common.show_table(table, headings, rows, words=headings[-1:])
 
 
 def _normal_form_in_words(family: Any, special: Any) -> str:
@@ -281,7 +275,7 @@ def _has_dry_friction(parameters: Any) -> bool:
 def _print_extrema(response: Any, factor: float, unit: str, table: Any) -> None:
     entries = [("maximum", e) for e in response.maxima()] + [("minimum", e) for e in response.minima()]
     if not entries:
-        console.print(
+        common.console.print(
             "no maximum or minimum of the amplitude inside the range stands out by a thousandth", highlight=False
         )
         return
@@ -292,7 +286,7 @@ def _print_extrema(response: Any, factor: float, unit: str, table: Any) -> None:
     amplitude = (f"amplitude [{length}]",) if alone else ("of", "amplitude")
     headings = ("", f"at [{unit}]", *amplitude, "motion", *(f"{name} [{length}]" for name in names))
     if table is not None and _has_dry_friction(response.family.parameters):
-        console.print("the approximations are of the mechanism without its Coulomb friction", highlight=False)
+        common.console.print("the approximations are of the mechanism without its Coulomb friction", highlight=False)
     entries.sort(key=lambda entry: entry[1].parameter)
     beside = [] if table is None else list(table.at([extremum.parameter for _, extremum in entries]).values())
     rows = [
@@ -306,7 +300,7 @@ def _print_extrema(response: Any, factor: float, unit: str, table: Any) -> None:
         for number, (word, extremum) in enumerate(entries)
     ]
     title = f"where the amplitude of {what} is largest and least" if alone else "where amplitudes are largest and least"
-    show_table(title, headings, rows, words=("", "of", "motion"))
+    common.show_table(title, headings, rows, words=("", "of", "motion"))
 
 
 def _coordinate_and_amplitude(extremum: Any) -> list[str]:
@@ -322,9 +316,9 @@ def _print_ranges_to_avoid(response: Any, factor: float, unit: str) -> None:
     ranges = response.speeds_to_avoid
     words = "speeds" if response.family.unit == "rad/s" else f"values of {response.family.name}"
     if response.caution:
-        say(f"{response.caution}: --places seeks them")
+        common.say(f"{response.caution}: --places seeks them")
     else:
-        say(f"all motions were sought at {response.sought_values} only: more --places may find more")
+        common.say(f"all motions were sought at {response.sought_values} only: more --places may find more")
     what, size, length = swing_unit(response.branches[0].orbits[0])
     if not ranges:
         tops = greatest_amplitudes(response.branches)
@@ -336,15 +330,15 @@ def _print_ranges_to_avoid(response: Any, factor: float, unit: str) -> None:
                 for (name, scale, of), (value, place) in zip(shown, tops)
             ]
             peak = f"the amplitude has no peak; it is greatest, {'; '.join(places)}"
-        say(f"no {words} to avoid: one stable motion throughout, and {peak}")
+        common.say(f"no {words} to avoid: one stable motion throughout, and {peak}")
     else:
         rows = [(f"{factor * a.low:.6g}", f"{factor * a.high:.6g}", a.words) for a in ranges]
-        show_table(f"{words} to avoid", (f"from [{unit}]", f"to [{unit}]", "because"), rows, words=("because",))
+        common.show_table(f"{words} to avoid", (f"from [{unit}]", f"to [{unit}]", "because"), rows, words=("because",))
     for jump in response.jumps:
         side, way = ("below", "rises") if jump.direction > 0 else ("above", "falls")
         after = " or ".join(f"{size * amplitude:.4g}" for amplitude in jump.after)
         then = f"it jumps to {after} {length}" if after else "it ends, and no other stable motion was followed"
-        say(
+        common.say(
             f"the stable motion of {size * jump.before:.4g} {length} of {what} is there only {side} "
             f"{factor * jump.parameter:.6g} {unit}: where {response.family.name} {way} past it, {then}"
         )
@@ -359,14 +353,14 @@ def _print_ranges_to_avoid(response: Any, factor: float, unit: str) -> None:
 )
 @click.option("--y-range", nargs=2, metavar="FROM TO", help="Range of y, such as 0 '2e4 dyn.s/cm'.")
 @click.option("--points", default=80, type=click.IntRange(2, 2000), help="Points along each axis.")
-@workers_options(default=-1)
+@common.workers_options(default=-1)
 @click.option("--chart/--no-chart", "charted", default=True, help="Whether to compute the chart, not only the verdict.")
 @click.option(
     "--coexisting",
     is_flag=True,
     help="Seek all motions at every point, to show how many are stable, and their amplitudes.",
 )
-@html_option
+@common.html_option
 def stability(
     chosen: CaseChoice,
     x: str | None,
@@ -426,12 +420,12 @@ def stability(
         raise missing
     if not charted:
         return
-    stem = output_folder(chosen.folder) / f"{chosen.stem}-stability"
+    stem = common.output_folder(chosen.folder) / f"{chosen.stem}-stability"
 
     def write_first_picture(found: Any) -> None:
         """Write a picture of the chart when only its grid of points is computed; computing its boundaries takes longer."""
-        print_paths(save_picture(figures.picture(found, title=chosen.case.title), stem, html=html))
-        say("its boundaries follow; after Ctrl-C the picture stays without them")
+        common.print_paths(common.save_picture(figures.picture(found, title=chosen.case.title), stem, html=html))
+        common.say("its boundaries follow; after Ctrl-C the picture stays without them")
 
     axis_names = (names[0], names[1])
     found = stability_chart(
@@ -444,7 +438,7 @@ def stability(
         beside=linear_motion(parameters, drive, axis_names) if mechanism is FIVE_BAR else None,
         coexisting=coexisting,
         n_jobs=jobs,
-        progress=console.is_terminal,
+        progress=common.console.is_terminal,
         first=write_first_picture,
     )
     _print_regions(found)
@@ -455,7 +449,7 @@ def stability(
         found.to_csv(f"{stem}.csv"),
         found.boundaries_to_csv(f"{stem}-boundaries.csv"),
         *more,
-        *save_picture(picture, stem, html=html),
+        *common.save_picture(picture, stem, html=html),
     ]
     chosen.finish(written, found.problems)
 
@@ -467,7 +461,7 @@ def _axis_range(
 
     if texts is None:
         return default_range(parameters, drive, name)
-    low, high = (quantity(text, parameter_unit(find_mechanism(parameters), name), option) for text in texts)
+    low, high = (common.quantity(text, parameter_unit(find_mechanism(parameters), name), option) for text in texts)
     _require_range(parameters, low, high, name, option, option)
     return low, high
 
@@ -489,9 +483,9 @@ def _report_verdict(title: str, parameters: Any, drive: Any, start: Any) -> None
     friction = _has_dry_friction(parameters)
     if drive.speed_drive and not friction and find_mechanism(parameters) is FIVE_BAR:
         lines.append(f"by the linear equation about u = 0, as in the thesis: {linear_verdict(parameters, drive)}")
-    console.print("\n".join(lines), highlight=False, soft_wrap=True)
+    common.console.print("\n".join(lines), highlight=False, soft_wrap=True)
     if friction:
-        print_error(
+        common.print_error(
             "note: Coulomb friction is smoothed over 1 mm/s: where it would stick, the model creeps to one place, "
             "and its multipliers are those of the creep"
         )
@@ -513,7 +507,7 @@ def _print_regions(found: Any) -> None:
         sentences.append(
             f"up to {found.most} stable motions were found at one point of the lines searched: --coexisting shows where"
         )
-    say("; ".join(sentences))
+    common.say("; ".join(sentences))
     rows = []
     for traced in found.boundaries:
         spans = [
@@ -524,9 +518,9 @@ def _print_regions(found: Any) -> None:
         rows.append((traced.motion, traced.kind.value, *spans, ends))
     if rows:
         headings = ("motion", "kind", *_headings(x, y), "ends because")
-        show_table("boundaries of instability", headings, rows, words=headings)
+        common.show_table("boundaries of instability", headings, rows, words=headings)
     for removal in found.removals:
-        console.print(removal, highlight=False, soft_wrap=True)
+        common.console.print(removal, highlight=False, soft_wrap=True)
 
 
 def _headings(*axes: Any) -> list[str]:
@@ -549,4 +543,4 @@ def _print_runs(found: Any) -> None:
         )
         for run, c in ((run, run.confirmation) for run in found.runs)
     ]
-    show_table("confirmed by long nonlinear runs", headings, rows, words=headings)
+    common.show_table("confirmed by long nonlinear runs", headings, rows, words=headings)

@@ -20,24 +20,9 @@ from matplotlib.patheffects import withStroke
 from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 from numpy.typing import ArrayLike, NDArray
 
+from . import style
 from .dispatch import picture, plot
 from .marks import label_place, mark_place, settle
-from .style import (
-    COLOURS,
-    LINE,
-    MARK,
-    MARKED,
-    SHADE,
-    SHADES,
-    THIN,
-    Figure,
-    align_labels,
-    figure_style,
-    finish,
-    legend_above,
-    write_notes,
-    write_title,
-)
 
 _Arguments = ParamSpec("_Arguments")
 
@@ -177,7 +162,7 @@ def plot_curves(
     columns: int = 1,
     size: tuple[float, float] = (6.4, 3.7),
     notes: Sequence[str] = (),
-) -> Figure:
+) -> style.Figure:
     """Plot curves for print, one pair of axes per panel.
 
     Parameters
@@ -189,14 +174,14 @@ def plot_curves(
     return draw(Picture(parts=panels, title=title, columns=columns, size=size, notes=notes))
 
 
-def register_picture(of: Callable[_Arguments, Picture]) -> Callable[_Arguments, Figure]:
+def register_picture(of: Callable[_Arguments, Picture]) -> Callable[_Arguments, style.Figure]:
     """Register a function that returns the picture of a result, and return a function that draws this picture as a figure.
 
     The two functions are registered with `dispatch.picture` and `dispatch.plot`, by the type of their first argument.
     """
 
     @wraps(of)
-    def plot_picture(*arguments: _Arguments.args, **options: _Arguments.kwargs) -> Figure:
+    def plot_picture(*arguments: _Arguments.args, **options: _Arguments.kwargs) -> style.Figure:
         return draw(of(*arguments, **options))
 
     picture.register(of)
@@ -204,13 +189,13 @@ def register_picture(of: Callable[_Arguments, Picture]) -> Callable[_Arguments, 
     return plot_picture
 
 
-def draw(picture: Picture) -> Figure:
+def draw(picture: Picture) -> style.Figure:
     """Draw a picture as a figure with one pair of axes for each part."""
     parts, columns, size = picture.parts, picture.columns, picture.size
     rows = ceil(len(parts) / columns)
     heights = picture.heights or [1.0] * rows
-    with figure_style():
-        figure = Figure(figsize=(size[0] * columns, 0.35 + size[1] * sum(heights)))
+    with style.figure_style():
+        figure = style.Figure(figsize=(size[0] * columns, 0.35 + size[1] * sum(heights)))
         axes = figure.subplots(
             rows, columns, squeeze=False, height_ratios=heights, sharex="col" if picture.heights else False
         )
@@ -221,29 +206,29 @@ def draw(picture: Picture) -> Figure:
         for axis in list(axes.flat)[len(parts) :]:
             axis.remove()
         if picture.heights:
-            align_labels(list(axes.flat))
-        write_title(figure, picture.title)
-        write_notes(figure, picture.notes)
-        return settle(finish(figure))
+            style.align_labels(list(axes.flat))
+        style.write_title(figure, picture.title)
+        style.write_notes(figure, picture.notes)
+        return settle(style.finish(figure))
 
 
-def resize(figure: Figure, width: float, height: float) -> Figure:
+def resize(figure: style.Figure, width: float, height: float) -> style.Figure:
     """Change the size of a drawn figure (inches) and lay it out again."""
-    with figure_style():
+    with style.figure_style():
         figure.set_layout_engine("constrained")
         figure.set_size_inches(width, height)
-        write_title(figure, figure.get_suptitle().replace("\n", " "))
-        return settle(finish(figure))
+        style.write_title(figure, figure.get_suptitle().replace("\n", " "))
+        return settle(style.finish(figure))
 
 
 @singledispatch
-def draw_part(part: Any, figure: Figure, axis: Axes) -> None:
+def draw_part(part: Any, figure: style.Figure, axis: Axes) -> None:
     """Draw a part of a picture on the given axes; a function is registered for each kind of part."""
     raise TypeError(f"a part of a picture is a Panel or a HeatMap, not a {type(part).__name__}")
 
 
 @draw_part.register
-def _(panel: Panel, figure: Figure, axis: Axes) -> None:
+def _(panel: Panel, figure: style.Figure, axis: Axes) -> None:
     draw_panel(axis, panel)
 
 
@@ -262,16 +247,21 @@ def draw_panel(axis: Axes, panel: Panel) -> None:
         outline = Outline.make_compound_path(
             *(Outline(np.vstack([ring, ring[:1]]), closed=True) for ring in boundaries)
         )
-        axis.add_patch(PathPatch(outline, facecolor=SHADE, alpha=0.22, edgecolor="none", zorder=0))
+        axis.add_patch(PathPatch(outline, facecolor=style.SHADE, alpha=0.22, edgecolor="none", zorder=0))
     for number, curve in enumerate(panel.curves):
-        _draw_curve(axis, curve, curve.colour or COLOURS[number % len(COLOURS)])
+        _draw_curve(axis, curve, curve.colour or style.COLOURS[number % len(style.COLOURS)])
     for entry, number, those in shades_by_label(panel):
-        colour, hatch, _ = SHADES[number]
+        colour, hatch, _ = style.SHADES[number]
         for shade, name in zip(those, (entry or None, *[None] * len(those))):
             look: dict[str, Any] = {"facecolor": (colour, 0.16), "edgecolor": (colour, 0.45), "linewidth": 0.0}
             axis.axvspan(shade.low, shade.high, hatch=hatch, label=name, zorder=0.5, **look)
     for arrow in panel.arrows:
-        look = {"arrowstyle": "-|>,head_width=0.25,head_length=0.5", "color": MARKED, "linewidth": LINE, "shrinkB": 0.0}
+        look = {
+            "arrowstyle": "-|>,head_width=0.25,head_length=0.5",
+            "color": style.MARKED,
+            "linewidth": style.LINE,
+            "shrinkB": 0.0,
+        }
         axis.annotate("", (arrow.x, arrow.end), (arrow.x, arrow.begin), arrowprops=look, zorder=3.5)
     for label in panel.labels:
         label_place(axis, (label.x, label.y), label.text)
@@ -293,11 +283,11 @@ def draw_panel(axis: Axes, panel: Panel) -> None:
     if panel.equal:
         axis.set_aspect("equal")
     for place in panel.dashed:
-        axis.axvline(place, **MARK | {"linestyle": (0, (5, 4))})
+        axis.axvline(place, **style.MARK | {"linestyle": (0, (5, 4))})
     for text, place in (panel.verticals or {}).items():
         mark_place(axis, place, text)
     if panel.legend_at == "above" and axis.get_legend_handles_labels()[0]:
-        legend_above(axis, title=panel.legend or None, ncols=3)
+        style.legend_above(axis, title=panel.legend or None, ncols=3)
     elif any(curve.label for curve in panel.curves):
         outside: dict[str, Any] = {"loc": "upper left", "bbox_to_anchor": (1.0, 1.0)}
         where = outside if panel.legend_at == "outside" else {"loc": panel.legend_at}
@@ -322,7 +312,7 @@ def _draw_curve(axis: Axes, curve: Curve, colour: str) -> None:
         markersize=6.0 if letters else None,
         label=curve.label or None,
         linewidth=curve.width,
-        markeredgewidth=0.3 if letters else THIN if curve.hollow else LINE,
+        markeredgewidth=0.3 if letters else style.THIN if curve.hollow else style.LINE,
         zorder=curve.order or (3 if curve.marker else 2),
         clip_on=curve.cut,
         # letters on a line have a white outline, so that they can be read

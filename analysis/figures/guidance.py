@@ -16,24 +16,9 @@ from matplotlib.patches import Polygon
 from numpy.typing import NDArray
 
 from ..synthesis import Dyad, Guidance, GuidanceMap, Solution
+from . import style
 from .dispatch import plot
 from .marks import label_place, place_marks
-from .style import (
-    COLOURS,
-    CRANK,
-    DOT,
-    GROUND,
-    ROCKER,
-    SLIDER,
-    SMALL,
-    TARGET,
-    THIN,
-    TRACE,
-    figure_style,
-    finish,
-    write_notes,
-    write_title,
-)
 
 MM_PER_METRE = 1e3
 #: Length of the long arm that marks a pose, relative to the size of the poses.
@@ -53,7 +38,7 @@ def plot_guidance(found: Guidance, *, title: str = "") -> Figure:
     count = len(found.solutions)
     columns = 3
     rows = ceil(count / columns)
-    with figure_style():
+    with style.figure_style():
         figure = Figure(figsize=(9.0, 4.0 + 3.2 * rows))
         parts: Any = figure.subfigures(2, 1, height_ratios=(4.0, 3.2 * rows)) if rows else [figure]
         poses, axis = parts[0].subplots(1, 2)
@@ -62,11 +47,11 @@ def plot_guidance(found: Guidance, *, title: str = "") -> Figure:
         poses.set_title("the poses: a long arm along the body, a short one across")
         _set_equal_scale(poses)
         _draw_poses(axis, found)
-        for dyad, colour in zip(found.dyads, COLOURS):
+        for dyad, colour in zip(found.dyads, style.COLOURS):
             x, y = _parts(MM_PER_METRE * np.array([dyad.pivot, dyad.point], dtype=complex))
             axis.plot(x, y, linewidth=2.4, zorder=4, color=colour)
             axis.plot(x[0], y[0], "^", markersize=7.0, zorder=5, color=colour)
-            axis.plot(x[1], y[1], "o", markersize=DOT, zorder=5, color=colour, markerfacecolor="white")
+            axis.plot(x[1], y[1], "o", markersize=style.DOT, zorder=5, color=colour, markerfacecolor="white")
         axis.set_title("links between a fixed pivot (triangle)\nand a point of the body (circle), in pose 1")
         _set_equal_scale(axis)
         if rows:
@@ -75,14 +60,14 @@ def plot_guidance(found: Guidance, *, title: str = "") -> Figure:
                 _draw_poses(panel, found)
                 _draw_links(panel, solution, found.dyads)
                 panel.set_aspect("equal", adjustable="datalim")
-                panel.set_title(f"{number}: {_verdict(solution)}", fontsize=SMALL)
+                panel.set_title(f"{number}: {_verdict(solution)}", fontsize=style.SMALL)
             for panel in panels[count:]:
                 panel.set_visible(False)
-        write_title(figure, f"{title}: {found.describe()}".removeprefix(": "))
-        write_notes(
+        style.write_title(figure, f"{title}: {found.describe()}".removeprefix(": "))
+        style.write_notes(
             figure, ["Thick: the crank, in the colour of its link above. Thin triangle: the body with its point."]
         )
-        return place_marks(finish(figure))
+        return place_marks(style.finish(figure))
 
 
 @plot.register
@@ -91,14 +76,14 @@ def plot_guidance_map(found: GuidanceMap, *, title: str = "") -> Figure:
 
     The quality is the least transmission angle of the four-bar with this crank and the rocker that is best for it.
     """
-    with figure_style():
+    with style.figure_style():
         figure = Figure(figsize=(10.4, 5.4))
         left, right = figure.subplots(1, 2, sharex=True, sharey=True)
         low, high = _view(found)
         _draw_poses(left, found, numbered=True, arm=_ARM_IN_VIEW * (high - low).real)
         for curve, colour, label in (
-            (found.pivots, GROUND, "where a fixed pivot can be"),
-            (found.points, TRACE, "where its point of the body is in pose 1"),
+            (found.pivots, style.GROUND, "where a fixed pivot can be"),
+            (found.points, style.TRACE, "where its point of the body is in pose 1"),
         ):
             left.plot(*_parts(MM_PER_METRE * curve), ".", markersize=3.0, color=colour, zorder=2, label=label)
         if found.solutions:
@@ -112,7 +97,13 @@ def plot_guidance_map(found: GuidanceMap, *, title: str = "") -> Figure:
         if found.solutions:
             a = MM_PER_METRE * np.array(found.solutions[0].linkage.pins(0.0)["A"])
             right.plot(
-                *a, "o", markersize=13.0, markerfacecolor="none", color=CRANK, zorder=5, label="best, as on the left"
+                *a,
+                "o",
+                markersize=13.0,
+                markerfacecolor="none",
+                color=style.CRANK,
+                zorder=5,
+                label="best, as on the left",
             )
         right.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=2)
         scale = right.inset_axes((1.03, 0.0, 0.05, 1.0))
@@ -127,8 +118,8 @@ def plot_guidance_map(found: GuidanceMap, *, title: str = "") -> Figure:
             axis.set_xlim(low.real, high.real)
             axis.set_ylim(low.imag, high.imag)
         number = f"{int(found.sound.sum())} of {found.sound.size - len(found.sound)} pairs of links are sound four-bars"
-        write_title(figure, f"{title}: {number}".removeprefix(": "))
-        return place_marks(finish(figure))
+        style.write_title(figure, f"{title}: {number}".removeprefix(": "))
+        return place_marks(style.finish(figure))
 
 
 def _parts(z: NDArray[Any]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
@@ -163,7 +154,7 @@ def _draw_poses(axis: Axes, found: Guidance | GuidanceMap, *, numbered: bool = F
         along = max(arm, ARM * size) * np.exp(1j * angle)
         mark = place + np.array([along, 0.0, 0.5j * along])
         name = "pose, its long arm along the body" if numbered and number == 1 else None
-        axis.plot(*_parts(mark), color=TARGET, linewidth=2.2, zorder=3, solid_joinstyle="miter", label=name)
+        axis.plot(*_parts(mark), color=style.TARGET, linewidth=2.2, zorder=3, solid_joinstyle="miter", label=name)
         if numbered:
             label_place(axis, (place.real, place.imag), str(number))
 
@@ -184,14 +175,16 @@ def _draw_links(axis: Axes, solution: Solution, dyads: Sequence[Dyad] = (), *, n
     names = ("crank", "rocker", "body with its point, pose 1", "fixed pivots") if named else (None,) * 4
     pins = _pins(solution)
     pivots = np.array([MM_PER_METRE * dyad.pivot for dyad in dyads])
-    for ends, colour, width, name in (("AB", CRANK, 4.0, names[0]), ("DC", ROCKER, 2.0, names[1])):
+    for ends, colour, width, name in (("AB", style.CRANK, 4.0, names[0]), ("DC", style.ROCKER, 2.0, names[1])):
         if len(pivots):
-            colour = COLOURS[int(np.abs(pivots - pins[ends[0]]).argmin()) % len(COLOURS)]
+            colour = style.COLOURS[int(np.abs(pivots - pins[ends[0]]).argmin()) % len(style.COLOURS)]
         axis.plot(*_parts(np.array([pins[n] for n in ends])), color=colour, linewidth=width, zorder=6, label=name)
     corners = np.column_stack(_parts(np.array([pins[n] for n in "BPC"])))
     axis.add_patch(Polygon(corners, facecolor="0.5", alpha=0.15, zorder=4, label=names[2]))
-    axis.plot(*_parts(np.array([pins[n] for n in "BPCB"])), color=SLIDER, linewidth=THIN, zorder=5)
-    axis.plot(*_parts(np.array([pins[n] for n in "AD"])), "^", color=GROUND, markersize=6.0, zorder=7, label=names[3])
+    axis.plot(*_parts(np.array([pins[n] for n in "BPCB"])), color=style.SLIDER, linewidth=style.THIN, zorder=5)
+    axis.plot(
+        *_parts(np.array([pins[n] for n in "AD"])), "^", color=style.GROUND, markersize=6.0, zorder=7, label=names[3]
+    )
 
 
 def _verdict(solution: Solution) -> str:

@@ -20,31 +20,10 @@ from linkwork.five_bar.parameters import FiveBarParameters
 
 from ..run import Trajectory
 from ..units import CM_PER_METRE
+from . import style
 from .animation import check_frames, gif
 from .dispatch import draw_mechanism, last_samples, plot
 from .marks import roomiest_position
-from .style import (
-    BLOCK,
-    BOLD,
-    COUPLER,
-    CRANK,
-    DOT,
-    GROUND,
-    HAIR,
-    LETTER,
-    LINE,
-    ROCKER,
-    SLIDER,
-    SMALL,
-    THIN,
-    TITLE,
-    TRACE,
-    Figure,
-    figure_style,
-    finish,
-    frame_drawing,
-    write_title,
-)
 
 #: Least angle (deg) between the letter of the crank angle and the ground link, so that the crank does not cover it.
 _LEAST_TURN = 32.0
@@ -88,7 +67,9 @@ def _pins(parameters: FiveBarParameters, crank_angle: float, slider_position: fl
 class _Scene:
     """A mechanism to be drawn at several configurations, with axis limits that contain all of them; lengths in cm."""
 
-    def __init__(self, parameters: FiveBarParameters, configurations: Sequence[_Pins], letter: float = LETTER) -> None:
+    def __init__(
+        self, parameters: FiveBarParameters, configurations: Sequence[_Pins], letter: float = style.LETTER
+    ) -> None:
         self.parameters, self.letter = parameters, letter
         k = parameters.constants()
         #: Length by which pins, supports and letters are drawn.
@@ -123,14 +104,14 @@ class _Scene:
         """Draw the whole mechanism at one configuration; ``trace`` is the path of P in cm, shape (n, 2)."""
         self._ground(axis, letters)
         if trace is not None and len(trace):
-            axis.plot(*trace.T, color=TRACE, linewidth=LINE, zorder=2, solid_capstyle="round")
+            axis.plot(*trace.T, color=style.TRACE, linewidth=style.LINE, zorder=2, solid_capstyle="round")
         self._slider(axis, q)
         self._links(axis, q)
         if letters:
             self._letters(axis, q)
 
     def _line(self, axis: Axes, points: Sequence[NDArray[np.float64]], **options: Any) -> None:
-        look: dict[str, Any] = {"color": GROUND, "linewidth": LINE, "solid_capstyle": "butt"}
+        look: dict[str, Any] = {"color": style.GROUND, "linewidth": style.LINE, "solid_capstyle": "butt"}
         axis.plot(*np.array(points).T, **look | options)
 
     def _hatch(self, axis: Axes, start: NDArray[np.float64], end: NDArray[np.float64], count: int) -> None:
@@ -140,15 +121,17 @@ class _Scene:
         feet = [start + share * (end - start) for share in (np.arange(count) + 0.9) / count]
         gap = np.full(2, np.nan)
         points = [point for foot in feet for point in (foot, foot + stroke, gap)]
-        self._line(axis, points, linewidth=HAIR, zorder=1)
+        self._line(axis, points, linewidth=style.HAIR, zorder=1)
 
     def _ground(self, axis: Axes, letters: bool) -> None:
         unit = self.unit
-        self._line(axis, [np.zeros(2), self.zero], linewidth=HAIR, linestyle=(0, (9, 3, 2, 3)), color="0.55", zorder=0)
+        self._line(
+            axis, [np.zeros(2), self.zero], linewidth=style.HAIR, linestyle=(0, (9, 3, 2, 3)), color="0.55", zorder=0
+        )
         # the bearing of A
         foot, half = -1.75 * unit, 1.0 * unit
         bearing = np.array([[-0.3 * unit, 0.0], [-half, foot], [half, foot], [0.3 * unit, 0.0]])
-        axis.add_patch(Polygon(bearing, facecolor="0.92", edgecolor=GROUND, linewidth=LINE, zorder=5))
+        axis.add_patch(Polygon(bearing, facecolor="0.92", edgecolor=style.GROUND, linewidth=style.LINE, zorder=5))
         ends = np.array([-1.5 * unit, foot]), np.array([1.5 * unit, foot])
         self._line(axis, ends)
         self._hatch(axis, *ends, count=6)
@@ -164,7 +147,7 @@ class _Scene:
     def _slider(self, axis: Axes, q: _Pins) -> None:
         unit = self.unit
         block = [self.point(q.u + s * 1.5 * unit, n * unit) for s, n in ((-1, -1), (1, -1), (1, 1), (-1, 1))]
-        axis.add_patch(Polygon(block, facecolor=BLOCK, edgecolor=SLIDER, linewidth=LINE, zorder=4))
+        axis.add_patch(Polygon(block, facecolor=style.BLOCK, edgecolor=style.SLIDER, linewidth=style.LINE, zorder=4))
         start, end = q.u + 1.5 * unit, self.wall
         side = 0.55 * unit if self.sprung and self.damped else 0.0
         if self.sprung:
@@ -172,31 +155,35 @@ class _Scene:
             swing = np.zeros(len(share))
             swing[2:-2] = 0.38 * unit * (-1.0) ** np.arange(len(share) - 4)
             spring = [self.point(start + s * (end - start), side + w) for s, w in zip(share, swing)]
-            self._line(axis, spring, color=SLIDER, linewidth=LINE, zorder=3)
+            self._line(axis, spring, color=style.SLIDER, linewidth=style.LINE, zorder=3)
         if self.damped:
             middle, width, deep = 0.5 * (start + end), 0.32 * unit, 1.6 * unit
             cup = ((-0.5, 1), (0.5, 1), (0.5, -1), (-0.5, -1))
-            self._line(axis, [self.point(middle + s * deep, w * width - side) for s, w in cup], color=SLIDER, zorder=3)
-            self._line(axis, [self.point(middle + 0.5 * deep, -side), self.point(end, -side)], color=SLIDER, zorder=3)
-            self._line(axis, [self.point(start, -side), self.point(middle, -side)], color=SLIDER, zorder=3)
+            self._line(
+                axis, [self.point(middle + s * deep, w * width - side) for s, w in cup], color=style.SLIDER, zorder=3
+            )
+            self._line(
+                axis, [self.point(middle + 0.5 * deep, -side), self.point(end, -side)], color=style.SLIDER, zorder=3
+            )
+            self._line(axis, [self.point(start, -side), self.point(middle, -side)], color=style.SLIDER, zorder=3)
             piston = [self.point(middle, w * width - side) for w in (-0.8, 0.8)]
-            self._line(axis, piston, color=SLIDER, linewidth=BOLD, zorder=3)
+            self._line(axis, piston, color=style.SLIDER, linewidth=style.BOLD, zorder=3)
 
     def _links(self, axis: Axes, q: _Pins) -> None:
         a = np.zeros(2)
         width = {"linewidth": 4.5, "solid_capstyle": "round"}
         offset = abs(float(np.cross(np.append(q.c - q.b, 0.0), np.append(q.p - q.b, 0.0))[2]))
         if offset > 0.02 * hypot(*(q.c - q.b)) ** 2:
-            axis.add_patch(Polygon([q.b, q.c, q.p], facecolor=COUPLER, alpha=0.16, edgecolor="none", zorder=5))
-            self._line(axis, [q.b, q.p, q.c], color=COUPLER, linewidth=LINE, zorder=6)
+            axis.add_patch(Polygon([q.b, q.c, q.p], facecolor=style.COUPLER, alpha=0.16, edgecolor="none", zorder=5))
+            self._line(axis, [q.b, q.p, q.c], color=style.COUPLER, linewidth=style.LINE, zorder=6)
         elif self.parameters.coupler_point_distance:
-            self._line(axis, [q.b, q.p], color=COUPLER, **width, zorder=6)
-        self._line(axis, [q.d, q.c], color=ROCKER, **width, zorder=6)
-        self._line(axis, [q.b, q.c], color=COUPLER, **width, zorder=7)
-        self._line(axis, [a, q.b], color=CRANK, **width, zorder=8)
+            self._line(axis, [q.b, q.p], color=style.COUPLER, **width, zorder=6)
+        self._line(axis, [q.d, q.c], color=style.ROCKER, **width, zorder=6)
+        self._line(axis, [q.b, q.c], color=style.COUPLER, **width, zorder=7)
+        self._line(axis, [a, q.b], color=style.CRANK, **width, zorder=8)
         dots = [(pin, 0.36, "white", 1.2, 9) for pin in (a, q.b, q.c, q.d)]
         if self.parameters.coupler_point_distance:
-            dots.append((q.p, 0.24, TRACE, 0.9, 10))
+            dots.append((q.p, 0.24, style.TRACE, 0.9, 10))
         for pin, radius, colour, edge, order in dots:
             look = {"facecolor": colour, "edgecolor": "black", "linewidth": edge, "zorder": order}
             axis.add_patch(Circle((pin[0], pin[1]), radius * self.unit, **look))
@@ -208,7 +195,7 @@ class _Scene:
         # the crank angle
         turn = np.degrees(q.crank_angle) % 360.0
         radius = max(0.5 * CM_PER_METRE * self.parameters.crank_length, 1.3 * unit)
-        arc: dict[str, Any] = {"color": GROUND, "linewidth": THIN, "zorder": 3}
+        arc: dict[str, Any] = {"color": style.GROUND, "linewidth": style.THIN, "zorder": 3}
         taken: list[NDArray[np.float64]] = []
         if turn > 1.0:
             axis.add_patch(Arc((0, 0), 2 * radius, 2 * radius, theta1=0.0, theta2=turn, **arc))
@@ -231,9 +218,9 @@ class _Scene:
         # the slider position
         level = -2.35 * unit
         for s in {0.0, q.u}:
-            self._line(axis, [self.point(s, -1.75 * unit), self.point(s, level - 0.4 * unit)], linewidth=HAIR)
+            self._line(axis, [self.point(s, -1.75 * unit), self.point(s, level - 0.4 * unit)], linewidth=style.HAIR)
         if abs(q.u) > 1.2 * unit:
-            arrow = {"arrowstyle": "-|>", "color": GROUND, "shrinkA": 0, "shrinkB": 0, "linewidth": HAIR}
+            arrow = {"arrowstyle": "-|>", "color": style.GROUND, "shrinkA": 0, "shrinkB": 0, "linewidth": style.HAIR}
             axis.annotate("", tuple(self.point(q.u, level)), tuple(self.point(0.0, level)), arrowprops=arrow)
         slope = (np.degrees(self.parameters.slider_guide_angle) + 90.0) % 180.0 - 90.0
         place = self.point(0.5 * q.u, level - 1.05 * unit)
@@ -259,7 +246,7 @@ def draw_linkage(
     *,
     title: str = "",
     trace: ArrayLike | None = None,
-) -> Figure:
+) -> style.Figure:
     """Draw the five-bar at one configuration: links, pins, guide, spring, damper, coupler point, crank angle, slider position.
 
     Parameters
@@ -280,14 +267,14 @@ def draw_linkage(
     path = CM_PER_METRE * (np.empty((0, 2)) if trace is None else np.asarray(trace, dtype=float))
     scene = _Scene(parameters, [q, *(replace(q, p=point) for point in path if np.all(np.isfinite(point)))])
     width, height = scene.high - scene.low
-    with figure_style():
-        figure = Figure(figsize=(6.4, 6.4 * height / width + (0.3 if title else 0.0)))
+    with style.figure_style():
+        figure = style.Figure(figsize=(6.4, 6.4 * height / width + (0.3 if title else 0.0)))
         axis = figure.subplots()
-        frame_drawing(axis, scene.low, scene.high)
+        style.frame_drawing(axis, scene.low, scene.high)
         scene.draw(axis, q, trace=path)
         if title:
-            axis.set_title(title, fontsize=TITLE, fontweight="bold")
-        return finish(figure)
+            axis.set_title(title, fontsize=style.TITLE, fontweight="bold")
+        return style.finish(figure)
 
 
 @draw_mechanism.register
@@ -301,8 +288,8 @@ def _draw_at_start(parameters: FiveBarParameters, axis: Axes, run: Trajectory) -
         k, turned, tilted = parameters.constants(), run["crank.angle"], run["coupler.angle"]
         x, y = (k.l2 * f(turned) + k.l3 * f(tilted) for f in (np.cos, np.sin))
         name, path = "C", CM_PER_METRE * np.column_stack([x, y])
-    scene = _Scene(parameters, configurations, SMALL)
-    frame_drawing(axis, scene.low, scene.high)
+    scene = _Scene(parameters, configurations, style.SMALL)
+    style.frame_drawing(axis, scene.low, scene.high)
     samples, when = last_samples(run)
     scene.draw(axis, configurations[0], trace=path[samples])
     return f"at {run.time[0]:.4g} s, with the path of {name} {when}"
@@ -345,19 +332,19 @@ def animate_linkage(
     configurations = [_pins(parameters, float(trajectory["crank.angle"][i]), float(slides[i])) for i in chosen]
     scene = _Scene(parameters, configurations)
     width, height = scene.high - scene.low
-    with figure_style():
-        figure = Figure(figsize=(5.0, 5.0 * height / width + 1.9))
+    with style.figure_style():
+        figure = style.Figure(figsize=(5.0, 5.0 * height / width + 1.9))
         above, below = figure.subplots(2, 1, height_ratios=(5.0 * height / width, 1.7))
-        write_title(figure, title)
+        style.write_title(figure, title)
         below.plot(time, u, color="0.8")
-        (done,) = below.plot([], [], color=SLIDER)
-        (dot,) = below.plot([], [], "o", color=SLIDER, markersize=DOT)
+        (done,) = below.plot([], [], color=style.SLIDER)
+        (dot,) = below.plot([], [], "o", color=style.SLIDER, markersize=style.DOT)
         below.set_xlabel("time [s]")
         below.set_ylabel("slider position [mm]")
         with gif(figure, path, frames_per_second) as (file, add_frame):
             for i, q in zip(chosen, configurations):
                 above.clear()
-                frame_drawing(above, scene.low, scene.high)
+                style.frame_drawing(above, scene.low, scene.high)
                 scene.draw(above, q, letters=False, trace=trace[: i + 1])
                 done.set_data(time[: i + 1], u[: i + 1])
                 dot.set_data(time[i : i + 1], u[i : i + 1])

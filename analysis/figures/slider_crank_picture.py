@@ -33,28 +33,10 @@ from linkwork.slider_crank.vectors import Vector
 from ..run import Trajectory
 from ..slider_crank import PeriodicShift, Range, assembled_ranges, constant_shift, ranges
 from ..units import INCH
+from . import style
 from .animation import check_frames, gif
 from .dispatch import animate, draw_mechanism, last_samples, plot
 from .solids import ball, box, cylinder, paint
-from .style import (
-    BOLD,
-    COLOURS,
-    COUPLER,
-    CRANK,
-    DOT,
-    GROUND,
-    HAIR,
-    LINE,
-    SLIDER,
-    THIN,
-    TINY,
-    TRACE,
-    figure_style,
-    finish,
-    frame_drawing,
-    legend_above,
-    write_title,
-)
 
 FloatArray: TypeAlias = NDArray[np.float64]
 
@@ -66,7 +48,7 @@ VIEW = (22.0, -112.0)
 _POINTS = 361
 #: Distance of the first and last drawn angle from the ends of a range (rad): rounding could make a square root negative there.
 _INSET = 1e-6
-_DEAD, _LIMIT, _SHIFT, _TWIST = COLOURS[2], "#B07700", "#A0527F", "#2478A8"
+_DEAD, _LIMIT, _SHIFT, _TWIST = style.COLOURS[2], "#B07700", "#A0527F", "#2478A8"
 
 
 @dataclass(frozen=True, slots=True)
@@ -229,7 +211,12 @@ class _Scene:
             self._letters(axis, pose)
 
     def _line(self, axis: Axes, points: ArrayLike, **look: Any) -> None:
-        default: dict[str, Any] = {"color": GROUND, "linewidth": THIN, "zorder": 4, "solid_capstyle": "round"}
+        default: dict[str, Any] = {
+            "color": style.GROUND,
+            "linewidth": style.THIN,
+            "zorder": 4,
+            "solid_capstyle": "round",
+        }
         shown = self.page(points).T
         axis.plot(*shown, **default | look)
         # about thirty points of a curve are enough to keep texts away
@@ -248,14 +235,14 @@ class _Scene:
         # the crank ends before the ball, so that the ball seems to lie in a fork
         solids: list[tuple[FloatArray, str]] = [
             (cylinder(bearing * k1, (bearing + 3.2 * u) * k1, 0.95 * u, pieces=3), "#AEB7BE"),
-            (cylinder(pose.centre, np.array([0.0, 0.0, self.high_shift + 6.6 * u]), 0.42 * u, pieces=16), CRANK),
-            (cylinder(pose.centre - 0.42 * u * k1, pose.centre + 0.42 * u * k1, 0.85 * u, sides=24), CRANK),
+            (cylinder(pose.centre, np.array([0.0, 0.0, self.high_shift + 6.6 * u]), 0.42 * u, pieces=16), style.CRANK),
+            (cylinder(pose.centre - 0.42 * u * k1, pose.centre + 0.42 * u * k1, 0.85 * u, sides=24), style.CRANK),
             (box([0.6 * u, -0.45 * u, -0.3 * u], [self.a1 - 0.45 * u, 0.45 * u, 0.3 * u], crank, pose.centre, pieces=6),
-             CRANK),
+             style.CRANK),
             (ball(pose.crank_pin, 0.66 * u), "#F0A57A"),
-            (cylinder(pose.crank_pin + 0.5 * u * along, pin - 0.5 * u * along, 0.3 * u, pieces=30), COUPLER),
+            (cylinder(pose.crank_pin + 0.5 * u * along, pin - 0.5 * u * along, 0.3 * u, pieces=30), style.COUPLER),
             (ball(pin, 0.66 * u), "#86BFE3"),
-            (cylinder(pin + 0.5 * u * guide[2], pin + 0.95 * u * guide[2], 0.34 * u), SLIDER),
+            (cylinder(pin + 0.5 * u * guide[2], pin + 0.95 * u * guide[2], 0.34 * u), style.SLIDER),
             (box([-1.6 * u, -1.2 * u, 0.9 * u], [1.6 * u, 1.2 * u, 2.0 * u], guide, pin, pieces=4), "#84929D"),
             (box([start, -0.7 * u, 2.0 * u], [end, 0.7 * u, 2.45 * u], guide, self.foot, pieces=24), "#D9DEE2"),
         ]  # fmt: skip
@@ -263,32 +250,32 @@ class _Scene:
 
     def _centre_lines(self, axis: Axes, pose: _Pose) -> None:
         u = self.size
-        dashes = {"linestyle": (0, (9, 2, 2, 2)), "linewidth": HAIR, "color": "0.4", "zorder": 1}
+        dashes = {"linestyle": (0, (9, 2, 2, 2)), "linewidth": style.HAIR, "color": "0.4", "zorder": 1}
         self._line(axis, [[0, 0, self.low_shift - 4.0 * u], [0, 0, self.high_shift + 8.0 * u]], **dashes)
         ends = min(self.least - 2.3 * u, -1.5 * u), max(self.most + 2.6 * u, 1.5 * u)
         self._line(axis, [self.at(slide) for slide in ends], **dashes)
         turn = np.linspace(0.0, 2.0 * pi, 181)
         ring = self.a1 * np.column_stack([np.cos(turn), np.sin(turn), 0.0 * turn])
-        self._line(axis, ring + pose.centre, color="0.6", linewidth=THIN, linestyle=":", zorder=1)
+        self._line(axis, ring + pose.centre, color="0.6", linewidth=style.THIN, linestyle=":", zorder=1)
 
     def _paths(self, axis: Axes, pose: _Pose, letters: bool) -> None:
         """Draw the paths of the pins, and mark dead centres and limits; with ``letters`` draw crank and rod there, too."""
         for part in self.parts:
-            self._line(axis, part.crank_pins, color=TRACE, linewidth=BOLD, zorder=2)
-            self._line(axis, part.slider_pins, color=TRACE, linewidth=3.0, zorder=2)
+            self._line(axis, part.crank_pins, color=style.TRACE, linewidth=style.BOLD, zorder=2)
+            self._line(axis, part.slider_pins, color=style.TRACE, linewidth=3.0, zorder=2)
             for places, _, colour, marker in part.marks:
                 for place in places:
                     if letters:
                         joints = [place.centre, place.crank_pin, place.slider_pin]
-                        self._line(axis, joints, color=colour, linewidth=THIN, linestyle="--", zorder=2)
+                        self._line(axis, joints, color=colour, linewidth=style.THIN, linestyle="--", zorder=2)
                     pins = self.page([place.crank_pin, place.slider_pin])
-                    edge: dict[str, Any] = {"markeredgecolor": "white", "markeredgewidth": HAIR}
-                    axis.plot(*pins.T, marker, color=colour, markersize=DOT, zorder=6, **edge)
+                    edge: dict[str, Any] = {"markeredgecolor": "white", "markeredgewidth": style.HAIR}
+                    axis.plot(*pins.T, marker, color=colour, markersize=style.DOT, zorder=6, **edge)
 
     def _dimensions(self, axis: Axes, pose: _Pose, letters: bool) -> None:
         u = self.size
         if self.a4 != 0.0:
-            self._line(axis, [np.zeros(3), self.foot], color="black", linewidth=LINE, zorder=5)
+            self._line(axis, [np.zeros(3), self.foot], color="black", linewidth=style.LINE, zorder=5)
         if abs(pose.centre[2]) > 1e-9 * self.size:
             self._line(axis, [np.zeros(3), pose.centre], color=_SHIFT, linewidth=2.6, zorder=6)
         if not letters:
@@ -296,14 +283,14 @@ class _Scene:
         if self.a4 != 0.0:
             # the direction of the crank axis, repeated at the guide
             along = self.foot + np.array([0.0, 0.0, 2.6 * u])
-            self._line(axis, [self.foot, along], color="0.4", linewidth=HAIR, linestyle="--")
+            self._line(axis, [self.foot, along], color="0.4", linewidth=style.HAIR, linestyle="--")
         t = np.linspace(0.0, self.parameters.guide_twist, 121)
         twist = self.foot + 1.5 * u * np.column_stack([0.0 * t, np.sin(t), np.cos(t)])
-        self._line(axis, twist, color=_TWIST, linewidth=LINE)
+        self._line(axis, twist, color=_TWIST, linewidth=style.LINE)
         look = {
             "arrowstyle": "-|>",
             "color": "black",
-            "linewidth": THIN,
+            "linewidth": style.THIN,
             "mutation_scale": 8,
             "shrinkA": 0,
             "shrinkB": 0,
@@ -351,7 +338,7 @@ class _Scene:
             x_lines=[line[0] for line in self.lines], y_lines=[line[1] for line in self.lines],
             xlims=(self.low[0] + 0.5 * u, self.high[0] - 0.5 * u), ylims=(self.low[1], self.high[1]),
             margin=0.003, min_distance=0.005, nbr_candidates=500,
-            textsize=[label.size for label in labels], textcolor=colours, linecolor=colours, linewidth=HAIR,
+            textsize=[label.size for label in labels], textcolor=colours, linecolor=colours, linewidth=style.HAIR,
             plot_kwargs={"zorder": 11}, zorder=12, path_effects=[withStroke(linewidth=2.4, foreground="white")],
         )  # fmt: skip
 
@@ -375,10 +362,8 @@ def plot_mechanism(
     Parameters
     ----------
     parameters : SliderCrankParameters
-    crank_angle : float
-        Crank angle theta1 (rad).
-    shift : float
-        Axial shift S1 (m).
+    crank_angle, shift : float
+        Crank angle theta1 (rad) and axial shift S1 (m).
     law : PeriodicShift, optional
         The shift over the crank angle, for the paths; by default it is constant, ``shift``.
     unit : str
@@ -397,11 +382,11 @@ def plot_mechanism(
     pose = _checked_pose(parameters, crank_angle, shift, _factor(unit))
     parts = _parts(parameters, constant_shift(shift) if law is None else law, _factor(unit))
     scene = _Scene(parameters, parts, [pose], unit, view)
-    with figure_style(laid_out=False):
+    with style.figure_style(laid_out=False):
         figure, axis = _sheet(scene, 9.0, head=0.35 if title else 0.0)
         scene.draw(axis, pose)
-        write_title(figure, title)
-        return finish(figure)
+        style.write_title(figure, title)
+        return style.finish(figure)
 
 
 @draw_mechanism.register
@@ -415,7 +400,7 @@ def _draw_at_start(parameters: SliderCrankParameters, axis: Axes, run: Trajector
     )
     samples, when = last_samples(run)
     scene = _Scene(parameters, [_Track(poses, crank[samples], slider[samples])], poses, "mm", VIEW)
-    frame_drawing(axis, scene.low, scene.high)
+    style.frame_drawing(axis, scene.low, scene.high)
     scene.draw(axis, poses[0], letters=False)
     return f"at {run.time[0]:.4g} s, with the paths of the pins {when}"
 
@@ -427,7 +412,7 @@ def _sheet(scene: _Scene, wide: float, *, head: float, foot: float = 0.0) -> tup
     figure = Figure(figsize=(wide, head + tall + foot))
     FigureCanvasAgg(figure)
     axis = figure.add_axes((0.0, foot / (head + tall + foot), 1.0, tall / (head + tall + foot)))
-    frame_drawing(axis, scene.low, scene.high)
+    style.frame_drawing(axis, scene.low, scene.high)
     axis.apply_aspect()
     return figure, axis
 
@@ -480,14 +465,14 @@ def animate_mechanism(
     poses = [_pose(parameters, float(a), law.at(float(a))[0], factor) for a in angles]
     parts = _parts(parameters, law, factor)
     scene = _Scene(parameters, parts, poses, unit, view)
-    with figure_style(laid_out=False):
+    with style.figure_style(laid_out=False):
         head, foot = (0.35 if title else 0.0), 1.6
         figure, above = _sheet(scene, 7.0, head=head, foot=foot)
         total = figure.get_figheight()
         below = figure.add_axes((0.11, 0.45 / total, 0.86, (foot - 0.55) / total))
-        write_title(figure, title)
+        style.write_title(figure, title)
         _plot_slider_position(below, parts, unit)
-        (dot,) = below.plot([], [], "o", color=CRANK, markersize=DOT, zorder=7)
+        (dot,) = below.plot([], [], "o", color=style.CRANK, markersize=style.DOT, zorder=7)
         with gif(figure, path, frames_per_second) as (file, add_frame):
             for pose in poses:
                 scene.draw(above, pose, letters=False)
@@ -501,13 +486,13 @@ def animate_mechanism(
 def _plot_slider_position(axis: Axes, parts: Sequence[_Part], unit: str) -> None:
     """Plot the slider position over the crank angle, and mark dead centres and limits of assembly."""
     for part in parts:
-        axis.plot(np.degrees(part.angles), [pose.slide for pose in part.poses], color=COLOURS[0], zorder=3)
+        axis.plot(np.degrees(part.angles), [pose.slide for pose in part.poses], color=style.COLOURS[0], zorder=3)
         for places, _, colour, marker in part.marks:
             for place in places:
                 low, turn = degrees(part.angles[0]), degrees(place.angle)
                 # a range may begin before zero and reach beyond a turn
                 shown = turn if turn >= low - 1e-6 else turn + 360.0 * ceil((low - 1e-6 - turn) / 360.0)
-                axis.plot(shown, place.slide, marker, color=colour, markersize=DOT, zorder=6)
+                axis.plot(shown, place.slide, marker, color=colour, markersize=style.DOT, zorder=6)
     axis.set_xlabel("crank angle [deg]")
     axis.set_ylabel(f"slider position [{unit}]")
 
@@ -543,7 +528,7 @@ def plot_range(
     angles = np.linspace(min(ends), max(ends), 2 * _POINTS)
     square = np.array([kinematics.assembly_square(float(a), law.at(float(a))[0], p) for a in angles])
     margin = factor * (p.a2 - np.sqrt(p.a2 * p.a2 - square))
-    with figure_style():
+    with style.figure_style():
         figure = Figure(figsize=(9.6, 4.4))
         panels = figure.subplot_mosaic(
             [["circle", "margin"], ["circle", "slider"]], width_ratios=(1.0, 1.35), height_ratios=(1.0, 1.0)
@@ -553,37 +538,37 @@ def plot_range(
         missing: dict[str, Any] = {"where": (margin < 0.0).tolist(), "label": "the rod does not reach the guide"}
         upper.fill_between(np.degrees(angles), margin, 0.0, color="0.85", linewidth=0.0, **missing)
         if margin.min() < 0.0:
-            legend_above(upper)
-        upper.plot(np.degrees(angles), margin, color=COLOURS[0])
-        upper.axhline(0.0, color="0.3", linewidth=HAIR)
+            style.legend_above(upper)
+        upper.plot(np.degrees(angles), margin, color=style.COLOURS[0])
+        upper.axhline(0.0, color="0.3", linewidth=style.HAIR)
         upper.set_ylabel(f"assembly margin [{unit}]")
         upper.sharex(panels["slider"])
         _plot_slider_position(panels["slider"], parts, unit)
         for angle in (degrees(float(part.angles[end])) for part in parts if part.limits for end in (0, -1)):
             for axis in (upper, panels["slider"]):
-                axis.axvline(angle, color=_LIMIT, linewidth=THIN, linestyle="--", zorder=1)
-        write_title(figure, title)
+                axis.axvline(angle, color=_LIMIT, linewidth=style.THIN, linestyle="--", zorder=1)
+        style.write_title(figure, title)
         figure.align_ylabels([upper, panels["slider"]])
-        return finish(figure)
+        return style.finish(figure)
 
 
 def _draw_circle(axis: Axes, parts: Sequence[_Part], radius: float, unit: str) -> None:
     """Draw the crank pin's circle, seen along the crank axis, with the part that the crank can reach as a solid line."""
     turn = np.linspace(0.0, 2.0 * pi, 181)
-    axis.plot(radius * np.cos(turn), radius * np.sin(turn), ":", color="0.5", linewidth=LINE)
+    axis.plot(radius * np.cos(turn), radius * np.sin(turn), ":", color="0.5", linewidth=style.LINE)
     for part in parts:
-        axis.plot(*part.crank_pins[:, :2].T, color=TRACE, linewidth=3.5)
+        axis.plot(*part.crank_pins[:, :2].T, color=style.TRACE, linewidth=3.5)
         for places, name, colour, marker in part.marks:
             for place in places:
                 x, y = place.crank_pin[:2]
-                axis.plot([0.0, x], [0.0, y], "--", color=colour, linewidth=THIN)
-                axis.plot(x, y, marker, color=colour, markersize=DOT, zorder=5)
+                axis.plot([0.0, x], [0.0, y], "--", color=colour, linewidth=style.THIN)
+                axis.plot(x, y, marker, color=colour, markersize=style.DOT, zorder=5)
                 side = "left" if x > 0.3 * radius else "right" if x < -0.3 * radius else "center"
                 out = 10.0 * x / radius, 18.0 * y / radius
                 text = f"{name}\n{degrees(place.angle) % 360.0:.2f}°"
-                look: dict[str, Any] = {"color": colour, "fontsize": TINY, "ha": side, "va": "center"}
+                look: dict[str, Any] = {"color": colour, "fontsize": style.TINY, "ha": side, "va": "center"}
                 axis.annotate(text, (x, y), out, textcoords="offset points", **look)
-    axis.plot(0.0, 0.0, "o", color=CRANK, markersize=DOT)
+    axis.plot(0.0, 0.0, "o", color=style.CRANK, markersize=style.DOT)
     axis.set_aspect("equal")
     axis.set_xlim(-1.75 * radius, 1.75 * radius)
     axis.set_ylim(-1.4 * radius, 1.4 * radius)

@@ -22,50 +22,12 @@ from shapely import MultiLineString, MultiPoint
 
 from linkwork.errors import InputError
 
-from ..synthesis import (
-    OVER,
-    SHOWN,
-    Assessment,
-    InfeasibleError,
-    LinkageScene,
-    PinForces,
-    SliderCrank,
-    Solution,
-    Synthesis,
-    TradeOff,
-    assess,
-    error_unit,
-    headline,
-    quality_name,
-    quality_unit,
-)
+from .. import synthesis as syn
 from ..units import ROUNDING
+from . import style
 from .animation import check_frames, gif
 from .dispatch import animate, plot
 from .marks import roomiest_position
-from .style import (
-    BLOCK,
-    BOLD,
-    COLOURS,
-    COUPLER,
-    CRANK,
-    DOT,
-    GROUND,
-    HAIR,
-    LETTER,
-    LINE,
-    ROCKER,
-    SLIDER,
-    SMALL,
-    TARGET,
-    THIN,
-    TINY,
-    TRACE,
-    figure_style,
-    finish,
-    write_notes,
-    write_title,
-)
 
 FloatArray = NDArray[np.float64]
 
@@ -81,7 +43,7 @@ FRAMED = 72
 class _Frame:
     """Axis limits (mm) that contain a linkage at all crank ``rotations``, and the size of its pins."""
 
-    def __init__(self, scene: LinkageScene, rotations: FloatArray) -> None:
+    def __init__(self, scene: syn.LinkageScene, rotations: FloatArray) -> None:
         places = [pins for phi in rotations if (pins := scene.pins(float(phi))) is not None]
         points = [np.array(list(pins.values())) for pins in places]
         points += [p for p in (*scene.curves, scene.target, scene.guide) if p is not None]
@@ -106,7 +68,7 @@ def _set_one_scale(axis: Axes, low: FloatArray, high: FloatArray) -> None:
 
 
 def _draw_line(axis: Axes, points: Any, **options: Any) -> None:
-    look: dict[str, Any] = {"color": GROUND, "linewidth": LINE, "solid_capstyle": "round"}
+    look: dict[str, Any] = {"color": style.GROUND, "linewidth": style.LINE, "solid_capstyle": "round"}
     axis.plot(*np.array(points).T, **look | options)
 
 
@@ -114,39 +76,39 @@ def _draw_support(axis: Axes, at: FloatArray, unit: float) -> None:
     """Draw the bearing of a fixed pin."""
     foot, half = at[1] - 1.5 * unit, 0.85 * unit
     corners = np.array([at, [at[0] - half, foot], [at[0] + half, foot]])
-    axis.add_patch(Polygon(corners, facecolor="0.92", edgecolor=GROUND, linewidth=THIN, zorder=5))
-    _draw_line(axis, [(at[0] - 1.3 * unit, foot), (at[0] + 1.3 * unit, foot)], linewidth=THIN, zorder=5)
+    axis.add_patch(Polygon(corners, facecolor="0.92", edgecolor=style.GROUND, linewidth=style.THIN, zorder=5))
+    _draw_line(axis, [(at[0] - 1.3 * unit, foot), (at[0] + 1.3 * unit, foot)], linewidth=style.THIN, zorder=5)
     for x in np.linspace(at[0] - 0.9 * unit, at[0] + 1.3 * unit, 5):
-        _draw_line(axis, [(x, foot), (x - 0.5 * unit, foot - 0.5 * unit)], linewidth=HAIR, zorder=5)
+        _draw_line(axis, [(x, foot), (x - 0.5 * unit, foot - 0.5 * unit)], linewidth=style.HAIR, zorder=5)
 
 
-def _draw_target(axis: Axes, scene: LinkageScene, *, size: float = 3.0) -> None:
+def _draw_target(axis: Axes, scene: syn.LinkageScene, *, size: float = 3.0) -> None:
     if scene.target is None:
         return
     points = MM_PER_METRE * scene.target
-    look: dict[str, Any] = {"color": TARGET, "zorder": 3, "label": "target"}
+    look: dict[str, Any] = {"color": style.TARGET, "zorder": 3, "label": "target"}
     if scene.target_closed is None:
-        axis.plot(*points.T, "o", markersize=size, fillstyle="none", markeredgewidth=THIN, **look)
+        axis.plot(*points.T, "o", markersize=size, fillstyle="none", markeredgewidth=style.THIN, **look)
     else:
         closed = np.vstack([points, points[:1]]) if scene.target_closed else points
         axis.plot(*closed.T, linewidth=2.6, alpha=0.8, **look)
 
 
-def _draw_curves(axis: Axes, scene: LinkageScene, *, traced: bool = True) -> None:
+def _draw_curves(axis: Axes, scene: syn.LinkageScene, *, traced: bool = True) -> None:
     for piece in scene.curves:
-        axis.plot(*(MM_PER_METRE * piece).T, color=TRACE, alpha=0.45, linewidth=THIN, zorder=2)
+        axis.plot(*(MM_PER_METRE * piece).T, color=style.TRACE, alpha=0.45, linewidth=style.THIN, zorder=2)
     if not scene.curves:
         # for a rocker function the paths of B and C, with gaps where the links cannot be joined
         places = [scene.pins(float(phi)) for phi in scene.transmission[0]]
-        for name, colour in (("B", CRANK), ("C", ROCKER)):
+        for name, colour in (("B", style.CRANK), ("C", style.ROCKER)):
             way = MM_PER_METRE * np.array([(np.nan, np.nan) if pins is None else pins[name] for pins in places])
-            axis.plot(*way.T, color=colour, alpha=0.35, linewidth=THIN, zorder=2)
+            axis.plot(*way.T, color=colour, alpha=0.35, linewidth=style.THIN, zorder=2)
     if traced and scene.traced_curve is not None:
-        axis.plot(*(MM_PER_METRE * scene.traced_curve).T, color=TRACE, linewidth=BOLD, zorder=4)
+        axis.plot(*(MM_PER_METRE * scene.traced_curve).T, color=style.TRACE, linewidth=style.BOLD, zorder=4)
 
 
 def _draw_linkage(
-    axis: Axes, scene: LinkageScene, frame: _Frame, pins: Mapping[str, tuple[float, float]], *, letters: bool = True
+    axis: Axes, scene: syn.LinkageScene, frame: _Frame, pins: Mapping[str, tuple[float, float]], *, letters: bool = True
 ) -> None:
     """Draw links, pins and supports at one position; ``pins`` are their positions by name (m)."""
     unit = frame.unit
@@ -154,25 +116,29 @@ def _draw_linkage(
     a, b, c, d, e = (at[name] for name in "ABCDE")
     p = at.get("P")
     link: dict[str, Any] = {"linewidth": 3.6 if letters else 2.4}
-    _draw_line(axis, [a, e], linewidth=HAIR, linestyle=(0, (9, 3, 2, 3)), color="0.55", zorder=1)
+    _draw_line(axis, [a, e], linewidth=style.HAIR, linestyle=(0, (9, 3, 2, 3)), color="0.55", zorder=1)
     _draw_support(axis, a, unit)
     if scene.guide is not None:
         _draw_slider(axis, MM_PER_METRE * scene.guide, scene.guide_directions(), d, unit)
     else:
         _draw_support(axis, e if scene.second_crank else d, unit)
     if scene.second_crank:
-        _draw_line(axis, [e, d], color=CRANK, zorder=8, **link)
+        _draw_line(axis, [e, d], color=style.CRANK, zorder=8, **link)
     if p is not None:
-        axis.add_patch(Polygon([b, c, p], facecolor=COUPLER, alpha=0.14, edgecolor="none", zorder=5))
-        _draw_line(axis, [b, p, c], color=COUPLER, linewidth=LINE, zorder=6)
-    if not isinstance(scene.linkage, SliderCrank):
-        _draw_line(axis, [d, c], color=ROCKER, zorder=6, **link)
-    _draw_line(axis, [b, c], color=COUPLER, zorder=7, **link)
-    _draw_line(axis, [a, b], color=CRANK, zorder=8, **link)
+        axis.add_patch(Polygon([b, c, p], facecolor=style.COUPLER, alpha=0.14, edgecolor="none", zorder=5))
+        _draw_line(axis, [b, p, c], color=style.COUPLER, linewidth=style.LINE, zorder=6)
+    if not isinstance(scene.linkage, syn.SliderCrank):
+        _draw_line(axis, [d, c], color=style.ROCKER, zorder=6, **link)
+    _draw_line(axis, [b, c], color=style.COUPLER, zorder=7, **link)
+    _draw_line(axis, [a, b], color=style.CRANK, zorder=8, **link)
     for pin in (a, b, c, d, *([e] if scene.second_crank else [])):
-        axis.add_patch(Circle(tuple(pin), 0.36 * unit, facecolor="white", edgecolor="black", linewidth=THIN, zorder=9))
+        axis.add_patch(
+            Circle(tuple(pin), 0.36 * unit, facecolor="white", edgecolor="black", linewidth=style.THIN, zorder=9)
+        )
     if p is not None:
-        axis.add_patch(Circle(tuple(p), 0.32 * unit, facecolor=TRACE, edgecolor="black", linewidth=THIN, zorder=10))
+        axis.add_patch(
+            Circle(tuple(p), 0.32 * unit, facecolor=style.TRACE, edgecolor="black", linewidth=style.THIN, zorder=10)
+        )
     if letters:
         _write_letters(axis, scene, at, unit)
 
@@ -183,12 +149,12 @@ def _draw_slider(
     along, left = directions
     for side in (-0.8, 0.8):
         rail = [guide[0] - 2.2 * unit * along + side * unit * left, guide[1] + 2.2 * unit * along + side * unit * left]
-        _draw_line(axis, rail, linewidth=THIN, zorder=3)
+        _draw_line(axis, rail, linewidth=style.THIN, zorder=3)
     block = [d + s * 1.3 * unit * along + n * 0.8 * unit * left for s, n in ((-1, -1), (1, -1), (1, 1), (-1, 1))]
-    axis.add_patch(Polygon(block, facecolor=BLOCK, edgecolor=SLIDER, linewidth=LINE, zorder=4))
+    axis.add_patch(Polygon(block, facecolor=style.BLOCK, edgecolor=style.SLIDER, linewidth=style.LINE, zorder=4))
 
 
-def _write_letters(axis: Axes, scene: LinkageScene, at: Mapping[str, FloatArray], unit: float) -> None:
+def _write_letters(axis: Axes, scene: syn.LinkageScene, at: Mapping[str, FloatArray], unit: float) -> None:
     """Write each pin's letter where it is farthest from links, supports, curve and other letters."""
     names = [n for n in scene.pin_letters if n in at]
     lines = [(at["A"], at["B"]), (at["B"], at["C"]), (at["C"], at["D"]), (at["A"], at["E"])]
@@ -207,11 +173,11 @@ def _write_letters(axis: Axes, scene: LinkageScene, at: Mapping[str, FloatArray]
     drawn = [MultiLineString(lines), *(MultiPoint(curve[np.isfinite(curve).all(axis=1)]) for curve in curves)]
     for name in names:
         place = roomiest_position(at[name], 1.5 * unit, drawn, marks)
-        axis.text(place[0], place[1], name, ha="center", va="center", fontsize=LETTER, zorder=11)
+        axis.text(place[0], place[1], name, ha="center", va="center", fontsize=style.LETTER, zorder=11)
         marks.append(place)
 
 
-def _start_position(scene: LinkageScene) -> tuple[float, Mapping[str, tuple[float, float]]]:
+def _start_position(scene: syn.LinkageScene) -> tuple[float, Mapping[str, tuple[float, float]]]:
     """Return the first crank rotation (rad) at which the links can be joined, and the positions of the pins there (m)."""
     for phi in (*scene.rotation, *scene.transmission[0]):
         pins = scene.pins(float(phi))
@@ -220,7 +186,7 @@ def _start_position(scene: LinkageScene) -> tuple[float, Mapping[str, tuple[floa
     raise InputError("the links cannot be joined at any rotation of the crank: there is nothing to draw")
 
 
-def _framed_rotations(scene: LinkageScene) -> FloatArray:
+def _framed_rotations(scene: syn.LinkageScene) -> FloatArray:
     """Return crank rotations (rad) at which the links can be joined; the linkage must fit in the frame at all of them."""
     rotation, angle = scene.transmission
     joined = rotation[np.isfinite(angle)]
@@ -238,7 +204,7 @@ def magnification(worst: float, extent: float) -> float:
     return max(1.0, float(power * max(m for m in (0.5, 1.0, 2.0, 5.0) if m * power <= most)))
 
 
-def _plot_magnified_errors(axis: Axes, scene: LinkageScene) -> None:
+def _plot_magnified_errors(axis: Axes, scene: syn.LinkageScene) -> None:
     """Plot target and path, without the linkage, with magnified error vectors."""
     assert scene.target is not None
     columns = scene.stations
@@ -252,9 +218,11 @@ def _plot_magnified_errors(axis: Axes, scene: LinkageScene) -> None:
     times = "" if factor == 1.0 else f" (x {factor:g})"
     _draw_target(axis, scene, size=4.0)
     if scene.traced_curve is not None:
-        axis.plot(*(MM_PER_METRE * scene.traced_curve).T, color=TRACE, linewidth=LINE, zorder=4, label="path")
+        axis.plot(
+            *(MM_PER_METRE * scene.traced_curve).T, color=style.TRACE, linewidth=style.LINE, zorder=4, label="path"
+        )
     if not _is_met(scene):
-        axis.plot(*strokes.T, color=CRANK, linewidth=HAIR, zorder=5, label=f"error{times}")
+        axis.plot(*strokes.T, color=style.CRANK, linewidth=style.HAIR, zorder=5, label=f"error{times}")
     points = np.vstack([wanted, ends])
     low, high = points.min(axis=0), points.max(axis=0)
     rim = 0.06 * float((high - low).max())
@@ -262,7 +230,7 @@ def _plot_magnified_errors(axis: Axes, scene: LinkageScene) -> None:
     axis.legend(loc="lower center", bbox_to_anchor=(0.5, 0.99), ncols=3, borderpad=0.2)
 
 
-def _station_axis(scene: LinkageScene) -> tuple[FloatArray, str]:
+def _station_axis(scene: syn.LinkageScene) -> tuple[FloatArray, str]:
     """Return the x coordinates of the stations (crank rotation or number), and the label of the x axis."""
     rotation = np.degrees(scene.stations["crank rotation [rad]"])
     if scene.timed:
@@ -270,41 +238,41 @@ def _station_axis(scene: LinkageScene) -> tuple[FloatArray, str]:
     return np.arange(len(rotation), dtype=float), "target point"
 
 
-def _plot_rocker(axis: Axes, scene: LinkageScene) -> None:
+def _plot_rocker(axis: Axes, scene: syn.LinkageScene) -> None:
     """Plot the rocker angle over the crank rotation with its target."""
     assert scene.function is not None
     columns = scene.stations
     x = np.degrees(columns["crank rotation [rad]"])
-    axis.plot(*np.degrees(scene.function), color=ROCKER, label="rocker", zorder=4)
-    look: dict[str, Any] = {"markersize": 3.5, "fillstyle": "none", "markeredgewidth": THIN}
-    axis.plot(x, np.degrees(columns["target angle [rad]"]), "o", color=TARGET, label="target", zorder=3, **look)
+    axis.plot(*np.degrees(scene.function), color=style.ROCKER, label="rocker", zorder=4)
+    look: dict[str, Any] = {"markersize": 3.5, "fillstyle": "none", "markeredgewidth": style.THIN}
+    axis.plot(x, np.degrees(columns["target angle [rad]"]), "o", color=style.TARGET, label="target", zorder=3, **look)
     axis.set_xlabel("crank rotation [deg]")
     axis.set_ylabel("rocker angle [deg]")
     axis.legend(loc="lower center", bbox_to_anchor=(0.5, 0.99), ncols=2, borderpad=0.2)
 
 
-def _is_met(scene: LinkageScene) -> bool:
+def _is_met(scene: syn.LinkageScene) -> bool:
     """Return whether the linkage meets the target: all errors are only rounding errors."""
     errors = [scene.stations[name] for name in ("error [m]", "error of angle [rad]") if name in scene.stations]
     return all(np.nanmax(np.abs(error), initial=0.0) < 1e-3 * ROUNDING for error in errors)
 
 
-def _plot_errors(axis: Axes, scene: LinkageScene) -> None:
+def _plot_errors(axis: Axes, scene: syn.LinkageScene) -> None:
     """Plot the errors of position and of angle at the stations."""
     x, words = _station_axis(scene)
     columns = scene.stations
     few: dict[str, Any] = {"marker": "o", "markersize": 3.0} if len(x) <= 100 else {}
     if "error [m]" in columns:
         error = MM_PER_METRE * columns["error [m]"]
-        axis.plot(x, np.where(error > ROUNDING, error, 0.0), color=COLOURS[0], **few)
+        axis.plot(x, np.where(error > ROUNDING, error, 0.0), color=style.COLOURS[0], **few)
         axis.set_ylabel("error [mm]")
         axis.set_ylim(0.0, max(axis.get_ylim()[1], 10.0 * ROUNDING))
     if "error of angle [rad]" in columns:
         beside = axis.twinx() if "error [m]" in columns else axis
         turned = np.degrees(columns["error of angle [rad]"])
         turned = np.where(np.abs(turned) > ROUNDING, turned, 0.0)
-        colour = COLOURS[2] if beside is not axis else COLOURS[0]
-        beside.axhline(0.0, color="0.6", linewidth=HAIR)
+        colour = style.COLOURS[2] if beside is not axis else style.COLOURS[0]
+        beside.axhline(0.0, color="0.6", linewidth=style.HAIR)
         beside.plot(x, turned, color=colour, linestyle="-" if beside is axis else "--", **few)
         beside.set_ylabel("error of angle [deg]", color=colour if beside is not axis else "black")
         if beside is not axis:
@@ -315,22 +283,22 @@ def _plot_errors(axis: Axes, scene: LinkageScene) -> None:
         axis.xaxis.set_major_locator(MaxNLocator(integer=True))
 
 
-def _plot_transmission(axis: Axes, scene: LinkageScene) -> None:
+def _plot_transmission(axis: Axes, scene: syn.LinkageScene) -> None:
     """Plot the transmission angle over a crank turn; the part of the turn that the task uses is a thick line."""
     rotation, angle = scene.transmission
     turns, angles = np.degrees(rotation), np.degrees(angle)
     begin, end = np.degrees([scene.rotation.min(), scene.rotation.max()])
     within = (turns >= begin - 1e-9) & (turns <= end + 1e-9)
-    axis.plot(turns, angles, color=COUPLER, linewidth=THIN, alpha=0.5)
-    axis.plot(turns, np.where(within, angles, np.nan), color=COUPLER, linewidth=BOLD)
-    axis.axhline(90.0, color="0.6", linewidth=HAIR)
+    axis.plot(turns, angles, color=style.COUPLER, linewidth=style.THIN, alpha=0.5)
+    axis.plot(turns, np.where(within, angles, np.nan), color=style.COUPLER, linewidth=style.BOLD)
+    axis.axhline(90.0, color="0.6", linewidth=style.HAIR)
     axis.set_ylim(0.0, 180.0)
     axis.set_yticks([0.0, 40.0, 90.0, 140.0, 180.0])
     _tick_quarter_turns(axis, turns)
     axis.set_ylabel("transmission\nangle [deg]")
 
 
-def _plot_pivot_motion(axis: Axes, scene: LinkageScene) -> None:
+def _plot_pivot_motion(axis: Axes, scene: syn.LinkageScene) -> None:
     """Plot the motion of a movable rocker pivot, on a slider or a second crank, over a crank turn."""
     assert scene.motion is not None
     name, values = scene.motion
@@ -339,7 +307,7 @@ def _plot_pivot_motion(axis: Axes, scene: LinkageScene) -> None:
     else:
         name, values = name.replace("[rad]", "[deg]"), np.degrees(values)
     turns = np.degrees(scene.transmission[0])
-    axis.plot(turns, values, color=SLIDER)
+    axis.plot(turns, values, color=style.SLIDER)
     _tick_quarter_turns(axis, turns)
     axis.set_ylabel(name.replace(" ", "\n", 1))
 
@@ -349,7 +317,7 @@ def _tick_quarter_turns(axis: Axes, turns: FloatArray) -> None:
     axis.set_xlabel("crank rotation [deg]")
 
 
-def _draw_panel(axis: Axes, scene: LinkageScene, *, size: float, letters: bool = True) -> None:
+def _draw_panel(axis: Axes, scene: syn.LinkageScene, *, size: float, letters: bool = True) -> None:
     """Draw the linkage at the start of its motion with its curve and the target."""
     _, pins = _start_position(scene)
     frame = _Frame(scene, _framed_rotations(scene))
@@ -359,7 +327,7 @@ def _draw_panel(axis: Axes, scene: LinkageScene, *, size: float, letters: bool =
     _draw_linkage(axis, scene, frame, pins, letters=letters)
 
 
-def _plot_task(axis: Axes, scene: LinkageScene) -> None:
+def _plot_task(axis: Axes, scene: syn.LinkageScene) -> None:
     """Plot target and result of the task: the rocker function, or the path with magnified errors."""
     if scene.function is not None:
         _plot_rocker(axis, scene)
@@ -368,7 +336,7 @@ def _plot_task(axis: Axes, scene: LinkageScene) -> None:
 
 
 @plot.register
-def plot_solution(solution: Solution, *, title: str = "") -> Figure:
+def plot_solution(solution: syn.Solution, *, title: str = "") -> Figure:
     """Plot a linkage to scale, its target and result with magnified errors, the errors, and the transmission angle.
 
     Raises
@@ -376,8 +344,8 @@ def plot_solution(solution: Solution, *, title: str = "") -> Figure:
     InputError
         If the links cannot be joined anywhere.
     """
-    scene = LinkageScene(solution, title)
-    with figure_style():
+    scene = syn.LinkageScene(solution, title)
+    with style.figure_style():
         met = _is_met(scene)
         right = ["task", *([] if met else ["errors"]), "transmission", *([] if scene.motion is None else ["motion"])]
         figure = Figure(figsize=(10.4, 3.1 + 1.3 * max(3, len(right))))
@@ -393,14 +361,14 @@ def plot_solution(solution: Solution, *, title: str = "") -> Figure:
         _plot_transmission(panels["transmission"], scene)
         if scene.motion is not None:
             _plot_pivot_motion(panels["motion"], scene)
-        write_title(figure, scene.title)
-        write_notes(figure, ["Every target is met: errors are rounding alone."] if met else [])
+        style.write_title(figure, scene.title)
+        style.write_notes(figure, ["Every target is met: errors are rounding alone."] if met else [])
         figure.align_ylabels([panels[name] for name in right])
-        return finish(figure)
+        return style.finish(figure)
 
 
 def plot_sheet(
-    solution: Solution | Assessment, forces: PinForces | None = None, *, title: str = "", made: str = ""
+    solution: syn.Solution | syn.Assessment, forces: syn.PinForces | None = None, *, title: str = "", made: str = ""
 ) -> Figure:
     """Plot an A4 page for the workshop: linkage, curve and target, transmission angle, pin forces, dimensions.
 
@@ -419,10 +387,10 @@ def plot_sheet(
     InputError
         If the links cannot be joined anywhere.
     """
-    assessment = solution if isinstance(solution, Assessment) else assess(solution)
+    assessment = solution if isinstance(solution, syn.Assessment) else syn.assess(solution)
     solution = assessment.solution
-    scene = LinkageScene(solution, title)
-    with figure_style():
+    scene = syn.LinkageScene(solution, title)
+    with style.figure_style():
         figure = Figure(figsize=A4)
         right = ["task", "transmission", *(["forces"] if forces is not None else [])]
         rows: list[Any] = [*(["linkage", name] for name in right), ["table", "table"]]
@@ -435,24 +403,24 @@ def plot_sheet(
         _plot_task(panels["task"], scene)
         _plot_transmission(panels["transmission"], scene)
         if forces is not None:
-            _plot_forces(panels["forces"], forces, "guide" if isinstance(solution.linkage, SliderCrank) else "D")
+            _plot_forces(panels["forces"], forces, "guide" if isinstance(solution.linkage, syn.SliderCrank) else "D")
         head, *dimensions = assessment.dimensions
         panels["table"].axis("off")
         grid = panels["table"].table(
             dimensions, colLabels=head, cellLoc="right", loc="upper center", edges="horizontal"
         )
         grid.auto_set_font_size(False)
-        grid.set_fontsize(TINY)
+        grid.set_fontsize(style.TINY)
         grid.auto_set_column_width(range(len(head)))
-        write_title(figure, scene.title)
-        verdict = f"{solution.verdicts.grashof}; " + headline(solution).replace("\n", "; ")
-        write_notes(figure, [line for line in (verdict, assessment.rounding, made) if line])
-        return finish(figure)
+        style.write_title(figure, scene.title)
+        verdict = f"{solution.verdicts.grashof}; " + syn.headline(solution).replace("\n", "; ")
+        style.write_notes(figure, [line for line in (verdict, assessment.rounding, made) if line])
+        return style.finish(figure)
 
 
-def _plot_forces(axis: Axes, forces: PinForces, last: str) -> None:
+def _plot_forces(axis: Axes, forces: syn.PinForces, last: str) -> None:
     """Plot the resultant force on each pin over the crank rotation; ``last`` labels the fourth force: D or the guide."""
-    for pin, force, colour in zip(("A", "B", "C", last), forces.force.T, COLOURS):
+    for pin, force, colour in zip(("A", "B", "C", last), forces.force.T, style.COLOURS):
         axis.plot(np.degrees(forces.rotation), force, color=colour, label=f"{pin}: {force.max():.3g} N at most")
     _tick_quarter_turns(axis, np.degrees(forces.rotation))
     axis.set_ylabel("pin force [N]")
@@ -460,7 +428,7 @@ def _plot_forces(axis: Axes, forces: PinForces, last: str) -> None:
 
 
 @plot.register
-def plot_alternatives(synthesis: Synthesis, *, title: str = "") -> Figure:
+def plot_alternatives(synthesis: syn.Synthesis, *, title: str = "") -> Figure:
     """Plot the ranked linkages beside one another, each to its own scale, with curve, target and error.
 
     Raises
@@ -468,19 +436,25 @@ def plot_alternatives(synthesis: Synthesis, *, title: str = "") -> Figure:
     InputError
         If there are no linkages.
     """
-    scenes = [LinkageScene(s, f"{k}: {headline(s)}") for k, s in enumerate(synthesis.solutions, start=1)]
+    scenes = [syn.LinkageScene(s, f"{k}: {syn.headline(s)}") for k, s in enumerate(synthesis.solutions, start=1)]
     if not scenes:
         raise InputError("there are no linkages to draw")
     columns = min(3, len(scenes))
     rows = ceil(len(scenes) / columns)
-    with figure_style():
+    with style.figure_style():
         figure = Figure(figsize=(3.5 * columns, 3.8 * rows + 0.3 + (0.3 if title else 0.0)))
         axes = figure.subplots(rows, columns, squeeze=False).ravel()
         for axis, scene in zip(axes, scenes):
             _draw_panel(axis, scene, size=1.8, letters=False)
-            axis.set_title("\n".join(fill(line, 46) for line in scene.title.splitlines()), fontsize=SMALL)
-        names = [("crank", CRANK), ("coupler", COUPLER), ("rocker", ROCKER), ("target", TARGET), ("path", TRACE)]
-        if all(isinstance(scene.linkage, SliderCrank) for scene in scenes):
+            axis.set_title("\n".join(fill(line, 46) for line in scene.title.splitlines()), fontsize=style.SMALL)
+        names = [
+            ("crank", style.CRANK),
+            ("coupler", style.COUPLER),
+            ("rocker", style.ROCKER),
+            ("target", style.TARGET),
+            ("path", style.TRACE),
+        ]
+        if all(isinstance(scene.linkage, syn.SliderCrank) for scene in scenes):
             del names[2]
         if scenes[0].target is None:
             names = names[:-2]
@@ -488,12 +462,12 @@ def plot_alternatives(synthesis: Synthesis, *, title: str = "") -> Figure:
         figure.legend(handles=handles, loc="outside lower center", ncols=min(len(handles), 3 * columns))
         for axis in axes[len(scenes) :]:
             axis.set_visible(False)
-        write_title(figure, title)
-        return finish(figure)
+        style.write_title(figure, title)
+        return style.finish(figure)
 
 
 @plot.register
-def plot_trade_off(traded: TradeOff, *, title: str = "") -> Figure:
+def plot_trade_off(traded: syn.TradeOff, *, title: str = "") -> Figure:
     """Plot quality function and worst error over the limit that was varied; limits at which no linkage was found are marked.
 
     Raises
@@ -503,19 +477,19 @@ def plot_trade_off(traded: TradeOff, *, title: str = "") -> Figure:
     """
     task = next((s.task for s in traded.solutions if s is not None), None)
     if task is None:
-        raise InfeasibleError("there is no linkage at any of the limits: there is nothing to plot")
-    (factor, unit), (scale, length) = quality_unit(task), error_unit(task)
+        raise syn.InfeasibleError("there is no linkage at any of the limits: there is nothing to plot")
+    (factor, unit), (scale, length) = syn.quality_unit(task), syn.error_unit(task)
     worst = np.array([np.nan if s is None else s.evaluation.worst for s in traded.solutions])
     errors = {
-        f"{fill(quality_name(task), 26)} [{unit}]": factor * traded.error.filled(np.nan),
+        f"{fill(syn.quality_name(task), 26)} [{unit}]": factor * traded.error.filled(np.nan),
         f"worst error [{length}]": scale * worst,
     }
-    shown, unit = SHOWN[OVER[traded.over].unit]
-    over = OVER[traded.over]
+    shown, unit = syn.SHOWN[syn.OVER[traded.over].unit]
+    over = syn.OVER[traded.over]
     label = f"limit of the {over.name}" if over.small else f"{over.name} asked for"
     limit, limit_label = shown * traded.limit, f"{label} [{unit}]"
     order = np.argsort(limit)
-    with figure_style():
+    with style.figure_style():
         figure = Figure(figsize=(6.4, 2.6 * len(errors) + 0.4))
         axes = figure.subplots(len(errors), 1, sharex=True, squeeze=False).ravel()
         for axis, (label, values) in zip(axes, errors.items()):
@@ -523,23 +497,23 @@ def plot_trade_off(traded: TradeOff, *, title: str = "") -> Figure:
             known = values[there]
             if len(known) and known.min() > 0.0 and known.max() > 20.0 * known.min():
                 axis.set_yscale("log")
-            axis.plot(limit[order], values[order], "-o", color=COLOURS[0], markersize=4.0)
+            axis.plot(limit[order], values[order], "-o", color=style.COLOURS[0], markersize=4.0)
             if not there.all():
                 # at the foot of the panel, whatever its scale
                 foot = {"transform": axis.get_xaxis_transform(), "clip_on": False, "zorder": 5}
                 none = limit[~there]
-                axis.plot(none, np.full(len(none), 0.04), "x", color=COLOURS[1], label="no linkage", **foot)
+                axis.plot(none, np.full(len(none), 0.04), "x", color=style.COLOURS[1], label="no linkage", **foot)
                 axis.legend()
             axis.set_ylabel(label)
         axes[-1].set_xlabel(limit_label)
-        write_title(figure, title)
+        style.write_title(figure, title)
         figure.align_ylabels()
-        return finish(figure)
+        return style.finish(figure)
 
 
 @animate.register
 def animate_solution(
-    solution: Solution, path: str | Path, *, title: str = "", frames: int = 48, frames_per_second: int = 20
+    solution: syn.Solution, path: str | Path, *, title: str = "", frames: int = 48, frames_per_second: int = 20
 ) -> Path:
     """Write a GIF of the linkage over a crank turn, with the transmission angle below it.
 
@@ -552,23 +526,23 @@ def animate_solution(
         If there are fewer than two frames, or the links cannot be joined anywhere.
     """
     check_frames(frames)
-    scene = LinkageScene(solution, title)
+    scene = syn.LinkageScene(solution, title)
     first, _ = _start_position(scene)
     backwards = len(scene.rotation) > 1 and scene.rotation[-1] < scene.rotation[0]
     turn = first + (-1.0 if backwards else 1.0) * np.linspace(0.0, 2.0 * np.pi, frames, endpoint=False)
     frame = _Frame(scene, _framed_rotations(scene))
     width, height = frame.high - frame.low
     tall = float(np.clip(5.0 * height / width, 2.5, 7.0))
-    with figure_style():
+    with style.figure_style():
         figure = Figure(figsize=(5.4, tall + 2.1))
         above, below = figure.subplots(2, 1, height_ratios=(tall, 1.6))
-        write_title(figure, scene.title)
+        style.write_title(figure, scene.title)
         if scene.function is not None:
             _plot_rocker(below, scene)
         else:
             _plot_transmission(below, scene)
         x, y = np.degrees(scene.transmission if scene.function is None else scene.function)
-        (now,) = below.plot([], [], "o", color=CRANK, markersize=DOT, zorder=6)
+        (now,) = below.plot([], [], "o", color=style.CRANK, markersize=style.DOT, zorder=6)
         trace: list[FloatArray] = []
         frame.prepare(above)
         _draw_target(above, scene, size=2.0)
@@ -586,7 +560,7 @@ def animate_solution(
                         artist.remove()
                 if "P" in pins:
                     trace.append(MM_PER_METRE * np.array(pins["P"]))
-                    _draw_line(above, trace, color=TRACE, linewidth=BOLD, zorder=4)
+                    _draw_line(above, trace, color=style.TRACE, linewidth=style.BOLD, zorder=4)
                 _draw_linkage(above, scene, frame, pins, letters=False)
                 at = x[0] + (np.degrees(phi) - x[0]) % 360.0
                 now.set_data([at], [np.interp(at, x, y) if at <= x[-1] + 1e-9 else np.nan])

@@ -11,6 +11,7 @@ import numpy as np
 
 from linkwork.errors import ParameterError
 
+from .. import synthesis as syn
 from ..display import format_count
 from ..files import Choice, Many, Quantity, Whole, entry, flag, save_drawing, write_csv, write_tables
 from ..mechanisms import find_mechanism
@@ -18,35 +19,12 @@ from ..periodic import default_variable
 from ..run import Case, read_case
 from ..slider import inverse_dynamics, motion_of_plant, slider_motion
 from ..studio import page_state
-from ..synthesis import (
-    Constraint,
-    FiveBar,
-    FullTurn,
-    Kind,
-    LargestLink,
-    LeastTransmission,
-    Linkage,
-    LinkageScene,
-    MachineSpec,
-    Search,
-    SecondCrank,
-    SliderCrank,
-    SliderMotion,
-    SliderUnknown,
-    Solution,
-    TargetPath,
-    UntimedPath,
-    drawing,
-    format_transmission,
-    format_variants,
-    synthesize,
-)
 from ..youssef import require_five_bar
 from .answers import Answer, FloatArray, chart, file, folder
 
 _POINT = Many(Quantity("m"), length=2)
 #: Notes on kinds of linkages that the page cannot show completely.
-_NOTES: dict[Kind, str] = {
+_NOTES: dict[syn.Kind, str] = {
     "slider-crank": "The page's slider-crank has no coupler point: its curve is in the small picture.",
     "geared-five-bar": "A geared five-bar is none of the page's mechanisms: its drawing is at real size, and linkwork "
     "synthesize with its own file searches its gears alone.",
@@ -63,22 +41,22 @@ class _Drawn:
     closed: bool = entry(flag, True)
     starts: int = entry(Whole(1), 24)
 
-    def task(self) -> UntimedPath:
-        return UntimedPath(path=TargetPath(points=np.array(self.points), closed=self.closed))
+    def task(self) -> syn.UntimedPath:
+        return syn.UntimedPath(path=syn.TargetPath(points=np.array(self.points), closed=self.closed))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Linkages(_Drawn):
     """Options of a search for linkages: kinds, least transmission angle (rad) and greatest length of a link (m)."""
 
-    kinds: tuple[Kind, ...] = entry(Many(Choice(get_args(Kind)), least=1), ("four-bar",))
-    least_transmission: float = entry(Quantity("rad", least=0.0, below=0.5 * pi), LeastTransmission().angle)
+    kinds: tuple[syn.Kind, ...] = entry(Many(Choice(get_args(syn.Kind)), least=1), ("four-bar",))
+    least_transmission: float = entry(Quantity("rad", least=0.0, below=0.5 * pi), syn.LeastTransmission().angle)
     longest: float = entry(Quantity("m", above=0.0), inf)
 
-    def constraints(self) -> list[Constraint]:
+    def constraints(self) -> list[syn.Constraint]:
         angle = self.least_transmission
-        found: list[Constraint] = [LeastTransmission(angle=angle)] if angle else [FullTurn()]
-        return [*found, LargestLink(length=self.longest)] if isfinite(self.longest) else found
+        found: list[syn.Constraint] = [syn.LeastTransmission(angle=angle)] if angle else [syn.FullTurn()]
+        return [*found, syn.LargestLink(length=self.longest)] if isfinite(self.longest) else found
 
     def tables(self, title: str, **search: Any) -> dict[str, Any]:
         """Return the search as tables of a case file for `linkwork synthesize`; ``search`` are further entries of [search]."""
@@ -107,8 +85,8 @@ def linkages(case: Case, wanted: Linkages) -> Answer:
 
     As a geared five-bar cannot be run, the answer has a drawing for CAD and a case file instead of the state of a five-bar.
     """
-    found = synthesize(
-        wanted.task(), constraints=wanted.constraints(), kinds=wanted.kinds, search=Search(starts=wanted.starts)
+    found = syn.synthesize(
+        wanted.task(), constraints=wanted.constraints(), kinds=wanted.kinds, search=syn.Search(starts=wanted.starts)
     )
     headings = ["rank", "area [mm²]", "worst [mm]", "transmission [deg]", "largest link [mm]", "kind"]
     rows, states, curves, files = [], [], [], []
@@ -120,13 +98,13 @@ def linkages(case: Case, wanted: Linkages) -> Answer:
                     str(rank),
                     f"{1e6 * solution.error:.4g}",
                     f"{1e3 * solution.evaluation.worst:.3g}",
-                    format_transmission(v),
+                    syn.format_transmission(v),
                     f"{1e3 * solution.largest_link:.4g}",
-                    ", ".join(filter(None, (v.grashof, *v.defects, format_variants(solution)))),
+                    ", ".join(filter(None, (v.grashof, *v.defects, syn.format_variants(solution)))),
                 ]
             )
             title = f"Linkage {rank} for a path that was drawn"
-            shown = not isinstance(solution.linkage, FiveBar)
+            shown = not isinstance(solution.linkage, syn.FiveBar)
             states.append(_state(solution, title) if shown else None)
             curves.append(_in_ground_frame(np.array(wanted.points), solution.linkage).tolist())
             files.append(
@@ -149,31 +127,31 @@ def linkages(case: Case, wanted: Linkages) -> Answer:
         }
 
 
-def _state(solution: Solution, title: str) -> Answer:
-    case = read_case(solution.run_case(MachineSpec(), title), folder=Path(), title=title)
+def _state(solution: syn.Solution, title: str) -> Answer:
+    case = read_case(solution.run_case(syn.MachineSpec(), title), folder=Path(), title=title)
     state, speed = page_state(case), default_variable(find_mechanism(case.parameters))
     # the path does not say in which direction the crank turns; the page seeks periodic motions with positive speed
     state["values"][speed] = abs(state["values"][speed])
     return state
 
 
-def _files_instead_of_state(solution: Solution, wanted: Linkages, path: Path, title: str) -> list[Answer]:
+def _files_instead_of_state(solution: syn.Solution, wanted: Linkages, path: Path, title: str) -> list[Answer]:
     """Return the drawing of a linkage that the page cannot show, and a case that searches only its kind and gear ratio."""
     pivot = solution.linkage.pivot
-    assert isinstance(pivot, SecondCrank)
+    assert isinstance(pivot, syn.SecondCrank)
     case = wanted.tables(title, kinds=[solution.linkage.kind], gears=[pivot.ratio])
-    drawn = drawing(solution, title=title)
+    drawn = syn.drawing(solution, title=title)
     return [file(write_tables(path.with_suffix(".toml"), case)), file(save_drawing(path.with_suffix(".dxf"), drawn))]
 
 
-def _picture(solution: Solution) -> Answer:
+def _picture(solution: syn.Solution) -> Answer:
     """Return the lines of a small picture of a linkage at the first station of the path: links, guide and traced curve (m)."""
-    scene = LinkageScene(solution)
+    scene = syn.LinkageScene(solution)
     pins = scene.pins(float(scene.rotation[0])) or {}
     links = [
         "AB",
         "BCPB",
-        *([] if isinstance(solution.linkage, SliderCrank) else ["CD"]),
+        *([] if isinstance(solution.linkage, syn.SliderCrank) else ["CD"]),
         *(["DE"] if scene.second_crank else []),
     ]
     guide = [] if scene.guide is None else [scene.guide.tolist()]
@@ -184,12 +162,12 @@ def _picture(solution: Solution) -> Answer:
     }
 
 
-def _joined(scene: LinkageScene) -> list[FloatArray]:
+def _joined(scene: syn.LinkageScene) -> list[FloatArray]:
     traced = scene.traced_curve
     return [] if traced is None else [traced[np.isfinite(traced).all(axis=1)]]
 
 
-def _in_ground_frame(points: FloatArray, linkage: Linkage) -> FloatArray:
+def _in_ground_frame(points: FloatArray, linkage: syn.Linkage) -> FloatArray:
     """Return points of the plane in the frame of a linkage's ground link, shape (n, 2)."""
     z = (points[:, 0] + 1j * points[:, 1] - complex(linkage.pivot_x, linkage.pivot_y)) * np.exp(
         -1j * linkage.ground_angle
@@ -208,7 +186,7 @@ def moved(case: Case, wanted: Moved) -> Answer:
             "not be zero: the path is that of the crank pin, which the slider does not move",
         )
     task = wanted.task()
-    linkage = Linkage(
+    linkage = syn.Linkage(
         ground_length=p.ground_length,
         crank_length=p.crank_length,
         coupler_length=p.coupler_length,
@@ -218,23 +196,25 @@ def moved(case: Case, wanted: Moved) -> Answer:
         branch=p.assembly_branch,
     )
     if wanted.closed:
-        still = Solution.from_linkage(task, linkage)
+        still = syn.Solution.from_linkage(task, linkage)
     else:
         kept = {name: (value, value) for name, value in linkage.values().items() if name != "branch"}
-        still = synthesize(task, kept, [FullTurn()], search=Search(starts=4, candidates=1 << 10, solutions=1)).best
+        still = syn.synthesize(
+            task, kept, [syn.FullTurn()], search=syn.Search(starts=4, candidates=1 << 10, solutions=1)
+        ).best
     found = [still]
     guide = (p.slider_guide_angle, p.slider_guide_angle)
     for harmonics in range(1, wanted.harmonics + 1):
-        unknown = SliderUnknown(harmonics=harmonics, guide_angle=guide, stroke=wanted.stroke)
-        search = Search(starts=wanted.starts)
+        unknown = syn.SliderUnknown(harmonics=harmonics, guide_angle=guide, stroke=wanted.stroke)
+        search = syn.Search(starts=wanted.starts)
         found.append(slider_motion(task, still, unknown, guesses=found[1:], search=search).best)
     rows = [
         [
             "at rest" if n == 0 else format_count(n, "harmonic"),
             f"{1e6 * s.error:.4g}",
             f"{1e3 * s.evaluation.worst:.3g}",
-            f"{1e3 * s.linkage.pivot.stroke:.4g}" if isinstance(s.linkage.pivot, SliderMotion) else "",
-            format_transmission(s.verdicts),
+            f"{1e3 * s.linkage.pivot.stroke:.4g}" if isinstance(s.linkage.pivot, syn.SliderMotion) else "",
+            syn.format_transmission(s.verdicts),
         ]
         for n, s in enumerate(found)
     ]

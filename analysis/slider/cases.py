@@ -13,47 +13,11 @@ import numpy as np
 
 from linkwork.errors import InputError, MissingParameterError, ParameterError
 
-from ..files import (
-    Choice,
-    Many,
-    Quantity,
-    Range,
-    Table,
-    Whole,
-    any_value,
-    as_table,
-    check_names,
-    entry,
-    entry_names,
-    flag,
-    override,
-    read,
-    read_rows,
-    read_tables,
-    text,
-)
+from .. import files
+from .. import synthesis as syn
 from ..linear import Design, design_pid, linearise_orbit
 from ..numerics.fourier import FourierSeries
 from ..run import parameter_tables
-from ..synthesis import (
-    ANGLES,
-    LENGTHS,
-    LINKS,
-    Assembly,
-    Constraint,
-    Linkage,
-    RockerFunction,
-    Search,
-    SliderUnknown,
-    Solution,
-    Synthesis,
-    SynthesisCase,
-    Task,
-    TimedPath,
-    UntimedPath,
-    read_synthesis_case,
-    synthesize,
-)
 from ..units import with_unit
 from .inverse import SliderDrive, best_spring, inverse_dynamics
 from .motion import motion_of_plant, slider_motion
@@ -61,11 +25,11 @@ from .strategy import RATIOS, Criterion, Strategy, simplest_mechanism
 from .tracking import TrackingController, TrackingResult, track
 
 #: Names of the dimensions of a linkage; the columns of solutions.csv have them with their units.
-DIMENSIONS = (*LENGTHS, *ANGLES)
+DIMENSIONS = (*syn.LENGTHS, *syn.ANGLES)
 
 
 def _read_increasing(value: Any, name: str) -> tuple[int, ...]:
-    return tuple(sorted(set(Many(Whole(0), least=1, single=True)(value, name))))
+    return tuple(sorted(set(files.Many(files.Whole(0), least=1, single=True)(value, name))))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -85,43 +49,43 @@ class SliderTable:
         Number of starts of each search.
     """
 
-    harmonics: tuple[int, ...] = entry(_read_increasing, (2,))
-    links: str = entry(Choice(("kept", "free")), "kept")
-    guide_angle: tuple[float, float] = entry(Range(Quantity("rad")), (-pi, pi))
-    position: tuple[float, float] | None = entry(Range(Quantity("m")), None)
-    stroke: float = entry(Quantity("m", above=0.0), inf)
-    speed: float = entry(Quantity("m/rad", above=0.0), inf)
-    acceleration: float = entry(Quantity("m/rad**2", above=0.0), inf)
-    starts: int = entry(Whole(1), 24)
+    harmonics: tuple[int, ...] = files.entry(_read_increasing, (2,))
+    links: str = files.entry(files.Choice(("kept", "free")), "kept")
+    guide_angle: tuple[float, float] = files.entry(files.Range(files.Quantity("rad")), (-pi, pi))
+    position: tuple[float, float] | None = files.entry(files.Range(files.Quantity("m")), None)
+    stroke: float = files.entry(files.Quantity("m", above=0.0), inf)
+    speed: float = files.entry(files.Quantity("m/rad", above=0.0), inf)
+    acceleration: float = files.entry(files.Quantity("m/rad**2", above=0.0), inf)
+    starts: int = files.entry(files.Whole(1), 24)
 
     def __post_init__(self) -> None:
         self.unknown(0)  # checks the bounds
 
-    def unknown(self, harmonics: int) -> SliderUnknown:
+    def unknown(self, harmonics: int) -> syn.SliderUnknown:
         """Return the unknowns of a motion with this number of harmonics, within the bounds of the table."""
         bounds = {name: getattr(self, name) for name in ("guide_angle", "position", "stroke", "speed", "acceleration")}
-        return SliderUnknown(harmonics=harmonics, **bounds)
+        return syn.SliderUnknown(harmonics=harmonics, **bounds)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class StrategyTable:
     """The table ``[strategy]``: the arguments of `simplest_mechanism`."""
 
-    tolerance: float = entry(any_value)
-    criterion: Criterion = entry(Choice(get_args(Criterion)), "worst")
-    harmonics: int = entry(Whole(1), 3)
-    ratios: tuple[int, ...] = entry(Many(Whole()), RATIOS)
-    second_crank: float | None = entry(Quantity("m", above=0.0), None)
-    starts: int = entry(Whole(1), 12)
+    tolerance: float = files.entry(files.any_value)
+    criterion: Criterion = files.entry(files.Choice(get_args(Criterion)), "worst")
+    harmonics: int = files.entry(files.Whole(1), 3)
+    ratios: tuple[int, ...] = files.entry(files.Many(files.Whole()), RATIOS)
+    second_crank: float | None = files.entry(files.Quantity("m", above=0.0), None)
+    starts: int = files.entry(files.Whole(1), 12)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class DriveTable:
     """The table ``[drive]``: crank speed (rad/s), number of samples per crank turn, and whether the best spring is added."""
 
-    speed: float = entry(Quantity("rad/s", above=0.0))
-    samples: int = entry(Whole(72), 720)
-    best_spring: bool = entry(flag, False)
+    speed: float = files.entry(files.Quantity("rad/s", above=0.0))
+    samples: int = files.entry(files.Whole(72), 720)
+    best_spring: bool = files.entry(files.flag, False)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -148,22 +112,22 @@ class TrackingTable:
         Whether the feed-forward knows the load.
     """
 
-    period: float = entry(Quantity("s", above=0.0), 1e-3)
-    bandwidth: float | None = entry(Quantity("rad/s", least=0.0), None)
-    feedforward: bool = entry(flag, True)
-    revolutions: float = entry(Quantity("1", above=0.0), 5.0)
-    limit: float = entry(Quantity("N", above=0.0), inf)
-    coulomb_friction: float | None = entry(Quantity("N", least=0.0), None)
-    mass_error: float = entry(Quantity("1", above=-1.0, requirement="be a share above -1"), 0.0)
-    load_known: bool = entry(flag, True)
+    period: float = files.entry(files.Quantity("s", above=0.0), 1e-3)
+    bandwidth: float | None = files.entry(files.Quantity("rad/s", least=0.0), None)
+    feedforward: bool = files.entry(files.flag, True)
+    revolutions: float = files.entry(files.Quantity("1", above=0.0), 5.0)
+    limit: float = files.entry(files.Quantity("N", above=0.0), inf)
+    coulomb_friction: float | None = files.entry(files.Quantity("N", least=0.0), None)
+    mass_error: float = files.entry(files.Quantity("1", above=-1.0, requirement="be a share above -1"), 0.0)
+    load_known: bool = files.entry(files.flag, True)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Load:
     """The table ``[load]``: components of the force at P (N), along the ground link and perpendicular to it, to the left."""
 
-    fx: float = entry(Quantity("N"), 0.0)
-    fy: float = entry(Quantity("N"), 0.0)
+    fx: float = files.entry(files.Quantity("N"), 0.0)
+    fy: float = files.entry(files.Quantity("N"), 0.0)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -184,13 +148,13 @@ class SliderCase:
         Force at the coupler point.
     """
 
-    synthesis: SynthesisCase = entry(any_value)
-    linkage: Linkage | None = entry(any_value, None)
-    slider: SliderTable = entry(Table(SliderTable), SliderTable())
-    strategy: StrategyTable | None = entry(any_value, None)
-    drive: DriveTable | None = entry(Table(DriveTable), None)
-    load: Load | None = entry(Table(Load), None)
-    tracking: TrackingTable | None = entry(Table(TrackingTable), None)
+    synthesis: syn.SynthesisCase = files.entry(files.any_value)
+    linkage: syn.Linkage | None = files.entry(files.any_value, None)
+    slider: SliderTable = files.entry(files.Table(SliderTable), SliderTable())
+    strategy: StrategyTable | None = files.entry(files.any_value, None)
+    drive: DriveTable | None = files.entry(files.Table(DriveTable), None)
+    load: Load | None = files.entry(files.Table(Load), None)
+    tracking: TrackingTable | None = files.entry(files.Table(TrackingTable), None)
 
     def __post_init__(self) -> None:
         if self.linkage is not None and not self.free and self.synthesis.bounds:
@@ -207,10 +171,10 @@ class SliderCase:
         return self.slider.links == "free"
 
     @property
-    def _constraints(self) -> tuple[Constraint, ...]:
+    def _constraints(self) -> tuple[syn.Constraint, ...]:
         constraints: tuple[Any, ...] = self.synthesis.constraints
-        if self.linkage is not None and not any(isinstance(c, Assembly) for c in constraints):
-            constraints = (*constraints, Assembly(branch=self.linkage.branch))
+        if self.linkage is not None and not any(isinstance(c, syn.Assembly) for c in constraints):
+            constraints = (*constraints, syn.Assembly(branch=self.linkage.branch))
         return constraints
 
     def _bounds(self) -> Mapping[str, tuple[float, float]]:
@@ -219,22 +183,27 @@ class SliderCase:
             return self.synthesis.bounds
         return _fixed_bounds(self.linkage)
 
-    def find_four_bar(self, *, progress: bool = False) -> Solution:
+    def find_four_bar(self, *, progress: bool = False) -> syn.Solution:
         """Evaluate the given linkage with a fixed pivot; if no linkage is given, search for the best four-bar."""
         task = self.synthesis.task
         if self.linkage is None:
             return self.synthesis.solve(progress=progress).best
-        if isinstance(task, (TimedPath, RockerFunction)) or (isinstance(task, UntimedPath) and task.path.closed):
-            return Solution.from_linkage(task, self.linkage)
+        if isinstance(task, (syn.TimedPath, syn.RockerFunction)) or (
+            isinstance(task, syn.UntimedPath) and task.path.closed
+        ):
+            return syn.Solution.from_linkage(task, self.linkage)
         # the crank rotations along an open path are unknown: a search with all dimensions fixed finds them
-        only, seed = (Assembly(branch=self.linkage.branch),), self.synthesis.search.seed
-        return synthesize(
-            task, _fixed_bounds(self.linkage), only, search=Search(seed=seed, candidates=1 << 10, starts=4, solutions=1)
+        only, seed = (syn.Assembly(branch=self.linkage.branch),), self.synthesis.search.seed
+        return syn.synthesize(
+            task,
+            _fixed_bounds(self.linkage),
+            only,
+            search=syn.Search(seed=seed, candidates=1 << 10, starts=4, solutions=1),
         ).best
 
     def find_motion(
-        self, four_bar: Solution, harmonics: int, guesses: tuple[Solution, ...], *, progress: bool
-    ) -> Synthesis:
+        self, four_bar: syn.Solution, harmonics: int, guesses: tuple[syn.Solution, ...], *, progress: bool
+    ) -> syn.Synthesis:
         """Find the best motion of the pivot with this number of harmonics; see `slider_motion`.
 
         ``four_bar`` is the linkage with a fixed pivot; ``guesses`` are further solutions to start from.
@@ -262,13 +231,13 @@ class SliderCase:
             bounds=self._bounds(),
             constraints=self._constraints,
             stroke=self.slider.stroke if isfinite(self.slider.stroke) else None,
-            search=Search(starts=wanted.starts, seed=search.seed, n_jobs=search.jobs, progress=progress),
+            search=syn.Search(starts=wanted.starts, seed=search.seed, n_jobs=search.jobs, progress=progress),
             **{name: value for name, value in asdict(wanted).items() if name != "starts"},
         )
 
     # Dynamics
 
-    def compute_drive(self, solution: Solution) -> SliderDrive:
+    def compute_drive(self, solution: syn.Solution) -> SliderDrive:
         """Compute force, torque and pin forces of a solution's motion; the crank turns in the sense of the task."""
         wanted = self.drive
         assert wanted is not None
@@ -366,16 +335,16 @@ class SliderCase:
         }
 
 
-def _fixed_bounds(linkage: Linkage) -> dict[str, tuple[float, float]]:
+def _fixed_bounds(linkage: syn.Linkage) -> dict[str, tuple[float, float]]:
     """Return bounds, by dimension, that fix all dimensions of a linkage."""
     return {name: (value, value) for name, value in linkage.values().items() if name != "branch"}
 
 
-def _free_bounds(linkage: Linkage, task: Task) -> dict[str, tuple[float, float]]:
+def _free_bounds(linkage: syn.Linkage, task: syn.Task) -> dict[str, tuple[float, float]]:
     """Return wide bounds for free links, such as a quarter to four times a length; dimensions without bounds stay fixed."""
-    near = {name: (0.25 * getattr(linkage, name), 4.0 * getattr(linkage, name)) for name in LINKS}
+    near = {name: (0.25 * getattr(linkage, name), 4.0 * getattr(linkage, name)) for name in syn.LINKS}
     near["crank_phase"] = (linkage.crank_phase - pi, linkage.crank_phase + pi)
-    if isinstance(task, RockerFunction):
+    if isinstance(task, syn.RockerFunction):
         del near["ground_length"]
         return near
     reach = 4.0 * linkage.largest_link
@@ -413,44 +382,38 @@ TABLES: Mapping[str, type] = {
 
 def _read_strategy(value: Any, name: str, *, angular: bool) -> StrategyTable:
     """Read the table ``[strategy]``; the tolerance is a worst error (m, rad) or a value of the quality function (m2, rad2)."""
-    unit = ("rad" if angular else "m") + "**2" * (as_table(value, name).get("criterion") == "error")
-    return read(StrategyTable, value, name, readers={"tolerance": Quantity(unit, above=0.0)})
+    unit = ("rad" if angular else "m") + "**2" * (files.as_table(value, name).get("criterion") == "error")
+    return files.read(StrategyTable, value, name, readers={"tolerance": files.Quantity(unit, above=0.0)})
 
 
-def _read_linkage(value: Any, name: str, *, folder: Path) -> Linkage:
+def _read_linkage(value: Any, name: str, *, folder: Path) -> syn.Linkage:
     """Read a linkage from its dimensions or from a file of `linkwork synthesize`."""
-    if "file" not in as_table(value, name):
-        dimensions = {d: Quantity("rad" if d in ANGLES else "m") for d in DIMENSIONS}
-        return read(Linkage, value, name, readers={**dimensions, "branch": Whole()})
-    found: dict[str, Any] = read(dict, value, name, readers={"file": text, "rank": Whole(1)})
+    if "file" not in files.as_table(value, name):
+        dimensions = {d: files.Quantity("rad" if d in syn.ANGLES else "m") for d in DIMENSIONS}
+        return files.read(syn.Linkage, value, name, readers={**dimensions, "branch": files.Whole()})
+    found: dict[str, Any] = files.read(dict, value, name, readers={"file": files.text, "rank": files.Whole(1)})
     return linkage_from_csv(folder / found["file"], found.get("rank", 1))
 
 
 def load_slider_case(path: str | Path, overrides: Mapping[str, Any] | None = None) -> SliderCase:
-    """Read a case from a TOML or JSON file; see `docs/slider-cases.md`.
-
-    Raises
-    ------
-    InputError, ParameterError
-        If the file cannot be read, or an entry is invalid.
-    InfeasibleError
-        If bounds and constraints contradict one another.
-    """
-    return read_slider_case(read_tables(path), folder=Path(path).parent, title=Path(path).stem, overrides=overrides)
+    """Read a case from a TOML or JSON file; see `docs/slider-cases.md`. Errors are those of `load_synthesis_case`."""
+    return read_slider_case(
+        files.read_tables(path), folder=Path(path).parent, title=Path(path).stem, overrides=overrides
+    )
 
 
 def read_slider_case(
     data: Mapping[str, Any], *, folder: Path, title: str = "", overrides: Mapping[str, Any] | None = None
 ) -> SliderCase:
     """Build a case from the tables of a case file; file names in the tables are relative to ``folder``."""
-    data = {"title": title} | override(data, overrides or {})
-    own = [name for name in entry_names(SliderCase) if name != "synthesis"]
-    check_names(data, "", [name for name in (*entry_names(SynthesisCase), *own) if name != "trade_off"])
+    data = {"title": title} | files.override(data, overrides or {})
+    own = [name for name in files.entry_names(SliderCase) if name != "synthesis"]
+    files.check_names(data, "", [name for name in (*files.entry_names(syn.SynthesisCase), *own) if name != "trade_off"])
     if "slider" not in data and "strategy" not in data:
         raise MissingParameterError("slider")
-    synthesis = read_synthesis_case({name: value for name, value in data.items() if name not in own}, folder=folder)
-    angular = isinstance(synthesis.task, RockerFunction)
-    return read(
+    synthesis = syn.read_synthesis_case({name: value for name, value in data.items() if name not in own}, folder=folder)
+    angular = isinstance(synthesis.task, syn.RockerFunction)
+    return files.read(
         SliderCase,
         {"synthesis": synthesis} | {name: value for name, value in data.items() if name in own},
         "",
@@ -461,7 +424,7 @@ def read_slider_case(
     )
 
 
-def linkage_from_csv(path: str | Path, rank: int = 1) -> Linkage:
+def linkage_from_csv(path: str | Path, rank: int = 1) -> syn.Linkage:
     """Read a linkage from a file of `Synthesis.to_csv`; ``rank`` 1 is the best linkage.
 
     Raises
@@ -469,11 +432,11 @@ def linkage_from_csv(path: str | Path, rank: int = 1) -> Linkage:
     InputError
         If the file cannot be read, was not written by `Synthesis.to_csv`, or has no linkage of that rank.
     """
-    rows = read_rows(path)
+    rows = files.read_rows(path)
     if not 1 <= rank <= len(rows):
         raise InputError(f"{path} has {len(rows)} linkages: there is none of rank {rank}")
     row = rows[rank - 1]
-    columns = {name: f"{name} [{'rad' if name in ANGLES else 'm'}]" for name in DIMENSIONS}
+    columns = {name: f"{name} [{'rad' if name in syn.ANGLES else 'm'}]" for name in DIMENSIONS}
     try:
         values: dict[str, Any] = {name: float(row[column]) for name, column in columns.items()}
         values["branch"] = int(float(row["branch"]))
@@ -481,4 +444,4 @@ def linkage_from_csv(path: str | Path, rank: int = 1) -> Linkage:
         raise InputError(
             f"{path} is no list of linkages as 'linkwork synthesize' writes it ({type(error).__name__}: {error})"
         ) from None
-    return Linkage(**values)
+    return syn.Linkage(**values)

@@ -12,24 +12,7 @@ import pytest
 from scipy.linalg import expm
 
 from analysis import Inputs, simulate, steps
-from analysis.linear import (
-    DesignError,
-    Equilibrium,
-    LinearModel,
-    LoopResult,
-    SampledController,
-    control_loop,
-    design_lqr,
-    design_pi,
-    design_pid,
-    find_equilibria,
-    find_equilibrium,
-    largest_difference,
-    linearise,
-    linearise_orbit,
-    predict_loop,
-    settled_motion,
-)
+from analysis import linear as lin
 from analysis.units import RAD_S_PER_RPM
 from linkwork.errors import InputError, UnknownNameError
 from linkwork.five_bar.parameters import InitialState
@@ -43,20 +26,20 @@ WEIGHTS = {"slider.position": 1e6, "slider.velocity": 1e2}
 
 @pytest.fixture(scope="module")
 def rest():
-    return find_equilibrium(TABLE_3_1, held={"crank.angle": 0.5})
+    return lin.find_equilibrium(TABLE_3_1, held={"crank.angle": 0.5})
 
 
 @pytest.fixture(scope="module")
 def held(rest):
     """Table 3.1 with the crank held: one freedom."""
-    return linearise(TABLE_3_1, rest.state, rest.inputs)
+    return lin.linearise(TABLE_3_1, rest.state, rest.inputs)
 
 
 @pytest.fixture(scope="module")
 def hanging():
     """Table 3.1 with the crank free."""
-    rest = find_equilibrium(TABLE_3_1)
-    return linearise(TABLE_3_1, rest.state, rest.inputs)
+    rest = lin.find_equilibrium(TABLE_3_1)
+    return lin.linearise(TABLE_3_1, rest.state, rest.inputs)
 
 
 def start(model, *deviation: float) -> InitialState:
@@ -72,7 +55,7 @@ def start(model, *deviation: float) -> InitialState:
 def test_lqr_keeps_its_return_difference(which, integral, request) -> None:
     """Kalman's inequality |1 + L| >= 1 holds for LQR alone; it makes the margins 60 deg and infinite."""
     model = request.getfixturevalue(which)
-    design = design_lqr(model, {"slider.position": 1e6, "slider.velocity": 50.0}, 0.3, integral=integral)
+    design = lin.design_lqr(model, {"slider.position": 1e6, "slider.velocity": 50.0}, 0.3, integral=integral)
     loop = design.loop(1j * np.geomspace(1e-2, 1e5, 2000))
     assert np.abs(1.0 + loop).min() >= 1.0 - 1e-6
     assert np.abs(1.0 + loop).min() < 1.001
@@ -86,16 +69,16 @@ def test_lqr_keeps_its_return_difference(which, integral, request) -> None:
 BALANCE = {"crank.angle": 1e2, "slider.position": 1e6}
 
 
-def upright_crank() -> tuple[Equilibrium, LinearModel]:
+def upright_crank() -> tuple[lin.Equilibrium, lin.LinearModel]:
     """The unstable equilibrium without a drive, and its linear model."""
-    upright = next(one for one in find_equilibria(TABLE_3_1) if not one.stable)
-    return upright, linearise(TABLE_3_1, upright.state, upright.inputs)
+    upright = next(one for one in lin.find_equilibria(TABLE_3_1) if not one.stable)
+    return upright, lin.linearise(TABLE_3_1, upright.state, upright.inputs)
 
 
 def test_lqr_of_a_heavy_force_only_moves_the_unstable_poles() -> None:
     """With no weight but on the force the stable poles stay and the unstable one is mirrored."""
     _, model = upright_crank()
-    design = design_lqr(model, np.full(4, 1e-9), 1e3)
+    design = lin.design_lqr(model, np.full(4, 1e-9), 1e3)
     mirrored = np.where(model.poles.real > 0.0, -model.poles.conj(), model.poles)
     # of the two nearly equal real poles the product and sum are what is determined
     assert np.poly(design.poles) == pytest.approx(np.poly(mirrored), rel=1e-6)
@@ -103,9 +86,9 @@ def test_lqr_of_a_heavy_force_only_moves_the_unstable_poles() -> None:
 
 def test_pid_has_the_poles_asked_for(held) -> None:
     wanted = [-50.0, -30.0 + 40.0j, -30.0 - 40.0j]
-    design = design_pid(held, poles=wanted)
+    design = lin.design_pid(held, poles=wanted)
     assert np.sort_complex(design.poles) == pytest.approx(np.sort_complex(np.array(wanted)), rel=1e-8)
-    assert np.abs(design_pid(held, bandwidth=80.0, damping=0.6).poles) == pytest.approx([80.0] * 3, rel=1e-8)
+    assert np.abs(lin.design_pid(held, bandwidth=80.0, damping=0.6).poles) == pytest.approx([80.0] * 3, rel=1e-8)
     # all of it is shown in a line
     assert repr(design).startswith("<PID from slider.force to slider.position: gains ")
     assert repr(held).startswith(
@@ -114,68 +97,68 @@ def test_pid_has_the_poles_asked_for(held) -> None:
     assert repr(held.mechanism).startswith(
         "<mechanism five-bar: freedoms crank.angle, slider.position; inputs drive.torque"
     )
-    assert design_pid(held, bandwidth=80.0, damping=1.0).poles == pytest.approx([-80.0] * 3, rel=1e-4)
+    assert lin.design_pid(held, bandwidth=80.0, damping=1.0).poles == pytest.approx([-80.0] * 3, rel=1e-4)
 
 
 def test_pi_has_the_crossover_and_phase_asked_for(held) -> None:
-    design = design_pi(held, bandwidth=12.0, phase_margin=1.1)
+    design = lin.design_pi(held, bandwidth=12.0, phase_margin=1.1)
     at = complex(design.loop(12.0j))
     assert abs(at) == pytest.approx(1.0, rel=1e-9)
     assert np.angle(-at) >= 1.1 - 1e-9
     assert (design.crossover, design.delay_margin) == pytest.approx((12.0, design.phase_margin / 12.0), rel=1e-6)
     # nearer to the resonance the lag of the integral alone is too much, and the margin is just that asked for
-    fast = design_pi(held, bandwidth=30.0, phase_margin=1.1)
+    fast = lin.design_pi(held, bandwidth=30.0, phase_margin=1.1)
     assert fast.gains[0] > 0.0
     assert np.angle(-complex(fast.loop(30.0j))) == pytest.approx(1.1, rel=1e-9)
     assert fast.phase_margin == pytest.approx(1.1, rel=1e-6)
 
 
 def test_the_closed_loop_has_the_poles_and_no_static_error(held) -> None:
-    design = design_pid(held, bandwidth=80.0)
+    design = lin.design_pid(held, bandwidth=80.0)
     closed = design.closed_loop(("slider.position", "slider.acceleration"))
     assert np.sort_complex(closed.poles()) == pytest.approx(np.sort_complex(design.poles), rel=1e-8)
     assert abs(complex(closed[0, 0](0.0))) < 1e-12
-    lqr = design_lqr(held, WEIGHTS)
+    lqr = lin.design_lqr(held, WEIGHTS)
     assert complex(lqr.closed_loop()(0.0)).real == pytest.approx(1.0 / (held.K[0, 0] + lqr.gains[0]), rel=1e-10)
 
 
 def test_designs_that_cannot_be(held, hanging) -> None:
-    with pytest.raises(DesignError, match="design_pid"):
-        design_pi(held, bandwidth=60.0)
-    with pytest.raises(DesignError, match="phase margin is 4"):
-        design_pi(held, bandwidth=3.0, phase_margin=4.0)
-    with pytest.raises(DesignError, match="bandwidth is -1"):
-        design_pi(held, bandwidth=-1.0)
-    with pytest.raises(DesignError, match="design_lqr"):
-        design_pid(hanging, bandwidth=50.0)
-    with pytest.raises(DesignError, match=r"poles.*bandwidth"):
-        design_pid(held)
-    with pytest.raises(DesignError, match="damping is 0"):
-        design_pid(held, bandwidth=1.0, damping=0.0)
+    with pytest.raises(lin.DesignError, match="design_pid"):
+        lin.design_pi(held, bandwidth=60.0)
+    with pytest.raises(lin.DesignError, match="phase margin is 4"):
+        lin.design_pi(held, bandwidth=3.0, phase_margin=4.0)
+    with pytest.raises(lin.DesignError, match="bandwidth is -1"):
+        lin.design_pi(held, bandwidth=-1.0)
+    with pytest.raises(lin.DesignError, match="design_lqr"):
+        lin.design_pid(hanging, bandwidth=50.0)
+    with pytest.raises(lin.DesignError, match=r"poles.*bandwidth"):
+        lin.design_pid(held)
+    with pytest.raises(lin.DesignError, match="damping is 0"):
+        lin.design_pid(held, bandwidth=1.0, damping=0.0)
     for poles in ([-1.0, -2.0], [-1.0, -2.0 + 1.0j, -2.0], [1.0, -2.0, -3.0]):
-        with pytest.raises(DesignError, match="poles"):
-            design_pid(held, poles=poles)
+        with pytest.raises(lin.DesignError, match="poles"):
+            lin.design_pid(held, poles=poles)
     with pytest.raises(UnknownNameError, match=r"crank\.speed"):
-        design_lqr(held, {"crank.speed": 1.0})
-    with pytest.raises(DesignError, match="shape"):
-        design_lqr(held, [1.0, 2.0, 3.0])
-    with pytest.raises(DesignError, match="weights"):
-        design_lqr(held, [1.0, -2.0])
-    with pytest.raises(DesignError, match="force is 0"):
-        design_lqr(held, WEIGHTS, 0.0)
-    turning = linearise(TABLE_3_1, (0.0, 0.0, 40.0, 0.0))
-    with pytest.raises(DesignError, match=r"crank\.angle is free and turns at 40 rad/s"):
-        design_lqr(turning, {"slider.position": 1e6, "crank.angle": 1.0})
-    with pytest.raises(DesignError, match="integral is -1"):
-        design_lqr(held, WEIGHTS, integral=-1.0)
+        lin.design_lqr(held, {"crank.speed": 1.0})
+    with pytest.raises(lin.DesignError, match="shape"):
+        lin.design_lqr(held, [1.0, 2.0, 3.0])
+    with pytest.raises(lin.DesignError, match="weights"):
+        lin.design_lqr(held, [1.0, -2.0])
+    with pytest.raises(lin.DesignError, match="force is 0"):
+        lin.design_lqr(held, WEIGHTS, 0.0)
+    turning = lin.linearise(TABLE_3_1, (0.0, 0.0, 40.0, 0.0))
+    with pytest.raises(lin.DesignError, match=r"crank\.angle is free and turns at 40 rad/s"):
+        lin.design_lqr(turning, {"slider.position": 1e6, "crank.angle": 1.0})
+    with pytest.raises(lin.DesignError, match="integral is -1"):
+        lin.design_lqr(held, WEIGHTS, integral=-1.0)
 
 
 def test_a_crank_that_no_slider_force_holds_is_reported() -> None:
     """Without gravity a free crank turns as it likes: its double pole at zero is out of the slider's reach, or nearly."""
     horizontal = SETS["rig-2-spring-c"].parameters
-    rest = find_equilibrium(horizontal, guess=(0.0, 0.0))
-    with pytest.raises(DesignError):
-        design_lqr(linearise(horizontal, rest.state, rest.inputs), WEIGHTS)
+    rest = lin.find_equilibrium(horizontal, guess=(0.0, 0.0))
+    with pytest.raises(lin.DesignError):
+        lin.design_lqr(lin.linearise(horizontal, rest.state, rest.inputs), WEIGHTS)
 
 
 @pytest.mark.parametrize(
@@ -184,19 +167,19 @@ def test_a_crank_that_no_slider_force_holds_is_reported() -> None:
 )
 def test_a_pi_near_a_light_resonance_is_refused(damping, bandwidth, reason) -> None:
     p = replace(SETS["rig-2-spring-c"].parameters, slider_damping=damping)
-    rest = find_equilibrium(p, held={"crank.angle": 0.0})
-    with pytest.raises(DesignError, match=reason):
-        design_pi(linearise(p, rest.state, rest.inputs), bandwidth=bandwidth)
+    rest = lin.find_equilibrium(p, held={"crank.angle": 0.0})
+    with pytest.raises(lin.DesignError, match=reason):
+        lin.design_pi(lin.linearise(p, rest.state, rest.inputs), bandwidth=bandwidth)
 
 
 # loops
 
 
 def test_the_predicted_loop_is_the_sampled_one_in_closed_form(held) -> None:
-    design = design_pid(held, bandwidth=80.0)
+    design = lin.design_pid(held, bandwidth=80.0)
     h, steps = 2e-3, 60
-    run = predict_loop(
-        held, SampledController(design, h), float(held.state[1]), stop_time=steps * h, deviation=[1e-3, 0.0]
+    run = lin.predict_loop(
+        held, lin.SampledController(design, h), float(held.state[1]), stop_time=steps * h, deviation=[1e-3, 0.0]
     )
     whole = expm(h * np.block([[held.A, held.B[:, :1]], [np.zeros((1, 3))]]))
     x, total = np.array([1e-3, 0.0]), 0.0
@@ -213,7 +196,7 @@ def test_the_predicted_loop_is_the_sampled_one_in_closed_form(held) -> None:
 
 
 def test_sampled_poles_tell_a_period_that_is_too_long(held) -> None:
-    design = design_pid(held, bandwidth=150.0)
+    design = lin.design_pid(held, bandwidth=150.0)
     assert np.abs(design.sampled_poles(1e-3)).max() < 1.0
     slow = 3.0 * design.delay_margin
     assert np.abs(design.sampled_poles(slow)).max() > 1.0
@@ -224,17 +207,17 @@ def test_sampled_poles_tell_a_period_that_is_too_long(held) -> None:
 @pytest.mark.parametrize("which", ["held", "hanging"])
 def test_the_loop_is_the_predicted_one_to_first_order(which, request) -> None:
     model = request.getfixturevalue(which)
-    design = design_lqr(model, {"slider.position": 1e6, "slider.velocity": 10.0}, 1.0, integral=1e7)
-    controller = SampledController(design, 2e-3)
+    design = lin.design_lqr(model, {"slider.position": 1e6, "slider.velocity": 10.0}, 1.0, integral=1e7)
+    controller = lin.SampledController(design, 2e-3)
     errors = []
     for size in (4e-3, 4e-4):
         target = float(model.state[1]) + size
-        loop = control_loop(
+        loop = lin.control_loop(
             TABLE_3_1, controller, target, model.inputs.replace(force=None), initial=start(model), stop_time=0.5,
             tolerance=1e-12,
         )  # fmt: skip
-        linear = predict_loop(model, controller, target, stop_time=0.5)
-        errors.append(largest_difference(loop, linear))
+        linear = lin.predict_loop(model, controller, target, stop_time=0.5)
+        errors.append(lin.largest_difference(loop, linear))
         assert np.abs(loop.position - model.state[1]).max() > 0.9 * size
     # with the square of the amplitude
     assert errors[1] < 0.03 * errors[0]
@@ -242,22 +225,24 @@ def test_the_loop_is_the_predicted_one_to_first_order(which, request) -> None:
 
 
 def test_sampling_tends_to_the_continuous_law(held) -> None:
-    design = design_lqr(held, WEIGHTS)
+    design = lin.design_lqr(held, WEIGHTS)
     target = float(held.state[1]) + 3e-3
     inputs = Inputs(speed=0.0, force=design.continuous_law(target))
     exact = simulate(TABLE_3_1, inputs, initial=start(held), stop_time=0.2, step=1e-2, tolerance=1e-12)
     errors = []
     for every in (10, 20, 40):
         h = 1e-2 / every
-        loop = control_loop(TABLE_3_1, SampledController(design, h), target, HELD, initial=start(held), stop_time=0.2)
+        loop = lin.control_loop(
+            TABLE_3_1, lin.SampledController(design, h), target, HELD, initial=start(held), stop_time=0.2
+        )
         errors.append(np.abs(loop.position[::every] - exact["slider.position"]).max())
     assert errors[0] < 2e-4
     assert errors[1] / errors[0] == pytest.approx(0.5, abs=0.05)
     assert errors[2] / errors[1] == pytest.approx(0.5, abs=0.05)
     # the reference is held on the linear model, whose stiffness is nearly the plant's
     assert exact["slider.position"][-1] == pytest.approx(target, abs=1e-4)
-    with pytest.raises(DesignError, match="integral action"):
-        design_pid(held, bandwidth=50.0).continuous_law(target)
+    with pytest.raises(lin.DesignError, match="integral action"):
+        lin.design_pid(held, bandwidth=50.0).continuous_law(target)
 
 
 def test_the_integral_takes_a_load_away(held) -> None:
@@ -265,9 +250,9 @@ def test_the_integral_takes_a_load_away(held) -> None:
     tip = replace(TABLE_3_1, coupler_point_distance=0.15)
     errors = []
     for integral in (0.0, 1e9):
-        design = design_lqr(held, WEIGHTS, integral=integral)
-        loop = control_loop(
-            tip, SampledController(design, 2e-3), float(held.state[1]), HELD.replace(load_x=steps([0.0, 0.1], [0.0, 3.0])),
+        design = lin.design_lqr(held, WEIGHTS, integral=integral)
+        loop = lin.control_loop(
+            tip, lin.SampledController(design, 2e-3), float(held.state[1]), HELD.replace(load_x=steps([0.0, 0.1], [0.0, 3.0])),
             initial=start(held), stop_time=1.5,
         )  # fmt: skip
         errors.append(abs(float(loop.position[-1] - held.state[1])))
@@ -277,12 +262,12 @@ def test_the_integral_takes_a_load_away(held) -> None:
 
 
 def test_a_limited_force_is_kept_and_does_not_wind_up(held) -> None:
-    design = design_pid(held, bandwidth=100.0)
+    design = lin.design_pid(held, bandwidth=100.0)
     target = float(held.state[1]) + 0.02
     runs = {}
     for limit in (25.0, inf):
-        controller = SampledController(design, 1e-3, limit=limit)
-        loop = control_loop(TABLE_3_1, controller, target, HELD, initial=start(held), stop_time=1.0)
+        controller = lin.SampledController(design, 1e-3, limit=limit)
+        loop = lin.control_loop(TABLE_3_1, controller, target, HELD, initial=start(held), stop_time=1.0)
         runs[limit] = loop.metrics(band=1e-4)
         assert loop.metrics(band=1e-4).rms_error < 1e-6
     assert runs[25.0].peak_force == 25.0
@@ -294,8 +279,8 @@ def test_a_limited_force_is_kept_and_does_not_wind_up(held) -> None:
 def test_the_slider_force_balances_the_crank() -> None:
     upright, model = upright_crank()
     lean = start(model, 0.02, 0.0, 0.0, 0.0)
-    controller = SampledController(design_lqr(model, BALANCE), 2e-3)
-    loop = control_loop(TABLE_3_1, controller, upright["slider.position"], initial=lean, stop_time=2.0)
+    controller = lin.SampledController(lin.design_lqr(model, BALANCE), 2e-3)
+    loop = lin.control_loop(TABLE_3_1, controller, upright["slider.position"], initial=lean, stop_time=2.0)
     assert abs(loop.states[-1, 0] - upright["crank.angle"]) < 1e-5
     fallen = simulate(TABLE_3_1, initial=lean, stop_time=2.0, step=1e-2)
     assert np.abs(fallen["crank.angle"] - upright["crank.angle"]).max() > 1.0
@@ -304,8 +289,8 @@ def test_the_slider_force_balances_the_crank() -> None:
 def test_a_loop_that_loses_the_assembly_ends_there() -> None:
     upright, model = upright_crank()
     lean = start(model, 0.3, 0.0, 0.0, 0.0)
-    controller = SampledController(design_lqr(model, BALANCE), 1e-3)
-    loop = control_loop(TABLE_3_1, controller, upright["slider.position"], initial=lean, stop_time=1.0)
+    controller = lin.SampledController(lin.design_lqr(model, BALANCE), 1e-3)
+    loop = lin.control_loop(TABLE_3_1, controller, upright["slider.position"], initial=lean, stop_time=1.0)
     assert loop.status == loop.trajectory.status == 3
     assert "limit of assembly" in loop.message
     assert 10 < len(loop.time) == len(loop.states) == len(loop.trajectory) < 100
@@ -318,66 +303,66 @@ def resonant():
     speed = 585.0 * RAD_S_PER_RPM
     p = SETS["rig-2-spring-c"].parameters
     turning = Inputs(speed=speed)
-    return p, turning, linearise_orbit(p, settled_motion(p, turning), turning)
+    return p, turning, lin.linearise_orbit(p, lin.settled_motion(p, turning), turning)
 
 
 def test_the_slider_is_kept_still_at_resonance(resonant) -> None:
     p, turning, models = resonant
     mean = models.mean()
     middle = float(mean.state[1])
-    controller = SampledController(design_pid(mean, bandwidth=150.0), 1e-3)
+    controller = lin.SampledController(lin.design_pid(mean, bandwidth=150.0), 1e-3)
     th2, u, w2, v = models.states[0, :4].tolist()
     initial = InitialState(crank_angle=th2, slider_position=u, crank_speed=w2, slider_velocity=v)
-    loop = control_loop(p, controller, middle, turning, initial=initial, stop_time=0.5)
-    periodic = predict_loop(models, controller, middle, stop_time=0.5)
-    averaged = predict_loop(models, controller, middle, stop_time=0.5, averaged=True)
+    loop = lin.control_loop(p, controller, middle, turning, initial=initial, stop_time=0.5)
+    periodic = lin.predict_loop(models, controller, middle, stop_time=0.5)
+    averaged = lin.predict_loop(models, controller, middle, stop_time=0.5, averaged=True)
     reached = loop.metrics(band=1e-3, window=models.period).rms_error
     assert models.states[:, 1].std() > 100.0 * reached
     # the time-periodic model knows what the averaged one leaves out
-    assert largest_difference(loop, periodic) < 0.3 * largest_difference(loop, averaged)
-    assert largest_difference(loop, periodic) < 1e-3 * np.ptp(models.states[:, 1])
+    assert lin.largest_difference(loop, periodic) < 0.3 * lin.largest_difference(loop, averaged)
+    assert lin.largest_difference(loop, periodic) < 1e-3 * np.ptp(models.states[:, 1])
 
 
 def test_without_control_the_periodic_model_repeats_the_motion(resonant) -> None:
     p, turning, models = resonant
     none = {"gains": np.zeros(2), "integral_gain": 0.0, "force_slope": 0.0}
-    idle = SampledController(replace(design_pid(models.mean(), bandwidth=50.0), **none), models.period / 100.0)
-    run = predict_loop(models, idle, 0.0, stop_time=2.0 * models.period)
+    idle = lin.SampledController(replace(lin.design_pid(models.mean(), bandwidth=50.0), **none), models.period / 100.0)
+    run = lin.predict_loop(models, idle, 0.0, stop_time=2.0 * models.period)
     assert np.abs(run.force).max() == 0.0
     assert run.position[:100] == pytest.approx(run.position[100:200], abs=1e-12)
-    motion = settled_motion(p, turning, samples=100)
+    motion = lin.settled_motion(p, turning, samples=100)
     assert run.position[:100] == pytest.approx(motion[:, 1], abs=1e-8)
 
 
 def test_the_fmu_runs_the_same_loop(fmu, held) -> None:
-    controller = SampledController(design_pid(held, bandwidth=60.0), 5e-3, limit=50.0)
+    controller = lin.SampledController(lin.design_pid(held, bandwidth=60.0), 5e-3, limit=50.0)
     target = float(held.state[1]) + 5e-3
     options = {"inputs": HELD, "initial": start(held), "stop_time": 0.3}
-    inside = control_loop(TABLE_3_1, controller, target, **options)
-    outside = control_loop(TABLE_3_1, controller, target, fmu=fmu, **options)
+    inside = lin.control_loop(TABLE_3_1, controller, target, **options)
+    outside = lin.control_loop(TABLE_3_1, controller, target, fmu=fmu, **options)
     assert outside.states == pytest.approx(inside.states, abs=1e-12)
     assert outside.trajectory.values == pytest.approx(inside.trajectory.values, abs=1e-9)
 
 
 def test_bad_loops_are_reported(held) -> None:
-    design = design_lqr(held, WEIGHTS)
+    design = lin.design_lqr(held, WEIGHTS)
     for period in (0.0, float("nan")):
         with pytest.raises(InputError, match="sampling period"):
-            SampledController(design, period)
+            lin.SampledController(design, period)
     with pytest.raises(InputError, match="limit of the force"):
-        SampledController(design, 1e-3, limit=0.0)
-    controller = SampledController(design, 1e-2)
+        lin.SampledController(design, 1e-3, limit=0.0)
+    controller = lin.SampledController(design, 1e-2)
     with pytest.raises(InputError, match="force is among the inputs"):
-        control_loop(TABLE_3_1, controller, 0.0, Inputs(force=1.0), initial=InitialState(), stop_time=0.1)
+        lin.control_loop(TABLE_3_1, controller, 0.0, Inputs(force=1.0), initial=InitialState(), stop_time=0.1)
     with pytest.raises(InputError, match=r"reference is nan m at t = 0\.05 s"):
-        control_loop(
+        lin.control_loop(
             TABLE_3_1, controller, lambda t: 0.0 if t < 0.045 else float("nan"), initial=InitialState(), stop_time=0.1
         )
     with pytest.raises(InputError, match="2 finite"):
-        predict_loop(held, controller, 0.0, stop_time=0.1, deviation=[1.0])
-    moving = linearise(TABLE_3_1, (0.0, 0.0, 0.0, 0.5), HELD)
+        lin.predict_loop(held, controller, 0.0, stop_time=0.1, deviation=[1.0])
+    moving = lin.linearise(TABLE_3_1, (0.0, 0.0, 0.0, 0.5), HELD)
     with pytest.raises(InputError, match="PeriodicModel"):
-        predict_loop(moving, controller, 0.0, stop_time=0.1)
+        lin.predict_loop(moving, controller, 0.0, stop_time=0.1)
 
 
 def test_the_code_of_the_page_runs() -> None:
@@ -391,11 +376,11 @@ def test_the_code_of_the_page_runs() -> None:
 # metrics
 
 
-def result(position, reference=1.0) -> LoopResult:
+def result(position, reference=1.0) -> lin.LoopResult:
     n = len(position)
     states = np.zeros((n, 4))
     states[:, 1] = position
-    return LoopResult(
+    return lin.LoopResult(
         time=0.1 * np.arange(n), states=states, force=np.linspace(-3.0, 2.0, n), reference=np.full(n, reference)
     )
 
@@ -423,4 +408,4 @@ def test_bad_metrics_are_reported() -> None:
     with pytest.raises(InputError, match=r"start at 0\.2"):
         run.metrics(band=0.1, start=0.2)
     with pytest.raises(InputError, match="3 and 2 samples"):
-        largest_difference(run, result([0.0, 1.0]))
+        lin.largest_difference(run, result([0.0, 1.0]))

@@ -29,22 +29,7 @@ from ...numerics.continuation import ContinuationError
 from ...numerics.workers import record_interrupts
 from ...run import inertia_and_stiffness, require_kind, show_progress, takes_published
 from ...units import Amount, si
-from ..motion import (
-    SAME,
-    Crossing,
-    Drive,
-    Family,
-    OrbitError,
-    PeriodicOrbit,
-    default_variable,
-    find_cranks,
-    newton_orbit,
-    parameter_unit,
-    published_drive,
-    require_turns,
-    search_orbits,
-    speed_names,
-)
+from .. import motion
 from ..stability import SpecialPoint
 from .advice import Avoided, Extremum, FoldJump, extrema, fold_jumps, ranges_to_avoid
 from .branch import GREATEST, GREATEST_MULTIPLIER, Branch, describe, follow, follow_both, passes, switch
@@ -98,7 +83,7 @@ def mean_effective_mass(parameters: Parameters) -> float:
         If the links cannot be joined over the whole turn with this degree of freedom held.
     """
     mechanism = find_mechanism(parameters)
-    cranks, freedom = find_cranks(mechanism), first_freedom(mechanism)
+    cranks, freedom = motion.find_cranks(mechanism), first_freedom(mechanism)
     if not cranks:
         raise InputError(f"a {mechanism.name} has no freedom that turns: it has no mean over a turn")
     own = stiffness_name(mechanism)
@@ -217,7 +202,7 @@ class Response(NotebookResult):
         return f"{format_count(self.sought, 'value')} of {self.family.name}"
 
     @property
-    def family(self) -> Family:
+    def family(self) -> motion.Family:
         """The family: mechanism and drive as functions of the parameter that varies."""
         return self.branches[0].family
 
@@ -278,13 +263,13 @@ class ResponseInterrupted(Interrupted):
         )
 
 
-@takes_published(drive=published_drive)
+@takes_published(drive=motion.published_drive)
 def frequency_response(
     parameters: Parameters,
     low: Amount,
     high: Amount,
     *,
-    drive: Drive | None = None,
+    drive: motion.Drive | None = None,
     vary: str = "",
     start: ArrayLike | None = None,
     doublings: int = 1,
@@ -340,18 +325,18 @@ def frequency_response(
     ['1.715 cm']
     """
     mechanism = find_mechanism(parameters)
-    vary = vary or default_variable(mechanism, drive)
-    unit = parameter_unit(mechanism, vary)
+    vary = vary or motion.default_variable(mechanism, drive)
+    unit = motion.parameter_unit(mechanism, vary)
     low, high = float(si(low, unit, "low")), float(si(high, unit, "high"))
     if drive is None:
-        if vary not in speed_names(mechanism):
+        if vary not in motion.speed_names(mechanism):
             raise InputError(
                 f"{vary} varies: say what drives the plant with drive=Drive(speed=...) or Drive(torque=...)"
             )
-        drive = Drive(speed=low)
+        drive = motion.Drive(speed=low)
     if not (np.isfinite(low) and np.isfinite(high) and low < high):
         raise InputError(f"the range is {low} to {high}: it must be finite and increasing")
-    family = Family(parameters=parameters, drive=drive, vary=vary)
+    family = motion.Family(parameters=parameters, drive=drive, vary=vary)
     with record_interrupts() as interrupted, show_progress(progress, high - low, "following the response") as show:
         search = _Search(family, low, high, greatest_step, lambda: bool(interrupted))
         search.follow_from_both_ends(start, most_points, show)
@@ -369,14 +354,14 @@ def frequency_response(
 class _Search:
     """State of a frequency response while its branches are followed: the branches so far, and the problems."""
 
-    family: Family
+    family: motion.Family
     low: float
     high: float
     greatest: float
     stop: Callable[[], bool]
     branches: list[Branch] = field(default_factory=list)
     problems: list[str] = field(default_factory=list)
-    failures: list[OrbitError | ContinuationError] = field(default_factory=list)
+    failures: list[motion.OrbitError | ContinuationError] = field(default_factory=list)
 
     def follow_from_both_ends(self, start: ArrayLike | None, most_points: int, show: Callable[[float], None]) -> None:
         """Follow the branch from the low end of the range, and the branch from the high end if it is a different branch.
@@ -396,7 +381,7 @@ class _Search:
                 # under a torque there is no guess of the speed at the high end, or only the motor's
                 break
             try:
-                orbit = newton_orbit(at, driven, start=guess)
+                orbit = motion.newton_orbit(at, driven, start=guess)
                 if any(_passes(branch, value, orbit) for branch in self.branches):
                     continue
                 branch = follow(
@@ -411,7 +396,7 @@ class _Search:
                     watch=watch,
                     stop=lambda _: self.stop(),
                 )
-            except (OrbitError, ContinuationError) as error:
+            except (motion.OrbitError, ContinuationError) as error:
                 self.failures.append(error)
                 self.problems.append(f"at {self.family.format_value(value)}: {error}")
                 continue
@@ -438,7 +423,7 @@ class _Search:
 
         doubled = self.branches
         for largest in (GREATEST_MULTIPLIER, *[STRAYED] * (times - 1))[:times]:
-            points = [(b.family, s) for b in doubled for s in b.special if s.kind is Crossing.PERIOD_DOUBLING]
+            points = [(b.family, s) for b in doubled for s in b.special if s.kind is motion.Crossing.PERIOD_DOUBLING]
             doubled = []
             for family, special in points:
                 if is_end(special):
@@ -453,7 +438,7 @@ class _Search:
                         largest=largest,
                         stop=lambda _: self.stop(),
                     )
-                except (OrbitError, ContinuationError) as error:
+                except (motion.OrbitError, ContinuationError) as error:
                     place = self.family.format_value(special.parameter)
                     self.problems.append(f"the branch of twice the period at {place} is not followed: {error}")
                     continue
@@ -473,7 +458,7 @@ class _Search:
             points = [point for b in simple for point in zip(np.abs(b.parameter - value), b.orbits)]
             start = min(points, key=lambda point: float(point[0]))[1].start
         limit = GREATEST if turns == 1 else GREATEST_OF_SEVERAL
-        for orbit in search_orbits(parameters, drive, turns=turns, start=start).orbits:
+        for orbit in motion.search_orbits(parameters, drive, turns=turns, start=start).orbits:
             if self.stop() or orbit.largest > limit or self._knows(orbit, value):
                 continue
             try:
@@ -496,7 +481,7 @@ class _Search:
             if not (branch.reached or strayed):
                 self.problems.append(describe_end(branch))
 
-    def _knows(self, orbit: PeriodicOrbit, value: float) -> bool:
+    def _knows(self, orbit: motion.PeriodicOrbit, value: float) -> bool:
         """Return whether a known branch passes through a motion, at whichever turn the motion is taken to begin."""
         own = [branch for branch in self.branches if branch.turns == orbit.turns]
         starts = orbit.passages()
@@ -517,11 +502,12 @@ def describe_end(branch: Branch) -> str:
     return f"the branch {period}from {first} is followed to {last} only: {branch.reason}"
 
 
-def _passes(branch: Branch, value: float, orbit: PeriodicOrbit) -> bool:
+def _passes(branch: Branch, value: float, orbit: motion.PeriodicOrbit) -> bool:
     """Return whether one of the two ends of a branch is the given orbit at the parameter ``value``."""
     return any(
         abs(branch.parameter[i] - value) <= 1e-9 * abs(value)
-        and float(np.abs(orbit.flow.remove_turns(branch.orbits[i].start - orbit.start) / orbit.scale).max()) < SAME
+        and float(np.abs(orbit.flow.remove_turns(branch.orbits[i].start - orbit.start) / orbit.scale).max())
+        < motion.SAME
         for i in (0, -1)
     )
 
@@ -570,7 +556,7 @@ def with_isolas(
     require_kind(response, Response, "response", "what frequency_response returns")
     if places < 1:
         raise InputError(f"places is {places}: motions must be sought at one value of the parameter at least")
-    require_turns(turns)
+    motion.require_turns(turns)
     branches, problems = list(response.branches), list(response.problems)
     with (
         record_interrupts() as interrupted,

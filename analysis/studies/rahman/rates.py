@@ -14,6 +14,7 @@ from ..rules import ABNORMAL, ABOUT_DEG, VERY_CLOSE_DEG
 from ..statements import Statement, at_least, at_most, near, text
 from ..study import Study, StudyResult, padded
 from ..variation import unvaried
+from . import method, printed
 from .figures import (
     ANGLE,
     ANGLES_DEG,
@@ -24,60 +25,28 @@ from .figures import (
     full_name,
     nothing,
 )
-from .method import (
-    AT,
-    AT_RATES,
-    CLEAR_SINE,
-    DOTS,
-    MAYBE,
-    MOVING,
-    ROW_F,
-    FloatArray,
-    H,
-    difference,
-    draw,
-    followed,
-    joints,
-    links,
-)
-from .printed import (
-    CRANK_AT_SPEED,
-    GENERAL,
-    GRID_DEG,
-    MAX_STEPS,
-    STEP_DEG,
-    Crank,
-    Joints,
-    forward_rod_velocity,
-    forward_slider_velocity,
-    joint_accelerations,
-    joint_rates,
-    later,
-    loop_rates,
-    mended_row,
-    separated_rates,
-    velocities,
-)
 from .table import IDEAL, SPIKES_DEG, Case
 
 
-def row_f(case: Case) -> tuple[FloatArray, FloatArray]:
+def row_f(case: Case) -> tuple[method.FloatArray, method.FloatArray]:
     """Return the residuals of eq 37f (in/s): as printed, NaN where eq 41 is unbounded, and with erratum 2 mended.
 
     Each residual has a value at every angle of the turn.
     """
-    p, q = parameters(case.offset_in, case.twist_deg), joints(followed(case).unknowns[:, 0])
-    lacking = loop_rates(CRANK_AT_SPEED, q, joint_rates(CRANK_AT_SPEED, q))[5]
-    shift = np.full(GRID_DEG.size, case.shift_in * INCH)
-    mended = mended_row(p, np.radians(GRID_DEG), shift, q, CRANK_SPEED)
-    return np.where(np.abs(np.sin(q.th2)) > CLEAR_SINE, lacking, np.nan), mended
+    p, q = parameters(case.offset_in, case.twist_deg), method.joints(method.followed(case).unknowns[:, 0])
+    lacking = printed.loop_rates(printed.CRANK_AT_SPEED, q, printed.joint_rates(printed.CRANK_AT_SPEED, q))[5]
+    shift = np.full(printed.GRID_DEG.size, case.shift_in * INCH)
+    mended = printed.mended_row(p, np.radians(printed.GRID_DEG), shift, q, CRANK_SPEED)
+    return np.where(np.abs(np.sin(q.th2)) > method.CLEAR_SINE, lacking, np.nan), mended
 
 
 def _angular_velocity() -> float:
     """Return the error (rad/s) of eqs 30 and 31 as the angular velocity of Z(theta) Y(eta), by a difference quotient."""
     th, eta, th_rate, eta_rate = 0.8, 0.3, 1.7, -2.1
-    before, now, after = (about_k(th + h * th_rate).real @ about_j(eta + h * eta_rate).real for h in (-H, 0.0, H))
-    omega = axial(Dual((after - before) / (2.0 * H) @ now.T)).real
+    before, now, after = (
+        about_k(th + h * th_rate).real @ about_j(eta + h * eta_rate).real for h in (-method.H, 0.0, method.H)
+    )
+    omega = axial(Dual((after - before) / (2.0 * method.H) @ now.T)).real
     return float(np.linalg.norm(omega - [0.0, eta_rate, th_rate]))
 
 
@@ -86,17 +55,19 @@ def _velocities() -> dict[str, float]:
 
     The matrices are those of eqs 1 to 3, the velocities those of eqs 29 to 32.
     """
-    r, (crank, rod, slider) = joint_rates(MOVING, GENERAL), links()
-    of_crank, of_rod, _ = velocities(MOVING, GENERAL, r)
-    forward = forward_rod_velocity(MOVING, GENERAL, r)
-    first = Dual(np.array([0.0, 0.0, MOVING.speed]), np.array([0.0, 0.0, MOVING.shift_rate]))
+    r, (crank, rod, slider) = printed.joint_rates(method.MOVING, printed.GENERAL), method.links()
+    of_crank, of_rod, _ = printed.velocities(method.MOVING, printed.GENERAL, r)
+    forward = printed.forward_rod_velocity(method.MOVING, printed.GENERAL, r)
+    first = Dual(np.array([0.0, 0.0, method.MOVING.speed]), np.array([0.0, 0.0, method.MOVING.shift_rate]))
     second, third = (Dual(np.array([0.0, eta, th])) for eta, th in ((r.eta2, r.th2), (r.eta3, r.th3)))
     back = Dual(np.zeros(3), np.array([0.0, 0.0, -float(r.s4)]))
     return {
-        "eq 33": difference(of_crank, apply(crank.T, first)),
-        "eqs 34, 35": difference(forward, apply(rod.T, of_crank + second)),
-        "eq 36": difference(of_rod, apply(slider, back) - third),
-        "eqs 44, 45": difference(forward_slider_velocity(MOVING, GENERAL, r), apply(slider.T, forward + third)),
+        "eq 33": method.difference(of_crank, apply(crank.T, first)),
+        "eqs 34, 35": method.difference(forward, apply(rod.T, of_crank + second)),
+        "eq 36": method.difference(of_rod, apply(slider, back) - third),
+        "eqs 44, 45": method.difference(
+            printed.forward_slider_velocity(method.MOVING, printed.GENERAL, r), apply(slider.T, forward + third)
+        ),
     }
 
 
@@ -105,7 +76,7 @@ def _sinusoidal() -> tuple[float, float]:
 
     Eq 28a should be the rate of eq 28, and eq 28b the rate of eq 28a with its amplitude mended.
     """
-    ratio, amplitude, angle, speed, acceleration, h = 2.0, 2.0, AT, CRANK_SPEED, 3.0, 1e-20
+    ratio, amplitude, angle, speed, acceleration, h = 2.0, 2.0, method.AT, CRANK_SPEED, 3.0, 1e-20
     # derivatives along the motion by a complex step, which has no rounding error
     moved, quicker = angle + 1j * h * speed, speed + 1j * h * acceleration
     shift = amplitude * np.sin(ratio * moved)
@@ -117,10 +88,10 @@ def _sinusoidal() -> tuple[float, float]:
     return float(printed_rate - shift.imag / h), float(printed_second - rate.imag / h)
 
 
-def _rows(crank: Crank, q: Joints) -> tuple[FloatArray, FloatArray]:
+def _rows(crank: printed.Crank, q: printed.Joints) -> tuple[method.FloatArray, method.FloatArray]:
     """Return the coefficients of the joint rates in eqs 37a to 37f, shape (6, 5), and the constant terms, shape (6,)."""
-    right = loop_rates(crank, q, Joints(*np.zeros(5)))
-    return np.stack([loop_rates(crank, q, Joints(*unit)) - right for unit in np.eye(5)], -1), right
+    right = printed.loop_rates(crank, q, printed.Joints(*np.zeros(5)))
+    return np.stack([printed.loop_rates(crank, q, printed.Joints(*unit)) - right for unit in np.eye(5)], -1), right
 
 
 def _of_frames() -> tuple[Statement, ...]:
@@ -151,10 +122,10 @@ def _of_frames() -> tuple[Statement, ...]:
 
 def _solved() -> tuple[Statement, ...]:
     """Judge eqs 38 to 43 by comparison with eqs 37a to 37f, in a general position with the shift in motion."""
-    matrix, right = _rows(MOVING, GENERAL)
-    found = joint_rates(MOVING, GENERAL)
-    order = [Joints._fields.index(name) for name in ("th2", "th3", "eta2", "eta3", "s4")]
-    eq_38 = separated_rates(MOVING, GENERAL) - np.column_stack([matrix[:, order], -right])
+    matrix, right = _rows(method.MOVING, printed.GENERAL)
+    found = printed.joint_rates(method.MOVING, printed.GENERAL)
+    order = [printed.Joints._fields.index(name) for name in ("th2", "th3", "eta2", "eta3", "s4")]
+    eq_38 = printed.separated_rates(method.MOVING, printed.GENERAL) - np.column_stack([matrix[:, order], -right])
     errors = [
         nothing(name, rate - solved, "in/s" if "S4" in name else "rad/s", why="erratum 4: no cos^2 eta2")
         for name, rate, solved in zip(
@@ -174,7 +145,7 @@ def _solved() -> tuple[Statement, ...]:
                 nothing("coefficients, and right side of rows 1 to 5", [*eq_38[:, :5].ravel(), *eq_38[:5, 5]]),
                 nothing("right side of row 6", eq_38[5, 5], "in/s"),
             ),
-            f"erratum 9: sin theta2 lacks sin eta2, {MAYBE}",
+            f"erratum 9: sin theta2 lacks sin eta2, {method.MAYBE}",
         ),
         Statement(
             "Since rank of the coefficient matrix equals 5, the number of columns, a unique solution can be obtained.",
@@ -200,7 +171,12 @@ def _solved() -> tuple[Statement, ...]:
             ROUNDING,
             (
                 *errors,
-                nothing("row 37f", loop_rates(MOVING, GENERAL, found)[5], "in/s", why="erratum 3: it is left unsolved"),
+                nothing(
+                    "row 37f",
+                    printed.loop_rates(method.MOVING, printed.GENERAL, found)[5],
+                    "in/s",
+                    why="erratum 3: it is left unsolved",
+                ),
             ),
         ),
     )
@@ -209,10 +185,10 @@ def _solved() -> tuple[Statement, ...]:
 def _derivatives() -> tuple[Statement, ...]:
     """Judge eqs 28a, 28b and 38a to 42a as derivatives."""
     of_28a, of_28b = _sinusoidal()
-    found = joint_rates(MOVING, GENERAL)
-    seconds = joint_accelerations(MOVING, GENERAL, found)
-    quicker, moved, _ = later(MOVING, GENERAL, found, seconds)
-    rough = max(abs(float(a - b.imag / 1e-20)) for a, b in zip(seconds, joint_rates(quicker, moved)))
+    found = printed.joint_rates(method.MOVING, printed.GENERAL)
+    seconds = printed.joint_accelerations(method.MOVING, printed.GENERAL, found)
+    quicker, moved, _ = printed.later(method.MOVING, printed.GENERAL, found, seconds)
+    rough = max(abs(float(a - b.imag / 1e-20)) for a, b in zip(seconds, printed.joint_rates(quicker, moved)))
     return (
         Statement(
             "S1' = alpha S1 cos(alpha theta1) theta1' [when S1 is sinusoidal] (28a)",
@@ -220,7 +196,7 @@ def _derivatives() -> tuple[Statement, ...]:
             "S1' by eq 28a less the rate of eq 28, at theta1 = 0.9 rad with alpha = 2 and an amplitude of 2 in",
             ROUNDING,
             (nothing("eq 28a", of_28a, "in/s"),),
-            f"erratum 9: S1 for its amplitude S_S1, {MAYBE}",
+            f"erratum 9: S1 for its amplitude S_S1, {method.MAYBE}",
         ),
         Statement(
             "S1'' = alpha S_S1 [cos(alpha theta1) theta1'' - alpha sin(alpha theta1) theta1'^2] (28b)",
@@ -235,7 +211,7 @@ def _derivatives() -> tuple[Statement, ...]:
             "equations (38) through (42) with respect to time. Hence the five acceleration equations are as follows:",
             text("section 2.8, eqs 38a to 42a, L1035-1045"),
             "greatest difference from the rates of eqs 39 to 43, which this sentence calls 38 to 42, in a general position "
-            f"{AT_RATES}; {DOTS}",
+            f"{method.AT_RATES}; {method.DOTS}",
             ROUNDING,
             (nothing("eqs 38a to 42a", rough, "rad/s2 or in/s2"),),
             "38a is the rate of eq 39 as printed and has its erratum 4",
@@ -255,12 +231,12 @@ EQUATIONS = {
 }
 
 
-def _near_dead_centres(case: Case, q: Joints, angles_deg: FloatArray) -> dict[str, float]:
+def _near_dead_centres(case: Case, q: printed.Joints, angles_deg: method.FloatArray) -> dict[str, float]:
     """Return the greatest second rate of each joint within 10 deg of a dead centre, relative to the greatest elsewhere.
 
     The second rates are those of eqs 38a to 42a.
     """
-    found = joint_accelerations(CRANK_AT_SPEED, q, joint_rates(CRANK_AT_SPEED, q))
+    found = printed.joint_accelerations(printed.CRANK_AT_SPEED, q, printed.joint_rates(printed.CRANK_AT_SPEED, q))
     close_by = np.min([np.abs(angles_deg - at) for at in dead_centres_deg(case)], axis=0) < ABOUT_DEG
     sizes = {name: np.abs(second) for name, second in found._asdict().items()}
     return {
@@ -268,27 +244,29 @@ def _near_dead_centres(case: Case, q: Joints, angles_deg: FloatArray) -> dict[st
     }
 
 
-def _ended(case: Case, angles_deg: FloatArray, start: FloatArray) -> FloatArray:
+def _ended(case: Case, angles_deg: method.FloatArray, start: method.FloatArray) -> method.FloatArray:
     """Return the unknowns (n, 5) at the end of the printed iteration at n crank angles, given a start for each angle."""
     p, unit = parameters(case.offset_in, case.twist_deg), [1.0, 1.0, 1.0, 1.0, INCH]
     shift = case.shift_in * INCH
-    ended = settle(p, np.radians(angles_deg), shift, rows="printed", start=start * unit, max_steps=MAX_STEPS)
+    ended = settle(p, np.radians(angles_deg), shift, rows="printed", start=start * unit, max_steps=printed.MAX_STEPS)
     return np.asarray(ended.unknowns / unit)
 
 
-def _ended_on_turn(case: Case) -> FloatArray:
+def _ended_on_turn(case: Case) -> method.FloatArray:
     """Return the unknowns at the end of the printed iteration at every half degree of a turn.
 
     The iteration starts from the solution at the last multiple of five degrees.
     """
-    starts = np.repeat(followed(case).unknowns[:, 0], round(2.0 * STEP_DEG), axis=0)
+    starts = np.repeat(method.followed(case).unknowns[:, 0], round(2.0 * printed.STEP_DEG), axis=0)
     return _ended(case, ANGLES_DEG[:-1], starts)
 
 
-def _zeros(case: Case, angles_deg: FloatArray, unknowns: FloatArray) -> tuple[FloatArray, FloatArray]:
+def _zeros(
+    case: Case, angles_deg: method.FloatArray, unknowns: method.FloatArray
+) -> tuple[method.FloatArray, method.FloatArray]:
     """Return the angles (deg) at which sin theta2 is zero in the printed iteration's results, and the unknowns there."""
     sine, step = np.sin(unknowns[:, 0]), np.diff(angles_deg).max()
-    small = np.abs(sine) < CLEAR_SINE
+    small = np.abs(sine) < method.CLEAR_SINE
     (at,) = np.nonzero((sine[:-1] * sine[1:] < 0.0) & small[:-1] & small[1:])
     zeros, start = angles_deg[at], unknowns[at]
     while step > 1e-5 * BESIDE_DEG:
@@ -298,22 +276,24 @@ def _zeros(case: Case, angles_deg: FloatArray, unknowns: FloatArray) -> tuple[Fl
     return zeros, start
 
 
-def _beside_zeros(case: Case, angles_deg: FloatArray, unknowns: FloatArray) -> tuple[FloatArray, FloatArray]:
+def _beside_zeros(
+    case: Case, angles_deg: method.FloatArray, unknowns: method.FloatArray
+) -> tuple[method.FloatArray, method.FloatArray]:
     """Return the angles (deg) `BESIDE_DEG` before and after each zero of sin theta2, and the unknowns there."""
     zeros, start = _zeros(case, angles_deg, unknowns)
     beside = np.concatenate([zeros - BESIDE_DEG, zeros + BESIDE_DEG])
     return beside, _ended(case, beside, np.tile(start, (2, 1)))
 
 
-def _roundoff(q: Joints) -> float:
+def _roundoff(q: printed.Joints) -> float:
     """Return the greatest roundoff error of eqs 38a to 42a, relative to the greatest acceleration by the same equation.
 
     ``q`` are the joint values.
     """
     digit = np.spacing(2.0 * np.pi)
     short, long = (
-        joint_accelerations(CRANK_AT_SPEED, at, joint_rates(CRANK_AT_SPEED, at))
-        for at in (q, Joints(*(x.astype(np.longdouble) + digit for x in q)))
+        printed.joint_accelerations(printed.CRANK_AT_SPEED, at, printed.joint_rates(printed.CRANK_AT_SPEED, at))
+        for at in (q, printed.Joints(*(x.astype(np.longdouble) + digit for x in q)))
     )
     return max(float(np.abs(x - y).max() / np.abs(y).max()) for x, y in zip(short, long) if np.abs(y).max() > NOTHING)
 
@@ -351,7 +331,7 @@ def _abnormal() -> Statement:
     case, angles = OFFSETS[1], ANGLES_DEG[:-1]
     unknowns = _ended_on_turn(case)
     beside, closest = _beside_zeros(case, angles, unknowns)
-    ratios = _near_dead_centres(case, joints(np.concatenate([unknowns, closest])), np.append(angles, beside))
+    ratios = _near_dead_centres(case, method.joints(np.concatenate([unknowns, closest])), np.append(angles, beside))
     th2 = np.abs((np.degrees(closest[: closest.shape[0] // 2, 0]) + 180.0) % 360.0 - 180.0)
     return Statement(
         "Using the computer program it has been observed that near those particular values for input crank "
@@ -367,7 +347,7 @@ def _abnormal() -> Statement:
         (
             *(at_most(f"theta2 near {spike:g} deg", VERY_CLOSE_DEG, at, "deg") for spike, at in zip(SPIKES_DEG, th2)),
             *(at_least(words, ABNORMAL, ratios[name]) for name, words in EQUATIONS.items()),
-            at_least("share that is roundoff", 0.5, _roundoff(joints(unknowns))),
+            at_least("share that is roundoff", 0.5, _roundoff(method.joints(unknowns))),
         ),
         "38a, 40a and 41a are unbounded, as eq 41 divides by sin theta2; roundoff does not decide",
     )
@@ -375,8 +355,8 @@ def _abnormal() -> Statement:
 
 def rates() -> StudyResult:
     """Compute the joint rates as printed, and the residual of the equation 37f that is not solved."""
-    columns = {ANGLE: GRID_DEG}
-    for case in ROW_F:
+    columns = {ANGLE: printed.GRID_DEG}
+    for case in method.ROW_F:
         lacking, mended = row_f(case)
         columns[f"opening of the loop as printed; {case.name} [in/s]"] = lacking
         columns[f"opening of the loop mended; {case.name} [in/s]"] = mended
@@ -389,4 +369,4 @@ def rates() -> StudyResult:
 
 
 #: The study by its name.
-STUDIES = {"rahman-rates": Study("rahman-rates", unvaried(rates), draw)}
+STUDIES = {"rahman-rates": Study("rahman-rates", unvaried(rates), method.draw)}

@@ -20,33 +20,7 @@ from ...units import RAD_S_PER_RPM
 from ..rules import ABOUT, ABOUT_DEG, ALIKE, SMALL
 from ..statements import Statement, at_least, at_most, near, text
 from ..study import Study, StudyResult
-from . import rig_1
-from .rigs import (
-    LOST,
-    NOTICED,
-    RIG,
-    SAMPLES,
-    SEEN_IN_RECORDS,
-    SLIGHT,
-    SLOWEST,
-    amplitude,
-    complex_stiffness,
-    count_sign_changes,
-    harmonic,
-    largest_multiplier,
-    natural_speed,
-    near_fraction,
-    near_half,
-    orbit,
-    overtones,
-    peak_rise,
-    peaks,
-    rig,
-    rounded,
-    slider,
-    speed_of_fewer_peaks,
-    turn,
-)
+from . import rig_1, rigs
 
 FINDINGS = """\
 The chapter claims that two rigs bear out the theory: rig 1 (vertical, springs A and B) the equations of chapters II and
@@ -98,12 +72,12 @@ class Turns:
 
     def compute(self) -> StudyResult:
         """Compute a steady turn at each speed of the figure."""
-        turns = {f"{speed:g} rpm": turn(self.spring, speed) for speed in self.speeds}
+        turns = {f"{speed:g} rpm": rigs.turn(self.spring, speed) for speed in self.speeds}
         if self.rough:
             (speed,) = self.speeds
-            turns["friction"] = turn(self.spring, speed, slider_friction_coefficient=SLIGHT)
-        columns = {"crank angle [deg]": np.linspace(0.0, 360.0, len(slider(next(iter(turns.values())))))}
-        columns |= {f"slider position u; {name} [cm]": slider(of) for name, of in turns.items()}
+            turns["friction"] = rigs.turn(self.spring, speed, slider_friction_coefficient=rigs.SLIGHT)
+        columns = {"crank angle [deg]": np.linspace(0.0, 360.0, len(rigs.slider(next(iter(turns.values())))))}
+        columns |= {f"slider position u; {name} [cm]": rigs.slider(of) for name, of in turns.items()}
         return StudyResult(
             number=self.number,
             claim=self.claim,
@@ -121,12 +95,12 @@ class Turns:
         curves = []
         for (name, u), size, colour in zip(positions, sizes, COLOURS):
             label = name.partition("; ")[2].removesuffix(" [cm]")
-            label = f"with friction,\ncoefficient {SLIGHT:g}" if label == "friction" else label
+            label = f"with friction,\ncoefficient {rigs.SLIGHT:g}" if label == "friction" else label
             curves.append(Curve(x=angle[1], y=u / (size if relative else 1.0), label=label, colour=colour))
         panel = Panel(
             x_label="crank angle [deg]",
             y_label="slider position u / amplitude" if relative else "slider position u [cm]",
-            title=f"rig {RIG[self.spring]}, spring {self.spring}",
+            title=f"rig {rigs.RIG[self.spring]}, spring {self.spring}",
             curves=curves,
             legend_at="outside",
             x_range=(0.0, 360.0),
@@ -154,12 +128,16 @@ def _periodic() -> tuple[Statement, ...]:
     """Judge Fig 8.7: one cycle of the slider takes one turn of the crank, at the speed of the figure and at all others."""
     stable = "below 1: the motion of one crank cycle exists, and every motion near it tends to it"
     largest = [
-        at_most(f"spring {s}, to {rig_1.STOPPED[s]} rpm", 1.0, largest_multiplier(s, SLOWEST, float(rig_1.STOPPED[s])))
+        at_most(
+            f"spring {s}, to {rig_1.STOPPED[s]} rpm",
+            1.0,
+            rigs.largest_multiplier(s, rigs.SLOWEST, float(rig_1.STOPPED[s])),
+        )
         for s in "AB"
     ]
     shown = [(s, w) for s in "AB" for w in OF_FIGURES[s]]
-    here = max(orbit(rig(s), w).largest for s, w in shown)
-    fewest = min(peaks(turn(s, w)) for s, w in shown)
+    here = max(rigs.orbit(rigs.rig(s), w).largest for s, w in shown)
+    fewest = min(rigs.peaks(rigs.turn(s, w)) for s, w in shown)
     return (
         Statement(
             "The theory predicts the steady state slider motion to be oscillatory and periodic with one crank cycle.",
@@ -173,14 +151,14 @@ def _periodic() -> tuple[Statement, ...]:
             "This is verified experimentally as shown in Fig. (8.7) in which a typical experimentally observed steady state "
             "motion of the slider is shown against the crank angle.",
             text("8.4.1.1, L6439"),
-            why=LOST,
+            why=rigs.LOST,
         ),
         Statement(
             "However, for all other speeds, using this spring and also spring B, the motion was always periodic with one "
             "crank cycle.",
             text("8.4.1.1, L6449"),
-            f"largest Floquet multiplier of the motion of one crank cycle, from {SLOWEST:g} rpm (ours) to the greatest speed "
-            "that was run with each spring (L6555)",
+            f"largest Floquet multiplier of the motion of one crank cycle, from {rigs.SLOWEST:g} rpm (ours) to the greatest "
+            "speed that was run with each spring (L6555)",
             stable,
             tuple(largest),
         ),
@@ -194,13 +172,13 @@ def _compared_a() -> tuple[Statement, ...]:
             "As may be seen from Figs. (8.8), (8.9) and (8.10) the theoretical and experimental results are in good "
             "agreement in both phase and amplitude.",
             text("8.4.1.1, L6479"),
-            why=LOST,
+            why=rigs.LOST,
         ),
         Statement(
             "It can however be observed that while the phase is almost in total agreement the amplitude shows slight "
             "variations.",
             text("8.4.1.1, L6482"),
-            why=LOST,
+            why=rigs.LOST,
         ),
     )
 
@@ -211,27 +189,27 @@ def _compared_b() -> tuple[Statement, ...]:
         Statement(
             "As may be seen the theoretical and experimental results are almost in total agreement in phase.",
             text("8.4.1.1, L6524"),
-            why=LOST,
+            why=rigs.LOST,
         ),
         Statement(
             "The agreement in amplitude is, however, not as good but nevertheless reasonable.",
             text("8.4.1.1, L6526"),
-            why=LOST,
+            why=rigs.LOST,
         ),
         Statement(
             "The experimental and theoretical results were compared for a number of other speeds below the natural "
             "frequencies with both springs A and B and in all cases the agreement in phase was good and in amplitude "
             "reasonable.",
             text("8.4.1.1, L6533"),
-            why=f"{LOST}, and the other speeds are not named",
+            why=f"{rigs.LOST}, and the other speeds are not named",
         ),
     )
 
 
 def _fig_8_14() -> tuple[Statement, ...]:
     natural, shown = {"A": "580", "B": "1160"}, OF_FIGURES["A"]
-    of_four = sum(peaks(turn("A", speed)) == 4 for speed in shown)
-    second = min(harmonic(turn("A", w), 2) / harmonic(turn("A", w), 1) for w in shown)
+    of_four = sum(rigs.peaks(rigs.turn("A", speed)) == 4 for speed in shown)
+    second = min(rigs.harmonic(rigs.turn("A", w), 2) / rigs.harmonic(rigs.turn("A", w), 1) for w in shown)
     return (
         Statement(
             "Theoretical calculations give the natural frequency with spring A to be in the region of 580 RPM and with "
@@ -241,7 +219,7 @@ def _fig_8_14() -> tuple[Statement, ...]:
             "mean over a turn with u = 0",
             f"{100 * ABOUT:g} %, the rule for *in the region of*",
             tuple(
-                near(f"spring {s}", stated, natural_speed(s), ABOUT * float(stated), "rpm")
+                near(f"spring {s}", stated, rigs.natural_speed(s), ABOUT * float(stated), "rpm")
                 for s, stated in natural.items()
             ),
         ),
@@ -264,11 +242,11 @@ def _fig_8_14() -> tuple[Statement, ...]:
 
 def _amplitude_a() -> Statement:
     """Judge the amplitude over the speed with spring A."""
-    tops, _ = np.transpose([near_half("A", stiffness) for stiffness in rounded("A")])
-    top, low = near_half("A", rig("A").slider_stiffness)
+    tops, _ = np.transpose([rigs.near_half("A", stiffness) for stiffness in rigs.rounded("A")])
+    top, low = rigs.near_half("A", rigs.rig("A").slider_stiffness)
     # the stiffness that puts the maximum as low as its tolerance allows
     least = 290.0 - 5.0
-    soft = brentq(lambda stiffness: near_half("A", stiffness)[0] - least, *rounded("A"), xtol=1.0)
+    soft = brentq(lambda stiffness: rigs.near_half("A", stiffness)[0] - least, *rigs.rounded("A"), xtol=1.0)
     return Statement(
         "The amplitude of oscillations increases as the speed increases up to 290 RPM, i.e. half the natural frequency, "
         "where it reaches a maximum after which the amplitude decreases with increase of speed up to 345 RPM beyond "
@@ -279,12 +257,12 @@ def _amplitude_a() -> Statement:
         (
             at_least("least rise by 10 rpm, 240 to 290 rpm", 0.0, _least_rise("A", range(240, 291, 10)), "cm"),
             near(_rounded("speed of the maximum", tops), "290", np.clip(290.0, *tops), 5.0, "rpm"),
-            near("maximum over half the natural frequency", 1.0, 2.0 * top / natural_speed("A"), ALIKE),
+            near("maximum over half the natural frequency", 1.0, 2.0 * top / rigs.natural_speed("A"), ALIKE),
             at_most("greatest rise by 5 rpm, 300 to 345 rpm", 0.0, -_least_rise("A", range(345, 299, -5)), "cm"),
             near(
                 f"speed of the minimum, the maximum at {least:g} rpm or more",
                 "345",
-                near_half("A", soft)[1],
+                rigs.near_half("A", soft)[1],
                 unit="rpm",
                 why="no one stiffness gives both speeds",
             ),
@@ -301,12 +279,15 @@ def _rounded(what: str, speeds: NDArray[np.float64]) -> str:
 
 def _least_rise(spring: str, speeds: Sequence[float]) -> float:
     """Return the least growth of the amplitude (cm) from one speed to the next."""
-    return float(np.diff([amplitude(turn(spring, speed)) for speed in speeds]).min())
+    return float(np.diff([rigs.amplitude(rigs.turn(spring, speed)) for speed in speeds]).min())
 
 
 def _fig_8_15() -> tuple[Statement, ...]:
-    at_500, shoulder = turn("A", 500.0), "the point of inflection has not reached the third peak: a shoulder is left"
-    u = slider(at_500)
+    at_500, shoulder = (
+        rigs.turn("A", 500.0),
+        "the point of inflection has not reached the third peak: a shoulder is left",
+    )
+    u = rigs.slider(at_500)
     return (
         Statement(
             "At 240 RPM the slider oscillation has four peaks; however when the speed is 450 RPM the first and last peaks "
@@ -317,26 +298,26 @@ def _fig_8_15() -> tuple[Statement, ...]:
             "a turn, of which a sine has two, and second harmonic over the first",
             f"none of a count; {TENS}; {ABOUT:g}, the rule for *nearly* a sine, as which *sinusoidal type* is read, by us",
             (
-                near("peaks at 240 rpm", "4", peaks(turn("A", 240.0)), 0.0),
+                near("peaks at 240 rpm", "4", rigs.peaks(rigs.turn("A", 240.0)), 0.0),
                 near(
                     "speed at which first and last peak meet",
                     "450",
-                    speed_of_fewer_peaks("A", 400.0, 500.0),
+                    rigs.speed_of_fewer_peaks("A", 400.0, 500.0),
                     5.0,
                     "rpm",
                 ),
-                near("peaks at 500 rpm", 2.0, peaks(at_500), 0.0),
+                near("peaks at 500 rpm", 2.0, rigs.peaks(at_500), 0.0),
                 near(
                     "points of inflection at 500 rpm",
                     2.0,
-                    count_sign_changes(np.diff(u, 2, prepend=u[-2])),
+                    rigs.count_sign_changes(np.diff(u, 2, prepend=u[-2])),
                     0.0,
                     why=shoulder,
                 ),
                 at_most(
                     "second harmonic over first at 500 rpm",
                     ABOUT,
-                    harmonic(at_500, 2) / harmonic(at_500, 1),
+                    rigs.harmonic(at_500, 2) / rigs.harmonic(at_500, 1),
                     why=shoulder,
                 ),
             ),
@@ -345,13 +326,13 @@ def _fig_8_15() -> tuple[Statement, ...]:
 
 
 def _fig_8_16() -> tuple[Statement, ...]:
-    four = sum(peaks(turn("B", speed)) == 4 for speed in SPEEDS["B"])
-    top = near_fraction("B", 2)[0]
-    tops, _ = np.transpose([near_half("B", stiffness) for stiffness in rounded("B")])
+    four = sum(rigs.peaks(rigs.turn("B", speed)) == 4 for speed in SPEEDS["B"])
+    top = rigs.near_fraction("B", 2)[0]
+    tops, _ = np.transpose([rigs.near_half("B", stiffness) for stiffness in rigs.rounded("B")])
     fractions = [(s, order, part) for s in "AB" for order, part in ((3, "a third"), (4, "a quarter"))]
     higher = []
     for s in "AB":
-        ratios = {speed: overtones(turn(s, speed)) for speed in OF_FIGURES[s]}
+        ratios = {speed: rigs.overtones(rigs.turn(s, speed)) for speed in OF_FIGURES[s]}
         for words, choose in (("most", max), ("least", min)):
             speed = choose(ratios, key=ratios.__getitem__)
             higher.append(at_most(f"spring {s}, the {words}, {speed:g} rpm", SMALL, ratios[speed]))
@@ -374,7 +355,7 @@ def _fig_8_16() -> tuple[Statement, ...]:
             (
                 at_least("least rise by 10 rpm, 500 to 560 rpm", 0.0, _least_rise("B", range(500, 561, 10)), "cm"),
                 near(_rounded("speed of the maximum", tops), "580", np.clip(580.0, *tops), 5.0, "rpm"),
-                near("maximum over half the natural frequency", 1.0, 2.0 * top / natural_speed("B"), ALIKE),
+                near("maximum over half the natural frequency", 1.0, 2.0 * top / rigs.natural_speed("B"), ALIKE),
                 at_most("greatest rise by 10 rpm, 570 to 710 rpm", 0.0, -_least_rise("B", range(710, 569, -10)), "cm"),
                 at_least("least rise by 10 rpm, 720 to 800 rpm", 0.0, _least_rise("B", range(720, 801, 10)), "cm"),
             ),
@@ -386,9 +367,9 @@ def _fig_8_16() -> tuple[Statement, ...]:
             text("8.4.1.2, L6770"),
             "rise of the amplitude at the maximum there over the next minimum, relative to this minimum; 0 where no maximum is "
             "found in the steps of the curve, there at most 4 rpm",
-            SEEN_IN_RECORDS,
+            rigs.SEEN_IN_RECORDS,
             tuple(
-                at_most(f"spring {s}, {part}, {natural_speed(s) / n:.0f} rpm", NOTICED, peak_rise(s, n))
+                at_most(f"spring {s}, {part}, {rigs.natural_speed(s) / n:.0f} rpm", rigs.NOTICED, rigs.peak_rise(s, n))
                 for s, n, part in fractions
             ),
             "the third and the fourth harmonic meet the natural frequency there",
@@ -407,10 +388,10 @@ def _fig_8_16() -> tuple[Statement, ...]:
 
 
 def _fig_8_17() -> tuple[Statement, ...]:
-    meeting = {s: speed_of_fewer_peaks(s, *ends) for s, ends in {"A": (400.0, 500.0), "B": (800.0, 900.0)}.items()}
-    of_natural = [speed / natural_speed(s) for s, speed in meeting.items()]
+    meeting = {s: rigs.speed_of_fewer_peaks(s, *ends) for s, ends in {"A": (400.0, 500.0), "B": (800.0, 900.0)}.items()}
+    of_natural = [speed / rigs.natural_speed(s) for s, speed in meeting.items()]
     late = [speed for speed in OF_FIGURES["B"] if speed >= 580.0]
-    angles = [_fall_angle(turn("B", speed)) for speed in late]
+    angles = [_fall_angle(rigs.turn("B", speed)) for speed in late]
     return (
         Statement(
             "The four peaks in the oscillations show the same tendency as for spring A, i.e. the first and last peaks "
@@ -439,7 +420,7 @@ def _fig_8_17() -> tuple[Statement, ...]:
 
 def _fall_angle(of: Turn) -> float:
     """Return the crank angle (deg) from the last maximum of the slider position in a turn to the minimum after it."""
-    rising = np.diff(slider(of)) > 0.0
+    rising = np.diff(rigs.slider(of)) > 0.0
     tops, lows = (np.flatnonzero(x & ~np.roll(x, -1)) for x in (rising, ~rising))
     return float(((lows - tops[-1]) % len(rising)).min()) * 360.0 / len(rising)
 
@@ -453,20 +434,29 @@ def _unbalance_ratio(spring: str, speeds: NDArray[np.float64], unbalance: float)
 
     The single mass is on the same spring and damper.
     """
-    rates, amplitudes = RAD_S_PER_RPM * speeds, np.array([amplitude(turn(spring, w)) for w in speeds.tolist()])
-    return float((amplitudes * np.abs(complex_stiffness(rig(spring), rates)) / (unbalance * rates**2)).max())
+    rates, amplitudes = (
+        RAD_S_PER_RPM * speeds,
+        np.array([rigs.amplitude(rigs.turn(spring, w)) for w in speeds.tolist()]),
+    )
+    return float((amplitudes * np.abs(rigs.complex_stiffness(rigs.rig(spring), rates)) / (unbalance * rates**2)).max())
 
 
 def _fig_8_18() -> tuple[Statement, ...]:
     section, speeds = "8.4.2.1", np.arange(RUN[0], RUN[1] + 1.0, 10.0).tolist()
-    sizes = {s: np.array([[harmonic(turn(s, w), n) for n in (1, 2)] for w in speeds]) for s in "CD"}
+    sizes = {s: np.array([[rigs.harmonic(rigs.turn(s, w), n) for n in (1, 2)] for w in speeds]) for s in "CD"}
     ratios = {s: table[:, 1] / table[:, 0] for s, table in sizes.items()}
     # about the greatest ratio in steps of 1 rpm
     about = {s: np.clip(speeds[ratio.argmax()] + np.arange(-10.0, 11.0), *RUN).tolist() for s, ratio in ratios.items()}
-    most = {s: max(harmonic(turn(s, w), 2) / harmonic(turn(s, w), 1) for w in of) for s, of in about.items()}
-    higher = {s: max(overtones(turn(s, w)) for w in speeds) for s in "CD"}
-    largest = max(largest_multiplier(s, *RUN) for s in "CD")
-    first = {s: np.array([np.fft.rfft(slider(turn(s, w))[:-1])[1] / (0.5 * SAMPLES) for w in speeds]) for s in "CD"}
+    most = {
+        s: max(rigs.harmonic(rigs.turn(s, w), 2) / rigs.harmonic(rigs.turn(s, w), 1) for w in of)
+        for s, of in about.items()
+    }
+    higher = {s: max(rigs.overtones(rigs.turn(s, w)) for w in speeds) for s in "CD"}
+    largest = max(rigs.largest_multiplier(s, *RUN) for s in "CD")
+    first = {
+        s: np.array([np.fft.rfft(rigs.slider(rigs.turn(s, w))[:-1])[1] / (0.5 * rigs.SAMPLES) for w in speeds])
+        for s in "CD"
+    }
     shift = {s: _phase_range(of) for s, of in first.items()}
     why = "near half the natural frequency the second harmonic has its resonance"
     almost = f"{ABOUT:g}, the rule for *almost*"
@@ -532,7 +522,7 @@ def _like_one_mass(
     """
     rates, constant, phase, spread, beyond = RAD_S_PER_RPM * speeds, [], [], [], []
     for s in "CD":
-        force = first[s] * complex_stiffness(rig(s), rates)
+        force = first[s] * rigs.complex_stiffness(rigs.rig(s), rates)
         unbalance = np.abs(force) / rates**2
         constant.append(at_most(f"spring {s}, F0", 1.0 + ABOUT, np.abs(force).max() / np.abs(force).min()))
         phase.append(at_most(f"spring {s}, phi", ABOUT_DEG, _phase_range(force), "deg"))

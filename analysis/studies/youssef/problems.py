@@ -20,23 +20,7 @@ from types import MappingProxyType
 import numpy as np
 from numpy.typing import NDArray
 
-from ...synthesis import (
-    USUAL,
-    Constraint,
-    FullTurn,
-    LargestLink,
-    Linkage,
-    RockerFunction,
-    Straight,
-    TargetPath,
-    Task,
-    TimedPath,
-    UntimedPath,
-    area_difference,
-    evaluate,
-    path_from_formula,
-    turn,
-)
+from ... import synthesis as syn
 from ...units import CM_PER_METRE
 
 CM2_PER_M2 = CM_PER_METRE**2
@@ -76,11 +60,11 @@ class PublishedProblem:
         Place in the thesis.
     """
 
-    task: Task
+    task: syn.Task
     bounds: Mapping[str, tuple[float, float]] = field(default_factory=dict)
-    constraints: tuple[Constraint, ...]
-    printed: Linkage
-    mended: Linkage | None = None
+    constraints: tuple[syn.Constraint, ...]
+    printed: syn.Linkage
+    mended: syn.Linkage | None = None
     error: float | None
     goal: float
     unit: str = "cm2"
@@ -88,7 +72,7 @@ class PublishedProblem:
     source: str
 
     @property
-    def linkage(self) -> Linkage:
+    def linkage(self) -> syn.Linkage:
         """The printed linkage with its misprints mended, if it has any."""
         return self.mended or self.printed
 
@@ -96,12 +80,12 @@ class PublishedProblem:
         """Convert an error from SI to ``unit``."""
         return self.per_si * error
 
-    def linkage_error(self, linkage: Linkage) -> float:
+    def linkage_error(self, linkage: syn.Linkage) -> float:
         """Return the error of a linkage in ``unit``, infinite if its links cannot be joined."""
-        if isinstance(self.task, UntimedPath):
-            curve = linkage.path(turn(AREA_N))
-            return self.convert(area_difference(curve, self.task.path)) if np.isfinite(curve).all() else np.inf
-        return self.convert(evaluate(self.task, linkage).error)
+        if isinstance(self.task, syn.UntimedPath):
+            curve = linkage.path(syn.turn(AREA_N))
+            return self.convert(syn.area_difference(curve, self.task.path)) if np.isfinite(curve).all() else np.inf
+        return self.convert(syn.evaluate(self.task, linkage).error)
 
 
 def ellipse(semi_axis_cm: float, n: int) -> NDArray[np.float64]:
@@ -109,21 +93,21 @@ def ellipse(semi_axis_cm: float, n: int) -> NDArray[np.float64]:
 
     The semi-axis along x is given in cm, the semi-axis along y is 5 cm.
     """
-    phi = turn(n)
+    phi = syn.turn(n)
     return np.column_stack([20.0 + semi_axis_cm * np.cos(phi), 15.0 + 5.0 * np.sin(phi)]) / CM_PER_METRE
 
 
-def rocker_function(n: int, *, weighted: bool = False, mounting: bool = False) -> RockerFunction:
+def rocker_function(n: int, *, weighted: bool = False, mounting: bool = False) -> syn.RockerFunction:
     """Return the function th4* = 70 + 100 |sin(th/2)| degrees at n crank angles, optionally weighted by `WEIGHT`.
 
     With ``mounting`` the output may be mounted on the rocker at any angle. The weighted window is 60 to 260 degrees, with both
     ends. The thesis prints 60 < omega t < 260 and an error of 35.0 deg2. The computed error comes nearest to 35.0 if 60 degrees
     belongs to the window, with 24 crank angles, and if only the errors within the window are added up.
     """
-    phi = turn(n)
+    phi = syn.turn(n)
     # in whole numbers, so that the ends of the window are exact
     within = np.array([60 * n <= 360 * k <= 260 * n for k in range(n)])
-    return RockerFunction(
+    return syn.RockerFunction(
         angle=np.radians(70.0 + 100.0 * np.abs(np.sin(0.5 * phi))),
         weights=np.where(within, WEIGHT, 1.0) if weighted else None,
         mounting=mounting,
@@ -151,19 +135,19 @@ PACKAGING_TRAVEL, PACKAGING_FLATNESS = 144.0 / CM_PER_METRE, 2.5 / CM_PER_METRE
 PACKAGING_ROTATION = radians(120.0)
 
 
-def packaging_path() -> TargetPath:
+def packaging_path() -> syn.TargetPath:
     """Return the closed polygon of the ten points of the packaging machine."""
-    return TargetPath(points=(np.array(PACKAGING_POINTS_CM) + PACKAGING_OFFSET_CM) / CM_PER_METRE, closed=True)
+    return syn.TargetPath(points=(np.array(PACKAGING_POINTS_CM) + PACKAGING_OFFSET_CM) / CM_PER_METRE, closed=True)
 
 
-def _packaging() -> UntimedPath:
+def _packaging() -> syn.UntimedPath:
     # the ends of the straight part replace the points (160, 0) and (50, 0); they are half a centimetre farther apart than the
     # required travel, and clear of the corners, so that the polygon is the same
     points = np.array([*PACKAGING_POINTS_CM[:2], (159.5, 0.0), (15.0, 0.0), *PACKAGING_POINTS_CM[4:]])
-    path = TargetPath(points=(points + PACKAGING_OFFSET_CM) / CM_PER_METRE, closed=True)
+    path = syn.TargetPath(points=(points + PACKAGING_OFFSET_CM) / CM_PER_METRE, closed=True)
     # the flatness is constrained at the stations only: keep a reserve for the curve between them
-    straight = Straight(start=2, end=3, rotation=PACKAGING_ROTATION, flatness=0.9 * PACKAGING_FLATNESS)
-    return UntimedPath(path=path, straight=straight)
+    straight = syn.Straight(start=2, end=3, rotation=PACKAGING_ROTATION, flatness=0.9 * PACKAGING_FLATNESS)
+    return syn.UntimedPath(path=path, straight=straight)
 
 
 def _linkage(
@@ -172,11 +156,11 @@ def _linkage(
     point_cm: float,
     angles_deg: tuple[float, float, float],
     branch: int = 1,
-) -> Linkage:
+) -> syn.Linkage:
     """Build a linkage from the printed numbers: X0, Y0; l1 to l4; r; a1, th20, a2 (cm, deg)."""
     l1, l2, l3, l4 = links_cm
     a1, th20, a2 = angles_deg
-    return Linkage(
+    return syn.Linkage(
         pivot_x=place_cm[0] / CM_PER_METRE,
         pivot_y=place_cm[1] / CM_PER_METRE,
         ground_length=l1 / CM_PER_METRE,
@@ -202,16 +186,16 @@ _PATH_B = _linkage((-49.13, 144.98), (142.576, 8.18, 152.743, 183.443), 147.38, 
 _PACKAGING = _linkage((94.53, -48.55), (137.54, 36.05, 134.05, 40.06), 435.15, (116.73, 0.0, 345.01), branch=-1)
 
 
-def _capped(linkage: Linkage) -> tuple[Constraint, ...]:
+def _capped(linkage: syn.Linkage) -> tuple[syn.Constraint, ...]:
     """Return the usual constraints, and the bound that no link is longer than the longest of ``linkage``."""
-    return (LargestLink(length=linkage.largest_link), *USUAL)
+    return (syn.LargestLink(length=linkage.largest_link), *syn.USUAL)
 
 
 _PATH_B_READ = replace(_PATH_B, rocker_length=184.443 / CM_PER_METRE)
 PROBLEMS: Mapping[str, PublishedProblem] = MappingProxyType(
     {
         "ellipse-a": PublishedProblem(
-            task=TimedPath(points=ellipse(10.0, N)),
+            task=syn.TimedPath(points=ellipse(10.0, N)),
             constraints=_capped(_ELLIPSE_A),
             printed=_ELLIPSE_A,
             error=0.889,
@@ -219,7 +203,7 @@ PROBLEMS: Mapping[str, PublishedProblem] = MappingProxyType(
             source="Youssef, chapter VI, ellipse (a), timed",
         ),
         "ellipse-b": PublishedProblem(
-            task=TimedPath(points=ellipse(15.0, N)),
+            task=syn.TimedPath(points=ellipse(15.0, N)),
             constraints=_capped(_ELLIPSE_B),
             printed=_ELLIPSE_B,
             error=4.001,
@@ -227,7 +211,7 @@ PROBLEMS: Mapping[str, PublishedProblem] = MappingProxyType(
             source="Youssef, chapter VI, ellipse (b), timed",
         ),
         "ellipse-a-bounded": PublishedProblem(
-            task=TimedPath(points=ellipse(10.0, N)),
+            task=syn.TimedPath(points=ellipse(10.0, N)),
             bounds=MappingProxyType(
                 {
                     **dict.fromkeys(("ground_length", "coupler_length", "rocker_length"), (0.1, 0.3)),
@@ -236,7 +220,7 @@ PROBLEMS: Mapping[str, PublishedProblem] = MappingProxyType(
                     "point_distance": (0.0, 0.3),
                 }
             ),
-            constraints=USUAL,
+            constraints=syn.USUAL,
             printed=_BOUNDED,
             # ERRATA: a1 = 93.8 deg is printed without its sign
             mended=replace(_BOUNDED, ground_angle=radians(-93.8)),
@@ -246,7 +230,7 @@ PROBLEMS: Mapping[str, PublishedProblem] = MappingProxyType(
         ),
         "rocker": PublishedProblem(
             task=rocker_function(N),
-            constraints=(FullTurn(),),
+            constraints=(syn.FullTurn(),),
             printed=_ROCKER,
             error=700.0,
             goal=1025.0,
@@ -256,7 +240,7 @@ PROBLEMS: Mapping[str, PublishedProblem] = MappingProxyType(
         ),
         "rocker-weighted": PublishedProblem(
             task=rocker_function(WEIGHTED_N, weighted=True),
-            constraints=(FullTurn(),),
+            constraints=(syn.FullTurn(),),
             printed=_WEIGHTED,
             error=35.0,
             goal=35.6,
@@ -265,7 +249,7 @@ PROBLEMS: Mapping[str, PublishedProblem] = MappingProxyType(
             source="Youssef, chapter VI, rocker function, weighted; N is not printed",
         ),
         "path-a": PublishedProblem(
-            task=UntimedPath(path=path_from_formula("0.20 + 0.10*cos(t)", "0.15 + 0.05*sin(t)", n=AREA_N)),
+            task=syn.UntimedPath(path=syn.path_from_formula("0.20 + 0.10*cos(t)", "0.15 + 0.05*sin(t)", n=AREA_N)),
             constraints=_capped(_PATH_A),
             printed=_PATH_A,
             # ERRATA: X0 = 154.85 cm, the point misplaced by a digit: the curve would lie 139 cm beside its target
@@ -275,7 +259,7 @@ PROBLEMS: Mapping[str, PublishedProblem] = MappingProxyType(
             source="Youssef, chapter VI, path (a), area",
         ),
         "path-b": PublishedProblem(
-            task=UntimedPath(path=path_from_formula("0.20 + 0.15*cos(t)", "0.15 + 0.05*sin(t)", n=AREA_N)),
+            task=syn.UntimedPath(path=syn.path_from_formula("0.20 + 0.15*cos(t)", "0.15 + 0.05*sin(t)", n=AREA_N)),
             constraints=_capped(_PATH_B_READ),
             printed=_PATH_B,
             # ERRATA: l4 = 183.443 cm
@@ -290,7 +274,7 @@ PROBLEMS: Mapping[str, PublishedProblem] = MappingProxyType(
             bounds=MappingProxyType(
                 {"pivot_y": ((PACKAGING_OFFSET_CM[1] - 500.0) / CM_PER_METRE, PACKAGING_OFFSET_CM[1] / CM_PER_METRE)}
             ),
-            constraints=(LargestLink(length=_PACKAGING.point_distance), *USUAL),
+            constraints=(syn.LargestLink(length=_PACKAGING.point_distance), *syn.USUAL),
             printed=_PACKAGING,
             error=None,
             goal=620.0,

@@ -18,32 +18,14 @@ from ..rules import ABOUT, ALIKE, SMALL
 from ..statements import Case, Statement, at_least, at_most, near, text
 from ..study import Study, StudyResult, padded
 from ..variation import cache
-from .rigs import (
-    FASTEST,
-    LOST,
-    NOTICED,
-    SEEN_IN_RECORDS,
-    SLIGHT,
-    SLOWEST,
-    amplitude,
-    follow,
-    marks,
-    motions,
-    natural_speed,
-    near_fraction,
-    peak_rise,
-    rig,
-    rounded,
-    rpm,
-    turn,
-)
+from . import rigs
 
 # --- 8.19 to 8.21: resonance curves
 
 #: Natural frequencies (rpm) that the thesis sees and calculates, as printed, by spring.
 NATURAL = {"C": ("585", "582"), "D": ("825", "829")}
 #: Speeds (rpm) of the linear equation, and those that were run.
-CURVE = np.arange(SLOWEST, FASTEST["C"] + 1.0, 10.0)
+CURVE = np.arange(rigs.SLOWEST, rigs.FASTEST["C"] + 1.0, 10.0)
 RANGE = np.arange(300.0, 1001.0, 10.0).tolist()
 #: Speeds (rpm) beyond resonance, by spring, at which the amplitude is compared, and dampers relative to the rig's.
 BEYOND, DAMPERS = {"C": (650.0, 700.0, 800.0, 900.0, 1000.0), "D": (890.0, 950.0, 1000.0)}, (1.25, 0.8)
@@ -56,21 +38,21 @@ WIDTH = "width of the range of speeds at which the amplitude over the speed squa
 @cache
 def linear_motion(spring: str, speed: float, variant: Variant = Variant.SECOND_ORDER) -> HarmonicMotion:
     """Return the motion u/l4 at a speed (rpm) by two harmonics of the corrected linear equation of chapter IV."""
-    return two_harmonics(slider_equation(rig(spring), speed * RAD_S_PER_RPM, variant=variant))
+    return two_harmonics(slider_equation(rigs.rig(spring), speed * RAD_S_PER_RPM, variant=variant))
 
 
 def length(spring: str) -> float:
     """Return the rocker's length (cm), the reference of amplitudes."""
-    return CM_PER_METRE * rig(spring).rocker_length
+    return CM_PER_METRE * rigs.rig(spring).rocker_length
 
 
 def compute_resonance(number: str, spring: str) -> StudyResult:
     """Compute the amplitude over the speed by the full equations and by two harmonics of the linear equation."""
-    (branch,), l4 = motions(spring).branches, length(spring)
-    place, _ = near_fraction(spring, 1)
+    (branch,), l4 = rigs.motions(spring).branches, length(spring)
+    place, _ = rigs.near_fraction(spring, 1)
     speeds = np.unique(np.append(CURVE, place)).tolist()
     columns = {
-        "speed; full equations [rpm]": rpm(branch),
+        "speed; full equations [rpm]": rigs.rpm(branch),
         "amplitude over l4; full equations [1]": CM_PER_METRE * branch.amplitude / l4,
         "speed; linear equation [rpm]": speeds,
         "amplitude over l4; linear equation [1]": [linear_motion(spring, speed).amplitude for speed in speeds],
@@ -90,11 +72,11 @@ def width(spring: str, linear: Variant | None = None, /, **changes: float) -> fl
 
     It follows from the full equations, with changes of the rig, or from the variant ``linear`` of the linear equation.
     """
-    speeds = natural_speed(spring) + np.arange(-40.0, 40.1, 5.0)
+    speeds = rigs.natural_speed(spring) + np.arange(-40.0, 40.1, 5.0)
     if linear:
         sizes = np.array([linear_motion(spring, speed, linear).amplitude for speed in speeds.tolist()])
     else:
-        sizes = follow(spring, speeds.tolist(), **changes)
+        sizes = rigs.follow(spring, speeds.tolist(), **changes)
     fine = np.linspace(speeds[0], speeds[-1], 80001)
     # the force on the slider grows with the square of the speed
     shape = CubicSpline(speeds, sizes / speeds**2)(fine)
@@ -108,14 +90,17 @@ def _resonance() -> tuple[Statement, ...]:
     for s in "CD":
         orders = (Variant.SECOND_ORDER, Variant.FIRST_ORDER)
         linear = {(w, v): length(s) * linear_motion(s, w, v).amplitude for w in BEYOND[s] for v in orders}
-        over[f"spring {s}, amplitude"] = [amplitude(turn(s, w)) / size for (w, _), size in linear.items()]
+        over[f"spring {s}, amplitude"] = [rigs.amplitude(rigs.turn(s, w)) / size for (w, _), size in linear.items()]
         over[f"spring {s}, width"] = [width(s) / width(s, v) for v in orders]
-        exact += [amplitude(turn(s, w)) / (length(s) * linear_motion(s, w, Variant.EXACT).amplitude) for w in BEYOND[s]]
+        exact += [
+            rigs.amplitude(rigs.turn(s, w)) / (length(s) * linear_motion(s, w, Variant.EXACT).amplitude)
+            for w in BEYOND[s]
+        ]
     beyond = " and ".join(f"{', '.join(f'{w:g}' for w in speeds)} rpm with {s}" for s, speeds in BEYOND.items())
-    natural = {s: natural_speed(s) for s in "CD"}
-    around = {s: [natural_speed(s, slider_stiffness=k) for k in rounded(s)] for s in "CD"}
+    natural = {s: rigs.natural_speed(s) for s in "CD"}
+    around = {s: [rigs.natural_speed(s, slider_stiffness=k) for k in rigs.rounded(s)] for s in "CD"}
     error = {
-        s: max(abs(length(s) * linear_motion(s, w).amplitude / amplitude(turn(s, w)) - 1.0) for w in RANGE)
+        s: max(abs(length(s) * linear_motion(s, w).amplitude / rigs.amplitude(rigs.turn(s, w)) - 1.0) for w in RANGE)
         for s in "CD"
     }
     return (
@@ -123,13 +108,13 @@ def _resonance() -> tuple[Statement, ...]:
             "The experimental and theoretical curves agree in the region of speed leading up to resonance at [omega = "
             "omega_n].",
             text(f"{section}, L6837"),
-            why=LOST,
+            why=rigs.LOST,
         ),
         Statement(
             "However the width of the resonance region and the amplitude of vibration beyond resonance obtained from the "
             "theory is smaller than that of the experiment but, nevertheless, a reasonable agreement is evident.",
             text(f"{section}, L6841"),
-            why=LOST,
+            why=rigs.LOST,
         ),
         Statement(
             "These differences may however be attributed to the fact that quantities involving the second and higher orders "
@@ -148,8 +133,9 @@ def _resonance() -> tuple[Statement, ...]:
             "in the theory.",
             text(f"{section}, L6853"),
             "amplitude and width of the sentence before by the full equations, with one factor over those without it, the "
-            f"least of both springs: friction by {SLIGHT:g} of the guide's force, a friction radius of {1e3 * PIN_RADIUS:g} mm "
-            f"in the pins, a damper {' or '.join(f'{d:g}' for d in DAMPERS)} times as strong (all ours)",
+            f"least of both springs: friction by {rigs.SLIGHT:g} of the guide's force, a friction radius of "
+            f"{1e3 * PIN_RADIUS:g} mm in the pins, a damper {' or '.join(f'{d:g}' for d in DAMPERS)} times as "
+            "strong (all ours)",
             larger,
             _factors(),
             "no one factor does both",
@@ -161,7 +147,7 @@ def _resonance() -> tuple[Statement, ...]:
             "speed of the greatest amplitude by the full equations",
             f"{100 * ABOUT:g} %, the rule for *in the region of*",
             tuple(
-                near(f"spring {s}", NATURAL[s][0], near_fraction(s, 1)[0], ABOUT * float(NATURAL[s][0]), "rpm")
+                near(f"spring {s}", NATURAL[s][0], rigs.near_fraction(s, 1)[0], ABOUT * float(NATURAL[s][0]), "rpm")
                 for s in "CD"
             ),
         ),
@@ -199,7 +185,7 @@ def _resonance() -> tuple[Statement, ...]:
             f"{SMALL:g}, the rule for *negligible*",
             (
                 *(at_most(f"spring {s}", SMALL, error[s]) for s in "CD"),
-                Case(label="agreement with the experiment", computed=None, why=LOST),
+                Case(label="agreement with the experiment", computed=None, why=rigs.LOST),
             ),
         ),
     )
@@ -208,14 +194,16 @@ def _resonance() -> tuple[Statement, ...]:
 def _factors() -> tuple[Case, ...]:
     """Judge how friction and other dampers change the amplitude beyond resonance and the width of the resonance."""
     factors: dict[str, dict[str, float]] = {
-        "friction in the guide": {"slider_friction_coefficient": SLIGHT},
+        "friction in the guide": {"slider_friction_coefficient": rigs.SLIGHT},
         "friction in the pins": {f"pin_{pin}_friction_radius": PIN_RADIUS for pin in "BCD"},
     }
-    factors |= {f"damper {d:g} times as strong": {"slider_damping": d * rig("C").slider_damping} for d in DAMPERS}
+    factors |= {f"damper {d:g} times as strong": {"slider_damping": d * rigs.rig("C").slider_damping} for d in DAMPERS}
     cases = []
     for name, changes in factors.items():
         beyond = [
-            amplitude(turn(s, w, **changes)) / amplitude(turn(s, w)) for s, speeds in BEYOND.items() for w in speeds
+            rigs.amplitude(rigs.turn(s, w, **changes)) / rigs.amplitude(rigs.turn(s, w))
+            for s, speeds in BEYOND.items()
+            for w in speeds
         ]
         cases += [
             at_least(f"{name}, amplitude", 1.0, min(beyond)),
@@ -240,9 +228,9 @@ def draw_resonance(spring: str, result: StudyResult) -> Figure:
             )
             for n, line, w in (("full equations", "-", None), ("linear equation", ":", 2.2))
         ],
-        verticals=marks(spring, 1, 2),
+        verticals=rigs.marks(spring, 1, 2),
         legend_at="upper left",
-        x_range=(SLOWEST, FASTEST[spring]),
+        x_range=(rigs.SLOWEST, rigs.FASTEST[spring]),
         y_range=(1e-4, 1.0),
         logarithmic="y",
     )
@@ -254,7 +242,7 @@ ORDERS = (1, 2, 3)
 
 def _greatest(spring: str, n: int) -> float:
     """Return the greatest amplitude of the n-th harmonic of the linear equation near its resonance, relative to l4."""
-    place = natural_speed(spring) / n
+    place = rigs.natural_speed(spring) / n
     found = minimize_scalar(
         lambda speed: -linear_motion(spring, float(speed)).harmonic(n),
         bounds=(place - 10.0, place + 10.0),
@@ -269,10 +257,10 @@ def compute_harmonics() -> StudyResult:
     columns: dict[str, NDArray[np.float64]] = {}
     points = CURVE[::3]
     for spring in "CD":
-        (branch,), l4, name = motions(spring).branches, length(spring), f"spring {spring}"
+        (branch,), l4, name = rigs.motions(spring).branches, length(spring), f"spring {spring}"
         table = branch.columns()
         sizes = {n: CM_PER_METRE * table[f"harmonic {n} of u [m]"] / l4 for n in ORDERS}
-        columns[f"speed; {name} [rpm]"] = rpm(branch)
+        columns[f"speed; {name} [rpm]"] = rigs.rpm(branch)
         columns |= {f"harmonic {n} over l4; {name} [1]": size for n, size in sizes.items()}
         columns[f"speed; linear equation; {name} [rpm]"] = points
         columns[f"harmonic 2 over l4; linear equation; {name} [1]"] = np.array(
@@ -289,14 +277,14 @@ def compute_harmonics() -> StudyResult:
                 text("8.4.2.2, L6871"),
                 "rise of the amplitude at the maximum there over the next minimum, relative to this minimum; 0 where no "
                 "maximum is found in the steps of the curve, at most 6 rpm",
-                SEEN_IN_RECORDS,
+                rigs.SEEN_IN_RECORDS,
                 tuple(
-                    at_most(f"spring {spring}, {part}", NOTICED, peak_rise(spring, n))
+                    at_most(f"spring {spring}, {part}", rigs.NOTICED, rigs.peak_rise(spring, n))
                     for spring in "CD"
                     for n, part in ((4, "quarter"), (3, "third"), (2, "half"))
                 ),
-                f"of these places only half with D, {natural_speed('D') / 2.0:.0f} rpm, lies within the range that was run "
-                "(L6808); how far the first harmonic is the motion is judged at L6814",
+                f"of these places only half with D, {rigs.natural_speed('D') / 2.0:.0f} rpm, lies within the range that was "
+                "run (L6808); how far the first harmonic is the motion is judged at L6814",
             ),
             Statement(
                 "The theoretical resonance curves corresponding to the second harmonic for both springs C and D are shown in "
@@ -344,10 +332,10 @@ def draw_harmonics(result: StudyResult) -> Figure:
                 y_label="amplitude of the harmonic / l4",
                 title=f"rig 2, {name}",
                 curves=[*curves, points],
-                verticals=marks(spring, 1, 2, 3),
+                verticals=rigs.marks(spring, 1, 2, 3),
                 legend_at="outside",
                 logarithmic="y",
-                x_range=(SLOWEST, FASTEST[spring]),
+                x_range=(rigs.SLOWEST, rigs.FASTEST[spring]),
                 y_range=(1e-6, 1.0),
             )
         )
@@ -364,8 +352,8 @@ def compute_forces() -> StudyResult:
     """Compute the crank torque and the pin forces over the speed."""
     columns: dict[str, NDArray[np.float64]] = {}
     for spring in "CD":
-        name, branch = f"spring {spring}", motions(spring).branches[0]
-        table, speeds = branch.columns(), rpm(branch)
+        name, branch = f"spring {spring}", rigs.motions(spring).branches[0]
+        table, speeds = branch.columns(), rigs.rpm(branch)
         columns[f"speed; {name} [rpm]"] = speeds
         for torque in TORQUES:
             columns[f"{torque}; {name} [N.m]"] = table[f"{torque} [N.m]"]
@@ -412,10 +400,10 @@ def _panel(spring: str, y_label: str, lines: list[Curve], top: float, legend: st
         y_label=y_label,
         title=f"spring {spring}",
         curves=[replace(line, label="") for line in lines] if first else lines,
-        verticals=marks(spring, 1),
+        verticals=rigs.marks(spring, 1),
         legend=legend,
         legend_at="outside",
-        x_range=(SLOWEST, FASTEST[spring]),
+        x_range=(rigs.SLOWEST, rigs.FASTEST[spring]),
         y_range=(0.0, top),
     )
 

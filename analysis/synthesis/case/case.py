@@ -14,22 +14,7 @@ from numpy.typing import NDArray
 
 from linkwork.errors import ParameterError
 
-from ...files import (
-    Choice,
-    Many,
-    Quantity,
-    Range,
-    Table,
-    Whole,
-    any_value,
-    as_table,
-    entry,
-    flag,
-    override,
-    read,
-    read_tables,
-    text,
-)
+from ... import files
 from ...units import quantity
 from ..exact.quick_return import QuickReturn, QuickSwing
 from ..linkage import ANGLES, PINS, Kind, MachineSpec, PinForces, pin_forces
@@ -37,24 +22,7 @@ from ..result.solution import Solution
 from ..search.polish import worst_violation
 from ..search.solve import OVER, Synthesis, TradeOff, synthesize, trade_off
 from ..search.start import Search
-from ..task.constraint import (
-    FORCES,
-    SECOND_LENGTH,
-    UNKNOWNS,
-    USUAL,
-    Assembly,
-    Constraint,
-    FullTurn,
-    Grashof,
-    GrashofType,
-    LargestLink,
-    LeastPinForce,
-    LeastTransmission,
-    MaxPinForce,
-    PivotRegion,
-    Stroke,
-    TimeRatio,
-)
+from ..task import constraint
 from ..task.formula import requirement
 from ..task.limit_position import DeadCentre, MechanicalAdvantage, NoToggle, Toggle
 from ..task.limits import GEARS, limits_by_kind
@@ -65,7 +33,7 @@ FloatArray = NDArray[np.float64]
 
 
 def _cores(value: Any, name: str) -> int:
-    number = Whole(-1)(value, name)
+    number = files.Whole(-1)(value, name)
     if number == 0:
         raise ParameterError(name, value, "be a number of cores, or -1 for all")
     return number
@@ -75,13 +43,13 @@ def _cores(value: Any, name: str) -> int:
 class SearchTable:
     """The table ``[search]``: kinds of linkages and effort; see `Search` and `synthesize`."""
 
-    seed: int = entry(Whole(0), 0)
-    candidates: int = entry(Whole(1), 1 << 16)
-    starts: int = entry(Whole(1), 24)
-    solutions: int = entry(Whole(1), 6)
-    kinds: tuple[Kind, ...] | None = entry(Many(Choice(get_args(Kind)), least=1), None)
-    gears: tuple[float, ...] = entry(Many(Quantity("1"), least=1), GEARS)
-    jobs: int = entry(_cores, 1)
+    seed: int = files.entry(files.Whole(0), 0)
+    candidates: int = files.entry(files.Whole(1), 1 << 16)
+    starts: int = files.entry(files.Whole(1), 24)
+    solutions: int = files.entry(files.Whole(1), 6)
+    kinds: tuple[Kind, ...] | None = files.entry(files.Many(files.Choice(get_args(Kind)), least=1), None)
+    gears: tuple[float, ...] = files.entry(files.Many(files.Quantity("1"), least=1), GEARS)
+    jobs: int = files.entry(_cores, 1)
 
     def search(self, **changes: Any) -> Search:
         """Return the `Search` that the table describes, with the fields in ``changes`` replaced."""
@@ -93,7 +61,7 @@ def _transmission(value: Any, name: str) -> float | None:
     if value is False:
         return None
     requirement = "be at least 0 and below 90 deg; a number without a unit is in rad"
-    return Quantity("rad", least=0.0, below=0.5 * pi, requirement=requirement)(value, name)
+    return files.Quantity("rad", least=0.0, below=0.5 * pi, requirement=requirement)(value, name)
 
 
 def _error(value: Any, name: str) -> Any:
@@ -130,51 +98,55 @@ class Constraints:
         Letters of the pins whose forces count.
     """
 
-    least_transmission_angle: float | None = entry(_transmission, LeastTransmission().angle)
-    over: str | None = entry(Choice(("turn", "task")), None)
-    full_turn: bool = entry(flag, False)
-    grashof: GrashofType | None = entry(Choice(get_args(GrashofType)), None)
-    time_ratio: tuple[float, float] | None = entry(Range(Quantity("1", least=1.0, requirement="be 1 or greater")), None)
-    stroke: tuple[float, float] | None = entry(Range(Quantity("m", least=0.0)), None)
-    largest_link: float | None = entry(Quantity("m"), None)
-    assembly: int | None = entry(Whole(), None)
-    pivot_A: FloatArray | None = entry(read_plane_points, None)
-    pivot_D: FloatArray | None = entry(read_plane_points, None)
-    least_mechanical_advantage: float | None = entry(Quantity("1", least=0.0), None)
-    greatest_mechanical_advantage: float | None = entry(Quantity("1", above=0.0), None)
-    mechanical_advantage_at: tuple[float, ...] | None = entry(Many(Quantity("rad"), single=True), None)
-    dead_centre_stretched: tuple[float, float] | None = entry(Range(Quantity("rad")), None)
-    dead_centre_folded: tuple[float, float] | None = entry(Range(Quantity("rad")), None)
-    toggle_stretched: tuple[float, float] | None = entry(Range(Quantity("rad")), None)
-    toggle_folded: tuple[float, float] | None = entry(Range(Quantity("rad")), None)
-    no_toggle: tuple[float, float] | None = entry(Range(Quantity("rad")), None)
-    max_pin_force: float | None = entry(Quantity("N", above=0.0), None)
-    least_pin_force_within: Any = entry(_error, None)
-    pins: str = entry(text, PINS)
-    require: tuple[Constraint, ...] = entry(Many(requirement), ())
+    least_transmission_angle: float | None = files.entry(_transmission, constraint.LeastTransmission().angle)
+    over: str | None = files.entry(files.Choice(("turn", "task")), None)
+    full_turn: bool = files.entry(files.flag, False)
+    grashof: constraint.GrashofType | None = files.entry(files.Choice(get_args(constraint.GrashofType)), None)
+    time_ratio: tuple[float, float] | None = files.entry(
+        files.Range(files.Quantity("1", least=1.0, requirement="be 1 or greater")), None
+    )
+    stroke: tuple[float, float] | None = files.entry(files.Range(files.Quantity("m", least=0.0)), None)
+    largest_link: float | None = files.entry(files.Quantity("m"), None)
+    assembly: int | None = files.entry(files.Whole(), None)
+    pivot_A: FloatArray | None = files.entry(read_plane_points, None)
+    pivot_D: FloatArray | None = files.entry(read_plane_points, None)
+    least_mechanical_advantage: float | None = files.entry(files.Quantity("1", least=0.0), None)
+    greatest_mechanical_advantage: float | None = files.entry(files.Quantity("1", above=0.0), None)
+    mechanical_advantage_at: tuple[float, ...] | None = files.entry(
+        files.Many(files.Quantity("rad"), single=True), None
+    )
+    dead_centre_stretched: tuple[float, float] | None = files.entry(files.Range(files.Quantity("rad")), None)
+    dead_centre_folded: tuple[float, float] | None = files.entry(files.Range(files.Quantity("rad")), None)
+    toggle_stretched: tuple[float, float] | None = files.entry(files.Range(files.Quantity("rad")), None)
+    toggle_folded: tuple[float, float] | None = files.entry(files.Range(files.Quantity("rad")), None)
+    no_toggle: tuple[float, float] | None = files.entry(files.Range(files.Quantity("rad")), None)
+    max_pin_force: float | None = files.entry(files.Quantity("N", above=0.0), None)
+    least_pin_force_within: Any = files.entry(_error, None)
+    pins: str = files.entry(files.text, PINS)
+    require: tuple[constraint.Constraint, ...] = files.entry(files.Many(requirement), ())
 
-    def constraints(self) -> tuple[Constraint | Stroke, ...]:
+    def constraints(self) -> tuple[constraint.Constraint | constraint.Stroke, ...]:
         """Return the constraints; if the crank cannot turn fully, the transmission angle is bounded only over the task."""
         swings = self.grashof in ("double-rocker", "rocker-crank", "triple-rocker")
         over: Any = self.over or ("task" if swings else "turn")
-        made: tuple[tuple[Any, Callable[[Any], Constraint | Stroke]], ...] = (
-            (self.least_transmission_angle, lambda angle: LeastTransmission(angle=angle, over=over)),
-            (self.full_turn or None, lambda _: FullTurn()),
-            (self.grashof, lambda kind: Grashof(type=kind)),
-            (self.time_ratio, lambda ends: TimeRatio(least=ends[0], greatest=ends[1])),
-            (self.stroke, lambda ends: Stroke(least=ends[0], greatest=ends[1])),
-            (self.largest_link, lambda length: LargestLink(length=length)),
-            (self.assembly, lambda branch: Assembly(branch=branch)),
-            (self.pivot_A, lambda corners: PivotRegion(pivot="A", polygon=corners)),
-            (self.pivot_D, lambda corners: PivotRegion(pivot="D", polygon=corners)),
+        made: tuple[tuple[Any, Callable[[Any], constraint.Constraint | constraint.Stroke]], ...] = (
+            (self.least_transmission_angle, lambda angle: constraint.LeastTransmission(angle=angle, over=over)),
+            (self.full_turn or None, lambda _: constraint.FullTurn()),
+            (self.grashof, lambda kind: constraint.Grashof(type=kind)),
+            (self.time_ratio, lambda ends: constraint.TimeRatio(least=ends[0], greatest=ends[1])),
+            (self.stroke, lambda ends: constraint.Stroke(least=ends[0], greatest=ends[1])),
+            (self.largest_link, lambda length: constraint.LargestLink(length=length)),
+            (self.assembly, lambda branch: constraint.Assembly(branch=branch)),
+            (self.pivot_A, lambda corners: constraint.PivotRegion(pivot="A", polygon=corners)),
+            (self.pivot_D, lambda corners: constraint.PivotRegion(pivot="D", polygon=corners)),
             (self._advantage(), lambda bounds: MechanicalAdvantage(**bounds)),
             (self.dead_centre_stretched, lambda at: DeadCentre(at=at)),
             (self.dead_centre_folded, lambda at: DeadCentre(at=at, position="folded")),
             (self.toggle_stretched, lambda at: Toggle(at=at)),
             (self.toggle_folded, lambda at: Toggle(at=at, position="folded")),
             (self.no_toggle, lambda ends: NoToggle(between=ends)),
-            (self.max_pin_force, lambda force: MaxPinForce(force=force, pins=self.pins)),
-            (self.least_pin_force_within, lambda error: LeastPinForce(error=error, pins=self.pins)),
+            (self.max_pin_force, lambda force: constraint.MaxPinForce(force=force, pins=self.pins)),
+            (self.least_pin_force_within, lambda error: constraint.LeastPinForce(error=error, pins=self.pins)),
         )
         return (*(make(value) for value, make in made if value is not None), *self.require)
 
@@ -193,15 +165,18 @@ class Constraints:
 class TradeOffTable:
     """The table ``[trade_off]``: arguments of `trade_off`."""
 
-    over: Any = entry(Choice(OVER))
-    limits: tuple[float, ...] = entry(Many(any_value, least=2))
-    starts: int = entry(Whole(1), 12)
+    over: Any = files.entry(files.Choice(OVER))
+    limits: tuple[float, ...] = files.entry(files.Many(files.any_value, least=2))
+    starts: int = files.entry(files.Whole(1), 12)
 
 
 #: The table ``[bounds]``: [least, greatest], or one value that fixes the dimension.
-BOUNDS = Table(
+BOUNDS = files.Table(
     dict,
-    {name: Range(Quantity("rad" if name in ANGLES else "m"), ordered=False) for name in (*UNKNOWNS, SECOND_LENGTH)},
+    {
+        name: files.Range(files.Quantity("rad" if name in ANGLES else "m"), ordered=False)
+        for name in (*constraint.UNKNOWNS, constraint.SECOND_LENGTH)
+    },
 )
 #: The tables of a case file besides ``[task]``, for `linkwork new`.
 TABLES: Mapping[str, type] = {
@@ -212,30 +187,30 @@ TABLES: Mapping[str, type] = {
 }
 
 
-def _constraints(value: Any, name: str) -> tuple[Constraint | Stroke, ...]:
-    return read(Constraints, value, name).constraints()
+def _constraints(value: Any, name: str) -> tuple[constraint.Constraint | constraint.Stroke, ...]:
+    return files.read(Constraints, value, name).constraints()
 
 
 def _trade_off(value: Any, name: str) -> TradeOffTable:
-    over = as_table(value, name).get("over")
-    limit = Quantity(OVER[over].unit if isinstance(over, str) and over in OVER else "m")
-    return read(TradeOffTable, value, name, readers={"limits": Many(limit, least=2)})
+    over = files.as_table(value, name).get("over")
+    limit = files.Quantity(OVER[over].unit if isinstance(over, str) and over in OVER else "m")
+    return files.read(TradeOffTable, value, name, readers={"limits": files.Many(limit, least=2)})
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class SynthesisCase:
     """A synthesis described by a case file: task, bounds, constraints, search and trade-off."""
 
-    title: str = entry(text)
-    task: Task = entry(any_value)
-    bounds: Mapping[str, tuple[float, float]] = entry(BOUNDS, factory=dict)
-    constraints: tuple[Constraint | Stroke, ...] = entry(_constraints, USUAL)
-    search: SearchTable = entry(Table(SearchTable), SearchTable())
-    make: MachineSpec = entry(Table(MachineSpec), MachineSpec())
-    trade_off: TradeOffTable | None = entry(_trade_off, None)
+    title: str = files.entry(files.text)
+    task: Task = files.entry(files.any_value)
+    bounds: Mapping[str, tuple[float, float]] = files.entry(BOUNDS, factory=dict)
+    constraints: tuple[constraint.Constraint | constraint.Stroke, ...] = files.entry(_constraints, constraint.USUAL)
+    search: SearchTable = files.entry(files.Table(SearchTable), SearchTable())
+    make: MachineSpec = files.entry(files.Table(MachineSpec), MachineSpec())
+    trade_off: TradeOffTable | None = files.entry(_trade_off, None)
 
     def __post_init__(self) -> None:
-        made = (replace(c, make=self.make) if isinstance(c, FORCES) else c for c in self.constraints)
+        made = (replace(c, make=self.make) if isinstance(c, constraint.FORCES) else c for c in self.constraints)
         object.__setattr__(self, "constraints", tuple(made))
         # contradictions are reported before anything is searched
         if not isinstance(self.task, QuickReturn | QuickSwing):
@@ -258,7 +233,7 @@ class SynthesisCase:
 
     def forces(self, solutions: Sequence[Solution]) -> list[PinForces] | None:
         """Compute the pin forces of solutions by simulation; None if no constraint involves pin forces."""
-        if not any(isinstance(c, FORCES) for c in self.constraints):
+        if not any(isinstance(c, constraint.FORCES) for c in self.constraints):
             return None
         return [pin_forces(s.linkage, self.make, s.rotation_range) for s in solutions]
 
@@ -268,8 +243,8 @@ class SynthesisCase:
         if wanted is None:
             return None
         constraints = self.constraints
-        if wanted.over == "pin-force" and not any(isinstance(c, MaxPinForce) for c in constraints):
-            constraints = (*constraints, MaxPinForce(force=max(wanted.limits), make=self.make))
+        if wanted.over == "pin-force" and not any(isinstance(c, constraint.MaxPinForce) for c in constraints):
+            constraints = (*constraints, constraint.MaxPinForce(force=max(wanted.limits), make=self.make))
         return trade_off(
             self.task,
             wanted.over,
@@ -298,12 +273,14 @@ def load_synthesis_case(path: str | Path, overrides: Mapping[str, Any] | None = 
     InfeasibleError
         If bounds and constraints contradict one another.
     """
-    return read_synthesis_case(read_tables(path), folder=Path(path).parent, title=Path(path).stem, overrides=overrides)
+    return read_synthesis_case(
+        files.read_tables(path), folder=Path(path).parent, title=Path(path).stem, overrides=overrides
+    )
 
 
 def read_synthesis_case(
     data: Mapping[str, Any], *, folder: Path, title: str = "", overrides: Mapping[str, Any] | None = None
 ) -> SynthesisCase:
     """Read a synthesis from the tables of a case file; names of further files are relative to ``folder``."""
-    tables = {"title": title} | override(data, overrides or {})
-    return read(SynthesisCase, tables, "", readers={"task": partial(read_task, folder=folder)})
+    tables = {"title": title} | files.override(data, overrides or {})
+    return files.read(SynthesisCase, tables, "", readers={"task": partial(read_task, folder=folder)})

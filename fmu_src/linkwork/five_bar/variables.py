@@ -8,26 +8,11 @@ from __future__ import annotations
 from functools import partial
 from math import pi
 
-from ..variables import (
-    POSITION,
-    RATE,
-    Variable,
-    centre,
-    choice,
-    closure_outputs,
-    crank_outputs,
-    crank_start,
-    energy_outputs,
-    output,
-    parameter,
-    speed_inputs,
-    status_variables,
-    tolerance_parameter,
-)
+from .. import variables as shared
 from .published import SETS
 
 _SET = SETS["table-3.1"]
-_parameter, _centre = partial(parameter, _SET.parameters), partial(centre, _SET.parameters)
+_parameter, _centre = partial(shared.parameter, _SET.parameters), partial(shared.centre, _SET.parameters)
 _SLIDE = "slider.position"
 
 PARAMETERS = (
@@ -85,55 +70,57 @@ PARAMETERS = (
     _parameter(
         "ground.inclination", "rad", "Angle of the ground link above the horizontal", "\\alpha_1", role="gravity"
     ),
-    choice(
+    shared.choice(
         "assembly.branch",
         "Assembly: sign of sin(rocker.angle - coupler.angle), +1 or -1",
         _SET.parameters.assembly_branch,
         -1,
         1,
     ),
-    choice("drive.mode", "0: drive.torque acts on the crank; 1: the crank turns at drive.speed", 1, 0, 1),
-    *crank_start("\\theta_2", _SET.crank_speed, "in speed drive"),
-    Variable("initial.slider_position", "parameter", "m", "Slider position at the start", "u"),
-    Variable("initial.slider_velocity", "parameter", "m/s", "Slider velocity at the start", "\\dot u"),
-    tolerance_parameter(),
+    shared.choice("drive.mode", "0: drive.torque acts on the crank; 1: the crank turns at drive.speed", 1, 0, 1),
+    *shared.crank_start("\\theta_2", _SET.crank_speed, "in speed drive"),
+    shared.Variable("initial.slider_position", "parameter", "m", "Slider position at the start", "u"),
+    shared.Variable("initial.slider_velocity", "parameter", "m/s", "Slider velocity at the start", "\\dot u"),
+    shared.tolerance_parameter(),
 )
 
 INPUTS = (
-    Variable(
+    shared.Variable(
         "drive.torque", "input", "N.m", "Torque on the crank, counter-clockwise; used where drive.mode is 0", "T_1"
     ),
-    *speed_inputs("\\theta_2", _SET.crank_speed),
-    Variable("slider.force", "input", "N", "Control force on the slider, along the guide", "F_2"),
-    Variable("load.fx", "input", "N", "Load on the coupler point P, along the ground link", "F_{1x}"),
-    Variable("load.fy", "input", "N", "Load on the coupler point P, to the left of the ground link", "F_{1y}"),
+    *shared.speed_inputs("\\theta_2", _SET.crank_speed),
+    shared.Variable("slider.force", "input", "N", "Control force on the slider, along the guide", "F_2"),
+    shared.Variable("load.fx", "input", "N", "Load on the coupler point P, along the ground link", "F_{1x}"),
+    shared.Variable("load.fy", "input", "N", "Load on the coupler point P, to the left of the ground link", "F_{1y}"),
 )
 
 
-def _pin(pin: str, description: str) -> tuple[Variable, ...]:
+def _pin(pin: str, description: str) -> tuple[shared.Variable, ...]:
     directions = {"x": "along the ground link", "y": "to the left of the ground link"}
     return tuple(
-        output(f"pin.{pin}.f{axis}", "N", f"Force of {description}, {way}", role="joint force", of=f"pin.{pin}")
+        shared.output(f"pin.{pin}.f{axis}", "N", f"Force of {description}, {way}", role="joint force", of=f"pin.{pin}")
         for axis, way in directions.items()
     )
 
 
-def _angle(name: str, description: str, symbol: str) -> Variable:
+def _angle(name: str, description: str, symbol: str) -> shared.Variable:
     text = f"{description}, continuous unless B passes behind D"
-    return output(name, "rad", text, symbol, *POSITION, minimum=-2.0 * pi, maximum=2.0 * pi, display="deg")
+    return shared.output(
+        name, "rad", text, symbol, *shared.POSITION, minimum=-2.0 * pi, maximum=2.0 * pi, display="deg"
+    )
 
 
 #: The real outputs stand in the order of `dynamics.Outputs`.
 OUTPUTS = (
-    *crank_outputs("\\theta_2"),
+    *shared.crank_outputs("\\theta_2"),
     _angle("coupler.angle", "Coupler angle B to C", "\\theta_3"),
     _angle("rocker.angle", "Absolute rocker angle D to C", "\\theta_4 + \\alpha"),
-    output("slider.position", "m", "Slider position along the guide", "u", *POSITION),
-    output("slider.velocity", "m/s", "Slider velocity", "\\dot u", *RATE, rate_of="slider.position"),
-    output("slider.acceleration", "m/s2", "Slider acceleration", "\\ddot u", rate_of="slider.velocity"),
-    output("coupler.point.x", "m", "Coupler point P, along the ground link from A", "x", *POSITION),
-    output("coupler.point.y", "m", "Coupler point P, to the left of the ground link", "y", *POSITION),
-    output(
+    shared.output("slider.position", "m", "Slider position along the guide", "u", *shared.POSITION),
+    shared.output("slider.velocity", "m/s", "Slider velocity", "\\dot u", *shared.RATE, rate_of="slider.position"),
+    shared.output("slider.acceleration", "m/s2", "Slider acceleration", "\\ddot u", rate_of="slider.velocity"),
+    shared.output("coupler.point.x", "m", "Coupler point P, along the ground link from A", "x", *shared.POSITION),
+    shared.output("coupler.point.y", "m", "Coupler point P, to the left of the ground link", "y", *shared.POSITION),
+    shared.output(
         "drive.applied_torque",
         "N.m",
         "Torque on the crank; in speed drive the torque that holds the speed",
@@ -145,19 +132,19 @@ OUTPUTS = (
     *_pin("B", "the crank on the coupler"),
     *_pin("C", "the rocker on the coupler"),
     *_pin("D", "the slider on the rocker"),
-    output(
+    shared.output(
         "slider.guide_force",
         "N",
         "Force of the guide on the slider, to the left of its direction of travel",
         role="guide force",
     ),
-    *energy_outputs(
+    *shared.energy_outputs(
         "spring and gravity, the latter zero with every centre of mass at A",
         "damper, guide and pins",
         "crank torque, slider force and load",
     ),
-    *closure_outputs("Angle between coupler and rocker at C", pi),
-    *status_variables(),
+    *shared.closure_outputs("Angle between coupler and rocker at C", pi),
+    *shared.status_variables(),
 )
 
 VARIABLES = PARAMETERS + INPUTS + OUTPUTS
