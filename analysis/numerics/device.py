@@ -201,8 +201,8 @@ def _write_elementary_functions(module: ir.Module) -> None:
         write(f"linkwork.{name}", 1, lanes.FUNCTIONS[name])
         # angles that cannot be reduced exactly, see `lanes.GREATEST_ANGLE`
         write(name, 1, lambda x: Vector(x.build, lanes.constant(DOUBLE, float("nan"))))
-    for name in ("pow", "linkwork.pow"):
-        write(name, 2, lanes.power)
+    write("pow", 2, lanes.power)
+    write("linkwork.pow", 2, lanes.FUNCTIONS["pow"])
     write("sqrt", 1, Vector.square_root)
     # no array on a device is Numba's own: there are no references to count
     pointer = ir.IntType(8).as_pointer()
