@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 from linkwork.limits import LIMIT_SINE, NEAR_LIMIT
 
 from ...numerics.codegen import MATRIX, VECTOR, copy, evaluate, inner, kernel, part
+from ...numerics.continuation import NOISE
 from ...run.stepping import (
     NODES,
     STAGES,
@@ -59,9 +60,6 @@ LEAST_STEP = 1e-9
 STALL = 1e-3
 #: Least fraction of a Newton correction that is tried: in Newton's method, and in the search for other motions.
 _LEAST_FRACTION, _LEAST_SEARCHED = 1.0 / 4096.0, 1.0 / 64.0
-#: Size of a correction, relative to the scale, below which corrections that do not fall are errors of the integrator: steep
-#: friction or the kinks of a force law make them larger than its tolerance.
-_NOISE = 1e-7
 
 
 class Section(NamedTuple):
@@ -337,7 +335,8 @@ def continue_newton(section, most, status, z, hunt):
     if not taken:
         numbers[_FRACTION] *= 0.5
         if numbers[_FRACTION] < _LEAST_FRACTION:
-            if status == DONE and numbers[_SIZE] > _NOISE:
+            # smaller ones that do not fall are errors of the integrator: of steep friction, or the kinks of a force law
+            if status == DONE and numbers[_SIZE] > NOISE:
                 return DIVERGED
             return status
         move(start, numbers[_FRACTION], correction, trial)

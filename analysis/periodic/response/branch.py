@@ -407,12 +407,7 @@ def _branch(
             follower, first = _divide_period(family, last, settings)
         except OrbitError:
             break
-    problems: list[str] = []
-    special = [
-        s
-        for part, (own, curve) in enumerate(pieces)
-        for s in _special_points(family, curve, own, pieces[:part], problems)
-    ]
+    located = [_special_points(family, curve, own, pieces[:part]) for part, (own, curve) in enumerate(pieces)]
     # the first point of a piece is the last of the one before
     points = [p for part, (_, curve) in enumerate(pieces) for p in curve.points[min(part, 1) :]]
     return Branch(
@@ -420,11 +415,11 @@ def _branch(
         turns=turns,
         parameter=np.array([point.parameter for point in points]),
         orbits=tuple(point.data for point in points),
-        special=tuple(special),
+        special=tuple(special for found, _ in located for special in found),
         reached=curve.reached or merged,
         closed=curve.closed,
         reason=curve.reason,
-        problems=tuple(problems),
+        problems=tuple(problem for _, problems in located for problem in problems),
     )
 
 
@@ -454,14 +449,15 @@ def _tests(point: Point) -> dict[Crossing, float]:
 
 
 def _special_points(
-    family: Family, curve: Curve, follower: Follower, pieces: Sequence[tuple[Follower, Curve]], problems: list[str]
-) -> list[SpecialPoint]:
+    family: Family, curve: Curve, follower: Follower, pieces: Sequence[tuple[Follower, Curve]]
+) -> tuple[list[SpecialPoint], list[str]]:
     """Locate the special points on one part of a branch, ``curve``; ``pieces`` are the parts of the branch before this part.
 
-    A sentence on each point that cannot be located is added to ``problems``.
+    Return the points, and a sentence on each point that cannot be located.
     """
     passed = sum(len(piece.points) - 1 for _, piece in pieces)
     found: list[tuple[int, float, SpecialPoint]] = []
+    problems: list[str] = []
     values = [_tests(point) for point in curve.points]
     for i, length in enumerate(curve.steps):
         for kind in Crossing:
@@ -485,7 +481,7 @@ def _special_points(
             if kind is Crossing.TORUS and abs(point.data.multipliers[0].imag) < 1e-6:
                 continue
             found.append((i, s, SpecialPoint(kind=kind, parameter=point.parameter, orbit=point.data, after=passed + i)))
-    return [special for _, _, special in sorted(found, key=lambda entry: entry[:2])]
+    return [special for _, _, special in sorted(found, key=lambda entry: entry[:2])], problems
 
 
 def describe(branches: Sequence[Branch]) -> str:
