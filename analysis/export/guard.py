@@ -12,14 +12,14 @@ from importlib import resources
 from pathlib import Path
 from xml.etree import ElementTree
 
-from .native_fmu import HEADERS, OPTIONS, PLATFORMS, compile_library
+from .native_fmu import CODE, HEADERS, PLATFORMS, compile_library
 
 #: Place of the guard's source in the archive.
 SOURCE = "sources/guard.c"
 #: Name of PythonFMU's library by the folder of its platform.
 PYTHONFMU = {"linux64": "libpythonfmu-export.so", "win64": "pythonfmu-export.dll"}
 
-#: Options in addition to `OPTIONS`. On Windows the guard calls only the system: the C library takes a minute to compile.
+#: Options in addition to `CODE`. On Windows the guard calls only the system: the C library takes a minute to compile.
 _OPTIONS = {
     "linux64": ("-Os", "-ldl"),
     "win64": ("-Os", "-ffreestanding", "-nostdlib", "-lkernel32", "-Wl,--entry,DllMain"),
@@ -69,7 +69,7 @@ def compile_guard(source: bytes, *, kept: bool = True) -> dict[str, bytes]:
         for platform in PLATFORMS.values():
             if (place := platform.folder_fmi2) in PYTHONFMU:
                 library = f"guard.{platform.suffix}"
-                options = (*OPTIONS, *_OPTIONS[place])
+                options = (*CODE, *_OPTIONS[place])
                 compile_library(folder, ["guard.c"], library, platform.target, options, kept=kept)
                 made[place] = (Path(folder) / library).read_bytes()
     return made

@@ -58,10 +58,11 @@ PLATFORMS = {
 
 #: Options of the compiler. Without fused multiplications the arithmetic is the same on every platform. Traps on undefined
 #: behaviour are for tests only.
-OPTIONS = (
+CODE = (
     "-std=c11", "-O2", "-shared", "-fPIC", "-fvisibility=hidden", "-ffp-contract=off", "-fno-sanitize=undefined",
     "-ffunction-sections", "-Wl,--gc-sections", "-s",
 )  # fmt: skip
+OPTIONS = (*CODE, "-lm")
 
 #: Options for a WebAssembly module, which imports only what the source declares as an import.
 WASM_OPTIONS = (
@@ -280,7 +281,6 @@ def _fingerprint(folder: Path, files: Sequence[str], library: str, target: str, 
 
 def _run_compiler(folder: Path | str, files: Sequence[str], library: str, target: str, options: Sequence[str]) -> None:
     """Compile C files of a folder with Zig, whose own objects are kept in the cache."""
-    libraries = () if "-nostdlib" in options else ("-lm",)
     cache = code_folder(f"zig-{target}")
     known = cache / "hashes"
     with lock_folder(cache), tempfile.TemporaryDirectory(prefix="linkwork-zig-") as own:
@@ -292,7 +292,7 @@ def _run_compiler(folder: Path | str, files: Sequence[str], library: str, target
         if not known.is_file():
             sys.stderr.write(f"linkwork: Zig compiles what it needs itself for {target}, once on this machine ...\n")
         done = subprocess.run(
-            [sys.executable, "-m", "ziglang", "cc", "-target", target, *options, "-o", library, *files, *libraries],
+            [sys.executable, "-m", "ziglang", "cc", "-target", target, *options, "-o", library, *files],
             cwd=folder,
             env=os.environ | {"ZIG_GLOBAL_CACHE_DIR": str(cache), "ZIG_LOCAL_CACHE_DIR": own},
             capture_output=True,

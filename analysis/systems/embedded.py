@@ -77,7 +77,7 @@ def build_host(wiring: Wiring, folder: str | Path) -> Path:
     if name != "linux":
         raise BuildError(f"the host in C is for Linux, this is {name}: compile the files on the target")
     files = write_host(wiring, folder)
-    compile_library(folder, files, "host", f"{architecture}-linux-musl", (*OPTIONS, "-static"), kept=True)
+    compile_library(folder, files, "host", f"{architecture}-linux-musl", (*OPTIONS, "-static", "-lm"), kept=True)
     return Path(folder) / "host"
 
 

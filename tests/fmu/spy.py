@@ -14,16 +14,9 @@ from .c_host import unpack
 
 SOURCE = Path(__file__).with_name("spy.c")
 OPTIONS = (
-    "-std=c11",
-    "-O2",
-    "-D_GNU_SOURCE",
-    "-Wall",
-    "-Wextra",
-    "-Werror",
-    "-shared",
-    "-fPIC",
+    "-std=c11", "-O2", "-D_GNU_SOURCE", "-Wall", "-Wextra", "-Werror", "-shared", "-fPIC", "-lm",
     "-Wl,-rpath,$ORIGIN,--no-as-needed",
-)
+)  # fmt: skip
 
 
 def watched(fmu: Path, target: Path) -> Path:

@@ -85,7 +85,7 @@ def test_all_link_into_one_program(tmp_path: Path) -> None:
             assert [name for name in visible if not name.startswith(f"{prefix}fmi{kind.fmi}")] == []
     main = _MAIN.format(declarations="\n".join(declarations), calls="".join(calls))
     (tmp_path / "main.c").write_text(main, encoding="utf-8")
-    compile_library(tmp_path, ["main.c", *objects], "program", target, options)
+    compile_library(tmp_path, ["main.c", *objects], "program", target, (*options, "-lm"))
     printed = subprocess.run([tmp_path / "program"], capture_output=True, text=True, check=True).stdout.split()
     assert [float(text) for text in printed] == pytest.approx(angles, rel=1e-12)
 
