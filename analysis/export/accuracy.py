@@ -24,7 +24,7 @@ from linkwork.mechanism import Mechanism
 from linkwork.plant import TOLERANCE_RANGE, Plant
 
 from ..mechanisms import MECHANISMS, output_units
-from ..run import EXPERIMENTS, Case, compare, simulate, standard_cases
+from ..run import EXPERIMENTS, Case, compare, output_scales, simulate, standard_cases
 
 DATA = Path(__file__).with_name("accuracy.json")
 TOLERANCES = (1e-3, 1e-5, 1e-7, 1e-9, 1e-11)
@@ -102,12 +102,8 @@ def default_rows(mechanism: Mechanism, reference: str) -> list[list[float]]:
     unit_of = {v.name: v.unit for v in mechanism.variables}
     units = np.array([unit_of[name] for name in heading[1:]])
     starts = {v.name: v.start for v in mechanism.variables}
-    # 1 for angles; else the largest magnitude of the output, but at least a thousandth of the largest in its unit
-    largest = np.abs(right).max(axis=0)
-    like = np.array([largest[units == unit].max() for unit in units])
-    scale = np.where(
-        units == "rad", 1.0, np.maximum.reduce([largest, 1e-3 * like, np.full(len(like), np.finfo(float).tiny)])
-    )
+    largest = dict(zip(heading[1:], np.abs(right).max(axis=0).tolist()))
+    scale = np.array(list(output_scales(largest, unit_of).values()))
     found = []
     for tolerance in TOLERANCES:
         try:

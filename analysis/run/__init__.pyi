@@ -30,6 +30,7 @@ from .cosimulation import OutputDifference as OutputDifference
 from .cosimulation import compare as compare
 from .cosimulation import cosimulate as cosimulate
 from .cosimulation import input_sampler as input_sampler
+from .cosimulation import output_scales as output_scales
 from .ensemble import Ensemble as Ensemble
 from .ensemble import EnsembleBroken as EnsembleBroken
 from .ensemble import EnsembleInterrupted as EnsembleInterrupted

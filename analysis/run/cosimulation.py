@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time as clock
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from math import pi
@@ -19,6 +19,7 @@ from ..files import unknown_name
 from ..mechanisms import InitialState, Parameters, output_units, residual_outputs, wrapping_outputs
 from ..numerics.workers import record_interrupts
 from ..units import Amount, in_si
+from .angles import coordinate_outputs
 from .arguments import complete_initial_state, complete_inputs, require_kind, takes_published, usual_times
 from .case import Case
 from .events import RunInterrupted, show_progress
@@ -163,7 +164,7 @@ class _Stepwise:
         names = self.mechanism.output_names
         rate_of = {v.rate_of: v.name for v in self.mechanism.variables if v.rate_of}
         freedoms = self.mechanism.freedoms
-        self.coordinates = [names.index(f.coordinate) for f in freedoms]
+        self.coordinates = coordinate_outputs(self.mechanism)
         self.rates = [names.index(f.rate) for f in freedoms]
         self.accelerations = [names.index(rate_of[f.rate]) for f in freedoms]
 
@@ -348,6 +349,7 @@ def compare(a: Trajectory, b: Trajectory, *, tolerance: float = 1e-6) -> Compari
         raise InputError(f"the runs cannot be compared: {ends[0]}, and {ends[1]}")
     units, wrapped = output_units(), wrapping_outputs()
     largest = {name: float(np.max(np.abs(np.nan_to_num(a[name])), initial=0.0)) for name in a.names}
+    scales = output_scales(largest, units)
     differences = []
     for name in a.names:
         with np.errstate(invalid="ignore"):
@@ -362,29 +364,21 @@ def compare(a: Trajectory, b: Trajectory, *, tolerance: float = 1e-6) -> Compari
                 unit=units[name],
                 largest=float(difference.max()),
                 rms=float(np.sqrt(np.mean(difference**2))),
-                scale=max(largest[name], _floor(name, largest, units), np.finfo(float).tiny),
+                scale=scales[name],
             )
         )
     return Comparison(differences=tuple(differences), tolerance=tolerance)
 
 
-def _floor(name: str, largest: dict[str, float], units: dict[str, str]) -> float:
-    """Return a lower limit of an output's scale, from the largest magnitudes of outputs of the same kind."""
-
+def output_scales(largest: Mapping[str, float], units: Mapping[str, str]) -> dict[str, float]:
+    """Return the scale of each output, as `compare` describes it, from the largest magnitude of each output."""
     residuals = residual_outputs()
 
     def like(unit: str) -> float:
         return max((size for n, size in largest.items() if units[n] == unit and n not in residuals), default=0.0)
 
-    if units[name] == "rad":
-        return 1.0
     lengths, speed = like("m"), next((size for n, size in largest.items() if units[n] == "rad/s"), 0.0)
-    if name in residuals and units[name] == "m":
-        return lengths
-    if name in residuals and units[name] == "J":
-        # without energies among the outputs, a torque is of the same dimension
-        return like("J") or like("N.m") or 1.0
-    scales = {
+    floors = {
         "m": lengths,
         "m/s": lengths * speed,
         "m/s2": lengths * speed**2,
@@ -394,4 +388,12 @@ def _floor(name: str, largest: dict[str, float], units: dict[str, str]) -> float
         "N.m": like("N") * lengths,
         "J": like("J"),
     }
-    return 1e-3 * scales.get(units[name], 0.0)
+    # the size of a residual's terms; without energies among the outputs, a torque is of the same dimension
+    terms = {"m": lengths, "J": like("J") or like("N.m") or 1.0}
+
+    def floor(name: str, unit: str) -> float:
+        if name in residuals and unit in terms:
+            return terms[unit]
+        return 1.0 if unit == "rad" else 1e-3 * floors.get(unit, 0.0)
+
+    return {name: max(size, floor(name, units[name]), np.finfo(float).tiny) for name, size in largest.items()}
