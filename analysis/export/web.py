@@ -32,10 +32,8 @@ def build_web(mechanism: Mechanism) -> bytes:
 
     Raises
     ------
-    BuildError
-        If Zig is not installed, or a file does not compile.
-    MechanismError
-        If the parts of the mechanism do not fit together.
+    BuildError, MechanismError
+        If a file does not compile, or the parts of the mechanism do not fit together.
     """
     check(mechanism)
     with tempfile.TemporaryDirectory(prefix="linkwork-web-") as folder:
@@ -93,7 +91,7 @@ def _header(mechanism: Mechanism) -> str:
             "Equation equations_motor_forward;  /* ..., dmotor, dspeed -> dtorque */",
             "Equation equations_slopes;         /* x, m, u, p, motor -> x', accelerations by coordinates and rates */",
             "Equation equations_along;          /* ..., dx, du, dp, dmotor -> accelerations; both without a switch */",
-            "Equation equations_at_rest;        /* crank angle, p -> mass, stiffness of the freedom beside the crank */",
+            "Equation equations_at_rest;        /* crank angle, p -> mass of the freedom beside the crank */",
             "",
         ]
     )
@@ -133,7 +131,7 @@ def _motor_functions(mechanism: Mechanism) -> list[tuple[Any, ...]]:
     """Return the functions for the motor on the studio's page, each as (name, arguments, *results).
 
     The functions are: the motor torque and its derivative; the derivative of the state with the motor, and the derivatives of
-    the accelerations; and, for the natural frequency, inertia and stiffness at rest in the coordinate beside the crank angle.
+    the accelerations; and, for the natural frequency, the inertia at rest in the coordinate beside the crank angle.
     """
     casadi = symbolic.library()
     join, sx, freedoms = casadi.vertcat, casadi.SX, len(mechanism.freedoms)
@@ -150,18 +148,14 @@ def _motor_functions(mechanism: Mechanism) -> list[tuple[Any, ...]]:
     accelerations, of = slopes[freedoms : 2 * freedoms], [run.x, run.u, run.p, motor]
     changes = [sx.sym(f"d{n}", *v.shape) for n, v in enumerate(of)]
     angle, k = sx.sym("angle"), sx.sym("k", len(mechanism.constants._fields))
-    resting = (
-        inertia_and_stiffness(mechanism, (crank,), other)(angle, 0.0, k)
-        if min(crank, other) >= 0
-        else (sx(0.0), sx(0.0))
-    )
+    mass = inertia_and_stiffness(mechanism, (crank,), other)(angle, 0.0, k)[0] if min(crank, other) >= 0 else sx(0.0)
     d_torque = casadi.jtimes(torque, join(motor, speed), join(d_motor, d_speed))
     return [
         ("motor", [motor, speed], torque),
         ("motor_forward", [motor, speed, d_motor, d_speed], d_torque),
         ("slopes", [*run, motor], slopes, casadi.jacobian(accelerations, run.x)[:, : 2 * freedoms]),
         ("along", [*run, motor, *changes], casadi.jtimes(accelerations, join(*of), join(*changes))),
-        ("at_rest", [angle, k], join(*resting)),
+        ("at_rest", [angle, k], mass),
     ]
 
 

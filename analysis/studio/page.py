@@ -102,16 +102,9 @@ def make_page(state: Mapping[str, Any]) -> str:
 
 
 def page_address(state: Mapping[str, Any], page: str) -> str:
-    """Return the address that opens the page with a state, in the form in which the page itself writes addresses.
+    """Return the address that opens the page at the address ``page`` with a state, in the form that the page itself writes.
 
     Values that are equal to their start values are left out.
-
-    Parameters
-    ----------
-    state : mapping
-        State of a mechanism that the page has.
-    page : str
-        Address of the page itself.
     """
     start = {variable.name: variable.start for variable in MECHANISMS[state["mechanism"]].variables}
     values = {name: value for name, value in state["values"].items() if value != start.get(name)}

@@ -97,7 +97,7 @@ export interface Mechanism {
   /** Outputs that swing with the motion. */
   moving: number[];
   transmission: number;
-  /** The reference of the stiffness of which there is a natural frequency; -1: it is in the energy, null: there is none. */
+  /** The reference of the stiffness of which there is a natural frequency; null: there is none. */
   natural: number | null;
   /** Name of the damping over which stability is charted. */
   damping: string;

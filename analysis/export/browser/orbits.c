@@ -517,16 +517,15 @@ double FACE(studio_amplitude)(void) {
     return swing_amplitude(samples);
 }
 
-/* Natural frequency of the freedom beside the crank, from the means of what moves with it over a turn, the links at rest and it at
-   its zero; its stiffness is what is given by this value reference, -1: from the energy. Not a number where there is none. */
+/* Natural frequency of the freedom beside the crank, from the mean of what moves with it over a turn, the links at rest and it at
+   its zero; its stiffness is what is given by this value reference. Not a number where there is none. */
 double FACE(studio_natural)(int reference) {
-    double mean[2] = {0.0, 0.0};
+    double mean = 0.0, stiffness = plant.given[reference];
     if (CRANK < 0 || begin(&plant) != GOOD) return NAN;
     for (int i = 0; i < TURN_SAMPLES; i++) {
-        double angle = PERIOD * i / TURN_SAMPLES, both[2];
-        equations_at_rest((const double *[]){&angle, plant.p}, (double *[]){both}, NULL, NULL, 0);
-        for (int k = 0; k < 2; k++) mean[k] += both[k] / TURN_SAMPLES;
+        double angle = PERIOD * i / TURN_SAMPLES, mass;
+        equations_at_rest((const double *[]){&angle, plant.p}, (double *[]){&mass}, NULL, NULL, 0);
+        mean += mass / TURN_SAMPLES;
     }
-    double stiffness = reference < 0 ? mean[1] : plant.given[reference];
-    return stiffness > 0.0 && mean[0] > 0.0 ? sqrt(stiffness / mean[0]) : NAN;
+    return stiffness > 0.0 && mean > 0.0 ? sqrt(stiffness / mean) : NAN;
 }

@@ -200,11 +200,6 @@ class InitialState(CheckedState):
     """Initial state of a run: rad, rad/s, m, m/s.
 
     In speed drive the commanded speed at the start replaces ``crank_speed``.
-
-    Raises
-    ------
-    ParameterError
-        If a value is not a finite number.
     """
 
     crank_angle: float = 0.0

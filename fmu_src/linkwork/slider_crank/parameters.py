@@ -206,11 +206,6 @@ class InitialState(CheckedState):
 
     A commanded crank speed at the start replaces ``crank_speed``, a commanded axial speed replaces ``shift_velocity``; a groove
     determines shift and axial velocity.
-
-    Raises
-    ------
-    ParameterError
-        If a value is not a finite number.
     """
 
     crank_angle: float = 0.0
