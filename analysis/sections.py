@@ -2,7 +2,7 @@
 
 The closed forms of uniform bodies are those of Meriam and Kraige, Engineering Mechanics: Dynamics, appendix D. Moments of
 inertia are about an axis normal to the plane in which a planar linkage moves. Every quantity is a number in SI or a text with
-its unit; a density may be the name of a material of `DENSITIES`.
+its unit; a density may be the name of a material of `DENSITIES`. A dimension that is not positive raises ParameterError.
 """
 
 from __future__ import annotations
@@ -62,49 +62,49 @@ class _Section:
 
 
 @dataclass(frozen=True, slots=True)
-class Rod(_Section):
-    """A round rod.
+class _Profile(_Section):
+    """Base class of the sections of links with two pins, with the same section over the whole length."""
 
-    Attributes
-    ----------
-    diameter : float
-        Diameter (m).
-    density : float
-        Density (kg/m3), or the name of a material.
+    def _mass_per_length(self) -> float:
+        raise NotImplementedError
 
-    Raises
-    ------
-    ParameterError
-        If a dimension is not positive.
-    """
+    def _width_squared(self) -> float:
+        """Return the square of the width (m2) of the rectangular bar with the same radius of gyration."""
+        raise NotImplementedError
+
+    def mass(self, length: Amount) -> float:
+        """Return the mass (kg) of a piece of given length (m)."""
+        return float(self._mass_per_length() * _check_length(length))
+
+    def inertia(self, length: Amount) -> float:
+        """Return the moment of inertia (kg.m2) of a piece of given length (m) about a transverse axis through its centre."""
+        return float(self.mass(length) * (self._width_squared() + _check_length(length) ** 2) / 12.0)
+
+
+@dataclass(frozen=True, slots=True)
+class Rod(_Profile):
+    """A round rod of given diameter (m) and density (kg/m3), or name of a material: moment of inertia m (3 r^2 + L^2)/12."""
 
     diameter: Amount
     density: Amount
 
-    def mass(self, length: Amount) -> float:
-        """Return the mass (kg) of a piece of given length (m)."""
-        return float(0.25 * pi * self.diameter**2 * self.density * _check_length(length))
+    def _mass_per_length(self) -> float:
+        return float(0.25 * pi * self.diameter**2 * self.density)
 
-    def inertia(self, length: Amount) -> float:
-        """Return the moment of inertia (kg.m2) about a transverse axis through the centre of mass: m (3 r^2 + L^2)/12."""
-        return float(self.mass(length) * (0.75 * self.diameter**2 + _check_length(length) ** 2) / 12.0)
+    def _width_squared(self) -> float:
+        return float(0.75 * self.diameter**2)
 
 
 @dataclass(frozen=True, slots=True)
-class Tube(_Section):
-    """A round tube.
+class Tube(_Profile):
+    """A round tube: moment of inertia m (3 (ro^2 + ri^2) + L^2)/12.
 
     Attributes
     ----------
     outer, inner : float
-        Diameters (m).
+        Diameters (m); the inner one must be less.
     density : float
         Density (kg/m3), or the name of a material.
-
-    Raises
-    ------
-    ParameterError
-        If a dimension is not positive, or the inner diameter is not below the outer one.
     """
 
     outer: Amount
@@ -116,46 +116,34 @@ class Tube(_Section):
         if self.inner >= self.outer:
             raise ParameterError("inner", self.inner, f"be less than the outer diameter of {self.outer:g} m")
 
-    def mass(self, length: Amount) -> float:
-        """Return the mass (kg) of a piece of given length (m)."""
-        return float(0.25 * pi * (self.outer**2 - self.inner**2) * self.density * _check_length(length))
+    def _mass_per_length(self) -> float:
+        return float(0.25 * pi * (self.outer**2 - self.inner**2) * self.density)
 
-    def inertia(self, length: Amount) -> float:
-        """Return the inertia (kg.m2) about a transverse axis through the centre of mass: m (3 (ro^2 + ri^2) + L^2)/12."""
-        across = 0.75 * (self.outer**2 + self.inner**2)
-        return float(self.mass(length) * (across + _check_length(length) ** 2) / 12.0)
+    def _width_squared(self) -> float:
+        return float(0.75 * (self.outer**2 + self.inner**2))
 
 
 @dataclass(frozen=True, slots=True)
-class Bar(_Section):
-    """A rectangular bar.
+class Bar(_Profile):
+    """A rectangular bar: moment of inertia m (L^2 + w^2)/12 about an axis normal to the plane of motion.
 
     Attributes
     ----------
-    width : float
-        Width in the plane of motion (m).
-    thickness : float
-        Thickness normal to that plane (m).
+    width, thickness : float
+        Width in the plane of motion, and thickness normal to that plane (m).
     density : float
         Density (kg/m3), or the name of a material.
-
-    Raises
-    ------
-    ParameterError
-        If a dimension is not positive.
     """
 
     width: Amount
     thickness: Amount
     density: Amount
 
-    def mass(self, length: Amount) -> float:
-        """Return the mass (kg) of a piece of given length (m)."""
-        return float(self.width * self.thickness * self.density * _check_length(length))
+    def _mass_per_length(self) -> float:
+        return float(self.width * self.thickness * self.density)
 
-    def inertia(self, length: Amount) -> float:
-        """Return the moment of inertia (kg.m2) about the centre of mass, normal to the plane of motion: m (L^2 + w^2)/12."""
-        return float(self.mass(length) * (self.width**2 + _check_length(length) ** 2) / 12.0)
+    def _width_squared(self) -> float:
+        return float(self.width**2)
 
 
 #: Section of a link with two pins.
@@ -172,20 +160,7 @@ class MassProperties(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class Plate(_Section):
-    """A flat plate with straight edges.
-
-    Attributes
-    ----------
-    thickness : float
-        Thickness (m).
-    density : float
-        Density (kg/m3), or the name of a material.
-
-    Raises
-    ------
-    ParameterError
-        If a dimension is not positive.
-    """
+    """A flat plate with straight edges, of given thickness (m) and density (kg/m3), or name of a material."""
 
     thickness: Amount
     density: Amount

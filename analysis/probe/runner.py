@@ -254,7 +254,7 @@ class _Forked:
 
 def _command(work: Path, *words: str) -> dict[str, Any]:
     """Return the arguments of a process that runs `child` in the folder of a probe."""
-    paths = os.pathsep.join(dict.fromkeys([*(path or os.getcwd() for path in sys.path)]))
+    paths = os.pathsep.join(dict.fromkeys(path or os.getcwd() for path in sys.path))
     # freed and uninitialised memory is filled with a pattern, so that reading it has a visible effect
     environment = {**os.environ, "PYTHONPATH": paths, "MALLOC_PERTURB_": "165"}
     return {"args": [sys.executable, "-m", f"{__package__}.child", *words], "env": environment, "cwd": work}

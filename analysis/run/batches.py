@@ -24,7 +24,7 @@ from ..mechanisms import MECHANISMS, InitialState, Parameters
 from .cautions import MANY_STEPS, is_too_slow
 from .inputs import Encoded, Inputs, align, compile_source, encode
 from .prepared import STEPS_PER_CALL, Run, Settings, compute_outputs, make_problem, verdict
-from .sampling import function_values
+from .sampling import NotFiniteError, function_values
 from .varied import VariedSequence, array_functions, distinct_objects, varied_constants
 
 #: solver.status of a run that was not begun, or was interrupted.
@@ -186,7 +186,7 @@ def _verdicts(task: Task, prepared: PreparedBatch, ends: NDArray[np.float64]) ->
         elif code == _PAUSED:
             status[i], messages[i] = NOT_RUN, f"interrupted at t = {t:.6g} s" if samples else "not run: interrupted"
         elif code == k.BAD_INPUT:
-            status[i], messages[i] = code, str(run().not_finite_error(lost, t, x))
+            status[i], messages[i] = code, str(NotFiniteError(run().encoded, lost, t, x))
         else:
             switched = task.mechanism.is_switched_on(prepared.batch.p[i])
             limit = run().limit if switched else None

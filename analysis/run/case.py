@@ -44,11 +44,11 @@ class Case:
         object.__setattr__(self, "initial", initial)
 
 
-def published_case(name: str, *, revolutions: float = 3.0, steps_per_revolution: int = 360) -> Case:
+def published_case(name: str) -> Case:
     """Return the case of a published set, with its published drive and initial state.
 
-    The run lasts ``revolutions`` of the slowest crank; the step is one revolution of the fastest crank divided by
-    ``steps_per_revolution``. Without a commanded speed, duration and step are those of the default experiment of the FMU.
+    The run lasts three revolutions of the slowest crank, in steps of one degree of the fastest crank. Without a commanded
+    speed, duration and step are those of the default experiment of the FMU.
 
     Raises
     ------
@@ -60,7 +60,7 @@ def published_case(name: str, *, revolutions: float = 3.0, steps_per_revolution:
     turn = turn_durations(inputs, mechanism)
     _, stop_time, step, _ = mechanism.experiment
     if turn is not None:
-        stop_time, step = revolutions * turn[0], turn[1] / steps_per_revolution
+        stop_time, step = 3.0 * turn[0], turn[1] / 360.0
     return Case(
         title=entry.source,
         parameters=entry.parameters,

@@ -451,13 +451,7 @@ def _check_runs(
 
 
 def output_column(name: str, names: tuple[str, ...]) -> int:
-    """Return the index of an output among ``names``.
-
-    Raises
-    ------
-    InputError
-        If there is no output of that name.
-    """
+    """Return the index of an output among ``names``; raise UnknownNameError if it is not there."""
     if name not in names:
         raise unknown_name(name, names, f"output {name!r}")
     return names.index(name)

@@ -24,6 +24,7 @@ if TYPE_CHECKING:
 #: Indices in `Machine.addresses` of the functions that a run needs.
 DERIVATIVE, OUTPUTS, CLEARANCE, JUMP = range(4)
 _NAMES = ("derivative", "outputs", "clearance", "jump")
+#: Functions that write the outputs of several lanes row by row.
 _IN_ROWS = ("outputs", "chosen")
 
 _ALLOWED = (
@@ -176,13 +177,6 @@ def expressions(mechanism: Mechanism, switched: bool = False) -> TracedEquations
     )
 
 
-def _compile(traces: TracedEquations, functions: Mapping[str, Any], lanes: int = 1) -> MachineCode:
-    """Compile the named expressions ``functions`` of the symbols of ``traces``; several lanes write outputs row by row."""
-    from ..numerics.codegen import MachineCode
-
-    return MachineCode(_functions(traces, functions), lanes, _IN_ROWS)
-
-
 def _functions(traces: TracedEquations, expressions: Mapping[str, Any]) -> list[Any]:
     """Return CasADi functions of the time and the symbols of ``traces``, by name, for `codegen.MachineCode`."""
     casadi = symbolic.library()
@@ -208,8 +202,9 @@ class Machine:
     """
 
     def __init__(self, mechanism: Mechanism, switched: bool, lanes: int) -> None:
-        traces = expressions(mechanism, switched)
-        self._code = _compile(traces, {name: getattr(traces, name) for name in _NAMES}, lanes)
+        from ..numerics.codegen import MachineCode
+
+        self._code = MachineCode(run_functions(mechanism, switched), lanes, _IN_ROWS)
         self.addresses: NDArray[np.int64] = np.array([self._code.addresses[name] for name in _NAMES], dtype=np.int64)
         self.fingerprint = self._code.fingerprint
 
@@ -232,8 +227,8 @@ def machine(mechanism: Mechanism, switched: bool = False, lanes: int = 1) -> Mac
 @cache
 def compile_outputs(mechanism: Mechanism, switched: bool, columns: tuple[int, ...], lanes: int) -> MachineCode:
     """Compile a function ``chosen`` that computes only the outputs with the indices ``columns``: it is faster."""
-    from ..numerics.codegen import MAKING
+    from ..numerics.codegen import MAKING, MachineCode
 
     traces = expressions(mechanism, switched)
     with MAKING:
-        return _compile(traces, {"chosen": traces.outputs[list(columns)]}, lanes)
+        return MachineCode(_functions(traces, {"chosen": traces.outputs[list(columns)]}), lanes, _IN_ROWS)

@@ -24,7 +24,6 @@ class Event:
     Parameters
     ----------
     name : str
-        Name under which the event is reported.
     output : str, optional
         Output of the FMI contract that crosses ``level``.
     level : float

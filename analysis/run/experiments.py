@@ -271,10 +271,8 @@ def verify(fmu: str | Path, *, allowed: float | None = None) -> Iterator[Outcome
 
     Raises
     ------
-    InputError
-        If the file is not an FMU.
-    ExperimentError
-        If the FMU has no experiments, or they cannot be read.
+    InputError, ExperimentError
+        As for `read_experiments`.
 
     Examples
     --------

@@ -277,7 +277,10 @@ class March:
         what: What = None
         if solution.status == 1:
             t_cut = happened[-1][0]
-            _, what, self.x = next(item for item in happened if item[0] == t_cut and self._ends_interval(item[1]))
+            ending = (
+                item for item in happened if item[0] == t_cut and (not isinstance(item[1], Event) or item[1].stop)
+            )
+            _, what, self.x = next(ending)
             self.t, self.x = t_cut, self.x.copy()
             if isinstance(what, int):
                 self.x[self.angles[what]] = self.laws[what, 1]
@@ -304,10 +307,6 @@ class March:
         if isinstance(what, int):
             self.laws[what, 2] = 0.0
         return bool(solution.status == 0)
-
-    @staticmethod
-    def _ends_interval(what: What) -> bool:
-        return what.stop if isinstance(what, Event) else True
 
     def _event_functions(self, stop: float) -> list[tuple[What, Callable[[float, NDArray[np.float64]], float]]]:
         """Return events and their functions for `solve_ivp`: limit of assembly, release of torsion bars, events of the user."""

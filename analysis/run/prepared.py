@@ -136,10 +136,6 @@ class Run:
         usual = max([pi * (len(times) - 1) / float(np.ptp(times)), *(_HARMONICS * speed for speed in turning)])
         return stiffness(disturbance_rates(mechanism, x, self.apply_inputs(u), self.p), steps, passed, usual)
 
-    def not_finite_error(self, channel: int, t: float, x: NDArray[np.float64]) -> NotFiniteError:
-        """Return the error for an input that is not finite at time t and state x; ``channel`` is the index of its channel."""
-        return NotFiniteError(self.encoded, channel, t, x)
-
     def _records(self, times: NDArray[np.float64], x: NDArray[np.float64]) -> tuple[Any, Any]:
         """Return arrays for samples at the given times, and the solver's records at the start of the run from the state x."""
         from .records import CARRY, Samples, State
@@ -201,7 +197,7 @@ class Run:
                 interrupted.append(True)
         t = float(carry["begin"] + carry["elapsed"])
         if status[0] == BAD_INPUT:
-            raise self.not_finite_error(int(carry["lost"]), t, x + turns.taken)
+            raise NotFiniteError(self.encoded, int(carry["lost"]), t, x + turns.taken)
         done = int(carry["sample"])
         times, states, forces = times[:done], samples.states[0, :done], samples.forces[0, :done]
         if carry["started"] and times[-1] < t:

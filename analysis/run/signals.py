@@ -222,18 +222,15 @@ def table(times: ArrayLike, values: ArrayLike, kind: str = "linear") -> Piecewis
     t, y, unit = _points(times, values, least=2)
     if kind == "linear":
         slopes = np.diff(y) / np.diff(t)
-        inner = np.column_stack([y[:-1], slopes, np.zeros_like(slopes), np.zeros_like(slopes)])
+        inner = np.pad(np.column_stack([y[:-1], slopes]), ((0, 0), (0, 2)))
     elif kind == "cubic":
         from scipy.interpolate import CubicSpline
 
         inner = CubicSpline(t, y).c[::-1].T
     else:
         raise InputError(f"kind of table is {kind!r}: it must be 'linear', 'cubic' or 'hold'")
-    flat = np.zeros((1, 4))
-    flat[0, 0] = y[0]
-    end = np.zeros((1, 4))
-    end[0, 0] = y[-1]
-    return Piecewise(np.concatenate([[t[0] - 1.0], t, [t[-1] + 1.0]]), np.vstack([flat, inner, end]), unit)
+    before, after = ((value, 0.0, 0.0, 0.0) for value in (y[0], y[-1]))
+    return Piecewise(np.array([t[0] - 1.0, *t, t[-1] + 1.0]), np.vstack([before, inner, after]), unit)
 
 
 def _points(times: ArrayLike, values: ArrayLike, least: int) -> tuple[NDArray[np.float64], NDArray[np.float64], str]:

@@ -242,28 +242,19 @@ def binors(p: SliderCrankParameters) -> tuple[Binor, Binor, Binor]:
     )
 
 
-def joint_loads(
-    closure: Closure,
-    *,
-    speed: Any,
-    shift_velocity: Any = 0.0,
-    acceleration: Any = 0.0,
-    shift_acceleration: Any = 0.0,
-    torque: Any = None,
-    slider_force: Any = None,
-) -> JointLoads:
+def joint_loads(closure: Closure, *, torque: Any = None, slider_force: Any = None, **motion: Any) -> JointLoads:
     """Compute all joint forces and moments of a motion (eqs 62 to 69) for a given crank torque or slider force.
 
     Parameters
     ----------
     closure : Closure
         The positions.
-    speed, shift_velocity, acceleration, shift_acceleration : array_like
-        theta1' (rad/s), S1' (m/s), theta1'' (rad/s2), S1'' (m/s2): one value, or one for each point.
     torque : array_like, optional
         Torque on the crank about its axis (N.m), if the slider's force is sought.
     slider_force : array_like, optional
         Force on the slider along the guide, positive where S4 increases (N), if the torque is sought.
+    **motion : array_like
+        Arguments of `rates`: ``speed``, and others that are not zero; one value, or one for each point.
 
     Raises
     ------
@@ -278,18 +269,12 @@ def joint_loads(
         raise InputError("give either the torque, and the slider's force is sought, or the slider's force, not both")
     p = closure.parameters
     n = closure.crank_angle.size
-    motion = rates(
-        closure,
-        speed=speed,
-        shift_velocity=shift_velocity,
-        acceleration=acceleration,
-        shift_acceleration=shift_acceleration,
-    )
+    moving = rates(closure, **motion)
     if torque is not None:
-        _check_dead_centres(closure, motion)
+        _check_dead_centres(closure, moving)
     length = scale(p, closure.shift)
     pin, front = _ball_frames(closure)
-    matrix, load = _equations(closure, motion, length)
+    matrix, load = _equations(closure, moving, length)
     # the moment equation of the rod about its own line is always satisfied
     kept = np.delete(np.arange(18), 9)
     given, value = (5, torque) if torque is not None else (17, slider_force)

@@ -301,20 +301,18 @@ class ForceTurn:
             mask = mask | self._parallel[:, None]
         return np.ma.MaskedArray(_stack_components(turned, len(self)), mask=mask, fill_value=np.nan)
 
-    def columns(self, units: str = "SI", frames: tuple[int, ...] = (1, 2, 3, 4)) -> dict[str, FloatArray]:
+    def columns(self, units: str = "SI") -> dict[str, FloatArray]:
         """Return all quantities as columns of a file, by name with unit; masked values are NaN, the last two columns say why.
 
         Parameters
         ----------
         units : str
             "SI", or "inch": degrees, inches, seconds and pounds force, as the thesis prints them.
-        frames : tuple of int
-            Frames of the joint forces and moments.
 
         Raises
         ------
         InputError
-            If there are no such units or frames.
+            If there are no such units.
         """
         known = unit_table(units)
         parts: list[tuple[str, str, Any]] = [
@@ -332,7 +330,7 @@ class ForceTurn:
         ]
         parts += [
             (f"{name.replace('_', ' ')} {axis} in frame {frame}", joint.unit, values)
-            for frame in frames
+            for frame in range(1, 5)
             for name, joint in JOINTS.items()
             for axis, values in zip("ijk", self.vector(name, frame).T)
         ]

@@ -83,8 +83,6 @@ class Region:
         Motion with the least value of the test function.
     across : CrossPlane
         Equation that picks the motion ``worst`` from the branch.
-    value : float
-        Value of the test function at the motion ``worst``.
     """
 
     kind: Crossing
@@ -94,7 +92,6 @@ class Region:
     last: SpecialPoint | None
     worst: Spot
     across: CrossPlane
-    value: float
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -345,17 +342,9 @@ def _regions(wish: Wish, x: FloatArray, branch: Branch, response: Response) -> I
                 continue
             levels = [*branch.parameter[part], *(s.parameter for s in (first, last) if s is not None)]
             place, at_level = int(part[tests[part].argmin()]), kind is not Crossing.FOLD
-            worst, across, value = _find_minimum(wish, x, branch, kind, place, 1.0, at_level=at_level)
-            yield Region(
-                kind=kind,
-                low=min(levels),
-                high=max(levels),
-                first=first,
-                last=last,
-                worst=worst,
-                across=across,
-                value=value,
-            )
+            worst, across, _ = _find_minimum(wish, x, branch, kind, place, 1.0, at_level=at_level)
+            low, high = min(levels), max(levels)
+            yield Region(kind=kind, low=low, high=high, first=first, last=last, worst=worst, across=across)
 
 
 def _find_minimum(
