@@ -281,8 +281,6 @@ def design_lqr(
     ------
     UnknownNameError
         If a weight is for a state that the model does not have.
-    InputError
-        If ``model`` is no `LinearModel`.
     DesignError
         If a weight is not usable, or the force cannot stabilise the model.
 
@@ -347,13 +345,10 @@ def design_pid(
         Instead of poles: bandwidth in rad/s and damping ratio. The poles are -bandwidth and
         -bandwidth (damping +- i sqrt(1 - damping^2)).
     channel : str, optional
-        FMI name of the force; by default the force on the last degree of freedom that is not commanded:
-        see `LinearModel.force_channel`.
+        As for `design_lqr`.
 
     Raises
     ------
-    InputError
-        If ``model`` is no `LinearModel`.
     DesignError
         If the model has more than one degree of freedom that is not commanded, or the poles are not usable.
 
@@ -408,13 +403,10 @@ def design_pi(
     phase_margin : float
         Least phase margin (rad).
     channel : str, optional
-        FMI name of the force; by default the force on the last degree of freedom that is not commanded:
-        see `LinearModel.force_channel`.
+        As for `design_lqr`.
 
     Raises
     ------
-    InputError
-        If ``model`` is no `LinearModel`.
     DesignError
         If no PI controller meets the requirements: a PI controller gives no phase lead, which a sprung mass needs near its
         resonance and above.

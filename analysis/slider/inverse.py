@@ -330,10 +330,8 @@ class BestSpring:
         Parameters of the mechanism with this spring.
     stiffness, free_position : float
         Stiffness (N/m) and free position (m) of the spring; a stiffness of zero means that it is best to have no spring.
-    rms_force : float
-        Rms control force with this spring (N).
-    rms_force_without : float
-        Rms control force without any spring (N).
+    rms_force, rms_force_without : float
+        Rms control force with this spring, and without any spring (N).
     """
 
     parameters: FiveBarParameters

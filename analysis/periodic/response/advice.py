@@ -72,14 +72,12 @@ class Avoided:
 class FoldJump:
     """The jump of a machine at a fold at which its stable motion ends.
 
+    ``parameter`` is the value of the parameter at the fold, ``before`` the amplitude of the motion that ends.
+
     Attributes
     ----------
-    parameter : float
-        Value of the parameter at the fold.
     direction : int
         +1 if the motion exists below the fold and ends as the parameter rises, -1 if the motion ends as the parameter falls.
-    before : float
-        Amplitude of the motion that ends.
     after : tuple of float
         Amplitudes of the stable motions to which the machine may jump; empty if no such motion was followed.
     """

@@ -274,15 +274,8 @@ def _slope(family: Family, of: Forms, special: SpecialPoint) -> float:
 class FormRun:
     """A run near a period doubling or a torus point, on the side where the motion of the branch is unstable.
 
-    Attributes
-    ----------
-    parameter : float
-        Value of the parameter in the run.
-    distance : float
-        Greatest distance from the motion of the branch over the last periods, relative to the scale of y; infinite if the run
-        ended early.
-    expected : float
-        Distance that the normal form predicts for a supercritical point.
+    ``distance`` is the greatest distance from the motion of the branch over the last periods, relative to the scale of y, and
+    infinite if the run ended early; ``expected`` is the distance that the normal form predicts for a supercritical point.
     """
 
     parameter: float

@@ -334,10 +334,8 @@ def motion_gradient(orbit: PeriodicOrbit, names: Sequence[str] | None = None) ->
 
     Raises
     ------
-    UnknownNameError
-        If a name is not that of a parameter.
-    InputError
-        If a parameter does not act in this drive.
+    UnknownNameError, InputError
+        If a name is not that of a parameter, or the parameter does not act in this drive.
     LinkworkError
         If the variational equations cannot be resolved.
 
@@ -400,15 +398,7 @@ def crossing_gradient(
 ) -> PointGradient:
     """Compute how a fold, a period doubling or a torus point moves along one parameter when other parameters change.
 
-    Parameters
-    ----------
-    orbit : PeriodicOrbit
-        A motion near the point, from which Newton's method begins.
-    kind : Crossing
-    along : str
-        FMI name of the parameter along which the point moves.
-    names : sequence of str, optional
-        FMI names of the other parameters; by default all, see `gradient_names`.
+    The arguments are those of `extremum_gradient`, with the ``kind`` of the point.
 
     Raises
     ------

@@ -366,14 +366,12 @@ class DeadCentre(_LimitPosition):
 
 
 class Toggle(_LimitPosition):
-    """Constraint: a toggle, in which the crank can turn no further, is at a crank rotation or within a range of rotations.
+    """Constraint, as `DeadCentre`: a toggle, in which the crank can turn no further, is at a rotation or in a range of them.
 
     In a slider-crank's toggle the coupler is perpendicular to the guide and points away from A, or towards it.
 
     Attributes
     ----------
-    at : float or (float, float)
-        Crank rotation, or range of crank rotations, counted as in the task (rad).
     position : "stretched" or "folded"
         The coupler extends the rocker, or lies over it.
     """
