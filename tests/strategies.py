@@ -95,34 +95,15 @@ def draw(uniform: Uniform, choose: Callable[[], bool]) -> Case:
     m3, inertia3, cog3, nu3 = link(l3)
     m4, inertia4, cog4, nu4 = link(l4)
     parameters = FiveBarParameters(
-        ground_length=l1,
-        crank_length=l2,
-        coupler_length=l3,
-        rocker_length=l4,
-        crank_mass=m2,
-        coupler_mass=m3,
-        rocker_mass=m4,
-        slider_mass=uniform(0.1, 1.0),
-        crank_inertia=inertia2 + m2 * cog2**2,
-        coupler_inertia=inertia3,
-        rocker_inertia=inertia4,
-        crank_cog_distance=cog2,
-        coupler_cog_distance=cog3,
-        rocker_cog_distance=cog4,
-        crank_cog_angle=nu2,
-        coupler_cog_angle=nu3,
-        rocker_cog_angle=nu4,
-        slider_guide_angle=alpha,
-        slider_stiffness=uniform(0.0, 2000.0),
-        slider_spring_free_position=l1 * uniform(-0.2, 0.2),
-        slider_damping=uniform(0.0, 30.0),
-        slider_coulomb_friction=uniform(0.0, 5.0),
-        coupler_point_distance=l3 * uniform(-0.5, 1.5),
-        coupler_point_angle=uniform(-pi, pi),
-        gravity=uniform(0.0, 20.0),
-        ground_inclination=uniform(-pi, pi),
-        assembly_branch=branch,
-    )
+        ground_length=l1, crank_length=l2, coupler_length=l3, rocker_length=l4, crank_mass=m2, coupler_mass=m3,
+        rocker_mass=m4, slider_mass=uniform(0.1, 1.0), crank_inertia=inertia2 + m2 * cog2**2, coupler_inertia=inertia3,
+        rocker_inertia=inertia4, crank_cog_distance=cog2, coupler_cog_distance=cog3, rocker_cog_distance=cog4,
+        crank_cog_angle=nu2, coupler_cog_angle=nu3, rocker_cog_angle=nu4, slider_guide_angle=alpha,
+        slider_stiffness=uniform(0.0, 2000.0), slider_spring_free_position=l1 * uniform(-0.2, 0.2),
+        slider_damping=uniform(0.0, 30.0), slider_coulomb_friction=uniform(0.0, 5.0),
+        coupler_point_distance=l3 * uniform(-0.5, 1.5), coupler_point_angle=uniform(-pi, pi), gravity=uniform(0.0, 20.0),
+        ground_inclination=uniform(-pi, pi), assembly_branch=branch,
+    )  # fmt: skip
     state = (th2, u, uniform(-30.0, 30.0), uniform(-1.0, 1.0), 0.0, 0.0)
     force, load_x, load_y = uniform(-50.0, 50.0), uniform(-50.0, 50.0), uniform(-50.0, 50.0)
     return Case(

@@ -26,25 +26,12 @@ source = "a machine of one cylinder"
 gravity = "9.81 m/s^2"
 [linkage.ground]
 A = [0, 0]
-[linkage.bodies.crank]
-bar = ["A", "B"]
-length = "35 mm"
-mass = "14 kg"
-cog = ["-4 mm", 0]
-inertia = "0.18 kg*m^2"
-[linkage.bodies.rod]
-bar = ["B", "C"]
-length = "140 mm"
-mass = "0.7 kg"
-cog = ["42 mm", 0]
-inertia = "2.4e-3 kg*m^2"
-[linkage.bodies.piston]
-points = { C = [0, 0] }
-mass = "0.55 kg"
-[linkage.slides.G]
-body = "piston"
-through = "A"
-direction = "90 deg"
+[linkage.bodies]
+crank = { bar = ["A", "B"], length = "35 mm", mass = "14 kg", cog = ["-4 mm", 0], inertia = "0.18 kg*m^2" }
+rod = { bar = ["B", "C"], length = "140 mm", mass = "0.7 kg", cog = ["42 mm", 0], inertia = "2.4e-3 kg*m^2" }
+piston = { points = { C = [0, 0] }, mass = "0.55 kg" }
+[linkage.slides]
+G = { body = "piston", through = "A", direction = "90 deg" }
 [linkage.springs.gas]
 at = "G"
 law = "a*(min(max(p1*((1-tanh(-v/w))/2*((s+c)/(b+c-x))**n + (1-tanh(v/w))/2*((p2/p1)**(1/n)*c/(b+c-x))**n), p1), p2) - p1)"
@@ -102,6 +89,14 @@ def test_the_verdict_needs_no_axes_of_a_chart(linkwork: Callable[..., Result], t
     assert "no chart, as --y is not given: a compressor has no damping" in charted.stderr
 
 
+def respond(compressor: Case, least: float, *, greatest_step: float) -> Response:
+    """Follow the motion over the flywheel's inertia, from ``least`` to 0.3 kg.m2."""
+    return frequency_response(
+        compressor.parameters, least, 0.3, vary="crank.inertia", drive=Drive(torque=0.0), start=(GUESS,),
+        greatest_step=greatest_step,
+    )  # fmt: skip
+
+
 @pytest.mark.parametrize("inertia", [0.35, 0.45, 0.8])
 def test_newtons_method_ends_at_the_errors_of_the_integrator(compressor: Case, inertia: float) -> None:
     parameters = variant(compressor.parameters, motor_m0=0.0)
@@ -111,15 +106,7 @@ def test_newtons_method_ends_at_the_errors_of_the_integrator(compressor: Case, i
 
 
 def test_a_flywheel_is_sized_with_friction_by_joint_forces(compressor: Case) -> None:
-    response = frequency_response(
-        compressor.parameters,
-        0.15,
-        0.3,
-        vary="crank.inertia",
-        drive=Drive(torque=0.0),
-        start=(GUESS,),
-        greatest_step=0.1,
-    )
+    response = respond(compressor, 0.15, greatest_step=0.1)
     assert response.problems == ()
     (branch,) = response.branches
     assert branch.parameter[[0, -1]].tolist() == [0.15, 0.3]
@@ -131,20 +118,9 @@ def test_what_was_followed_is_kept_when_a_branch_is_lost(compressor: Case, monke
     def lose(*_: object) -> None:
         raise ContinuationError("no point there")
 
-    def respond() -> Response:
-        return frequency_response(
-            compressor.parameters,
-            0.2,
-            0.3,
-            vary="crank.inertia",
-            drive=Drive(torque=0.0),
-            start=(GUESS,),
-            greatest_step=0.3,
-        )
-
     with monkeypatch.context() as patch:
         patch.setattr(Follower, "_find_bound_point", lose)
-        lost = respond()
+        lost = respond(compressor, 0.2, greatest_step=0.3)
     assert len(lost.branches[0]) > 1
     assert lost.problems == (
         f"the branch from crank.inertia = 0.2 kg.m2 is followed to crank.inertia = {lost.branches[0].parameter[-1]:.6g} kg.m2 "
@@ -152,4 +128,4 @@ def test_what_was_followed_is_kept_when_a_branch_is_lost(compressor: Case, monke
     )
     monkeypatch.setattr(Follower, "start", lose)
     with pytest.raises(ContinuationError, match="no point there"):
-        respond()
+        respond(compressor, 0.2, greatest_step=0.3)

@@ -34,10 +34,8 @@ crank = { bar = ["A", "B"], length = 0.015, mass = 1, inertia = 0.01 }
 rod = { points = { B = [0, 0] }, mass = 0 }
 head = { points = { C = [0, 0] }, mass = 0 }
 lever = { bar = ["E", "C"], length = 0.3, mass = 6, cog = [0.2, 0], inertia = 0.05 }
-[linkage.slides.S]
-body = "head"
-on = "rod"
-through = "B"
+[linkage.slides]
+S = { body = "head", on = "rod", through = "B" }
 [linkage.springs]
 rodspring = { at = "S", stiffness = 3e4, free = 0.583, damping = 40 }
 back = { at = "E", stiffness = 400, free = "90 deg", damping = 0.5, friction = 3 }
@@ -55,10 +53,8 @@ ground = { O = [0, 0] }
 block = { points = { P = [0, 0], R = [0.1, 0] }, mass = 10 }
 rotor = { points = { R = [0, 0] }, mass = 2, cog = [0.01, 0], inertia = 0.01 }
 pendulum = { points = { P = [0, 0] }, mass = 1.2, cog = [0.25, 0], inertia = 0.002 }
-[linkage.slides.Y]
-body = "block"
-through = "O"
-direction = "90 deg"
+[linkage.slides]
+Y = { body = "block", through = "O", direction = "90 deg" }
 [linkage.springs]
 foot = { at = "Y", stiffness = 1600, free = 0.084, damping = 10 }
 hinge = { at = "P", damping = 0.008 }
@@ -79,10 +75,8 @@ head = { points = { C = [0, 0] }, mass = 0.8 }
 left = { bar = ["E", "H"], length = 0.25, mass = 1, cog = [0.125, 0], inertia = 0.006 }
 right = { bar = ["G", "K"], length = 0.25, mass = 1, cog = [0.125, 0], inertia = 0.006 }
 trough = { points = { H = [0, 0], K = [0.8, 0], C = [0.05, -0.06] }, mass = 40 }
-[linkage.slides.S]
-body = "head"
-on = "rod"
-through = "B"
+[linkage.slides]
+S = { body = "head", on = "rod", through = "B" }
 [linkage.springs]
 leaf = { at = "E", stiffness = 3000, free = "115 deg", damping = 2 }
 [linkage.freedoms]

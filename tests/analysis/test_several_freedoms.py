@@ -20,33 +20,16 @@ SHAKER = """
 name = "shaker"
 [linkage.ground]
 O = [0, 0]
-[linkage.bodies.carriage]
-points = { H = [0, 0] }
-mass = "2 kg"
-[linkage.bodies.frame]
-points = { P = [0, 0] }
-mass = "7 kg"
-[linkage.bodies.rotor]
-points = { P = [0, 0] }
-mass = "1 kg"
-cog = ["10 mm", 0]
-inertia = "0.01 kg*m^2"
-[linkage.slides.X]
-body = "carriage"
-through = "O"
-[linkage.slides.Y]
-body = "frame"
-on = "carriage"
-through = "H"
-direction = "90 deg"
-[linkage.springs.side]
-at = "X"
-stiffness = "40 N/mm"
-damping = "60 N*s/m"
-[linkage.springs.up]
-at = "Y"
-stiffness = "20 N/mm"
-damping = "40 N*s/m"
+[linkage.bodies]
+carriage = { points = { H = [0, 0] }, mass = "2 kg" }
+frame = { points = { P = [0, 0] }, mass = "7 kg" }
+rotor = { points = { P = [0, 0] }, mass = "1 kg", cog = ["10 mm", 0], inertia = "0.01 kg*m^2" }
+[linkage.slides]
+X = { body = "carriage", through = "O" }
+Y = { body = "frame", on = "carriage", through = "H", direction = "90 deg" }
+[linkage.springs]
+side = { at = "X", stiffness = "40 N/mm", damping = "60 N*s/m" }
+up = { at = "Y", stiffness = "20 N/mm", damping = "40 N*s/m" }
 [linkage.freedoms]
 rotor = { joint = "P", speed = "500 rpm" }
 across = "X"

@@ -408,9 +408,7 @@ class TestJumps:
 
     def test_an_open_motion_has_no_last_step(self) -> None:
         # where the one jump of a closed motion leads from the last rotation to the first
-        random = np.random.default_rng(1)
-        phi = np.arange(36) * pi / 18.0
-        found = 0
+        found, random, phi = 0, np.random.default_rng(1), np.arange(36) * pi / 18.0
         for _ in range(100):
             linkage, target = random_linkage(random), random_task(random, phi, path=True)
             closed = optimum(linkage, phi[:12], target[:12], guide_angle=0.3)
