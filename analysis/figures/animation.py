@@ -11,7 +11,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 
 from linkwork.errors import InputError
 
-from ..files import free_path, record_output
+from ..files import output
 from .style import Figure
 
 
@@ -28,17 +28,19 @@ def gif(figure: Figure, path: str | Path, frames_per_second: int) -> Iterator[tu
     If the current command may not overwrite the file, the GIF gets another name. The figure is laid out once, for the first
     frame, so that its panels do not move between frames.
     """
-    path = free_path(path)
-    path.parent.mkdir(parents=True, exist_ok=True)
     FigureCanvasAgg(figure)
     writer = PillowWriter(fps=frames_per_second, metadata={})
-    with writer.saving(figure, str(path), dpi=80):
 
-        def add() -> None:
-            if figure.get_layout_engine() is not None:
-                figure.draw_without_rendering()
-                figure.set_layout_engine("none")
-            writer.grab_frame()
+    def add() -> None:
+        if figure.get_layout_engine() is not None:
+            figure.draw_without_rendering()
+            figure.set_layout_engine("none")
+        writer.grab_frame()
 
+    # not by the writer's own context, which writes what there is after an error, too
+    with output(path) as (part, path):
+        draft = part.with_suffix(".gif")  # Pillow takes the format from the ending
+        writer.setup(figure, str(draft), dpi=80)
         yield path, add
-    record_output(path)
+        writer.finish()
+        draft.replace(part)

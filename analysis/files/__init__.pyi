@@ -11,9 +11,7 @@ from .drawings import save_figure as save_figure
 from .drawings import to_dxf as to_dxf
 from .drawings import to_svg as to_svg
 from .outputs import attribute_files as attribute_files
-from .outputs import free_path as free_path
 from .outputs import output as output
-from .outputs import record_output as record_output
 from .outputs import write_text as write_text
 from .paths import WritingError as WritingError
 from .paths import check_fmu as check_fmu

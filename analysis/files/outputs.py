@@ -56,10 +56,10 @@ def attribute_files(command: str, force: bool = False) -> Iterator[Writing]:
 @contextmanager
 def output(path: str | Path) -> Iterator[tuple[Path, Path]]:
     """Yield a temporary path to write to, and the final path, to which the file is moved when it is complete."""
-    path = free_path(path)
+    path = _free_path(path)
     with write_completely(path) as part:
         yield part, path
-    record_output(path)
+    _record_output(path)
 
 
 def write_text(path: str | Path, text: str) -> Path:
@@ -72,7 +72,7 @@ def write_text(path: str | Path, text: str) -> Path:
     return path
 
 
-def free_path(path: str | Path) -> Path:
+def _free_path(path: str | Path) -> Path:
     """Return the path, or a numbered path in the same folder if the current command may not overwrite the file ``path``."""
     path, writing = Path(path), _CURRENT.get()
     if writing is None or writing.force or _is_own(path, writing.command):
@@ -85,7 +85,7 @@ def free_path(path: str | Path) -> Path:
     return beside
 
 
-def record_output(path: Path) -> None:
+def _record_output(path: Path) -> None:
     """Record in the file ``.linkwork`` of the same folder that the current command wrote the file ``path``."""
     writing = _CURRENT.get()
     if writing is None:

@@ -17,6 +17,7 @@ from PIL import Image
 
 from analysis import Inputs, figures, simulate
 from analysis.figures import Curve, Panel, charts
+from analysis.figures.animation import gif
 from analysis.figures.curves import Arrow, Label
 from analysis.files import save_figure
 from analysis.mechanisms import MECHANISMS
@@ -297,6 +298,19 @@ def test_animation(run, tmp_path: Path) -> None:
 def test_animation_of_nothing(run, tmp_path: Path) -> None:
     with pytest.raises(InputError, match="at least 2"):
         figures.animate_linkage(WITH_POINT, run, tmp_path / "run.gif", frames=1)
+
+
+@pytest.mark.parametrize("frames", [0, 2])
+def test_an_animation_that_fails_is_not_written_and_says_why(tmp_path: Path, frames: int) -> None:
+    def fail() -> None:
+        with gif(figures.Figure(), tmp_path / "run.gif", 10) as (_, add):
+            for _ in range(frames):
+                add()
+            raise AssemblyError("too short")
+
+    with pytest.raises(AssemblyError, match="too short"):
+        fail()
+    assert list(tmp_path.iterdir()) == []
 
 
 def test_leaders_of_texts_cross_no_text_and_no_arrow() -> None:
