@@ -16,34 +16,7 @@ from linkwork.errors import InputError
 
 from ..mechanisms import PUBLISHED
 from ..units import RAD_S_PER_RPM, display_scale
-from .common import (
-    CHECK_FAILED,
-    ENDED_EARLY,
-    INTERRUPTED,
-    PARAMETERS,
-    RUN,
-    case_kind,
-    case_options,
-    changes,
-    check_kind,
-    chosen_case,
-    console,
-    escape_controls,
-    in_units,
-    number_or_text,
-    out_option,
-    output_folder,
-    plot_option,
-    print_error,
-    print_paths,
-    quantity,
-    report_errors,
-    say,
-    set_option,
-    show_table,
-    tolerance_option,
-    unknown_name_error,
-)
+from . import common
 
 #: A value below this share of the largest value in the same unit is a rounding error, and is printed as zero.
 _ROUNDING = 1e-12
@@ -60,7 +33,7 @@ class CaseChanges(TypedDict):
 
 
 @click.command()
-@case_options(PUBLISHED)
+@common.case_options(PUBLISHED)
 @click.option(
     "--fmu", type=click.Path(exists=True, dir_okay=False), help="Run this FMU instead of the in-process solver."
 )
@@ -72,10 +45,10 @@ class CaseChanges(TypedDict):
 @click.option("--method", default="compiled", help="compiled, balanced, Hamming, or a method of SciPy's solve_ivp.")
 @click.option("--stop-time", metavar="TIME", help="End of the run, such as '2 s'.")
 @click.option("--step", metavar="TIME", help="Step of the samples and of the co-simulation, such as '0.1 ms'.")
-@tolerance_option(help="Tolerance of the solver; 1e-9 by default.")
-@out_option(help="Folder for CSV and plot.")
-@plot_option
-@report_errors
+@common.tolerance_option(help="Tolerance of the solver; 1e-9 by default.")
+@common.out_option(help="Folder for CSV and plot.")
+@common.plot_option
+@common.report_errors
 def run(
     case: str | None,
     published: str | None,
@@ -103,53 +76,53 @@ def run(
     changed: dict[str, Any] = {name: value for name, value in given.items() if value is not None}
     for name in ("stop_time", "step"):
         if name in changed:
-            changed[name] = quantity(changed[name], "s", f"--{name.replace('_', '-')}")
+            changed[name] = common.quantity(changed[name], "s", f"--{name.replace('_', '-')}")
     if any(setting.startswith("run.revolutions=") for setting in settings) and "stop_time" in changed:
         raise click.UsageError("give --stop-time or --set run.revolutions, not both")
     if "stop_time" in changed and (case is not None or settings):
         # the stop time replaces the number of revolutions in the file
         settings = (*settings, f"run.stop_time={changed['stop_time']!r}")
-    chosen = chosen_case(case, published, settings)
+    chosen = common.chosen_case(case, published, settings)
     if fmu is not None and method != "compiled":
         raise click.UsageError("--method is for a run in process: the FMU brings its own")
     if fmu is None and interface is not None:
         raise click.UsageError("--interface is for a run through an FMU: give --fmu")
     chosen = replace(chosen, **changed)
-    common = {name: getattr(chosen, name) for name in ("initial", "stop_time", "step", "tolerance")}
-    common["progress"] = console.is_terminal
+    how = {name: getattr(chosen, name) for name in ("initial", "stop_time", "step", "tolerance")}
+    how["progress"] = common.console.is_terminal
     interrupted = False
     try:
         if fmu is not None:
             from ..run import cosimulate  # FMPy takes a tenth of a second
 
-            common |= {"interface": interface} if interface else {}
-            result = cosimulate(fmu, chosen.parameters, chosen.inputs, **common)
+            how |= {"interface": interface} if interface else {}
+            result = cosimulate(fmu, chosen.parameters, chosen.inputs, **how)
         else:
-            result = simulate(chosen.parameters, chosen.inputs, method=method, **common)
+            result = simulate(chosen.parameters, chosen.inputs, method=method, **how)
     except RunInterrupted as stopped:
         result, interrupted = stopped.trajectory, True
-    stem = output_folder(out) / ((Path(case).stem if case else str(published)) + ("-fmu" if fmu else ""))
+    stem = common.output_folder(out) / ((Path(case).stem if case else str(published)) + ("-fmu" if fmu else ""))
     written = [result.to_csv(f"{stem}.csv")]
     if plot and len(result) > 1:
         written.append(save_figure(figures.plot(result, title=chosen.title), f"{stem}.png"))
     _print_extremes(chosen.title, result)
-    say(describe_masses(chosen.masses)[0])
-    print_paths(written)
+    common.say(describe_masses(chosen.masses)[0])
+    common.print_paths(written)
     if fmu is not None and interface in (None, "co-simulation") and not chosen.inputs.held_exactly:
-        print_error(
+        common.print_error(
             f"note: inputs that vary over a step are sampled and held over it ({chosen.step:.3g} s), as any master does; "
             "a run in process lets them act continuously. Shorten --step until the result no longer changes."
         )
     if interrupted:
-        print_error(f"interrupted at t = {result.time[-1]:.6g} s; what was computed is kept")
-        sys.exit(INTERRUPTED)
+        common.print_error(f"interrupted at t = {result.time[-1]:.6g} s; what was computed is kept")
+        sys.exit(common.INTERRUPTED)
     if result.status:
-        print_error(f"the run ended early: {in_units(result.message, display_scale)}", "red")
+        common.print_error(f"the run ended early: {common.in_units(result.message, display_scale)}", "red")
         for sentence in _bare_speeds(case, settings, chosen):
-            print_error(sentence)
-        sys.exit(ENDED_EARLY)
+            common.print_error(sentence)
+        sys.exit(common.ENDED_EARLY)
     if result.message:
-        print_error(f"note: {result.message}")
+        common.print_error(f"note: {result.message}")
 
 
 def _bare_speeds(file: str | None, settings: Sequence[str], case: Any) -> list[str]:
@@ -160,7 +133,7 @@ def _bare_speeds(file: str | None, settings: Sequence[str], case: Any) -> list[s
 
     given = {
         **flatten(read_tables(file) if file else {}),
-        **changes(settings, number_or_text, "drive.speed='420 rpm'"),
+        **common.changes(settings, common.number_or_text, "drive.speed='420 rpm'"),
     }
     speeds = [name for name, acting in case_inputs(find_mechanism(case.parameters)).items() if acting.unit == "rad/s"]
     return [
@@ -191,14 +164,14 @@ def _print_extremes(title: str, result: Any) -> None:
         varies = x.max() - x.min() > _ROUNDING * largest[si]
         least, greatest = (place(x.argmin()), place(x.argmax())) if varies else ("", "")
         rows.append((name, unit, numbers[0], least, numbers[1], greatest, numbers[2]))
-    show_table(
+    common.show_table(
         f"{title}  ({result.source}, {len(result)} samples to t = {result.time[-1]:.6g} s)",
         headings,
         rows,
         words=headings[:2],
     )
     for event in result.events:
-        console.print(f"{event.name} at t = {event.time:.9g} s", highlight=False)
+        common.console.print(f"{event.name} at t = {event.time:.9g} s", highlight=False)
 
 
 def _places(result: Any) -> tuple[str, Callable[[Any], str]]:
@@ -251,9 +224,9 @@ def _with_magnitudes(result: Any) -> Iterator[tuple[str, Any, str]]:
     help="In-process method: compiled, Hamming, or one of SciPy's solve_ivp; can be given several times. Model exchange, which "
     "uses CVode, is compared with the first one only.",
 )
-@tolerance_option(default=1e-6, help="Largest relative difference that passes.")
-@out_option()
-@report_errors
+@common.tolerance_option(default=1e-6, help="Largest relative difference that passes.")
+@common.out_option()
+@common.report_errors
 def check(
     cases: Sequence[str],
     fmu: str | None,
@@ -289,7 +262,7 @@ def check(
         lines, verdicts = [], []
         for path, interface, words, method in runs:
             in_process, through_fmu, comparison = compare_case(
-                path, case, interface=interface, method=method, tolerance=tolerance, progress=console.is_terminal
+                path, case, interface=interface, method=method, tolerance=tolerance, progress=common.console.is_terminal
             )
             good = comparison.agrees and in_process.status == through_fmu.status
             marks = (path.stem.removeprefix(model)[1:], interface if interface != "co-simulation" else "")
@@ -301,7 +274,7 @@ def check(
                     f"{case.title}: {path.name}, {words}, less in process ({in_process.source})", comparison
                 )
             if not good or path == runs[0][0]:
-                _write_comparison(output_folder(out) / label, case, in_process, through_fmu)
+                _write_comparison(common.output_folder(out) / label, case, in_process, through_fmu)
             worst = comparison.worst
             verdicts.append(good)
             lines.append(
@@ -309,15 +282,15 @@ def check(
             )
         if len(runs) > len(methods):
             headings = ("FMU", "interface", "in process", "largest difference in", "relative", "verdict")
-            show_table(
+            common.show_table(
                 f"{case.title}, tolerance {tolerance:g}", headings, lines, words=headings[:4] + headings[5:],
                 styles=[None if good else "red" for good in verdicts],
             )  # fmt: skip
         count += len(runs)
     if failed:
-        print_error(f"check failed: {', '.join(failed)}", "red")
-        sys.exit(CHECK_FAILED)
-    console.print(f"{count} of {count} checks pass", style="green", highlight=False)
+        common.print_error(f"check failed: {', '.join(failed)}", "red")
+        sys.exit(common.CHECK_FAILED)
+    common.console.print(f"{count} of {count} checks pass", style="green", highlight=False)
 
 
 def _find_fmus(model: str, fmu: str | None, only: str | None) -> list[tuple[Path, str, str]]:
@@ -329,7 +302,7 @@ def _find_fmus(model: str, fmu: str | None, only: str | None) -> list[tuple[Path
     from ..run import CHECKED, list_interfaces
 
     if only is not None and only not in CHECKED:
-        raise unknown_name_error(only, CHECKED, f"interface {only!r} to check")
+        raise common.unknown_name_error(only, CHECKED, f"interface {only!r} to check")
     kinds = sorted(DEFAULT_FOLDER.glob(f"{model}-*.fmu")) if fmu is None else []
     first = DEFAULT_FOLDER / f"{model}.fmu" if fmu is None else Path(fmu)
     paths = [path for path in (first, *kinds) if path.is_file()] or [first]
@@ -365,7 +338,7 @@ def _find_cases(names: Sequence[str], fmu: str | None, everything: bool) -> list
         elif Path(name).suffix in (".toml", ".json"):
             chosen.append((Path(name).stem, load_case(name)))
         else:
-            raise unknown_name_error(name, CASES, f"standard case or case file {name!r}")
+            raise common.unknown_name_error(name, CASES, f"standard case or case file {name!r}")
     return chosen
 
 
@@ -400,15 +373,15 @@ def _write_comparison(stem: Path, case: Any, in_process: Any, through_fmu: Any) 
         labels=(f"in process ({in_process.source})", "FMU"),
     )
     save_figure(figure, f"{stem}.png")
-    say(f"wrote {stem}.png, -in-process.csv and -fmu.csv")
+    common.say(f"wrote {stem}.png, -in-process.csv and -fmu.csv")
     for which, result in (("in process", in_process), ("FMU", through_fmu)):
         if result.status:
-            print_error(f"{which}: the run ended early: {result.message}")
+            common.print_error(f"{which}: the run ended early: {result.message}")
 
 
 def _print_comparison(title: str, comparison: Any) -> None:
     verdicts = ["pass" if d.relative <= comparison.tolerance else "FAIL" for d in comparison.differences]
-    show_table(
+    common.show_table(
         f"{title}, tolerance {comparison.tolerance:g}",
         ("output", "unit", "largest difference", "rms", "relative", "verdict"),
         [
@@ -422,7 +395,7 @@ def _print_comparison(title: str, comparison: Any) -> None:
 
 @click.command()
 @click.argument("what", required=False)
-@report_errors
+@common.report_errors
 def info(what: str | None) -> None:
     """Describe WHAT: a mechanism, a published set, a parameter file, a case file or an FMU.
 
@@ -442,11 +415,11 @@ def info(what: str | None) -> None:
 
     if what is None:
         kinds = [(m.name, m.title, f"{m.fmu}.fmu") for m in MECHANISMS.values()]
-        show_table("mechanisms", ("name", "what it is", "FMU"), kinds, words=("name", "what it is", "FMU"))
+        common.show_table("mechanisms", ("name", "what it is", "FMU"), kinds, words=("name", "what it is", "FMU"))
         sets = [(name, entry.source, f"{entry.crank_speed / RAD_S_PER_RPM:g}") for name, entry in PUBLISHED.items()]
-        show_table("published sets", ("name", "source", "speed [rpm]"), sets, words=("name", "source"))
+        common.show_table("published sets", ("name", "source", "speed [rpm]"), sets, words=("name", "source"))
         place = cache_root()
-        say(f"linkwork {__version__}; compiled code is kept in {place}")
+        common.say(f"linkwork {__version__}; compiled code is kept in {place}")
     elif what in PUBLISHED:
         _print_parameters(PUBLISHED[what].source, PUBLISHED[what].parameters)
     elif what in MECHANISMS:
@@ -454,15 +427,15 @@ def info(what: str | None) -> None:
     elif Path(what).suffix == ".fmu":
         _print_fmu(Path(what))
     elif Path(what).suffix in (".toml", ".json"):
-        check_kind(what, RUN, PARAMETERS)
-        if case_kind(read_tables(what)) == PARAMETERS:
+        common.check_kind(what, common.RUN, common.PARAMETERS)
+        if common.case_kind(read_tables(what)) == common.PARAMETERS:
             _print_parameters(Path(what).stem, load_parameters(what))
         else:
             case = load_case(what)
             _print_parameters(case.title, case.parameters)
-            say(describe_masses(case.masses)[0])
+            common.say(describe_masses(case.masses)[0])
     else:
-        raise unknown_name_error(
+        raise common.unknown_name_error(
             what, (*MECHANISMS, *PUBLISHED), f"mechanism, published set, case file or FMU {what!r}"
         )
 
@@ -479,7 +452,7 @@ def _print_mechanism(mechanism: Any) -> None:
         *((v.name, v.unit, v.description) for v in parameters),
         *((name, unit, inputs.get(argument, "true or false")) for name, (argument, unit) in what.items()),
     ]
-    show_table(
+    common.show_table(
         mechanism.title, ("in a case file", "unit", "meaning"), rows, words=("in a case file", "unit", "meaning")
     )
 
@@ -496,15 +469,17 @@ def _print_parameters(title: str, parameters: Any) -> None:
     mechanism = find_mechanism(parameters)
     values = [(v, getattr(parameters, field_name(v.name))) for v in mechanism.mechanism_variables.values()]
     rows = [(v.name, f"{value:.9g}", v.unit, v.description) for v, value in values]
-    show_table(title, ("parameter", "value", "unit", "meaning"), rows, words=("parameter", "unit", "meaning"))
+    common.show_table(title, ("parameter", "value", "unit", "meaning"), rows, words=("parameter", "unit", "meaning"))
     if mechanism is SLIDER_CRANK:
-        console.print("where it can be assembled, dead centres, stroke: linkwork slider-crank info", highlight=False)
+        common.console.print(
+            "where it can be assembled, dead centres, stroke: linkwork slider-crank info", highlight=False
+        )
     if mechanism is not FIVE_BAR:
         return
     p = parameters.constants()
     clearance = min(assembly_square(float(angle), 0.0, p) for angle in np.linspace(0.0, 2.0 * np.pi, 721))
     turns = "turns fully" if clearance > 0.0 else "does not turn fully"
-    console.print(f"with the slider at zero the crank {turns}", highlight=False)
+    common.console.print(f"with the slider at zero the crank {turns}", highlight=False)
 
 
 def _print_fmu(path: Path) -> None:
@@ -524,24 +499,26 @@ def _print_fmu(path: Path) -> None:
             return ""
         return f"{float(variable.start):.6g}" if variable.type in ("Real", "Float64") else str(variable.start)
 
-    show_table(
+    common.show_table(
         f"{description.modelName} {description.version}, FMI {description.fmiVersion}, {description.guid}",
         ("variable", "causality", "start", "unit", "description"),
         [(v.name, v.causality, start(v), v.unit or "", v.description) for v in description.modelVariables],
         words=("variable", "causality", "unit", "description"),
     )
     problems = validate_fmu(str(path))
-    console.print(escape_controls("; ".join(problems) or "valid"), style="red" if problems else "green", markup=False)
+    common.console.print(
+        common.escape_controls("; ".join(problems) or "valid"), style="red" if problems else "green", markup=False
+    )
     if problems:
-        sys.exit(CHECK_FAILED)
+        sys.exit(common.CHECK_FAILED)
 
 
 @click.command()
 @click.argument("numbers", nargs=-1)
-@out_option("out/figures", help="Folder.")
-@set_option("rod.length='45 in'; bare numbers are in SI. The verdicts are then on the changed mechanism")
+@common.out_option("out/figures", help="Folder.")
+@common.set_option("rod.length='45 in'; bare numbers are in SI. The verdicts are then on the changed mechanism")
 @click.option("--list", "listing", is_flag=True, help="Only list the figures, with what each is about.")
-@report_errors
+@common.report_errors
 def figures(numbers: Sequence[str], out: str, settings: Sequence[str], listing: bool) -> None:
     """Make the figures of the theses: plots, CSV, and each statement of the thesis with a verdict. Also draw the linkage.
 
@@ -564,26 +541,28 @@ def figures(numbers: Sequence[str], out: str, settings: Sequence[str], listing: 
         about = sentences()
         for number, study in STUDIES.items():
             place = ENTRIES[number].place
-            console.print(
+            common.console.print(
                 f"{number:>8}  {study}{place and f' ({place})'}", highlight=False, markup=False, soft_wrap=True
             )
             for sentence in about[number]:
-                console.print(f"{'':>10}{sentence}", highlight=False, markup=False, soft_wrap=True)
+                common.console.print(f"{'':>10}{sentence}", highlight=False, markup=False, soft_wrap=True)
         return
-    values = changes(settings, number_or_text, "rod.length='45 in'")
+    values = common.changes(settings, common.number_or_text, "rod.length='45 in'")
     if values and not numbers:
         raise click.UsageError("name the figures whose mechanism --set changes, such as linkwork figures R5 --set ...")
     for number in numbers:
         if number not in STUDIES:
-            raise unknown_name_error(number, STUDIES, f"figure {number}")
+            raise common.unknown_name_error(number, STUDIES, f"figure {number}")
     for number in numbers or STUDIES:
-        with console.status(f"figure {number}"):
+        with common.console.status(f"figure {number}"):
             result, paths = make(number, Path(out), values)
         wrote = f": wrote {', '.join(p.name for p in paths)}" if paths else ""
-        console.print(f"[bold]{number}[/bold]  {result.title}{wrote}", highlight=False)
+        common.console.print(f"[bold]{number}[/bold]  {result.title}{wrote}", highlight=False)
         if values:
-            console.print("  with changed parameters: the verdicts are on the changed mechanism, not on the thesis")
+            common.console.print(
+                "  with changed parameters: the verdicts are on the changed mechanism, not on the thesis"
+            )
         if result.see:
-            console.print(f"  statements that concern it are judged at {result.see}", highlight=False)
+            common.console.print(f"  statements that concern it are judged at {result.see}", highlight=False)
         for statement in result.statements:
-            console.print(indent(str(statement), "  "), highlight=False, markup=False, soft_wrap=True)
+            common.console.print(indent(str(statement), "  "), highlight=False, markup=False, soft_wrap=True)

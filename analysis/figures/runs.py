@@ -16,21 +16,8 @@ from linkwork.variables import UNITS, Variable
 
 from ..mechanisms import MECHANISMS, find_mechanism, wrapping_outputs
 from ..run import Trajectory
+from . import style
 from .dispatch import draw_mechanism, has_picture, plot
-from .style import (
-    COLOURS,
-    HAIR,
-    LINES,
-    MARKED,
-    SMALL,
-    Figure,
-    figure_style,
-    finish,
-    legend_above,
-    name_in_words,
-    write_notes,
-    write_title,
-)
 
 FloatArray: TypeAlias = NDArray[np.float64]
 
@@ -67,7 +54,7 @@ def plot_outputs(
     *,
     columns: int = 1,
     title: str = "",
-) -> Figure:
+) -> style.Figure:
     """Plot a run: outputs over time, and the mechanism at the start with the paths of its points.
 
     Lengths are in mm, angles in degrees and speeds in rpm, by the units of the mechanism's table of variables.
@@ -93,10 +80,10 @@ def plot_outputs(
         notes.append(f"The run ended early: {run.message}.")
     elif run.message:
         notes.append(f"Note: {run.message}.")
-    with figure_style():
+    with style.figure_style():
         grid = _picture_grid(len(panels)) if picture else _column_grid(len(panels), columns)
         width, height = (2 * _BESIDE, 1.15 * _HEIGHT) if picture else (_WIDTH * columns, _HEIGHT)
-        figure = Figure(figsize=(width, 1.0 + height * len(grid)))
+        figure = style.Figure(figsize=(width, 1.0 + height * len(grid)))
         cells = figure.add_gridspec(*grid.shape)
 
         def place(number: int, **options: Any) -> Axes:
@@ -117,12 +104,12 @@ def plot_outputs(
             figure.align_ylabels(of_panels)
         if picture:
             axis = place(_DRAWN)
-            axis.set_title(draw_mechanism(run.parameters, axis, run), fontsize=SMALL, color=MARKED)
-        write_title(figure, title)
+            axis.set_title(draw_mechanism(run.parameters, axis, run), fontsize=style.SMALL, color=style.MARKED)
+        style.write_title(figure, title)
         if any(is_fast(values) for panel in panels for values in panel.curves.values()):
             notes.append(BANDS)
-        write_notes(figure, notes)
-        return finish(figure)
+        style.write_notes(figure, notes)
+        return style.finish(figure)
 
 
 def _column_grid(count: int, columns: int) -> NDArray[np.int64]:
@@ -146,10 +133,10 @@ def _draw(axis: Axes, time: FloatArray, panel: _Rows) -> None:
         axis.set_axis_off()
         return
     for number, (name, values) in enumerate(panel.curves.items()):
-        draw_over_time(axis, time, values, label=name, line=LINES[number % len(LINES)])
+        draw_over_time(axis, time, values, label=name, line=style.LINES[number % len(style.LINES)])
     axis.set_ylabel(panel.label)
     if any(panel.curves):
-        legend_above(axis)
+        style.legend_above(axis)
 
 
 def draw_over_time(axis: Axes, time: FloatArray, values: FloatArray, *, label: str = "", line: Any = "-") -> None:
@@ -163,7 +150,7 @@ def draw_over_time(axis: Axes, time: FloatArray, values: FloatArray, *, label: s
     (drawn,) = axis.plot(middle, [_smooth_mean(values[part]) for part in parts], line, label=label or None)
     colour = drawn.get_color()
     # edges tell overlapping bands apart
-    axis.fill_between(middle, *ends.T, facecolor=(colour, 0.15), edgecolor=(colour, 0.6), linewidth=HAIR)
+    axis.fill_between(middle, *ends.T, facecolor=(colour, 0.15), edgecolor=(colour, 0.6), linewidth=style.HAIR)
 
 
 def _smooth_mean(values: FloatArray) -> float:
@@ -208,7 +195,7 @@ def display_unit(variable: Variable) -> tuple[str, float]:
 def _output_row(run: Trajectory, table: Mapping[str, Variable], name: str) -> _Rows:
     values = run.unwrapped(name)  # raises an error for an unknown name
     unit, factor = display_unit(table[name])
-    return _Rows(name=name_in_words(name), unit=unit, curves={"": factor * values})
+    return _Rows(name=style.name_in_words(name), unit=unit, curves={"": factor * values})
 
 
 def _default_rows(run: Trajectory, table: Mapping[str, Variable]) -> list[_Rows]:
@@ -270,7 +257,7 @@ def plot_comparison(
     *,
     title: str = "",
     labels: tuple[str, str] = ("first", "second"),
-) -> Figure:
+) -> style.Figure:
     """Plot each output of two runs in a row of its own, and beside it the difference: the second run minus the first.
 
     A difference that is only rounding is stated in words; if all differences are only rounding, this is stated at the foot.
@@ -293,27 +280,27 @@ def plot_comparison(
     ]
     said = [_rounding_text(a, b, unit) for (a, b), (unit, _) in zip(pairs, units)]
     beside = not all(said)
-    with figure_style():
-        figure = Figure(figsize=(9.6 if beside else 7.2, 0.9 + 1.8 * len(names)))
+    with style.figure_style():
+        figure = style.Figure(figsize=(9.6 if beside else 7.2, 0.9 + 1.8 * len(names)))
         rows = figure.subplots(len(names), 1 + beside, sharex=True, squeeze=False, width_ratios=(3, 2)[: 1 + beside])
         for axes, name, (unit, _), (a, b), size in zip(rows, names, units, pairs, said):
-            for values, label, colour, line in zip((a, b), labels, COLOURS, LINES):
+            for values, label, colour, line in zip((a, b), labels, style.COLOURS, style.LINES):
                 axes[0].plot(time, values, line, color=colour, label=label)
-            axes[0].set_ylabel(f"{name_in_words(name)}\n[{unit}]")
+            axes[0].set_ylabel(f"{style.name_in_words(name)}\n[{unit}]")
             if beside:
                 _draw_difference(axes[1], time, b - a, unit, size)
-        legend_above(rows[0, 0])
+        style.legend_above(rows[0, 0])
         if beside:
             rows[0, 1].set_title(f"{labels[1]} less {labels[0]}")
         else:
-            each = ", ".join(f"{name_in_words(name)} by {size}" for name, size in zip(names, said) if size != "0")
+            each = ", ".join(f"{style.name_in_words(name)} by {size}" for name, size in zip(names, said) if size != "0")
             apart = f"differ by rounding only: {each} at most" if each else "are identical"
-            write_notes(figure, [f"{labels[0]} and {labels[1]} {apart}."])
+            style.write_notes(figure, [f"{labels[0]} and {labels[1]} {apart}."])
         for axis in rows[-1]:
             axis.set_xlabel("time [s]")
-        write_title(figure, title)
+        style.write_title(figure, title)
         figure.align_ylabels()
-        return finish(figure)
+        return style.finish(figure)
 
 
 def _side_by_side(first: Trajectory, second: Trajectory, name: str, n: int) -> tuple[FloatArray, FloatArray]:
@@ -332,10 +319,10 @@ def _rounding_text(a: FloatArray, b: FloatArray, unit: str) -> str:
 
 def _draw_difference(axis: Axes, time: FloatArray, difference: FloatArray, unit: str, size: str) -> None:
     if not size:
-        axis.plot(time, difference, color=MARKED)
+        axis.plot(time, difference, color=style.MARKED)
         axis.set_ylabel(f"difference\n[{unit}]")
         return
     words = "identical" if size == "0" else f"identical but for rounding,\n{size} at most"
-    axis.text(0.5, 0.5, words, transform=axis.transAxes, ha="center", va="center", color=MARKED)
+    axis.text(0.5, 0.5, words, transform=axis.transAxes, ha="center", va="center", color=style.MARKED)
     axis.set_yticks([])
     axis.grid(visible=False)

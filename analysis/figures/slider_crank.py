@@ -16,27 +16,13 @@ from numpy.typing import NDArray
 from linkwork.errors import InputError
 
 from ..slider_crank import JOINTS, QUANTITIES, SLIDER_FORCE, SYMBOLS, ForceTurn, MonteCarlo, shown_units
+from . import style
 from .curves import Curve, Panel, plot_curves
 from .dispatch import plot
-from .style import (
-    BOLD,
-    COLOURS,
-    HAIR,
-    LINE,
-    MARK,
-    PLAIN,
-    SMALL,
-    THIN,
-    figure_style,
-    finish,
-    name_in_words,
-    write_notes,
-    write_title,
-)
 
 FloatArray = NDArray[np.float64]
 
-_LINEAR, _SAMPLES, _SECOND, _WORST = COLOURS[0], COLOURS[1], COLOURS[2], "0.45"
+_LINEAR, _SAMPLES, _SECOND, _WORST = style.COLOURS[0], style.COLOURS[1], style.COLOURS[2], "0.45"
 #: If greatest/median error over the turn is above the first number, the axis is cut at the second number times the median.
 _PEAK, _CUT = 12.0, 4.0
 #: If the shares to second order differ by less than this from those to first order, they are not drawn.
@@ -195,7 +181,7 @@ def plot_tolerances(
     foot = [f"{found.samples:,} samples at each angle; {lost if most else 'all can be assembled'}."]
     foot += [f"{note[0].upper()}{note[1:]}." for note in found.notes(units)]
     lines = sum(len(fill(note, _LETTERS).splitlines()) for note in foot) - 1
-    with figure_style():
+    with style.figure_style():
         figure = Figure(figsize=(9.6, 7.0 + 0.16 * lines))
         above, below = np.ravel(figure.subfigures(2, 1, squeeze=False, height_ratios=(1.0, 1.0 + 0.03 * lines)))
         band = above.subplots()
@@ -205,9 +191,9 @@ def plot_tolerances(
         band.set_ylabel(f"error of {name} [{unit}]")
         histogram.set_xlabel(f"error of {name} [{unit}]")
         _draw_shares(bars, found, quantity, at)
-        write_notes(below, foot)
-        write_title(figure, title or f"Tolerances: {name}")
-        return finish(figure)
+        style.write_notes(below, foot)
+        style.write_title(figure, title or f"Tolerances: {name}")
+        return style.finish(figure)
 
 
 def _draw_band(axis: Axes, found: MonteCarlo, quantity: str, at: int, one: float) -> None:
@@ -221,9 +207,9 @@ def _draw_band(axis: Axes, found: MonteCarlo, quantity: str, at: int, one: float
     three = curve(3.0 * linear.deviation)
     axis.fill_between(whole, -three, three, color=_LINEAR, alpha=0.18, linewidth=0.0, label=r"linear, $\pm 3\,\sigma$")
     low, lower, _, upper, high = spread.percentiles - linear.nominal
-    dashed: dict[str, Any] = {"color": _WORST, "linewidth": THIN, "linestyle": "--"}
-    thin: dict[str, Any] = {"color": _SAMPLES, "linewidth": HAIR, "alpha": 0.7}
-    mean: dict[str, Any] = {"color": "black", "linewidth": LINE, "linestyle": ":"}
+    dashed: dict[str, Any] = {"color": _WORST, "linewidth": style.THIN, "linestyle": "--"}
+    thin: dict[str, Any] = {"color": _SAMPLES, "linewidth": style.HAIR, "alpha": 0.7}
+    mean: dict[str, Any] = {"color": "black", "linewidth": style.LINE, "linestyle": ":"}
     for values, look, label in (
         (linear.worst, dashed, "linear, worst case"),
         (-linear.worst, dashed, None),
@@ -234,9 +220,9 @@ def _draw_band(axis: Axes, found: MonteCarlo, quantity: str, at: int, one: float
         (spread.mean - linear.nominal, mean, "mean of the samples"),
     ):
         axis.plot(whole, curve(values), label=label, **look)
-    axis.axvline(angle[at], color=MARK["color"], linewidth=THIN, linestyle="-.")
+    axis.axvline(angle[at], color=style.MARK["color"], linewidth=style.THIN, linestyle="-.")
     for pole in found.poles(quantity):
-        axis.axvline(np.degrees(pole), color=MARK["color"], linewidth=THIN, linestyle=":")
+        axis.axvline(np.degrees(pole), color=style.MARK["color"], linewidth=style.THIN, linestyle=":")
     # at each angle the largest departure that is not NaN, if there is one
     departures = [low, lower, upper, high, linear.worst]
     reach = np.fmax.reduce([np.abs(np.ma.filled(values, np.nan)) for values in departures], axis=0) / one
@@ -273,10 +259,12 @@ def _draw_histogram(axis: Axes, found: MonteCarlo, quantity: str, at: int, unit:
         axis.plot(fine, curve, color=_LINEAR, label="linear estimate, normal")
         for place in (-3.0 * deviation, 3.0 * deviation):
             if edges[0] <= place <= edges[-1]:
-                axis.axvline(place, ymax=0.55, color=_LINEAR, linewidth=THIN, linestyle="--")
-                axis.text(place, 0.6, r"$3\,\sigma$", transform=axis.get_xaxis_transform(), ha="center", fontsize=SMALL)
+                axis.axvline(place, ymax=0.55, color=_LINEAR, linewidth=style.THIN, linestyle="--")
+                axis.text(
+                    place, 0.6, r"$3\,\sigma$", transform=axis.get_xaxis_transform(), ha="center", fontsize=style.SMALL
+                )
     elif isfinite(deviation):
-        axis.axvline(0.0, ymax=0.72, color=_LINEAR, linewidth=BOLD, label="linear estimate: no spread")
+        axis.axvline(0.0, ymax=0.72, color=_LINEAR, linewidth=style.BOLD, label="linear estimate: no spread")
     sigmas = {"of the samples": of_samples, "linear": deviation, "to second order": second}
     lines = [f"$\\sigma$ {what} {_number_text(x)} {unit}" for what, x in sigmas.items() if isfinite(x)]
     axis.set_ylabel("share of the samples")
@@ -286,10 +274,10 @@ def _draw_histogram(axis: Axes, found: MonteCarlo, quantity: str, at: int, unit:
     axis.set_title(
         f"at {np.degrees(found.turn.angle[at]):.4g} deg, nominal {_number_text(nominal / one, 6)} {unit}; "
         f"{spread.counts[at].sum() / found.samples:.1%} of the samples",
-        fontsize=PLAIN,
+        fontsize=style.PLAIN,
     )
     axis.legend(loc="upper left")
-    axis.text(0.985, 0.97, "\n".join(lines), transform=axis.transAxes, ha="right", va="top", fontsize=SMALL)
+    axis.text(0.985, 0.97, "\n".join(lines), transform=axis.transAxes, ha="right", va="top", fontsize=style.SMALL)
 
 
 def _draw_shares(axis: Axes, found: MonteCarlo, quantity: str, at: int) -> None:
@@ -307,7 +295,7 @@ def _draw_shares(axis: Axes, found: MonteCarlo, quantity: str, at: int) -> None:
         none = "no variance to first or second order"
         if np.ma.getmaskarray(estimate.deviation)[at]:
             none = "no variance: a dead centre is within the tolerances"
-        axis.text(0.5, 0.5, none, ha="center", va="center", fontsize=PLAIN)
+        axis.text(0.5, 0.5, none, ha="center", va="center", fontsize=style.PLAIN)
         axis.set_axis_off()
         return
     height = 0.66 / len(orders)
@@ -315,12 +303,12 @@ def _draw_shares(axis: Axes, found: MonteCarlo, quantity: str, at: int) -> None:
         places = np.arange(len(names)) + height * (0.5 * (len(orders) - 1) - number)
         bars = axis.barh(places, shares[:, column], color=colour, alpha=0.8, height=height, label=label)
         labels = [f"{share:.1%}" if share >= 5e-4 else "< 0.1%" for share in shares[:, column]]
-        axis.bar_label(bars, labels, padding=3, fontsize=SMALL)
+        axis.bar_label(bars, labels, padding=3, fontsize=style.SMALL)
     if second:
         axis.legend(loc="lower right")
     axis.set_yticks(
         np.arange(len(names)),
-        [name_in_words(name) + (f" ${SYMBOLS[name]}$" if name in SYMBOLS else "") for name in names],
+        [style.name_in_words(name) + (f" ${SYMBOLS[name]}$" if name in SYMBOLS else "") for name in names],
     )
     axis.set_xlim(0.0, 1.22 * float(np.nanmax(shares)))
     axis.xaxis.set_major_formatter(PercentFormatter(1.0, decimals=0))
