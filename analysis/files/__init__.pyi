@@ -40,7 +40,6 @@ from .structured import override as override
 from .structured import read_tables as read_tables
 from .structured import write_tables as write_tables
 from .tables import load_array as load_array
-from .tables import read_columns as read_columns
 from .tables import read_record as read_record
 from .tables import read_rows as read_rows
 from .tables import save_array as save_array

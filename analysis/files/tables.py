@@ -102,11 +102,6 @@ _FORMULA = tuple("=+-@")
 _SPLITTING = ',;\t"'
 
 
-def read_columns(path: str | Path, names: Sequence[str | None]) -> list[NDArray[np.float64]]:
-    """Read columns of numbers from a CSV file as they are; see `read_record`."""
-    return read_record(path, names)[1]
-
-
 def read_record(
     path: str | Path, names: Sequence[str | None] | None = None
 ) -> tuple[list[str], list[NDArray[np.float64]]]:

@@ -32,7 +32,7 @@ from analysis.files import (
     load_array,
     override,
     read,
-    read_columns,
+    read_record,
     read_rows,
     reader,
     save_array,
@@ -316,7 +316,7 @@ def test_a_file_that_was_there_stays_where_writing_is_interrupted(tmp_path, monk
 def test_an_empty_csv_is_refused_in_a_sentence(tmp_path, text):
     (tmp_path / "x.csv").write_text(text)
     with pytest.raises(InputError, match=r"x\.csv has no numbers: it must have rows of numbers"):
-        read_columns(tmp_path / "x.csv", ("t",))
+        read_record(tmp_path / "x.csv", ("t",))
 
 
 @pytest.mark.parametrize(
@@ -369,8 +369,8 @@ def test_blocks_make_the_same_file_as_one(tmp_path, monkeypatch):
 @pytest.mark.parametrize("mark", [",", ";", "\t"])
 def test_columns_are_between_what_the_first_line_has(tmp_path, mark):
     (tmp_path / "x.csv").write_text(f't{mark}u [m]{mark}note\n0{mark}1{mark}a\n2{mark}3{mark}"b;c,d\te"\n')
-    assert np.column_stack(read_columns(tmp_path / "x.csv", ["u", None])).tolist() == [[1.0, 1.0], [3.0, 3.0]]
-    assert read_columns(tmp_path / "x.csv", ["t"])[0].tolist() == [0.0, 2.0]
+    assert np.column_stack(read_record(tmp_path / "x.csv", ["u", None])[1]).tolist() == [[1.0, 1.0], [3.0, 3.0]]
+    assert read_record(tmp_path / "x.csv", ["t"])[1][0].tolist() == [0.0, 2.0]
 
 
 def test_csv_columns_of_different_length_are_refused(tmp_path):
@@ -380,7 +380,7 @@ def test_csv_columns_of_different_length_are_refused(tmp_path):
 
 def test_csv_and_arrays_are_read_back(tmp_path):
     path = write_csv(tmp_path / "x.csv", {"a [m]": [0.1, 2.0], "fx, fy": [1.0, 1 / 3]})
-    assert np.column_stack(read_columns(path, (None, None))).tolist() == [[0.1, 1.0], [2.0, 1 / 3]]
+    assert np.column_stack(read_record(path, (None, None))[1]).tolist() == [[0.1, 1.0], [2.0, 1 / 3]]
     assert float(read_rows(path)[1]["fx, fy"]) == 1 / 3
     assert np.array_equal(load_array(save_array(tmp_path / "deep" / "x.npy", [[1.0, 2.0]])), [[1.0, 2.0]])
     assert load_array(tmp_path / "none.npy") is load_array(tmp_path) is None
@@ -391,13 +391,13 @@ def test_csv_and_arrays_are_read_back(tmp_path):
 @pytest.mark.parametrize("head", ["", "t,x # seconds\n", "# t,x\n"])
 def test_columns_need_no_header_line_and_may_have_comments(tmp_path, head):
     (tmp_path / "x.csv").write_text(f"{head}0,1 # start\n\n# later\n2,3\n")
-    assert np.column_stack(read_columns(tmp_path / "x.csv", (None, None))).tolist() == [[0.0, 1.0], [2.0, 3.0]]
+    assert np.column_stack(read_record(tmp_path / "x.csv", (None, None))[1]).tolist() == [[0.0, 1.0], [2.0, 3.0]]
 
 
 def test_a_cell_of_any_length_is_a_sentence(tmp_path):
     (tmp_path / "x.csv").write_text(f"t\n{'1' * 200_000}\n")
     with pytest.raises(InputError, match=r"x\.csv cannot be read: field larger than field limit"):
-        read_columns(tmp_path / "x.csv", ("t",))
+        read_record(tmp_path / "x.csv", ("t",))
 
 
 def test_an_unknown_name_of_any_length_is_cut_in_the_message() -> None:

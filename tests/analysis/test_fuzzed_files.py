@@ -17,7 +17,7 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from analysis.files import check_fmu, load_array, read_columns, read_points, read_rows, read_tables, save_array
+from analysis.files import check_fmu, load_array, read_points, read_record, read_rows, read_tables, save_array
 from analysis.run import load_case, load_parameters
 from analysis.slider.cases import linkage_from_csv, load_slider_case
 from analysis.synthesis import load_synthesis_case
@@ -85,12 +85,12 @@ def bounded(examples: int) -> Any:
 
 
 READERS: dict[str, Callable[[Path], Any]] = {
-    "x.csv": partial(read_columns, names=(None, None)),
+    "x.csv": partial(read_record, names=(None, None)),
     "rows.csv": read_rows,
     "curve.csv": read_points,
     "curve.svg": read_points,
     "linkage.csv": linkage_from_csv,
-    "x.csv.gz": partial(read_columns, names=(None, None)),
+    "x.csv.gz": partial(read_record, names=(None, None)),
     "x.toml": read_tables,
     "x.json": read_tables,
     "run.toml": load_case,

@@ -22,8 +22,8 @@ from analysis.files import (
     check_fmu,
     outputs,
     paths,
-    read_columns,
     read_points,
+    read_record,
     read_rows,
     read_tables,
     save_array,
@@ -39,7 +39,7 @@ from linkwork.five_bar.published import TABLE_3_1
 
 
 def read_two_columns(path):
-    return [column.tolist() for column in read_columns(path, (None, None))]
+    return [column.tolist() for column in read_record(path, (None, None))[1]]
 
 
 @pytest.mark.parametrize(
@@ -78,7 +78,7 @@ def test_large_files_are_refused_until_the_limit_is_raised(tmp_path, monkeypatch
     with pytest.raises(InputError, match=r"more than 1 MB of text: give LINKWORK_MAX_FILE_MB a greater number"):
         read_two_columns(path)
     monkeypatch.setenv("LINKWORK_MAX_FILE_MB", "3")
-    assert len(read_columns(path, ("t",))[0]) == 500_000
+    assert len(read_record(path, ("t",))[1][0]) == 500_000
     monkeypatch.setenv("LINKWORK_MAX_FILE_MB", "much")
     with pytest.raises(InputError, match="LINKWORK_MAX_FILE_MB is 'much': it must be a whole number"):
         read_two_columns(path)
@@ -381,7 +381,7 @@ def test_the_option_force(tmp_path, linkwork):
         result = linkwork(*words, *force)
         assert "wrote out/table-3.1.csv" in result.stdout
         assert not result.stderr
-    assert len(read_columns(tmp_path / "out" / "table-3.1.csv", ("time",))[0]) > 1
+    assert len(read_record(tmp_path / "out" / "table-3.1.csv", ("time",))[1][0]) > 1
     assert outputs.RECORD in os.listdir(tmp_path / "out")
 
 
@@ -391,7 +391,7 @@ def test_cells_are_not_executed(tmp_path, text):
     names = list(read_rows(path)[0])
     assert names[0][0] == "'"
     assert names[1:] == ["-1.5", 'a "b", c', "two lines"]
-    assert read_columns(path, [None] * 4) == [1.0, 2.0, -3.0, 4.0]
+    assert read_record(path, [None] * 4)[1] == [1.0, 2.0, -3.0, 4.0]
 
 
 # Messages

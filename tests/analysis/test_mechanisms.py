@@ -20,7 +20,7 @@ from scipy.linalg import expm
 
 from analysis import Inputs, compare, cosimulate, simulate
 from analysis.export import build
-from analysis.files import read_columns
+from analysis.files import read_record
 from analysis.linear import (
     PeriodicModel,
     SampledController,
@@ -211,7 +211,7 @@ def test_pendulum_swings_as_by_hand() -> None:
 
 def test_a_published_set_that_nothing_drives_runs_from_the_command_line(linkwork: Callable[..., Result]) -> None:
     assert linkwork("run", "--published", "pendulum-demo", "--no-plot").exit_code == 0
-    time, angle = read_columns("out/pendulum-demo.csv", ("time", "pendulum.angle"))
+    time, angle = read_record("out/pendulum-demo.csv", ("time", "pendulum.angle"))[1]
     known = demo(PENDULUM)
     swung = solve_ivp(
         right_side(PENDULUM, known.parameters.constants(), {"torque": 0.0}), (0.0, 1.0), (0.0, 30.0), rtol=1e-9
