@@ -65,6 +65,13 @@ class Decay:
     offset: float
     residual: float
 
+    def __repr__(self) -> str:
+        return (
+            f"<Decay: {len(self.time)} turning points, damping ratio {self.damping_ratio:.6g} +- "
+            f"{self.damping_ratio_error:.2g}, natural frequency {self.natural_frequency:.6g} +- "
+            f"{self.natural_frequency_error:.2g} rad/s>"
+        )
+
     @property
     def damping_ratio(self) -> float:
         """Damping relative to critical damping."""

@@ -67,7 +67,9 @@ def takes_published(**fills: Fill) -> Callable[[_Function], _Function]:
                 sets = [None if known is None else _without_drives(known, varied) for known in sets]
             for name, fill in fills.items():
                 value: Any = bound.get(name)
-                own_each = several and isinstance(value, (list, tuple)) and len(value) == len(sets)
+                own_each = several and isinstance(value, (list, tuple))
+                if own_each and len(value) != len(sets):
+                    raise InputError(f"{name} has {len(value)} entries for {len(sets)} sets: give one, or as many")
                 values = value if own_each else [value] * len(sets)
                 filled = [v if known is None else fill(known, v) for known, v in zip(sets, values)]
                 bound[name] = filled if several else filled[0]

@@ -88,9 +88,12 @@ class Ensemble:
     energies: NDArray[np.float64]
 
     def __repr__(self) -> str:
-        early = int(np.count_nonzero(self.status))
+        missing = int(np.count_nonzero(self.status == NOT_RUN))
+        early = int(np.count_nonzero(self.status)) - missing
         over = f"{len(self.time)} samples from {self.time[0]:.4g} to {self.time[-1]:.4g} s"
         ended = "all complete" if not early else f"{early} of them ended early, as messages says"
+        if missing:
+            ended = f"{missing} of them not run to the end, as interrupted" + (f", {ended}" if early else "")
         return f"<Ensemble: {format_count(len(self), 'run')} of {over}, {ended}>"
 
     def __len__(self) -> int:

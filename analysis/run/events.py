@@ -7,6 +7,7 @@ from contextlib import contextmanager
 from contextvars import ContextVar
 from dataclasses import dataclass
 from math import isfinite
+from numbers import Real
 from typing import Any
 
 from linkwork.errors import InputError, Interrupted
@@ -14,6 +15,7 @@ from linkwork.mechanism import Mechanism
 
 from ..files import unknown_name
 from ..mechanisms import output_units
+from ..units import Amount, si
 from .signals import StateFunction
 
 
@@ -26,8 +28,8 @@ class Event:
     name : str
     output : str, optional
         Output of the FMI contract that crosses ``level``.
-    level : float
-        Level of the output, in its SI unit.
+    level : float or str
+        Level of the output, in its SI unit, or text with a unit, such as "5 mm".
     function : callable, optional
         Function that crosses zero, instead of an output. Its arguments are time, all coordinates and all their rates (floats).
         The compiled solver compiles the function with Numba.
@@ -44,7 +46,7 @@ class Event:
 
     name: str
     output: str | None = None
-    level: float = 0.0
+    level: Amount = 0.0
     function: StateFunction | None = None
     direction: int = 0
     stop: bool = False
@@ -58,7 +60,10 @@ class Event:
             raise InputError(f"event {self.name!r} has the function {self.function!r}: it must be callable")
         if self.direction not in (-1, 0, 1):
             raise InputError(f"event {self.name!r} has direction {self.direction}: it must be -1, 0 or +1")
-        if not isfinite(self.level):
+        if self.output is not None:
+            level = si(self.level, output_units()[self.output], f"level of event {self.name!r}")
+            object.__setattr__(self, "level", level)
+        if not isinstance(self.level, Real) or not isfinite(self.level):
             raise InputError(f"event {self.name!r} has level {self.level}: it must be a finite number")
 
     def column(self, mechanism: Mechanism) -> int:

@@ -93,9 +93,9 @@ class Trajectory(NotebookResult):
         happened = f", {format_count(len(self.events), 'event')}" if self.events else ""
         moving = dict.fromkeys(n for m in MECHANISMS.values() for f in m.freedoms for n in (f.coordinate, f.rate))
         ranges = [f"{name} {format_range(self[name], self.units[name])}" for name in moving if name in self.names]
-        masses = f"; {self.masses}" if self.masses else ""
         source = self.source or "hand"
-        return f"<Trajectory: {len(self)} samples{over} by {source}, {ended}{happened}; {', '.join(ranges)}{masses}>"
+        parts = (f"{len(self)} samples{over} by {source}, {ended}{happened}", ", ".join(ranges), self.masses)
+        return f"<Trajectory: {'; '.join(filter(None, parts))}>"
 
     def __getitem__(self, name: str) -> NDArray[np.float64]:
         return self.values[:, self.column(name)]

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from linkwork.errors import InputError, ParameterError
+from linkwork.errors import InputError, LinkworkError, ParameterError
 from linkwork.mechanism import Mechanism
 from linkwork.parameters import Rules, field_name, fmi_name
 
@@ -119,7 +119,14 @@ def _read_input(name: str, text: str) -> float:
 def _column(name: str, given: Any, read: Callable[[str], float]) -> NDArray[np.float64]:
     """Return the values of one parameter or input as an array; ``read`` converts texts to SI."""
     if isinstance(given, (list, tuple)):
-        given = [read(value) if isinstance(value, str) else value for value in given]
+        values: list[Any] = []
+        for i, value in enumerate(given):
+            try:
+                values.append(read(value) if isinstance(value, str) else value)
+            except LinkworkError as error:
+                error.args = (f"set {i} of {len(given)}: {error}",)
+                raise
+        given = values
     column = np.asarray(given)
     if column.ndim != 1 or column.dtype.kind not in "iuf" or len(column) == 0:
         raise InputError(

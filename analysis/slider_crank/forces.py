@@ -32,6 +32,7 @@ from linkwork.slider_crank.kinematics import Position
 from linkwork.slider_crank.parameters import Constants, SliderCrankParameters
 from linkwork.slider_crank.vectors import Vector
 
+from ..display import format_range
 from ..run import complete_speed, require_kind, takes_published
 from ..units import Amount, in_si
 from . import mobility
@@ -172,6 +173,14 @@ class ForceTurn:
     unreachable: FloatArray
     _joints: Mapping[str, MaskedArray]
     _position: Position
+
+    def __repr__(self) -> str:
+        left_out = f", {len(self.unreachable)} left out: not assembled" if len(self.unreachable) else ""
+        torque, force = (
+            format_range(x.compressed(), unit) for x, unit in ((self.torque, "N.m"), (self.slider_force, "N"))
+        )
+        found = f"crank torque {torque}, slider force {force}"
+        return f"<ForceTurn: {len(self)} crank angles{left_out}; {self.sought} sought; {found}>"
 
     def __len__(self) -> int:
         return len(self.angle)

@@ -17,6 +17,7 @@ from linkwork.limits import LIMIT_SINE
 from linkwork.parameters import POSITIVE, field_name
 from linkwork.slider_crank.parameters import SliderCrankParameters
 
+from ..display import format_range
 from ..files import Whole
 from ..numerics.workers import check_jobs, run_in_parallel, worker_count
 from .forces import NO_LEVER, SLIDER_FORCE, ForceTurn
@@ -104,6 +105,18 @@ class MonteCarlo:
     estimates: Mapping[str, Estimate]
     not_assembled: NDArray[np.int64]
     undetermined: NDArray[np.int64]
+
+    def __repr__(self) -> str:
+        spreads = ", ".join(
+            f"{name} {format_range(spread.deviation.compressed(), QUANTITIES[name])}"
+            for name, spread in self.spreads.items()
+        )
+        lost = int((self.not_assembled + self.undetermined).max(initial=0))
+        left_out = f"; up to {lost} samples left out, as notes() says" if lost else ""
+        return (
+            f"<MonteCarlo: {self.samples} samples of seed {self.seed} at {len(self.turn)} crank angles; standard deviations "
+            f"{spreads}{left_out}>"
+        )
 
     def notes(self, units: str = "SI") -> tuple[str, ...]:
         """Return sentences about samples that cannot be assembled, poles, and failures of the linear estimate.

@@ -26,6 +26,7 @@ from linkwork.parameters import field_name
 from linkwork.slider_crank import parameters, variables
 from linkwork.slider_crank.parameters import Constants, SliderCrankParameters
 
+from ..display import format_range
 from ..files import unknown_name
 from ..numerics.dual import Dual, dual
 from ..numerics.dual import variables as independent
@@ -103,6 +104,9 @@ class Sensitivities:
     names: tuple[str, ...]
     values: Mapping[str, MaskedArray]
     derivatives: Mapping[str, MaskedArray]
+
+    def __repr__(self) -> str:
+        return f"<Sensitivities of {', '.join(self.derivatives)} to {', '.join(self.names)} at {len(self.turn)} crank angles>"
 
     def derivative(self, quantity: str, error: str) -> MaskedArray:
         """Return the derivative of a quantity with respect to an error, shape (n,).
@@ -356,6 +360,11 @@ class Estimate:
     second_mean: MaskedArray
     second_deviation: MaskedArray
     second_shares: MaskedArray
+
+    def __repr__(self) -> str:
+        named = {"nominal": self.nominal, "standard deviation": self.deviation, "worst case": self.worst}
+        ranges = ", ".join(f"{name} {format_range(x.compressed(), '')}" for name, x in named.items())
+        return f"<Estimate at {len(self.nominal)} crank angles, SI: {ranges}>"
 
 
 def tolerance_effects(

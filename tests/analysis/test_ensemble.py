@@ -211,6 +211,8 @@ def test_texts_and_names_of_the_contract_vary_too(tmp_path: Path) -> None:
         ({"slider.stiffness": 3.0}, InputError, "it must be a list or an array of numbers"),
         ({"slider.stiffness": [True]}, InputError, "it must be a list or an array of numbers"),
         ({"torque": [0.0, nan]}, InputError, "set 1 of 2: torque is nan"),
+        ({"torque": ["1 N.m", "1 N"]}, InputError, "set 1 of 2: torque is '1 N'"),
+        ({"crank.length": ["5 cm", "5"]}, ParameterError, "set 1 of 2: parameter crank_length is '5'"),
         ({}, InputError, "vary has nothing"),
     ],
 )
@@ -221,6 +223,9 @@ def test_what_varies_is_checked_and_names_the_set(values: dict[str, Any], error:
 
 
 def test_one_set_without_what_varies_is_refused() -> None:
+    for names in (["table-3.1"] * 3, [TABLE_3_1] * 3):
+        with pytest.raises(InputError, match=r"2 .*for 3 sets.*: give one, or as many"):
+            simulate_many(names, initial=[{}, {}], **OPTIONS)
     with pytest.raises(InputError, match="it must be a list, or vary must say what differs"):
         simulate_many(TABLE_3_1, **OPTIONS)
     with pytest.raises(InputError, match="one set of parameters"):
@@ -424,6 +429,12 @@ def test_an_interrupt_is_heard_and_keeps_what_was_done(n_jobs: int | None, tmp_p
     assert many.messages[2].startswith("interrupted at t = ")
     assert many.messages[7] == "not run: interrupted"
     assert many[2].status == -1
+    over = "8 runs of 101 samples from 0 to 10 s"
+    assert repr(many) == f"<Ensemble: {over}, 6 of them not run to the end, as interrupted>"
+    ended = replace(many, status=np.array([0, 3] + [-1] * 6))
+    assert repr(ended).endswith(
+        "6 of them not run to the end, as interrupted, 1 of them ended early, as messages says>"
+    )
     # the short one is there, what was cut off is not
     assert len(list(tmp_path.iterdir())) == 2
 

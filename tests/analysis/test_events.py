@@ -15,7 +15,7 @@ from scipy.integrate import solve_ivp
 from analysis import Event, Function, Harmonics, Inputs, TorsionBar, Trajectory, ramp, simulate, steps
 from analysis.linkages import linkage
 from analysis.run import compiled
-from linkwork.errors import InputError
+from linkwork.errors import InputError, ParameterError
 from linkwork.five_bar import dynamics
 from linkwork.five_bar.parameters import InitialState
 from linkwork.five_bar.published import SETS, TABLE_3_1
@@ -321,12 +321,20 @@ def test_events_do_not_change_the_motion() -> None:
         ),
         (lambda: Event(name="e", function=3), "it must be callable"),  # type: ignore[arg-type]
         (lambda: Event(name="e", output="crank.angle", direction=2), "direction 2"),
+        (lambda: Event(name="e", output="crank.angle", level="2 mm"), "level of event 'e' is '2 mm'"),
+        (lambda: Event(name="e", function=abs, level="2 mm"), "level 2 mm: it must be a finite number"),
         (lambda: Event(name="e", output="crank.angle", level=nan), "level nan"),
     ],
 )
 def test_event_that_is_not_usable(make: Any, said: str) -> None:
-    with pytest.raises(InputError, match=said):
+    with pytest.raises((InputError, ParameterError), match=said):
         make()
+
+
+def test_a_level_may_have_a_unit() -> None:
+    assert Event(name="e", output="slider.position", level="-2 mm") == Event(
+        name="e", output="slider.position", level=-0.002
+    )
 
 
 def test_event_state_is_a_state_of_the_motion() -> None:

@@ -312,11 +312,20 @@ def test_other_results_say_what_they_are() -> None:
     assert repr(chart).startswith(
         "<StabilityChart: drive.speed 550 to 560 rpm by slider.damping 50 to 60 N.s/m, 3 x 3 points, 0.0%"
     )
+    forces = force_turn("rahman-a4-10-s1-3.5", angles=["30 deg", "90 deg"])
+    wide = [Tolerance("rod.length", half_width="0.5 mm")]
+    numbers = (monte_carlo(forces, wide, samples=100), *tolerance_effects(forces, wide).values())
+    for result in (orbit.turn(), forces, *numbers, sensitivities(forces)):
+        assert repr(result).startswith(f"<{type(result).__name__}")
+        assert len(repr(result)) < 800
+    assert "standard deviations slider.position 0.000" in repr(numbers[0])
     for result in (orbit, response, response.branches[0], chart):
         assert len(repr(result)) < 400
         assert min(picture_in(result._repr_html_())) > 200
     runs = simulate_many(["table-3.1"] * 2, Inputs(force=-2e3), stop_time="1 s")
     assert repr(runs) == ("<Ensemble: 2 runs of 1001 samples from 0 to 1 s, 2 of them ended early, as messages says>")
+    forces = simulate_many(["table-3.1"], stop_time=0.01, outputs=["pin.A.fx"])
+    assert "complete; masses" in repr(forces[0])
 
 
 def test_solutions_say_what_they_are() -> None:

@@ -260,7 +260,7 @@ _MECHANISM_OPTIONS = (
         "--units",
         type=click.Choice(["SI", "inch"]),
         default="SI",
-        help="Units of the output. SI: millimetres in tables, pictures and errors, metres in CSV files, as in those of a run; "
+        help="Units of the output. SI: lengths in millimetres, but in metres in the CSV file of forces, as in that of a run; "
         "inch: inches, pounds force and degrees.",
     ),
 )

@@ -115,6 +115,11 @@ class Turn:
     roundings: tuple[float, ...]
     angles: frozenset[str]
 
+    def __repr__(self) -> str:
+        sizes = ", ".join(f"{name} {size:.4g}" for name, size in zip(self.swings, self.amplitudes))
+        turns = format_count(self.turns, "turn")
+        return f"<Turn: {len(self.angle)} samples of {turns} in {self.period:.4g} s; amplitudes in SI: {sizes}>"
+
     def __getitem__(self, name: str) -> FloatArray:
         if name not in self.names:
             raise unknown_name(name, self.names, f"output {name!r} of an orbit")
