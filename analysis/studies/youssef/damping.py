@@ -259,15 +259,15 @@ def judge_determinant() -> tuple[Statement, ...]:
         "right equation": (Variant.EXACT, partial(first_order, variant=Variant.EXACT)),
         "listings": (Variant.FORTRAN, appendix_3),
     }
-    apart = {
-        f"{name}; {end}": max(
-            abs(getattr(region, end) - getattr(perturbed(p), end)) / region.width
-            for p in map(chapter_4, COMPARED)
-            for region in (hill(p, variant=variant),)
-        )
-        for name, (variant, perturbed) in ways.items()
-        for end in ("low", "high")
-    }
+    apart, shares = {}, []
+    for name, (variant, perturbed) in ways.items():
+        pairs = [(hill(p, variant=variant), perturbed(p)) for p in map(chapter_4, COMPARED)]
+        # at I4 = 0 the region begins at lambda_k^2 = 1/4
+        scale = pairs[-1][0].high - 0.25
+        for end in ("low", "high"):
+            sizes = [abs(getattr(region, end) - getattr(other, end)) for region, other in pairs]
+            apart[f"{name}; {end}"] = max(sizes) / scale
+            shares += [size / region.width for size, (region, _) in zip(sizes, pairs)]
     return (
         Statement(
             "The values of [omega] and s2 that satisfy equations (5.35) determine the boundaries of the unstable regions.",
@@ -302,12 +302,12 @@ def judge_determinant() -> tuple[Statement, ...]:
             "The computer orientated method gave results which are in good agreement with the perturbation method; "
             "see the outer boundary of fig. (5.4) and fig. (5.1).",
             text("5.3.3 e, L3964-3968"),
-            "boundaries of the first region without a damper, the outer ones, by (5.35) less those by (5.16), over its width "
-            "by (5.35); right linear equation, and listings of appendices 4 and 3; the greatest of I4 = 0.5, 1 "
-            "and 1.5",
-            f"{SMALL:g}, the rule for *small*: the next order",
-            tuple(at_most(name, SMALL, x) for name, x in apart.items()),
-            "the listings have different coefficients (errata 17, 18)",
+            "boundaries of the first region without a damper, the outer ones, by (5.35) less those by (5.16), over the least "
+            "scale of their graph, from 1/4 at I4 = 0 to the highest at I4 = 1.5; right linear equation, and listings of "
+            "appendices 4 and 3; the greatest of I4 = 0.5, 1 and 1.5",
+            f"{ALIKE:g}, for *good agreement* as for *the same*, and as at L6865",
+            tuple(at_most(name, ALIKE, x) for name, x in apart.items()),
+            f"of the region's width the listings' boundaries differ by up to {max(shares):.2f} (errata 17, 18)",
         ),
         Statement(
             "THIS PROG. INV[E]STIGATES STABILITY IN PRESENCE [O]F DAMPING",
