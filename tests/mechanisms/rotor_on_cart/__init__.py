@@ -5,11 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import ClassVar
 
-from linkwork.mechanism import CRANK, CRANK_CHANNELS, Channel, Freedom
-from linkwork.parameters import CheckedParameters, Rules
+from linkwork.mechanism import CRANK, CRANK_CHANNELS, Channel, Equations, Freedom, Mechanism, PublishedSet
+from linkwork.parameters import CheckedParameters, CheckedState, Rules
 from linkwork.variables import Variable, output, status_variables, tolerance_parameter
 
-from .. import make_initial, make_mechanism
 from . import equations
 from .equations import Constants
 
@@ -41,7 +40,15 @@ class Parameters(CheckedParameters):
         )
 
 
-Initial = make_initial(__name__, "rotor_angle", "rotor_speed", "cart_position", "cart_velocity")
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Initial(CheckedState):
+    """State at the start (rad, rad/s, m, m/s)."""
+
+    rotor_angle: float = 0.0
+    rotor_speed: float = 0.0
+    cart_position: float = 0.0
+    cart_velocity: float = 0.0
+
 
 _DEMO = Parameters(
     rotor_mass=0.5, rotor_radius=0.05, rotor_inertia=2e-3, cart_mass=2.0, cart_stiffness=1500.0, cart_damping=6.0
@@ -83,21 +90,30 @@ VARIABLES = (
     *status_variables(),
 )
 
-MECHANISM = make_mechanism(
-    equations,
-    ("rotor-demo", _DEMO, Initial(rotor_speed=_SPEED), {"speed": _SPEED}),
-    (
-        CRANK._replace(coordinate="rotor.angle", rate="rotor.speed", initial=("rotor_angle", "rotor_speed")),
-        Freedom("cart.position", "cart.velocity", ("cart_position", "cart_velocity")),
-    ),
+MECHANISM = Mechanism(
     name="rotor-on-cart",
     fmu="RotorOnCart",
     title="Rotor on a sprung cart",
     description="An unbalanced rotor on a sprung, damped cart",
     notes=("The rotor turns in the vertical plane of the cart's motion.",),
+    parameters=Parameters,
+    initial=Initial,
+    published={
+        "rotor-demo": PublishedSet(_DEMO, Initial(rotor_speed=_SPEED), {"speed": _SPEED}, "made up for the tests")
+    },
+    freedoms=(
+        CRANK._replace(coordinate="rotor.angle", rate="rotor.speed", initial=("rotor_angle", "rotor_speed")),
+        Freedom("cart.position", "cart.velocity", ("cart_position", "cart_velocity")),
+    ),
     channels=(
         *CRANK_CHANNELS,
         Channel("cart.force", "force", freedom=1),
     ),
     variables=VARIABLES,
+    position_parameters=("initial.rotor_angle", "initial.cart_position"),
+    experiment=(0.0, 1.0, 1e-3, 1e-9),
+    modules=(equations,),
+    equations=Equations.of(equations),
+    check_assembly=lambda parameters, x: None,
+    error_scale=equations.error_scale,
 )

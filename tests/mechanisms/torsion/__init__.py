@@ -6,11 +6,10 @@ from dataclasses import dataclass
 from math import pi
 from typing import ClassVar
 
-from linkwork.mechanism import Channel, Freedom
-from linkwork.parameters import CheckedParameters, Rules
+from linkwork.mechanism import Channel, Equations, Freedom, Mechanism, PublishedSet
+from linkwork.parameters import CheckedParameters, CheckedState, Rules
 from linkwork.variables import Variable, output, status_variables, tolerance_parameter
 
-from .. import make_initial, make_mechanism
 from . import equations
 from .equations import Constants
 
@@ -45,7 +44,14 @@ class Parameters(CheckedParameters):
         )
 
 
-Initial = make_initial(__name__, "crank_angle", "crank_speed", "rotor_angle", "rotor_speed")
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Initial(CheckedState):
+    """State at the start (rad, rad/s)."""
+
+    crank_angle: float = 0.0
+    crank_speed: float = 0.0
+    rotor_angle: float = 0.0
+    rotor_speed: float = 0.0
 
 
 def _p(name: str, unit: str, description: str, role: str = "") -> Variable:
@@ -79,22 +85,33 @@ VARIABLES = (
     *status_variables(),
 )
 
-MECHANISM = make_mechanism(
-    equations,
-    ("torsion-demo", Parameters(rotor_stiffness=1.0), Initial(), {"speed": 1.0}),
-    (
-        Freedom("crank.angle", "crank.speed", ("crank_angle", "crank_speed"), period=2.0 * pi),
-        Freedom("rotor.angle", "rotor.speed", ("rotor_angle", "rotor_speed")),
-    ),
+MECHANISM = Mechanism(
     name="torsion",
     fmu="Torsion",
     title="Rotor on a torsion spring",
     description="A rotor on a torsion spring, excited by a crank",
     notes=("The crank turns at a commanded speed.",),
+    parameters=Parameters,
+    initial=Initial,
+    published={
+        "torsion-demo": PublishedSet(
+            Parameters(rotor_stiffness=1.0), Initial(), {"speed": 1.0}, "made up for the tests"
+        )
+    },
+    freedoms=(
+        Freedom("crank.angle", "crank.speed", ("crank_angle", "crank_speed"), period=2.0 * pi),
+        Freedom("rotor.angle", "rotor.speed", ("rotor_angle", "rotor_speed")),
+    ),
     channels=(
         Channel("drive.speed", "speed", "command", 0),
         Channel("drive.acceleration", "acceleration", "rate", 0),
         Channel("rotor.torque", "force", freedom=1),
     ),
     variables=VARIABLES,
+    position_parameters=("initial.crank_angle", "initial.rotor_angle"),
+    experiment=(0.0, 1.0, 1e-3, 1e-9),
+    modules=(equations,),
+    equations=Equations.of(equations),
+    check_assembly=lambda parameters, x: None,
+    error_scale=equations.error_scale,
 )

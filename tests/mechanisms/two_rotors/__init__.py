@@ -6,11 +6,10 @@ from dataclasses import dataclass
 from math import pi
 from typing import ClassVar
 
-from linkwork.mechanism import Channel, Drawing, Freedom, Joint, Mode, Part
-from linkwork.parameters import CheckedParameters, Rules
+from linkwork.mechanism import Channel, Drawing, Equations, Freedom, Joint, Mechanism, Mode, Part, PublishedSet
+from linkwork.parameters import CheckedParameters, CheckedState, Rules
 from linkwork.variables import Variable, output, status_variables, tolerance_parameter
 
-from .. import make_initial, make_mechanism
 from . import drawing, equations
 from .equations import Constants
 
@@ -46,14 +45,27 @@ class Parameters(CheckedParameters):
         )
 
 
-Initial = make_initial(
-    __name__, "left_angle", "left_speed", "right_angle", "right_speed", "cart_position", "cart_velocity"
-)
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Initial(CheckedState):
+    """State at the start (rad, rad/s, m, m/s)."""
+
+    left_angle: float = 0.0
+    left_speed: float = 0.0
+    right_angle: float = 0.0
+    right_speed: float = 0.0
+    cart_position: float = 0.0
+    cart_velocity: float = 0.0
+
 
 _DEMO = Parameters(
-    left_mass=0.2, left_radius=0.05, right_mass=0.1, right_radius=0.06, cart_mass=4.0, cart_stiffness=3000.0,
+    left_mass=0.2,
+    left_radius=0.05,
+    right_mass=0.1,
+    right_radius=0.06,
+    cart_mass=4.0,
+    cart_stiffness=3000.0,
     cart_damping=12.0,
-)  # fmt: skip
+)
 _SPEEDS = {"left": 20.0, "right": 30.0}
 
 
@@ -108,15 +120,23 @@ VARIABLES = (
     *status_variables(),
 )
 
-MECHANISM = make_mechanism(
-    equations,
-    (
-        "two-rotors-demo",
-        _DEMO,
-        Initial(left_speed=_SPEEDS["left"], right_speed=_SPEEDS["right"]),
-        {f"{side}_speed": speed for side, speed in _SPEEDS.items()},
-    ),
-    (
+MECHANISM = Mechanism(
+    name="two-rotors",
+    fmu="TwoRotors",
+    title="Two rotors on a sprung cart",
+    description="Two unbalanced rotors on one sprung, damped cart",
+    notes=("The rotors turn in the horizontal plane of the cart's motion.",),
+    parameters=Parameters,
+    initial=Initial,
+    published={
+        "two-rotors-demo": PublishedSet(
+            _DEMO,
+            Initial(left_speed=_SPEEDS["left"], right_speed=_SPEEDS["right"]),
+            {f"{side}_speed": speed for side, speed in _SPEEDS.items()},
+            "made up for the tests",
+        )
+    },
+    freedoms=(
         *(
             Freedom(
                 f"{side}.angle",
@@ -129,11 +149,6 @@ MECHANISM = make_mechanism(
         ),
         Freedom("cart.position", "cart.velocity", ("cart_position", "cart_velocity")),
     ),
-    name="two-rotors",
-    fmu="TwoRotors",
-    title="Two rotors on a sprung cart",
-    description="Two unbalanced rotors on one sprung, damped cart",
-    notes=("The rotors turn in the horizontal plane of the cart's motion.",),
     channels=(
         *(
             Channel(f"{side}.{name}", f"{side}_{name}", kind, number)
@@ -143,6 +158,12 @@ MECHANISM = make_mechanism(
         Channel("cart.force", "force", freedom=2),
     ),
     variables=VARIABLES,
+    position_parameters=("initial.left_angle", "initial.right_angle", "initial.cart_position"),
+    experiment=(0.0, 1.0, 1e-3, 1e-9),
+    modules=(equations,),
+    equations=Equations.of(equations),
+    check_assembly=lambda parameters, x: None,
+    error_scale=equations.error_scale,
     drawing=Drawing(
         (
             Joint("G", "zero of the cart"),
