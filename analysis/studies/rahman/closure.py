@@ -511,7 +511,7 @@ def _step() -> tuple[Statement, ...]:
             "Equation set (20) does not include the constraint that the each diagonal element must be equal to unity at "
             "closure. This constraint is included through modification of the current set of equations as discussed in Sandor "
             "and Erdman (1984).",
-            text("section 2.6.1, eqs 20, 22, L430-436"),
+            text("section 2.6.1, eqs 20, 22, L429-436"),
             "right sides of eqs 20 for a loop that is open by half a turn about i; greatest departure from unity of a diagonal "
             "element of a loop that is open and for which the right sides of eqs 22 vanish",
             ROUNDING,

@@ -231,8 +231,8 @@ def compute_first() -> StudyResult:
                 tuple(near(f"I4 = {ratio:g}", 1.0, by_mean[ratio] / x, ALIKE) for ratio, x in below.items()),
             ),
             Statement(
-                "Fig. (4.3) and fig. (4.4) also show that the amplitude of oscillation decreases with decrease of I4 "
-                "and that as I4 increases it widens the region of resonance.",
+                "Fig. (4.3) and fig. (4.4) also show that the amplitude of oscillation decreases with decrease of [I4] "
+                "and that as [I4] increases it widens the region of resonance.",
                 text("4.5.1, L3156-3162; the same in L3197-3201"),
                 "amplitudes by the right equation without a damper, 9 to 40 rad/s, farther than 1 rad/s from 15.5 and 2 rad/s "
                 "from 31 rad/s, and range of speeds in which they exceed a level, relative to those at the next smaller I4, "
@@ -241,7 +241,7 @@ def compute_first() -> StudyResult:
                 (*growth(1), *growth(2)),
             ),
             Statement(
-                "THIS PROG. INV[E]STIG[A]TES RESONANCE IN PRES[EN]CE OF DAMPING",
+                "THIS PROG. I[NVE]STIG[A]TES RESONANCE IN PRES[EN]CE [O]F DAMPING",
                 listing("appendix 2, L8398"),
                 "*investigates* is read as finds right: speed and height of the peak of the first harmonic and height of the "
                 f"second's, by the listing and by the right equation; omega_c = {DAMPERS[0]:g} 1/s, the listing's first "
@@ -359,7 +359,7 @@ def compute_deviation() -> StudyResult:
         statements=(
             Statement(
                 "However, as shown in fig. (4.5), this deviation decreases linearly with decrease of inertia ratio "
-                "I4 and becomes zero when I4=0.",
+                "[I4] and becomes zero when [I4=0].",
                 text("4.5.1, L3146-3150"),
                 "distance of the deviation of the lower root from omega_k, by the right equation, from the straight line "
                 "through zero and its value at I4 = 1.5, ours, relative to that value; deviation at I4 = 0",
@@ -370,7 +370,7 @@ def compute_deviation() -> StudyResult:
                 ),
             ),
             Statement(
-                "In fact for the case I4=0 the equation of motion of the slider reduces to a second order linear "
+                "In fact for the case [I4]=0 the equation of motion of the slider reduces to a second order linear "
                 "differential equation describing an idealised spring-mass system.",
                 text("4.5.1, L3152-3156"),
                 "greatest harmonic or mean of M - 1, K and F of the right equation at I4 = 0",

@@ -390,7 +390,7 @@ def judge_coupler(found: Mapping[str, Sequence[Region]]) -> tuple[Statement, ...
         ),
         Statement(
             "In all the above examples the second region of instability was so small within the values of [sigma2], "
-            "[sigma3] and I4 it was negligible.",
+            "[sigma3] and [I4] it was negligible.",
             text("5.3.1, L3902-3906"),
             "width of the second region in lambda_k^2 over that of the first, the greatest of each figure, in Fig 5.3 with the "
             "angles held; right linear equation",

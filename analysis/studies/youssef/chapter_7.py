@@ -258,7 +258,7 @@ def family() -> StudyResult:
                 "Such 'isochronous' curves, which are arcs of circles centred at the corresponding fixed position, of B, can "
                 "be regarded simply as a reference grid from which the resulting motion can be determined once a particular "
                 "continuous variation of U is specified.",
-                text("7.0, L5256"),
+                text("7.0, L5260"),
                 f"distance of P from B less r: its greatest size at {TURN.size - 1} crank angles and {ALONG.size} values of U "
                 f"from {1.0 + ALONG[0]:g} to {1.0 + ALONG[-1]:g}",
                 "1e-12 l3, the rounding",

@@ -383,7 +383,7 @@ def launch_speeds() -> StudyResult:
         Statement(
             "It is clear from the figure that during the time in which the torque T is acting the crank speed "
             "behaves in a linear manner up to the stage when the input torque becomes less than the torque "
-            "sufficient to accelerate the mechanism. This stage occurs when the points p1 and p2 are reached.",
+            "sufficient to accelerate the mechanism. This stage occurs when the points [p1] and p2 are reached.",
             text("3.2.2, L2124-2134"),
             f"{RISE}; p1 and p2 are read as the peaks",
             ALIKE_WORDS,
