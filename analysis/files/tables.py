@@ -137,7 +137,10 @@ def read_record(
     unquoted = re.sub('"[^"]*"', "", lines[0][1]) if lines else ""
     separator = next((mark for mark in ";\t" if mark in unquoted), ",")
     try:
-        rows = [(number, next(csv.reader([line], delimiter=separator))) for number, line in lines]
+        rows = [
+            (number, next(csv.reader([line], delimiter=separator)) if '"' in line else line.split(separator))
+            for number, line in lines
+        ]
     except csv.Error as error:
         raise InputError(f"{path} cannot be read: {error}") from error
 
@@ -166,12 +169,15 @@ def read_record(
             raise unknown_name(name, header, f"column {name!r} in {path.name}")
         places.append(place if name is None else header.index(name) if name in header else short.index(name))
     columns = np.empty((len(places), len(rows)))
-    for i, (number, cells) in enumerate(rows):
-        for column, place in zip(columns, places):
-            own = cells[place].partition("#")[0].strip() if place < len(cells) else ""
-            if not is_number(as_number(own)):
-                raise InputError(f"{path}, line {number}, column {place + 1}: {own[:40]!r} is not a number")
-            column[i] = float(as_number(own))
+    for column, place in zip(columns, places):
+        for i, (number, cells) in enumerate(rows):
+            own = cells[place].partition("#")[0] if place < len(cells) else ""
+            try:
+                column[i] = float(as_number(own))
+            except ValueError:
+                raise InputError(
+                    f"{path}, line {number}, column {place + 1}: {own.strip()[:40]!r} is not a number"
+                ) from None
     return [heading_unit(header[place]) if header else "" for place in places], list(columns)
 
 

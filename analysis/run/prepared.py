@@ -129,9 +129,15 @@ class Run:
 
         ``x`` and ``u`` are state and input channels after ``steps`` steps, which covered the time ``passed`` (s).
         """
-        if steps < MANY_STEPS:
+        times, mechanism, hold = self.settings.times, self.mechanism, self.settings.hold
+        # a step ends at each break of the inputs, as at each point of a table
+        breaks = (
+            passed / hold
+            if hold
+            else np.ptp(np.searchsorted(self.encoded.source.breaks, (times[0], times[0] + passed)))
+        )
+        if steps - breaks < MANY_STEPS:
             return ""
-        times, mechanism = self.settings.times, self.mechanism
         turning = [abs(x[len(mechanism.freedoms) + i]) for i in mechanism.cyclic_freedoms]
         usual = max([pi * (len(times) - 1) / float(np.ptp(times)), *(_HARMONICS * speed for speed in turning)])
         return stiffness(disturbance_rates(mechanism, x, self.apply_inputs(u), self.p), steps, passed, usual)

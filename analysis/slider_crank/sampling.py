@@ -267,7 +267,7 @@ def monte_carlo(
         If ``turn`` is no `ForceTurn`; if there is no tolerance, or two of the same name; if samples are invalid: a length not
         above zero, or a crank inertia below the least that its mass allows.
     ParameterError
-        If there is no such quantity, or ``samples`` is no whole number of at least two.
+        If there is no such quantity, or ``samples`` is no whole number of at least two, or ``seed`` none of at least zero.
 
     Examples
     --------
@@ -280,7 +280,7 @@ def monte_carlo(
     require_turn(turn)
     check_tolerances(tolerances)
     check_names(quantities, QUANTITIES, "quantity")
-    samples = Whole(least=2)(samples, "samples")
+    samples, seed = Whole(least=2)(samples, "samples"), Whole(least=0)(seed, "seed")
     check_jobs(n_jobs)
     linear = tolerance_effects(turn, tolerances, quantities)
     cores = worker_count(n_jobs)

@@ -245,8 +245,10 @@ def undetermined_mask(turn: ForceTurn, quantity: str) -> NDArray[np.bool_]:
 def check_names(names: Sequence[str], known: Collection[str], kind: str) -> None:
     """Check that quantities or errors of these names exist.
 
-    Raises UnknownNameError if one does not.
+    Raises UnknownNameError if one does not, and InputError if a text is in the place of a list.
     """
+    if isinstance(names, str):
+        raise InputError(f"{kind} is {names!r}: it must be a list of names, such as [{names!r}]")
     for name in names:
         if name not in known:
             raise unknown_name(name, known, f"{kind} {name!r}")

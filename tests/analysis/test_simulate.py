@@ -509,6 +509,15 @@ def test_a_run_is_stiff_by_what_decays_in_a_step() -> None:
     assert slow == ""
 
 
+def test_steps_to_the_points_of_a_table_are_no_vibration(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(prepared, "MANY_STEPS", 500)
+    times = np.arange(0.0, 20.0, 0.01)
+    options: dict[str, Any] = {"stop_time": 20.0, "step": 1.0}
+    forces = Inputs(speed=0.0, force=table(times, np.sin(times)))
+    assert simulate(TABLE_3_1, forces, **options).message == ""
+    assert simulate(TABLE_3_1, Inputs(speed=0.0, force=1.0), hold=0.01, **options | {"step": 0.01}).message == ""
+
+
 def test_a_stiff_run_says_so_and_ends_where_it_would_take_too_long(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(cautions, "_PATIENCE", 100_000)
     whole, cut = (

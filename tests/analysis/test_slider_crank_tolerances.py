@@ -328,6 +328,20 @@ def test_samples_that_cannot_be_assembled_are_counted(seed: int) -> None:
     assert spread.counts[0].sum() <= samples - result.not_assembled[0]
 
 
+@pytest.mark.parametrize(
+    ("options", "said"),
+    [
+        ({"seed": -1}, "seed is -1: it must be at least 0"),
+        ({"seed": 1.5}, "seed is 1.5: it must be a whole number"),
+        ({"seed": None}, "seed is None: it must be a whole number"),
+        ({"quantities": "slider.position"}, r"it must be a list of names, such as \['slider.position'\]"),
+    ],
+)
+def test_a_sampling_that_cannot_be_repeated_or_has_no_list(options: dict[str, Any], said: str) -> None:
+    with pytest.raises((InputError, ParameterError), match=said):
+        monte_carlo(offset_turn([0.5]), TOLERANCES, samples=10, **options)
+
+
 def test_where_hardly_any_sample_can_be_assembled_nothing_is_made_up() -> None:
     limit = GREATEST_SHIFTS_IN[0.0] * INCH
     turn = force_turn(IDEAL, crank_speed=1.0, shift=ConstantShift(limit - 1e-5), angles=[0.0])
