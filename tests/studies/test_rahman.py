@@ -20,7 +20,7 @@ from analysis.slider_crank.dual_dynamics import Binor
 from analysis.studies import ENTRIES, RAHMAN
 from analysis.studies.rahman import closure, forces, method, rates
 from analysis.studies.rahman import figures as rahman
-from analysis.studies.rahman.printed import CRANK_AT_SPEED, GENERAL, dependable, joint_rates
+from analysis.studies.rahman.printed import CRANK_AT_SPEED, GENERAL, dependable, joint_rates, turn
 from analysis.studies.rahman.table import (
     CAPTIONS,
     COMPONENTS,
@@ -487,6 +487,16 @@ class TestMethod:
         """eta2 of the closed loop at theta1 = 0 is the angle of the rod to the plane of the crank."""
         along = -slider(case, np.zeros(1))[0] * cos(np.radians(case.twist_deg)) - case.shift_in
         assert closure._estimate_error(case) == pytest.approx(np.degrees(np.arcsin(abs(along) / ROD_IN)), abs=1e-9)
+
+    def test_the_roundoff_counts_in_components_that_one_path_alone_has(self) -> None:
+        """51a has roundoff in the component i of the slider's momentum, which 53a prints as 0."""
+        assert {case.label: case.computed for case in forces._roundoffs()}["slider, component i"] == np.inf
+
+    def test_a_turn_in_the_plane_does_not_depend_on_its_start(self) -> None:
+        """A start that is off by 0.01 rad and in takes more corrections at the first angle, and ends at the same loops."""
+        planar, off = (turn(parameters(10.0), 0.0, off=by) for by in (0.0, 0.01))
+        assert off.steps[0] > planar.steps[0]
+        assert off.unknowns == pytest.approx(planar.unknowns, abs=1e-9)
 
     def test_eqs_62_and_64_miss_the_balance_by_twice_the_inertia(self) -> None:
         plane = Case("", 10.0, 0.0, 270.0)

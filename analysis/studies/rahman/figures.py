@@ -67,9 +67,10 @@ Out of the plane the method fails at its root. A ball joint has three rotations,
 1): the chain has one freedom, so that crank angle and shift cannot both be given. The iteration stops where its steps
 become small, on loops that are open by up to 38 deg, with the slider wrong by up to 6 in; with Davidon, Fletcher and
 Powell's steps, joined in our way, the loops stay open as well. The limits of S1 and alpha4 within which "the program
-converges" are, but for a4 = 20 in, those of this iteration. The mechanism works far beyond them, and its greatest shift
-falls with the offset, where the thesis infers that it rises. The axial force on the crank, which the thesis puts to
-zero, is an unknown (erratum 7), so that 2F2k is not zero and the bearing moments 1T1i and 1T1j lack a part.
+converges" are, but for a4 = 10 and 20 in, those of this iteration; without an offset rounding decides from 1 to 2 in. The
+mechanism works far beyond them, and its greatest shift falls with the offset, where the thesis infers that it rises. The
+axial force on the crank, which the thesis puts to zero, is an unknown (erratum 7), so that 2F2k is not zero and the bearing
+moments 1T1i and 1T1j lack a part.
 
 Of the conclusions on the engine, the displacements are almost sinusoidal, and a shift does load the bearing by two more
 moments. The offset lengthens the stroke, and saves no power. Clear of the dead centres most forces do not grow at every step
@@ -255,7 +256,7 @@ def _forces() -> tuple[Statement, ...]:
             "100 and 300 deg",
             f"none of a count; {ABOUT_DEG:g} deg, the rule for *near*",
             tuple(spikes),
-            "3F3k is finite at the dead centres, 4F4k at neither; the offset and the twist move them",
+            "3F3k is finite at both dead centres, 4F4k at none; the offset and the twist move them",
         ),
         Statement(
             "Hence [from the spikes] it is very obvious that with the increase of offset the chance of fatigue failure of "

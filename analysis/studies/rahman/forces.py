@@ -203,7 +203,9 @@ def _roundoffs() -> list[Judged]:
     judged = []
     for body, ones, others in zip(("rod", "slider"), by_forward, by_mixed):
         judged += [
-            at_least(f"{body}, {name}", 1.0, one / other) for name, one, other in zip(names, ones, others) if other
+            at_least(f"{body}, {name}", 1.0, one / other if other else np.inf)
+            for name, one, other in zip(names, ones, others)
+            if one or other
         ]
     return judged
 
@@ -315,7 +317,8 @@ def _momentum_rates() -> tuple[Statement, ...]:
             "Finally the second set [the mixed path's] is used in the program to have better accuracy.",
             text("section 2.8, L750; L730, L859"),
             "greatest roundoff of the momenta, single precision less double, over a turn by half degrees: by 50a and 51a over "
-            "that by 52a and 53a, of the components that have any; in the plane, a4 = 10 in",
+            "that by 52a and 53a, infinite where these have none; components that have any by one of them; in the plane, "
+            "a4 = 10 in",
             "none, the sign decides",
             tuple(_roundoffs()),
             "component i of the rod takes the roundoff of S4' by 52a besides",

@@ -46,18 +46,18 @@ class Turn(NamedTuple):
     settled: NDArray[np.bool_]
 
 
-def turn(p: SliderCrankParameters, shift_in: ArrayLike, *, small: float = STEP) -> Turn:
+def turn(p: SliderCrankParameters, shift_in: ArrayLike, *, small: float = STEP, off: ArrayLike = 0.0) -> Turn:
     """Run the iteration over a turn for given shifts (in), starting at theta1 = 0 from the planar estimate.
 
-    At each later angle it starts from the solution at the previous angle. It ends when a correction is below ``small`` (rad,
-    in).
+    ``off`` (n, 5), in rad and in, is added to this estimate. At each later angle the iteration starts from the solution at the
+    previous angle. It ends when a correction is below ``small`` (rad, in).
     """
     shifts = np.atleast_1d(np.asarray(shift_in, dtype=float))
     shape = (GRID_DEG.size, shifts.size)
     blank = np.full(shape, np.nan)
     found = Turn(np.full((*shape, 5), np.nan), blank, blank.copy(), blank.copy(), np.ones(shifts.size, dtype=bool))
     going = np.arange(shifts.size)
-    start = None
+    start = planar(p, np.zeros(going.size)) + np.asarray(off) * [1.0, 1.0, 1.0, 1.0, INCH]
     for k, angle in enumerate(np.radians(GRID_DEG)):
         angles, shift = np.full(going.size, angle), shifts[going] * INCH
         ended = settle(p, angles, shift, rows="printed", start=start, step_tolerance=small, max_steps=MAX_STEPS)

@@ -73,8 +73,12 @@ APART = (np.abs(SPEEDS - 15.5) > 1.0) & (np.abs(SPEEDS - 31.0) > 2.0)
 DAMPERS = tuple(0.2 * n for n in range(1, 7))
 #: omega_c (1/s) at which second harmonics are compared: the thesis's value, which removes all instability.
 COMPARED_AT = 0.45
-#: Order of the balance by which harmonics above the second are judged, and its speeds (rad/s).
-MANY, EVEN = 10, np.arange(9.0, 40.01, 0.02).round(2)
+#: Order of the balance by which harmonics above the second are judged.
+MANY = 10
+#: Speeds (rad/s) so close to each other at the resonances of the first three harmonics that peaks are right to 0.1 %, and
+#: these among others.
+AT_PEAKS = np.concatenate([np.arange(low, high, 0.002) for low, high in ((9.9, 10.7), (15.0, 15.8), (30.0, 31.3))])
+EVERY = np.unique(np.append(np.arange(9.0, 40.05, 0.1), AT_PEAKS).round(3))
 #: Amplitude above which a speed lies in the region of resonance, and distance (rad/s) from the peak beyond which it lies
 #: outside this region: our choice.
 LARGE, OUTSIDE = 0.1, 3.0
@@ -111,11 +115,11 @@ def harmonic(
 
 
 def ten_harmonics(inertia_ratio: float) -> NDArray[np.float64]:
-    """Return the amplitudes of harmonics 0 to `MANY`, one row for each speed of `EVEN`, at omega_c `COMPARED_AT`."""
+    """Return the amplitudes of harmonics 0 to `MANY`, one row for each speed of `EVERY`, at omega_c `COMPARED_AT`."""
     once = equation(inertia_ratio, Variant.EXACT)
     motions = (
         harmonic_balance(replace(once, spring=SQUARE_OF_OMEGA_K / speed**2, damping=COMPARED_AT / speed), MANY)
-        for speed in EVEN.tolist()
+        for speed in EVERY.tolist()
     )
     return np.array([motion.series.amplitudes for motion in motions])
 
@@ -154,6 +158,13 @@ def undamped_columns(n: int) -> dict[str, NDArray[np.float64]]:
     return columns
 
 
+def range_above(level: float, speeds: NDArray[np.float64], curve: NDArray[np.float64]) -> float:
+    """Return the width of the range between the first and the last of the speeds at which a curve crosses a level."""
+    (at,) = np.nonzero((curve[:-1] > level) != (curve[1:] > level))
+    crossed = speeds[at] + (level - curve[at]) / (curve[at + 1] - curve[at]) * np.diff(speeds)[at]
+    return float(np.ptp(crossed))
+
+
 def growth(n: int) -> list[Case]:
     """Judge whether the amplitude of the n-th harmonic and the width of its resonance grow with I4."""
     columns, word = undamped_columns(n), ("first", "second")[n - 1]
@@ -161,7 +172,7 @@ def growth(n: int) -> list[Case]:
     ratios = [np.min((larger / smaller)[APART]) for smaller, larger in pairwise(curves)]
     level = LARGE if n == 1 else 0.1 * LARGE
     near_it = np.arange(28.0, 34.0, 0.02) if n == 1 else np.arange(14.8, 16.2, 0.01)
-    widths = [np.count_nonzero(harmonic(n, near_it, ratio) > level) for ratio in INERTIA_RATIOS]
+    widths = [range_above(level, near_it, harmonic(n, near_it, ratio)) for ratio in INERTIA_RATIOS]
     return [
         at_least(f"{word} harmonic outside the resonances", 1.0, min(ratios)),
         at_least(
@@ -225,7 +236,8 @@ def compute_first() -> StudyResult:
             Statement(
                 "[T]heir deviation from the idealised spring-mass system accounts for the oscillating inertia of the rocker.",
                 text("4.5.1, L3143-3146"),
-                "deviation from omega_k that the mean of M makes, by the rocker's share, relative to that of the lower root; "
+                "distance of the resonance below omega_k that follows from the mean of M alone, which is above 1 by the "
+                "rocker's inertia, over that of the lower root of the determinant; "
                 "*oscillating inertia of the rocker* is read as the inertia of the rocker, which oscillates",
                 ALIKE_WORDS,
                 tuple(near(f"I4 = {ratio:g}", 1.0, by_mean[ratio] / x, ALIKE) for ratio, x in below.items()),
@@ -425,21 +437,24 @@ def flattening(inertia_ratio: float, times: float) -> float:
     return float(brentq(excess, 0.1, 12.0, xtol=1e-6))
 
 
-def one_mass(inertia_ratio: float, omega_c: float) -> NDArray[np.float64]:
-    """Return the amplitude of a single mass on a spring at the speeds `CLOSE`, under the first harmonic of the force.
+def one_mass(speeds: NDArray[np.float64], inertia_ratio: float, omega_c: float) -> NDArray[np.float64]:
+    """Return the amplitude of a single mass on a spring at the speeds (rad/s), under the first harmonic of the force.
 
     The mass and the spring follow from the mean values of M and K.
     """
     found = equation(inertia_ratio, Variant.EXACT)
-    stiffness = SQUARE_OF_OMEGA_K / CLOSE**2 + found.stiffness.mean - found.mass.mean
-    amplitude: NDArray[np.float64] = found.force.amplitudes[1] / np.abs(stiffness + 1j * omega_c / CLOSE)
+    stiffness = SQUARE_OF_OMEGA_K / speeds**2 + found.stiffness.mean - found.mass.mean
+    amplitude: NDArray[np.float64] = found.force.amplitudes[1] / np.abs(stiffness + 1j * omega_c / speeds)
     return amplitude
 
 
 def from_one_mass(inertia_ratio: float, omega_c: float) -> float:
     """Return the greatest difference between the first harmonic and the amplitude of `one_mass`, relative to the peak."""
-    near_peak = harmonic(1, CLOSE, inertia_ratio, omega_c)
-    return float(np.abs(near_peak - one_mass(inertia_ratio, omega_c)).max() / peak(1, inertia_ratio, omega_c)[1])
+    at, height = peak(1, inertia_ratio, omega_c)
+    # closer about the peak, where the difference is greatest
+    speeds = np.append(CLOSE, at + np.arange(-0.2, 0.2, 0.002))
+    apart = harmonic(1, speeds, inertia_ratio, omega_c) - one_mass(speeds, inertia_ratio, omega_c)
+    return float(np.abs(apart).max() / height)
 
 
 @cache

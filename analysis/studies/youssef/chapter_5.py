@@ -269,7 +269,10 @@ def formulas() -> tuple[Case, ...]:
 
 
 #: Upper limits of I4 that Fig 5.1 may have, in words: the text does not say which range it means.
-RANGES = {1.5: "I4 = 1.5, the end of Fig 5.4 (L3919)", 2.0: "I4 = 2, the value of Fig 5.3"}
+RANGES = {
+    1.5: "I4 = 1.5, the end of Fig 5.4 (L3919), with which Fig 5.1 is compared (L3966)",
+    2.0: "I4 = 2, the value of Fig 5.3",
+}
 
 
 def widest_by_inertia() -> dict[float, float]:

@@ -17,7 +17,7 @@ from ...periodic import natural_frequency
 from ...youssef import HarmonicMotion, harmonic_balance, resonance, slider_equation
 from ..rules import ABOUT, ALIKE, SMALL
 from ..statements import Case, Statement, at_least, at_most, near, text
-from .chapter_4 import DAMPERS
+from .chapter_4 import AT_PEAKS, DAMPERS, range_above
 from .chapter_5 import closed, held
 from .linearised import with_crank
 from .regions import axis, hill, removing_estimate
@@ -26,14 +26,14 @@ OMEGA_K = sqrt(SQUARE_OF_OMEGA_K)
 #: Inertia ratios of the stability, and of the resonance with its dampers omega_c (1/s) and speeds (rad/s).
 RATIOS, RESONANT = (0.25, 0.5, 1.0, 1.5, 2.0), (0.5, 1.0, 1.5)
 WEAK, STRONG = DAMPERS[0], DAMPERS[-1]
-SPEEDS = np.arange(10.0, 45.0, 0.05)
+SPEEDS = np.unique(np.append(np.arange(10.0, 45.0, 0.05), AT_PEAKS[AT_PEAKS > 10.0]).round(3))
 #: Lengths of crank and coupler relative to the rocker's, in the ranges of Fig 5.2 and 5.3.
 CRANKS, COUPLERS = (0.01, 0.03, 0.05, 0.07, 0.1), (0.8, 0.9, 1.0, 1.1, 1.2)
 #: Amplitude u/l4 above which a speed counts as resonant.
 LARGE = 0.05
 #: Words for the equation behind the numbers of chapters IV and V, for the speeds and for the dampers.
 RIGHT = "right linear equation"
-SPEEDS_WORDS = "10 to 45 rad/s in steps of 0.05 (ours)"
+SPEEDS_WORDS = "10 to 45 rad/s in steps of 0.05, closer at the resonances (ours)"
 DAMPERS_WORDS = f"omega_c = {WEAK:g} and {STRONG:g} 1/s (Fig 4.6)"
 SIGN = "none, the sign decides"
 
@@ -67,7 +67,7 @@ def unlike_oscillator(inertia_ratio: float) -> tuple[float, float]:
         stiffness = np.abs(SQUARE_OF_OMEGA_K / SPEEDS**2 - mass + 1j * damper / SPEEDS)
         first = harmonic(1, inertia_ratio, damper)
         both = np.array([motion.amplitude for motion in short_crank(inertia_ratio, damper, 2)])
-        oscillator = (first * stiffness).mean() / stiffness
+        oscillator = np.average(first * stiffness, weights=np.gradient(SPEEDS)) / stiffness
         compared.append([np.abs(size / oscillator - 1.0).max() for size in (first, both)])
     one, two = np.max(compared, axis=0).tolist()
     return one, two
@@ -77,16 +77,6 @@ def like_oscillator(why: str = "") -> tuple[Case, ...]:
     """Judge whether the slider moves as a damped oscillator does; see `unlike_oscillator`."""
     found = np.max([unlike_oscillator(i) for i in RESONANT], axis=0)
     return tuple(at_most(name, ABOUT, x, why=why) for name, x in zip(("first harmonic", "both harmonics"), found))
-
-
-def speeds_above(level: float, curve: NDArray[np.float64]) -> float:
-    """Return the width (rad/s) of the speed range between the first and the last speed at which a curve crosses a level.
-
-    ``curve`` has a value for each of the `SPEEDS`.
-    """
-    (at,) = np.nonzero((curve[:-1] > level) != (curve[1:] > level))
-    passed = SPEEDS[at] + (level - curve[at]) / (curve[at + 1] - curve[at]) * np.diff(SPEEDS)[at]
-    return float(np.ptp(passed))
 
 
 def width(parameters: FiveBarParameters, number: int = 1) -> float:
@@ -181,8 +171,8 @@ def _on_resonance() -> tuple[Statement, ...]:
     # by damper, then by inertia
     curves = [[first[i, damper] for i in RESONANT] for damper in (WEAK, STRONG)]
     tops = np.array([[of.max() for of in row] for row in curves])
-    wide = np.array([[speeds_above(LARGE, of) for of in row] for row in curves])
-    half = [speeds_above(0.5 * of.max(), of) for of in curves[-1]]
+    wide = np.array([[range_above(LARGE, SPEEDS, of) for of in row] for row in curves])
+    half = [range_above(0.5 * of.max(), SPEEDS, of) for of in curves[-1]]
     return (
         Statement(
             "Results for a short crank showed similarity to a damped second order linear system behaviour.",

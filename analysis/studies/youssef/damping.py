@@ -313,7 +313,7 @@ def judge_determinant() -> tuple[Statement, ...]:
             "THIS PROG. INV[E]STIGATES STABILITY IN PRESENCE [O]F DAMPING",
             listing("appendix 4, L8698"),
             "*investigates* is read as finds right: omega_c that removes the first region up to I4 = 1.5, by the equation of "
-            "the listing, solved without its cut after nine terms, and by the true periodic motion",
+            "the listing (its cut after nine terms does not change these digits) and by the true periodic motion",
             "0.0005 1/s, to which the listing's value is found",
             (near("", f"{removing_most('listing of appendix 4'):.3f}", removing_most("true orbit"), unit="1/s"),),
             "its regions are too wide (errata 2, 16, 17, 20)",

@@ -559,10 +559,10 @@ def _hamming_statements() -> list[Statement]:
             "truncation, from the information already calculated. These errors are in all cases convergent and, thus the "
             "methods are highly stable.",
             text("2.4, L1379-1387"),
-            f"Hamming's estimate 9/121 (p - c) of the error of u in a step of {1e3 * STEP:g} ms at 420 rpm: over the error; "
-            f"its change over roundings to {CM_PER_METRE * UNIT:g} cm, and over an error of the start (*inherent*, so read) "
-            f"of {CM_PER_METRE * START_ERROR:g} cm; factor per step of the spurious solution of Milne's corrector, for y' = -y "
-            "with the step 0.1, ours",
+            f"Hamming's estimate 9/121 (p - c) of the error of u by the corrector, c, in a step of {1e3 * STEP:g} ms at 420 "
+            f"rpm: over the error; its change over roundings to {CM_PER_METRE * UNIT:g} cm, and over an error of the start "
+            f"(*inherent*, so read) of {CM_PER_METRE * START_ERROR:g} cm; factor per step of the spurious solution of Milne's "
+            "corrector, for y' = -y with the step 0.1, ours",
             "0.5 to 2, ours: an estimate within a factor of 2 is of use; at most 1, as *convergent* says; one counterexample "
             "refutes *in all cases*",
             (
