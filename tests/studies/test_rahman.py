@@ -351,6 +351,12 @@ class TestStatements:
             moment = judged("R14", "Two torque components")[f"1T1{axis}; {case.name}"]
             assert moment.computed == pytest.approx(np.abs(left_out).max(), rel=1e-5)
 
+    @pytest.mark.parametrize(("axis", "lever"), [("i", S), ("j", C)])
+    def test_what_the_bearing_moments_by_hand_lack(self, axis: str, lever: FloatArray) -> None:
+        most = max(np.abs(pin_force(case)[2] * CRANK_IN * lever)[clear(case)].max() for case in (*OFFSETS, *SHIFTS))
+        found = judged("R14", "By manual manipulation")[f"1T1{axis}; right forces"]
+        assert found.computed == pytest.approx(most, rel=1e-5)
+
     def test_with_a_sinusoidal_shift_the_rod_pulls_along_the_axis_too(self) -> None:
         """1F1k less m1 S1'' is the pull of the rod at the crank pin: the rod's inertia and the force along it."""
         found = judged(CONSTANT, "Axial force")["a4 = 10 in, sinusoidal shift of 3.5 in, alpha = 1"]

@@ -283,7 +283,15 @@ def _bearing_moments() -> tuple[Statement, ...]:
     seconds = joint_accelerations(CRANK_AT_SPEED, GENERAL, rates)
     forces = joint_forces(CRANK_AT_SPEED, bodies(parameters()), GENERAL, rates, seconds, TORQUE)
     (i, j), (about_i, about_j) = on_crank(np.array(0.9), forces), on_bearing(np.array(0.9), 3.5, forces)
-    by_hand = (nothing("1T1i", about_i + j * 3.5, "lb.in"), nothing("1T1j", about_j - i * 3.5, "lb.in"))
+    by_hand = (nothing("1T1i; 69q", about_i + j * 3.5, "lb.in"), nothing("1T1j; 69p", about_j - i * 3.5, "lb.in"))
+    by_forces = [
+        nothing(
+            f"{symbol}; right forces",
+            max(greatest(c, of[c] + sign * c.shift_in * values(c, COMPONENTS[force])) for c in shifted),
+            "lb.in",
+        )
+        for (symbol, of), sign, force in zip(moments.items(), (1.0, -1.0), ("1F1j", "1F1i"))
+    ]
     extra = [
         at_least(symbol, NOTHING, min(greatest(c, of[c]) for c in shifted), "lb.in") for symbol, of in moments.items()
     ]
@@ -313,9 +321,10 @@ def _bearing_moments() -> tuple[Statement, ...]:
         Statement(
             "By manual manipulation it is found that [1T1i = -1F1j S1] and [1T1j = 1F1i S1].",
             text("section 3.2, L1119"),
-            "difference of the two sides by the printed 69p and 69q, in a general position at a constant shift",
+            "difference of the two sides: by the printed 69p and 69q, in a general position at a constant shift; by the right "
+            f"forces, the most of the six cases with a shift, {FROM_DEAD}",
             ROUNDING,
-            by_hand,
+            (*by_hand, *by_forces),
             "the thesis puts 1F1k to zero; the right 1F1k (erratum 7) adds to both moments",
         ),
     )
