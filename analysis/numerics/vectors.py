@@ -7,16 +7,18 @@ instruction for all lanes. An array in lanes is flat: number i of lane l is at `
 from __future__ import annotations
 
 import operator
+from collections.abc import Sequence
 from typing import Any, ClassVar
 
 from llvmlite import ir
 from numba import float64, int64, types
+from numba.core import cgutils
 from numba.core.datamodel.models import PrimitiveModel
 from numba.core.datamodel.registry import register_default
 from numba.core.typing.templates import ConcreteTemplate, infer_global, signature
 from numba.extending import intrinsic, lower_builtin
 
-from .lanes import declare_function, repeat_number, vector, width
+from .lanes import constant, declare_function, repeat_number, vector, width
 
 #: Number of doubles in a vector of the processor.
 LANES = width()
@@ -153,3 +155,67 @@ def greater(typing_context, a, b):
         return builder.select(builder.fcmp_ordered(">", a, b), a, b)
 
     return LANE(LANE, LANE), generate
+
+
+# Weighted sums of rows
+
+#: Weights of a sum of rows: each the index of a row and its weight.
+Weights = Sequence[tuple[int, float]]
+
+
+def nonzero_weights(weights: Sequence[float]) -> Weights:
+    """Return the weights that are not zero, each with its index."""
+    return [(row, weight) for row, weight in enumerate(weights) if weight != 0.0]
+
+
+def weighted_rows(table: Sequence[Weights]) -> Any:
+    """Return a compiled function f(n, x, rows, h, out): out = x + h (sum over ``table[n]`` of weight * rows[row]).
+
+    ``x`` may be None for zero. Each sum is written out without a loop, in the order of the table, for two columns at a time.
+    Between two sums an integrator calls a function that computes a row, one number after the other: two numbers are soon
+    there, whereas a longer vector would wait for the last.
+    """
+
+    @intrinsic
+    def combine(typing_context: Any, n: Any, x: Any, rows: Any, h: Any, out: Any) -> Any:
+        def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+            number, begin, rows, h, out = (
+                context.make_array(kind)(context, builder, value) if isinstance(kind, types.Array) else value
+                for kind, value in zip(signature.args, arguments)
+            )
+            columns, length = builder.extract_value(out.shape, 0), builder.extract_value(rows.shape, 1)
+
+            def write_columns(weights: Weights, lanes: int, first: Any, end: Any) -> None:
+                kind = vector(lanes)
+
+                def at(data: Any, place: Any) -> Any:
+                    return builder.bitcast(builder.gep(data, [place]), kind.as_pointer())
+
+                step = repeat_number(builder, h, lanes)
+                with cgutils.for_range_slice(builder, first, end, length.type(lanes), length.type) as (column, _):
+                    total = None
+                    for row, weight in weights:
+                        place = builder.add(builder.mul(length, length.type(row)), column)
+                        term = builder.fmul(constant(kind, weight), builder.load(at(rows.data, place), align=8))
+                        total = term if total is None else builder.fadd(total, term)
+                    total = builder.fmul(step, total)
+                    if signature.args[1] != types.none:
+                        total = builder.fadd(builder.load(at(begin.data, column), align=8), total)
+                    builder.store(total, at(out.data, column), align=8)
+
+            even = builder.and_(columns, columns.type(-2))
+            end = builder.append_basic_block()
+            chosen = builder.switch(number, end)
+            for i, weights in enumerate(table):
+                if weights:
+                    chosen.add_case(number.type(i), block := builder.append_basic_block())
+                    with builder.goto_block(block):
+                        write_columns(weights, 2, columns.type(0), even)
+                        write_columns(weights, 1, even, columns)
+                        builder.branch(end)
+            builder.position_at_end(end)
+            return context.get_dummy_value()
+
+        return types.void(int64, x, rows, float64, out), generate
+
+    return combine

@@ -12,48 +12,17 @@ from linkwork import tableau
 from linkwork.integrate import GREATEST_FACTOR, LEAST_FACTOR, SAFETY
 
 from ..numerics.codegen import evaluate, inner
+from ..numerics.vectors import nonzero_weights, weighted_rows
 from .sources import write_channels
 
-# DOP853: the weights in stage s are WEIGHT[ROW[s]:ROW[s + 1]], of the rates at the stages FROM[ROW[s]:ROW[s + 1]]
-ROW = np.cumsum([0, *(len(row) for row in tableau.A)])
-FROM = np.array([stage for row in tableau.A for stage, _ in row])
-WEIGHT = np.array([weight for row in tableau.A for _, weight in row])
 NODES = np.array(tableau.C)
-E3 = np.array(tableau.E3)
-E5 = np.array(tableau.E5)
-_D = np.array(tableau.D)
 STAGES = tableau.STAGES
 EXPONENT = -1.0 / tableau.ORDER
 
-
-@inner
-def stage(s, x, k, h, y):
-    """Compute the state y at stage s of a step of size h from x, from the rates k; stage 12 is the end of the step.
-
-    Four components at a time are summed in the processor's registers, each in the order of the stages.
-    """
-    n = x.shape[0]
-    first, end = ROW[s], ROW[s + 1]
-    i = 0
-    while i + 4 <= n:
-        a = b = c = d = 0.0
-        for j in range(first, end):
-            weight, row = WEIGHT[j], FROM[j]
-            a += weight * k[row, i]
-            b += weight * k[row, i + 1]
-            c += weight * k[row, i + 2]
-            d += weight * k[row, i + 3]
-        y[i] = x[i] + h * a
-        y[i + 1] = x[i + 1] + h * b
-        y[i + 2] = x[i + 2] + h * c
-        y[i + 3] = x[i + 3] + h * d
-        i += 4
-    while i < n:
-        a = 0.0
-        for j in range(first, end):
-            a += WEIGHT[j] * k[FROM[j], i]
-        y[i] = x[i] + h * a
-        i += 1
+#: ``stage(s, x, k, h, y)`` computes the state y at stage s of a step of size h from x, from the rates k; stage 12 is the end.
+stage = weighted_rows(tableau.A)
+_error = weighted_rows([nonzero_weights(tableau.E3), nonzero_weights(tableau.E5)])
+_curve = weighted_rows([nonzero_weights(row) for row in tableau.D])
 
 
 class Flow(NamedTuple):
@@ -87,17 +56,18 @@ def attempt(flow, begin, elapsed, h, x, room, u, piece, source):
 @inner
 def _local_error(x, y, k, h, scale):
     """Return Hairer's error estimate of order 8 for a step from x to y, relative to scale + state; NaN if y is not finite."""
+    # the rates at these stages are computed later
+    e3, e5 = k[STAGES + 1], k[STAGES + 2]
+    _error(0, None, k, 1.0, e3)
+    _error(1, None, k, 1.0, e5)
     sum3 = sum5 = 0.0
     for i in range(x.shape[0]):
-        e3 = e5 = 0.0
-        for j in range(STAGES):
-            e3 += E3[j] * k[j, i]
-            e5 += E5[j] * k[j, i]
         if not isfinite(y[i]):
             return nan
         weight = scale[i] + max(abs(x[i]), abs(y[i]))
-        sum3 += (e3 / weight) ** 2
-        sum5 += (e5 / weight) ** 2
+        a, b = e3[i] / weight, e5[i] / weight
+        sum3 += a * a
+        sum5 += b * b
     bottom = sum5 + 0.01 * sum3
     return 0.0 if bottom == 0.0 else h * sum5 / np.sqrt(bottom * x.shape[0])
 
@@ -126,11 +96,8 @@ def interpolant(x, y, k, h, f):
         f[0, i] = delta
         f[1, i] = h * k[0, i] - delta
         f[2, i] = 2.0 * delta - h * (k[12, i] + k[0, i])
-        for r in range(4):
-            total = 0.0
-            for j in range(16):
-                total += _D[r, j] * k[j, i]
-            f[3 + r, i] = h * total
+    for r in range(4):
+        _curve(r, None, k, h, f[3 + r])
 
 
 @inner

@@ -13,13 +13,17 @@ from linkwork import tableau
 
 from ..numerics.codegen import inner
 from ..numerics.vectors import LANES, absolute, greater, load, multiply_add, spread, square_root, store
-from .stepping import E3, E5, FROM, ROW, STAGES, WEIGHT
+from .stepping import STAGES
 
 #: Replaces a sum of squares that is zero.
 _LEAST = 1e-300
+# the weights in stage s are _WEIGHT[_ROW[s]:_ROW[s + 1]], of the rates at the stages _FROM[_ROW[s]:_ROW[s + 1]]
+_ROW = np.cumsum([0, *(len(row) for row in tableau.A)])
+_FROM = np.array([stage for row in tableau.A for stage, _ in row])
+_WEIGHT = np.array([weight for row in tableau.A for _, weight in row])
 # numbers of the stages that the error and the interpolant use, and their weights
-_OF_ERROR = np.flatnonzero((E3 != 0.0) | (E5 != 0.0))
-_E3, _E5 = E3[_OF_ERROR], E5[_OF_ERROR]
+_OF_ERROR = np.flatnonzero(np.any([tableau.E3, tableau.E5], axis=0))
+_E3, _E5 = np.array([tableau.E3, tableau.E5])[:, _OF_ERROR].copy()
 _OF_CURVE = np.flatnonzero(np.any(tableau.D, axis=0))
 _D0, _D1, _D2, _D3 = np.array(tableau.D)[:, _OF_CURVE].copy()
 
@@ -30,8 +34,8 @@ def stage_in_lanes(s, x, k, h, y):
     step = load(h, 0)
     for i in range(x.shape[0] // LANES):
         total = 0.0 * step
-        for j in range(ROW[s], ROW[s + 1]):
-            total = multiply_add(WEIGHT[j], load(k[FROM[j]], i), total)
+        for j in range(_ROW[s], _ROW[s + 1]):
+            total = multiply_add(_WEIGHT[j], load(k[_FROM[j]], i), total)
         store(y, i, multiply_add(step, total, load(x, i)))
 
 
