@@ -7,7 +7,6 @@ relative to the state, and would allow errors of whole turns.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from itertools import chain
 from typing import Any
 
 import numpy as np
@@ -35,8 +34,7 @@ class WholeTurns:
         self._mechanism, self._p, self._modes = mechanism, p, modes
         self._periods = [freedom.period for freedom in mechanism.freedoms]
         self.taken = np.zeros(mechanism.size)
-        functions = chain(chain.from_iterable(encoded.functions), (event.function for event in events))
-        self._never = any(functions)
+        self._never = encoded.has_functions or any(event.function for event in events)
         #: index of a sample, and the angles subtracted from that sample on
         self._since: list[tuple[int, NDArray[np.float64]]] = []
 

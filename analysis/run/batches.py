@@ -7,7 +7,6 @@ import warnings
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cache, partial
-from itertools import chain
 from math import prod
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -308,7 +307,7 @@ def prepare(task: Task) -> PreparedBatch:
     source = compile_source(replace(encoded, functions=((None, None),) * len(encoded.functions)))[0]
     compiled.channels_of_many(t, source, batch, x, u)
     doubtful: set[int] = set()
-    if any(chain.from_iterable(encoded.functions)):
+    if encoded.has_functions:
         for i in range(len(x)):
             try:
                 u[i] += function_values(encoded, t, x[i])

@@ -266,7 +266,7 @@ def simulate_many(
     # what cannot be compiled is reported here, and not by a worker
     encoded = encode(all_inputs[0], mechanism)
     compile_source(encoded)
-    if on_device := _check_device(options.get("device"), n_jobs, any(chain.from_iterable(encoded.functions))):
+    if on_device := _check_device(options.get("device"), n_jobs, encoded.has_functions):
         n_jobs, batch = 1, batch or max(16, _SAMPLES_ON_DEVICE // len(settings.times))
     usual = max(min(128, len(parameters) // 4), min(256, len(parameters) // 16))
     # a multiple of 8 fills whole vectors

@@ -343,11 +343,16 @@ class Encoded:
     functions: tuple[tuple[StateFunction | None, StateFunction | None], ...]
 
     @cached_property
+    def has_functions(self) -> bool:
+        """Return whether the user's functions add to any signal."""
+        return any(chain.from_iterable(self.functions))
+
+    @cached_property
     def constant(self) -> NDArray[np.float64] | None:
         """Return the values of all channels if these do not change during a run, else None."""
         u = np.zeros(len(self.mechanism.channels))
         u[self.source.places[:, 0]] = self.source.coefficients[0, :, 0]
-        changes = not self.source.is_constant or any(chain.from_iterable(self.functions))
+        changes = not self.source.is_constant or self.has_functions
         return None if changes or not np.isfinite(u).all() else u
 
     @cached_property
@@ -360,7 +365,7 @@ class Encoded:
         return not (
             len(self.source.harmonics)
             or self.source.laws[:, 3].any()
-            or any(chain.from_iterable(self.functions))
+            or self.has_functions
             or bends.any()
             or slopes[:, self.source.places[:, 1] < 0].any()
         )
@@ -515,7 +520,7 @@ def _reason(error: Exception) -> str:
 def compile_source(encoded: Encoded) -> tuple[Source, list[Any]]:
     """Return the inputs for the compiled code, with a copy of the torque laws, and the objects to keep while it is in use."""
     freedoms, source = len(encoded.mechanism.freedoms), encoded.source._replace(laws=encoded.source.laws.copy())
-    if not any(chain.from_iterable(encoded.functions)):
+    if not encoded.has_functions:
         return source, []
     kept = [[f and compile_function(f, freedoms) for f in row] for row in encoded.functions]
     return source._replace(functions=np.array([[f.address if f else 0 for f in row] for row in kept])), kept

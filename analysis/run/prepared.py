@@ -5,6 +5,7 @@ from __future__ import annotations
 import time as clock
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
+from functools import cache
 from math import pi
 from typing import Any
 
@@ -33,6 +34,22 @@ EVENTS_PER_CALL = 1_000
 _GREAT = 1e100
 #: Highest harmonic of the drive that is expected in a motion: a faster vibration is reported.
 _HARMONICS = 30.0
+
+
+@cache
+def _solver() -> Any:
+    """Return the module of the compiled solver: imported late, as Numba takes long, and once, as each import takes 1 us."""
+    from . import compiled
+
+    return compiled
+
+
+@cache
+def _records() -> Any:
+    """Return the module of the compiled solver's records, imported as `_solver` is."""
+    from . import records
+
+    return records
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -144,11 +161,10 @@ class Run:
 
     def _records(self, times: NDArray[np.float64], x: NDArray[np.float64]) -> tuple[Any, Any]:
         """Return arrays for samples at the given times, and the solver's records at the start of the run from the state x."""
-        from .records import CARRY, Samples, State
-
+        k = _records()
         n, channels = len(times), len(self.mechanism.channels)
-        samples = Samples(times, np.empty((1, n, self.mechanism.size)), np.empty((1, n, channels)))
-        state = State(np.zeros(1, dtype=CARRY), x[None].copy(), np.zeros((1, channels)))
+        samples = k.Samples(times, np.empty((1, n, self.mechanism.size)), np.empty((1, n, channels)))
+        state = k.State(np.zeros(1, dtype=k.CARRY), x[None].copy(), np.zeros((1, channels)))
         state.carries["begin"] = times[0]
         return samples, state
 
@@ -160,9 +176,7 @@ class Run:
         InputError
             As for `start`; or if ``balanced`` is not possible.
         """
-        from .compiled import run, single_batch
-        from .records import BAD_INPUT, NO_STEP, RUNNING
-
+        solver, k = _solver(), _records()
         begun = clock.perf_counter()
         turns = WholeTurns(self.mechanism, self.p, self.modes, self.encoded, self.events)
         start, laws = self.start(), self.encoded.source.laws
@@ -172,21 +186,21 @@ class Run:
             start = replace(start, energy=self.mechanism.equations.energy(tuple(start.x.tolist()), self.p))
         problem = make_problem(self.encoded, self.settings, self.mechanism.is_switched_on(self.p))
         source, kept = compile_source(self.encoded)
-        batch = single_batch(source, np.array([*self.p, start.energy]), start.scale, self.encoded.steady)
+        batch = solver.single_batch(source, np.array([*self.p, start.energy]), start.scale, self.encoded.steady)
         watch, watching = self._watch(self._balance() if balanced else ())
         kept += watching
         times, most = self.settings.times, self.settings.max_steps
         samples, state = self._records(times, start.x)
         carry, x, u = state.carries[0], state.x[0], state.u[0]
-        status, integrating = np.full(1, RUNNING), 0.0
+        status, integrating = np.full(1, k.RUNNING), 0.0
         occurrences: list[list[float]] = []
         stiff, needed, span = "", 0.0, times[-1] - times[0]
         with record_interrupts() as interrupted, show_progress(progress, span) as show:
             try:
-                while status[0] == RUNNING and carry["steps"] < most and not needed and not interrupted:
+                while status[0] == k.RUNNING and carry["steps"] < most and not needed and not interrupted:
                     entered = clock.perf_counter()
                     # the arrays are all made here, and a short run takes 160 us
-                    run.unchecked(problem, source, batch, watch, state, samples, status, most, STEPS_PER_CALL)
+                    solver.run.unchecked(problem, source, batch, watch, state, samples, status, most, STEPS_PER_CALL)
                     integrating += clock.perf_counter() - entered
                     if carry["found"]:
                         found = watch.found[: carry["found"]]
@@ -197,20 +211,20 @@ class Run:
                     show(passed)
                     stiff = self.stiffness_caution(x, u, steps, passed)
                     needed = steps * span / passed if stiff and is_too_slow(steps, passed, span, most) else 0.0
-                    if status[0] == RUNNING:
+                    if status[0] == k.RUNNING:
                         turns.take(x, u, source.laws, int(carry["sample"]), watch)
             except KeyboardInterrupt:  # raised by the caller's code
                 interrupted.append(True)
-        t = float(carry["begin"] + carry["elapsed"])
-        if status[0] == BAD_INPUT:
-            raise NotFiniteError(self.encoded, int(carry["lost"]), t, x + turns.taken)
-        done = int(carry["sample"])
+        last = dict(zip(k.CARRY.names, carry.item()))
+        t, done = last["begin"] + last["elapsed"], last["sample"]
+        if status[0] == k.BAD_INPUT:
+            raise NotFiniteError(self.encoded, last["lost"], t, x + turns.taken)
         times, states, forces = times[:done], samples.states[0, :done], samples.forces[0, :done]
-        if carry["started"] and times[-1] < t:
+        if last["started"] and times[-1] < t:
             # the run ended between two samples: its last configuration is recorded too
             times, states, forces = np.append(times, t), np.vstack([states, x]), np.vstack([forces, u])
         code, message = verdict(self.mechanism, self.settings, int(status[0]), t, x + turns.taken, self.limit, needed)
-        if status[0] == NO_STEP:
+        if status[0] == k.NO_STEP:
             message += self.describe_undefined_forces(x)
         values = turns.put_back(compute_outputs(self.mechanism, problem.modes, batch.p[0], states, forces))
         balance = "" if code else energy_balance(self.mechanism.output_names, values, self.settings.tolerance)
@@ -228,9 +242,9 @@ class Run:
             parameters=self.parameters,
             names=self.mechanism.output_names,
             statistics={
-                "steps": float(carry["steps"] - carry["rejected"]),
-                "rejected": float(carry["rejected"]),
-                "evaluations": float(carry["evaluations"]),
+                "steps": float(last["steps"] - last["rejected"]),
+                "rejected": float(last["rejected"]),
+                "evaluations": float(last["evaluations"]),
                 "seconds_integrating": integrating,
                 "seconds": clock.perf_counter() - begun,
             },
@@ -277,8 +291,9 @@ class Run:
 
     def _watch(self, balance: tuple[int, ...]) -> tuple[Any, list[Any]]:
         """Return the `Watch` of the compiled code (events and energy balance), and the objects to keep while it is used."""
-        from .records import Watch
-
+        k = _records()
+        if not (self.events or balance):
+            return k.watch_nothing(self.mechanism.size), []
         n = len(self.events)
         table, addresses, kept = np.zeros((n, 4)), np.zeros(n, dtype=np.int64), []
         for i, event in enumerate(self.events):
@@ -289,14 +304,12 @@ class Run:
                 kept.append(compile_function(event.function, len(self.mechanism.freedoms)))
                 addresses[i] = kept[-1].address
         found = np.empty((EVENTS_PER_CALL * n, 2 + self.mechanism.size))
-        return Watch(table, addresses, np.zeros(n), found, np.array(balance, dtype=np.int64)), kept
+        return k.Watch(table, addresses, np.zeros(n), found, np.array(balance, dtype=np.int64)), kept
 
 
 def make_problem(encoded: Encoded, settings: Settings, switched: bool) -> Any:
     """Return the `Problem` of the compiled code: data that runs with the same kind of inputs have in common."""
-    from .records import Problem
-
-    return Problem(
+    return _records().Problem(
         machine(encoded.mechanism, switched).addresses,
         np.array(list(encoded.modes.values()), dtype=float),
         encoded.commands,
@@ -321,17 +334,16 @@ def verdict(
     ``limit`` returns the message for a limit of the motion; by default it is the limit of assembly. ``needed`` is zero, or the
     number of steps that the run would have needed if it was given up as stiff.
     """
-    from .records import LIMIT, NO_STEP, RUNNING
-
-    if status not in (LIMIT, NO_STEP, RUNNING):
+    k = _records()
+    if status not in (k.LIMIT, k.NO_STEP, k.RUNNING):
         return 0, ""
     # a microsecond, at any time
     at = f"t = {t:.9g} s" if abs(t) < 1e3 else f"t = {t:.6f} s"
-    if status == LIMIT:
+    if status == k.LIMIT:
         return 3, f"{limit(x) if limit else ASSEMBLY} at {at}, {mechanism.describe_state(x.tolist())}"
-    if status == NO_STEP:
+    if status == k.NO_STEP:
         return 4, f"the step size fell below what {at} can resolve, {mechanism.describe_state(x.tolist())}"
-    if status == RUNNING and needed:
+    if status == k.RUNNING and needed:
         return 4, f"stopped at {at}, as about {needed:.2g} steps would be needed"
     return 4, f"{settings.max_steps} steps did not suffice: stopped at {at}, {mechanism.describe_state(x.tolist())}"
 
@@ -357,7 +369,6 @@ def compute_outputs(
         Indices of the outputs to compute, in this order; by default all.
     """
     from ..numerics.lanes import width
-    from .compiled import rows
 
     switched = mechanism.is_switched_on(p.tolist())
     if columns is None:
@@ -365,5 +376,5 @@ def compute_outputs(
     else:
         outputs, count = compile_outputs(mechanism, switched, columns, width()).addresses["chosen"], len(columns)
     values = np.empty((len(states), count))
-    rows(outputs, width(), modes, p, np.ascontiguousarray(states), np.ascontiguousarray(inputs), values)
+    _solver().rows(outputs, width(), modes, p, np.ascontiguousarray(states), np.ascontiguousarray(inputs), values)
     return values

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import cache
 from typing import NamedTuple
 
 import numpy as np
@@ -60,6 +61,7 @@ class Watch(NamedTuple):
 OUTPUT, LEVEL, DIRECTION, STOPS = range(4)
 
 
+@cache
 def watch_nothing(size: int) -> Watch:
     """Return a `Watch` without events, for states of a given size."""
     none = np.empty(0, dtype=np.int64)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from itertools import chain
+from math import isfinite
 
 import numpy as np
 from numpy.typing import NDArray
@@ -60,20 +60,22 @@ def sample(
     else:
         from .sources import channels  # compiled on its first call
 
-        channels(t, ahead, left, x, source, encoded.commands, u, np.empty_like(u))
+        # all arrays are those of `encode`, or made here
+        channels.unchecked(t, ahead, left, x, source, encoded.commands, u, np.empty_like(u))
     here = np.zeros_like(u)
-    if any(chain.from_iterable(encoded.functions)):
+    if encoded.has_functions:
         here = function_values(encoded, t, x)
         u += here
         if ahead > t and len(encoded.commands) and np.isfinite(here).all():
             there = function_values(encoded, ahead, x)
             for value, _, rate in encoded.commands:
                 u[rate] += (there[value] - here[value]) / (ahead - t) - here[rate]
-    for lost in np.flatnonzero(~np.isfinite(u)):
+    lost = next((n for n, value in enumerate(u.tolist()) if not isfinite(value)), None)
+    if lost is not None:
         # if inputs are held, the derivative of a command is the slope of its secant
         commands = {int(rate): int(value) for value, _, rate in encoded.commands}
         secant = ahead > t and np.isfinite(here[lost])
-        raise NotFiniteError(encoded, commands.get(int(lost), int(lost)) if secant else int(lost), t, x)
+        raise NotFiniteError(encoded, commands.get(lost, lost) if secant else lost, t, x)
     return u
 
 

@@ -280,5 +280,5 @@ class Source(NamedTuple):
     @property
     def is_constant(self) -> bool:
         """Return whether all signals are constant, apart from the users' functions, and no torque law acts."""
-        varies = self.coefficients[:, :, 1:].any() or len(self.harmonics) or self.laws[:, 2:4].any()
+        varies = len(self.harmonics) or self.laws[:, 2:4].any() or self.coefficients[:, :, 1:].any()
         return len(self.coefficients) == 1 and not varies

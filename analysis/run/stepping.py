@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from linkwork import tableau
 from linkwork.integrate import GREATEST_FACTOR, LEAST_FACTOR, SAFETY
 
-from ..numerics.codegen import evaluate, inner
+from ..numerics.codegen import evaluate, inline, inner
 from ..numerics.vectors import nonzero_weights, weighted_rows
 from .sources import write_channels
 
@@ -34,7 +34,7 @@ class Flow(NamedTuple):
     scale: NDArray[np.float64]
 
 
-@inner
+@inline
 def attempt(flow, begin, elapsed, h, x, room, u, piece, source):
     """Take a step of size h from x at the time ``begin + elapsed`` into room.y; return its relative error (`_local_error`).
 
