@@ -155,13 +155,13 @@ class TestGoals:
                 assert found.linkage.values() == pytest.approx(PROBLEMS[name].linkage.values(), rel=1e-12)
 
     def test_no_motion_traces_what_is_out_of_reach(self) -> None:
-        # P is l2 + r from A at most; over the ellipse by a sum over small squares
-        h = 2e-4
-        x, y = np.meshgrid(np.arange(0.05, 0.35, h) + 0.5 * h, np.arange(0.10, 0.20, h) + 0.5 * h)
+        # P is l2 + r from A at most: at each y the ellipse ends at the right, and the reach is left of that or not
         k = PROBLEMS[PATH].linkage
-        inside = ((x - 0.20) / 0.15) ** 2 + ((y - 0.15) / 0.05) ** 2 <= 1.0
-        beyond = np.hypot(x - k.pivot_x, y - k.pivot_y) > k.crank_length + k.point_distance
-        assert out_of_reach() == pytest.approx(1e4 * h * h * (inside & beyond).sum(), abs=5e-3)
+        y = np.linspace(0.10, 0.20, 200_001)
+        half = 0.15 * np.sqrt(np.clip(1.0 - ((y - 0.15) / 0.05) ** 2, 0.0, None))
+        reach = k.pivot_x + np.sqrt((k.crank_length + k.point_distance) ** 2 - (y - k.pivot_y) ** 2)
+        beyond = np.clip(0.20 + half - np.maximum(reach, 0.20 - half), 0.0, None)
+        assert out_of_reach() == pytest.approx(1e4 * beyond.mean() * 0.10, abs=1e-5)
 
 
 class TestPrintedSeries:

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
+import numpy as np
 import pytest
 
 from analysis.studies.statements import HOLDS, Statement
-from analysis.studies.youssef.conclusions import decay
+from analysis.studies.youssef.conclusions import decay, spacings
 from analysis.studies.youssef.conclusions_linear import introduction, linearised
 
 from .results import check, expected
@@ -26,6 +27,11 @@ def test_verdicts_on_the_linear_equation(part: Callable[[], tuple[Statement, ...
             HOLDS
         ]
         assert s.outcome == outcome, s.quote
+
+
+def test_spacings_are_those_of_the_maxima_between_the_samples() -> None:
+    angle = np.linspace(0.0, 30.0, 700)
+    assert spacings(angle, np.cos(0.9 * angle)) == pytest.approx(400.0, abs=0.01)
 
 
 def test_the_transient_of_a_launch_is_no_decay() -> None:

@@ -10,7 +10,7 @@ from math import asin, degrees, pi
 import numpy as np
 from numpy.typing import NDArray
 
-from ...run import Event, Inputs, Trajectory, simulate
+from ...run import Event, Inputs, simulate
 from ...slider import slider_motion
 from ...synthesis import Search, SliderUnknown, UntimedPath, path_from_formula
 from ...units import CM_PER_METRE, RAD_S_PER_RPM
@@ -48,12 +48,13 @@ DAMPED, FREE = 3e4, 3.0
 MOST_TURNS = 80
 
 
-def spacings(run: Trajectory) -> NDArray[np.float64]:
-    """Return the crank angles (deg) between successive maxima of the slider position after th2 = 1 rad."""
-    angle = run["crank.angle"]
-    grid = np.arange(1.0, angle[-1], pi / 720.0)
-    u = np.interp(grid, angle, run["slider.position"])
-    tops = grid[1:-1][(u[1:-1] > u[:-2]) & (u[1:-1] >= u[2:])]
+def spacings(angle: NDArray[np.float64], rate: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the crank angles (deg) between successive maxima of the slider position after th2 = 1 rad.
+
+    The maxima are where the slider's ``rate`` falls through zero.
+    """
+    (at,) = np.nonzero((angle[:-1] > 1.0) & (rate[:-1] > 0.0) & (rate[1:] <= 0.0))
+    tops = angle[at] + rate[at] / (rate[at] - rate[at + 1]) * np.diff(angle)[at]
     return np.degrees(np.diff(tops))
 
 
@@ -290,7 +291,8 @@ def springs_on_torque() -> tuple[float, float]:
 
 def launched() -> tuple[Statement, ...]:
     """Judge the conclusions on the motion after a launch by a torque."""
-    maxima = [spacings(launch(*which)) for which in LAUNCHES]
+    runs = [launch(*which) for which in LAUNCHES]
+    maxima = [spacings(run["crank.angle"], run["slider.velocity"]) for run in runs]
     fastest = max(run_peak(accelerated(*which)).angle for which in LAUNCHES)
     damped = max(decay(*which, DAMPED) for which in LAUNCHES)
     undamped = min(decay(*which, 0.0) for which in LAUNCHES if which not in FOLDING)

@@ -40,7 +40,7 @@ from ..statements import Statement, at_least, at_most, near, text
 from ..study import Study, StudyResult, padded
 from .chapter_6 import ROUNDED, TABLE, best, by_readings, half_units
 from .chapter_7 import LIMITS, enclosed, reach, slider
-from .problems import PROBLEMS, WEIGHT, packaging_path
+from .problems import PROBLEMS, WEIGHT, ellipse, packaging_path
 
 FloatArray = NDArray[np.float64]
 
@@ -317,15 +317,14 @@ def draw_rocker(result: StudyResult) -> Figure:
 def out_of_reach(quarter: int = 20000) -> float:
     """Return the area (cm2) of the ellipse's part that lies beyond l2 + r from the crank shaft.
 
-    The circle of this radius is approximated by a polygon with ``quarter`` sides in each quadrant.
+    Ellipse and circle of this radius are approximated by polygons with ``quarter`` sides in each quadrant.
     """
     from shapely import Point, Polygon
 
     p = PROBLEMS[PATH]
-    assert isinstance(p.task, UntimedPath)
     k = p.linkage
     reach = Point(k.pivot_x, k.pivot_y).buffer(k.crank_length + k.point_distance, quad_segs=quarter)
-    return p.convert(Polygon(p.task.path.points).difference(reach).area)
+    return p.convert(Polygon(ellipse(15.0, 4 * quarter)).difference(reach).area)
 
 
 def mended() -> Linkage:
