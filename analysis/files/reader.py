@@ -186,8 +186,7 @@ class Quantity:
     bare : str, optional
         Unit of numbers that are given without a unit; by default SI.
     requirement : str, optional
-        End of the error message "it must ..."; needed if a bound is not zero (by default the message says "be greater than
-        zero" or "be zero or greater").
+        End of the error message "it must ..."; by default it states the bounds, such as "be zero or greater".
     """
 
     unit: str
@@ -200,9 +199,19 @@ class Quantity:
     def __call__(self, value: Any, name: str) -> float:
         number = quantity(value, self.unit, name, bare=self.bare)
         if not (number > self.above and self.least <= number < self.below):
-            about_zero = "be greater than zero" if self.above == 0.0 else "be zero or greater"
-            raise ParameterError(name, value, self.requirement or about_zero)
+            raise ParameterError(name, value, self.requirement or f"be {self._bounds()}")
         return number
+
+    def _bounds(self) -> str:
+        """Return the bounds in words."""
+        unit = "" if self.unit == "1" else f" {self.unit}"
+        above, least, below = (f"{end:g}{unit}" if end else "zero" for end in (self.above, self.least, self.below))
+        said = {
+            f"greater than {above}": self.above,
+            f"{least} or greater": self.least,
+            f"less than {below}": self.below,
+        }
+        return " and ".join(words for words, end in said.items() if isfinite(end))
 
 
 #: Greatest whole number: that of an Integer in FMI.

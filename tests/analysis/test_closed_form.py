@@ -14,6 +14,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 from scipy.optimize import root
+from scipy.sparse import csr_matrix
+from scipy.sparse.csgraph import connected_components
 
 import analysis.synthesis as syn
 from analysis import cli, figures
@@ -135,6 +137,37 @@ def test_poses_on_both_assemblies_are_a_circuit_defect() -> None:
     assert near.linkage.coupler_length == pytest.approx(0.35, abs=1e-9)
     assert set(near.verdicts.defects) >= {"circuit defect", "branch defect"}
     assert near not in found.sound
+
+
+def circuits(linkage: syn.Linkage, poses: syn.PrecisionPoints) -> set[int]:
+    """The circuits on which poses lie: connected parts of the graph of crank angles (1/20 deg apart) and assemblies."""
+    n, values = 7200, linkage.values()
+    ends = np.exp(2j * pi * np.arange(n) / n) * values["crank_length"]
+    reach = np.abs(values["ground_length"] - ends)
+    l3, l4 = values["coupler_length"], values["rocker_length"]
+    closed = (abs(l3 - l4) < reach) & (reach < l3 + l4)
+    here, ahead = np.arange(n), np.roll(np.arange(n), -1)
+    on = here[closed & closed[ahead]]
+    last = here[closed & ~(closed[ahead] & np.roll(closed, 1))]
+    start, end = np.concatenate([on, on + n, last]), np.concatenate([ahead[on], ahead[on] + n, last + n])
+    _, part = connected_components(csr_matrix((np.ones(len(start)), (start, end)), shape=(2 * n, 2 * n)))
+    e = np.exp(1j * (np.asarray(poses.angle) - values["output_angle"] - values["ground_angle"]))
+    arm = values["point_distance"] * np.exp(1j * values["point_angle"])
+    from_a = np.asarray(poses.points) @ np.array([1.0, 1j]) - complex(values["pivot_x"], values["pivot_y"])
+    b = from_a * np.exp(-1j * values["ground_angle"]) - arm * e
+    assert np.allclose(np.abs(b), values["crank_length"])
+    left = (np.conj(values["ground_length"] - b) * e).imag > 0.0
+    at = [int(np.flatnonzero(closed)[np.abs(ends[closed] - place).argmin()]) for place in b]
+    return {int(part[k + n * one]) for k, one in zip(at, left)}
+
+
+@pytest.mark.parametrize("seed", [0, 5, 22, 31])
+def test_a_circuit_defect_is_what_no_drive_can_avoid(seed: int) -> None:
+    """Poses on both sides of a dead centre, as of a rocker that drives a crank, lie on one circuit."""
+    random = np.random.default_rng(seed)
+    points, angle = np.cumsum(random.normal([0.5, 0.0], 0.4, (5, 2)), axis=0), np.cumsum(random.uniform(0.0, 0.5, 5))
+    for solution in syn.guidance(syn.PrecisionPoints(points=points, angle=angle)).solutions:
+        assert solution.verdicts.circuit == (len(circuits(solution.linkage, solution.task)) == 1)  # type: ignore[arg-type]
 
 
 def test_none_is_sound_is_said_as_a_proof() -> None:

@@ -167,7 +167,7 @@ class Pin:
 class Bar:
     length: float = entry(Quantity("m", above=0.0))
     play: float = entry(Quantity("m", least=0.0), 0.0)
-    begin: float = entry(Quantity("rad", below=7.0, requirement="be below 7"), 0.0, key="from")
+    begin: float = entry(Quantity("rad", least=-1.0, below=7.0), 0.0, key="from")
     holes: int = entry(Whole(1), 2)
     material: str = entry(Choice(("steel", "brass")), "steel")
     tilt: tuple[float, float] = entry(Range(Quantity("rad")), (0.0, 0.0))
@@ -203,7 +203,7 @@ def test_a_table_becomes_a_dataclass():
         ({"length": 0}, ParameterError, r"bar\.length is 0: it must be greater than zero"),
         ({"play": -1}, ParameterError, r"bar\.play is -1: it must be zero or greater"),
         ({"length": None}, ParameterError, "have a value, or be left out"),
-        ({"from": 8}, ParameterError, "be below 7"),
+        ({"from": 8}, ParameterError, "be -1 rad or greater and less than 7 rad"),
         ({"holes": 1.5}, ParameterError, "be a whole number"),
         ({"holes": True}, ParameterError, "be a whole number"),
         ({"holes": 0}, ParameterError, "be at least 1"),

@@ -349,7 +349,6 @@ def build_four_bar(task: Poses, crank: Dyad, rocker: Dyad) -> Solution:
     b, c = (points + turned * (dyad.point - points[0]) for dyad in (crank, rocker))
     ground, arm, coupler = rocker.pivot - crank.pivot, b - crank.pivot, c - b
     sides = np.sign(np.imag(np.conj(rocker.pivot - b) * coupler))
-    rotation = unwrap_in_order(np.angle(arm * np.conj(arm[0])))
     linkage = Linkage(
         pivot_x=crank.pivot.real,
         pivot_y=crank.pivot.imag,
@@ -364,6 +363,13 @@ def build_four_bar(task: Poses, crank: Dyad, rocker: Dyad) -> Solution:
         output_angle=float(np.angle(np.exp(1j * angle[0]) * np.conj(coupler[0]))),
         branch=1 if sides[0] >= 0.0 else -1,
     )
+    if linkage.turns_fully or linkage.grashof == "change-point":
+        rotation = unwrap_in_order(np.angle(arm * np.conj(arm[0])))
+    else:
+        # the crank swings, and never points away from D, or else never to D: there its angle is cut
+        away = linkage.cosine_at_c(np.array([abs(ground) + abs(arm[0])]))[0] < -1.0
+        crank = np.angle(arm * np.conj(ground)) if away else np.angle(arm * np.conj(ground)) % (2.0 * pi)
+        rotation = crank - crank[0]
     return exact_solution(task, linkage, rotation, sides)
 
 
@@ -371,13 +377,18 @@ def exact_solution(task: Task, linkage: Linkage, rotation: FloatArray, sides: Fl
     """Return the solution of a linkage that meets all targets of a task exactly, with its defects.
 
     ``sides`` has the assembly at each target: +1 with C to the left of B -> D, -1 to the right. If the targets need both
-    assemblies, there is a branch defect. There is also a circuit defect if, by Grashof's criterion, the linkage cannot pass
-    from one assembly to the other.
+    assemblies, there is a branch defect. By Grashof's criterion the two assemblies are two circuits if the crank or the ground
+    link is the shortest; if another link is, the circuits differ by the side of the ground link on which the crank lies.
     """
     verdicts = judge(linkage, rotation, closed=False)
-    if (sides != sides[0]).any():
-        apart = linkage.grashof not in ("triple-rocker", "change-point")
-        verdicts = replace(verdicts, branch=False, circuit=not apart)
+    one_side = bool((sides == sides[0]).all())
+    circuit = verdicts.circuit
+    if linkage.grashof in ("crank-rocker", "drag-link"):
+        circuit = one_side
+    elif linkage.grashof in ("double-rocker", "rocker-crank"):
+        above = np.sin(linkage.crank_phase + rotation) > 0.0
+        circuit = bool((above == above[0]).all())
+    verdicts = replace(verdicts, circuit=circuit, branch=verdicts.branch and one_side)
     return Solution(task=task, linkage=linkage, evaluation=evaluate(task, linkage, rotation), verdicts=verdicts)
 
 
