@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from math import acos, cos, degrees, hypot, radians, sin
+from math import acos, cos, degrees, hypot, pi, radians, sin
 from pathlib import Path
 
 import ezdxf
@@ -476,6 +476,13 @@ def test_the_report_tells_dimensions_verdicts_and_errors() -> None:
     np.testing.assert_allclose([[float(cell) for cell in row[1:]] for row in shown[1:]], angles, atol=6e-5)
     assert f"slider at D: stroke {1e3 * SLIDING.pivot.stroke:.6g} mm" in syn.report(timed(SLIDING))
     assert "second crank at D: 2 turns" in syn.report(timed(GEARED))
+
+
+def test_the_least_mechanical_advantage_lies_between_targets_that_are_dead_centres() -> None:
+    swing = syn.synthesize(syn.QuickSwing(swing="110 deg", time_ratio=1.05), constraints=[]).best
+    turned = np.linspace(0.0, 2.0 * pi, 4001)
+    fastest = np.abs(np.gradient(np.unwrap(swing.linkage.rocker_angle(turned)), turned)).max()
+    assert f"for one of the crank: {1.0 / fastest:.3g} at least on the way" in syn.report(swing)
 
 
 def test_the_largest_link_is_what_the_constraint_bounds() -> None:

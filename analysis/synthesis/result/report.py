@@ -20,7 +20,7 @@ from ..task.constraint import SECOND_LENGTH, stroke
 from ..task.limit_position import dead_centres, mechanical_advantage, time_ratio, toggles
 from ..task.task import Normal, PrecisionPoints, RockerFunction, SliderFunction, Task, UntimedPath, normal_form
 from .alike import format_variants
-from .solution import CURVE, Solution, Verdicts, evaluate, nearest_rotations, path_rate
+from .solution import CLOSELY, CURVE, Solution, Verdicts, evaluate, nearest_rotations, path_rate, whole_turn
 
 FloatArray = NDArray[np.float64]
 #: Steps to which dimensions are rounded (m, rad): 0.1 mm, or a tenth of a small link, and 0.1 degrees.
@@ -464,7 +464,7 @@ class Assessment:
             f"largest link {1e3 * solution.largest_link:.6g} mm"
         )
         if pivot is None:
-            head += _slider_line(linkage) + _limit_lines(linkage, solution.rotation)
+            head += _slider_line(linkage) + _limit_lines(solution)
         elif isinstance(pivot, SliderMotion):
             head += f"\nslider at D: stroke {1e3 * pivot.stroke:.6g} mm"
         else:
@@ -528,17 +528,19 @@ def _slider_line(linkage: Linkage) -> str:
     return line + (f": stroke {1e3 * float(stroke(linkage)):.6g} mm" if linkage.turns_fully else "")
 
 
-def _limit_lines(linkage: Linkage, rotation: NDArray[np.float64]) -> str:
+def _limit_lines(solution: Solution) -> str:
     """Return lines with dead centres, toggles, time ratio and mechanical advantage of a four-bar or slider-crank.
 
-    The mechanical advantage is the least over the crank rotations ``rotation``.
+    The mechanical advantage is the least over closely spaced crank rotations: the targets may be dead centres.
     """
+    linkage, at = solution.linkage, solution.rotation
+    begin, end = (0.0, 2.0 * pi) if whole_turn(solution.task, at) else (float(at.min()), float(at.max()))
     last, motions, what = linkage.driven
     lines = _rotation_line(f"{last} at rest", dead_centres(linkage)) + _rotation_line("toggles", toggles(linkage))
     ratio = time_ratio(linkage)
     if ratio is not None:
         lines += f"\ntime ratio of the {last}'s {motions} {ratio:.4g}"
-    gained = np.abs(mechanical_advantage(linkage, rotation))
+    gained = np.abs(mechanical_advantage(linkage, np.linspace(begin, end, CLOSELY)))
     if np.isfinite(gained).any():
         lines += f"\n{what}: {np.nanmin(gained):.3g} at least on the way"
     return lines

@@ -30,6 +30,8 @@ FloatArray = NDArray[np.float64]
 EXACT = 1e-14
 #: Points of a coupler curve with which an untimed path is evaluated: the thesis's 360.
 CURVE = 360
+#: Crank rotations at which a linkage is judged between its first and its last target.
+CLOSELY = 1441
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -212,7 +214,7 @@ def judge(linkage: Linkage, rotation: FloatArray, *, closed: bool) -> Verdicts:
     steps = np.diff(rotation)
     order = bool(np.all(steps > 0.0) or np.all(steps < 0.0))
     begin, end = (0.0, 2.0 * pi) if closed else (float(rotation.min()), float(rotation.max()))
-    way = np.linspace(begin, end, 1441)
+    way = np.linspace(begin, end, CLOSELY)
     if linkage.pivot is None:
         # rotations at which th2 is a multiple of pi
         first = np.ceil((begin + linkage.crank_phase) / pi)
