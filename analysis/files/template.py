@@ -104,8 +104,8 @@ def meanings(kind: Any, *, follow: bool = True) -> dict[str, str]:
     for head in heads:
         words = " ".join(head[2].split()).removesuffix(".")
         sentence = words if len(words) < 90 else re.split(r"[.;:] ", words)[0]
-        # an explanation that is only a unit is left out: the value has a unit
-        if not re.fullmatch(r"\S{1,6}", words):
+        # an explanation that is only a unit is left out, as the value has one, and one that only points elsewhere
+        if not re.fullmatch(r"\S{1,6}|(?:As in|See) .*", words):
             sentence = re.sub(r" \([^)]*$", "", sentence.replace("`", ""))
             found |= {name.strip(): sentence for name in head[1].split(",")}
     return found
@@ -147,7 +147,9 @@ def entries(
     active : bool
         Whether the given entries are active; otherwise they are comments as well.
     """
-    about = {} if kind is dict else meanings(kind)
+    about: dict[str, str] = {}
+    for base in reversed(kind.__mro__ if is_dataclass(kind) else ()):
+        about |= meanings(base) if is_dataclass(base) else {}
     known: dict[str, tuple[Reader, Any, str]] = {name: (read, None, "") for name, read in (readers or {}).items()}
     if is_dataclass(kind):
         for field in fields(kind):

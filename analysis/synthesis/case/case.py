@@ -80,6 +80,22 @@ class Constraints:
 
     Attributes
     ----------
+    least_transmission_angle : float
+        0 only requires a full turn of the crank, false requires nothing.
+    over : "turn" or "task"
+        Where the transmission angle is bounded: over a turn, or at the stations only.
+    full_turn : bool
+        The crank turns fully.
+    grashof : str
+        Type of the four-bar.
+    stroke : (float, float)
+        Travel of the slider of a slider-crank.
+    largest_link : float
+        Greatest length of the links, and of the coupler point's distance from B.
+    assembly : int
+        1: C to the left of B -> D; -1: to the right.
+    pivot_A, pivot_D : list
+        Corners [[x, y], ...] of a polygon in which the pivot lies.
     time_ratio : (float, float)
         Bounds of the time ratio: duration of a crank-rocker's slow swing divided by that of its quick one.
     least_mechanical_advantage, greatest_mechanical_advantage : float
@@ -94,8 +110,12 @@ class Constraints:
         Crank rotations between which there is no toggle.
     max_pin_force : float
         Greatest force on any pin, at the speed and under the load of ``make``.
+    least_pin_force_within : float
+        Greatest error with which the greatest pin force is minimised instead of the error.
     pins : str
         Letters of the pins whose forces count.
+    require : list
+        Comparisons of dimensions, such as ["crank_length >= 0.2*ground_length"].
     """
 
     least_transmission_angle: float | None = files.entry(_transmission, constraint.LeastTransmission().angle)

@@ -168,7 +168,21 @@ def _refuse_entries(table: Any, names: tuple[str, ...], source: str) -> None:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _ObjectiveAndRange:
-    """Entries shared by several tasks: the objective and, for a formula, the number and the range of the parameter's values."""
+    """Entries shared by several tasks: the objective and, for a formula, the number and the range of the parameter's values.
+
+    Attributes
+    ----------
+    n : int
+        Number of steps of a formula, 72 by default.
+    start, end : float or str
+        Range of the parameter t of a formula: an angle, or a formula such as "2*pi".
+    unit, angle_unit : str
+        Unit of numbers without one.
+    rotation : list or Steps
+        Crank rotations as a list, or { from = "0 deg", to = "120 deg" }.
+    weights : list
+        One per target, or windows [{ from = "60 deg", to = "260 deg", weight = 1000 }].
+    """
 
     objective: Objective = entry(Choice(get_args(Objective)), "error")
     n: int | None = entry(Whole(3), None)
@@ -184,7 +198,23 @@ class _ObjectiveAndRange:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Curve(_ObjectiveAndRange):
-    """Entries for the points of a target: a list, a file or formulas, which can be scaled, rotated and shifted."""
+    """Entries for the points of a target: a list, a file or formulas, which can be scaled, rotated and shifted.
+
+    Attributes
+    ----------
+    points : list
+        Points [x, y] in the order in which they are passed.
+    file : str
+        CSV with two columns, or SVG, instead of points.
+    name : str
+        id of the element of an SVG file.
+    closed : bool
+        Whether the last point is followed by the first.
+    x, y : str
+        Formulas of t instead of points, such as "60*cos(t)".
+    scale, turn, shift : float, float, list
+        The target is scaled and turned about the origin, then shifted by [x, y].
+    """
 
     points: Any = entry(any_value, None)
     file: str | None = entry(text, None)
@@ -235,7 +265,15 @@ class TimedPathTable(_Curve):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class UntimedPathTable(_Curve):
-    """The table ``[task]`` of an `UntimedPath`."""
+    """The table ``[task]`` of an `UntimedPath`.
+
+    Attributes
+    ----------
+    smoothing : Smoothing
+        true, or { points = 180, deviation = "0.5 mm" }, for curves drawn by hand.
+    weights : list
+        One per point, or windows [{ from = 0, to = 3, weight = 10 }] of numbers of points.
+    """
 
     measure: Any = entry(Choice(("area", "distance")), "area")
     samples: int = entry(Whole(8), 72)
@@ -264,7 +302,13 @@ class UntimedPathTable(_Curve):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PrecisionPointsTable(_Curve):
-    """The table ``[task]`` of `PrecisionPoints`."""
+    """The table ``[task]`` of `PrecisionPoints`.
+
+    Attributes
+    ----------
+    length : float
+        Length that converts an error of angle into one of position; half the target's extent by default.
+    """
 
     angle: Any = entry(any_value, None)
     angle_unit: str | None = entry(_angle_unit, None)
@@ -302,7 +346,17 @@ class MotionTable(PrecisionPointsTable):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RockerFunctionTable(_ObjectiveAndRange):
-    """The table ``[task]`` of a `RockerFunction`."""
+    """The table ``[task]`` of a `RockerFunction`.
+
+    Attributes
+    ----------
+    angle : list or str
+        Angles of the rocker from the ground link, or a formula of the crank rotation t.
+    file : str
+        CSV with two columns, rotation and angle, instead of angles.
+    spacing : str
+        Places of a formula's points.
+    """
 
     angle: Any = entry(any_value, None)
     angle_unit: str | None = entry(_angle_unit, None)
@@ -336,7 +390,13 @@ class RockerFunctionTable(_ObjectiveAndRange):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SliderFunctionTable(_ObjectiveAndRange):
-    """The table ``[task]`` of a `SliderFunction`."""
+    """The table ``[task]`` of a `SliderFunction`.
+
+    Attributes
+    ----------
+    position : list or str
+        Places of the slider along the x axis, or a formula of the crank rotation t.
+    """
 
     position: Any = entry(any_value)
     unit: str | None = entry(_length_unit, None)
@@ -359,7 +419,13 @@ class SliderFunctionTable(_ObjectiveAndRange):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class QuickReturnTable:
-    """The table ``[task]`` of a `QuickReturn` or a `QuickSwing`."""
+    """The table ``[task]`` of a `QuickReturn` or a `QuickSwing`.
+
+    Attributes
+    ----------
+    time_ratio : float
+        Duration of the slow stroke or swing over that of the quick one, 1 or greater.
+    """
 
     stroke: float | None = entry(Quantity("m", above=0.0), None)
     swing: float | None = entry(Quantity("rad"), None)
