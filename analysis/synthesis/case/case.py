@@ -122,9 +122,7 @@ class Constraints:
     over: str | None = files.entry(files.Choice(("turn", "task")), None)
     full_turn: bool = files.entry(files.flag, False)
     grashof: constraint.GrashofType | None = files.entry(files.Choice(get_args(constraint.GrashofType)), None)
-    time_ratio: tuple[float, float] | None = files.entry(
-        files.Range(files.Quantity("1", least=1.0)), None
-    )
+    time_ratio: tuple[float, float] | None = files.entry(files.Range(files.Quantity("1", least=1.0)), None)
     stroke: tuple[float, float] | None = files.entry(files.Range(files.Quantity("m", least=0.0)), None)
     largest_link: float | None = files.entry(files.Quantity("m"), None)
     assembly: int | None = files.entry(files.Whole(), None)
