@@ -139,8 +139,9 @@ def run(
             f"bonds{then}"
         )
     folder, stem = common.output_folder(out), Path(file).stem
-    residuals = {f"power residual of {name}": power for name, power in found.powers.items()}
-    common.say(f"wrote {write_csv(folder / f'{stem}.csv', {'time': found.time, **found.values, **residuals})}")
+    columns = {"time [s]": found.time} | {f"{name} [{found.units[name]}]": x for name, x in found.values.items()}
+    columns |= {f"power residual of {name} [W]": power for name, power in found.powers.items()}
+    common.say(f"wrote {write_csv(folder / f'{stem}.csv', columns)}")
     common.print_paths(common.save_plot(plot, found, folder / f"{stem}.png"))
     if found.status:
         common.print_error(found.message)

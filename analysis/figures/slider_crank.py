@@ -146,10 +146,10 @@ def plot_tolerances(
 ) -> Figure:
     """Plot the errors that tolerances cause over the turn; at one crank angle, plot the samples and each tolerance's share.
 
-    The upper panel shows the linear estimate (three standard deviations filled, worst case dashed) and percentiles of the
-    samples. The lower panels show the histogram of the samples with the normal distribution of the linear estimate, and the
-    shares of the tolerances in the variance. Notes at the foot state samples that cannot be assembled, and where the linear
-    estimate is wrong.
+    The upper panel shows the linear estimate (three standard deviations, at most the worst case, filled; worst case dashed) and
+    percentiles of the samples. The lower panels show the histogram of the samples that can be assembled with the normal
+    distribution of the linear estimate, and the shares of the tolerances in the variance. Notes at the foot state samples that
+    cannot be assembled, and where the linear estimate is wrong.
 
     Parameters
     ----------
@@ -204,7 +204,8 @@ def _draw_band(axis: Axes, found: MonteCarlo, quantity: str, at: int, one: float
     def curve(values: Any) -> FloatArray:
         return _insert_breaks(np.ma.filled(values, np.nan) / one, turn.breaks)
 
-    three = curve(3.0 * linear.deviation)
+    # of bounded distributions three standard deviations are more than errors can do
+    three = curve(np.ma.minimum(3.0 * linear.deviation, linear.worst))
     axis.fill_between(whole, -three, three, color=_LINEAR, alpha=0.18, linewidth=0.0, label=r"linear, $\pm 3\,\sigma$")
     low, lower, _, upper, high = spread.percentiles - linear.nominal
     dashed: dict[str, Any] = {"color": _WORST, "linewidth": style.THIN, "linestyle": "--"}
@@ -247,7 +248,7 @@ def _draw_histogram(axis: Axes, found: MonteCarlo, quantity: str, at: int, unit:
     nominal = float(linear.nominal[at])
     edges = (spread.edges[at] - nominal) / one
     width = edges[1] - edges[0]
-    share = spread.counts[at] / found.samples
+    share = spread.counts[at] / (found.samples - found.not_assembled[at] - found.undetermined[at])
     axis.stairs(share, edges, fill=True, color=_SAMPLES, alpha=0.35, label="samples")
     deviation, of_samples, second = (
         float(np.ma.filled(x[at], np.nan)) / one for x in (linear.deviation, spread.deviation, linear.second_deviation)
@@ -273,7 +274,7 @@ def _draw_histogram(axis: Axes, found: MonteCarlo, quantity: str, at: int, unit:
     axis.set_ylim(0.0, 1.5 * float(share.max()))
     axis.set_title(
         f"at {np.degrees(found.turn.angle[at]):.4g} deg, nominal {_number_text(nominal / one, 6)} {unit}; "
-        f"{spread.counts[at].sum() / found.samples:.1%} of the samples",
+        f"{share.sum():.1%} of the samples" + " that can be assembled" * bool(found.not_assembled[at]),
         fontsize=style.PLAIN,
     )
     axis.legend(loc="upper left")

@@ -103,6 +103,24 @@ def test_band_over_the_turn_in_mm() -> None:
     assert np.asarray(corners)[:, 1].min() == pytest.approx(-3e3 * SIGMA.max())
 
 
+def test_the_band_of_bounded_errors_ends_at_their_worst_case() -> None:
+    found = made()
+    estimate = replace(found.estimates["slider.position"], worst=np.ma.masked_invalid(2.0 * SIGMA))
+    band, _, _ = panels(plot(replace(found, estimates={"slider.position": estimate})))
+    (filled,) = band.collections
+    assert np.asarray(filled.get_paths()[0].vertices)[:, 1].max() == pytest.approx(2e3 * SIGMA.max())
+
+
+def test_the_histogram_is_of_the_samples_that_can_be_assembled() -> None:
+    """Samples that are left out do not make it lower than the normal curve beside it."""
+    missing = np.full(25, 1_000_000)
+    found = replace(made(), samples=2_000_000, not_assembled=missing)
+    _, histogram, _ = panels(plot(found))
+    (steps,) = (x for x in histogram.patches if isinstance(x, StepPatch))
+    assert steps.get_data().values == pytest.approx(found.spreads["slider.position"].counts[0] / 1e6)
+    assert "99.9% of the samples" in histogram.get_title()
+
+
 def test_histogram_beside_the_normal_estimate() -> None:
     found = made()
     counts = found.spreads["slider.position"].counts[0]

@@ -271,6 +271,9 @@ def test_the_commands(linkwork: Callable[..., Result], tmp_path: Path, monkeypat
         "motor-crank.png",
         "motor-crank-check.png",
     } <= set(os.listdir("out"))
+    header = Path("out/motor-crank.csv").read_text().splitlines()[0]
+    assert header.startswith("time [s],motor.field.angle [rad],")
+    assert header.endswith("[W]")
     assert linkwork("system", "new", "motor-cranc").exit_code == 1
     assert linkwork("system", "run", "motor-crank.toml", "--stop", "0.05 s", "--coupling", "hole").exit_code == 1
 
