@@ -141,10 +141,9 @@ def read_model(folder: Path, interface: str) -> Model:
         raise InputError(f"the FMU has no interface {interface!r}: it has {', '.join(interfaces(description))}")
     experiment = description.defaultExperiment
     start, stop, step = (
-        None if experiment is None or (text := getattr(experiment, name)) is None else float(text)
-        for name in ("startTime", "stopTime", "stepSize")
+        _number(getattr(experiment, name, None), 0.0) for name in ("startTime", "stopTime", "stepSize")
     )
-    start = start or 0.0
+    steps = (_number(getattr(about, "fixedInternalStepSize", None), 0.0), step, (stop - start) / 500)
     offered = _capabilities(folder, interface)
     fixed = interface == "cs" and not about.canHandleVariableCommunicationStepSize
     derivatives = [unknown.variable for unknown in description.derivatives]
@@ -163,9 +162,7 @@ def read_model(folder: Path, interface: str) -> Model:
         state_names=names if len(names) == description.numberOfContinuousStates else (),
         indicators=description.numberOfEventIndicators,
         start_time=start,
-        step=_number(getattr(about, "fixedInternalStepSize", None), 0.0)
-        or step
-        or ((stop - start) / 500 if stop else 0.01),
+        step=next((size for size in steps if size > 0.0), 0.01),
         fixed_step=fixed,
         can_save=about.canGetAndSetFMUstate,
         can_serialize=about.canSerializeFMUstate,

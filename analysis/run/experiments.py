@@ -237,7 +237,10 @@ class _Reader:
 
     def _table(self, place: str) -> NDArray[Any]:
         """Read a CSV table of the FMU whose first column is the time."""
-        names, *rows = list(csv.reader(self.text(place).splitlines())) or [[]]
+        try:
+            names, *rows = list(csv.reader(self.text(place).splitlines())) or [[]]
+        except csv.Error as error:
+            raise ExperimentError(f"{self.fmu}: {place} cannot be read: {error}") from error
         names = [name.strip() for name in names]
         if len(names) < 2 or len(set(names)) < len(names) or not rows or any(len(row) != len(names) for row in rows):
             raise ExperimentError(

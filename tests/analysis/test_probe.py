@@ -23,6 +23,7 @@ from click.testing import CliRunner
 from analysis import probe
 from analysis.cli import INTERRUPTED, main
 from analysis.probe import journal, runner
+from analysis.probe.model import read_model
 from analysis.probe.walk import Walk
 from linkwork.errors import InputError
 from tests.scripts import called
@@ -313,3 +314,21 @@ def test_an_fmu_may_refuse_what_follows_from_start_values(state: str, severity: 
     Walk._judge(walk, "GetContinuousStates", state, 3)
     assert [said[0] for said in found] == [severity]
     assert "cannot be joined" in found[0][2]
+
+
+@pytest.mark.parametrize(
+    ("experiment", "step"),
+    [
+        ('startTime="5" stopTime="2"', 0.01),
+        ('startTime="1" stopTime="1"', 0.01),
+        ('startTime="-1" stopTime="0"', 0.002),
+        ('startTime="2"', 0.01),
+        ('stopTime="1" stepSize="-1"', 0.002),
+        ('startTime="soon"', 0.01),
+    ],
+)
+def test_steps_are_positive_whatever_the_default_experiment_is(tmp_path: Path, experiment: str, step: float) -> None:
+    text = (SOURCES / "modelDescription.xml").read_text(encoding="utf-8")
+    changed = text.replace('startTime="0" stopTime="1" stepSize="0.01"', experiment)
+    (tmp_path / "modelDescription.xml").write_text(changed, encoding="utf-8")
+    assert read_model(tmp_path, "cs").step == pytest.approx(step)

@@ -184,6 +184,7 @@ def test_experiments_of_another_tool(natives: dict[str, Path], tmp_path: Path) -
         ({"sub/set.ssv": SSV.replace(' value="1"', "")}, "set.ssv"),
         ({"sub/a b.csv": "time,crank.angle\n0,nan\n"}, "'nan'"),
         ({"sub/a b.csv": "time,crank.angle\n0\n"}, "a b.csv"),
+        ({"sub/a b.csv": f"time,crank.angle\n0,{'1' * 200_000}\n"}, "cannot be read: field larger"),
         ({"sub/a b.csv": "time,crank.angle\n1,0\n0,0\n"}, "increase"),
     ],
 )  # fmt: skip
