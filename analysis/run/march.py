@@ -162,7 +162,7 @@ class March:
         if event.function is not None:
             return float(event.function(t, *x[:-2].tolist()))
         column = event.column(self.of.mechanism)
-        return self.outputs(x, held)[column] - event.level
+        return float(self.outputs(x, held)[column] - event.level)
 
     def _inputs(self, t: float, x: NDArray[np.float64], stop: float) -> Any:
         if self.settings.hold or (self.of.encoded.steady and not self.laws[:, 2].any()):
