@@ -409,7 +409,12 @@ def _positions() -> tuple[Statement, ...]:
     least, moved = np.transpose([nearest(*at) for at in zip(ROTATION.tolist(), places.tolist())])
     off = np.abs(np.abs(places - pins) - LINKAGE.point_distance)[~missing] - least[~missing]
     anywhere = variational_motion(LINKAGE, ROTATION, targets, assemblies=(1, -1), closed=False)
-    above, standing = targets[missing, 1] > 0.0, np.sin(anywhere.rocker_angle[missing]) > UPRIGHT
+    upright = np.sin(anywhere.rocker_angle[missing])
+    above, standing = targets[missing, 1] > 0.0, upright > UPRIGHT
+    pointing = (places - pins)[missing]
+    heights = (
+        np.abs((pins[missing] + LINKAGE.coupler_length * pointing / np.abs(pointing)).imag) / LINKAGE.rocker_length
+    )
     # (7.15) has no real U where the upright rocker cannot be assembled
     with np.errstate(invalid="ignore"):
         arms = by_equations(ROTATION[missing], places[missing])[0] + 1j * LINKAGE.rocker_length - pins[missing, None]
@@ -430,6 +435,20 @@ def _positions() -> tuple[Statement, ...]:
             "(7.14) has a real root",
             fine.format(moved[~missing].max()),
             (at_most("greatest difference", 1e-3, off.max(), "l3"),),
+        ),
+        Statement(
+            "If the argument of the square root term in (7.14) is negative then (7.11a) is not true and (7.11b) is the correct "
+            "solution of (7.10b). In physical reality this is equivalent to the coupler being in a straight line with the "
+            "desired point, then no matter how the rocker CD is positioned, point D never lies on U.",
+            text("7.3.1, L5675-5685"),
+            f"at the {standing.size} points where it is negative: distance of C from the slider's line, over l4, the coupler "
+            "pointing at the point: the least; share of rockers at right angles to the line at the least error, as (7.11b), "
+            f"cos th4 = 0, says: size of sin th4 above {UPRIGHT:g}",
+            "more than 1: a rocker of length l4 does not reach the line; none of the share",
+            (
+                at_least("distance of C", 1.0, heights.min()),
+                near("cos th4 = 0", 1.0, np.mean(np.abs(upright) > UPRIGHT), 0.0),
+            ),
         ),
         Statement(
             "In these circumstances the optimum condition must surely be when the rocker CD is upright, i.e. [theta4 = "
