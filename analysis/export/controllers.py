@@ -268,7 +268,14 @@ class Pid(Controller):
         Row("integral_gain", "parameter", "N/(m.s)", 0.0, "Growth of the force by the error"),
         Row("derivative_gain", "parameter", "N.s/m", 0.0, "Force by the rate of the error"),
         Row("filter_time", "parameter", "s", 0.0, "Time constant of the filter before the derivative", "not negative"),
-        Row("tracking_time", "parameter", "s", 0.1, "Time in which the integral follows the limit", "positive"),
+        Row(
+            "tracking_time",
+            "parameter",
+            "s",
+            0.1,
+            "Time in which the integral follows the limit, or a sample",
+            "positive",
+        ),
         Row("limit", "parameter", "N", 1e6, "Greatest magnitude of the force", "not negative"),
         Row("reference", "input", "m", 0.0, "What the position is to be"),
         Row("measured", "input", "m", 0.0, "The position"),
@@ -290,7 +297,8 @@ class Pid(Controller):
             self.derivative = (self.filter_time * self.derivative + change) / (self.filter_time + self.sample_time)
         wanted = self.gain * self.error + self.integral + self.derivative + self.feed_forward
         self.force = _clamp(wanted, self.limit)
-        back = (self.force - wanted) / self.tracking_time
+        # within a shorter time than a sample the integral would swing, by more each time
+        back = (self.force - wanted) / max(self.tracking_time, self.sample_time)
         self.integral += self.sample_time * (self.integral_gain * self.error + back)
 
 

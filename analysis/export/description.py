@@ -308,11 +308,11 @@ def _index_or_reference(kind: Kind, reference: int) -> str:
 def _structure(mechanism: Mechanism, kind: Kind, entries: Sequence[Entry]) -> Element:
     reference = {entry.variable.name: entry.reference for entry in entries}
     outputs = [entry.reference for entry in entries if entry.role == "output"]
-    depends = _declared_dependencies(mechanism)
+    # the equations tell more than the table, which has one word for all outputs of a described linkage
+    depends = traced_dependencies(mechanism) if kind.native else _declared_dependencies(mechanism)
     groups: list[tuple[str, Sequence[int]]] = [("Output", outputs)]
     initial = outputs
     if kind.native:
-        depends = {of: depends.get(of, frozenset()) | on for of, on in traced_dependencies(mechanism).items()}
         groups.append(("ContinuousStateDerivative" if kind.fmi == 3 else "Derivative", derivatives(mechanism)))
         initial = sorted({*outputs, *states(mechanism), *derivatives(mechanism)})
     at_start: dict[str, Iterable[int] | None] = {

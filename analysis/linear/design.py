@@ -25,8 +25,8 @@ from linkwork.errors import InputError, LinkworkError
 from ..files import unknown_name
 from ..libraries import lazy
 from ..run import Function, require_kind
-from ..units import Amount, in_si
-from .model import FloatArray, LinearModel, LinearModelError, signal_name, sort_by_magnitude
+from ..units import Amount, in_si, si
+from .model import FloatArray, LinearModel, LinearModelError, as_names, signal_name, sort_by_magnitude, unit_of
 
 if TYPE_CHECKING:
     import control
@@ -114,19 +114,20 @@ class Design:
         """Return the open loop, from the force to the feedback signal."""
         return self.plant.loop(self.gains, self.integral_gain)
 
-    def closed_loop(self, outputs: Sequence[str] | None = None) -> control.StateSpace:
+    def closed_loop(self, outputs: str | Sequence[str] | None = None) -> control.StateSpace:
         """Return the closed loop from a disturbing force to the outputs with the given FMI names.
 
         The default output is the controlled coordinate.
         """
-        chosen = (self.coordinate,) if outputs is None else outputs
+        chosen = (self.coordinate,) if outputs is None else as_names(outputs)
         a, b, row = self.plant.feedback_matrices(self.gains, self.integral_gain)
         whole = self.model.to_state_space(chosen, (self.channel,))
         c = np.hstack([whole.C, np.zeros((len(chosen), a.shape[0] - whole.nstates))]) - whole.D @ row
         names = {"inputs": [signal_name(self.channel)], "outputs": [signal_name(name) for name in chosen]}
         return control.ss(a - b @ row, b, c, whole.D, **names)
 
-    def sampled_poles(self, period: float) -> NDArray[np.complex128]:
+    @in_si(period="s")
+    def sampled_poles(self, period: Amount) -> NDArray[np.complex128]:
         """Compute the poles in z of the closed loop if the law is sampled every ``period`` seconds and the force is held."""
         check_period(period)
         a, b = self.plant.a, self.plant.b
@@ -141,7 +142,7 @@ class Design:
         kept = closed if self.integral_gain else closed[:n, :n]
         return sort_by_magnitude(np.linalg.eigvals(kept))
 
-    def continuous_law(self, reference: float) -> Function:
+    def continuous_law(self, reference: Amount) -> Function:
         """Return the control law as a force for `analysis.run.Inputs` that depends continuously on the state, without sampling.
 
         Raises
@@ -152,6 +153,7 @@ class Design:
         if self.integral_gain:
             raise DesignError("a law with integral action is no function of the state: run it with control_loop")
         gains = tuple(self.plant_values(self.gains).tolist())
+        reference = si(reference, unit_of(self.model.mechanism, self.coordinate), "reference")
         step = reference - float(self.target[self.plant.place])
         bias = self.force + step * self.force_slope + float(self.gains @ (self.target + step * self.target_slope))
 

@@ -33,13 +33,13 @@ from ..run import (
     sample_times,
     takes_published,
 )
-from ..units import Amount, in_si
+from ..units import Amount, in_si, si
 from .design import Design, check_period
-from .model import FloatArray, LinearModel
+from .model import FloatArray, LinearModel, unit_of
 from .periodic import PeriodicModel
 
 #: A constant reference, or a function of time (s) that is sampled with the controller.
-Reference = float | Callable[[float], float]
+Reference = Amount | Callable[[float], float]
 #: Largest product of a step of the linear model's Runge-Kutta method with its fastest rate.
 FINE_STEP = 0.03
 #: Greatest rate and acceleration, relative to the mechanism's scales and stiffness, of the state of a model for `predict_loop`.
@@ -85,7 +85,9 @@ class SampledController:
         Largest magnitude of the force (N). While the force is at the limit, the integral does not grow further.
     """
 
-    def __init__(self, design: Design, period: float, *, limit: float = inf) -> None:
+    @in_si(period="s")
+    def __init__(self, design: Design, period: Amount, *, limit: Amount = inf) -> None:
+        limit = si(limit, unit_of(design.model.mechanism, design.channel), "limit")
         check_period(period)
         check_limit(limit)
         self.design = design
@@ -277,6 +279,8 @@ class Controller(Protocol):
 class _Plant(Protocol):
     """Plant of a closed loop: the nonlinear plant, its FMU, or a linear model."""
 
+    mechanism: Mechanism
+
     def measure(self) -> Sequence[float]: ...
 
     def act(self, time: float, ahead: float, measured: Sequence[float], force: float) -> None: ...
@@ -289,6 +293,8 @@ def _run_loop(
 ) -> LoopResult:
     """Reset the controller and run a closed loop: at each sampling time measure, compute the force, and advance the plant."""
     controller.reset()
+    mechanism = plant.mechanism
+    reference = si(reference, unit_of(mechanism, mechanism.freedoms[freedom].coordinate), "reference")
     rows: list[tuple[float, ...]] = []
     status, message = 0, ""
     ahead = [*times[1:].tolist(), float(times[-1]) + controller.period]

@@ -319,13 +319,13 @@ class LinearModel(Matrices):
         raise LinearModelError(f"no force {name or ''} drives a freedom of this model; these do: {known}")
 
     def to_state_space(
-        self, outputs: Sequence[str] | None = None, inputs: Sequence[str] | None = None
+        self, outputs: str | Sequence[str] | None = None, inputs: str | Sequence[str] | None = None
     ) -> control.StateSpace:
         """Convert the model to a state space of python-control.
 
         Parameters
         ----------
-        outputs, inputs : sequence of str, optional
+        outputs, inputs : str or sequence of str, optional
             FMI names; by default the last free coordinate, such as ``slider.position``, and all inputs.
 
         Returns
@@ -340,8 +340,8 @@ class LinearModel(Matrices):
         LinearModelError
             If a linear model does not have one of the outputs (`missing_outputs`).
         """
-        chosen = self.input_names if inputs is None else inputs
-        wanted = [self.state_names[len(self.state_names) // 2 - 1]] if outputs is None else outputs
+        chosen = self.input_names if inputs is None else as_names(inputs)
+        wanted = [self.state_names[len(self.state_names) // 2 - 1]] if outputs is None else as_names(outputs)
         for name in wanted:
             if name in (missing := missing_outputs(self.mechanism)):
                 raise LinearModelError(f"a linear model has no output {name}: it is {missing[name]}")
@@ -356,6 +356,16 @@ class LinearModel(Matrices):
             outputs=[signal_name(name) for name in wanted],
             states=[signal_name(name) for name in self.state_names],
         )
+
+
+def as_names(names: str | Sequence[str]) -> Sequence[str]:
+    """Return names; a single name as a list of one."""
+    return [names] if isinstance(names, str) else names
+
+
+def unit_of(mechanism: Mechanism, name: str) -> str:
+    """Return the unit of a variable of a mechanism."""
+    return next(v.unit for v in mechanism.variables if v.name == name)
 
 
 def sort_by_magnitude(values: ArrayLike) -> NDArray[np.complex128]:

@@ -25,7 +25,8 @@ static inline void PidController_sample(PidController *c) {
             (c->filter_time * c->derivative + c->derivative_gain * (c->error - before)) / (c->filter_time + c->sample_time);
     double wanted = c->gain * c->error + c->integral + c->derivative + c->feed_forward;
     c->force = limited(wanted, c->limit);
-    c->integral += c->sample_time * (c->integral_gain * c->error + (c->force - wanted) / c->tracking_time);
+    double back = (c->force - wanted) / fmax(c->tracking_time, c->sample_time);
+    c->integral += c->sample_time * (c->integral_gain * c->error + back);
 }
 
 typedef struct {

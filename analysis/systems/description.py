@@ -23,7 +23,7 @@ from ..files import Quantity, Table, entry, unknown_name
 from ..linkages import load_linkage
 from ..mechanisms import find_mechanism
 from ..numerics.cache import code_folder
-from ..run import published_case, read_case
+from ..run import Case, Inputs, published_case, read_case
 from ..units import quantity
 from .wiring import End, Part, Wiring, WiringError
 
@@ -121,43 +121,64 @@ class System:
         if table.controller:
             rows = {row.name: row.unit for row in CONTROLLERS[table.controller].rows} | {"sample_time": "s"}
             return Member(name=name, values=_read_values(table.values, rows, where), controller=table.controller)
-        parameters, initial, inputs = self._case(table)
+        case = self._case(table)
+        parameters, initial = case.parameters, case.initial
         mechanism = find_mechanism(parameters)
+        inputs = self._inputs(name, mechanism, case.inputs)
         values = {fmi_name(key): float(value) for key, value in asdict(parameters).items()}
         values |= {f"initial.{key}": float(value) for key, value in asdict(initial).items()}
         units = {v.name: v.unit or "1" for v in mechanism.variables if v.causality in ("parameter", "input")}
         return Member(
             name=name,
-            values=values | inputs | self._modes(name, mechanism, inputs) | _read_values(table.values, units, where),
+            values=values
+            | inputs
+            | self._modes(name, mechanism, case.inputs)
+            | _read_values(table.values, units, where),
             mechanism=mechanism,
         )
 
-    def _case(self, table: PartTable) -> tuple[Any, Any, dict[str, float]]:
-        """Return the parameters, the initial state and the constant driving inputs of the case of a part."""
+    def _case(self, table: PartTable) -> Case:
+        """Return the case of a part."""
         if table.partner:
             made = load_linkage(Path(str(HERE / "partners" / f"{table.partner}.toml")))
-            case = published_case(made.name)
-        elif Path(table.case).suffix in (".toml", ".json"):
+            return published_case(made.name)
+        if Path(table.case).suffix in (".toml", ".json"):
             # the stop time of the case itself is not used, and may be missing
             tables = files.read_tables(self.folder / table.case) | {"run": {"stop_time": self.run.stop_time}}
-            case = read_case(tables, folder=(self.folder / table.case).parent)
-        else:
-            case = published_case(table.case)
-        mechanism = find_mechanism(case.parameters)
-        given = {c.name: getattr(case.inputs, c.argument, None) for c in mechanism.channels if c.kind == "command"}
-        return case.parameters, case.initial, {k: float(v) for k, v in given.items() if isinstance(v, int | float)}
+            return read_case(tables, folder=(self.folder / table.case).parent)
+        return published_case(table.case)
 
-    def _modes(self, name: str, mechanism: Mechanism, inputs: Mapping[str, float]) -> dict[str, float]:
-        """Return the drive mode of each freedom: it follows from the connected input or, if there is none, from the case."""
+    def _inputs(self, name: str, mechanism: Mechanism, inputs: Inputs) -> dict[str, float]:
+        """Return the constant inputs of the case of a part; refuse one that varies, if nothing is in its place.
+
+        In its place is a connection or a start value of the input, or of another input that drives its freedom.
+        """
+        here = {end.port for end in self.connections if end.part == name} | set(self.parts[name].values)
+        driven = {c.freedom for c in mechanism.channels if c.name in here and c.freedom >= 0}
         found = {}
+        for channel in mechanism.channels:
+            if channel.kind == "rate" or channel.argument not in inputs:
+                continue
+            replaced = channel.freedom in driven and mechanism.freedoms[channel.freedom].mode is not None
+            if value := inputs.constants([channel.argument]):
+                found[channel.name] = value[0]
+            elif channel.name not in here and not replaced:
+                raise WiringError(
+                    f"parts.{name}: {channel.name} of its case is no constant: connect it, or give a constant in "
+                    f"parts.{name}.values"
+                )
+        return found
+
+    def _modes(self, name: str, mechanism: Mechanism, inputs: Inputs) -> dict[str, float]:
+        """Return the drive mode of each freedom: of its connected input, or of that with a start value, or of the case."""
+        found = {mode: float(value) for mode, value in inputs.modes(mechanism).items()}
         for number, freedom in enumerate(mechanism.freedoms):
             if freedom.mode is None:
                 continue
             channels = [c for c in mechanism.channels if c.freedom == number and c.argument in freedom.mode.arguments]
             wired = [c for c in channels if End(name, c.name) in self.connections]
-            driven = wired or [c for c in channels if c.name in inputs]
-            mode = freedom.mode.arguments.index(driven[0].argument) if driven else freedom.mode.default
-            found[freedom.mode.name] = float(mode)
+            if driven := wired or [c for c in channels if c.name in self.parts[name].values]:
+                found[freedom.mode.name] = float(freedom.mode.arguments.index(driven[0].argument))
         return found
 
     def wiring(self, folder: str | Path | None = None, *, fmi: int = 2) -> Wiring:

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from math import ceil
 from typing import Any
 
 import numpy as np
@@ -112,7 +113,7 @@ class SystemRun:
         orders = {"hold": 1.0, "derivatives": 2.0}
         if self.coupling not in orders or brought == 0.0:
             return None
-        return float(self.time[-1] / (len(self) - 1) * (share / brought) ** (1.0 / orders[self.coupling]))
+        return float(self.time[1] * (share / brought) ** (1.0 / orders[self.coupling]))
 
 
 class _Instances:
@@ -262,7 +263,8 @@ class _Stepper:
     def next_step(self, time: float) -> tuple[float, float]:
         """Return the length of the next step, and the time at its end."""
         if self.share is None:
-            end = (self.number + 1) * self.step
+            # the last step is shorter where the steps do not fill the run
+            end = (self.number + 1) * self.step if self.number + 1 < self.count else self.stop_time
         else:
             # the last two steps share the remaining time
             left = self.stop_time - time
@@ -272,8 +274,8 @@ class _Stepper:
 
     @property
     def count(self) -> int:
-        """Return the number of steps of a run with equal steps."""
-        return round(self.stop_time / self.first)
+        """Return the number of steps of a run with equal steps, of which the last may be shorter."""
+        return ceil(self.stop_time / self.first * (1.0 - 1e-12))
 
     def adapt(self, powers: Floats, flows: Floats) -> None:
         """Adapt the step to the power residuals and transmitted powers of the last step, by PI control of the added work."""
@@ -307,7 +309,8 @@ def run_system(
     coupling : str
         One of `COUPLINGS`.
     step, stop_time : float, optional
-        Communication step and end of the run (s); by default those of the wiring.
+        Communication step and end of the run (s); by default those of the wiring. If the steps do not fill the run, the last
+        one is shorter.
     share : float, optional
         Share of the work that the coupling may add, such as 1e-3, relative to the power that the bonds transmitted recently.
         The share controls the length of the steps; ``step`` is the length of the first step.
@@ -323,8 +326,8 @@ def run_system(
     CosimulationError
         If a part cannot be loaded or initialised.
     InputError
-        If the step is not positive or exceeds the stop time, if ``rollback`` is chosen and a part cannot restore its state, or
-        if ``share`` is not positive or there is no power bond for it.
+        If the step is not positive or exceeds the stop time, if ``rollback`` is chosen and a part cannot restore its state, if
+        ``share`` is not positive or there is no power bond for it, or if a part needs equal steps and does not get them.
     """
     if coupling not in COUPLINGS:
         raise unknown_name(coupling, COUPLINGS, f"coupling {coupling!r}")
@@ -339,8 +342,15 @@ def run_system(
             f"steps for a share of {share:g}: the share must be above 0, and the system must have a power bond, "
             f"of which it has {len(bonds)}"
         )
-    together = _Instances(wiring, bonds)
     stepper = _Stepper(step, stop_time, share)
+    if share is not None or abs(stepper.count * step - stop_time) > 1e-9 * step:
+        for name, part in wiring.parts.items():
+            if not part.description.coSimulation.canHandleVariableCommunicationStepSize:
+                raise InputError(
+                    f"{name} takes equal communication steps alone: the steps cannot follow a share, and {step:g} s must "
+                    f"divide the stop time, {stop_time:g} s"
+                )
+    together = _Instances(wiring, bonds)
     times, rows = [0.0], [together.outputs]
     effort, flow = together.bonds[:2]
     powers, flows = [np.zeros(len(bonds))], [together.outputs[effort] * together.outputs[flow]]
@@ -353,8 +363,6 @@ def run_system(
             )
         with record_interrupts() as interrupted, show_progress(progress, stop_time, "running the system") as show:
             while times[-1] < stop_time * (1.0 - 1e-12) and not interrupted:
-                if share is None and stepper.number == stepper.count:
-                    break
                 length, end = stepper.next_step(times[-1])
                 try:
                     together.step(coupling, times[-1], length)
@@ -381,7 +389,7 @@ def run_system(
         notes=tuple(wiring.notes()),
         title=wiring.title,
         coupling=coupling,
-        units={str(end): wiring.port(end).unit for end in together.ends},
+        units={str(end): wiring.unit(end) for end in together.ends},
         connected=tuple(map(str, dict.fromkeys(wiring.connections.values()))),
     )
     if interrupted:

@@ -17,14 +17,12 @@ from typing import Any
 from xml.etree import ElementTree
 
 from linkwork.errors import InputError
-from linkwork.variables import UNITS as MECHANICAL
 
-from ..export.controllers import UNITS
 from ..files import output
 from ..libraries import lazy
 from ..numerics.cache import code_folder, store_file
 from .layout import boxes
-from .wiring import REAL, End, Part, Port, Wiring, WiringError
+from .wiring import BASE, REAL, End, Part, Port, Wiring, WiringError, base_of
 
 ssp = lazy("pyssp_standard.ssp")
 ssd = lazy("pyssp_standard.ssd")
@@ -68,8 +66,9 @@ def write_ssp(wiring: Wiring, path: str | Path) -> Path:
                     structure.add_connection(ssd.Connection(**ends, end_element=end.part, end_connector=end.port))
                 structure.default_experiment = ssd.DefaultExperiment()
                 structure.default_experiment.start_time, structure.default_experiment.stop_time = 0.0, wiring.stop_time
-                for name in _units(wiring):
-                    structure.units.add_unit(unit.Unit(name, unit.BaseUnit(_base(name))))
+                ends = [end for pair in wiring.connections.items() for end in pair]
+                for made_unit in _units((wiring.parts[end.part], end.port) for end in ends):
+                    structure.units.add_unit(made_unit)
             _complete_structure(archive.unpacked_path / "SystemStructure.ssd", wiring)
         shutil.copy(made, target)
     return final
@@ -89,16 +88,14 @@ def _ports(wiring: Wiring, name: str) -> dict[str, list[str]]:
     return {kind: [port for port in part.real_variables(kind) if port in ends] for kind in ("input", "output")}
 
 
-def _units(wiring: Wiring) -> list[str]:
-    found = [wiring.port(end).unit for pair in wiring.connections.items() for end in pair]
-    return [name for name in dict.fromkeys(found) if name]
-
-
-def _base(name: str) -> dict[str, int]:
-    if name in UNITS:
-        return UNITS[name]
-    known = MECHANICAL.get(name)
-    return {k: v for k in ("kg", "m", "s", "rad") if (v := getattr(known, k, 0))}
+def _units(ports: Iterable[tuple[Part, str]]) -> list[Any]:
+    """Return the units of ports, each name once, as their FMUs define them."""
+    found: dict[str, dict[str, float]] = {}
+    for part, port in ports:
+        base = part.base_unit(port) or ()
+        known = dict(zip(BASE, base)) if len(base) == len(BASE) else {}
+        found.setdefault(part.ports[port].unit, {k: v for k, v in known.items() if v != (k == "factor")})
+    return [unit.Unit(name, unit.BaseUnit(base)) for name, base in found.items() if name]
 
 
 def _component(part: Part, source: str, ports: Mapping[str, Iterable[str]]) -> Any:
@@ -147,7 +144,7 @@ def _values(path: Path, part: Part) -> Path:
         for port in ports:
             value = part.values[port.name]
             if port.type in REAL:
-                values.add_parameter(port.name, "Real", value=float(value), unit=port.unit or None)
+                values.add_parameter(port.name, "Real", value=float(value), unit=port.unit)
             elif port.type == "Boolean":
                 values.add_parameter(port.name, "Boolean", value=str(bool(value)).lower())
             elif port.items:
@@ -155,17 +152,21 @@ def _values(path: Path, part: Part) -> Path:
                 values.add_parameter(port.name, "Enumeration", value=name, name=port.enumeration)
             else:
                 values.add_parameter(port.name, "Integer", value=int(value))
-        for name in dict.fromkeys(port.unit for port in ports if port.type in REAL and port.unit):
-            values.units.add_unit(unit.Unit(name, unit.BaseUnit(_base(name))))
+        for made in _units((part, port.name) for port in ports if port.type in REAL):
+            values.units.add_unit(made)
         for name, items in {port.enumeration: port.items for port in ports if port.items}.items():
             rows = [common.Item(text, number) for number, text in items]
             values.enumerations.add_enumeration(common.Enumeration(name, rows))
     tree = etree.parse(path)
-    for node in tree.getroot().findall(f"{{{tree.getroot().nsmap['ssc']}}}Enumerations"):
+    root = tree.getroot()
+    for node in root.findall(f"{{{root.nsmap['ssc']}}}Enumerations"):
         # the library puts enumerations last, and into another namespace than the schema
-        node.tag = f"{{{tree.getroot().nsmap['ssv']}}}Enumerations"
-        tree.getroot().insert(1, node)
-        tree.write(path, xml_declaration=True, encoding="utf-8")
+        node.tag = f"{{{root.nsmap['ssv']}}}Enumerations"
+        root.insert(1, node)
+    for node in root.iterfind(".//*[@unit='']"):
+        # the library writes no value without a unit
+        del node.attrib["unit"]
+    tree.write(path, xml_declaration=True, encoding="utf-8")
     return path
 
 
@@ -208,7 +209,8 @@ def read_ssp(path: str | Path) -> Wiring:
             )
             part = Part.from_fmu(element.name, fmu, {})
             values = {
-                key: _as_number(text, part.ports.get(key), f"{element.name}.{key}") for key, text in texts.items()
+                key: _convert(_as_number(text, part.ports.get(key), f"{element.name}.{key}"), part, key, *of)
+                for key, (text, *of) in texts.items()
             }
             parts[element.name] = Part.from_fmu(element.name, fmu, values)
         connections = {
@@ -222,19 +224,23 @@ def read_ssp(path: str | Path) -> Wiring:
                 f"{path}: an input has two connections, or one begins at the system's edge: it must have one"
             )
         experiment = structure.default_experiment
+    if experiment is not None and float(experiment.start_time or 0.0):
+        raise WiringError(f"{path} starts at {experiment.start_time} s: it must start at 0 s")
     stop_time = float(experiment.stop_time) if experiment is not None else 1.0
     steps = [str(node[0].text) for node in nodes if node.get("type") == _STEP and len(node)]
     step = _as_number(steps[0], None, f"{path}: the communication step") if steps else 1e-3 * stop_time
     return Wiring(title=structure.name, parts=parts, connections=connections, stop_time=stop_time, step=step)
 
 
-def _start_values(folder: Path, bindings: Iterable[Any], name: str, own: int) -> dict[str, str]:
-    """Return the start values of the part ``name`` as texts, by variable.
+def _start_values(
+    folder: Path, bindings: Iterable[Any], name: str, own: int
+) -> dict[str, tuple[str, str, tuple[float, ...] | None]]:
+    """Return the start values of the part ``name`` as texts, with unit and its definition in base units, by variable.
 
     The first ``own`` bindings belong to the part. The other bindings belong to the system; there the names of the part's
     variables begin with the name of the part. If a variable has several values, the first one is taken.
     """
-    found: dict[str, str] = {}
+    found: dict[str, tuple[str, str, tuple[float, ...] | None]] = {}
     for number, binding in enumerate(bindings):
         inline, prefix = binding.ssv is not None, binding.prefix or ""
         values = binding.ssv if inline else lazy("pyssp_standard.ssv").SSV(folder / binding.source, mode="r")
@@ -244,10 +250,24 @@ def _start_values(folder: Path, bindings: Iterable[Any], name: str, own: int) ->
                 whole = f"{prefix}{target}"
                 if number >= own and not whole.startswith(f"{name}."):
                     continue
-                text = parameter["type_value"].parameter["value"]
+                given = parameter["type_value"].parameter
+                of = given.get("unit") or ""
+                defined = values.units.units.get(of) if values.units is not None else None
+                base = None if defined is None or defined.base_unit is None else base_of(defined.base_unit)
                 key = whole if number < own else whole.removeprefix(f"{name}.")
-                found.setdefault(key, text)
+                found.setdefault(key, (given["value"], of, base))
     return found
+
+
+def _convert(value: float, part: Part, key: str, of: str, base: tuple[float, ...] | None) -> float:
+    """Return a start value in the unit of its variable; ``of`` is the unit in which it is given, ``base`` its definition."""
+    port = part.ports.get(key)
+    if port is None or of in ("", port.unit):
+        return value
+    own = part.base_unit(key)
+    if base is None or own is None or len(own) != len(base) or own[:-2] != base[:-2]:
+        raise WiringError(f"{part.name}.{key} starts with {value:g} {of}: it must be in {port.unit or 'no unit'}")
+    return float((value * base[-2] + base[-1] - own[-1]) / own[-2])
 
 
 def _mapping(folder: Path, binding: Any) -> dict[str, tuple[str, ...]]:

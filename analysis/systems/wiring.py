@@ -19,6 +19,13 @@ class WiringError(LinkworkError):
 
 #: The types of real variables, in FMI 2.0 and 3.0.
 REAL = ("Real", "Float64")
+#: Attributes of a unit in base units.
+BASE = ("kg", "m", "s", "A", "K", "mol", "cd", "rad", "factor", "offset")
+
+
+def base_of(unit: Any) -> tuple[float, ...]:
+    """Return the exponents of the base units, factor and offset of a definition, as FMPy or pyssp-standard reads it."""
+    return tuple(1.0 if k == "factor" and getattr(unit, k) is None else getattr(unit, k) or 0 for k in BASE)
 
 
 class Port(NamedTuple):
@@ -111,13 +118,27 @@ class Part:
         for known in values:
             if known not in settable:
                 raise unknown_name(known, settable, f"parameter or input {known} of {name}")
-        # a Python FMU states no dependencies, and its outputs follow its inputs at the next step
+        # an output without a list depends on all inputs; a Python FMU has no lists, and its outputs follow at the next step
+        wrapped = str(description.generationTool).startswith("PythonFMU")
+        inputs = [] if wrapped else [v for v in description.modelVariables if v.causality == "input"]
         feeds = {
-            unknown.variable.name: tuple(v.name for v in unknown.dependencies if v.causality == "input")
+            unknown.variable.name: tuple(v.name for v in on if v.causality == "input")
             for unknown in description.outputs
-            if unknown.dependencies
+            if (on := inputs if unknown.dependencies is None else unknown.dependencies)
         }
         return cls(name=name, fmu=Path(fmu), ports=ports, values=values, feeds=feeds, description=description)
+
+    def base_unit(self, port: str) -> tuple[Any, ...] | None:
+        """Return the unit of a port in base units, with factor and offset; None if the FMU does not tell any units.
+
+        A unit without a definition in base units is returned by its name.
+        """
+        known = self.description.unitDefinitions
+        if not known:
+            return None
+        name = self.ports[port].unit
+        base = next((unit.baseUnit for unit in known if unit.name == name), None)
+        return (name,) if base is None else base_of(base)
 
     def real_variables(self, causality: str) -> tuple[str, ...]:
         """Return the names of all real variables with a causality."""
@@ -182,11 +203,18 @@ class Wiring:
                     raise unknown_name(
                         end.port, part.real_variables(causality), f"{causality} {end}, of {source} -> {target}"
                     )
-                found = part.ports[end.port].causality
-                if found != causality:
-                    raise WiringError(f"{source} -> {target}: {end} is of causality {found}, it must be an {causality}")
+                port = part.ports[end.port]
+                if port.causality != causality:
+                    raise WiringError(
+                        f"{source} -> {target}: {end} is of causality {port.causality}, it must be an {causality}"
+                    )
+                if port.type not in REAL:
+                    raise WiringError(
+                        f"{source} -> {target}: {end} is of type {port.type}: only real variables are connected"
+                    )
             units = [self.port(end).unit for end in (source, target)]
-            if units[0] != units[1]:
+            bases = [self.parts[end.part].base_unit(end.port) for end in (source, target)]
+            if units[0] != units[1] and None not in bases and bases[0] != bases[1]:
                 said = [unit or "without a unit" for unit in units]
                 raise WiringError(
                     f"{source} -> {target}: the units do not match, {said[0]} and {said[1]}; they must be the same"
@@ -195,6 +223,12 @@ class Wiring:
     def port(self, end: End) -> Port:
         """Return the port at an end of a connection."""
         return self.parts[end.part].ports[end.port]
+
+    def unit(self, end: End) -> str:
+        """Return the unit of a port; if its FMU tells no units, the unit of what it is connected to."""
+        others = [t for t, source in self.connections.items() if source == end]
+        others += [self.connections[end]] if end in self.connections else []
+        return next((self.port(one).unit for one in (end, *others) if self.port(one).unit), "")
 
     def rate_input(self, end: End) -> End | None:
         """Return the input for the time derivative of a given input: in the same table, with the unit divided by seconds."""
@@ -215,6 +249,12 @@ class Wiring:
             free = [i for i in inputs if _table(i) not in served]
             if free:
                 found.append(f"{name}: not connected, and at their start values: {', '.join(free)}")
+            if not part.description.unitDefinitions:
+                own = {
+                    end.port: self.unit(end) for pair in self.connections.items() for end in pair if end.part == name
+                }
+                if said := ", ".join(f"{port} in {unit}" for port, unit in own.items() if unit):
+                    found.append(f"{name}: its FMU tells no units, taken as those at the other end: {said}")
             gains = [own for own in part.real_variables("parameter") if f"_{own}".endswith("_gain")]
             starts = {v.name: float(v.start or 0.0) for v in part.description.modelVariables if v.name in gains}
             if gains and not any(part.values.get(gain, starts[gain]) for gain in gains):
@@ -255,7 +295,7 @@ class Wiring:
             for target, source in self.connections.items()
             for flow_to, flow in self.connections.items()
             if (flow.part, flow_to.part) == (target.part, source.part)
-            and (self.port(source).unit, self.port(flow).unit) in _POWERS
+            and (self.unit(source), self.unit(flow)) in _POWERS
         ]
         efforts, flows = [bond.effort_to for bond in found], [bond.flow_to for bond in found]
         return [b for b in found if efforts.count(b.effort_to) == 1 and flows.count(b.flow_to) == 1]

@@ -230,6 +230,18 @@ def test_a_refused_step_ends_the_run_and_keeps_what_was_there(coupling: str) -> 
     assert np.isfinite(run["linkage.slider.position"]).all()
 
 
+@pytest.mark.parametrize("step", [3e-3, 4e-3, 6e-3])
+def test_steps_that_do_not_fill_the_run_end_with_a_shorter_one(step: float, monkeypatch: pytest.MonkeyPatch) -> None:
+    wiring = wiring_of("motor-crank")
+    run = run_system(wiring, step=step, stop_time=0.01)
+    assert run.time == pytest.approx([*np.arange(0.0, 0.01, step), 0.01], abs=1e-15)
+    interface = wiring.parts["motor"].description.coSimulation
+    monkeypatch.setattr(interface, "canHandleVariableCommunicationStepSize", False)
+    with pytest.raises(InputError, match="motor takes equal communication steps alone"):
+        run_system(wiring, step=step, stop_time=0.01)
+    assert len(run_system(wiring, step=5e-3, stop_time=0.01)) == 3
+
+
 def test_wrong_arguments_are_refused() -> None:
     wiring = wiring_of("motor-crank")
     with pytest.raises(UnknownNameError, match="rollback"):

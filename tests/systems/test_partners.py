@@ -135,6 +135,16 @@ def test_a_pid_controller_has_its_three_shares() -> None:
     assert pid.force == pytest.approx(3.0 * 1.0 + 5.0 * 0.1 * 4.5 + 0.5 * 1.0)
 
 
+def test_a_tracking_time_below_a_sample_leaves_the_force_at_its_limit() -> None:
+    made = controller(
+        "pid", gain=1.0, integral_gain=1.0, limit=1.0, tracking_time=1e-3, reference=5.0, sample_time=0.01
+    )
+    begin(made)
+    for number in range(20):
+        made.do_step(0.01 * number, 0.01)
+        assert made.force == 1.0
+
+
 def test_an_integral_does_not_wind_up_at_the_limit() -> None:
     limited = controller("pid", integral_gain=100.0, limit=1.0, tracking_time=0.05, reference=1.0, sample_time=0.01)
     begin(limited)

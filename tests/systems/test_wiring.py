@@ -15,7 +15,9 @@ import pytest
 import xmlschema
 from click.testing import Result
 
-from analysis import figures
+from analysis import figures, simulate
+from analysis.files import read_tables
+from analysis.run import read_case
 from analysis.systems import (
     End,
     System,
@@ -28,7 +30,7 @@ from analysis.systems import (
     ssp,
     write_ssp,
 )
-from analysis.systems.description import RunTable
+from analysis.systems.description import PartTable, RunTable
 from linkwork.errors import InputError, LinkworkError, ParameterError, UnknownNameError
 
 from .conftest import system_of, wiring_of
@@ -90,9 +92,9 @@ def test_a_wrong_description_is_refused(
 def test_notes_name_what_is_not_connected_and_loops() -> None:
     notes = wiring_of("motor-crank").notes()
     assert any("not connected" in note and "slider.force" in note for note in notes)
-    # the torque of a shaft does not depend on the acceleration of its flange, but the FMU cannot tell
-    assert sum("algebraic loop" in note for note in notes) == 1
-    assert not any("loop" in note for note in system_of("motor-crank").without_rates().wiring().notes())
+    # the torque of a shaft depends on the speed of its flange, not on its acceleration
+    assert wiring_of("motor-crank").parts["motor"].feeds["shaft.exerted_torque"] == ("flangeDrive.speed",)
+    assert not any("loop" in note for name in library() for note in wiring_of(name).notes())
     # an output of a crank at commanded speed that sets that speed's own rate
     own = wired("slider-tracking", linkage__drive__acceleration="linkage.crank.acceleration").wiring()
     assert any(
@@ -108,6 +110,41 @@ def test_a_controller_without_gains_is_noted(tmp_path: Path) -> None:
     found = [note for note in load_system(tmp_path / "idle.toml").wiring().notes() if "gains" in note]
     assert [note.partition(": ")[2] for note in found] == ["its gains are 0: gain, integral_gain, derivative_gain"]
     assert not any("gains" in note for note in wiring_of("slider-tracking").notes())
+
+
+@pytest.mark.parametrize(
+    "case",
+    [
+        'published = "table-3.1"\nforce = "10 N"\n[drive]\nspeed = "100 rpm"',
+        'published = "table-3.1"\n[drive]\ntorque = "0.5 N*m"',
+        'published = "rahman-ideal"\n[drive]\nspeed = "60 rpm"\n[axial]\ngroove = true\n[groove]\namplitude = "30 mm"',
+    ],
+)
+def test_the_constant_inputs_of_a_case_act_in_a_system(tmp_path: Path, case: str) -> None:
+    (tmp_path / "case.toml").write_text(f"{case}\n[run]\nstop_time = '20 ms'\nstep = '1 ms'", encoding="utf-8")
+    read = read_case(read_tables(tmp_path / "case.toml"), folder=tmp_path)
+    right = simulate(read.parameters, read.inputs, initial=read.initial, stop_time=0.02, step=1e-3)
+    system = System(parts={"a": PartTable(case="case.toml")}, run=RunTable(stop_time=0.02), folder=tmp_path)
+    run = run_system(system.wiring())
+    assert run["a.slider.position"] == pytest.approx(right["slider.position"], rel=1e-7, abs=1e-10)
+
+
+def test_an_input_of_a_case_that_varies_is_refused_unless_something_takes_its_place(tmp_path: Path) -> None:
+    ramp = "{ kind = 'ramp', start = '0 rpm', end = '9 rpm', from_time = '0 s', to_time = '1 s' }"
+    (tmp_path / "case.toml").write_text(f"published = 'table-3.1'\n[drive]\nspeed = {ramp}", encoding="utf-8")
+    part = PartTable(case="case.toml")
+    with pytest.raises(WiringError, match=r"parts.a: drive.speed of its case is no constant: connect it, or give"):
+        _ = System(parts={"a": part}, folder=tmp_path).members
+    held = System(parts={"a": replace(part, values={"drive.speed": "3 rad/s"})}, folder=tmp_path).members["a"].values
+    assert (held["drive.mode"], held["drive.speed"]) == (1.0, 3.0)
+    pushed = System(parts={"a": replace(part, values={"drive.torque": "2 N*m"})}, folder=tmp_path).members["a"].values
+    assert (pushed["drive.mode"], pushed["drive.torque"]) == (0.0, 2.0)
+    motor = System(
+        parts={"a": part, "motor": PartTable(partner="induction-motor")},
+        connections={End("a", "drive.torque"): End("motor", "shaft.exerted_torque")},
+        folder=tmp_path,
+    )
+    assert motor.members["a"].values["drive.mode"] == 0.0
 
 
 def test_a_system_given_to_a_command_for_cases_is_named(linkwork: Callable[..., Result]) -> None:
@@ -190,6 +227,31 @@ def test_enumerations_are_written_by_the_names_of_their_items(tmp_path: Path) ->
     assert ssp._as_number("speed", mode, "drive.mode") == 1.0
     with pytest.raises(WiringError, match="it must be a number"):
         ssp._as_number("fast", mode, "drive.mode")
+
+
+def test_start_values_in_other_units_are_converted_or_refused(tmp_path: Path) -> None:
+    entries = entries_of(write_ssp(wiring_of("motor-crank"), tmp_path / "made.ssp"))
+    text = entries["resources/linkage.ssv"].decode()
+    right = wiring_of("motor-crank").parts["linkage"].values["crank.length"]
+    own = f'"crank.length">\n      <ssv:Real value="{right}" unit="m"/>'
+    assert own in text
+    defined = '<ssc:Unit name="mm"><ssc:BaseUnit m="1" factor="1e-3"/></ssc:Unit></ssv:Units>'
+    for unit, definition, fits in (
+        ("mm", defined, True),
+        ("kg", "</ssv:Units>", False),
+        ("ell", "</ssv:Units>", False),
+    ):
+        given = own.replace(f'value="{right}" unit="m"', f'value="{1e3 * right}" unit="{unit}"')
+        entries["resources/linkage.ssv"] = text.replace(own, given).replace("</ssv:Units>", definition).encode()
+        with zipfile.ZipFile(tmp_path / "other.ssp", "w") as archive:
+            for name, content in entries.items():
+                archive.writestr(name, content)
+        if fits:
+            values = read_ssp(tmp_path / "other.ssp").parts["linkage"].values
+            assert values["crank.length"] == pytest.approx(right, rel=1e-15)
+        else:
+            with pytest.raises(WiringError, match=f"crank.length starts with .* {unit}: it must be in m"):
+                read_ssp(tmp_path / "other.ssp")
 
 
 def test_a_part_that_nothing_is_connected_to_is_kept(tmp_path: Path) -> None:

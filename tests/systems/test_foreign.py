@@ -1,0 +1,70 @@
+"""FMUs of other tools as parts of a system."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from pythonfmu.builder import FmuBuilder
+
+from analysis.systems import System, WiringError, load_system, read_ssp, run_system, write_ssp
+
+SYSTEM = """
+[parts.pump]
+fmu = "Pump.fmu"
+values = { displacement = 2e-6 }
+
+[parts.linkage]
+case = "rig-2-spring-d"
+
+[connections]
+"linkage.drive.torque" = "pump.torque"
+"pump.omega" = "linkage.crank.speed"
+
+[run]
+stop_time = "10 ms"
+"""
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    made = tmp_path_factory.mktemp("foreign")
+    FmuBuilder.build_FMU(Path(__file__).with_name("pump.py"), dest=made)
+    return made
+
+
+def system(folder: Path, old: str = "", new: str = "") -> System:
+    (folder / "system.toml").write_text(SYSTEM.replace(old, new) if old else SYSTEM, encoding="utf-8")
+    return load_system(folder / "system.toml")
+
+
+def test_an_fmu_without_units_takes_those_at_the_other_end(folder: Path) -> None:
+    wiring = system(folder).wiring()
+    (note,) = (note for note in wiring.notes() if "units" in note)
+    assert "torque in N.m" in note
+    assert "omega in rad/s" in note
+    (bond,) = wiring.bonds()
+    assert str(bond.effort) == "pump.torque"
+    run = run_system(wiring)
+    assert run.units["pump.torque"] == "N.m"
+    # the torque is there after the first step
+    work = -2e-6 * 2e5 * (run["linkage.crank.angle"][-1] - run["linkage.crank.angle"][1])
+    assert run["linkage.energy.supplied"][-1] == pytest.approx(work, rel=1e-9)
+
+
+def test_values_without_a_unit_go_into_an_archive_and_back(folder: Path, tmp_path: Path) -> None:
+    wiring = system(folder).wiring()
+    again = read_ssp(write_ssp(wiring, tmp_path / "made.ssp"))
+    assert dict(again.parts["pump"].values) == {"displacement": 2e-6}
+    one, other = run_system(wiring), run_system(again)
+    assert all(np.array_equal(one[name], other[name]) for name in one.values)
+
+
+@pytest.mark.parametrize(
+    ("new", "kind"),
+    [('"linkage.load.fx" = "pump.full"', "Boolean"), ('"pump.valve" = "linkage.crank.speed"', "Integer")],
+)
+def test_ports_that_are_not_real_are_not_connected(folder: Path, new: str, kind: str) -> None:
+    with pytest.raises(WiringError, match=f"is of type {kind}: only real variables are connected"):
+        system(folder, '"linkage.drive.torque" = "pump.torque"', new).wiring()
