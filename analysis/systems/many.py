@@ -20,7 +20,7 @@ from linkwork.errors import InputError, LinkworkError
 from ..files import unknown_name
 from ..numerics.workers import WorkersLost, record_interrupts, run_in_parallel
 from ..run import CosimulationError, show_progress
-from .master import run_system
+from .master import count_steps, run_system
 from .wiring import End, Part, Wiring
 
 #: Number of runs per batch.
@@ -134,7 +134,7 @@ def run_many(
     for name in outputs:
         if name not in known:
             raise unknown_name(name, known, f"output {name!r}")
-    time = step * np.arange(0, round(stop_time / step) + 1, every)
+    time = np.minimum(step * np.arange(0, count_steps(stop_time, step) + 1, every), stop_time)
     parts = tuple((name, part.fmu.resolve(), tuple(part.values.items())) for name, part in wiring.parts.items())
     task = _Task(
         parts, tuple(wiring.connections.items()), tuple(vary), sets, tuple(outputs), (coupling, step, stop_time, every)

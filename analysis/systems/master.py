@@ -253,6 +253,11 @@ class _Instances:
             instance.close()
 
 
+def count_steps(stop_time: float, step: float) -> int:
+    """Return the number of steps of a run with equal steps, of which the last may be shorter."""
+    return ceil(stop_time / step * (1.0 - 1e-12))
+
+
 class _Stepper:
     """Controller of the communication step: constant, or adapted so that the coupling adds a wanted share of the work."""
 
@@ -264,18 +269,17 @@ class _Stepper:
         """Return the length of the next step, and the time at its end."""
         if self.share is None:
             # the last step is shorter where the steps do not fill the run
-            end = (self.number + 1) * self.step if self.number + 1 < self.count else self.stop_time
+            end = (
+                (self.number + 1) * self.step
+                if self.number + 1 < count_steps(self.stop_time, self.first)
+                else self.stop_time
+            )
         else:
             # the last two steps share the remaining time
             left = self.stop_time - time
             end = self.stop_time if left <= 1.0001 * self.step else time + min(self.step, 0.5 * left)
         self.number += 1
         return end - time, end
-
-    @property
-    def count(self) -> int:
-        """Return the number of steps of a run with equal steps, of which the last may be shorter."""
-        return ceil(self.stop_time / self.first * (1.0 - 1e-12))
 
     def adapt(self, powers: Floats, flows: Floats) -> None:
         """Adapt the step to the power residuals and transmitted powers of the last step, by PI control of the added work."""
@@ -343,7 +347,7 @@ def run_system(
             f"of which it has {len(bonds)}"
         )
     stepper = _Stepper(step, stop_time, share)
-    if share is not None or abs(stepper.count * step - stop_time) > 1e-9 * step:
+    if share is not None or abs(count_steps(stop_time, step) * step - stop_time) > 1e-9 * step:
         for name, part in wiring.parts.items():
             if not part.description.coSimulation.canHandleVariableCommunicationStepSize:
                 raise InputError(

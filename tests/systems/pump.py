@@ -1,6 +1,6 @@
 """A pump as the FMU of another tool: without units, with outputs of other types, and without lists of dependencies."""
 
-from pythonfmu import Boolean, Fmi2Causality, Fmi2Slave, Integer, Real
+from pythonfmu import Boolean, Fmi2Causality, Fmi2Slave, Fmi2Variability, Integer, Real
 
 
 class Pump(Fmi2Slave):
@@ -9,10 +9,14 @@ class Pump(Fmi2Slave):
     def __init__(self, **keywords):
         super().__init__(**keywords)
         self.displacement, self.pressure, self.omega, self.torque, self.valve, self.full = 1e-6, 2e5, 0.0, 0.0, 0, False
-        for name, causality in (
-            ("displacement", "parameter"), ("pressure", "parameter"), ("omega", "input"), ("torque", "output"),
-        ):  # fmt: skip
-            self.register_variable(Real(name, causality=Fmi2Causality[causality]))
+        for name, causality, variability in (
+            ("displacement", "parameter", "fixed"),
+            ("pressure", "parameter", "fixed"),
+            ("omega", "input", "continuous"),
+            ("torque", "output", "continuous"),
+        ):
+            kinds = {"causality": Fmi2Causality[causality], "variability": Fmi2Variability[variability]}
+            self.register_variable(Real(name, **kinds))
         self.register_variable(Integer("valve", causality=Fmi2Causality.input))
         self.register_variable(Boolean("full", causality=Fmi2Causality.output))
 

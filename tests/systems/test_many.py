@@ -43,6 +43,13 @@ def test_each_is_the_run_of_its_values() -> None:
             assert found.output(name)[number].tolist() == alone[name][::5].tolist()
 
 
+def test_steps_that_do_not_fill_the_run_end_with_a_shorter_one() -> None:
+    found = runs(springs=SPRINGS[:2], step=3e-3, stop_time=1e-2, every=1)
+    assert found.time.tolist() == pytest.approx([0.0, 3e-3, 6e-3, 9e-3, 1e-2])
+    assert found.output(OUTPUTS[0]).shape == (2, 5)
+    assert not found.messages
+
+
 def test_what_is_there_is_not_run_again(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     calls: list[int] = []
     whole = many._batch
