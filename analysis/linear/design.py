@@ -153,8 +153,8 @@ class Design:
         if self.integral_gain:
             raise DesignError("a law with integral action is no function of the state: run it with control_loop")
         gains = tuple(self.plant_values(self.gains).tolist())
-        reference = si(reference, unit_of(self.model.mechanism, self.coordinate), "reference")
-        step = reference - float(self.target[self.plant.place])
+        there: float = si(reference, unit_of(self.model.mechanism, self.coordinate), "reference")
+        step = there - float(self.target[self.plant.place])
         bias = self.force + step * self.force_slope + float(self.gains @ (self.target + step * self.target_slope))
 
         def force(t: float, *x: float) -> float:

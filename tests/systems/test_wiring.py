@@ -119,6 +119,7 @@ def test_a_controller_without_gains_is_noted(tmp_path: Path) -> None:
         'published = "table-3.1"\n[drive]\ntorque = "0.5 N*m"',
         'published = "rahman-ideal"\n[drive]\nspeed = "60 rpm"\n[axial]\ngroove = true\n[groove]\namplitude = "30 mm"',
     ],
+    ids=["force", "torque", "groove"],
 )
 def test_the_constant_inputs_of_a_case_act_in_a_system(tmp_path: Path, case: str) -> None:
     (tmp_path / "case.toml").write_text(f"{case}\n[run]\nstop_time = '20 ms'\nstep = '1 ms'", encoding="utf-8")
