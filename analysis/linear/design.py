@@ -26,7 +26,7 @@ from ..files import unknown_name
 from ..libraries import lazy
 from ..run import Function, require_kind
 from ..units import Amount, in_si, si
-from .model import FloatArray, LinearModel, LinearModelError, as_names, signal_name, sort_by_magnitude, unit_of
+from .model import FloatArray, LinearModel, LinearModelError, as_names, signal_name, sort_by_magnitude, variable_unit
 
 if TYPE_CHECKING:
     import control
@@ -153,7 +153,7 @@ class Design:
         if self.integral_gain:
             raise DesignError("a law with integral action is no function of the state: run it with control_loop")
         gains = tuple(self.plant_values(self.gains).tolist())
-        there: float = si(reference, unit_of(self.model.mechanism, self.coordinate), "reference")
+        there: float = si(reference, variable_unit(self.model.mechanism, self.coordinate), "reference")
         step = there - float(self.target[self.plant.place])
         bias = self.force + step * self.force_slope + float(self.gains @ (self.target + step * self.target_slope))
 

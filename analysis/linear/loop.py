@@ -35,7 +35,7 @@ from ..run import (
 )
 from ..units import Amount, in_si, si
 from .design import Design, check_period
-from .model import FloatArray, LinearModel, unit_of
+from .model import FloatArray, LinearModel, variable_unit
 from .periodic import PeriodicModel
 
 #: A constant reference, or a function of time (s) that is sampled with the controller.
@@ -87,7 +87,7 @@ class SampledController:
 
     @in_si(period="s")
     def __init__(self, design: Design, period: Amount, *, limit: Amount = inf) -> None:
-        limit = si(limit, unit_of(design.model.mechanism, design.channel), "limit")
+        limit = si(limit, variable_unit(design.model.mechanism, design.channel), "limit")
         check_period(period)
         check_limit(limit)
         self.design = design
@@ -294,7 +294,7 @@ def _run_loop(
     """Reset the controller and run a closed loop: at each sampling time measure, compute the force, and advance the plant."""
     controller.reset()
     mechanism = plant.mechanism
-    reference = si(reference, unit_of(mechanism, mechanism.freedoms[freedom].coordinate), "reference")
+    reference = si(reference, variable_unit(mechanism, mechanism.freedoms[freedom].coordinate), "reference")
     rows: list[tuple[float, ...]] = []
     status, message = 0, ""
     ahead = [*times[1:].tolist(), float(times[-1]) + controller.period]

@@ -363,7 +363,7 @@ def as_names(names: str | Sequence[str]) -> Sequence[str]:
     return [names] if isinstance(names, str) else names
 
 
-def unit_of(mechanism: Mechanism, name: str) -> str:
+def variable_unit(mechanism: Mechanism, name: str) -> str:
     """Return the unit of a variable of a mechanism."""
     return next(v.unit for v in mechanism.variables if v.name == name)
 

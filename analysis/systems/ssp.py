@@ -22,7 +22,7 @@ from ..files import output
 from ..libraries import lazy
 from ..numerics.cache import code_folder, store_file
 from .layout import boxes
-from .wiring import BASE, REAL, End, Part, Port, Wiring, WiringError, base_of
+from .wiring import BASE, REAL, End, Part, Port, Wiring, WiringError, exponents
 
 ssp = lazy("pyssp_standard.ssp")
 ssd = lazy("pyssp_standard.ssd")
@@ -66,8 +66,8 @@ def write_ssp(wiring: Wiring, path: str | Path) -> Path:
                     structure.add_connection(ssd.Connection(**ends, end_element=end.part, end_connector=end.port))
                 structure.default_experiment = ssd.DefaultExperiment()
                 structure.default_experiment.start_time, structure.default_experiment.stop_time = 0.0, wiring.stop_time
-                ends = [end for pair in wiring.connections.items() for end in pair]
-                for made_unit in _units((wiring.parts[end.part], end.port) for end in ends):
+                connected = [end for pair in wiring.connections.items() for end in pair]
+                for made_unit in _units((wiring.parts[end.part], end.port) for end in connected):
                     structure.units.add_unit(made_unit)
             _complete_structure(archive.unpacked_path / "SystemStructure.ssd", wiring)
         shutil.copy(made, target)
@@ -209,8 +209,8 @@ def read_ssp(path: str | Path) -> Wiring:
             )
             part = Part.from_fmu(element.name, fmu, {})
             values = {
-                key: _convert(_as_number(text, part.ports.get(key), f"{element.name}.{key}"), part, key, *of)
-                for key, (text, *of) in texts.items()
+                key: _convert(_as_number(text, part.ports.get(key), f"{element.name}.{key}"), part, key, of, base)
+                for key, (text, of, base) in texts.items()
             }
             parts[element.name] = Part.from_fmu(element.name, fmu, values)
         connections = {
@@ -253,7 +253,7 @@ def _start_values(
                 given = parameter["type_value"].parameter
                 of = given.get("unit") or ""
                 defined = values.units.units.get(of) if values.units is not None else None
-                base = None if defined is None or defined.base_unit is None else base_of(defined.base_unit)
+                base = None if defined is None or defined.base_unit is None else exponents(defined.base_unit)
                 key = whole if number < own else whole.removeprefix(f"{name}.")
                 found.setdefault(key, (given["value"], of, base))
     return found

@@ -23,7 +23,7 @@ REAL = ("Real", "Float64")
 BASE = ("kg", "m", "s", "A", "K", "mol", "cd", "rad", "factor", "offset")
 
 
-def base_of(unit: Any) -> tuple[float, ...]:
+def exponents(unit: Any) -> tuple[float, ...]:
     """Return the exponents of the base units, factor and offset of a definition, as FMPy or pyssp-standard reads it."""
     return tuple(1.0 if k == "factor" and getattr(unit, k) is None else getattr(unit, k) or 0 for k in BASE)
 
@@ -138,7 +138,7 @@ class Part:
             return None
         name = self.ports[port].unit
         base = next((unit.baseUnit for unit in known if unit.name == name), None)
-        return (name,) if base is None else base_of(base)
+        return (name,) if base is None else exponents(base)
 
     def real_variables(self, causality: str) -> tuple[str, ...]:
         """Return the names of all real variables with a causality."""
