@@ -178,7 +178,9 @@ def check(file: str, stop: str | None, decades: int, out: str, plot: bool) -> No
         return
     described = load_system(file)
     if foreign := [name for name, table in described.parts.items() if table.fmu]:
-        print_error(f"note: {' and '.join(foreign)} tells no equations: the errors of the couplings are not measured")
+        common.print_error(
+            f"note: {' and '.join(foreign)} tells no equations: the errors of the couplings are not measured"
+        )
         return
     found = convergence(
         described,

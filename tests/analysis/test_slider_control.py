@@ -114,15 +114,18 @@ def test_pi_has_the_crossover_and_phase_asked_for(held) -> None:
 
 
 def test_amounts_are_texts_with_units_and_a_name_stands_alone(held) -> None:
-    design = design_pid(held, bandwidth=80.0)
-    words, numbers = SampledController(design, "1 ms", limit="20 N"), SampledController(design, 1e-3, limit=20.0)
+    design = lin.design_pid(held, bandwidth=80.0)
+    words, numbers = (
+        lin.SampledController(design, "1 ms", limit="20 N"),
+        lin.SampledController(design, 1e-3, limit=20.0),
+    )
     runs = [
-        predict_loop(held, one, where, stop_time=0.02) for one, where in ((words, "5 mm"), (numbers, 5e-3))
+        lin.predict_loop(held, one, where, stop_time=0.02) for one, where in ((words, "5 mm"), (numbers, 5e-3))
     ]  # fmt: skip
     assert np.array_equal(runs[0].force, runs[1].force)
     assert np.array_equal(design.sampled_poles("1 ms"), design.sampled_poles(1e-3))
     with pytest.raises(ParameterError, match="limit is '20 mm': it must be a number in N"):
-        SampledController(design, 1e-3, limit="20 mm")
+        lin.SampledController(design, 1e-3, limit="20 mm")
     assert design.closed_loop("slider.position").output_labels == ["slider_position"]
     assert held.to_state_space("slider.position", "slider.force").input_labels == ["slider_force"]
 
