@@ -9,6 +9,7 @@ from contextlib import contextmanager
 from dataclasses import replace
 from math import pi
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -24,6 +25,7 @@ from analysis.periodic import (
     frequency_response,
     natural_frequency,
     sweep,
+    with_isolas,
 )
 from analysis.periodic.response import frequency as resonance
 from analysis.units import RAD_S_PER_RPM
@@ -214,11 +216,25 @@ def test_an_interrupt_keeps_what_was_followed(monkeypatch: pytest.MonkeyPatch) -
         yield show
 
     monkeypatch.setattr(resonance, "show_progress", counting)
-    with pytest.raises(ResponseInterrupted, match="1 branches followed") as stopped:
+    with pytest.raises(ResponseInterrupted, match="1 branch followed") as stopped:
         frequency_response(RIG["a"], 100.0 * RPM, 1300.0 * RPM)
     (branch,) = stopped.value.response.branches
     assert len(branch) == 41
     assert "it was interrupted" in stopped.value.response.problems[0]
+
+
+def test_a_search_that_is_interrupted_does_not_count(monkeypatch: pytest.MonkeyPatch) -> None:
+    response = frequency_response(RIG["c"], 500.0 * RPM, 520.0 * RPM, doublings=0)
+
+    def interrupted(*_: object, **__: object) -> SimpleNamespace:
+        os.kill(os.getpid(), signal.SIGINT)
+        return SimpleNamespace(orbits=())
+
+    monkeypatch.setattr(resonance.motion, "search_orbits", interrupted)
+    with pytest.raises(ResponseInterrupted) as stopped:
+        with_isolas(response, places=2)
+    assert stopped.value.response.sought == 0
+    assert stopped.value.response.caution
 
 
 def test_one_end_without_an_orbit_is_a_problem_that_is_reported() -> None:

@@ -259,7 +259,7 @@ class ResponseInterrupted(Interrupted):
     def __init__(self, response: Response) -> None:
         self.response = response
         super().__init__(
-            f"interrupted with {len(response.branches)} branches followed, the last in part; they are kept"
+            f"interrupted with {format_count(len(response.branches), 'branch')} followed, the last in part; they are kept"
         )
 
 
@@ -571,9 +571,9 @@ def with_isolas(
             show(float(number))
             if interrupted:
                 break
-    result = replace(
-        response, branches=tuple(branches), problems=tuple(problems), sought=response.sought + number // turns
-    )
+    # a search that was interrupted does not count
+    sought = response.sought + (number - bool(interrupted)) // turns
+    result = replace(response, branches=tuple(branches), problems=tuple(problems), sought=sought)
     if interrupted:
         raise ResponseInterrupted(result)
     return result
