@@ -116,7 +116,7 @@ def test_a_function_of_the_rocker_is_shown_with_its_target() -> None:
     panel = axis_of(figure, "rocker angle")
     np.testing.assert_allclose(drawn(panel, "target"), np.degrees(np.column_stack([PHI, 2.0 + 0.4 * np.sin(PHI)])))
     x, y = np.radians(drawn(panel, "rocker")).T
-    np.testing.assert_allclose(y, solution.linkage.rocker_angle(x))
+    np.testing.assert_allclose(np.exp(1j * y), np.exp(1j * solution.linkage.rocker_angle(x)))
     np.testing.assert_allclose(axis_of(figure, "error").lines[-1].get_ydata(), np.degrees(solution.evaluation.errors))
     # there is no coupler point
     assert "P" not in {text.get_text() for text in figure.axes[0].texts}
@@ -483,6 +483,17 @@ def test_the_least_mechanical_advantage_lies_between_targets_that_are_dead_centr
     turned = np.linspace(0.0, 2.0 * pi, 4001)
     fastest = np.abs(np.gradient(np.unwrap(swing.linkage.rocker_angle(turned)), turned)).max()
     assert f"for one of the crank: {1.0 / fastest:.3g} at least on the way" in syn.report(swing)
+
+
+@pytest.mark.parametrize("turns", [-1, 0, 2])
+def test_a_rocker_is_drawn_and_listed_in_the_turn_of_its_targets(turns: int) -> None:
+    at = np.radians([0.0, 20.0, 40.0, 60.0])
+    task = syn.RockerFunction(angle=LINKAGE.rocker_angle(at) + 2.0 * pi * turns, rotation=at)
+    solution = syn.Solution.from_linkage(task, LINKAGE)
+    np.testing.assert_allclose(solution.columns()["rocker angle [rad]"], task.angle, atol=1e-9)
+    drawn = syn.LinkageScene(solution).function
+    assert drawn is not None
+    np.testing.assert_allclose(np.interp(at, *drawn), np.asarray(task.angle), atol=1e-4)
 
 
 def test_the_largest_link_is_what_the_constraint_bounds() -> None:

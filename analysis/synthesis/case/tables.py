@@ -351,7 +351,7 @@ class RockerFunctionTable(_ObjectiveAndRange):
     Attributes
     ----------
     angle : list or str
-        Angles of the rocker from the ground link, or a formula of the crank rotation t.
+        Angles of the rocker from the ground link, or a formula of the crank rotation t in rad.
     file : str
         CSV with two columns, rotation and angle, instead of angles.
     spacing : str
@@ -395,7 +395,7 @@ class SliderFunctionTable(_ObjectiveAndRange):
     Attributes
     ----------
     position : list or str
-        Places of the slider along the x axis, or a formula of the crank rotation t.
+        Places of the slider along the x axis, or a formula of the crank rotation t in rad.
     """
 
     position: Any = entry(any_value)

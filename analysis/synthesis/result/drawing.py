@@ -6,7 +6,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import combinations
-from math import dist, hypot, isfinite, pi
+from math import dist, hypot, isfinite, pi, tau
 from typing import Any
 
 import numpy as np
@@ -126,11 +126,12 @@ class LinkageScene:
     @cached_property
     def function(self) -> FloatArray | None:
         """Return crank rotations and rocker angles over a rocker function, shape (2, n); None for any other task."""
-        return (
-            np.vstack([self.task_rotations, self.linkage.rocker_angle(self.task_rotations)])
-            if self.target is None
-            else None
-        )
+        if self.target is not None:
+            return None
+        at, turned = self.task_rotations, self.linkage.rocker_angle(self.task_rotations)
+        # the angle is known up to whole turns: in the turn of the targets
+        wanted = np.interp(self.stations["crank rotation [rad]"], at, turned) - self.stations["rocker angle [rad]"]
+        return np.vstack([at, turned - tau * np.rint(np.median(wanted) / tau)])
 
     @cached_property
     def guide(self) -> FloatArray | None:

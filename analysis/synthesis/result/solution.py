@@ -437,11 +437,7 @@ class Solution(NotebookResult):
         assert at is not None
         columns = {"crank rotation [rad]": at}
         if isinstance(task, RockerFunction):
-            columns |= {
-                "target angle [rad]": np.asarray(task.angle),
-                "rocker angle [rad]": self.linkage.rocker_angle(at),
-            }
-            columns["error of angle [rad]"] = self.evaluation.errors
+            columns |= _angle_columns("rocker", task.angle, self.evaluation.errors)
         else:
             wanted = target_points(task)
             assert wanted is not None
@@ -450,16 +446,21 @@ class Solution(NotebookResult):
                 columns |= {f"{name} {axis} [m]": both[:, k] for k, axis in enumerate("xy")}
             columns["error [m]"] = self.evaluation.errors
         if self.evaluation.angle_errors is not None:
-            angle = self.linkage.coupler_angle(at)
-            columns["target angle [rad]"] = angle - self.evaluation.angle_errors
-            columns["coupler angle [rad]"] = angle
-            columns["error of angle [rad]"] = self.evaluation.angle_errors
+            columns |= _angle_columns("coupler", task.angle, self.evaluation.angle_errors)  # type: ignore[union-attr]
         columns["transmission angle [rad]"] = angle_at_c(self.linkage, at)
         return columns
 
     def to_csv(self, path: str | Path) -> Path:
         """Write `columns` to a CSV file."""
         return write_csv(path, self.columns())
+
+
+def _angle_columns(link: str, target: Any, error: FloatArray) -> dict[str, FloatArray]:
+    """Return target and angle of a link, in the same turn, and their difference, by name (rad)."""
+    wanted = np.asarray(target)
+    return {
+        "target angle [rad]": wanted, f"{link} angle [rad]": wanted + error, "error of angle [rad]": error,
+    }  # fmt: skip
 
 
 def whole_turn(task: Task, rotation: FloatArray) -> bool:
