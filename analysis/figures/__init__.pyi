@@ -20,6 +20,7 @@ from .linkage import animate_linkage as animate_linkage
 from .linkage import draw_linkage as draw_linkage
 from .response import plot_branches as plot_branches
 from .runs import plot_comparison as plot_comparison
+from .runs import plot_ensemble as plot_ensemble
 from .runs import plot_outputs as plot_outputs
 from .scheme import plot_schemes as plot_schemes
 from .slider import plot_drive as plot_drive

@@ -15,7 +15,7 @@ from linkwork.mechanism import Mechanism
 from linkwork.variables import UNITS, Variable
 
 from ..mechanisms import MECHANISMS, find_mechanism, wrapping_outputs
-from ..run import Trajectory
+from ..run import Ensemble, Trajectory
 from . import style
 from .dispatch import draw_mechanism, has_picture, plot
 
@@ -30,6 +30,8 @@ _BESIDE, _WIDTH, _HEIGHT = 5.3, 6.4, 1.55
 #: If a curve has more oscillations than this, a band is drawn instead; greatest number of its parts; note about it.
 _FAST, _BANDS = 120, 200
 BANDS = "Band: range of an oscillation that is too fast to be drawn; its line is the mean."
+#: The axis of many runs is cut off if their range is so many times that of 90 % of them.
+_FAR = 10.0
 #: Number of the picture of the mechanism among the numbers of panels.
 _DRAWN = -1
 
@@ -108,6 +110,57 @@ def plot_outputs(
         style.write_title(figure, title)
         if any(is_fast(values) for panel in panels for values in panel.curves.values()):
             notes.append(BANDS)
+        style.write_notes(figure, notes)
+        return style.finish(figure)
+
+
+@plot.register
+def plot_ensemble(runs: Ensemble, names: Sequence[str] | None = None, *, title: str = "") -> style.Figure:
+    """Plot many runs: the median of outputs over time, and the ranges in which 90 % of the runs and all runs are.
+
+    At each time these are of the runs that reach it; the foot says how many do not reach the end.
+
+    Parameters
+    ----------
+    runs : Ensemble
+    names : sequence of str, optional
+        Outputs to plot, one panel each; by default the first eight that were chosen, or the coordinates.
+    title : str
+    """
+    mechanism = find_mechanism(runs.parameters[0])
+    if names is None:
+        first, *others = mechanism.freedoms
+        names = [f.coordinate for f in others or (first,)] if runs.values is None else runs.names[:8]
+    known = {v.name: v for v in mechanism.variables}
+    missing = int(np.count_nonzero(runs.status))
+    notes = [f"{len(runs):,} runs" + (f"; ended early, and left out from there on: {missing:,}." if missing else ".")]
+    with style.figure_style():
+        figure = style.Figure(figsize=(_WIDTH, 1.0 + 1.6 * _HEIGHT * len(names)))
+        axes = np.ravel(figure.subplots(len(names), 1, sharex=True))
+        for axis, name in zip(axes, names):
+            values = np.ma.filled(runs.output(name), np.nan)
+            if name in wrapping_outputs():
+                for row, count, i in zip(values, runs.counts.tolist(), range(len(runs))):
+                    row[:count] = runs[i].unwrapped(name)
+            unit, factor = display_unit(known[name])
+            reached = ~np.isnan(values).all(axis=0)
+            least, low, median, high, greatest = factor * np.nanpercentile(
+                values[:, reached], (0.0, 5.0, 50.0, 95.0, 100.0), axis=0
+            )
+            time, shade = runs.time[reached], {"color": style.COLOURS[0], "linewidth": 0.0}
+            axis.fill_between(time, least, greatest, alpha=0.15, label="all runs", **shade)
+            axis.fill_between(time, low, high, alpha=0.3, label="90 % of the runs", **shade)
+            axis.plot(time, median, color=style.COLOURS[0], label="median")
+            bottom, top = low.min(initial=np.inf), high.max(initial=-np.inf)
+            ends = least.min(initial=np.inf), greatest.max(initial=-np.inf)
+            if 0.0 < _FAR * (top - bottom) < ends[1] - ends[0]:
+                axis.set_ylim(bottom - (top - bottom), top + (top - bottom))
+                notes.append(f"{name} is {ends[0]:.4g} to {ends[1]:.4g} {unit} in all runs, which is cut off.")
+            axis.set_ylabel(f"{style.name_in_words(name)}\n[{unit}]")
+        style.legend_above(axes[0])
+        axes[-1].set_xlabel("time [s]")
+        figure.align_ylabels(axes)
+        style.write_title(figure, title)
         style.write_notes(figure, notes)
         return style.finish(figure)
 

@@ -15,7 +15,7 @@ from matplotlib.path import Path as Path2D
 from matplotlib.text import Text
 from PIL import Image
 
-from analysis import Inputs, figures, simulate
+from analysis import Inputs, figures, simulate, simulate_many
 from analysis.figures import Curve, Panel, charts
 from analysis.figures.animation import gif
 from analysis.figures.curves import Arrow, Label
@@ -109,6 +109,24 @@ def test_a_run_in_which_nothing_changes_says_so(run) -> None:
     assert labels_of(figure) == []
     assert [text.get_text() for text in figure.axes[0].texts] == ["nothing changes in this run"]
     assert "pin force A" in figure.get_supxlabel()
+
+
+@pytest.mark.parametrize("outputs", [None, ["slider.position", "pin.A.fx"]])
+def test_many_runs_are_the_quantiles_of_those_that_last(outputs: list[str] | None) -> None:
+    forces = np.array([0.0, 1.0, 2.0, 3.0, -2e3])
+    runs = simulate_many("table-3.1", vary={"force": forces}, stop_time=0.1, outputs=outputs)
+    assert runs.status.tolist() == [0, 0, 0, 0, 3]
+    figure = figures.plot(runs, title="scattered")
+    assert labels_of(figure) == ["slider position [mm]", "pin A fx [N]"][: len(figure.axes)]
+    (median,) = figure.axes[0].lines
+    x = 1e3 * np.array(runs.output("slider.position")[:4])
+    late = np.asarray(median.get_xdata()) > 0.05
+    assert np.asarray(median.get_ydata())[late] == pytest.approx(np.median(x, axis=0)[runs.time > 0.05])
+    widest, _ = figure.axes[0].collections
+    last = np.asarray(widest.get_paths()[0].vertices)
+    last = last[last[:, 0] == 0.1, 1]
+    assert (last.min(), last.max()) == pytest.approx((x[:, -1].min(), x[:, -1].max()))
+    assert figure.get_supxlabel() == "5 runs; ended early, and left out from there on: 1."
 
 
 def test_a_run_that_ended_early_says_why(run) -> None:
