@@ -17,6 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from linkwork.errors import InputError, LinkworkError
 
+from ..display import format_count
 from ..files import unknown_name
 from ..numerics.workers import WorkersLost, record_interrupts, run_in_parallel
 from ..run import CosimulationError, show_progress
@@ -59,6 +60,12 @@ class SystemRuns:
     samples: NDArray[np.float64]
     lengths: NDArray[np.int64]
     messages: Mapping[int, str]
+
+    def __repr__(self) -> str:
+        missing = len(self) - len(self.messages.keys() | {*np.flatnonzero(self.lengths).tolist()})
+        early = f", {len(self.messages)} of them ended early, as messages says" if self.messages else ""
+        rest = f", {missing} of them not run" if missing else ""
+        return f"<SystemRuns: {format_count(len(self), 'run')} of {len(self.time)} samples{early}{rest}>"
 
     def __len__(self) -> int:
         return len(self.lengths)

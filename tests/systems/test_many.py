@@ -87,6 +87,7 @@ def test_failures_are_kept_beside_results(tmp_path: Path) -> None:
     assert found.lengths[0] == len(found.time)
     assert found.lengths[1] == 0
     assert 0 < found.lengths[2] < len(found.time)
+    assert repr(found) == f"<SystemRuns: 3 runs of {len(found.time)} samples, 2 of them ended early, as messages says>"
     assert "slider.mass" in found.messages[1]
     assert "refused the step" in found.messages[2]
     assert found.output("linkage.slider.position").mask.any(axis=1).tolist() == [False, True, True]
