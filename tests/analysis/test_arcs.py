@@ -126,7 +126,7 @@ def test_what_is_outside_of_the_branches_has_no_stable_motion() -> None:
 
 def test_a_maximum_that_is_no_resonance_is_not_denied(monkeypatch: pytest.MonkeyPatch) -> None:
     said: list[str] = []
-    monkeypatch.setattr("analysis.cli.vibration.say", said.append)
+    monkeypatch.setattr("analysis.cli.vibration.common.say", said.append)
     flat = response(branch(X, 1.0 - 4e-4 * ((X - 103.0) / 10.0) ** 2, 0.9))
     assert not flat.maxima()
     _print_ranges_to_avoid(replace(flat, sought=3), 1.0, "kg")
