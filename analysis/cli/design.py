@@ -216,6 +216,7 @@ def synthesize(
         TradeOffInterrupted,
         alternatives,
         assess,
+        crowded_plates,
         has_cognates,
         load_synthesis_case,
         solution_columns,
@@ -251,6 +252,11 @@ def synthesize(
     common.print_paths(written)
     if best.poor:
         common.print_error(f"note: {best.poor}")
+    if crowded := crowded_plates(result.best, chosen.make.hole):
+        common.print_error(
+            f"note: in the plates, holes of {1e3 * chosen.make.hole:g} mm overlap in {' and '.join(crowded)}: smaller make.pin "
+            "and make.width, or longer links"
+        )
     if not result.best.verdicts.sound:
         common.print_error(f"note: none of them is free of defects: the first has {result.best.verdicts}")
     leave_if_stopped(stopped, "the best so far is kept")

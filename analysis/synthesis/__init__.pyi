@@ -33,6 +33,7 @@ from .linkage.pivot import SliderMotion as SliderMotion
 from .linkage.pivot import SliderUnknown as SliderUnknown
 from .result.alike import format_variants as format_variants
 from .result.drawing import LinkageScene as LinkageScene
+from .result.drawing import crowded_plates as crowded_plates
 from .result.drawing import drawing as drawing
 from .result.drawing import plates as plates
 from .result.report import Assessment as Assessment

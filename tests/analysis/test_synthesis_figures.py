@@ -496,6 +496,14 @@ def test_a_rocker_is_drawn_and_listed_in_the_turn_of_its_targets(turns: int) -> 
     np.testing.assert_allclose(np.interp(at, *drawn), np.asarray(task.angle), atol=1e-4)
 
 
+def test_plates_too_short_for_their_holes_say_so() -> None:
+    short = timed(replace(LINKAGE, crank_length=0.007))
+    assert syn.crowded_plates(short, 0.008) == ("crank",)
+    assert syn.crowded_plates(short, 0.006) == ()
+    texts = [t.text for t in syn.plates(short, width=0.02, thickness=0.005, pin=0.008).texts]
+    assert [text.partition(":")[0] for text in texts if "overlap" in text] == ["crank"]
+
+
 def test_the_largest_link_is_what_the_constraint_bounds() -> None:
     """The coupler plate from B to P counts, where the task has points."""
     long = replace(LINKAGE, point_distance=2.0 * LINKAGE.largest_link)

@@ -317,6 +317,36 @@ def _number_box(dimension: Dimension) -> Any:
     )
 
 
+def _plate_holes(solution: Solution) -> dict[str, dict[str, complex]]:
+    """Return the places of the holes of each plate relative to its first one (m), by the plate's name and the pin's letter."""
+    linkage = solution.linkage
+    coupler = {"B": 0j, "C": complex(linkage.coupler_length)}
+    if target_points(solution.task) is not None and linkage.point_distance > 0.0 and not linkage.point_is_pin:
+        coupler["P"] = linkage.point_distance * np.exp(1j * linkage.point_angle)
+    made: dict[str, dict[str, complex]] = {
+        "crank": {"A": 0j, "B": complex(linkage.crank_length)},
+        "coupler": coupler,
+    }
+    if not isinstance(linkage, SliderCrank):
+        made["rocker"] = {"D": 0j, "C": complex(linkage.rocker_length)}
+    if linkage.slider(0.0) is None:
+        made = {
+            "ground": {"A": 0j, "E" if isinstance(linkage, FiveBar) else "D": complex(linkage.ground_length)}
+        } | made
+    if isinstance(linkage, FiveBar):
+        made["second crank"] = {"E": 0j, "D": complex(linkage.pivot.length)}
+    return made
+
+
+def crowded_plates(solution: Solution, pin: float) -> tuple[str, ...]:
+    """Return the names of the links whose holes, of the diameter ``pin`` (m), would overlap or touch in a plate."""
+    return tuple(
+        name
+        for name, holes in _plate_holes(solution).items()
+        if min(abs(a - b) for a, b in combinations(holes.values(), 2)) <= pin
+    )
+
+
 def plates(solution: Solution, *, width: float, thickness: float, pin: float, title: str = "") -> Drawing:
     """Draw the links as plates with round ends and holes for the pins, one below the other, with dimensions.
 
@@ -341,26 +371,12 @@ def plates(solution: Solution, *, width: float, thickness: float, pin: float, ti
             raise ParameterError(name, value, "be a finite number greater than zero (m)")
     if pin >= width:
         raise ParameterError("pin", pin, f"be below the width of the plates, {width:g} m")
-    linkage = solution.linkage
-    coupler = {"B": 0j, "C": complex(linkage.coupler_length)}
-    if target_points(solution.task) is not None and linkage.point_distance > 0.0 and not linkage.point_is_pin:
-        coupler["P"] = linkage.point_distance * np.exp(1j * linkage.point_angle)
-    made: dict[str, dict[str, complex]] = {
-        "crank": {"A": 0j, "B": complex(linkage.crank_length)},
-        "coupler": coupler,
-    }
-    if not isinstance(linkage, SliderCrank):
-        made["rocker"] = {"D": 0j, "C": complex(linkage.rocker_length)}
-    if linkage.slider(0.0) is None:
-        made = {
-            "ground": {"A": 0j, "E" if isinstance(linkage, FiveBar) else "D": complex(linkage.ground_length)}
-        } | made
-    if isinstance(linkage, FiveBar):
-        made["second crank"] = {"E": 0j, "D": complex(linkage.pivot.length)}
+    crowded = crowded_plates(solution, pin)
     height = 0.2 * width
     polylines, circles, dimensions, texts = [], [], [], []
     top = 0.0
-    for name, holes in made.items():
+    linkage = solution.linkage
+    for name, holes in _plate_holes(solution).items():
         places = np.array(list(holes.values()))
         places = places + 1j * (top - places.imag.max() - 0.5 * width)
         outline, bulges = rounded_hull(places, 0.5 * width)
@@ -376,6 +392,7 @@ def plates(solution: Solution, *, width: float, thickness: float, pin: float, ti
             for here, there, offset in _hole_dimensions(places, width)
         ]
         label = f"{name}: {1e3 * width:g} x {1e3 * thickness:g} mm, holes {1e3 * pin:g} mm"
+        label += ", which overlap" if name in crowded else ""
         if name == "second crank" and isinstance(linkage, FiveBar):
             label += f", geared {format_ratio(linkage.pivot.ratio)} : 1 to the first"
         right = float(places.real.max()) + 1.2 * width
