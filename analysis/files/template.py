@@ -148,7 +148,7 @@ def entries(
         Whether the given entries are active; otherwise they are comments as well.
     """
     about: dict[str, str] = {}
-    for base in reversed(kind.__mro__ if is_dataclass(kind) else ()):
+    for base in reversed(kind.__mro__ if isinstance(kind, type) else ()):
         about |= meanings(base) if is_dataclass(base) else {}
     known: dict[str, tuple[Reader, Any, str]] = {name: (read, None, "") for name, read in (readers or {}).items()}
     if is_dataclass(kind):

@@ -266,7 +266,7 @@ _MECHANISM_OPTIONS = (
 )
 speed_option = click.option("--speed", metavar="SPEED", help="Crank speed, such as '50 rpm'.")
 out_option = common.out_option(help="Folder for the results.")
-plot_option = click.option("--plot/--no-plot", default=True, help="Whether to write plots.")
+plot_option = common.plot_option
 
 
 def add_mechanism_options(command: Command) -> Command:

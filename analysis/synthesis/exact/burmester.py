@@ -368,8 +368,9 @@ def build_four_bar(task: Poses, crank: Dyad, rocker: Dyad) -> Solution:
     else:
         # the crank swings, and never points away from D, or else never to D: there its angle is cut
         away = linkage.cosine_at_c(np.array([abs(ground) + abs(arm[0])]))[0] < -1.0
-        crank = np.angle(arm * np.conj(ground)) if away else np.angle(arm * np.conj(ground)) % (2.0 * pi)
-        rotation = crank - crank[0]
+        th2 = np.angle(arm * np.conj(ground))
+        th2 = th2 if away else th2 % (2.0 * pi)
+        rotation = th2 - th2[0]
     return exact_solution(task, linkage, rotation, sides)
 
 
