@@ -266,7 +266,9 @@ def _plot_errors(axis: Axes, scene: syn.LinkageScene) -> None:
         error = MM_PER_METRE * columns["error [m]"]
         axis.plot(x, np.where(error > ROUNDING, error, 0.0), color=style.COLOURS[0], **few)
         axis.set_ylabel("error [mm]")
-        axis.set_ylim(0.0, max(axis.get_ylim()[1], 10.0 * ROUNDING))
+        # even if all errors are nearly the same
+        most = 1.05 * float(error[np.isfinite(error)].max(initial=0.0))
+        axis.set_ylim(0.0, max(axis.get_ylim()[1], most, 10.0 * ROUNDING))
     if "error of angle [rad]" in columns:
         beside = axis.twinx() if "error [m]" in columns else axis
         turned = np.degrees(columns["error of angle [rad]"])

@@ -496,6 +496,17 @@ def test_a_rocker_is_drawn_and_listed_in_the_turn_of_its_targets(turns: int) -> 
     np.testing.assert_allclose(np.interp(at, *drawn), np.asarray(task.angle), atol=1e-4)
 
 
+def test_free_rotations_start_near_zero_and_equal_errors_lie_within_the_picture() -> None:
+    """As those of a straight line that is given by its two ends."""
+    at = np.array([0.5, 1.2])
+    ends = LINKAGE.path(at) + np.array([[1e-3, 0.0], [-1.0001e-3, 0.0]])
+    task = syn.UntimedPath(path=syn.TargetPath(points=ends, closed=False))
+    solution = syn.Solution.from_linkage(task, LINKAGE, at + 4.0 * pi)
+    np.testing.assert_allclose(solution.rotation, at, atol=1e-14)
+    panel = axis_of(figures.plot(solution), "error")
+    assert panel.get_ylim()[1] > 1.04e3 * solution.evaluation.worst
+
+
 def test_plates_too_short_for_their_holes_say_so() -> None:
     short = timed(replace(LINKAGE, crank_length=0.007))
     assert syn.crowded_plates(short, 0.008) == ("crank",)

@@ -295,7 +295,9 @@ class Solution(NotebookResult):
 
     @classmethod
     def from_linkage(cls, task: Task, linkage: Linkage, rotation: FloatArray | None = None) -> Solution:
-        """Evaluate and judge a linkage; see `evaluate`."""
+        """Evaluate and judge a linkage; see `evaluate`. Free crank rotations start within half a turn of 0."""
+        if rotation is not None and linkage.pivot is None:
+            rotation = rotation - 2.0 * pi * np.rint(rotation[0] / (2.0 * pi))
         evaluation = evaluate(task, linkage, rotation)
         closed = isinstance(task, UntimedPath) and task.path.closed
         at = np.array([0.0, 2.0 * pi]) if evaluation.rotation is None else evaluation.rotation
