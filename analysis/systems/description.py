@@ -177,6 +177,9 @@ class System:
                 continue
             channels = [c for c in mechanism.channels if c.freedom == number and c.argument in freedom.mode.arguments]
             wired = [c for c in channels if End(name, c.name) in self.connections]
+            if len(wired) > 1:
+                both = " and ".join(c.name for c in wired)
+                raise WiringError(f"parts.{name}: {both} are both connected: {freedom.coordinate} is driven by one")
             if driven := wired or [c for c in channels if c.name in self.parts[name].values]:
                 found[freedom.mode.name] = float(freedom.mode.arguments.index(driven[0].argument))
         return found

@@ -58,6 +58,11 @@ def wired(name: str, **connections: str) -> System:
             "is of causality parameter, it must be an output",
         ),
         ({"linkage__crank__speed": "motor.rotor.speed"}, WiringError, "is of causality output, it must be an input"),
+        (
+            {"linkage__drive__speed": "motor.rotor.speed"},
+            WiringError,
+            "drive.torque and drive.speed are both connected: crank.angle is driven by one",
+        ),
         ({"linkage__drive__torq": "motor.shaft.exerted_torque"}, UnknownNameError, r"did you mean drive\.torque"),
         ({"linkage__drive__torque": "engine.shaft.exerted_torque"}, UnknownNameError, "motor"),
     ],
