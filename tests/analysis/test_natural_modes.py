@@ -151,8 +151,8 @@ def test_modes_are_followed_where_their_frequencies_cross_and_one_is_overdamped_
     """Beside the lever, whose frequency varies over the turn, a block on a spring of its own."""
     text = LEVER
     for table, more in (
-        ("slides.S", "block = { points = { P = [0, 0] }, mass = 2 }"),
-        ("springs", '[linkage.slides.Y]\nbody = "block"\nthrough = "E"\ndirection = "90 deg"'),
+        ("slides", "block = { points = { P = [0, 0] }, mass = 2 }"),
+        ("springs", 'Y = { body = "block", through = "E", direction = "90 deg" }'),
         ("freedoms", 'foot = { at = "Y", stiffness = 16020, damping = 4 }'),
     ):
         text = text.replace(f"[linkage.{table}]", f"{more}\n[linkage.{table}]")
