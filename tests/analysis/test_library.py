@@ -163,10 +163,7 @@ bodies.crank = { bar = ["A", "B"], length = "50 mm", mass = 0.1, inertia = 3e-5 
 bodies.lever = { points = { E = [0, 0], K = ["10 mm", "5 mm"] }, mass = 0.5, cog = ["80 mm", 0], inertia = 2e-3 }
 slots.S = { pin = "B", on = "lever", through = "K", direction = "4 deg" }
 springs.tab = { at = "S", stiffness = "500 N/m", free = "150 mm", damping = "5 N*s/m" }
-springs.return.at = "E"
-springs.return.free = "-70 deg"
-springs.return.law = "c*x + s*x**3"
-springs.return.constants = { c = "0.5 N*m/rad", s = "0.1 N*m/rad" }
+springs.return = { at = "E", free = "-70 deg", law = "c*x + s*x**3", constants = { c = "0.5 N*m/rad", s = "0.1 N*m/rad" } }
 springs.stop = { at = "E", free = "-1.4 rad", law = "200*(x + fabs(x))" }
 friction = { S = 0.15 }
 freedoms.crank = { joint = "A", speed = "120 rpm" }
