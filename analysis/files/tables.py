@@ -10,6 +10,7 @@ import sys
 import warnings
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
+from math import isfinite, nan
 from pathlib import Path
 from typing import TextIO
 
@@ -127,7 +128,7 @@ def read_record(
     Raises
     ------
     InputError
-        If the file cannot be read, or a cell is not a number; the message gives the line.
+        If the file cannot be read, or a cell is not a finite number; the message gives the line.
     UnknownNameError
         If the file has no column of a given name.
     """
@@ -172,12 +173,11 @@ def read_record(
     for column, place in zip(columns, places):
         for i, (number, cells) in enumerate(rows):
             own = cells[place].partition("#")[0] if place < len(cells) else ""
-            try:
-                column[i] = float(as_number(own))
-            except ValueError:
+            column[i] = float(as_number(own)) if is_number(as_number(own)) else nan
+            if not isfinite(column[i]):
                 raise InputError(
-                    f"{path}, line {number}, column {place + 1}: {own.strip()[:40]!r} is not a number"
-                ) from None
+                    f"{path}, line {number}, column {place + 1}: {own.strip()[:40]!r} is not a finite number"
+                )
     return [heading_unit(header[place]) if header else "" for place in places], list(columns)
 
 

@@ -263,9 +263,9 @@ class TestCommand:
         [
             ("", "has no numbers"),
             ("t,u\n", "has no numbers"),
-            ("t,u\n0,1\n0.1,high\n", "line 3, column 2: 'high' is not a number"),
-            ("t,u\n0,1\n0.1\n", "line 3, column 2: '' is not a number"),
-            ("t\n0\n1\n", "line 2, column 2: '' is not a number"),
+            ("t,u\n0,1\n0.1,high\n", "line 3, column 2: 'high' is not a finite number"),
+            ("t,u\n0,1\n0.1\n", "line 3, column 2: '' is not a finite number"),
+            ("t\n0\n1\n", "line 2, column 2: '' is not a finite number"),
         ],
     )
     def test_files_that_are_no_record(self, content: str, words: str) -> None:

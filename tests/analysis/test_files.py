@@ -395,9 +395,10 @@ def test_columns_need_no_header_line_and_may_have_comments(tmp_path, head):
 
 
 def test_a_cell_of_any_length_is_a_sentence(tmp_path):
-    (tmp_path / "x.csv").write_text(f"t\n{'1' * 200_000}\n")
-    with pytest.raises(InputError, match=r"x\.csv cannot be read: field larger than field limit"):
-        read_record(tmp_path / "x.csv", ("t",))
+    for quote, said in (("", r"line 2, column 1: '1{40}' is not a finite number"), ('"', "cannot be read: field larger")):
+        (tmp_path / "x.csv").write_text(f"t\n{quote}{'1' * 200_000}{quote}\n")
+        with pytest.raises(InputError, match=rf"x\.csv,? {said}"):
+            read_record(tmp_path / "x.csv", ("t",))
 
 
 def test_an_unknown_name_of_any_length_is_cut_in_the_message() -> None:
