@@ -395,7 +395,10 @@ def test_columns_need_no_header_line_and_may_have_comments(tmp_path, head):
 
 
 def test_a_cell_of_any_length_is_a_sentence(tmp_path):
-    for quote, said in (("", r"line 2, column 1: '1{40}' is not a finite number"), ('"', "cannot be read: field larger")):
+    for quote, said in (
+        ("", r"line 2, column 1: '1{40}' is not a finite number"),
+        ('"', "cannot be read: field larger"),
+    ):
         (tmp_path / "x.csv").write_text(f"t\n{quote}{'1' * 200_000}{quote}\n")
         with pytest.raises(InputError, match=rf"x\.csv,? {said}"):
             read_record(tmp_path / "x.csv", ("t",))
