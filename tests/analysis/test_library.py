@@ -149,8 +149,6 @@ racks.teeth = { gear = "gear", rack = "lever", radius = "30 mm", offset = "120 m
 springs.buffer = { at = "way", law = [["-100 mm", "-200 N"], [0.0, 0.0], ["10 cm", "0.1 kN"], [0.2, 400.0]], damping = 20.0 }
 friction = { guide = 0.08, B = "0.5 mm" }
 freedoms.crank = { joint = "A", speed = "240 rpm" }
-[run]
-revolutions = 1.0
 """
 
 #: A spring and friction in a slot; constants of a law that are called like a cosine and a sine.
@@ -167,8 +165,6 @@ springs.return = { at = "E", free = "-70 deg", law = "c*x + s*x**3", constants =
 springs.stop = { at = "E", free = "-1.4 rad", law = "200*(x + fabs(x))" }
 friction = { S = 0.15 }
 freedoms.crank = { joint = "A", speed = "120 rpm" }
-[run]
-revolutions = 1.0
 """
 
 #: A pendulum on a gear that is called like a tooth force; three bodies on a pin, beside a slide that is called like the second.
@@ -189,15 +185,13 @@ slides.C2 = { body = "ram", through = "G" }
 springs.tie = { at = "Q", stiffness = "0.5 N*m/rad", damping = 1e-3 }
 freedoms.crank = { joint = "A", speed = "90 rpm" }
 freedoms.pendulum = { joint = "Q", start = "-60 deg" }
-[run]
-revolutions = 1.0
 """
 
 
 @pytest.mark.parametrize("text", [LEVER_RACK, SLOTTED_LEVER, GEARED_PENDULUM], ids=lambda text: text.split('"')[1])
 def test_a_linkage_beside_the_library_moves_as_with_multipliers(text, tmp_path):
     path = tmp_path / "own.toml"
-    path.write_text(text, encoding="utf-8")
+    path.write_text(f"{text}[run]\nrevolutions = 1.0\n", encoding="utf-8")
     test_a_linkage_of_the_library_moves_as_with_multipliers(path)
 
 

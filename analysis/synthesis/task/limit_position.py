@@ -301,15 +301,7 @@ class MechanicalAdvantage(Demand):
 @in_si(at="rad")
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _LimitPosition(Demand):
-    """Base class of the constraints that a dead centre or a toggle is at a crank rotation, or within a range of rotations.
-
-    Attributes
-    ----------
-    at : float or (float, float)
-        Crank rotation, or range of crank rotations, counted as in the task (rad).
-    position : "stretched" or "folded"
-        Whether one link extends the other, or lies over it.
-    """
+    """Base class of `DeadCentre` and `Toggle`, which describe its attributes."""
 
     _name: ClassVar[str]
 
@@ -374,6 +366,8 @@ class Toggle(_LimitPosition):
     ----------
     position : "stretched" or "folded"
         The coupler extends the rocker, or lies over it.
+    at : float or (float, float)
+        Crank rotation, or range of crank rotations, as of a dead centre (rad).
     """
 
     __slots__ = ()
