@@ -252,7 +252,7 @@ def _synthesis_case(kind: str, file: str) -> Iterator[str]:
 @click.option("--force", is_flag=True, help="Overwrite a file of the same name.")
 @report_errors
 def new(kind: str | None, file: str | None, parameters: bool, force: bool) -> None:
-    """Write a case file to start from, with every entry explained. It runs without changes. Without KIND list the kinds.
+    """Write a case file to start from, with every entry explained. It runs without changes. Without KIND, list the kinds.
 
     KIND is a mechanism (for a run), a synthesis task, "slider-motion", "tuning", or "linkage" (for a linkage of your own).
 

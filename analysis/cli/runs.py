@@ -175,9 +175,9 @@ def _print_extremes(title: str, result: Any) -> None:
 
 
 def _places(result: Any) -> tuple[str, Callable[[Any], str]]:
-    """Return what tells the samples of a run apart, with its unit, and a function that returns it of a sample, as text.
+    """Return a column heading for the places of samples in a run, and a function that gives a sample's place as text.
 
-    It is the crank angle, within a turn, of a mechanism with one crank that moves; else the time.
+    The place is the crank angle within its turn if the mechanism has exactly one crank and it moves; otherwise the time.
     """
     from ..mechanisms import find_mechanism
 
@@ -399,7 +399,7 @@ def _print_comparison(title: str, comparison: Any) -> None:
 def info(what: str | None) -> None:
     """Describe WHAT: a mechanism, a published set, a parameter file, a case file or an FMU.
 
-    Without WHAT list all mechanisms and published sets.
+    Without WHAT, list all mechanisms and published sets.
 
     \b
     Examples:
@@ -522,8 +522,8 @@ def _print_fmu(path: Path) -> None:
 def figures(numbers: Sequence[str], out: str, settings: Sequence[str], listing: bool) -> None:
     """Make the figures of the theses: plots, CSV, and each statement of the thesis with a verdict. Also draw the linkage.
 
-    NUMBERS of figures are such as 3.2 (Youssef) or R5 (Rahman's figure 5); all figures by default. The linkage is drawn as a
-    picture and an animation.
+    NUMBERS are the figures to make, such as 3.2 (Youssef's) or R5 (Rahman's figure 5); by default all are made. The linkage is
+    drawn as a picture and an animation.
 
     \b
     Examples:

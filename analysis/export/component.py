@@ -307,7 +307,10 @@ def _outer_lines() -> list[str]:
 
 
 def _resource(interface: str) -> list[str]:
-    """Return the lines of an instance's type, and of the core module that returns a handle for an instance of the FMU."""
+    """Return WebAssembly text that defines the type of an instance, and a core module that makes instances.
+
+    The function of this module instantiates the FMU and replaces the instance's address in the result by a handle.
+    """
     resource, making = f"${interface}-instance", f"instantiate-{interface}"
     # the core function receives texts and lists as address and count, and returns the address of its result
     count = sum(1 if part.endswith(":bool") else 2 for part in _split(_INTERFACES[interface][1]))

@@ -34,7 +34,10 @@ def coordinate(value: Any, name: str) -> float:
 
 
 def is_given(value: Any) -> bool:
-    """Return whether an entry of a spring is given: the whole number 0 means that it is not."""
+    """Return whether an entry of a spring or freedom is given.
+
+    The default, the whole number 0, means that it is not given; 0.0 and "0 N/m" are given values.
+    """
     return value != 0 or not isinstance(value, int)
 
 

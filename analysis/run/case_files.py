@@ -375,7 +375,10 @@ def _reader(unit: str, folder: Path) -> Reader:
 
 
 def signal_kinds(unit: str, folder: Path) -> dict[str, Table]:
-    """Return the readers of signals in a unit, by kind: ramp, table, harmonics, and for torques torsion bar and motor."""
+    """Return a reader for each kind of signal: ramp, table and harmonics; a torque can also be a torsion bar or a motor.
+
+    The values of a signal have the unit ``unit``; the file of a table is read from ``folder``.
+    """
     value, values = Quantity(unit), Many(Quantity(unit))
     kinds: dict[str, Table] = {
         "ramp": Table(ramp, {"start": value, "end": value, "from_time": Quantity("s"), "to_time": Quantity("s")}),

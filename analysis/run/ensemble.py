@@ -407,7 +407,10 @@ def _hash_code(mechanism: Mechanism, parameters: Sequence[Parameters], functions
 
 
 def _check_device(device: str | None, n_jobs: int | None, functions: bool) -> str | None:
-    """Check the options of an ensemble on a device, and whether its inputs have Python functions; return the device."""
+    """Check that an ensemble can run on the given device; return the device, or None if none is given.
+
+    ``functions`` tells whether inputs are Python functions, which a device cannot evaluate.
+    """
     if device is None:
         return None
     if device != "cuda":

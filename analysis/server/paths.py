@@ -35,7 +35,10 @@ _TASK, _EVERY = "linkages.toml", 4
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Drawn:
-    """Options of both jobs: points of the drawn path (m), whether it is closed, and the number of starts of the search."""
+    """Options that the jobs `linkages` and `moved` share.
+
+    They are the points of the drawn path (m), whether it is closed, and the number of starts of the search.
+    """
 
     points: tuple[tuple[float, float], ...] = entry(Many(_POINT, least=3))
     closed: bool = entry(flag, True)
@@ -59,7 +62,10 @@ class Linkages(_Drawn):
         return [*found, syn.LargestLink(length=self.longest)] if isfinite(self.longest) else found
 
     def tables(self, title: str, **search: Any) -> dict[str, Any]:
-        """Return the search as tables of a case file for `linkwork synthesize`; ``search`` are further entries of [search]."""
+        """Return the tables of a case file with which `linkwork synthesize` repeats the search.
+
+        ``search`` are further entries of its table [search].
+        """
         angle: dict[str, Any] = {"least_transmission_angle": self.least_transmission or False}
         turn = {} if self.least_transmission else {"full_turn": True}
         longest = {"largest_link": self.longest} if isfinite(self.longest) else {}

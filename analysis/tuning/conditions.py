@@ -118,7 +118,10 @@ def sample_turn(orbit: PeriodicOrbit) -> Turn:
 
 
 def expansion(wish: Wish, spot: Spot) -> Expansion:
-    """Compute the derivatives at a spot by the variational equations to second order; the motion need not be periodic."""
+    """Compute the `Expansion` of the motion at a spot from the first and second variational equations.
+
+    The motion need not be periodic.
+    """
     along = motion_gradient(motion(wish, spot), (wish.over, *wish.names))
     v, n = along.variations, len(spot.y)
     unit = np.append(1.0, wish.tolerance)
@@ -421,10 +424,10 @@ class Condition(Protocol):
         """Name of the requirement to which the condition belongs."""
 
     def value(self, x: FloatArray) -> float:
-        """Return the value of the function at changes x; raise LostError if the motion is not found."""
+        """Return the value of the condition for changes x of the parameters; raise LostError if the motion is not found."""
 
     def slopes(self, x: FloatArray) -> FloatArray:
-        """Return the derivatives of the function with respect to the changes, shape (k,)."""
+        """Return the derivatives of the value with respect to the k changes of parameters, shape (k,)."""
 
 
 class MultipliersInside:

@@ -70,7 +70,7 @@ _OF_A_RUN = ("energy.dissipated", "energy.supplied", "energy.residual")
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Turn:
-    """One period of an orbit, sampled at equal steps of the crank angle without its end.
+    """One period of an orbit, sampled at equal steps of the crank angle; the end of the period is not a sample.
 
     Attributes
     ----------
@@ -81,7 +81,7 @@ class Turn:
     period : float
         Period (s).
     states, inputs : ndarray, shapes (n, states) and (n, channels)
-        States of a run, with zero work, and values of the channels.
+        States as in a run, and values of the input channels. The dissipated and the supplied work in the states are zero.
     values : ndarray, shape (n, outputs)
         Outputs by `names`: those of the FMI interface except the energies that count from the start of a run.
     turns : int
@@ -90,7 +90,7 @@ class Turn:
         Values of the mechanism's modes.
     names : tuple of str
     swings : tuple of str
-        Outputs of which there are `amplitudes`: the free coordinates, such as ``slider.position``, or the crank's speed if
+        Outputs that have `amplitudes`: the free coordinates, such as ``slider.position``, or the crank's speed if
         nothing else is free.
     roundings : tuple of float
         Amplitudes of ``swings`` up to these sizes count as rounding errors.

@@ -370,9 +370,10 @@ def extrema(branch: Branch, sign: int = 1) -> tuple[Extremum, ...]:
 def _locate_extremum(
     branch: Branch, point: int, a: float, c: float, sign: int, coordinate: int
 ) -> tuple[float, PeriodicOrbit]:
-    """Return the parameter of the extremum between a and c of a coordinate's amplitude, and the motion there.
+    """Find an extremum of a coordinate's amplitude; return the value of the parameter, and the motion there.
 
-    ``point`` is the index of the motion on the branch from which the search starts; ``sign`` is +1 for a maximum.
+    The search starts from the motion with the index ``point`` on the branch, and stays between the values a and c of the
+    parameter. ``sign`` is +1 for a maximum, -1 for a minimum.
     """
     family, orbit, begin = branch.family, branch.orbits[point], float(branch.parameter[point])
     if isinstance(family.vary, str):

@@ -2,7 +2,8 @@
 
 The equations are kept exactly, with their errors, to be compared with correct values. Where a second rate has one dot in our
 scan, it is read as two dots, since each term of a second rate has one second rate or two first rates. A switch ``erratum_N``
-mends the erratum N of docs/rahman.md. The suffix ``_t`` of an angle's name denotes its rate, ``_tt`` its second rate.
+mends the erratum N of docs/rahman.md. The suffix ``_t`` of an angle's name denotes its rate, ``_tt`` its second rate. nFni is
+the force in joint n along axis i of frame n, and nTni the moment; 1F1 and 1T1 act from the ground on the crank.
 """
 
 from __future__ import annotations
@@ -513,12 +514,15 @@ def joint_forces(
 
 
 def on_crank(angle: FloatArray, f: dict[str, FloatArray]) -> tuple[FloatArray, FloatArray]:
-    """Return 1F1i and 1F1j (lb) by eqs 69i and 69j; ``f`` has the forces that these equations need."""
+    """Return the forces 1F1i and 1F1j (lb) by eqs 69i and 69j; ``f`` has the forces that these equations need."""
     s, c = np.sin(angle), np.cos(angle)
     return f["along crank"] * c - f["across crank"] * s, f["along crank"] * s + f["across crank"] * c
 
 
 def on_bearing(angle: FloatArray, shift_in: float, f: dict[str, FloatArray]) -> tuple[FloatArray, FloatArray]:
-    """Return 1T1i and 1T1j (lb.in) by eqs 69q and 69p; 1F1k is 0, since the shift is constant."""
+    """Return the moments 1T1i and 1T1j (lb.in) by eqs 69q and 69p.
+
+    The equations take the axial force 1F1k as 0, as the thesis has it for a constant shift.
+    """
     (i, j), s, c = on_crank(angle, f), np.sin(angle), np.cos(angle)
     return -j * shift_in - f["f1xd"] * c + f["f1yd"] * s, i * shift_in - f["f1xd"] * s - f["f1yd"] * c

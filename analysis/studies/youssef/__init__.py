@@ -1,4 +1,8 @@
-"""List of the figures of Youssef's thesis and of the modules that compute them."""
+"""List of the figures of Youssef's thesis and of the modules that compute them.
+
+In these modules th2, th3 and th4 are the angles of crank, coupler and rocker, and u is the slider position; a prime denotes
+a derivative. L and a number denote a line of the scanned text.
+"""
 
 from __future__ import annotations
 

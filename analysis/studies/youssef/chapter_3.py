@@ -170,7 +170,7 @@ class Drift:
 
 @cache
 def drift(damping: float, gravity: float = 9.81) -> Drift:
-    """Run Table 3.1 at 420 rpm without a spring for `DRIFT_TURNS` turns, or until the links cannot be joined.
+    """Simulate the mechanism of Table 3.1 at 420 rpm without a spring, up to `DRIFT_TURNS` turns or the limit of assembly.
 
     The links count as collinear where the sine of the transmission angle falls below `COLLINEAR_SINE`.
     """

@@ -89,7 +89,10 @@ def removing_most(motion: str) -> float:
 
 
 def multiplier(inertia_ratio: float, omega_c: float, speed: float) -> float:
-    """Return the greatest size of a Floquet multiplier of the right linear equation with a damper (1/s) at a speed (rad/s)."""
+    """Return the greatest modulus of the Floquet multipliers of the correct linear equation.
+
+    ``omega_c`` is the damper (1/s), ``speed`` the crank speed (rad/s).
+    """
     found = slider_equation(chapter_4(inertia_ratio, omega_c), speed)
     return float(np.abs(hill_multipliers(found.homogeneous().stiffened(found.spring))).max())
 

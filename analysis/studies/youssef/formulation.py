@@ -1,6 +1,9 @@
 """Chapter II and section 3.1: the equations with Lagrange's multipliers, eqs (3.1) to (3.10), and their integration.
 
 The equations are exactly those of the thesis; their results are compared with those of the plant, which has no multipliers.
+By the first approach of section 3.1 all coordinates are integrated, and the loop does not stay closed exactly. By the second
+only the independent coordinates are integrated: the slider position u, and in a launch the crank angle th2. The others follow
+from the closure of the loop. A launch, section 3.2.2, is a motion from rest under a torque that falls to zero at th2 = 1 rad.
 """
 
 from __future__ import annotations
@@ -148,7 +151,10 @@ def launch_reduced(t: float, y: NDArray[np.float64]) -> NDArray[np.float64]:
 
 @cache
 def launched(step: float) -> tuple[float, tuple[float, float]]:
-    """Return the greatest failure of closure (cm) by the first approach in a launch, and the errors of u as in `Integrated`."""
+    """Integrate a launch by both approaches; return the greatest closure error (cm) by the first, and the errors of u (cm).
+
+    The errors are the greatest errors by the first and by the second approach, as in `Integrated`.
+    """
     options = {"method": Hamming, "first_step": step, "max_step": step, "rtol": 1e3, "atol": 1e9}
     first, second = (
         solve_ivp(f, (0.0, STOP), start, **options)
@@ -171,7 +177,7 @@ def exact_launch() -> Callable[[NDArray[np.float64]], NDArray[np.float64]]:
 
 
 def shown_by_closure() -> tuple[Case, ...]:
-    """Judge whether the failure of closure by the first approach shows the error of u, at constant speed and in a launch."""
+    """Judge whether the closure error by the first approach shows the error of u, at constant speed and in a launch."""
     runs = {step: integrated(step) for step in STEPS}
     shown = {_step(step): run.gap.max() / run.errors[0] for step, run in runs.items()}
     for step in STEPS:
@@ -190,7 +196,7 @@ def exact(start: float = 0.0) -> Callable[[NDArray[np.float64]], NDArray[np.floa
 
 
 def change_on_halving(step: float) -> float:
-    """Return the greatest change of u (cm), by the second approach, if the step is halved."""
+    """Return the greatest change of u (cm) if the step of the second approach is halved."""
     (times, u), (finer, other) = (integrated(h).slider for h in (step, 0.5 * step))
     return float(np.abs(u - np.interp(times, finer, other)).max())
 
@@ -273,16 +279,16 @@ def integration_error(u: NDArray[np.float64]) -> float:
 def of_runge_kutta(step: float) -> float:
     """Return the greatest error of u by Runge-Kutta's method relative to its estimate by halving the step.
 
-    The estimate is the greatest change of u divided by 1 - 1/16; the second approach is used.
+    The estimate is the greatest change of u divided by 1 - 1/16. The motion is integrated by the second approach.
     """
     u, halved = by_runge_kutta(step)[:, 0], by_runge_kutta(0.5 * step)[::2, 0]
     return integration_error(u) / (CM_PER_METRE * float(np.abs(u - halved).max()) / (1.0 - 2.0**-4))
 
 
 def with_slip(step: float) -> float:
-    """Return the greatest closure error divided by the greatest error of u, by Runge-Kutta's method with the stages `SLIP`.
+    """Return the greatest closure error divided by the greatest error of u if Runge-Kutta's method has the wrong stages `SLIP`.
 
-    The first approach is used.
+    The motion is integrated by the first approach.
     """
     states = by_runge_kutta(step, True, SLIP)
     crank = OMEGA * np.linspace(0.0, STOP, len(states))

@@ -1,4 +1,7 @@
-"""Figures 3.6 to 3.14: the crank accelerated from rest by a torque, and the crank in free motion."""
+"""Figures 3.6 to 3.14: the crank accelerated from rest by a torque, and the crank in free motion.
+
+A launch is a motion from rest under a torque that falls to zero at the crank angle th2 = 1 rad. u is the slider position.
+"""
 
 from __future__ import annotations
 
@@ -66,7 +69,7 @@ UNSAID = (
 def launch(
     torque: float, stiffness: float = 1e6, stop_time: float = 1.0, samples: int = 2000, damping: float = 3e4
 ) -> Trajectory:
-    """Run Table 3.1 from rest under the torque T = T0 (1 - th2) up to th2 = 1 rad, then without torque.
+    """Simulate the mechanism of Table 3.1 from rest: the crank torque is T = T0 (1 - th2) up to th2 = 1 rad, then zero.
 
     ``torque`` is T0. Torque, stiffness and damping are in CGS units; an event marks the end of the torque.
     """
@@ -101,7 +104,7 @@ def least_torque() -> float:
 
 @cache
 def coast(stiffness: float, damping: float = 3e4, rpm: float = SPEED) -> Trajectory:
-    """Run Table 3.1 without torque, released at crank angle 0 from its steady motion at a speed (rpm).
+    """Simulate the mechanism of Table 3.1 without torque, released at crank angle 0 from its steady motion at a speed (rpm).
 
     The steady motion has the thesis's damper, the free motion has ``damping`` (dyn.s/cm).
     """
@@ -167,7 +170,7 @@ class Turns:
 
 
 class Settling(NamedTuple):
-    """Transition of u after a launch to the steady decay of a free crank.
+    """Transition of the slider position u after a launch to the steady decay of a free crank.
 
     ``turns`` and ``time`` (s) pass from the end of the torque until u stays within `ALIKE` of the steady decay. ``first`` and
     ``last`` are the greatest distances of u from the steady decay in the first and in the last whole turn, relative to the
@@ -184,9 +187,9 @@ class Settling(NamedTuple):
 
 @cache
 def settling(torque: float, stiffness: float) -> Settling:
-    """Compare u after a launch with u of a free crank in steady decay.
+    """Compare the slider position u after a launch with u of a free crank in steady decay.
 
-    The two motions are compared at equal crank angles, in turns of equal mean speed.
+    They are compared at equal crank angles, in turns of equal mean speed.
     """
     launched, steady = launch(torque, stiffness), coast(stiffness, rpm=RELEASED[stiffness])
     (after, turns), (known, waves) = (

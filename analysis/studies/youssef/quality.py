@@ -1,10 +1,11 @@
 """Methods of sections 6.2 and 6.3 that have no figure: the combined quality function and the constraint of assembly.
 
-The quality functions of a timed path and of the area between the curves may be added. For ellipse (a) the thesis's downhill
-simplex minimises the sum; no link may be longer than the longest link of the two printed linkages. It is started three times:
-from our optimum for the area, and from our optima for the timed path, under this limit and under the longest link of the
-printed linkage for the timed path. A linkage found for the area alone gets its best crank phase; the thesis optimises th20 in
-this case too, although the area does not depend on it (L4700).
+The quality functions of a timed path and of the area between the curves may be added. Here the thesis's downhill simplex
+minimises their sum for ellipse (a). No link may be longer than the longest link of the two linkages that the thesis prints for
+this ellipse, one for the area and one for the timed path. The simplex is started from three linkages of ours: the best for the
+area; the best for the timed path; and the best for the timed path if no link is longer than the longest link of the linkage
+printed for it. The area does not depend on the crank phase th20. A linkage found for the area alone therefore gets the phase
+that is best for the timed path; the thesis optimises th20 in this case too (L4700, a line of the scanned text).
 """
 
 from __future__ import annotations

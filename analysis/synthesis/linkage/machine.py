@@ -125,7 +125,10 @@ class MachineSpec:
 
     @property
     def block_mass(self) -> float:
-        """Return the mass of the slider (kg): as given, or that of a block of four widths by two widths by four thicknesses."""
+        """Return the mass of the slider (kg): as given, or else that of a block of the bars' material.
+
+        The block is four bar widths long, two bar widths wide and four bar thicknesses high.
+        """
         return 32.0 * self.density * self.width**2 * self.thickness if self.slider_mass is None else self.slider_mass
 
     def slider_crank(self, linkage: Linkage) -> SliderCrankParameters:

@@ -323,12 +323,15 @@ class _Descent:
         return y
 
     def unknowns(self, y: FloatArray) -> FloatArray:
-        """Return the program's unknowns at steps y, clipped to their bounds."""
+        """Return the program's unknowns after steps y along the scaled directions, clipped to their bounds."""
         z = self._z0 + self._stretch @ y[: self._stretch.shape[1]]
         return np.clip(z, self._program.low, self._program.high)
 
     def value(self, y: FloatArray) -> tuple[float, FloatArray]:
-        """Return the minimised function at steps y, and its gradient; a large value if the links cannot be joined."""
+        """Return the function that SLSQP minimises and its gradient, after steps y along the scaled directions.
+
+        If the links cannot be joined, the value is large and the gradient zero.
+        """
         if self._bound_unknown:
             return float(y[-1]), np.append(np.zeros(len(y) - 1), 1.0)
         z = self.unknowns(y)
@@ -343,7 +346,7 @@ class _Descent:
         return (area + added) / self._size, whole @ self._stretch / self._size
 
     def _bounded_distances(self, z: FloatArray) -> list[tuple[Distances, Any]]:
-        """Return the two sets of distances of `Refinement.both_distances`, each with the indices of its bounded distances."""
+        """Return both sets of distances between curve and target, each with the indices of the distances that are bounded."""
         return list(zip(self._refinement.both_distances(self.curve(z)[0]), self._chosen))
 
     def constraints(self) -> list[dict[str, Any]]:

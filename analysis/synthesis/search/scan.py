@@ -202,7 +202,10 @@ def _allowed_shapes(limits: Limits, seed: int, count: int) -> Iterator[FloatArra
 
 
 def _merge_chunks(chunks: Iterator[FloatArray]) -> Iterator[FloatArray]:
-    """Merge chunks of shapes until each has at least `CHUNK` rows: only the best curves of a chunk are placed."""
+    """Merge chunks of shapes until each has at least `CHUNK` rows.
+
+    The best `PLACED` curves of each chunk are placed over the target; if chunks were small, poor curves would be placed, too.
+    """
     rows: list[FloatArray] = []
     for chunk in chunks:
         rows.append(chunk)

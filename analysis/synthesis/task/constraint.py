@@ -267,7 +267,7 @@ class Demand:
         raise NotImplementedError
 
     def least_function(self, way: RotationRange, normal: Normal) -> MinimisedFunction | None:
-        """Return the function that is minimised instead of an error; None if there is none."""
+        """Return the function that the search minimises in place of the error; None if it minimises the error."""
         return None
 
 
@@ -483,7 +483,7 @@ class LeastPinForce(_Forces):
         return ()
 
     def least_function(self, way: RotationRange, normal: Normal) -> MinimisedFunction:
-        """Return the function that is minimised instead of an error, with the bound of the greatest error."""
+        """Return the objective: minimise the greatest pin force while the greatest error is within its bound."""
         error = quantity(self.error, "rad" if normal.of_rocker else "m", "greatest error")
         if not (isfinite(error) and error > 0.0):
             raise ParameterError("greatest error", self.error, "be a finite number greater than zero")
