@@ -341,7 +341,7 @@ def _log(x: Vector) -> Vector:
 
 
 def power(x: Vector, y: Vector) -> Vector:
-    """Return x to the power of y without the C library; the error in units in the last place is 2 more than 3 abs(y log(x))."""
+    """Return x to the power of y without the C library; the error is at most 2 + 3 abs(y log(x)) units in the last place."""
     build, one = x.build, x._make(x.as_vector(1.0))
     shifted = y + _ROUNDER
     odd = build.icmp_unsigned("!=", build.and_(shifted.bits(), x.longs(1)), x.longs(0))

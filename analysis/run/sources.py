@@ -19,7 +19,10 @@ SOURCE = types.NamedTuple((VECTOR, CUBE, MATRIX, PLACES, MATRIX, PLACES, PLACES)
 
 @inner
 def find(t, breaks):
-    """Return the index of the polynomial piece that holds from t on; the outer pieces extend beyond the outer breaks."""
+    """Return the index of the polynomial piece that contains t, or begins at t.
+
+    The first and the last piece extend beyond the outer breaks.
+    """
     piece, above = 0, breaks.shape[0] - 1
     while above - piece > 1:
         middle = (piece + above) // 2
@@ -32,7 +35,7 @@ def find(t, breaks):
 
 @inner
 def _find_piece(t, breaks):
-    """Return the index of the polynomial piece that holds up to t."""
+    """Return the index of the polynomial piece that contains t, or ends at t."""
     piece = find(t, breaks)
     return piece - 1 if piece > 0 and t == breaks[piece] else piece
 
