@@ -116,7 +116,7 @@ def read_record(
     path : str or Path
     names : sequence of str or None, optional
         Name of each wanted column in the header line, with or without its unit in brackets; by default all columns. None stands
-        for the column of the file at the same position. In a file without a header line all columns are taken by position.
+        for the column of the file at the same position. A file without headings has no names.
 
     Returns
     -------
@@ -128,67 +128,94 @@ def read_record(
     Raises
     ------
     InputError
-        If the file cannot be read, or a cell is not a finite number; the message gives the line.
+        If the file cannot be read, has no headings where a name is given, or a cell is not a finite number, or a number beyond
+        the last column; the message gives the line.
     UnknownNameError
         If the file has no column of a given name.
     """
     path = Path(path)
     text = read_text(path).splitlines()
     lines = [(i, line) for i, line in enumerate(text, 1) if line.partition("#")[0].strip()]
-    unquoted = re.sub('"[^"]*"', "", lines[0][1]) if lines else ""
-    separator = next((mark for mark in ";\t" if mark in unquoted), ",")
+    # a comment above the numbers, as NumPy writes headings
+    comment = text[lines[0][0] - 2].lstrip("# ") if lines and lines[0][0] > 1 else ""
+    separator = _find_separator(lines[0][1]) if lines else ","
     try:
-        rows = [
-            (number, next(csv.reader([line], delimiter=separator)) if '"' in line else line.split(separator))
-            for number, line in lines
-        ]
+        rows = [(number, cells) for number, line in lines if (cells := _split_cells(line, separator))]
+        above = _split_cells(comment, _find_separator(comment))
     except csv.Error as error:
         raise InputError(f"{path} cannot be read: {error}") from error
 
     def as_number(cell: str) -> str:
         return cell.strip() if separator == "," else cell.strip().replace(",", ".")
 
-    if not rows or (len(rows) == 1 and not is_number(as_number(rows[0][1][0]))):
+    header = [] if not rows or is_number(as_number(rows[0][1][0])) else rows.pop(0)[1]
+    if not rows:
         raise InputError(f"{path} has no numbers: it must have rows of numbers, and may have a header line above them")
-    header = []
-    if not is_number(as_number(rows[0][1][0])):
-        header = rows.pop(0)[1]
-    elif lines[0][0] > 1:
-        # the comment above the numbers, as NumPy writes headings
-        comment = next(csv.reader([text[lines[0][0] - 2].lstrip("# ")], delimiter=separator), [])
-        header = comment if len(comment) == len(rows[0][1]) else []
+    if not header and len(above) == len(rows[0][1]):
+        header = above
     header = [name.strip() for name in header]
-    if header and any(cell.strip() for cell in rows[0][1][len(header) :]):
-        raise InputError(
-            f"{path}, line {rows[0][0]}: {len(rows[0][1])} cells below {len(header)} headings; numbers with a decimal comma "
-            "need semicolons or tabs between them"
-        )
     short = [_UNIT.sub("", known).strip() for known in header]
+    width = len(header or rows[0][1])
     places = []
-    for place, name in enumerate([None] * len(header or rows[0][1]) if names is None else names):
+    for place, name in enumerate([None] * width if names is None else names):
+        if name is not None and not header:
+            raise InputError(
+                f"{path} has no headings, and so no column {name!r}: its columns are taken by their position"
+            )
         if name is not None and name not in header and short.count(name) != 1:
             raise unknown_name(name, header, f"column {name!r} in {path.name}")
         places.append(place if name is None else header.index(name) if name in header else short.index(name))
+    for number, cells in rows:
+        if any(is_number(as_number(cell)) for cell in cells[width:]):
+            raise InputError(
+                f"{path}, line {number}: {len(cells)} cells in a table of {width} columns; numbers with a decimal comma need "
+                "semicolons or tabs between them"
+            )
     columns = np.empty((len(places), len(rows)))
     for column, place in zip(columns, places):
         for i, (number, cells) in enumerate(rows):
-            own = cells[place].partition("#")[0] if place < len(cells) else ""
-            column[i] = float(as_number(own)) if is_number(as_number(own)) else nan
+            own = as_number(cells[place]) if place < len(cells) else ""
+            column[i] = float(own) if is_number(own) else nan
             if not isfinite(column[i]):
-                raise InputError(
-                    f"{path}, line {number}, column {place + 1}: {own.strip()[:40]!r} is not a finite number"
-                )
+                raise InputError(f"{path}, line {number}, column {place + 1}: {own[:40]!r} is not a finite number")
     return [heading_unit(header[place]) if header else "" for place in places], list(columns)
 
 
-#: A unit in brackets at the end of a heading.
-_UNIT = re.compile(r"[\[(]([^\[\]()]*)[\])]\s*$")
+def _find_separator(line: str) -> str:
+    """Return what separates the cells of a CSV file with this first line: a semicolon, a tab or a comma."""
+    plain = re.sub('"[^"]*"', "", line)
+    # a comment tells only where nothing before it does, as in "drive #1;torque"
+    for part in (plain.partition("#")[0], plain):
+        for mark in ";\t,":
+            if mark in part:
+                return mark
+    return ","
+
+
+def _split_cells(line: str, separator: str) -> list[str]:
+    """Return the cells of a line of a CSV file, without a comment after a number, and without blank cells at the end."""
+    cells = next(csv.reader([line], delimiter=separator), []) if '"' in line else line.split(separator)
+    for place, cell in enumerate(cells if "#" in line else ()):
+        own, mark, _ = cell.partition("#")
+        if mark and is_number(own.replace(",", ".")):
+            cells = [*cells[:place], own]
+            break
+    while cells and not cells[-1].strip():
+        cells.pop()
+    return cells
+
+
+#: A unit in brackets at the end of a heading, or before a comment.
+_UNIT = re.compile(r"[\[(]([^\[\]()]*)[\])]\s*(?:#.*)?$")
 
 
 def heading_unit(heading: str) -> str:
-    """Return the unit in brackets at the end of a heading, as of ``time [ms]`` or ``x (mm)``; empty if there is none."""
+    """Return the unit in brackets at the end of a heading, as of ``time [ms]`` or ``x (mm)``; empty if there is none.
+
+    A number in brackets, as of ``x[0]``, is an index.
+    """
     found = _UNIT.search(heading)
-    return found[1].strip() if found else ""
+    return found[1].strip() if found and not found[1].strip().isdigit() else ""
 
 
 def read_rows(path: str | Path) -> list[dict[str, str]]:

@@ -189,7 +189,7 @@ def test_a_table_file_is_read_in_the_units_of_its_headings(tmp_path, text):
         ("t [ms],force [kg]\n0,1\n1,2\n", "column 2 in 'kg'"),
         ("t [mm],force [N]\n0,1\n1,2\n", "column 1 in 'mm'"),
         ("t,force\n0,1\n1,\n", "line 3, column 2: '' is not a finite number"),
-        ("t,force\n0,0,1,5\n0,5,2,5\n", "line 2: 4 cells below 2 headings; numbers with a decimal comma"),
+        ("t,force\n0,0,1,5\n0,5,2,5\n", "line 2: 4 cells in a table of 2 columns; numbers with a decimal comma"),
     ],
 )
 def test_a_table_file_that_is_none(tmp_path, text, said):

@@ -388,6 +388,41 @@ def test_csv_and_arrays_are_read_back(tmp_path):
         read_rows(tmp_path / "none.csv")
 
 
+@pytest.mark.parametrize(
+    ("text", "units", "columns"),
+    [
+        ("t [ms],x [mm] # rig 2\n0,1\n2,3\n", ["ms", "mm"], [[0.0, 2.0], [1.0, 3.0]]),
+        ("# t [ms], x [mm]\n0;1,5\n2;3\n", ["ms", "mm"], [[0.0, 2.0], [1.5, 3.0]]),
+        ("0,1 # slow, then fast; hot\n2,3\n", ["", ""], [[0.0, 2.0], [1.0, 3.0]]),
+        ("t;x\n0;1 # slow; hot\n2;3\n", ["", ""], [[0.0, 2.0], [1.0, 3.0]]),
+        ("drive #1 [s];torque\n0;1\n", ["s", ""], [[0.0], [1.0]]),
+        ("t[0],x[1]\n0,1\n", ["", ""], [[0.0], [1.0]]),
+        ("t,x,\r\n0,1,\r\n2,3,\r\n,,\r\n", ["", ""], [[0.0, 2.0], [1.0, 3.0]]),
+        (";\n0;1\n2;3;late\n", ["", ""], [[0.0, 2.0], [1.0, 3.0]]),
+    ],
+)
+def test_columns_of_tables_as_people_write_them(tmp_path, text, units, columns):
+    (tmp_path / "x.csv").write_text(text, newline="")
+    found, numbers = read_record(tmp_path / "x.csv")
+    assert found == units
+    assert [column.tolist() for column in numbers] == columns
+
+
+@pytest.mark.parametrize(
+    ("text", "names", "said"),
+    [
+        ("0,0\n0,5,1,5\n", None, "line 2: 4 cells in a table of 2 columns; numbers with a decimal comma need"),
+        ("t,x\n0,0\n0,5,1\n", ("t", "x"), "line 3: 3 cells in a table of 2 columns"),
+        ("0,1\n2,3\n", ("t", "x"), "has no headings, and so no column 't'"),
+        (f'# "{"1" * 200_000}",x\n0,1\n', None, "cannot be read: field larger"),
+    ],
+)
+def test_columns_that_are_none(tmp_path, text, names, said):
+    (tmp_path / "x.csv").write_text(text)
+    with pytest.raises(InputError, match=said):
+        read_record(tmp_path / "x.csv", names)
+
+
 @pytest.mark.parametrize("head", ["", "t,x # seconds\n", "# t,x\n"])
 def test_columns_need_no_header_line_and_may_have_comments(tmp_path, head):
     (tmp_path / "x.csv").write_text(f"{head}0,1 # start\n\n# later\n2,3\n")

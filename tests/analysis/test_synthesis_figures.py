@@ -485,6 +485,14 @@ def test_the_least_mechanical_advantage_lies_between_targets_that_are_dead_centr
     assert f"for one of the crank: {1.0 / fastest:.3g} at least on the way" in syn.report(swing)
 
 
+def test_a_crank_that_cannot_turn_on_has_no_advantage_in_its_toggle() -> None:
+    rocker = replace(LINKAGE, crank_length=0.9 * LINKAGE.ground_length, coupler_length=0.8 * LINKAGE.rocker_length)
+    at = np.linspace(0.0, 2.0 * pi, 24, endpoint=False)
+    assert not rocker.turns_fully
+    solution = syn.Solution.from_linkage(syn.RockerFunction(angle=np.sin(at), rotation=at), rocker)
+    assert "for one of the crank: 0 at least on the way" in syn.report(solution)
+
+
 @pytest.mark.parametrize("turns", [-1, 0, 2])
 def test_a_rocker_is_drawn_and_listed_in_the_turn_of_its_targets(turns: int) -> None:
     at = np.radians([0.0, 20.0, 40.0, 60.0])

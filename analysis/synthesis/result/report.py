@@ -542,7 +542,9 @@ def _limit_lines(solution: Solution) -> str:
         lines += f"\ntime ratio of the {last}'s {motions} {ratio:.4g}"
     gained = np.abs(mechanical_advantage(linkage, np.linspace(begin, end, CLOSELY)))
     if np.isfinite(gained).any():
-        lines += f"\n{what}: {np.nanmin(gained):.3g} at least on the way"
+        # where the links cannot be joined all the way, a toggle is on it
+        least = 0.0 if np.isnan(gained).any() else gained.min()
+        lines += f"\n{what}: {least:.3g} at least on the way"
     return lines
 
 
