@@ -273,7 +273,7 @@ class Pid(Controller):
             "parameter",
             "s",
             0.1,
-            "Time in which the integral follows the limit, or a sample",
+            "Time in which the integral follows the limit, at least sample_time",
             "positive",
         ),
         Row("limit", "parameter", "N", 1e6, "Greatest magnitude of the force", "not negative"),
@@ -297,7 +297,7 @@ class Pid(Controller):
             self.derivative = (self.filter_time * self.derivative + change) / (self.filter_time + self.sample_time)
         wanted = self.gain * self.error + self.integral + self.derivative + self.feed_forward
         self.force = _clamp(wanted, self.limit)
-        # within a shorter time than a sample the integral would swing, by more each time
+        # within less than half a sample the integral would swing, by more each time
         back = (self.force - wanted) / max(self.tracking_time, self.sample_time)
         self.integral += self.sample_time * (self.integral_gain * self.error + back)
 

@@ -294,7 +294,8 @@ def _run_loop(
     """Reset the controller and run a closed loop: at each sampling time measure, compute the force, and advance the plant."""
     controller.reset()
     mechanism = plant.mechanism
-    reference = si(reference, variable_unit(mechanism, mechanism.freedoms[freedom].coordinate), "reference")
+    unit = variable_unit(mechanism, mechanism.freedoms[freedom].coordinate)
+    reference = si(reference, unit, "reference")
     rows: list[tuple[float, ...]] = []
     status, message = 0, ""
     ahead = [*times[1:].tolist(), float(times[-1]) + controller.period]
@@ -302,7 +303,7 @@ def _run_loop(
         measured = tuple(plant.measure())
         wanted = reference(t) if callable(reference) else reference
         if not isfinite(wanted):
-            raise InputError(f"the reference is {wanted} m at t = {t:.9g} s: it must be a finite number")
+            raise InputError(f"the reference is {wanted} {unit} at t = {t:.9g} s: it must be a finite number")
         force = controller.force(measured, wanted)
         rows.append((*measured, force, wanted))
         plant.act(t, later, measured, force)

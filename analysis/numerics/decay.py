@@ -236,7 +236,7 @@ def _vertex(
     for _ in range(_ROUNDS):
         s = (t[near] - middle) / scale - place
         columns = np.column_stack([s * s * (1.0 - jump * np.sign(s)), s, np.ones_like(s)])
-        a, b, height = np.linalg.lstsq(columns, x[near])[0].tolist()
+        a, b, height = np.linalg.lstsq(columns, x[near], rcond=None)[0].tolist()
         step = float(np.clip(place - 0.5 * b / a, -width, width)) - place if a else 0.0
         place, height = place + step, height + (a * step + b) * step
     return middle + scale * place, height

@@ -129,7 +129,8 @@ def run_many(
     Raises
     ------
     InputError
-        If two variables have different numbers of values, or the folder has runs of another study.
+        If two variables have different numbers of values, ``every`` or the step is not positive, the stop time is not finite
+        or before the first step ends, or the folder has runs of another study.
     SystemRunsEnded
         On Ctrl-C, and if workers are lost.
     UnknownNameError
@@ -141,6 +142,8 @@ def run_many(
     for name in outputs:
         if name not in known:
             raise unknown_name(name, known, f"output {name!r}")
+    if every < 1:
+        raise InputError(f"every is {every} communication steps: it must be 1 or more")
     time = np.minimum(step * np.arange(0, count_steps(stop_time, step) + 1, every), stop_time)
     parts = tuple((name, part.fmu.resolve(), tuple(part.values.items())) for name, part in wiring.parts.items())
     task = _Task(

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from math import ceil
+from math import ceil, inf
 from typing import Any
 
 import numpy as np
@@ -254,7 +254,11 @@ class _Instances:
 
 
 def count_steps(stop_time: float, step: float) -> int:
-    """Return the number of steps of a run with equal steps, of which the last may be shorter."""
+    """Return the number of steps of a run with equal steps, of which the last may be shorter; refuse steps of no run."""
+    if not 0.0 < step <= stop_time < inf:
+        raise InputError(
+            f"the communication step is {step} s: it must be above 0 and at most the stop time, {stop_time} s, a finite one"
+        )
     return ceil(stop_time / step * (1.0 - 1e-12))
 
 
@@ -264,16 +268,13 @@ class _Stepper:
     def __init__(self, step: float, stop_time: float, share: float | None) -> None:
         self.step, self.stop_time, self.share = step, stop_time, share
         self.first, self.number, self.before, self.scale = step, 0, 0.0, 0.0
+        self.count = count_steps(stop_time, step)
 
     def next_step(self, time: float) -> tuple[float, float]:
         """Return the length of the next step, and the time at its end."""
         if self.share is None:
             # the last step is shorter where the steps do not fill the run
-            end = (
-                (self.number + 1) * self.step
-                if self.number + 1 < count_steps(self.stop_time, self.first)
-                else self.stop_time
-            )
+            end = (self.number + 1) * self.step if self.number + 1 < self.count else self.stop_time
         else:
             # the last two steps share the remaining time
             left = self.stop_time - time
@@ -330,24 +331,20 @@ def run_system(
     CosimulationError
         If a part cannot be loaded or initialised.
     InputError
-        If the step is not positive or exceeds the stop time, if ``rollback`` is chosen and a part cannot restore its state, if
-        ``share`` is not positive or there is no power bond for it, or if a part needs equal steps and does not get them.
+        If the step is not positive or exceeds the stop time, if the stop time is not finite, if ``rollback`` is chosen and a
+        part cannot restore its state, if ``share`` is not positive or there is no power bond for it, or if a part needs equal
+        steps and does not get them.
     """
     if coupling not in COUPLINGS:
         raise unknown_name(coupling, COUPLINGS, f"coupling {coupling!r}")
     step, stop_time = wiring.step if step is None else step, wiring.stop_time if stop_time is None else stop_time
-    if not 0.0 < step <= stop_time:
-        raise InputError(
-            f"the communication step is {step} s: it must be above 0 and at most the stop time, {stop_time} s"
-        )
-    bonds = wiring.bonds()
+    stepper, bonds = _Stepper(step, stop_time, share), wiring.bonds()
     if share is not None and not (share > 0.0 and bonds):
         raise InputError(
             f"steps for a share of {share:g}: the share must be above 0, and the system must have a power bond, "
             f"of which it has {len(bonds)}"
         )
-    stepper = _Stepper(step, stop_time, share)
-    if share is not None or abs(count_steps(stop_time, step) * step - stop_time) > 1e-9 * step:
+    if share is not None or abs(stepper.count * step - stop_time) > 1e-9 * step:
         for name, part in wiring.parts.items():
             if not part.description.coSimulation.canHandleVariableCommunicationStepSize:
                 raise InputError(

@@ -194,6 +194,9 @@ def read_ssp(path: str | Path) -> Wiring:
             raise WiringError(
                 f"{path} has a {tag}: systems are read without; give the part the factor, or a part that has it"
             )
+    for node in nodes:
+        if node.tag.endswith("}DefaultExperiment") and {"startTime", "stopTime"} - {*node.keys()}:
+            raise WiringError(f"{path} has a DefaultExperiment without startTime or stopTime: give both")
     folder = code_folder("systems") / hashlib.sha256(Path(path).read_bytes()).hexdigest()[:12]
     folder.mkdir(parents=True, exist_ok=True)
     with ssp.SSP(path, mode="r") as archive, archive.system_structure as structure:
@@ -224,9 +227,9 @@ def read_ssp(path: str | Path) -> Wiring:
                 f"{path}: an input has two connections, or one begins at the system's edge: it must have one"
             )
         experiment = structure.default_experiment
-    if experiment is not None and float(experiment.start_time or 0.0):
+    if experiment is not None and experiment.start_time:
         raise WiringError(f"{path} starts at {experiment.start_time} s: it must start at 0 s")
-    stop_time = float(experiment.stop_time) if experiment is not None else 1.0
+    stop_time = experiment.stop_time if experiment is not None else 1.0
     steps = [str(node[0].text) for node in nodes if node.get("type") == _STEP and len(node)]
     step = _as_number(steps[0], None, f"{path}: the communication step") if steps else 1e-3 * stop_time
     return Wiring(title=structure.name, parts=parts, connections=connections, stop_time=stop_time, step=step)
@@ -262,10 +265,10 @@ def _start_values(
 def _convert(value: float, part: Part, key: str, of: str, base: tuple[float, ...] | None) -> float:
     """Return a start value in the unit of its variable; ``of`` is the unit in which it is given, ``base`` its definition."""
     port = part.ports.get(key)
-    if port is None or of in ("", port.unit):
+    own = None if port is None else part.base_unit(key)
+    if port is None or own is None or of in ("", port.unit):
         return value
-    own = part.base_unit(key)
-    if base is None or own is None or len(own) != len(base) or own[:-2] != base[:-2]:
+    if base is None or len(own) != len(base) or own[:-2] != base[:-2]:
         raise WiringError(f"{part.name}.{key} starts with {value:g} {of}: it must be in {port.unit or 'no unit'}")
     return float((value * base[-2] + base[-1] - own[-1]) / own[-2])
 

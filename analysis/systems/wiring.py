@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from itertools import product
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -21,6 +22,7 @@ class WiringError(LinkworkError):
 REAL = ("Real", "Float64")
 #: Attributes of a unit in base units.
 BASE = ("kg", "m", "s", "A", "K", "mol", "cd", "rad", "factor", "offset")
+DIMENSIONLESS = tuple(float(k == "factor") for k in BASE)
 
 
 def exponents(unit: Any) -> tuple[float, ...]:
@@ -131,12 +133,13 @@ class Part:
     def base_unit(self, port: str) -> tuple[Any, ...] | None:
         """Return the unit of a port in base units, with factor and offset; None if the FMU does not tell any units.
 
-        A unit without a definition in base units is returned by its name.
+        A port without a unit is dimensionless. A unit without a definition in base units is returned by its name.
         """
         known = self.description.unitDefinitions
         if not known:
             return None
-        name = self.ports[port].unit
+        if not (name := self.ports[port].unit):
+            return DIMENSIONLESS
         base = next((unit.baseUnit for unit in known if unit.name == name), None)
         return (name,) if base is None else exponents(base)
 
@@ -230,6 +233,10 @@ class Wiring:
         others += [self.connections[end]] if end in self.connections else []
         return next((self.port(one).unit for one in (end, *others) if self.port(one).unit), "")
 
+    def _names(self, source: End, target: End) -> tuple[str, str]:
+        """Return the names of the unit of a connection, which may differ at its ends, such as N.m and Nm."""
+        return self.unit(source), self.unit(target)
+
     def rate_input(self, end: End) -> End | None:
         """Return the input for the time derivative of a given input: in the same table, with the unit divided by seconds."""
         unit = {"rad/s": "rad/s2", "m/s": "m/s2"}.get(self.port(end).unit)
@@ -295,7 +302,7 @@ class Wiring:
             for target, source in self.connections.items()
             for flow_to, flow in self.connections.items()
             if (flow.part, flow_to.part) == (target.part, source.part)
-            and (self.unit(source), self.unit(flow)) in _POWERS
+            and any(units in _POWERS for units in product(self._names(source, target), self._names(flow, flow_to)))
         ]
         efforts, flows = [bond.effort_to for bond in found], [bond.flow_to for bond in found]
         return [b for b in found if efforts.count(b.effort_to) == 1 and flows.count(b.flow_to) == 1]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from math import pi
+from math import inf, pi
 from pathlib import Path
 from typing import Any
 
@@ -246,8 +246,9 @@ def test_wrong_arguments_are_refused() -> None:
     wiring = wiring_of("motor-crank")
     with pytest.raises(UnknownNameError, match="rollback"):
         run_system(wiring, coupling="roll")
-    with pytest.raises(InputError, match="communication step"):
-        run_system(wiring, step=2.0, stop_time=1.0)
+    for step, stop_time in ((2.0, 1.0), (0.0, 1.0), (1e-3, inf)):
+        with pytest.raises(InputError, match="communication step"):
+            run_system(wiring, step=step, stop_time=stop_time)
     with pytest.raises(InputError, match="does not divide"):
         convergence(system_of("motor-crank"), [1e-3, 4e-4], stop_time=0.1)
     with pytest.raises(UnknownNameError, match="derivatives"):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import zipfile
 from pathlib import Path
 
 import numpy as np
@@ -9,6 +10,7 @@ import pytest
 from pythonfmu.builder import FmuBuilder
 
 from analysis.systems import System, WiringError, load_system, read_ssp, run_system, write_ssp
+from analysis.systems.description import PartTable, RunTable
 
 SYSTEM = """
 [parts.pump]
@@ -68,3 +70,47 @@ def test_values_without_a_unit_go_into_an_archive_and_back(folder: Path, tmp_pat
 def test_ports_that_are_not_real_are_not_connected(folder: Path, new: str, kind: str) -> None:
     with pytest.raises(WiringError, match=f"is of type {kind}: only real variables are connected"):
         system(folder, '"linkage.drive.torque" = "pump.torque"', new).wiring()
+
+
+def rewrite(source: Path, target: Path, name: str, *changes: tuple[str, str]) -> Path:
+    """Copy an archive with texts of one of its files replaced."""
+    with zipfile.ZipFile(source) as archive, zipfile.ZipFile(target, "w") as made:
+        for entry in archive.namelist():
+            content = archive.read(entry)
+            for old, new in changes if entry == name else ():
+                assert old.encode() in content
+                content = content.replace(old.encode(), new.encode())
+            made.writestr(entry, content)
+    return target
+
+
+def test_units_of_other_names_make_a_power_bond(folder: Path) -> None:
+    defined = (
+        '<UnitDefinitions><Unit name="Nm"><BaseUnit kg="1" m="2" s="-2"/></Unit>'
+        '<Unit name="rad/s"><BaseUnit rad="1" s="-1"/></Unit></UnitDefinitions>\n\t<LogCategories>'
+    )
+    units = ("<Real/>", '<Real unit="Nm"/>'), ('<Real start="0"/>', '<Real start="0" unit="rad/s"/>')
+    rewrite(folder / "Pump.fmu", folder / "Other.fmu", "modelDescription.xml", ("<LogCategories>", defined), *units)
+    wiring = system(folder, "Pump.fmu", "Other.fmu").wiring()
+    assert [str(bond.effort) for bond in wiring.bonds()] == ["pump.torque"]
+
+
+def test_start_values_with_units_fit_variables_without_one(folder: Path, tmp_path: Path) -> None:
+    servo = PartTable(controller="dc-servo", values={"encoder_counts": 512})
+    alone = System(parts={"servo": servo}, run=RunTable(stop_time=0.01))
+    end, one = "</ssv:ParameterSet>", '<ssv:Units><ssc:Unit name="1"><ssc:BaseUnit/></ssc:Unit></ssv:Units>'
+    for wiring, part, old, unit in (
+        (system(folder).wiring(), "pump", '<ssv:Real value="2e-06"', "m3"),
+        (alone.wiring(), "servo", '<ssv:Real value="512.0"', "1"),
+    ):
+        made = write_ssp(wiring, tmp_path / "made.ssp")
+        changes = [(old, f'{old} unit="{unit}"'), (end, one + end)]
+        other = rewrite(made, tmp_path / "other.ssp", f"resources/{part}.ssv", *changes)
+        assert read_ssp(other).parts[part].values == wiring.parts[part].values
+
+
+def test_an_experiment_without_an_end_is_refused(folder: Path, tmp_path: Path) -> None:
+    made = write_ssp(system(folder).wiring(), tmp_path / "made.ssp")
+    other = rewrite(made, tmp_path / "other.ssp", "SystemStructure.ssd", (' stopTime="0.01"', ""))
+    with pytest.raises(WiringError, match="without startTime or stopTime"):
+        read_ssp(other)

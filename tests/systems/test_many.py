@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from dataclasses import replace
+from math import inf
 from pathlib import Path
 from typing import Any
 
@@ -113,6 +114,9 @@ def test_wrong_arguments_are_refused() -> None:
     for vary in ({}, {"linkage.slider.stiffness": [1.0, 2.0], "linkage.slider.damping": [1.0]}):
         with pytest.raises(InputError, match="one of each for every run"):
             run_many(wiring, vary, OUTPUTS)
+    for wrong in ({"step": 0.0}, {"stop_time": inf}, {"every": 0}):
+        with pytest.raises(InputError, match="communication step"):
+            run_many(wiring, {"linkage.slider.stiffness": [1.0]}, OUTPUTS, **wrong)
 
 
 def test_processes_give_the_same() -> None:
