@@ -127,10 +127,9 @@ def _two_columns(path: Path, text: str) -> tuple[NDArray[np.float64], list[str]]
     if not rows:
         raise InputError(f"{path} has no points: it must have two columns of numbers, x and y")
     # NumPy writes headings as a comment
-    units = [heading_unit(heading) for heading in re.split(r"[,;\t]", header or comment)]
-    if not header and (len(units) != 2 or not all(units)):
-        units = []
-    return np.array(rows), [unit for unit in units if unit]
+    headings = re.split(r"[,;\t]|(?<=[\])])\s", header or comment)
+    units = [unit for heading in headings if (unit := heading_unit(heading))]
+    return np.array(rows), units if header or len(units) == 2 else []
 
 
 def _svg_points(path: Path, text: str, scale: float | None, name: str | None) -> tuple[NDArray[np.float64], bool]:

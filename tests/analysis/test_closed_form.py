@@ -170,6 +170,20 @@ def test_a_circuit_defect_is_what_no_drive_can_avoid(seed: int) -> None:
         assert solution.verdicts.circuit == (len(circuits(solution.linkage, solution.task)) == 1)  # type: ignore[arg-type]
 
 
+def test_rotations_beyond_the_swing_of_a_crank_are_a_branch_defect() -> None:
+    """A triple-rocker has one circuit: its other links pass from each target to the next, if not by these crank rotations."""
+    linkage = syn.Linkage(
+        ground_length=1.0, crank_length=0.8, coupler_length=0.7, rocker_length=0.75, crank_phase=np.radians(60.0)
+    )
+    at = np.radians([0.0, 30.0, 220.0])
+    angle = np.concatenate([linkage.rocker_angle(one) for one in at[:, None]])
+    task = syn.RockerFunction(angle=angle, rotation=at)
+    (solution,) = syn.function_generators(task, crank_phase="60 deg", ground_length=1.0).solutions
+    assert solution.linkage.rocker_length == pytest.approx(0.75)
+    assert solution.verdicts.grashof == "triple-rocker"
+    assert solution.verdicts.defects == ("branch defect",)
+
+
 def test_none_is_sound_is_said_as_a_proof() -> None:
     found = syn.guidance(random_poses(0, 5))
     assert isinstance(found, syn.Guidance)

@@ -415,6 +415,8 @@ def test_points_from_csv(tmp_path: Path, text: str) -> None:
         ("x [mm],y [mm]", None, 1e-3),
         ("x (cm),y (cm)", None, 1e-2),
         ("# x [mm],y [mm]", None, 1e-3),
+        ("# x [mm] y [mm]", None, 1e-3),
+        ("x [mm] y [mm] # drawn", None, 1e-3),
         ("x [mm],y [mm]", "mm", 1e-3),
         ("x,y", "in", 0.0254),
         ("# drawn by hand (again)", None, 1.0),

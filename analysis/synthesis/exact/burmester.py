@@ -379,11 +379,11 @@ def exact_solution(task: Task, linkage: Linkage, rotation: FloatArray, sides: Fl
 
     ``sides`` has the assembly at each target: +1 with C to the left of B -> D, -1 to the right. If the targets need both
     assemblies, there is a branch defect. By Grashof's criterion the two assemblies are two circuits if the crank or the ground
-    link is the shortest; if another link is, the circuits differ by the side of the ground link on which the crank lies.
+    link is the shortest; if another link is, the circuits differ by the side of the ground link on which the crank lies. All
+    other linkages have one circuit.
     """
     verdicts = judge(linkage, rotation, closed=False)
-    one_side = bool((sides == sides[0]).all())
-    circuit = verdicts.circuit
+    one_side, circuit = bool((sides == sides[0]).all()), True
     if linkage.grashof in ("crank-rocker", "drag-link"):
         circuit = one_side
     elif linkage.grashof in ("double-rocker", "rocker-crank"):
