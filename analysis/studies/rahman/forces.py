@@ -14,7 +14,7 @@ from ...slider_crank.dual_dynamics import Binor
 from ...units import INCH
 from ..rules import ABNORMAL, ABOUT_DEG, VERY_CLOSE_DEG
 from ..statements import Case as Judged
-from ..statements import Statement, at_least, text
+from ..statements import Statement, at_least, at_most, text
 from ..study import Study, StudyResult, padded
 from ..variation import unvaried
 from .figures import (
@@ -203,7 +203,7 @@ def _roundoffs() -> list[Judged]:
     judged = []
     for body, ones, others in zip(("rod", "slider"), by_forward, by_mixed):
         judged += [
-            at_least(f"{body}, {name}", 1.0, one / other if other else np.inf)
+            at_most(f"{body}, {name}", 1.0, other / one)
             for name, one, other in zip(names, ones, others)
             if one or other
         ]
@@ -316,9 +316,8 @@ def _momentum_rates() -> tuple[Statement, ...]:
         Statement(
             "Finally the second set [the mixed path's] is used in the program to have better accuracy.",
             text("section 2.8, L750; L730, L859"),
-            "greatest roundoff of the momenta, single precision less double, over a turn by half degrees: by 50a and 51a over "
-            "that by 52a and 53a, infinite where these have none; components that have any by one of them; in the plane, "
-            "a4 = 10 in",
+            "greatest roundoff of the momenta, single precision less double, over a turn by half degrees: by 52a and 53a over "
+            "that by 50a and 51a; components that have any by one of them; in the plane, a4 = 10 in",
             "none, the sign decides",
             tuple(_roundoffs()),
             "component i of the rod takes the roundoff of S4' by 52a besides",
