@@ -258,14 +258,15 @@ def _fit(tops: NDArray[np.float64], friction: bool) -> Decay:
         return np.asarray(offset + sides * ((size + constant) * q**n - constant))
 
     size = (height[0] - height[1]) / (1.0 + exp(-start))
-    guess = [size, start, height[0] - size]
-    if friction:
-        guess.append(0.0)
+    # in units of the first amplitude, so that the tolerances of the fit are relative; not by Levenberg and Marquardt as MINPACK
+    # has it, which finds no covariance where the guess is already the result
+    unit = np.array([abs(size), 1.0, abs(size), abs(size)])[: 4 if friction else 3]
+    guess = np.array([size, start, height[0] - size, 0.0])[: unit.size] / unit
     try:
-        values, covariance = curve_fit(model, n, height, guess, maxfev=4000)
+        found = curve_fit(model, n, height / abs(size), guess, method="trf", x_scale="jac", max_nfev=4000)
     except RuntimeError as error:
         raise InputError("no decay fits the record's turning points") from error
-    errors = np.sqrt(np.diag(covariance))
+    values, errors = found[0] * unit, np.sqrt(np.diag(found[1])) * unit
     if not values[1] > 0.0 or not np.isfinite(errors).all():
         raise InputError("no decaying motion fits the record's turning points: is there more friction than damping?")
     side = 1.0 if values[0] > 0.0 else -1.0

@@ -99,6 +99,18 @@ def test_dry_friction_does_not_move_the_frequency(friction: float, dt: float) ->
     assert found.stiffness(MASS)[0] == pytest.approx(STIFFNESS, rel=1e-4)
 
 
+@pytest.mark.parametrize("size", [1e-6, 1.0, 1e3])
+def test_a_fit_that_is_found_at_once_has_errors_in_any_unit(size: float) -> None:
+    """Six turning points of a record without noise or friction."""
+    t, damping = np.arange(0.0, 3.0, 1e-3), 0.11
+    below = np.sqrt(1.0 - damping**2)
+    swing = np.cos(20.0 * below * t) + damping / below * np.sin(20.0 * below * t)
+    found = fit_decay(t, size * np.exp(-20.0 * damping * t) * swing, friction=True)
+    assert found.damping_ratio == pytest.approx(damping, rel=1e-3)
+    assert found.friction / size == pytest.approx(0.0, abs=1e-4)
+    assert np.isfinite(found.friction_error)
+
+
 def test_no_friction_is_found_where_there_is_none() -> None:
     found = fit_decay(*noisy(0.005), friction=True)
     assert abs(found.friction) < 3.0 * found.friction_error
