@@ -273,27 +273,29 @@ class Wiring:
         return found
 
     def loops(self) -> Iterator[list[End]]:
-        """Yield each algebraic loop once: a chain of outputs that depend directly on one another."""
+        """Yield the shortest algebraic loop through each connected output, each loop once.
+
+        A loop is a chain of outputs that depend directly on one another.
+        """
+        connected = dict.fromkeys(self.connections.values())
         after: dict[End, list[End]] = {}
         for target, source in self.connections.items():
             for output, inputs in self.parts[target.part].feeds.items():
-                if target.port in inputs:
-                    after.setdefault(source, []).append(End(target.part, output))
-        connected = set(self.connections.values())
+                if target.port in inputs and (end := End(target.part, output)) in connected:
+                    after.setdefault(source, []).append(end)
         seen: set[frozenset[End]] = set()
-
-        def walk(path: list[End]) -> Iterator[list[End]]:
-            for end in after.get(path[-1], ()):
-                if end in path:
-                    loop = path[path.index(end) :]
-                    if frozenset(loop) not in seen:
-                        seen.add(frozenset(loop))
-                        yield [*loop, end]
-                elif end in connected:
-                    yield from walk([*path, end])
-
-        for source in dict.fromkeys(self.connections.values()):
-            yield from walk([source])
+        for first in connected:
+            # the chains from this output, which grow at their ends; all loops would be too many
+            chains, reached = [[first]], set[End]()
+            for chain in chains:
+                for end in after.get(chain[-1], ()):
+                    if end not in reached:
+                        reached.add(end)
+                        chains.append([*chain, end])
+            loop = next((chain for chain in chains[1:] if chain[-1] == first), [])
+            if loop and frozenset(loop) not in seen:
+                seen.add(frozenset(loop))
+                yield loop
 
     def bonds(self) -> list[Bond]:
         """Return the power bonds: unique pairs of an effort and a flow in opposite directions between two parts."""

@@ -7,6 +7,7 @@ import zipfile
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -31,6 +32,7 @@ from analysis.systems import (
     write_ssp,
 )
 from analysis.systems.description import PartTable, RunTable
+from analysis.systems.wiring import Part, Port
 from linkwork.errors import InputError, LinkworkError, ParameterError, UnknownNameError
 
 from .conftest import system_of, wiring_of
@@ -105,6 +107,27 @@ def test_notes_name_what_is_not_connected_and_loops() -> None:
     assert any(
         "algebraic loop linkage.crank.acceleration -> linkage.crank.acceleration" in note for note in own.notes()
     )
+
+
+def test_loops_of_parts_in_which_everything_depends_on_everything_are_found_soon() -> None:
+    """There are 10^8 loops, as between FMUs of other tools that list no dependencies."""
+    ports = {
+        f"{way}{n}": Port(f"{way}{n}", n, causality, "Real", "", "", False)
+        for way, causality in (("u", "input"), ("y", "output"))
+        for n in range(8)
+    }
+    inputs = tuple(name for name in ports if name.startswith("u"))
+    feeds = {name: inputs for name in ports if name.startswith("y")}
+    parts = {
+        name: Part(
+            name=name, fmu=Path(), ports=ports, values={}, feeds=feeds, description=SimpleNamespace(unitDefinitions=())
+        )
+        for name in "ab"
+    }
+    connections = {End(a, f"u{n}"): End(b, f"y{n}") for a, b in ("ab", "ba") for n in range(8)}
+    loops = list(Wiring(title="", parts=parts, connections=connections, stop_time=1.0, step=0.1).loops())
+    assert {len(loop) for loop in loops} == {3}
+    assert set().union(*loops) == set(connections.values())
 
 
 def test_a_controller_without_gains_is_noted(tmp_path: Path) -> None:
