@@ -42,5 +42,8 @@ def gif(figure: Figure, path: str | Path, frames_per_second: int) -> Iterator[tu
         draft = part.with_suffix(".gif")  # Pillow takes the format from the ending
         writer.setup(figure, str(draft), dpi=80)
         yield path, add
-        writer.finish()
-        draft.replace(part)
+        try:
+            writer.finish()
+            draft.replace(part)
+        finally:
+            draft.unlink(missing_ok=True)

@@ -10,6 +10,7 @@ from types import SimpleNamespace
 import matplotlib
 import numpy as np
 import pytest
+from matplotlib.animation import PillowWriter
 from matplotlib.colors import TwoSlopeNorm
 from matplotlib.path import Path as Path2D
 from matplotlib.text import Text
@@ -19,7 +20,7 @@ from analysis import Inputs, figures, simulate, simulate_many
 from analysis.figures import Curve, Panel, charts
 from analysis.figures.animation import gif
 from analysis.figures.curves import Arrow, Label
-from analysis.files import save_figure
+from analysis.files import WritingError, save_figure
 from analysis.mechanisms import MECHANISMS
 from linkwork.errors import AssemblyError, InputError
 from linkwork.five_bar.published import SETS, TABLE_3_1
@@ -328,6 +329,20 @@ def test_an_animation_that_fails_is_not_written_and_says_why(tmp_path: Path, fra
 
     with pytest.raises(AssemblyError, match="too short"):
         fail()
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_an_animation_leaves_nothing_where_space_runs_out(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def fill_disk(writer: PillowWriter) -> None:
+        Path(writer.outfile).write_bytes(b"GIF89a")
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(PillowWriter, "finish", fill_disk)
+    with (
+        pytest.raises(WritingError, match=r"run\.gif cannot be written: No space left"),
+        gif(figures.Figure(), tmp_path / "run.gif", 10) as (_, add),
+    ):
+        add()
     assert list(tmp_path.iterdir()) == []
 
 
