@@ -413,7 +413,7 @@ def find_equilibrium(
         given_words = [f"{name} = {value:g}" for name, value in (held or {}).items()]
         under = ", ".join(f"{name} {getattr(inputs, name)}" for name in inputs or ()) or "no force"
         raise EquilibriumError(
-            f"there is no equilibrium{' with ' * bool(held) + ', '.join(given_words)} under {under}, as far as a grid of "
-            f"{GRID[0]} angles and {GRID[1]} positions shows"
+            f"there is no equilibrium{' with ' * bool(held) + ', '.join(given_words)} under {under}, as far as a "
+            "search over a grid of configurations shows"
         )
     return next((one for one in found if one.stable), found[0])
