@@ -262,6 +262,11 @@ def input_units(mechanism: Mechanism) -> Mapping[str, str]:
     return MappingProxyType({c.argument: units[c.name] for c in mechanism.channels if c.kind != "rate"})
 
 
+def variable_unit(mechanism: Mechanism, name: str) -> str:
+    """Return the unit of a variable of a mechanism, by its FMI name."""
+    return next(v.unit for v in mechanism.variables if v.name == name)
+
+
 def variable_units() -> dict[str, str]:
     """Return the unit of every real variable of every mechanism, by its FMI name."""
     # cached, as every new `Drive` calls this

@@ -24,9 +24,10 @@ from linkwork.errors import InputError, LinkworkError
 
 from ..files import unknown_name
 from ..libraries import lazy
+from ..mechanisms import variable_unit
 from ..run import Function, require_kind
 from ..units import Amount, in_si, si
-from .model import FloatArray, LinearModel, LinearModelError, as_names, signal_name, sort_by_magnitude, variable_unit
+from .model import FloatArray, LinearModel, LinearModelError, as_names, signal_name, sort_by_magnitude
 
 if TYPE_CHECKING:
     import control

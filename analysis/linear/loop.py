@@ -19,7 +19,7 @@ from linkwork.errors import AssemblyError, InputError, IntegrationError
 from linkwork.mechanism import Channel, Mechanism
 from linkwork.plant import Plant
 
-from ..mechanisms import InitialState, Parameters, find_mechanism
+from ..mechanisms import InitialState, Parameters, find_mechanism, variable_unit
 from ..run import (
     FmuRun,
     Inputs,
@@ -35,7 +35,7 @@ from ..run import (
 )
 from ..units import Amount, in_si, si
 from .design import Design, check_period
-from .model import FloatArray, LinearModel, variable_unit
+from .model import FloatArray, LinearModel
 from .periodic import PeriodicModel
 
 #: A constant reference, or a function of time (s) that is sampled with the controller.

@@ -363,11 +363,6 @@ def as_names(names: str | Sequence[str]) -> Sequence[str]:
     return [names] if isinstance(names, str) else names
 
 
-def variable_unit(mechanism: Mechanism, name: str) -> str:
-    """Return the unit of a variable of a mechanism."""
-    return next(v.unit for v in mechanism.variables if v.name == name)
-
-
 def sort_by_magnitude(values: ArrayLike) -> NDArray[np.complex128]:
     """Return complex numbers sorted by magnitude; numbers of equal magnitude are sorted by imaginary part."""
     whole = np.asarray(values, dtype=complex)

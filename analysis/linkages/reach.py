@@ -11,6 +11,7 @@ import scipy
 from linkwork.limits import LIMIT_SINE
 from linkwork.mechanism import Mechanism
 
+from ..mechanisms import variable_unit
 from .description import GROUND
 from .package import Package
 from .structure import Pin, Slider
@@ -60,7 +61,7 @@ def reach(mechanism: Mechanism, freedom: int = 0, *, most: float | None = None, 
         displacement.
     """
     coordinate, period = mechanism.freedoms[freedom].coordinate, mechanism.freedoms[freedom].period
-    unit = next(v.unit for v in mechanism.variables if v.name == coordinate)
+    unit = variable_unit(mechanism, coordinate)
     if most is None:
         most = 0.5 * period or (8.0 * pi if unit == "rad" else 1.0)
     samples *= max(round(most / pi), 1) if unit == "rad" else 1

@@ -15,7 +15,7 @@ from linkwork.mechanism import Mechanism
 from linkwork.parameters import field_name, fmi_name
 
 from ...files import unknown_name
-from ...mechanisms import Parameters, find_mechanism
+from ...mechanisms import Parameters, find_mechanism, variable_unit
 from ...numerics import symbolic
 from ...run import InductionMotor, parameter_symbols, takes_published
 from ...units import RAD_S_PER_RPM
@@ -144,7 +144,7 @@ def parameter_unit(mechanism: Mechanism, name: str) -> str:
         raise unknown_name(name, names)
     if name in motor_parameters(mechanism):
         return motor_parameters(mechanism)[name][1]
-    return next(v.unit for v in mechanism.variables if v.name == name)
+    return variable_unit(mechanism, name)
 
 
 @takes_published()
