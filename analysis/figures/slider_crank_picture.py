@@ -82,7 +82,7 @@ def _checked_pose(parameters: SliderCrankParameters, angle: float, shift: float,
     for name, value in (("crank angle", angle), ("shift", shift)):
         if not isfinite(value):
             raise InputError(f"the {name} is {value!r}: it must be a finite number")
-    check_assembly(parameters, angle, shift)
+    check_assembly(angle, shift, parameters.constants())
     return _pose(parameters, angle, shift, factor)
 
 

@@ -406,7 +406,7 @@ def find_equilibrium(
         fixed = layout(balance.mechanism, tuple(balance.inputs.modes(balance.mechanism).values())).commanded
         start[list(fixed)] = coordinates[list(fixed)]
         state = [*start.tolist(), *[0.0] * (balance.mechanism.size - len(start))]
-        balance.mechanism.check_assembly(parameters, state)
+        balance.mechanism.check_assembly(state, parameters.constants())
         return balance.solve(start)
     found = find_equilibria(parameters, inputs, held=held)
     if not found:

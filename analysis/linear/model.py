@@ -403,7 +403,7 @@ def evaluate(parameters: Parameters, modes: Modes, states: FloatArray, channels:
         if not np.all(np.isfinite(row)):
             raise InputError(f"the state {row} is not finite")
         applied = mechanism.equations.apply_inputs(tuple(map(float, modes)), tuple(u.tolist()), p)
-        mechanism.check_state(parameters, mechanism.equations.start(tuple(row.tolist()), applied, p), applied, p)
+        mechanism.check_state(mechanism.equations.start(tuple(row.tolist()), applied, p), applied, p)
     constants = np.tile(np.array([*p, 0.0])[:, None], n)
     raw = _derivatives(mechanism, modes, mechanism.is_switched_on(p)).map(n)(states.T, channels.T, constants)
 

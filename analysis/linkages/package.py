@@ -97,9 +97,9 @@ VARIABLES = (
 )
 
 
-def check_assembly(parameters: Parameters, x: tuple[float, ...]) -> None:
+def check_assembly(x: tuple[float, ...], p: equations.Constants) -> None:
     """Make sure that the bodies can be joined."""
-    planar.check_clearance(equations.places, x, parameters.constants(), MECHANISM.describe_state(x))
+    planar.check_clearance(equations.places, x, p, MECHANISM.describe_state(x))
 
 
 MECHANISM = Mechanism(
@@ -227,7 +227,7 @@ class Package:
                 raise LinkageError(f"linkage.name is {name}: {of}; it must have another name")
         start = made.published[name]
         try:
-            made.check_assembly(start.parameters, made.state(start.initial))
+            made.check_assembly(made.state(start.initial), start.parameters.constants())
         except AssemblyError as error:
             signs = ", linkage.assembly" if any(dyad.has_two_assemblies for dyad in self.structure.dyads) else ""
             raise LinkageError(

@@ -107,7 +107,9 @@ def energy_balance(names: Sequence[str], values: NDArray[np.float64], tolerance:
     """
     if "energy.residual" not in names or not len(values):
         return ""
-    residual, *energies = np.abs(values.take(_energies(tuple(names)), axis=1)).max(axis=0).tolist()
+    # as rows of an array of their own the columns are searched several times faster
+    columns = values.T[_energies(tuple(names))]
+    residual, *energies = np.maximum(columns.max(axis=1), -columns.min(axis=1)).tolist()
     size = max(energies, default=0.0)
     if residual <= min(_RESIDUAL * tolerance, _MOST) * size:
         return ""

@@ -117,7 +117,7 @@ class Run:
             x[place] = u[channel]
         acting = self.apply_inputs(u)
         state = self.mechanism.equations.start(tuple(x.tolist()), acting, self.p)
-        self.mechanism.check_state(self.parameters, state, acting, self.p)
+        self.mechanism.check_state(state, acting, self.p)
         scale = np.array(self.mechanism.error_scale(self.parameters, state))
         energy = self.mechanism.equations.energy(state, self.p)
         # only such large values may overflow
@@ -147,6 +147,8 @@ class Run:
         ``x`` and ``u`` are state and input channels after ``steps`` steps, which covered the time ``passed`` (s).
         """
         times, mechanism, hold = self.settings.times, self.mechanism, self.settings.hold
+        if steps < MANY_STEPS:
+            return ""
         # a step ends at each break of the inputs, as at each point of a table
         breaks = (
             passed / hold
@@ -376,5 +378,6 @@ def compute_outputs(
     else:
         outputs, count = compile_outputs(mechanism, switched, columns, width()).addresses["chosen"], len(columns)
     values = np.empty((len(states), count))
-    _solver().rows(outputs, width(), modes, p, np.ascontiguousarray(states), np.ascontiguousarray(inputs), values)
+    rows = [np.ascontiguousarray(given, dtype=float) for given in (states, inputs)]
+    _solver().rows.unchecked(outputs, width(), modes, p, *rows, values)
     return values

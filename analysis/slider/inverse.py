@@ -313,7 +313,7 @@ def load_at_angle(load: Load, crank_angle: float) -> tuple[float, float]:
 
 def _check_joined(parameters: FiveBarParameters, crank_angle: float, slider_position: float) -> None:
     try:
-        check_assembly(parameters, crank_angle, slider_position)
+        check_assembly(crank_angle, slider_position, parameters.constants())
     except AssemblyError as error:
         raise AssemblyError(
             f"the motion of the slider cannot be followed beyond {degrees(crank_angle):.2f} deg of the turn: {error}"

@@ -305,7 +305,7 @@ class Mechanism:
         Modules of the equations and of all functions that they call; the last is in the package that has ``MECHANISM``.
     equations : Equations
     check_assembly : callable
-        ``check_assembly(parameters, x)`` raises AssemblyError unless the links can be joined with clearance `LIMIT_SINE`.
+        ``check_assembly(x, p)`` raises AssemblyError unless the links can be joined with clearance `LIMIT_SINE`.
     error_scale : callable
         ``error_scale(parameters, x)``: magnitudes of the state's components below which the integrator's error is absolute,
         by arithmetic without branches.
@@ -338,7 +338,7 @@ class Mechanism:
     experiment: tuple[float, float, float, float]
     modules: tuple[ModuleType, ...]
     equations: Equations
-    check_assembly: Callable[[Any, Sequence[float]], None]
+    check_assembly: Callable[[Sequence[float], Any], None]
     error_scale: Callable[[Any, Sequence[float]], tuple[float, ...]]
     unjoined: UnjoinedMessages | None = None
     switch: str = ""
@@ -395,7 +395,7 @@ class Mechanism:
         modes = tuple(float(mode.default) for mode in self.modes)
         return self.equations.apply_inputs(modes, (0.0,) * len(self.channels), p)
 
-    def check_state(self, parameters: Any, x: Sequence[float], i: Any, p: Any) -> None:
+    def check_state(self, x: Sequence[float], i: Any, p: Any) -> None:
         """Check that the links can be joined and do not jam, with a clearance of at least `limits.LIMIT_SINE`.
 
         Raises
@@ -403,7 +403,7 @@ class Mechanism:
         AssemblyError
             If the links cannot be joined; `JammingError` if friction may jam the links.
         """
-        self.check_assembly(parameters, x)
+        self.check_assembly(x, p)
         if self.is_switched_on(p) and not self.equations.clearance(x, i, p) >= LIMIT_SINE:
             raise JammingError(f"{JAMMING} at {self.describe_state(x)}")
 

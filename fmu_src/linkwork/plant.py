@@ -178,7 +178,7 @@ class Plant:
         return complete
 
     def _check_state(self, x: Vector) -> None:
-        self.mechanism.check_state(self.parameters, self._complete_start(x), self._applied_inputs(), self._p)
+        self.mechanism.check_state(self._complete_start(x), self._applied_inputs(), self._p)
 
     def _jump_rates(self, x: Vector, applied: Any, commanded: Collection[str]) -> Vector:
         """Return the state after the rates have jumped to the values of the inputs named in ``commanded``."""

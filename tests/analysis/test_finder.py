@@ -42,9 +42,9 @@ def test_starts_fill_a_range_that_is_wider_on_one_side() -> None:
     parameters, guess = replace(TABLE_3_1, coupler_length=0.2), np.zeros(2)
     low, high = assembly_ranges(parameters, Drive(speed=40.0), guess)
     for end in (low[0], high[0]):
-        check_assembly(parameters, 0.0, end / 1.25)
+        check_assembly(0.0, end / 1.25, parameters.constants())
         with pytest.raises(AssemblyError):
-            check_assembly(parameters, 0.0, end)
+            check_assembly(0.0, end, parameters.constants())
     starts = spread_starts(parameters, Drive(speed=40.0), guess, 64)
     assert starts[:, 0].min() < 0.7 * low[0]
     assert starts[:, 0].max() > 0.7 * high[0] > 2.0 * -low[0]

@@ -735,15 +735,15 @@ def test_start_outside_of_assembly() -> None:
 
 def test_start_at_the_limit_of_assembly() -> None:
     # BD = l1 + u - l2 at crank angle 0; 30 cm is stretched out
-    stretched = 0.30 - 0.1535 + 0.05
+    stretched, p = 0.30 - 0.1535 + 0.05, TABLE_3_1.constants()
     with pytest.raises(AssemblyError, match=r"limit of assembly .* collinear to 0\.009 deg"):
-        check_assembly(TABLE_3_1, 0.0, stretched - 1e-9)
+        check_assembly(0.0, stretched - 1e-9, p)
     # at the limit the sine is 1e-3: it is about 2 sqrt(2 x / 0.3) for BD short of stretched by x
     assert LIMIT_SINE == 1e-3
     inside = 0.3 / 8 * 1e-3**2
-    check_assembly(TABLE_3_1, 0.0, stretched - 1.05 * inside)
+    check_assembly(0.0, stretched - 1.05 * inside, p)
     with pytest.raises(AssemblyError):
-        check_assembly(TABLE_3_1, 0.0, stretched - 0.95 * inside)
+        check_assembly(0.0, stretched - 0.95 * inside, p)
 
 
 def test_start_out_of_the_rods_reach_says_by_how_much() -> None:

@@ -84,7 +84,7 @@ def _show_two_rotations(chosen: MechanismChoice, points: int, folder: Path) -> N
     reached = short < 0.0
     if not reached.any():
         worst = int(np.argmin(short))
-        check_assembly(chosen.parameters, float(angle[worst]), float(shift[worst]))
+        check_assembly(float(angle[worst]), float(shift[worst]), chosen.parameters.constants())
     end = sc.settle(chosen.parameters, angle[reached], shift[reached])
     length, scale = chosen.units.name("m"), chosen.units.factor("m")
     columns = {

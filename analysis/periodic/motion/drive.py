@@ -624,7 +624,7 @@ def assembly_ranges(
     """
     mechanism = find_mechanism(parameters)
     flow, vector, scale = drive.flow(mechanism), drive.vector(mechanism), motion_scales(parameters, drive, guess)
-    sides = []
+    p, sides = parameters.constants(), []
     for sign in (-1.0, 1.0):
         found = scale[: flow.size // 2].copy()
         for i in range(len(found)):
@@ -633,7 +633,7 @@ def assembly_ranges(
                 y = guess.copy()
                 y[i] = flow.rest[i] + sign * found[i]
                 try:
-                    mechanism.check_assembly(parameters, flow.state(y, vector))
+                    mechanism.check_assembly(flow.state(y, vector), p)
                 except AssemblyError:
                     break
                 found[i] *= _WIDER

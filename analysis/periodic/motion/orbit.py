@@ -673,7 +673,7 @@ def _check_assembly(point: OperatingPoint, start: FloatArray) -> None:
     applied = mechanism.equations.apply_inputs(modes, tuple(point.vector[: flow.inputs].tolist()), p)
     x = mechanism.equations.start(flow.state(start, point.vector), applied, p)
     try:
-        mechanism.check_state(point.parameters, x, applied, p)
+        mechanism.check_state(x, applied, p)
     except AssemblyError as error:
         raise OrbitAssemblyError(str(error), flow, start, np.inf, 0) from None
 

@@ -95,15 +95,16 @@ def mean_effective_mass(parameters: Parameters) -> float:
         mechanism.freedoms[crank.freedom].period * turn[np.arange(MASS_SAMPLES) * LATTICE**n % MASS_SAMPLES]
         for n, crank in enumerate(cranks)
     ]
+    p = parameters.constants()
     for at in zip(*(each.tolist() for each in angles)):
         x = [0.0] * mechanism.size
         x[freedom] = position
         for crank, angle in zip(cranks, at):
             x[crank.freedom] = angle
-        mechanism.check_assembly(parameters, x)
+        mechanism.check_assembly(x, p)
     resting = inertia_and_stiffness(mechanism, tuple(crank.freedom for crank in cranks), freedom)
     held = np.full(MASS_SAMPLES, position)
-    mass, _ = symbolic.evaluate_arrays(resting, *angles, held, list(parameters.constants()))
+    mass, _ = symbolic.evaluate_arrays(resting, *angles, held, list(p))
     return float(mass.mean())
 
 

@@ -8,7 +8,7 @@ from math import copysign, degrees, sqrt
 from ..limits import LIMIT_SINE, UnjoinedMessages
 from ..mechanism import crank_scale
 from . import kinematics
-from .parameters import FiveBarParameters
+from .parameters import Constants, FiveBarParameters
 
 UNJOINED = UnjoinedMessages(
     "the links cannot be joined",
@@ -18,7 +18,7 @@ UNJOINED = UnjoinedMessages(
 )
 
 
-def check_assembly(parameters: FiveBarParameters, crank_angle: float, slider_position: float) -> None:
+def check_assembly(crank_angle: float, slider_position: float, p: Constants) -> None:
     """Check that the links can be joined at a configuration, with a clearance of at least `LIMIT_SINE`.
 
     Raises
@@ -27,7 +27,6 @@ def check_assembly(parameters: FiveBarParameters, crank_angle: float, slider_pos
         If the links cannot be joined; the message has the configuration and the distance from crank pin to slider pin,
         with the range that coupler and rocker allow.
     """
-    p = parameters.constants()
     square = kinematics.assembly_square(crank_angle, slider_position, p)
     sine = copysign(sqrt(abs(square)) / (p.l3 * p.l4), square)
     if not sine >= LIMIT_SINE:

@@ -8,7 +8,7 @@ from math import copysign, degrees, sqrt
 from ..limits import LIMIT_SINE, UnjoinedMessages
 from ..mechanism import crank_scale
 from . import kinematics
-from .parameters import SliderCrankParameters
+from .parameters import Constants, SliderCrankParameters
 
 UNJOINED = UnjoinedMessages(
     "the rod does not reach the guide",
@@ -18,16 +18,16 @@ UNJOINED = UnjoinedMessages(
 )
 
 
-def check_assembly(parameters: SliderCrankParameters, crank_angle: float, shift: float) -> None:
+def check_assembly(crank_angle: float, shift: float, p: Constants) -> None:
     """Check that the rod reaches the guide at a configuration, with a clearance of at least `LIMIT_SINE`.
 
     Parameters
     ----------
-    parameters : SliderCrankParameters
     crank_angle : float
         Crank angle theta1 (rad).
     shift : float
         Axial shift S1 (m).
+    p : Constants
 
     Raises
     ------
@@ -35,7 +35,6 @@ def check_assembly(parameters: SliderCrankParameters, crank_angle: float, shift:
         If the rod does not reach the guide; the message has the configuration, and by how much the rod is too short or how
         near the rod is to perpendicular to the guide.
     """
-    p = parameters.constants()
     square = kinematics.assembly_square(crank_angle, shift, p)
     sine = copysign(sqrt(abs(square)) / p.a2, square)
     if not sine >= LIMIT_SINE:

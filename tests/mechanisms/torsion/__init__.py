@@ -112,6 +112,6 @@ MECHANISM = Mechanism(
     experiment=(0.0, 1.0, 1e-3, 1e-9),
     modules=(equations,),
     equations=Equations.of(equations),
-    check_assembly=lambda parameters, x: None,
+    check_assembly=lambda x, p: None,
     error_scale=equations.error_scale,
 )
