@@ -22,6 +22,7 @@ from .tables import heading_unit
 _CSS = {**LENGTHS, "": INCH / 96, "px": INCH / 96, "pt": INCH / 72, "pc": INCH / 6}
 #: Greatest deviation of the chords from a curve of an SVG file, as a share of the curve's extent.
 _CHORD_ERROR = 1e-4
+_DECIMAL_COMMA = re.compile(r"(?<=\d),(?=\d)")
 #: Greatest extent of a curve of an SVG file (m); a larger extent is taken for a typing error.
 _WIDEST = 1e9
 #: Greatest depth of nested groups and ``<use>`` elements in an SVG file; greatest number of elements after each ``<use>`` is
@@ -40,7 +41,7 @@ def read_points(
     """Read the points of a curve from a CSV or SVG file.
 
     CSV (also ``.txt``): two columns, x and y, separated by commas, semicolons, tabs or spaces; they may have a header line such
-    as ``x [mm],y [mm]``. Empty lines and lines that start with # are ignored. If the last point repeats the first point, it is
+    as ``x [mm],y [mm]``. Where a semicolon or a tab separates them, numbers may have a decimal comma. Empty lines and lines that start with # are ignored. If the last point repeats the first point, it is
     omitted and the curve is closed.
 
     SVG: the first path is read; if there is no path, the first ellipse, circle, polygon, polyline, rectangle or line. ``name``
@@ -110,6 +111,8 @@ def _two_columns(path: Path, text: str) -> tuple[NDArray[np.float64], list[str]]
     rows: list[tuple[float, float]] = []
     header = comment = ""
     for number, line in enumerate(text.splitlines(), start=1):
+        if ";" in line or "\t" in line.strip():
+            line = _DECIMAL_COMMA.sub(".", line)
         cells = re.split(r"\s*[,;]\s*|\s+", line.strip())
         if cells == [""] or line.lstrip().startswith("#"):
             comment = line if not rows and line.strip() else comment

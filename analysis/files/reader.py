@@ -277,7 +277,7 @@ class Many:
                 name, value, "be a list" if self.length is None else f"be a list of {self.length} entries"
             )
         if len(value) < self.least:
-            raise ParameterError(name, value, f"have at least {self.least} entries")
+            raise ParameterError(name, value, f"have at least {self.least} {'entry' if self.least == 1 else 'entries'}")
         return tuple(self.item(v, f"{name}[{k}]") for k, v in enumerate(value))
 
 

@@ -354,8 +354,9 @@ def _sample_angle(turn: ForceTurn, i: int, errors: Mapping[str, FloatArray], qua
         determined = np.abs(lever) > DEAD_CENTRE * turn.parameters.crank_length if with_pole else True
         good = reached & determined
         kept = int(good.sum())
+        chosen = slice(None) if kept == size else good
         for x, all_of_it in [(levers, lever), *((found[name], values[name]) for name in quantities)]:
-            x[count : count + kept] = np.broadcast_to(all_of_it, (size,))[good]
+            x[count : count + kept] = np.broadcast_to(all_of_it, (size,))[chosen]
         count += kept
         missed += size - int(reached.sum())
         dead += int(reached.sum()) - kept

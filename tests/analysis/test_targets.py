@@ -401,6 +401,8 @@ def save(folder: Path, name: str, text: str) -> Path:
         "﻿x; y\n0; 0\n\n1; 0\n1; 2.5\n",
         "# made by hand\nx\ty\n0\t0\n1\t0\n1\t2.5\n",
         " 0   0\n 1e0 0\n 1 , 2.5\n",
+        "x;y\n0,0;0\n1,0;0,0\n1;2,5\n",
+        "0,0\t0\n1,0\t0,0\n1.0,\t2.5\n",
     ],
 )
 def test_points_from_csv(tmp_path: Path, text: str) -> None:

@@ -11,7 +11,7 @@ machine does, including jumps between motions.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from typing import Any
@@ -292,6 +292,9 @@ class Orbits(NotebookResult):
 
     def __len__(self) -> int:
         return len(self.orbits)
+
+    def __iter__(self) -> Iterator[PeriodicOrbit]:
+        return iter(self.orbits)
 
     def __repr__(self) -> str:
         words = [orbit.verdict().stability.value for orbit in self.orbits]
