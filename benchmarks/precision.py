@@ -28,7 +28,6 @@ from benchmarks import engines
 from benchmarks.accuracy import ACCURACY, SCIPY_METHODS, shortest_time
 from benchmarks.engine_cases import CASES, Case, relative_error, run_scipy
 from benchmarks.ensembles import integration_time, without_lanes
-from benchmarks.solvers import run_multipliers
 from linkwork.five_bar.parameters import InitialState
 from linkwork.five_bar.published import SETS, TABLE_3_1
 
@@ -90,7 +89,6 @@ def measure_case(case: Case, say: Callable[[str], None]) -> dict[str, list[Point
     """Measure all solvers that are installed on a case; return their points by name, ours first."""
     found = {OURS: measure_in_process(case, "integration"), "Linkwork, all outputs": measure_in_process(case, "whole")}
     found |= {f"SciPy {method}": measure_scipy(case, method) for method in SCIPY_METHODS}
-    found["multiplier form, SciPy DOP853"] = measure_tolerances(case, partial(run_multipliers, case), 1)
     mujoco, exudyn = engines.ENGINES
     for name, engine, run in (
         ("MuJoCo", mujoco, partial(engines.run_mujoco, iterations=2)),

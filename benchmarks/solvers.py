@@ -1,4 +1,4 @@
-"""Compare the speed of the in-process solver at a stated accuracy with SciPy, the multiplier form, MuJoCo and Exudyn.
+"""Compare the speed of the in-process solver at a stated accuracy with SciPy, MuJoCo and Exudyn.
 
     python -m benchmarks.solvers
 
@@ -18,7 +18,7 @@ import numpy as np
 from rich.console import Console
 from rich.table import Table
 
-from analysis import Event, Inputs, TorsionBar, simulate
+from analysis import Inputs, TorsionBar, simulate
 from benchmarks import engines
 from benchmarks.accuracy import (
     ACCURACY,
@@ -31,7 +31,6 @@ from benchmarks.accuracy import (
 from benchmarks.engine_cases import CASES, Case, relative_error, run_scipy
 from benchmarks.ensembles import integration_time
 from linkwork.five_bar.parameters import InitialState
-from tests.oracles.multipliers import SpeedDrive, simulate_redundant
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -110,54 +109,6 @@ def time_scipy(case: Case) -> Timing:
     return min(timings, key=lambda timing: timing.seconds)
 
 
-def time_multipliers(case: Case) -> Timing:
-    """Time the multiplier form with SciPy's DOP853; the time at which the torsion bar releases is computed beforehand."""
-    rtol, error, reached = loosest_setting(
-        lambda rtol: relative_error(case, run_multipliers(case, rtol)), TOLERANCES[::5]
-    )
-    assert reached, "the multiplier form does not reach the accuracy"
-    seconds = shortest_time(lambda: run_multipliers(case, rtol), 2)
-    return Timing(
-        solver="multiplier form under SciPy", seconds=seconds, error=error, note=f"DOP853, rtol {rtol:.1e}, 8 states"
-    )
-
-
-def run_multipliers(case: Case, rtol: float) -> np.ndarray:
-    """Compute the slider position (m) at the sample times by the multiplier form with SciPy's DOP853."""
-
-    def run(start: InitialState, torque: float, times: np.ndarray, **drive: Any) -> Any:
-        def applied_forces(t: float, q: np.ndarray, qd: np.ndarray) -> tuple[float, ...]:
-            return (torque * (1.0 - q[0] / case.switch_angle), 0.0, 0.0, 0.0)
-
-        return simulate_redundant(case.parameters, start, applied_forces, times, rtol=rtol, atol=rtol * 1e-2, **drive)
-
-    start = InitialState(crank_speed=case.start_speed)
-    if case.crank_speed:
-        return run(start, 0.0, case.times, speed=SpeedDrive(case.crank_speed)).q[:, 3]
-    release = _release_time(case)
-    first = run(start, case.torque, np.append(case.times[case.times < release], release))
-    middle = InitialState(
-        crank_angle=first.q[-1, 0],
-        crank_speed=first.qd[-1, 0],
-        slider_position=first.q[-1, 3],
-        slider_velocity=first.qd[-1, 3],
-    )
-    second = run(middle, 0.0, np.append(release, case.times[case.times > release]))
-    return np.concatenate([first.q[:-1, 3], second.q[1:, 3]])
-
-
-def _release_time(case: Case) -> float:
-    run = simulate(
-        case.parameters,
-        Inputs(torque=TorsionBar(torque=case.torque)),
-        stop_time=case.duration,
-        step=case.duration,
-        tolerance=1e-12,
-        events=[Event(name="release", output="crank.angle", level=case.switch_angle)],
-    )
-    return run.events[0].time
-
-
 def time_engine(engine: engines.Engine, case: Case) -> Timing:
     """Time a multibody engine at its largest step that reaches the accuracy."""
     steps = engines.time_steps(case, engine.first_step, engine.last_step)
@@ -173,7 +124,7 @@ def main() -> None:
     console = Console(width=130)
     for case in CASES:
         timings, remark = time_in_process(case)
-        timings += [time_scipy(case), time_multipliers(case)]
+        timings.append(time_scipy(case))
         missing = []
         plain = engines.ENGINES[0]._replace(run=partial(engines.run_mujoco, stiffened=False))
         for engine in (*engines.ENGINES, plain):

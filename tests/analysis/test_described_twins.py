@@ -18,57 +18,13 @@ from analysis.mechanisms import FIVE_BAR, SLIDER_CRANK
 from analysis.run import Inputs, cosimulate
 from linkwork.mechanism import Mechanism
 from tests import slider_cranks, strategies
-
-
-def polar(distance: float, angle: float) -> list[float]:
-    return [distance * math.cos(angle) or 0, distance * math.sin(angle) or 0]
+from tests.oracles.five_bar import described, spring
 
 
 def rough(case: Any) -> Any:
     """A case of the five-bar with friction by the forces in its joints."""
     p, radii = case.parameters, {f"pin_{joint}_friction_radius": 3e-4 * n for n, joint in enumerate("DCBA", 1)}
     return case._replace(parameters=replace(p, slider_friction_coefficient=0.1, **radii))
-
-
-def spring(p: Any) -> dict[str, Any]:
-    return {
-        "at": "G", "stiffness": p.slider_stiffness, "damping": p.slider_damping,
-        "free": p.slider_spring_free_position, "friction": p.slider_coulomb_friction,
-    }  # fmt: skip
-
-
-def five_bar(p: Any) -> dict[str, Any]:
-    """The five-bar slider in words, of the parameters of the hand-written one."""
-    inertia = p.crank_inertia - p.crank_mass * p.crank_cog_distance**2
-    radii = {joint: getattr(p, f"pin_{joint}_friction_radius") for joint in "ABCD"}
-    return {
-        "friction": radii | {"G": p.slider_friction_coefficient} if p.slider_friction_coefficient else {},
-        "name": "five-bar-described",
-        "ground": {"A": [0, 0], "O": [p.ground_length, 0]},
-        "bodies": {
-            "crank": {
-                "bar": ["A", "B"], "length": p.crank_length, "mass": p.crank_mass, "inertia": inertia,
-                "cog": polar(p.crank_cog_distance, p.crank_cog_angle),
-            },
-            "coupler": {
-                "bar": ["B", "C"], "length": p.coupler_length, "mass": p.coupler_mass, "inertia": p.coupler_inertia,
-                "points": {"P": polar(p.coupler_point_distance, p.coupler_point_angle)},
-                "cog": polar(p.coupler_cog_distance, p.coupler_cog_angle),
-            },
-            "rocker": {
-                "bar": ["D", "C"], "length": p.rocker_length, "mass": p.rocker_mass, "inertia": p.rocker_inertia,
-                "cog": polar(p.rocker_cog_distance, p.rocker_cog_angle),
-            },
-            "block": {"points": {"D": [0, 0]}, "mass": p.slider_mass},
-        },
-        "slides": {"G": {"body": "block", "through": "O", "direction": p.slider_guide_angle}},
-        "freedoms": {"crank": {"joint": "A", "speed": 44.0}, "slider": "G"},
-        "springs": {"spring": spring(p)},
-        "assembly": {"C": p.assembly_branch},
-        "loads": ["P"],
-        "gravity": p.gravity,
-        "gravity_direction": -0.5 * math.pi - p.ground_inclination,
-    }  # fmt: skip
 
 
 def slider_crank(p: Any) -> dict[str, Any]:
@@ -136,8 +92,8 @@ OUTPUTS = {
     ),
 }
 WORDS: dict[str, tuple[Mechanism, Callable[[Any], dict[str, Any]], Callable[[int], Any]]] = {
-    "five-bar": (FIVE_BAR, five_bar, strategies.seeded),
-    "rough-five-bar": (FIVE_BAR, five_bar, lambda seed: rough(strategies.seeded(seed))),
+    "five-bar": (FIVE_BAR, described, strategies.seeded),
+    "rough-five-bar": (FIVE_BAR, described, lambda seed: rough(strategies.seeded(seed))),
     "slider-crank": (SLIDER_CRANK, slider_crank, lambda seed: planar(slider_cranks.seeded(seed), seed % 2 == 0)),
 }
 

@@ -18,9 +18,10 @@ from analysis.run import table
 from analysis.slider import best_spring, inverse_dynamics
 from analysis.slider.inverse import NAMES
 from linkwork.errors import AssemblyError, InputError
+from linkwork.five_bar import dynamics
 from linkwork.five_bar.parameters import InitialState
 from linkwork.five_bar.published import SETS, TABLE_3_1
-from tests.oracles.multipliers import FORCE_NAMES, assemble, rates, solve_multipliers
+from tests.oracles.five_bar import FORCE_NAMES, solve
 
 RIG, SPEED = SETS["rig-2-spring-c"].parameters, SETS["rig-2-spring-c"].crank_speed
 MOTION = FourierSeries(np.array([0.002, 0.004, 0.001]), np.array([0.0, 0.003, -0.002]))
@@ -94,16 +95,9 @@ def test_the_redundant_form_has_the_same_forces(case) -> None:
     """Accelerations, torque and nine pin forces, with Lagrange multipliers in redundant coordinates."""
     acceleration = case.crank_speed**2 * MOTION.derivative().derivative()(case.crank_angle)
     for index in range(0, len(case.time), 500):
-        th2, u, w2, v = case.states[index, :4].tolist()
-        q = assemble(case.parameters, th2, u)
-        solution = solve_multipliers(
-            case.parameters,
-            q,
-            rates(case.parameters, q, w2, v),
-            slider_force=float(case.force[index]),
-            load=load(th2),
-            crank_acceleration=0.0,
-        )
+        state = case.states[index, :4].tolist()
+        acting = dynamics.Inputs(1.0, 0.0, 0.0, float(case.force[index]), *load(state[0]))
+        solution = solve(case.parameters, state, acting)
         scale = np.abs([case[name][index] for name in FORCE_NAMES]).max()
         assert solution.accelerations[3] == pytest.approx(acceleration[index], rel=1e-9, abs=1e-9)
         assert solution.torque == pytest.approx(case.torque[index], abs=1e-10 * scale)

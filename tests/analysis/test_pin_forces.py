@@ -18,8 +18,9 @@ from analysis.run import read_case, simulate
 from analysis.synthesis.linkage.machine import pin_functions
 from analysis.synthesis.task.constraint import InfeasibleError, RotationRange
 from linkwork.errors import InputError, ParameterError
+from linkwork.five_bar.dynamics import Inputs
 from linkwork.five_bar.parameters import FiveBarParameters
-from tests.oracles import multipliers
+from tests.oracles.five_bar import solve
 
 LINKAGE = syn.Linkage(
     pivot_x=0.1, pivot_y=-0.2, ground_length=0.25, crank_length=0.07, coupler_length=0.2, rocker_length=0.18,
@@ -46,13 +47,10 @@ def plant(linkage: syn.Linkage, make: syn.MachineSpec) -> FiveBarParameters:
 def by_multipliers(linkage: syn.Linkage, make: syn.MachineSpec, rotation: float) -> np.ndarray:
     """Magnitudes of the forces on the pins A to D, the slider so heavy that it stands still."""
     p = plant(linkage, make)
-    q = multipliers.assemble(p, rotation + linkage.crank_phase, 0.0)
-    qd = multipliers.rates(p, q, make.speed, 0.0)
     c, s = cos(linkage.ground_angle), sin(linkage.ground_angle)
     x, y = make.load
-    load = c * x + s * y, c * y - s * x
-    held = p.slider_mass * p.gravity * s
-    found = multipliers.solve_multipliers(p, q, qd, slider_force=held, load=load, crank_acceleration=0.0)
+    acting = Inputs(1.0, 0.0, 0.0, p.slider_mass * p.gravity * s, c * x + s * y, c * y - s * x)
+    found = solve(p, (rotation + linkage.crank_phase, 0.0, make.speed, 0.0), acting)
     return np.array([hypot(found.forces[f"pin.{pin}.fx"], found.forces[f"pin.{pin}.fy"]) for pin in "ABCD"])
 
 

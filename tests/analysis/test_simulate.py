@@ -15,6 +15,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from scipy.integrate import solve_ivp
 
 from analysis import (
     Function,
@@ -48,7 +49,7 @@ from linkwork.five_bar.published import DYN_CM_PER_NEWTON_METRE, DYN_PER_NEWTON,
 from linkwork.limits import LIMIT_SINE
 from tests import published
 from tests.fmu.runner import run_in_process
-from tests.oracles.multipliers import SpeedDrive, rates, simulate_redundant, solve_multipliers
+from tests.oracles.five_bar import Known, solve
 from tests.strategies import seeded
 
 #: The compiled code of the five-bar.
@@ -111,29 +112,20 @@ def test_the_multiplier_form_gives_the_same_motion_and_forces(case: str) -> None
     ours = run(case, stop_time=stop, step=stop / 4, initial=initial, tolerance=1e-11)
     encoded = encode(inputs, FIVE_BAR)
 
-    def acting(t: float, q: np.ndarray, qd: np.ndarray) -> tuple[float, float, float, float]:
-        x = np.array([q[0], q[3], qd[0], qd[3]])
-        torque, _, _, force, load_x, load_y = sample(encoded, t, x, encoded.source.laws)
-        return torque, force, load_x, load_y
+    def known(t: float, x: Any) -> Known:
+        torque, _, _, force, *load = sample(encoded, t, np.asarray(x), encoded.source.laws)
+        return solve(parameters, x, dynamics.Inputs("speed" in inputs, torque, 0.0, force, *load))
 
-    speed = SpeedDrive(SPEED) if "speed" in inputs else None
-    theirs = simulate_redundant(parameters, initial, acting, ours.time, speed=speed)
-    for column, name, scale in ((0, "crank.angle", 1.0), (3, "slider.position", 0.01)):
-        assert np.abs(theirs.q[:, column] - ours[name]).max() < 1e-8 * scale
-    for column, name, scale in ((0, "crank.speed", SPEED), (3, "slider.velocity", 0.5)):
-        assert np.abs(theirs.qd[:, column] - ours[name]).max() < 1e-8 * scale
+    def rates(t: float, x: Any) -> Any:
+        return [*x[2:], *known(t, x).accelerations[[0, 3]]]
+
+    names = ("crank.angle", "slider.position", "crank.speed", "slider.velocity")
+    start = [ours[name][0] for name in names]
+    theirs = solve_ivp(rates, (0.0, stop), start, "DOP853", ours.time, rtol=1e-10, atol=1e-12).y
+    for name, column, scale in zip(names, theirs, (1.0, 0.01, SPEED, 0.5)):
+        assert np.abs(column - ours[name]).max() < 1e-8 * scale
     for i, t in enumerate(ours.time):
-        qd = rates(parameters, theirs.q[i], *theirs.qd[i, [0, 3]])
-        torque, force, load_x, load_y = acting(t, theirs.q[i], qd)
-        solution = solve_multipliers(
-            parameters,
-            theirs.q[i],
-            qd,
-            torque=torque,
-            slider_force=force,
-            load=(load_x, load_y),
-            crank_acceleration=0.0 if speed else None,
-        )
+        solution = known(t, theirs[:, i])
         largest = max(abs(f) for f in solution.forces.values())
         for name, f in solution.forces.items():
             assert ours[name][i] == pytest.approx(f, abs=1e-6 * largest)

@@ -17,7 +17,7 @@ from analysis.youssef.printed_coefficients import DATUM, listed, ratios
 from analysis.youssef.printed_coefficients import printed as as_printed
 from linkwork.five_bar.published import TABLE_3_1, chapter_4
 from tests import published
-from tests.oracles.multipliers import assemble
+from tests.oracles.five_bar import assemble
 
 TURN = np.linspace(0.0, 2.0 * pi, 64, endpoint=False)
 

@@ -20,9 +20,10 @@ import numpy as np
 from scipy.integrate import solve_ivp
 
 from analysis.units import RAD_S_PER_RPM
+from linkwork.five_bar.dynamics import Inputs
 from linkwork.five_bar.published import SETS
 
-from . import multipliers
+from .five_bar import solve
 
 #: Function of a library, which supplies functions such as sin, of (x, v, c, s) and of the parameter's value: the derivatives of
 #: x and v with respect to the crank angle.
@@ -91,10 +92,8 @@ def five_bar(library: Any, u: Sequence[Any], speed: Any) -> Sequence[Any]:
     """Return the derivatives for rig 1 with spring B in redundant coordinates with multipliers; u is in crank lengths."""
     x, v, c, s = (float(value) for value in u)
     length = RIG.crank_length
-    q = multipliers.assemble(RIG, np.arctan2(s, c), length * x)
-    qd = multipliers.rates(RIG, q, speed, length * speed * v)
-    matrix, right = multipliers._system(RIG, q, qd, (0.0, 0.0, 0.0, 0.0), 0.0)
-    return v, float(np.linalg.solve(matrix, right)[3]) / (length * speed * speed)
+    state = float(np.arctan2(s, c)), length * x, speed, length * speed * v
+    return v, float(solve(RIG, state, Inputs(1.0, 0.0, 0.0, 0.0, 0.0, 0.0)).accelerations[3]) / (length * speed * speed)
 
 
 RPM = RAD_S_PER_RPM

@@ -7,6 +7,7 @@ constraint equations; accelerations and joint forces follow from one linear syst
 from __future__ import annotations
 
 from collections.abc import Mapping
+from functools import cached_property
 from itertools import pairwise
 from typing import Any, NamedTuple
 
@@ -14,6 +15,7 @@ import casadi
 import numpy as np
 import pint
 from scipy.integrate import solve_ivp
+from scipy.optimize import root
 
 from analysis.linkages.description import GROUND, Description
 from linkwork.friction import FRICTION_FORCE, FRICTION_RATE, FRICTION_SPEED
@@ -35,11 +37,27 @@ def interpolated(rows: list[list[float]], x: Any) -> Any:
     return found
 
 
+def refined_solve(matrix: np.ndarray, right: np.ndarray) -> np.ndarray:
+    """Solve a system for several right-hand sides; it is scaled by powers of two and refined in extended precision.
+
+    The matrix is symmetric but for signs.
+    """
+    scale = np.ones(len(matrix))
+    for _ in range(3):
+        scale /= np.sqrt(np.abs(matrix * np.outer(scale, scale)).max(axis=1))
+    scale = np.ldexp(1.0, np.round(np.log2(scale)).astype(int))
+    a, b = matrix * np.outer(scale, scale), right * scale[:, None]
+    x = np.linalg.solve(a, b).astype(np.longdouble)
+    for _ in range(2):
+        x += np.linalg.solve(a, (b - a.astype(np.longdouble) @ x).astype(float))
+    return x.astype(float) * scale[:, None]
+
+
 class Solution(NamedTuple):
     """Accelerations of the freedoms, loads on them, joint forces and kinetic energy.
 
     ``forces`` are (x, y) for a pin, (force across, couple) for a slide, by joint. ``friction`` is the force along each slot
-    that has friction.
+    that has friction, ``lost`` the power of all friction by joint forces, ``places`` the accelerations of the bodies' places.
     """
 
     accelerations: np.ndarray
@@ -47,6 +65,8 @@ class Solution(NamedTuple):
     forces: dict[str, np.ndarray]
     kinetic: float
     friction: dict[str, float]
+    lost: float
+    places: np.ndarray
 
 
 class Multipliers:
@@ -63,7 +83,8 @@ class Multipliers:
                 owners.setdefault(own, []).append(name)
         self.owners = owners
         self.rows: dict[str, tuple[int, int]] = {}
-        self._functions: dict[Any, Any] = {}
+        self.loaded = [load.point for load in description.loads]
+        self.pushed = [*description.torques, *(name for name, s in description.springs.items() if s.driven)]
         #: Whole turns in the angles of torsion springs, where the linkage counts them.
         self.turns: dict[str, int] = {}
         rows: list[Any] = []
@@ -221,18 +242,18 @@ class Multipliers:
                 return q
         return q
 
-    def function(self, points: Mapping[str, tuple[float, float]], forces: Mapping[str, float]) -> Any:
-        """Return a function of places and velocities, for given forces on points and forces of springs.
+    @cached_property
+    def equations(self) -> Any:
+        """A function of places, velocities, and what `given` returns.
 
         It returns the Jacobian of closure and freedoms, their drift, the mass matrix, the generalised forces and the kinetic
         energy.
         """
-        key = (*points.items(), *forces.items())
-        if key not in self._functions:
-            self._functions[key] = self._made(points, forces)
-        return self._functions[key]
-
-    def _made(self, points: Mapping[str, tuple[float, float]], forces: Mapping[str, float]) -> Any:
+        given = casadi.SX.sym("given", 2 * len(self.loaded) + len(self.pushed) + len(self.d.springs))
+        acting = iter(casadi.vertsplit(given) if given.numel() else [])
+        points = {own: (next(acting), next(acting)) for own in self.loaded}
+        forces = {name: next(acting) for name in self.pushed}
+        turns = {name: next(acting) for name in self.d.springs}
         jacobian = casadi.jacobian(casadi.vertcat(self.closure, self.freedoms), self.q)
         drift = casadi.jtimes(
             casadi.jtimes(casadi.vertcat(self.closure, self.freedoms), self.q, self.v), self.q, self.v
@@ -255,7 +276,7 @@ class Multipliers:
             about = s.bodies or s.at in self.owners
             if about and s.at not in freed:
                 # an angle that is no freedom's coordinate is known only up to whole turns
-                x = casadi.atan2(casadi.sin(x), casadi.cos(x)) + 2.0 * np.pi * self.turns.get(name, 0)
+                x = casadi.atan2(casadi.sin(x), casadi.cos(x)) + 2.0 * np.pi * turns[name]
             known = {own: value for own, (value, _) in s.constants.items()}
             functions = {"fabs": casadi.fabs, "tanh": casadi.tanh}
             if isinstance(s.law, tuple):
@@ -277,7 +298,13 @@ class Multipliers:
                 fx, fy = c * fx - s * fy, s * fx + c * fy
             force += fx * casadi.gradient(x, self.q) + fy * casadi.gradient(y, self.q)
         inertia_of = casadi.jacobian(momentum, self.v)
-        return casadi.Function("f", [self.q, self.v], [jacobian, drift, inertia_of, force, kinetic])
+        return casadi.Function("f", [self.q, self.v, given], [jacobian, drift, inertia_of, force, kinetic])
+
+    def given(self, points: Mapping[str, tuple[float, float]], forces: Mapping[str, float]) -> list[float]:
+        """Return forces on points, torques on bodies and forces of driven springs, and the turns of springs, in their order."""
+        loads = [part for own in self.loaded for part in points.get(own, (0.0, 0.0))]
+        turns = [self.turns.get(name, 0) for name in self.d.springs]
+        return [*loads, *(forces.get(name, 0.0) for name in self.pushed), *turns]
 
     def rubbing(self, q: np.ndarray, v: np.ndarray) -> dict[str, tuple[float, np.ndarray]]:
         """Return the friction of each joint per newton of joint force: along its coordinate, and in all coordinates."""
@@ -303,11 +330,11 @@ class Multipliers:
         Freedoms have the given loads, or commanded accelerations by their index. ``points`` are forces on points, ``forces``
         torques on bodies and forces of driven springs, by name.
         """
-        f = self.function(points, forces)
-        j = np.asarray(f(q, np.zeros(len(q)))[0])
+        acting = self.given(points, forces)
+        j = np.asarray(self.equations(q, np.zeros(len(q)), acting)[0])
         size, count = self.closure.numel(), self.freedoms.numel()
         v = np.linalg.solve(j, np.concatenate([np.zeros(size), rates]))
-        j, d, m, right, energy = (np.asarray(a) for a in f(q, v))
+        j, d, m, right, energy = (np.asarray(a) for a in self.equations(q, v, acting))
         closed, along = j[:size], j[size:]
         held = sorted(commanded)
         free = [n for n in range(count) if n not in commanded]
@@ -319,28 +346,39 @@ class Multipliers:
         matrix[len(q) :, : len(q)] = constraints
         wanted = np.concatenate([-d[:size, 0], [commanded[n] - d[size + n, 0] for n in held]])
         rubbing = self.rubbing(q, v)
-        rubbed, before = np.zeros(len(q)), np.full(len(q), np.inf)
-        # iterate between the joint forces and the friction that depends on them
-        for _ in range(200):
-            solution = np.linalg.solve(
-                matrix, np.concatenate([right[:, 0] + along[free].T @ loads[free] + rubbed, wanted])
-            )
-            multipliers = solution[len(q) :]
+        columns = [np.concatenate([right[:, 0] + along[free].T @ loads[free], wanted])]
+        columns += [np.concatenate([rub, np.zeros(len(wanted))]) for _, rub in rubbing.values()]
+        responses = refined_solve(matrix, np.array(columns).T)
+
+        def joints_of(sizes: np.ndarray) -> dict[str, np.ndarray]:
+            """The joint forces where those that make friction have these sizes."""
+            multipliers = (responses @ [1.0, *sizes])[len(q) :]
             joints = {name: multipliers[a:b] for name, (a, b) in self.rows.items()}
             for name, gear in self.d.gears.items():
                 self.share(joints, q, gear, float(joints[name][0]))
             for name, rack in self.d.racks.items():
                 self.pull(joints, q, rack, float(joints[name][0]))
-            sizes = {name: np.hypot(FRICTION_FORCE, joints[name][0]) for name in rubbing}
-            sizes |= {name: np.hypot(sizes[name], joints[name][1]) for name in rubbing.keys() & self.owners.keys()}
-            before, rubbed = rubbed, sum((sizes[name] * rub for name, (_, rub) in rubbing.items()), np.zeros(len(q)))
-            if np.abs(rubbed - before).max() <= 1e-14 * np.abs(rubbed).max(initial=0.0):
-                break
+            return joints
+
+        def made(sizes: np.ndarray) -> np.ndarray:
+            joints = joints_of(sizes)
+            parts = [joints[name] if name in self.owners else joints[name][:1] for name in rubbing]
+            return np.array([np.hypot(FRICTION_FORCE, np.linalg.norm(part)) for part in parts])
+
+        sizes = made(np.zeros(len(rubbing)))
+        for _ in range(2 if rubbing else 0):
+            scale = sizes
+            sizes = scale * root(lambda z, scale=scale: made(scale * z) / scale - z, np.ones(len(sizes)), tol=1e-15).x
+        assert np.abs(made(sizes) - sizes).max(initial=0.0) < 1e-10 * sizes.max(initial=1.0)
+        solution, joints = responses @ [1.0, *sizes], joints_of(sizes)
+        multipliers = solution[len(q) :]
+        rubbed = sum((size * rub for size, (_, rub) in zip(sizes, rubbing.values())), np.zeros(len(q)))
         accelerations = along @ solution[: len(q)] + d[size:, 0]
         all_loads = loads.copy()
         all_loads[held] = multipliers[size:]
-        along_slots = {name: float(sizes[name]) * rubbing[name][0] for name in rubbing.keys() & self.d.slots.keys()}
-        return Solution(accelerations, all_loads, joints, float(energy[0, 0]), along_slots)
+        along_slots = {name: size * rubbing[name][0] for name, size in zip(rubbing, sizes) if name in self.d.slots}
+        lost = -float(rubbed @ v)
+        return Solution(accelerations, all_loads, joints, float(energy[0, 0]), along_slots, lost, solution[: len(q)])
 
     def on_bodies(
         self, solution: Solution, pulls: Mapping[str, float], q: np.ndarray

@@ -29,7 +29,7 @@ from tests import published, slider_cranks, strategies
 from tests.oracles import bodies
 from tests.oracles.bodies import Body, in_plane
 from tests.oracles.differences import along
-from tests.oracles.multipliers import FORCE_NAMES, assemble, rates, solve_multipliers
+from tests.oracles.five_bar import solve
 from tests.published import CM, DYN, DYN_CM
 from tests.strategies import Case, cases, seeded
 
@@ -366,16 +366,7 @@ def assert_agrees_with_multipliers(case: Case, i: D.Inputs) -> None:
     p = case.parameters.constants()
     x = case.state
     e = FIVE_BAR.evaluate(x, i, p)
-    q = assemble(case.parameters, x[0], x[1])
-    solution = solve_multipliers(
-        case.parameters,
-        q,
-        rates(case.parameters, q, x[2], x[3]),
-        torque=i.torque,
-        slider_force=i.force,
-        load=(i.load_x, i.load_y),
-        crank_acceleration=i.acceleration if i.speed_drive else None,
-    )
+    solution = solve(case.parameters, x, i)
     # relative to the largest of the like quantities: those of the crank pin are what one of the slider compares with
     angular = solution.accelerations[:3]
     tolerance = 1e-12 * np.abs(angular).max()
@@ -385,14 +376,14 @@ def assert_agrees_with_multipliers(case: Case, i: D.Inputs) -> None:
     assert e.motion.slider_acceleration == pytest.approx(
         slider, rel=0.0, abs=max(1e-12 * abs(slider), p.l2 * tolerance)
     )
-    forces = tuple(solution.forces[name] for name in FORCE_NAMES)
+    forces = tuple(solution.forces.values())
     tolerance = 1e-12 * max(abs(f) for f in forces)
     assert tuple(e.forces) == pytest.approx(forces, rel=0.0, abs=tolerance)
     assert e.motion.torque == pytest.approx(solution.torque, rel=1e-12, abs=p.l2 * tolerance)
 
 
 @pytest.mark.parametrize("drive", FIVE_BAR.drives)
-@settings(max_examples=200, derandomize=True, deadline=None)
+@settings(max_examples=60, derandomize=True, deadline=None)
 @given(case=cases())
 def test_redundant_form_agrees(drive: str, case: Case) -> None:
     assert_agrees_with_multipliers(case, case.inputs(drive))
@@ -400,7 +391,7 @@ def test_redundant_form_agrees(drive: str, case: Case) -> None:
 
 def test_redundant_form_agrees_on_seeded_mechanisms() -> None:
     # hypothesis likes round numbers; these are general ones
-    for seed in range(250):
+    for seed in range(80):
         case = seeded(seed)
         assert_agrees_with_multipliers(case, case.torque_inputs)
         assert_agrees_with_multipliers(case, case.speed_inputs)

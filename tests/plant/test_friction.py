@@ -1,4 +1,4 @@
-"""Friction in guide and pins of the five-bar: against Newton and Euler, textbook cases, energy, the limit of jamming."""
+"""Friction in guide and pins of the five-bar: against multipliers, textbook cases, energy, the limit of jamming."""
 
 from __future__ import annotations
 
@@ -16,9 +16,8 @@ from linkwork.five_bar.parameters import FiveBarParameters, InitialState
 from linkwork.five_bar.published import SETS, TABLE_3_1
 from linkwork.friction import FRICTION_FORCE, FRICTION_RATE, FRICTION_SPEED
 from linkwork.plant import Plant
-from tests.oracles import friction
 from tests.oracles.differences import along
-from tests.oracles.multipliers import FORCE_NAMES
+from tests.oracles.five_bar import FORCE_NAMES, solve
 from tests.strategies import FRICTION, PINS, rough, seeded
 
 both_drives = pytest.mark.parametrize("drive", ["torque", "speed"])
@@ -34,11 +33,11 @@ def forces(o: D.Outputs) -> tuple[float, ...]:
 @both_drives
 @pytest.mark.parametrize("only", [(), *((name,) for name in FRICTION)], ids=["all", "guide", *"ABCD"])
 @pytest.mark.parametrize("seed", range(12))
-def test_newton_and_euler_agree(seed: int, only: tuple[str, ...], drive: str) -> None:
+def test_joint_forces_by_multipliers_agree(seed: int, only: tuple[str, ...], drive: str) -> None:
     case = rough(seed, drive, *only)
     x, i, par = case.state, case.inputs(drive), case.parameters
     o, dx = D.outputs(x, i, 0.0, case.p), D.derivative(x, i, case.p)
-    known = friction.solve(par, x, i)
+    known = solve(par, x, i)
     size = np.abs(known.accelerations[:3]).max()
     assert o.crank_acceleration == pytest.approx(known.accelerations[0], abs=1e-9 * size)
     assert o.slider_acceleration == pytest.approx(known.accelerations[3], abs=1e-9 * size * par.crank_length)
@@ -175,7 +174,7 @@ def test_friction_that_would_jam_the_links_is_refused() -> None:
         go()
     # the last good state stays, and what is asked of it is right
     before = plant.outputs()
-    known = friction.solve(par, plant.state, D.Inputs(1.0, 0.0, 0.0, 0.0, 0.0, 0.0))
+    known = solve(par, plant.state, D.Inputs(1.0, 0.0, 0.0, 0.0, 0.0, 0.0))
     assert forces(before) == pytest.approx(tuple(known.forces.values()), rel=1e-7)
     initial = InitialState(crank_angle=plant.state[0], slider_velocity=plant.state[3])
     with pytest.raises(JammingError):
