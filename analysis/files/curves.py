@@ -41,8 +41,8 @@ def read_points(
     """Read the points of a curve from a CSV or SVG file.
 
     CSV (also ``.txt``): two columns, x and y, separated by commas, semicolons, tabs or spaces; they may have a header line such
-    as ``x [mm],y [mm]``. Where a semicolon or a tab separates them, numbers may have a decimal comma. Empty lines and lines that start with # are ignored. If the last point repeats the first point, it is
-    omitted and the curve is closed.
+    as ``x [mm],y [mm]``. Where a semicolon or a tab separates them, numbers may have a decimal comma. Empty lines and lines
+    that start with # are ignored. If the last point repeats the first point, it is omitted and the curve is closed.
 
     SVG: the first path is read; if there is no path, the first ellipse, circle, polygon, polyline, rectangle or line. ``name``
     selects an element by its ``id``; if the element is a group, the first path or shape in the group is read. Transforms are

@@ -450,7 +450,7 @@ def assembled_ranges(parameters: SliderCrankParameters, law: PeriodicShift) -> t
     if not found:
         nearest = greatest_margin(parameters, law).crank_angle
         try:
-            check_assembly(parameters, nearest, law.at(nearest)[0])
+            check_assembly(nearest, law.at(nearest)[0], parameters.constants())
         except AssemblyError as error:
             raise AssemblyError(
                 f"it cannot be assembled at any crank angle; where it comes nearest to it, {error}"
