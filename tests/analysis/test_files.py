@@ -245,14 +245,6 @@ def test_values_are_replaced_at_any_depth():
 # Tables of numbers
 
 
-def test_csv_keeps_every_digit_and_its_header(tmp_path):
-    values = np.array([0.1, 1 / 3, 1e-300])
-    path = write_csv(tmp_path / "x.csv", {"a [m]": values, "b [N]": -values})
-    assert path.read_text().splitlines()[0] == "a [m],b [N]"
-    assert np.array_equal(np.loadtxt(path, delimiter=",", skiprows=1)[:, 0], values)
-    assert not list(tmp_path.rglob("*.part"))
-
-
 @pytest.mark.parametrize("harm", ["flipped", "cut", "longer", "junk", "empty", "of another library"])
 def test_a_damaged_array_is_not_there(tmp_path, harm):
     path = save_array(tmp_path / "x.npy", [[1.0, 2.0]])

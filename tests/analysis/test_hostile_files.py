@@ -28,7 +28,6 @@ from analysis.files import (
     read_tables,
     save_array,
     save_figure,
-    write_csv,
     write_text,
 )
 from analysis.run import CASES, CosimulationError, load_case, read_case
@@ -383,15 +382,6 @@ def test_the_option_force(tmp_path, linkwork):
         assert not result.stderr
     assert len(read_record(tmp_path / "out" / "table-3.1.csv", ("time",))[1][0]) > 1
     assert outputs.RECORD in os.listdir(tmp_path / "out")
-
-
-@pytest.mark.parametrize("text", ["=1+1", "+cmd|' /C calc'!A0", "-2+3", "@SUM(A1)", "\t=1", "\r=1"])
-def test_cells_are_not_executed(tmp_path, text):
-    path = write_csv(tmp_path / "x.csv", {text: [1.0], "-1.5": [2.0], 'a "b", c': [-3.0], "two\nlines": [4.0]})
-    names = list(read_rows(path)[0])
-    assert names[0][0] == "'"
-    assert names[1:] == ["-1.5", 'a "b", c', "two lines"]
-    assert read_record(path, [None] * 4)[1] == [1.0, 2.0, -3.0, 4.0]
 
 
 # Messages

@@ -135,14 +135,6 @@ def test_induction_motor_is_kloss_formula(speed: float) -> None:
     assert value(motor, 3.0, x=[0, 0, speed, 0])["torque"] == pytest.approx(expected, rel=1e-13)
 
 
-def test_induction_motor_pulls_most_at_breakdown() -> None:
-    motor = Inputs(torque=InductionMotor(breakdown_torque=5.0, breakdown_slip=0.2, synchronous_speed=50.0))
-    speeds = np.linspace(0.0, 50.0, 501)
-    torques = [value(motor, 0.0, x=[0, 0, w, 0])["torque"] for w in speeds]
-    assert max(torques) == pytest.approx(5.0, rel=1e-12)
-    assert speeds[int(np.argmax(torques))] == pytest.approx(40.0)
-
-
 def test_functions_see_time_and_state() -> None:
     at = value(
         Inputs(
@@ -267,6 +259,7 @@ def test_a_signal_keeps_its_numbers_to_itself() -> None:
         (lambda: Piecewise([0.0, 1.0], [[1.0, 2.0]]), r"shape \(1, 4\)"),
         (lambda: Harmonics(0.0, [1.0], [2.0], []), "as many amplitudes"),
         (lambda: Harmonics(nan), "finite numbers"),
+        (lambda: Harmonics(1.0, 5.0, 30.0, 0.3), "must be lists of numbers"),
         (lambda: Harmonics(0.0, [1.0], [inf], [0.0]), "finite numbers"),
         (lambda: TorsionBar(torque=nan), "finite number of N.m"),
         (lambda: TorsionBar(torque=1.0, release_angle=0.0), "above 0 rad"),
@@ -297,26 +290,6 @@ def test_function_of_a_wrong_kind_of_value() -> None:
 def test_input_that_is_not_finite_is_named_with_its_time(inputs: Inputs, name: str) -> None:
     with pytest.raises(InputError, match=f"the input {name} is not a finite number at t = 1e.40 s"):
         value(inputs, 1e40)
-
-
-def test_ramp_of_half_a_turn_in_numbers() -> None:
-    # the speed goes from 0 to 2 pi in one second: half a turn under it
-    inputs = Inputs(speed=ramp(0.0, 2.0 * pi, 0.0, 1.0))
-    middles = (np.arange(1000) + 0.5) / 1000
-    assert sum(value(inputs, t)["speed"] for t in middles) / 1000 == pytest.approx(pi, rel=1e-12)
-
-
-@pytest.mark.parametrize(
-    ("make", "said"),
-    [
-        (lambda: ramp(1.0, 2.0, 0.3, 0.3), "it must end after it begins"),
-        (lambda: ramp(1.0, 2.0, 0.3, nan), "it must end after it begins"),
-        (lambda: Harmonics(1.0, 5.0, 30.0, 0.3), "must be lists of numbers"),  # type: ignore[arg-type]
-    ],
-)
-def test_slips_in_a_signal_are_reported_in_its_own_words(make: Any, said: str) -> None:
-    with pytest.raises(InputError, match=said):
-        make()
 
 
 def test_inputs_that_a_master_can_hold_without_loss() -> None:

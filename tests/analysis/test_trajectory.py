@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import csv
-import sys
 from pathlib import Path
 
 import numpy as np
@@ -95,12 +94,6 @@ def test_data_frame(trajectory: Trajectory) -> None:
     assert np.array_equal(frame["pin.B.fy"].to_numpy(), trajectory["pin.B.fy"])
 
 
-def test_data_frame_without_pandas(trajectory: Trajectory, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setitem(sys.modules, "pandas", None)
-    with pytest.raises(ImportError, match="pandas"):
-        trajectory.to_dataframe()
-
-
 def test_plot_shows_the_outputs_with_their_units(trajectory: Trajectory) -> None:
     figure = figures.plot(trajectory, ["slider.position", "crank.speed", "pin.A.fx"], title="three")
     assert isinstance(figure, figures.Figure)
@@ -126,10 +119,3 @@ def test_angles_are_unwrapped_where_their_turns_can_be_counted() -> None:
     np.testing.assert_allclose(run.unwrapped("coupler.angle"), turned, atol=1e-12)
     for name in ("rocker.angle", "slider.position"):
         assert np.array_equal(run.unwrapped(name), run[name])
-
-
-def test_run_cannot_be_changed(trajectory: Trajectory) -> None:
-    with pytest.raises(AttributeError):
-        trajectory.status = 3  # type: ignore[misc]
-    with pytest.raises(TypeError):
-        trajectory.units["crank.angle"] = "deg"  # type: ignore[index]

@@ -224,8 +224,3 @@ class Instance:
         value = c_int()
         status = self._call("GetBooleanStatus", c_int(3), byref(value))
         return status, value.value
-
-    def last_successful_time(self):
-        value = c_double()
-        status = self._call("GetRealStatus", c_int(2), byref(value))
-        return status, value.value

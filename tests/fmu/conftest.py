@@ -46,12 +46,6 @@ def five_bar(fmus: dict[str, Path]) -> Path:
     return fmus["FiveBarSlider"]
 
 
-@pytest.fixture(scope="session")
-def slider_crank(fmus: dict[str, Path]) -> Path:
-    """Return SliderCrank.fmu, for tests of its mechanics."""
-    return fmus["SliderCrank"]
-
-
 @pytest.fixture
 def description(fmu: Path) -> ElementTree.Element:
     """Return the root of the model description of the FMU under test."""

@@ -5,10 +5,9 @@ from __future__ import annotations
 from typing import Any
 
 import pytest
-from pythonfmu.enums import Fmi2Status
 
 from build_fmu import FMUS
-from linkwork.errors import LinkworkError, ParameterError
+from linkwork.errors import ParameterError
 from slave import LinkworkSlave
 
 from .models import Model
@@ -72,18 +71,6 @@ def test_no_exception_escapes_from_a_read(slave: LinkworkSlave, monkeypatch: pyt
     assert "something" in value(slave, "solver.message")
 
 
-def test_refusal_is_logged_once_and_readable(slave: LinkworkSlave, monkeypatch: pytest.MonkeyPatch) -> None:
-    def fail(time: float, step: float) -> None:
-        raise RuntimeError("at 50 % of the way")
-
-    monkeypatch.setattr(slave._plant, "step", fail)
-    slave.do_step(0.0, 1e-3)
-    (message,) = slave.log_queue
-    assert message.status == Fmi2Status.discard
-    assert "at 50 % of the way" in message.msg
-    assert "at 50 % of the way" in value(slave, "solver.message")
-
-
 def test_bad_parameter_is_raised_by_the_initialisation_alone(kind: type[LinkworkSlave]) -> None:
     slave = kind(instance_name="slave")
     reference = [v.name for v in slave.variables].index("crank.length")
@@ -100,25 +87,6 @@ def test_bad_parameter_is_raised_by_the_initialisation_alone(kind: type[Linkwork
     slave.exit_initialization_mode()
     assert value(slave, "solver.status") == 0
     assert slave.do_step(0.0, 1e-3)
-
-
-def test_reading_a_variable_of_another_type_is_an_error_with_a_sentence(slave: LinkworkSlave) -> None:
-    reference = [v.name for v in slave.variables].index("crank.length")
-    with pytest.raises(LinkworkError, match=r"variable crank\.length is not of type Integer"):
-        slave.get_integer([reference])
-    with pytest.raises(LinkworkError, match="no variable with the value reference -1"):
-        slave.get_real([-1])
-
-
-def test_saved_state_does_not_change_with_the_slave(slave: LinkworkSlave) -> None:
-    state = slave._get_fmu_state()
-    data = slave._fmu_state_to_bytes(state)
-    for k in range(5):
-        slave.do_step(k * 1e-3, 1e-3)
-    assert slave._fmu_state_to_bytes(state) == data
-    slave._set_fmu_state(state)
-    slave.do_step(0.0, 1e-3)
-    assert slave._fmu_state_to_bytes(state) == data
 
 
 def test_master_tolerance_outside_the_range_is_brought_into_it(kind: type[LinkworkSlave]) -> None:

@@ -30,7 +30,7 @@ from tests.oracles import bodies
 from tests.oracles.bodies import Body, in_plane
 from tests.oracles.differences import along
 from tests.oracles.five_bar import solve
-from tests.published import CM, DYN, DYN_CM
+from tests.published import CM, DYN
 from tests.strategies import Case, cases, seeded
 
 several = settings(max_examples=100, derandomize=True, deadline=None)
@@ -439,31 +439,6 @@ def test_slider_at_the_known_angles_of_table_3_1() -> None:
     f = FIVE_BAR.evaluate(tuple(result.y[:, 1 + angles.index(360)]), SPEED, p).forces
     assert f.cx / DYN == pytest.approx(published.FORCE_AT_C_AT_360_DEG_DYN[0], abs=2e-3)
     assert f.cy / DYN == pytest.approx(published.FORCE_AT_C_AT_360_DEG_DYN[1], abs=2e-3)
-
-
-def test_crank_torque_at_the_start_of_table_3_1() -> None:
-    w = SETS["table-3.1"].crank_speed
-    e = FIVE_BAR.evaluate((0.0, 0.0, w, 0.0, 0.0, 0.0), SPEED, TABLE_3_1.constants())
-    assert e.motion.torque / DYN_CM == pytest.approx(published.CRANK_TORQUE_AT_START_DYN_CM, rel=5e-10)
-
-
-def test_torque_driven_run_of_table_3_1() -> None:
-    # fig. 3.6: T = T0 (1 - th2) from rest up to th2 = 1 rad, then none
-    p = TABLE_3_1.constants()
-    t0 = published.TORQUE_T0_DYN_CM * DYN_CM
-
-    def one_radian(t: float, x: np.ndarray) -> float:
-        return x[0] - 1.0
-
-    one_radian.terminal = True  # type: ignore[attr-defined]
-    first = run(p, [0.0] * 6, lambda x: REST._replace(torque=t0 * (1.0 - float(x[0]))), (0.0, 1.0), events=one_radian)
-    t1 = float(first.t_events[0][0])
-    assert t1 == pytest.approx(published.TORQUE_END_TIME_S, abs=1e-11)
-    x = run(p, first.y_events[0][0], lambda x: REST, (t1, 0.25)).y[:, -1]
-    known = published.TORQUE_AT_0_25_S
-    assert x[0] == pytest.approx(known["th2_rad"], abs=6e-8)
-    assert x[1] / CM == pytest.approx(known["u_cm"], abs=6e-9)
-    assert x[2] == pytest.approx(known["th2_rate_rad_s"], abs=6e-8)
 
 
 def test_outputs_carry_the_configuration_and_the_forces() -> None:

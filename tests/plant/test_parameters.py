@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 
-from linkwork.errors import LinkworkError, MissingParameterError, ParameterError, UnknownNameError
+from linkwork.errors import LinkworkError, ParameterError, UnknownNameError
 from linkwork.five_bar.kinematics import joint_distance
 from linkwork.five_bar.parameters import InitialState
 from linkwork.five_bar.published import SETS, TABLE_3_1
@@ -369,17 +369,6 @@ def test_published_set_is_the_data_of_section_3_1(offset_in: float, twist_deg: f
     assert par.assembly_branch == 1
 
 
-def test_masses_are_those_of_the_weights() -> None:
-    # "specific gravity 0.28" is a weight density in lb/in3
-    density = rahman.DENSITY_LB_IN3 / rahman.GRAVITY_IN_S2
-    volumes = (
-        pi * rahman.CRANK_RADIUS_IN**2 * rahman.CRANK_IN,
-        pi * rahman.ROD_RADIUS_IN**2 * rahman.ROD_IN,
-        rahman.SLIDER_SIDE_IN**3,
-    )
-    assert pytest.approx([density * volume for volume in volumes], rel=5e-7) == rahman.MASSES_LB_S2_IN
-
-
 def test_speed_torque_and_start_of_section_3_1() -> None:
     assert pytest.approx(rahman.SPEED_RPM * 2.0 * pi / 60.0, rel=1e-15) == sets_3_1.CRANK_SPEED
     assert pytest.approx(rahman.TORQUE_LB_IN * POUND_INCH, rel=1e-15) == sets_3_1.CRANK_TORQUE
@@ -399,14 +388,6 @@ def test_a_rod_too_short_for_finite_moments_is_named(length: float) -> None:
         replace(sets_3_1.parameters(), rod_length=length)
 
 
-@pytest.mark.parametrize(("length", "cut"), [(498, False), (499, True)])
-def test_a_value_is_shown_up_to_500_characters(length: int, cut: bool) -> None:
-    # with its quotation marks
-    value = "a" * length
-    shown = repr(value)[:500] + "..." if cut else repr(value)
-    assert str(ParameterError("x", value, "be short")) == f"parameter x is {shown}: it must be short"
-
-
 @pytest.mark.parametrize(("count", "listed"), [(8, [f"a.{n}" for n in range(8)]), (60, ["a.1"])])
 def test_of_many_names_the_nearest_five_are_listed(count: int, listed: list[str]) -> None:
     error = UnknownNameError("a.1x", tuple(f"a.{n}" for n in range(count)), words="a name 'a.1x'")
@@ -415,16 +396,3 @@ def test_of_many_names_the_nearest_five_are_listed(count: int, listed: list[str]
     assert len(found) == (count if count <= 8 else 5)
     assert set(listed) <= set(found)
     assert f"the nearest of {count} names" in str(error) or count <= 8
-
-
-@pytest.mark.parametrize(
-    ("others", "said"),
-    [
-        ((), ""),
-        (("b",), ", and so is b"),
-        (("b", "c"), ", and so are b, c"),
-        (("b",) * 15, f", and so are {'b, ' * 11}b and 3 more"),
-    ],
-)
-def test_what_is_missing_is_named_with_the_others(others: tuple[str, ...], said: str) -> None:
-    assert str(MissingParameterError("a", others)) == f"parameter a is missing{said}"
