@@ -69,6 +69,6 @@ def _requirements() -> dict[str, tuple[str, str]]:
         library = re.match(r"[\w-]+", requirement)
         if library:
             extras[extra[1] if extra else ""][library[0].replace("-", "_")] = requirement
-    # of several extras with a library the smallest is taken, as 'all' and 'dev' repeat the others; the core precedes all
+    # if several extras have a library, take the smallest, because 'all' and 'dev' repeat the others; the core precedes all
     order = sorted(extras, key=lambda extra: len(extras[extra]) if extra else 0, reverse=True)
     return {library: (requirement, extra) for extra in order for library, requirement in extras[extra].items()}

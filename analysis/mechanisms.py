@@ -175,7 +175,7 @@ def _faults_of_drawing(m: Mechanism) -> Iterator[str]:
         if least is None or len(part.joints) < least or (part.kind != "link" and len(part.joints) > least):
             yield f"the {part.text} is a {part.kind!r} of {len(part.joints)} joints: it must be one of {PARTS}"
         if part.where and part.where not in parameters:
-            yield f"the {part.text} is drawn where {part.where!r} is not zero: it must be a real parameter"
+            yield f"the {part.text} is drawn where {part.where!r} is not zero: this must be a real parameter"
     for name in (*m.drawing.paths, *(name for part in m.drawing.parts for name in part.joints)):
         if name not in names:
             yield f"its picture has no joint {name!r}"

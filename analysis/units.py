@@ -246,28 +246,28 @@ def _convert(text: str, unit: str, spelled: str, name: str, wanted: str) -> floa
     if match is None:
         shown = text if len(text) <= _LONGEST else f"{text[:_LONGEST]}..."
         raise ParameterError(name, shown, f"{wanted}: {_PLAIN}" + (", and a unit" if unit != "1" else ""))
-    number, of = float(match[1]), match[2]
-    if of is None:
+    number, given = float(match[1]), match[2]
+    if given is None:
         if unit == "1":
             return number
         raise ParameterError(
             name, text, f"come with its unit, such as '{text} {spelled}', or be a number, which is in SI"
         )
-    of = re.sub(
-        r"(?<=[^\W\d_])(-?[0-9])", r"**\1", of.replace("·", "*").replace("^", "**")
+    given = re.sub(
+        r"(?<=[^\W\d_])(-?[0-9])", r"**\1", given.replace("·", "*").replace("^", "**")
     )  # m2 for m**2, as FMI has it
-    # what most files have need not wait for pint, half a second; the numbers are pint's to the last bit
-    if of in (unit, spelled):
+    # most files need only these units: pint, which takes half a second to load, gives the same numbers to the last bit
+    if given in (unit, spelled):
         return number
-    if unit == "m" and of in LENGTHS:
-        return number * LENGTHS[of]
+    if unit == "m" and given in LENGTHS:
+        return number * LENGTHS[given]
     shown, factor = display_scale(unit)
-    if of == shown:
+    if given == shown:
         return number * (1.0 / factor)
     import pint
 
     try:
-        return float(_registry().Quantity(number, of).to(spelled).magnitude)
+        return float(_registry().Quantity(number, given).to(spelled).magnitude)
     except pint.UndefinedUnitError as error:
         raise ParameterError(name, text, f"{wanted} ({error.args[0]!r} is no known unit)") from error
     except pint.DimensionalityError as error:

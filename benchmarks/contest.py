@@ -86,7 +86,7 @@ class Contest:
     on_area: bool
 
     @classmethod
-    def of(cls, problem: Problem, *, on_area: bool = False) -> Contest:
+    def from_problem(cls, problem: Problem, *, on_area: bool = False) -> Contest:
         """Return the contest for a problem."""
         normal = normal_form(problem.task)
         limits = make_limits(problem.task, normal, problem.bounds, problem.constraints)
@@ -303,7 +303,7 @@ class PlacedFourBar:
         self.set_constraints(self.get_constraints())
 
     @classmethod
-    def of(cls, linkage: Linkage, n: int) -> PlacedFourBar:
+    def from_linkage(cls, linkage: Linkage, n: int) -> PlacedFourBar:
         """Return the four-bar of a given linkage, with n steps in a turn."""
         return cls(np.append(linkage.vector, 0.0), np.arange(10), linkage.branch, n)
 

@@ -1,4 +1,4 @@
-"""Measure the errors that coupling of systems causes, over four decades of the communication step, in our and other masters.
+"""Measure the errors that coupling of systems causes, in our and other masters, over four decades of communication step.
 
     python -m benchmarks.coupling                          # every system of the library, and the other masters: an hour
     python -m benchmarks.coupling --system press           # one system (repeatable), without the other masters
@@ -55,7 +55,7 @@ def show(found: Convergence, powers: bool = True) -> None:
         }
         good = {way: ratio[np.isfinite(ratio) & (found.errors[way] < 0.1)] for way, ratio in ratios.items()}
         rows = [f"{r.min():.2g} to {r.max():.2g}" if len(r) else "-" for r in good.values()]
-        table.add_row("error / share brought in", *rows)
+        table.add_row("error / share added", *rows)
     CONSOLE.print(table)
 
 

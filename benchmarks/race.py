@@ -108,7 +108,7 @@ RACERS: Mapping[str, BlackBoxSearch] = {
 
 def run(target: Target, search: str, budget: float) -> Row:
     """Run one search on a target."""
-    contest = Contest.of(target, on_area=True)
+    contest = Contest.from_problem(target, on_area=True)
     normal = contest.normal
     with threadpool_limits(1):
         trace = run_search(RACERS[search], contest, budget, -inf, process_time)

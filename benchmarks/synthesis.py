@@ -150,7 +150,7 @@ def _kernel_times_of_pylinkage(linkage: Linkage, n: int) -> dict[str, float]:
     from pylinkage.bridge.solver_conversion import linkage_to_solver_data
     from pylinkage.solver.simulation import simulate
 
-    four_bar = PlacedFourBar.of(linkage, n)
+    four_bar = PlacedFourBar.from_linkage(linkage, n)
     data = linkage_to_solver_data(four_bar.linkage)
     arrays = (data.constraints, data.joint_types, data.parent_indices, data.constraint_offsets, data.solve_order)
 
@@ -284,7 +284,7 @@ def contest_table(names: Sequence[str], budget: float, console: Console) -> Tabl
         table.add_column(heading, justify="left" if heading in ("problem", "search") else "right")
     for name in names:
         problem = PROBLEMS[name]
-        traces = run_contest(Contest.of(problem), budget)
+        traces = run_contest(Contest.from_problem(problem), budget)
         best = min(trace.best for trace in traces.values())
         first = next(iter(traces.values())).reaching_time((1.0 + NEAR) * best)
         title = f"{name}: goal {problem.goal:g} {problem.unit}"
@@ -338,7 +338,7 @@ def main(budget: float = BUDGET, names: Sequence[str] = tuple(PROBLEMS)) -> None
     console.print(kernel_table())
     # machine code, CasADi and the workers are loaded before the timing begins
     for cores in (1, 2):
-        run_synthesize(Contest.of(PROBLEMS["ellipse-a"]), Search(n_jobs=cores))
+        run_synthesize(Contest.from_problem(PROBLEMS["ellipse-a"]), Search(n_jobs=cores))
     console.print(contest_table(names, budget, console))
     console.print(start_table())
     try:

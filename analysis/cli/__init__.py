@@ -22,7 +22,7 @@ from .codes import WRONG as WRONG
 
 #: Every command by name: the module of this package that defines the command, and the command's line in ``linkwork --help``.
 COMMANDS = {
-    "basins": ("motions", "Find all periodic motions, and which start ends in which."),
+    "basins": ("motions", "Find all periodic motions, and in which one each start ends."),
     "build": ("making", "Build and validate the FMUs."),
     "check": ("runs", "Compare the FMU with the in-process solver, output by output."),
     "decrement": ("record", "Damping and natural frequency from a decaying record."),
@@ -41,7 +41,7 @@ COMMANDS = {
     "studio": ("studio", "Open a page on which a mechanism moves and can be dragged."),
     "synthesize": ("design", "Find linkages for a path, a function or a motion."),
     "system": ("system", "Wire FMUs to a system: run, check, draw, write SSP."),
-    "tune": ("tuning", "Change parameters least so that a range of speeds is clear."),
+    "tune": ("tuning", "Find the least change of parameters that clears a range of speeds."),
     "verify": ("verify", "Run the experiments that an FMU carries, and compare."),
 }
 

@@ -49,10 +49,13 @@ class CaseChoice:
             drive.flow(find_mechanism(self.case.parameters))
             return drive
         except NothingFreeError as error:
-            one = error.force and f"; --set {error.force}=0 leaves one free, --set {error.force}=VALUE drives it so"
+            one = (
+                error.force
+                and f"; --set {error.force}=0 frees one freedom, --set {error.force}=VALUE sets a force on it"
+            )
             raise InputError(
-                f"{self.case.title}: all freedoms are commanded, and nothing is left that could vibrate: linkwork run has "
-                f"what the drives need{one}"
+                f"{self.case.title}: all freedoms are commanded, so that nothing can vibrate: linkwork run computes the "
+                f"torques and forces of the drives{one}"
             ) from None
         except InputError as error:
             torque = isinstance(error, VaryingInputError) and error.channel == "torque"

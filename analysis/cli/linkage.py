@@ -76,7 +76,9 @@ def _print_structure(package: Package) -> None:
             freedom = package.interface.drives[step.freedom]
             driven = f", driven as {freedom.table}" if freedom.table else ""
             rows.append((step.body, f"freedom {freedom.name}", f"from {step.parent} at {step.joint.name}{driven}"))
-    show_table("how the bodies follow", ("body", "by", "joints"), rows, words=("body", "by", "joints"))
+    show_table(
+        "steps that compute the positions of the bodies", ("body", "by", "joints"), rows, words=("body", "by", "joints")
+    )
 
 
 def _print_reach(made: Mechanism) -> None:

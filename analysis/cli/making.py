@@ -49,7 +49,7 @@ def _split_values(context: click.Context, parameter: click.Parameter, values: Se
     metavar="FOLDER",
     type=click.Path(file_okay=False),
     callback=check_place,
-    help="Write each FMU there too, with inputs, reference results and who imports it.",
+    help="Write each FMU to this folder too, with inputs, reference results and the importers that run it.",
 )
 @report_errors
 def build(
@@ -79,14 +79,14 @@ def build(
     for name, mechanism in described.items():
         if entries := _entries_of_runs(name, mechanism):
             print_error(
-                f"note: {mechanism.fmu} starts as [linkage] of {name} says; {', '.join(entries)} beside it "
-                f"{'is' if len(entries) == 1 else 'are'} of the file's runs. Set such values in the master, or in [linkage]: "
-                "start and speed of each of its freedoms"
+                f"note: {mechanism.fmu} starts with the values in [linkage] of {name}; {', '.join(entries)} outside of this "
+                f"table {'is' if len(entries) == 1 else 'are'} only for runs of the file. Set such values in the master, or in "
+                "[linkage]: start and speed of each freedom"
             )
 
 
 def _entries_of_runs(file: str, mechanism: Mechanism) -> list[str]:
-    """Return the parameters, start values and inputs that a file gives beside the linkage that it describes or names."""
+    """Return the parameters, start values and inputs that a file gives outside of the linkage that it describes or names."""
     from ..files import flatten, read_tables
     from ..linkages import with_linkage
     from ..run import case_inputs

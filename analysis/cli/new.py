@@ -20,7 +20,7 @@ LINKAGE = "linkage"
 _HEAD = """\
 # {title}: {command} {file}
 # Every quantity is a number in SI or a text with its unit, such as "5 cm" or "420 rpm". Entries behind a # may be left out:
-# they have their defaults, or examples of what may stand there.
+# they show their defaults or examples.
 """
 #: Entries of an example task of each kind, which can be solved within seconds; all other entries get their defaults.
 _TASKS: Mapping[str, Mapping[str, Any]] = {
@@ -58,8 +58,8 @@ _WISH: Mapping[str, Any] = {
 #: Cross section of the links of a new case, from which the masses of the links follow.
 _SECTION = {"kind": "bar", "width": "30 mm", "thickness": "8 mm", "material": "steel"}
 _OF_SECTIONS = """\
-# Masses, centres of mass and moments of inertia of {links} follow from their lengths and sections: say
-# what yours are made of, or give the numbers behind a # instead. A weighed mass may stand beside a section.
+# Masses, centres of mass and moments of inertia of {links} follow from their lengths and sections: give
+# your own sections, or the numbers behind a # instead. A measured mass may be given in addition to a section.
 {kinds}
 #   materials: {materials}, or a density such as "7.85 g/cm3"; overhang: material beyond each pin
 # All other numbers, such as {other}, are those of {source}: give your own."""
@@ -174,7 +174,7 @@ def _run_case(mechanism: Mechanism, file: str) -> Iterator[str]:
     published = mechanism.first_set
     meaning = {v.name: v.description for v in mechanism.variables}
     words = {c.argument: meaning[c.name] for c in mechanism.channels}
-    yield "# What acts may vary: then it is a table with a kind, such as speed = { kind = ..., ... }."
+    yield "# An input may vary: it is then a table with a kind, such as speed = { kind = ..., ... }."
     of_torques = set(signal_kinds("N.m", Path())) - set(signal_kinds("N", Path()))
     for kind, table in signal_kinds("N.m", Path()).items():
         yield f"#   {kind}{' (of torques)' if kind in of_torques else ''}: {', '.join(table.readers)}"
@@ -191,7 +191,7 @@ def _run_case(mechanism: Mechanism, file: str) -> Iterator[str]:
     for name, (argument, unit) in case_inputs(mechanism).items():
         leaf = name.rpartition(".")[2]
         if not unit:
-            rows[name] = line(leaf, True, "true or false, in the place of the others of its table", active=False)
+            rows[name] = line(leaf, True, "true or false, instead of the other entries of its table", active=False)
             continue
         driven = argument in published.drive
         value = published.drive.get(argument, 1.0)
@@ -206,7 +206,7 @@ def _tuning_case(file: str) -> Iterator[str]:
     from ..files import entries, line
     from ..tuning import TuneTable
 
-    yield "# The mechanism and what acts on it are those of a run: linkwork new five-bar."
+    yield "# The mechanism and its inputs are given as for a run: see linkwork new five-bar."
     yield 'published = "rig-2-spring-c"'
     yield line("title", Path(file).stem, "of tables and pictures", active=True)
     yield "\n[tune]"

@@ -32,15 +32,15 @@ from .common import (
 @click.option("--time-unit", help="Unit of the times; by default that in the column's heading, or s.")
 @click.option(
     "--unit",
-    help="Unit of the positions, a length or an angle; by default that in the column's heading, or m. It matters for the force "
-    "of friction alone.",
+    help="Unit of the positions, a length or an angle; by default that in the column's heading, or m. It affects the force "
+    "of friction only.",
 )
 @click.option("--from", "first", metavar="TIME", help="Ignore samples before this time, such as '0.2 s': the impulse.")
 @click.option("--to", "last", metavar="TIME", help="Ignore samples after this time.")
 @click.option(
     "--mass",
     metavar="MASS",
-    help="Moving mass, such as '600 g', or of an angle the moment of inertia, such as '2e-3 kg*m^2': gives the damping "
+    help="Moving mass, such as '600 g', or for an angle the moment of inertia, such as '2e-3 kg*m^2': gives the damping "
     "coefficient and the stiffness.",
 )
 @click.option("--friction", is_flag=True, help="Fit dry friction in addition to the damper.")
@@ -90,7 +90,7 @@ def decrement(record: str, time: str | None, position: str | None, out: str, plo
     if not options["friction"]:
         with suppress(InputError):
             dry = fit_decay(t[kept], x[kept], friction=True, least_swing=least)
-            # beyond what noise, and parabolas in the place of the motion, do
+            # more than noise, and the parabolas that approximate the motion, can cause
             if dry.friction > 5.0 * dry.friction_error and dry.residual < 0.5 * decay.residual:
                 print_error(
                     "note: the decrement grows from cycle to cycle, as with dry friction: with --friction the damping ratio is "
@@ -109,14 +109,15 @@ def decrement(record: str, time: str | None, position: str | None, out: str, plo
     print_paths(written)
 
 
-#: By the kind of a position, the SI units of what moves, its damping coefficient, its stiffness and its friction.
+#: SI units of mass or moment of inertia, damping coefficient, stiffness and friction, by the SI unit of the position.
 _UNITS = {"m": ("kg", "N.s/m", "N/m", "N"), "rad": ("kg.m2", "N.m.s/rad", "N.m/rad", "N.m")}
 
 
 def _column_unit(own: str, given: str | None, option: str, kinds: tuple[str, ...]) -> tuple[str, str, float]:
-    """Return the unit of a column, the one of the SI units ``kinds`` that fits it, and the factor to that one.
+    """Return the unit of a column, the SI unit among ``kinds`` that has its dimension, and the factor to this SI unit.
 
-    ``own`` is the unit in the column's heading. One of none of the kinds, as V of a gauge, has the kind "" and the factor NaN.
+    ``own`` is the unit in the column's heading. If it fits none of ``kinds``, as V of a strain gauge, the SI unit is "" and the
+    factor NaN.
     """
 
     def convert(unit: str) -> tuple[str, str, float]:

@@ -69,7 +69,7 @@ def slider_motion(
     if stopped is None and chosen.drive is not None:
         if isinstance(pivot, SecondCrank):
             common.print_error(
-                "note: no forces are computed of a five-bar with a geared second crank: run its linkage.toml"
+                "note: no forces are computed for a five-bar with a geared second crank: run its linkage.toml"
             )
         else:
             written += _dynamics(chosen, solution, folder, plots)
@@ -91,7 +91,7 @@ def _find_strategy(chosen: SliderCase) -> tuple[Any, Interrupted | None]:
         if error.strategy is None:
             raise
         found, stopped = error.strategy, error
-    headings = ("mechanism", "what came of it")
+    headings = ("mechanism", "result")
     rows = [(step.mechanism, step.reason) for step in found.steps]
     styles = ["green" if found.met and step is found.chosen else None for step in found.steps]
     common.show_table(

@@ -93,7 +93,7 @@ def build(file: str, fmi: str, out: str) -> None:
 @click.option(
     "--share",
     type=click.FloatRange(0.0, 1.0, min_open=True),
-    help="Choose the steps so that the coupling brings in about this share of the power, such as 1e-3.",
+    help="Choose the steps so that the coupling adds about this share of the power, such as 1e-3.",
 )
 @_FMI
 @common.out_option()
@@ -135,8 +135,7 @@ def run(
         advice = found.suggested_step(1e-3)
         then = f"; 0.1 % takes steps of about {1e3 * advice:.2g} ms" if advice is not None and share is None else ""
         common.say(
-            f"work that the coupling brought in: {100.0 * found.added_work():.2g} % of what went through the power "
-            f"bonds{then}"
+            f"work that the coupling added: {100.0 * found.added_work():.2g} % of the work through the power bonds{then}"
         )
     folder, stem = common.output_folder(out), Path(file).stem
     columns = {"time [s]": found.time} | {f"{name} [{found.units[name]}]": x for name, x in found.values.items()}
@@ -158,7 +157,7 @@ def run(
 def check(file: str, stop: str | None, decades: int, out: str, plot: bool) -> None:
     """Check the connections of a system. For a description also measure how the error of each coupling depends on the step.
 
-    That takes the equations of all parts: it is left out where a part is an FMU.
+    This needs the equations of all parts, and is left out if a part is an FMU.
     The step is the communication step. The reference for the errors is the system as a single model, solved by SciPy with a
     tolerance of 1e-12.
     """
@@ -179,7 +178,7 @@ def check(file: str, stop: str | None, decades: int, out: str, plot: bool) -> No
     described = load_system(file)
     if foreign := [name for name, table in described.parts.items() if table.fmu]:
         common.print_error(
-            f"note: {' and '.join(foreign)} tells no equations: the errors of the couplings are not measured"
+            f"note: the equations of {' and '.join(foreign)} are not known: the errors of the couplings are not measured"
         )
         return
     found = convergence(
@@ -199,7 +198,7 @@ def check(file: str, stop: str | None, decades: int, out: str, plot: bool) -> No
             (f"{1e3 * step:.4g}", *(f"{100.0 * powers[n]:.2g}" for powers in found.powers.values()))
             for n, step in enumerate(found.steps)
         ]
-        common.show_table("work that the coupling brought in, of what went through the power bonds [%]",
+        common.show_table("work that the coupling added, relative to the work through the power bonds [%]",
                    ("step [ms]", *found.powers), rows)  # fmt: skip
     for when, message in found.messages.items():
         common.print_error(f"note: {when}: {message}")

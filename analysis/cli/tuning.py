@@ -81,5 +81,5 @@ def _print(title: str, tuned: Any) -> None:
     headings = ("requirement", "wished", "before", "after", "")
     rows = [(r.name, r.wished, r.before.text, r.after.text, "met" if r.met else "not met") for r in tuned.requirements]
     styles = [None if r.met else "yellow" for r in tuned.requirements]
-    common.show_table("what was wished", headings, rows, words=headings, styles=styles)
+    common.show_table("requirements", headings, rows, words=headings, styles=styles)
     common.say(f"verified: {tuned.verification}" if tuned.met else f"computed anew: {tuned.verification}")

@@ -76,6 +76,8 @@ def _rebuild(fmu: str) -> None:
         styles=[None if part.same else "red" for part in parts],
     )  # fmt: skip
     if not all(part.same for part in parts):
-        print_error("rebuild failed: the FMU does not come of its sources with the programs installed here", "red")
+        print_error(
+            "rebuild failed: the FMU differs from a build from its sources with the programs installed here", "red"
+        )
         sys.exit(CHECK_FAILED)
-    console.print("the FMU comes of its sources", style="green", highlight=False)
+    console.print("the FMU is the same as a build from its sources", style="green", highlight=False)

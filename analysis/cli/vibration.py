@@ -44,7 +44,8 @@ def _require_range(parameters: Any, low: float, high: float, name: str, first: s
 @click.option(
     "--vary",
     metavar="NAME",
-    help="FMI name of what varies; by default the crank speed, of several commanded cranks the first, with constant ratios.",
+    help="FMI name of the parameter to vary; by default the crank speed, for several commanded cranks that of the first, with "
+    "constant ratios.",
 )
 @click.option(
     "--from", "low", metavar="VALUE", help="Beginning of the range, such as '100 rpm'; bare numbers are in SI."
@@ -154,7 +155,7 @@ def resonance(
 
 
 def _natural_frequency(parameters: Any) -> float | None:
-    """Return the natural frequency (rad/s) of the spring alone; None if this means nothing for the mechanism."""
+    """Return the natural frequency (rad/s) of the spring alone; None if the mechanism has none."""
     from ..periodic import natural_frequency
 
     try:
@@ -214,7 +215,7 @@ def _range_ends(
     from ..periodic import parameter_unit, speed_names
 
     unit = parameter_unit(find_mechanism(parameters), vary)
-    about, why = [natural] if natural else [], "it has no range of its own"
+    about, why = [natural] if natural else [], "it has no default range"
     if vary not in speed_names(find_mechanism(parameters)):
         about = []
     elif isinstance(modes, LinkworkError):

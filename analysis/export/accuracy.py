@@ -38,9 +38,9 @@ KINDS = {
 }
 HEADINGS = ("solver.tolerance", "evaluations per second", *KINDS)
 CAPTION = (
-    "Global error of the outputs on {}, the largest of all times, relative to the largest magnitude of the output; an output "
-    "that is small beside its like is compared with a thousandth of these. Evaluations of the equations are per second of "
-    "simulated time{}; shorter communication steps need more, and err less."
+    "Largest global error of the outputs over all times on {}, relative to the largest magnitude of the output, or to a "
+    "thousandth of the largest output of its unit if that is more. Evaluations of the equations are per second of "
+    "simulated time{}; shorter communication steps need more evaluations, and have smaller errors."
 )
 #: Words for the two gaps in the caption, for the standard cases and for the default experiment.
 STANDARD_CASES = ("the standard cases, the largest of all", ", the most of all cases")

@@ -264,9 +264,9 @@ class Pid(Controller):
     """
 
     rows = (
-        Row("gain", "parameter", "N/m", 0.0, "Force by the error"),
-        Row("integral_gain", "parameter", "N/(m.s)", 0.0, "Growth of the force by the error"),
-        Row("derivative_gain", "parameter", "N.s/m", 0.0, "Force by the rate of the error"),
+        Row("gain", "parameter", "N/m", 0.0, "Force per error"),
+        Row("integral_gain", "parameter", "N/(m.s)", 0.0, "Growth of the force per error and second"),
+        Row("derivative_gain", "parameter", "N.s/m", 0.0, "Force per rate of the error"),
         Row("filter_time", "parameter", "s", 0.0, "Time constant of the filter before the derivative", "not negative"),
         Row(
             "tracking_time",
@@ -277,13 +277,13 @@ class Pid(Controller):
             "positive",
         ),
         Row("limit", "parameter", "N", 1e6, "Greatest magnitude of the force", "not negative"),
-        Row("reference", "input", "m", 0.0, "What the position is to be"),
+        Row("reference", "input", "m", 0.0, "Wanted position"),
         Row("measured", "input", "m", 0.0, "The position"),
-        Row("feed_forward", "input", "N", 0.0, "Force that is added"),
+        Row("feed_forward", "input", "N", 0.0, "Force added to the controller's"),
         Row("force", "output", "N", 0.0, "The force"),
-        Row("error", "output", "m", 0.0, "Reference less position, at the last sample"),
-        Row("integral", "local", "N", 0.0, "Share of the integral"),
-        Row("derivative", "local", "N", 0.0, "Share of the derivative"),
+        Row("error", "output", "m", 0.0, "Reference minus position, at the last sample"),
+        Row("integral", "local", "N", 0.0, "Force of the integral term"),
+        Row("derivative", "local", "N", 0.0, "Force of the derivative term"),
     )
 
     error: float
@@ -297,7 +297,7 @@ class Pid(Controller):
             self.derivative = (self.filter_time * self.derivative + change) / (self.filter_time + self.sample_time)
         wanted = self.gain * self.error + self.integral + self.derivative + self.feed_forward
         self.force = _clamp(wanted, self.limit)
-        # within less than half a sample the integral would swing, by more each time
+        # with a tracking time below half a sample time the integral would oscillate with growing amplitude
         back = (self.force - wanted) / max(self.tracking_time, self.sample_time)
         self.integral += self.sample_time * (self.integral_gain * self.error + back)
 
@@ -306,14 +306,14 @@ class StateFeedback(Controller):
     """State feedback of position and velocity with feed-forward and force limit; `design_lqr` gives its gains."""
 
     rows = (
-        Row("position_gain", "parameter", "N/m", 0.0, "Force against the deviation of the position"),
-        Row("velocity_gain", "parameter", "N.s/m", 0.0, "Force against the deviation of the velocity"),
+        Row("position_gain", "parameter", "N/m", 0.0, "Force per deviation of the position"),
+        Row("velocity_gain", "parameter", "N.s/m", 0.0, "Force per deviation of the velocity"),
         Row("limit", "parameter", "N", 1e6, "Greatest magnitude of the force", "not negative"),
-        Row("reference", "input", "m", 0.0, "What the position is to be"),
-        Row("reference_velocity", "input", "m/s", 0.0, "What the velocity is to be"),
+        Row("reference", "input", "m", 0.0, "Wanted position"),
+        Row("reference_velocity", "input", "m/s", 0.0, "Wanted velocity"),
         Row("position", "input", "m", 0.0, "The position"),
         Row("velocity", "input", "m/s", 0.0, "The velocity"),
-        Row("feed_forward", "input", "N", 0.0, "Force that is added"),
+        Row("feed_forward", "input", "N", 0.0, "Force added to the controller's"),
         Row("force", "output", "N", 0.0, "The force"),
     )
 
@@ -344,7 +344,7 @@ class MotionReference(Controller):
         Row("angle", "input", "rad", 0.0, "Crank angle"),
         Row("speed", "input", "rad/s", 0.0, "Crank speed"),
         Row("position", "output", "m", 0.0, "Position there"),
-        Row("velocity", "output", "m/s", 0.0, "Its rate at that speed"),
+        Row("velocity", "output", "m/s", 0.0, "Velocity at the crank speed"),
         Row("force", "output", "N", 0.0, "Force there"),
     )
 
@@ -389,26 +389,26 @@ class DcServo(Controller):
     """
 
     rows = (
-        Row("resistance", "parameter", "V/A", 1.0, "Of the winding", "positive"),
-        Row("inductance", "parameter", "V.s/A", 1e-3, "Of the winding", "positive"),
-        Row("torque_constant", "parameter", "N.m/A", 0.1, "Torque by current, and voltage by speed", "positive"),
+        Row("resistance", "parameter", "V/A", 1.0, "Resistance of the winding", "positive"),
+        Row("inductance", "parameter", "V.s/A", 1e-3, "Inductance of the winding", "positive"),
+        Row("torque_constant", "parameter", "N.m/A", 0.1, "Torque per current, and voltage per speed", "positive"),
         Row("voltage_limit", "parameter", "V", 24.0, "Greatest magnitude of the voltage", "not negative"),
         Row(
             "current_limit",
             "parameter",
             "A",
             10.0,
-            "Greatest magnitude of the current that is asked for",
+            "Greatest magnitude of the current reference",
             "not negative",
         ),
-        Row("current_gain", "parameter", "V/A", 5.0, "Voltage by the error of the current"),
+        Row("current_gain", "parameter", "V/A", 5.0, "Voltage per error of the current"),
         Row("encoder_counts", "parameter", "1", 4096.0, "Counts of the encoder in a turn", "positive"),
-        Row("torque_reference", "input", "N.m", 0.0, "What the torque is to be"),
+        Row("torque_reference", "input", "N.m", 0.0, "Wanted torque"),
         Row("angle", "input", "rad", 0.0, "Angle of the shaft"),
         Row("speed", "input", "rad/s", 0.0, "Speed of the shaft"),
         Row("torque", "output", "N.m", 0.0, "Torque on the shaft"),
         Row("current", "output", "A", 0.0, "Current of the winding"),
-        Row("encoder_angle", "output", "rad", 0.0, "Angle that the encoder tells"),
+        Row("encoder_angle", "output", "rad", 0.0, "Angle measured by the encoder"),
         Row("voltage", "local", "V", 0.0, "Voltage since the last sample"),
     )
 

@@ -321,15 +321,15 @@ def _structure(mechanism: Mechanism, kind: Kind, entries: Sequence[Entry]) -> El
     }
     structure = Element("ModelStructure")
 
-    def add(group: str, references: Iterable[int], of: Mapping[int, Iterable[int] | None]) -> None:
+    def add(group: str, references: Iterable[int], known: Mapping[int, Iterable[int] | None]) -> None:
         # FMI 2.0 has each group in an element of its own
         parent = structure if kind.fmi == 3 else SubElement(structure, f"{group}s")
         for number in references:
             name = "valueReference" if kind.fmi == 3 else "index"
             node = SubElement(parent, group if kind.fmi == 3 else "Unknown", {name: _index_or_reference(kind, number)})
-            on = of[number]
+            on = known[number]
             if on is not None:
-                node.set("dependencies", " ".join(_index_or_reference(kind, known) for known in sorted(on)))
+                node.set("dependencies", " ".join(_index_or_reference(kind, each) for each in sorted(on)))
 
     for group, references in groups:
         add(group, references, depends)

@@ -149,13 +149,13 @@ def _table(mechanism: Mechanism, switched: bool) -> dict[str, tuple[list[Any], l
     given = join(own, state, s.u)
     dgiven = [sx.sym(f"d{n}", *v.shape) for n, v in (("own", own), ("state", state), ("u", s.u))]
 
-    def forward(results: list[Any], of: Any, change: Any) -> list[Any]:
-        return [casadi.densify(casadi.jtimes(result, of, change)) for result in results]
+    def forward(results: list[Any], variables: Any, change: Any) -> list[Any]:
+        return [casadi.densify(casadi.jtimes(result, variables, change)) for result in results]
 
-    def reverse(results: list[Any], of: Any, parts: list[Any]) -> tuple[list[Any], list[Any]]:
-        """Return symbols for weights of the results, and the gradient of the results' weighted sum, split into ``parts``."""
+    def reverse(results: list[Any], variables: Any, parts: list[Any]) -> tuple[list[Any], list[Any]]:
+        """Return symbols for weights of the results, and the gradient of their weighted sum, split into ``parts``."""
         weights = [sx.sym(f"g{n}", *result.shape) for n, result in enumerate(results)]
-        gradient = casadi.densify(casadi.jtimes(join(*results), of, join(*weights), True))
+        gradient = casadi.densify(casadi.jtimes(join(*results), variables, join(*weights), True))
         ends = [0]
         for part in parts:
             ends.append(ends[-1] + part.numel())
@@ -295,7 +295,9 @@ def _check_start(mechanism: Mechanism, begin: Any) -> None:
             *mechanism.error_scale(known.parameters, mechanism.state(known.initial)),
         ]
         if not np.allclose(found, wanted, rtol=1e-12, atol=0.0):
-            raise LinkworkError(f"the start of {mechanism.name}, traced, is another with the set {name}: {_START}")
+            raise LinkworkError(
+                f"the traced start of {mechanism.name} differs from the start with the set {name}: {_START}"
+            )
 
 
 # Tables

@@ -57,7 +57,7 @@ def add_guard(entries: Mapping[str, bytes], model: str, source: bytes) -> dict[s
 
 @cache
 def compile_guard(source: bytes, *, kept: bool = True) -> dict[str, bytes]:
-    """Compile the guard for every platform of PythonFMU, or take what is ``kept``; return the libraries by folder."""
+    """Compile the guard for every platform of PythonFMU, or take it from the cache if ``kept``; return libraries by folder."""
     headers = resources.files("fmpy") / "c-code"
     made = {}
     with tempfile.TemporaryDirectory(prefix="linkwork-guard-") as folder:

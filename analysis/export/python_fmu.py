@@ -48,7 +48,7 @@ def build(mechanism: Mechanism, dest: Path | str = "build", sources: Path | str 
     dest : path
         Folder for the FMU; made if it is not there.
     sources : path
-        Source root that holds ``linkwork`` and the slave.
+        Source root that contains ``linkwork`` and the slave.
 
     Raises
     ------
@@ -62,7 +62,7 @@ def build(mechanism: Mechanism, dest: Path | str = "build", sources: Path | str 
     sources = Path(sources)
     for needed in ("slave.py", "guard.c", "linkwork/__init__.py"):
         if not (sources / needed).is_file():
-            raise BuildError(f"{sources} holds no {needed}: FMUs are built from a checkout of the project")
+            raise BuildError(f"{sources} contains no {needed}: FMUs are built from a checkout of the project")
     dest = Path(dest)
     dest.mkdir(parents=True, exist_ok=True)
     with tempfile.TemporaryDirectory(prefix="linkwork-fmu-") as folder:
@@ -126,7 +126,7 @@ def _stage(mechanism: Mechanism, sources: Path, stage: Path) -> _StagedFiles:
     if package != f"linkwork.{folder}":
         own = Path(str(import_module(package).__file__)).parent
     if not (own / "__init__.py").is_file():
-        raise BuildError(f"{sources} holds no linkwork/{folder}: FMUs are built from a checkout of the project")
+        raise BuildError(f"{sources} contains no linkwork/{folder}: FMUs are built from a checkout of the project")
     kept = {f"linkwork/{path.name}": path for path in sorted(shared.glob("*.py"))}
     kept |= {f"linkwork/{folder}/{path.relative_to(own).as_posix()}": path for path in sorted(own.rglob("*.py"))}
     files = {name: path.read_text(encoding="utf-8") for name, path in kept.items()}

@@ -72,8 +72,8 @@ def _terminals(mechanism: Mechanism) -> dict[str, tuple[str, dict[str, str]]]:
     def table(name: str) -> str:
         return name.rpartition(".")[0]
 
-    def motion(of: str) -> dict[str, str]:
-        return {leaf(of): of} | (motion(rate[of]) if of in rate else {})
+    def motion(name: str) -> dict[str, str]:
+        return {leaf(name): name} | (motion(rate[name]) if name in rate else {})
 
     for number, freedom in enumerate(mechanism.freedoms):
         members = motion(freedom.coordinate)
@@ -88,7 +88,7 @@ def _terminals(mechanism: Mechanism) -> dict[str, tuple[str, dict[str, str]]]:
             _, members = found.setdefault(table(channel.name), ("Load, and motion of the point that it acts on", {}))
             members[leaf(channel.name)] = channel.name
             members |= motion(channel.displacement) if channel.displacement else {}
-            # of the body on which the point lies, where the point's name has it
+            # angle of the body on which the point lies, if the body's name is in the name of the displacement
             angle = f"{table(table(channel.displacement))}.angle"
             members |= {"angle": angle} if angle in mechanism.output_names else {}
     return found

@@ -37,7 +37,7 @@ def gif(figure: Figure, path: str | Path, frames_per_second: int) -> Iterator[tu
             figure.set_layout_engine("none")
         writer.grab_frame()
 
-    # not by the writer's own context, which writes what there is after an error, too
+    # not in the writer's own context manager, which would write an unfinished GIF after an error
     with output(path) as (part, path):
         draft = part.with_suffix(".gif")  # Pillow takes the format from the ending
         writer.setup(figure, str(draft), dpi=80)

@@ -118,7 +118,7 @@ def plot_outputs(
 def plot_ensemble(runs: Ensemble, names: Sequence[str] | None = None, *, title: str = "") -> style.Figure:
     """Plot many runs: the median of outputs over time, and the ranges in which 90 % of the runs and all runs are.
 
-    At each time these are of the runs that reach it; the foot says how many do not reach the end.
+    Median and ranges at a time are those of the runs that reach this time; the foot says how many do not reach the end.
 
     Parameters
     ----------

@@ -204,7 +204,7 @@ def _draw_band(axis: Axes, found: MonteCarlo, quantity: str, at: int, one: float
     def curve(values: Any) -> FloatArray:
         return _insert_breaks(np.ma.filled(values, np.nan) / one, turn.breaks)
 
-    # of bounded distributions three standard deviations are more than errors can do
+    # three standard deviations of a bounded distribution can exceed its greatest error
     three = curve(np.ma.minimum(3.0 * linear.deviation, linear.worst))
     axis.fill_between(whole, -three, three, color=_LINEAR, alpha=0.18, linewidth=0.0, label=r"linear, $\pm 3\,\sigma$")
     low, lower, _, upper, high = spread.percentiles - linear.nominal

@@ -103,7 +103,7 @@ def plot_system_run(run: SystemRun, names: Sequence[str] = (), *, title: str = "
         for name, power in run.powers.items():
             draw_over_time(axes[-1], run.time, power, label=f"at {style.name_in_words(name.rpartition('.')[0])}")
         if run.powers:
-            axes[-1].set_ylabel("power that the\ncoupling brings in\n[W]", fontsize=style.SMALL)
+            axes[-1].set_ylabel("power that the\ncoupling adds\n[W]", fontsize=style.SMALL)
             # above the axes, as the curves fill them
             axes[-1].legend(
                 loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=3, fontsize=style.TINY, borderaxespad=0.2

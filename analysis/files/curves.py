@@ -95,7 +95,7 @@ def read_points(
             raise InputError(f"{path} has a curve without an extent, or one beyond {_WIDEST:.0e} m")
         return points, closed
     if name is not None:
-        raise InputError(f"{path.name} has one curve without a name: {name!r} cannot be looked up in it")
+        raise InputError(f"{path.name} has one curve, without a name: {name!r} cannot be selected")
     rows, units = _two_columns(path, text)
     for own in units:
         found = quantity(f"1 {own}", si, f"{path.name} in {own!r}")

@@ -79,7 +79,8 @@ def _free_path(path: str | Path) -> Path:
         return path
     beside = next(p for n in count(2) if _is_own(p := path.with_stem(f"{path.stem}-{n}"), writing.command))
     writing.notes.append(
-        f"{path} is not as 'linkwork {writing.command}' wrote it and stays: the new file is {beside.name}; "
+        f"{path} was changed since 'linkwork {writing.command}' wrote it, or is not its file, and is kept: the new file is "
+        f"{beside.name}; "
         "--force writes over it"
     )
     return beside

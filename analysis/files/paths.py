@@ -64,7 +64,7 @@ def check_ending(path: Path, known: Sequence[str]) -> str:
 
 @contextmanager
 def write_completely(path: Path) -> Iterator[Path]:
-    """Yield a temporary path as `written_whole`; create the folder, and raise WritingError if the file cannot be written."""
+    """Yield a temporary path as `written_whole` does; create the folder; raise WritingError if the file cannot be written."""
     prepare(path)
     try:
         with written_whole(path) as part:
@@ -135,8 +135,8 @@ def check_fmu(path: str | Path) -> None:
         raise InputError(f"{path} is not an FMU: {getattr(error, 'strerror', None) or first_line(error)}") from error
     if len(found) > members:
         raise InputError(
-            f"{path} has {len(found)} members: more than {members} are unpacked where LINKWORK_MAX_FMU_MEMBERS in the "
-            "environment is greater"
+            f"{path} has {len(found)} members, and at most {members} are unpacked: LINKWORK_MAX_FMU_MEMBERS in the "
+            "environment raises the limit"
         )
     # a member cannot unpack to more than its declared size
     size = sum(member.file_size for member in found)
@@ -144,8 +144,8 @@ def check_fmu(path: str | Path) -> None:
     for what, amount, allowed in (("unpacked", size, most), ("of modelDescription.xml", description, most // 16)):
         if amount > allowed * _MB:
             raise InputError(
-                f"{path} has {amount / _MB:.0f} MB {what}: more than {allowed} MB are read where LINKWORK_MAX_FMU_MB in the "
-                f"environment, which is {most}, is greater"
+                f"{path} has {amount / _MB:.0f} MB {what}, and at most {allowed} MB are read: LINKWORK_MAX_FMU_MB in the "
+                f"environment, now {most}, raises the limit"
             )
     for member in found:
         name = member.filename
@@ -158,7 +158,7 @@ _PLAIN = re.compile(r"[A-Za-z_][A-Za-z_0-9]*(\.[A-Za-z_][A-Za-z_0-9]*)*")
 
 
 def find_problems(fmu: str | Path) -> list[str]:
-    """Return what FMPy finds wrong in an FMU; plain names of variables are not parsed by its grammar, which takes seconds."""
+    """Return the faults that FMPy finds in an FMU; its grammar, which takes seconds, parses no plain names of variables."""
     from fmpy import read_model_description
     from fmpy.validation import validate_fmu
 

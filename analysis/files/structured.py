@@ -60,7 +60,7 @@ def read_tables(path: str | Path) -> dict[str, Any]:
             f"{path} is not valid {ending[1:].upper()}: {first_line(error)[:300]}{_duplicate_in_words(text, error)}"
         ) from error
     if not isinstance(data, dict):
-        raise InputError(f"{path} must hold tables, not {type(data).__name__}")
+        raise InputError(f"{path} must contain tables, not {type(data).__name__}")
     _check(path, data)
     return data
 

@@ -128,8 +128,8 @@ def read_record(
     Raises
     ------
     InputError
-        If the file cannot be read, has no headings where a name is given, or a cell is not a finite number, or a number beyond
-        the last column; the message gives the line.
+        If the file cannot be read, has no headings where a name is given, has a cell that is not a finite number, or has a
+        number beyond the last column; the message gives the line.
     UnknownNameError
         If the file has no column of a given name.
     """
@@ -184,7 +184,7 @@ def read_record(
 def _find_separator(line: str) -> str:
     """Return what separates the cells of a CSV file with this first line: a semicolon, a tab or a comma."""
     plain = re.sub('"[^"]*"', "", line)
-    # a comment tells only where nothing before it does, as in "drive #1;torque"
+    # look into a comment only if there is no separator before it, as in "drive #1;torque"
     for part in (plain.partition("#")[0], plain):
         for mark in ";\t,":
             if mark in part:

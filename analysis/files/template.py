@@ -104,7 +104,7 @@ def meanings(kind: Any, *, follow: bool = True) -> dict[str, str]:
     for head in heads:
         words = " ".join(head[2].split()).removesuffix(".")
         sentence = words if len(words) < 90 else re.split(r"[.;:] ", words)[0]
-        # an explanation that is only a unit is left out, as the value has one, and one that only points elsewhere
+        # leave out an explanation that is only a unit, which the value shows, or only a reference
         if not re.fullmatch(r"\S{1,6}|(?:As in|See) .*", words):
             sentence = re.sub(r" \([^)]*$", "", sentence.replace("`", ""))
             found |= {name.strip(): sentence for name in head[1].split(",")}
@@ -119,16 +119,16 @@ def line(name: str, value: Any, comment: str, *, active: bool) -> str:
     return f"{text:<{_COLUMN}}  # {comment}" if comment else text
 
 
-def _default(of: Any, read: Reader) -> Any:
-    """Return ``of``, the default of an entry, in the form for a TOML file; None if TOML cannot express it."""
-    if isinstance(read, Quantity) and isinstance(of, (int, float)):
-        return (float(of) if read.unit == "1" else in_words(of, read.unit)) if isfinite(of) else None
-    if isinstance(read, Range) and isinstance(of, tuple):
-        ends = [_default(end, read.item) for end in of]
+def _default(value: Any, read: Reader) -> Any:
+    """Return the default of an entry in the form for a TOML file; None if TOML cannot express it."""
+    if isinstance(read, Quantity) and isinstance(value, (int, float)):
+        return (float(value) if read.unit == "1" else in_words(value, read.unit)) if isfinite(value) else None
+    if isinstance(read, Range) and isinstance(value, tuple):
+        ends = [_default(end, read.item) for end in value]
         return None if None in ends else ends
-    if isinstance(of, tuple) and of and all(isinstance(item, (int, float, str)) for item in of):
-        return list(of)
-    return of if isinstance(of, (bool, int, str)) else None
+    if isinstance(value, tuple) and value and all(isinstance(item, (int, float, str)) for item in value):
+        return list(value)
+    return value if isinstance(value, (bool, int, str)) else None
 
 
 def entries(

@@ -60,7 +60,9 @@ CHECKS = {
         lambda model: 3 if model.can_save else 0,
     ),
     "serialize": Check(
-        "a state becomes bytes, each time the same", _one_check(check_serializing), lambda model: 2 * _can_save(model)
+        "a state is serialized to the same bytes each time",
+        _one_check(check_serializing),
+        lambda model: 2 * _can_save(model),
     ),
     "deserialize": Check(
         "a run continued from those bytes in another process gives the same bits",
@@ -96,7 +98,7 @@ CHECKS = {
         lambda model: 3 if model.can_save else 2,
     ),
     "places": Check(
-        "it works in folders of any name, with resources said in every form that the standard allows",
+        "it works in folders of any name, with the resource location in every form of the standard",
         _one_check(places.check_places),
         places.count,
     ),

@@ -176,9 +176,9 @@ class Run:
         self.session.need("FreeFMUState", state)
 
 
-def random_inputs(rng: random.Random, run_model: Any, count: int) -> list[dict[Variable, Any]]:
+def random_inputs(rng: random.Random, model: Any, count: int) -> list[dict[Variable, Any]]:
     """Return random values of inputs for each of ``count`` steps: Real inputs at every step, others at every seventh step."""
-    inputs = [v for v in run_model.variables if v.causality == "input" and v.size == 1]
+    inputs = [v for v in model.variables if v.causality == "input" and v.size == 1]
     steps = []
     for number in range(count):
         changing = [v for v in inputs if v.is_real or number % 7 == 3]

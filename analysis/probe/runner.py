@@ -262,7 +262,7 @@ def _command(work: Path, *words: str) -> dict[str, Any]:
 
 @contextmanager
 def _parent_of_jobs(work: Path) -> Iterator[subprocess.Popen[bytes] | None]:
-    """Yield a process that forks the processes of jobs; None where a process with libraries of the system cannot be forked."""
+    """Yield a process that forks the processes of jobs; None except on Linux, because elsewhere forking would not be safe."""
     if sys.platform != "linux":
         yield None
         return

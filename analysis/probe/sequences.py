@@ -39,7 +39,7 @@ def run_legal_calls(context: Context, case: int) -> None:
 
 
 class ForbiddenCalls:
-    """Check of forbidden calls: in each case one instance gets one fault; the cases try all faults in turn."""
+    """Check of forbidden calls: each case makes one forbidden call on one instance; the cases try all faults in turn."""
 
     def __init__(self, context: Context) -> None:
         self.context = context

@@ -130,7 +130,7 @@ def _check_sums(
         run.session.need("GetAdjointDerivative", *arguments)
         for known, adjoint, declared in zip(knowns, arguments[6], row):
             if not abs(adjoint - 2 * declared) <= 1e-9 * max(map(abs, row)) + floor:
-                text = f"the adjoint derivative of {unknown.name} in {known.name} is {adjoint / 2!r}, the other {declared!r}"
+                text = f"d {unknown.name} / d {known.name}: adjoint {adjoint / 2!r}, directional {declared!r}"
                 context.note(WRONG, f"d {unknown.name} / d {known.name}: adjoint derivative", text)
 
 

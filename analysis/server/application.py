@@ -116,7 +116,7 @@ class Application:
         if environ.get("HTTP_HOST") not in self.hosts:
             raise _Refused(
                 HTTPStatus.MISDIRECTED_REQUEST,
-                "this server answers at its own address alone: open the one that linkwork studio printed; a tunnel must "
+                "this server is served only at its own address: open the one that linkwork studio printed; a tunnel must "
                 "keep its port",
             )
         place = environ.get("PATH_INFO", "")
@@ -130,7 +130,7 @@ class Application:
             raise _Refused(HTTPStatus.NOT_FOUND, "there is nothing here")
         served = self._places[place].get(environ["REQUEST_METHOD"])
         if served is None:
-            raise _Refused(HTTPStatus.METHOD_NOT_ALLOWED, f"this place takes {', '.join(self._places[place])}")
+            raise _Refused(HTTPStatus.METHOD_NOT_ALLOWED, f"this path allows only {', '.join(self._places[place])}")
         if not secrets.compare_digest(self._token(environ).encode(), self.token.encode()):
             if place == "/":
                 return HTTPStatus.UNAUTHORIZED, self._lost
@@ -230,7 +230,7 @@ class Server:
 
     @property
     def address(self) -> str:
-        """Address of the page with its token."""
+        """Return the address of the page with its token."""
         return f"http://{ADDRESS}:{self.port}/?token={self.application.token}"
 
     def run(self) -> None:

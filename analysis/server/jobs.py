@@ -108,7 +108,7 @@ def _tuned(case: Case, wanted: _Tuning) -> Answer:
 def _run(case: Case, wanted: _Run) -> Answer:
     """Run the native FMU and return its outputs at the samples of the page."""
     if wanted.rows > _ROWS:
-        raise InputError(f"{wanted.rows} rows are more than {_ROWS}: ask for less")
+        raise InputError(f"{wanted.rows} rows are more than {_ROWS}: ask for fewer")
     mechanism = find_mechanism(case.parameters)
     with folder() as place:
         fmu = build_native(mechanism, NATIVE, place)
@@ -141,7 +141,7 @@ def _exported(case: Case, wanted: _Export) -> Answer:
     motor = motor_parameters(mechanism)
     if any(values[name] != 0.0 for name, (field, _) in motor.items() if field == "breakdown_torque"):
         raise InputError(
-            "an FMU has no motor: take it out here, and connect one to the FMU's torque in the system that it goes into"
+            "an FMU has no motor: take it out here, and connect one to the FMU's torque in the system that contains it"
         )
     values = {name: value for name, value in values.items() if name not in motor}
     platforms = tuple(PLATFORMS) if wanted.everywhere else None

@@ -26,8 +26,8 @@ _POINT = Many(Quantity("m"), length=2)
 #: Notes on kinds of linkages that the page cannot show completely.
 _NOTES: dict[syn.Kind, str] = {
     "slider-crank": "The page's slider-crank has no coupler point: its curve is in the small picture.",
-    "geared-five-bar": "A geared five-bar is none of the page's mechanisms: its drawing is at real size, and linkwork "
-    "synthesize with its own file searches its gears alone.",
+    "geared-five-bar": "The page cannot show a geared five-bar: its drawing is at real size, and linkwork synthesize with "
+    "its own case file searches only its gears.",
 }
 #: Name of the case file of a search; step between the points of a curve that a small picture shows.
 _TASK, _EVERY = "linkages.toml", 4
@@ -244,7 +244,7 @@ def moved(case: Case, wanted: Moved) -> Answer:
     load = tuple(sum(case.inputs.parts(name)) for name in ("load_x", "load_y"))
     drive = inverse_dynamics(p, motion_of_plant(last), speed, load=load)
     answer["words"] += (
-        f" It takes a force of {drive.peak_force:.4g} N at most, {drive.rms_force:.4g} N rms, and a torque of the crank of "
+        f" It takes a force of {drive.peak_force:.4g} N at most, {drive.rms_force:.4g} N rms, and a crank torque of "
         f"{drive.peak_torque:.4g} N.m at most."
     )
     charts.append(chart("Force on the slider over the crank angle", "N", drive.crank_angle, drive.force))

@@ -26,7 +26,7 @@ from ..run import progress_listener
 #: Seconds between two reports of progress; seconds to wait for a killed process.
 _INTERVAL, _PATIENCE = 0.1, 5.0
 _NOTE = "linkwork: "
-_LOST = "the process that worked on it ended, as where memory runs out"
+_LOST = "the process that did the job ended, for example because memory ran out"
 
 
 class Busy(InputError):
@@ -82,7 +82,7 @@ class Worker:
         """
         with self._lock:
             if self.look()["state"] == "running":
-                raise Busy("a job is being done already: wait for it, or cancel it")
+                raise Busy("a job is running already: wait for it, or cancel it")
             self._number += 1
             self._job = {"state": "running", "job": self._number, "kind": kind, "what": "starting", "share": 0.0}
             try:

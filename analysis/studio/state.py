@@ -53,8 +53,8 @@ def page_state(case: Case) -> dict[str, Any]:
         for part in others:
             if not isinstance(part, (int, float, np.number)):
                 raise InputError(
-                    f"{channel.argument} is a {type(part).__name__}: the studio has inputs that are constant, and one motor on "
-                    "the crank; linkwork run takes the case as it is"
+                    f"{channel.argument} is a {type(part).__name__}: the studio has only constant inputs, and one motor on "
+                    "the crank; use linkwork run for this case"
                 )
         values[channel.name] = float(sum(others))
         if motors:

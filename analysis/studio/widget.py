@@ -61,7 +61,7 @@ class Widget(anywidget.AnyWidget):
 
     @property
     def case(self) -> Case:
-        """The case that the page shows: parameters, initial state and inputs."""
+        """Return the case that the page shows: parameters, initial state and inputs."""
         return page_case(self.state)
 
     def change(self, values: Mapping[str, float]) -> None:

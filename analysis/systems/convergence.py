@@ -19,7 +19,7 @@ from .master import SystemRun, run_system
 
 
 class Way(NamedTuple):
-    """A way of coupling: the master's coupling, whether inputs for rates of speeds are connected, and the FMI version."""
+    """A way of coupling: the master's coupling, whether rates of commanded speeds are connected, and the FMI version."""
 
     coupling: str
     rates: bool = True

@@ -149,9 +149,9 @@ class System:
         return published_case(table.case)
 
     def _inputs(self, name: str, mechanism: Mechanism, inputs: Inputs) -> dict[str, float]:
-        """Return the constant inputs of the case of a part; refuse one that varies, if nothing is in its place.
+        """Return the constant inputs of a part's case; refuse an input that varies unless something replaces it.
 
-        In its place is a connection or a start value of the input, or of another input that drives its freedom.
+        A connection or a start value replaces it: of the input itself, or of another input that drives the same freedom.
         """
         here = {end.port for end in self.connections if end.part == name} | set(self.parts[name].values)
         driven = {c.freedom for c in mechanism.channels if c.name in here and c.freedom >= 0}
@@ -164,13 +164,13 @@ class System:
                 found[channel.name] = value[0]
             elif channel.name not in here and not replaced:
                 raise WiringError(
-                    f"parts.{name}: {channel.name} of its case is no constant: connect it, or give a constant in "
+                    f"parts.{name}: {channel.name} of its case is not constant: connect it, or give a constant in "
                     f"parts.{name}.values"
                 )
         return found
 
     def _modes(self, name: str, mechanism: Mechanism, inputs: Inputs) -> dict[str, float]:
-        """Return the drive mode of each freedom: of its connected input, or of that with a start value, or of the case."""
+        """Return the drive mode of each freedom: of its connected input, else of one with a start value, else the case's."""
         found = {mode: float(value) for mode, value in inputs.modes(mechanism).items()}
         for number, freedom in enumerate(mechanism.freedoms):
             if freedom.mode is None:
@@ -179,7 +179,7 @@ class System:
             wired = [c for c in channels if End(name, c.name) in self.connections]
             if len(wired) > 1:
                 both = " and ".join(c.name for c in wired)
-                raise WiringError(f"parts.{name}: {both} are both connected: {freedom.coordinate} is driven by one")
+                raise WiringError(f"parts.{name}: {both} are both connected: only one may drive {freedom.coordinate}")
             if driven := wired or [c for c in channels if c.name in self.parts[name].values]:
                 found[freedom.mode.name] = float(freedom.mode.arguments.index(driven[0].argument))
         return found

@@ -40,7 +40,7 @@ def write_host(wiring: Wiring, folder: str | Path) -> list[str]:
             known = re.findall(r"void (\w+)_sample\(", files[_CONTROLLERS])
             if part.description.modelName not in known:
                 raise WiringError(
-                    f"{name}: {part.fmu.name} has no sources in C, and the host has none of it: it has {', '.join(known)}"
+                    f"{name}: {part.fmu.name} has no sources in C; controllers known to the host are {', '.join(known)}"
                 )
         elif fmus.setdefault(_identifier(part), part.fmu) != part.fmu:
             raise WiringError(f"{name}: two different FMUs are named {_identifier(part)}: one of them must be renamed")

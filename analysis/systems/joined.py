@@ -84,7 +84,7 @@ class JoinedSystem:
                 for key, value in member.values.items():
                     setattr(self.controllers[name], key, value)
             else:
-                raise WiringError(f"{name} is an FMU: there are no equations of it to join")
+                raise WiringError(f"{name} is an FMU, whose equations are not known: it cannot be joined to one model")
         self.given = [s for s in dict.fromkeys(system.connections.values()) if s.part in self.controllers]
         held = casadi.SX.sym("held", len(self.given))
         wires: dict[End, Any] = {end: held[n] for n, end in enumerate(self.given)}

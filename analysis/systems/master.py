@@ -254,10 +254,11 @@ class _Instances:
 
 
 def count_steps(stop_time: float, step: float) -> int:
-    """Return the number of steps of a run with equal steps, of which the last may be shorter; refuse steps of no run."""
+    """Return the number of equal steps in a run, of which the last may be shorter; refuse a step that no run can have."""
     if not 0.0 < step <= stop_time < inf:
         raise InputError(
-            f"the communication step is {step} s: it must be above 0 and at most the stop time, {stop_time} s, a finite one"
+            f"the communication step is {step} s: it must be above 0 and at most the stop time, {stop_time} s, which must be "
+            "finite"
         )
     return ceil(stop_time / step * (1.0 - 1e-12))
 
@@ -341,14 +342,14 @@ def run_system(
     stepper, bonds = _Stepper(step, stop_time, share), wiring.bonds()
     if share is not None and not (share > 0.0 and bonds):
         raise InputError(
-            f"steps for a share of {share:g}: the share must be above 0, and the system must have a power bond, "
-            f"of which it has {len(bonds)}"
+            f"the share is {share:g} and the system has {len(bonds)} power bonds: the share must be above 0, with a bond at "
+            "least"
         )
     if share is not None or abs(stepper.count * step - stop_time) > 1e-9 * step:
         for name, part in wiring.parts.items():
             if not part.description.coSimulation.canHandleVariableCommunicationStepSize:
                 raise InputError(
-                    f"{name} takes equal communication steps alone: the steps cannot follow a share, and {step:g} s must "
+                    f"{name} accepts only equal communication steps: they cannot follow a share, and {step:g} s must "
                     f"divide the stop time, {stop_time:g} s"
                 )
     together = _Instances(wiring, bonds)
@@ -359,9 +360,7 @@ def run_system(
     try:
         stuck = [name for name, each in together.instances.items() if not each.goes_back]
         if coupling == "rollback" and stuck:
-            raise InputError(
-                f"{stuck[0]} cannot go back to the start of a step: the coupling must be another than rollback"
-            )
+            raise InputError(f"{stuck[0]} cannot go back to the start of a step: choose another coupling than rollback")
         with record_interrupts() as interrupted, show_progress(progress, stop_time, "running the system") as show:
             while times[-1] < stop_time * (1.0 - 1e-12) and not interrupted:
                 length, end = stepper.next_step(times[-1])

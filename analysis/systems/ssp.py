@@ -191,9 +191,7 @@ def read_ssp(path: str | Path) -> Wiring:
     tags = {node.tag.rpartition("}")[2] for node in nodes}
     for tag in _UNREAD:
         if tag in tags:
-            raise WiringError(
-                f"{path} has a {tag}: systems are read without; give the part the factor, or a part that has it"
-            )
+            raise WiringError(f"{path} has a {tag}, which is not supported: a part of the system must do what it does")
     for node in nodes:
         if node.tag.endswith("}DefaultExperiment") and {"startTime", "stopTime"} - {*node.keys()}:
             raise WiringError(f"{path} has a DefaultExperiment without startTime or stopTime: give both")
@@ -203,7 +201,9 @@ def read_ssp(path: str | Path) -> Wiring:
         system, parts = structure.system, {}
         for element in system.elements:
             if not getattr(element, "source", None):
-                raise WiringError(f"{getattr(element, 'name', 'an element')} is no FMU: a system is read on one level")
+                raise WiringError(
+                    f"{getattr(element, 'name', 'an element')} is no FMU: a system inside a system is not read"
+                )
             fmu = folder / Path(element.source).name
             store_file(fmu, (archive.unpacked_path / element.source).read_bytes())
             bindings = [*(element.parameter_bindings or ()), *(system.parameter_bindings or ())]
@@ -212,8 +212,8 @@ def read_ssp(path: str | Path) -> Wiring:
             )
             part = Part.from_fmu(element.name, fmu, {})
             values = {
-                key: _convert(_as_number(text, part.ports.get(key), f"{element.name}.{key}"), part, key, of, base)
-                for key, (text, of, base) in texts.items()
+                key: _convert(_as_number(text, part.ports.get(key), f"{element.name}.{key}"), part, key, unit, base)
+                for key, (text, unit, base) in texts.items()
             }
             parts[element.name] = Part.from_fmu(element.name, fmu, values)
         connections = {
@@ -224,7 +224,8 @@ def read_ssp(path: str | Path) -> Wiring:
         twice = [c for c in system.connections if c.end_element]
         if len(connections) < len(twice):
             raise WiringError(
-                f"{path}: an input has two connections, or one begins at the system's edge: it must have one"
+                f"{path}: an input has two connections, or a connection begins at the system's edge: each input must have one, "
+                "from a part"
             )
         experiment = structure.default_experiment
     if experiment is not None and experiment.start_time:
@@ -262,14 +263,14 @@ def _start_values(
     return found
 
 
-def _convert(value: float, part: Part, key: str, of: str, base: tuple[float, ...] | None) -> float:
-    """Return a start value in the unit of its variable; ``of`` is the unit in which it is given, ``base`` its definition."""
+def _convert(value: float, part: Part, key: str, unit: str, base: tuple[float, ...] | None) -> float:
+    """Return a start value in the unit of its variable; ``unit`` is the unit in which it is given, ``base`` its definition."""
     port = part.ports.get(key)
     own = None if port is None else part.base_unit(key)
-    if port is None or own is None or of in ("", port.unit):
+    if port is None or own is None or unit in ("", port.unit):
         return value
     if base is None or len(own) != len(base) or own[:-2] != base[:-2]:
-        raise WiringError(f"{part.name}.{key} starts with {value:g} {of}: it must be in {port.unit or 'no unit'}")
+        raise WiringError(f"{part.name}.{key} starts with {value:g} {unit}: it must be in {port.unit or 'no unit'}")
     return float((value * base[-2] + base[-1] - own[-1]) / own[-2])
 
 

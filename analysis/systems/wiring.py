@@ -261,7 +261,7 @@ class Wiring:
                     end.port: self.unit(end) for pair in self.connections.items() for end in pair if end.part == name
                 }
                 if said := ", ".join(f"{port} in {unit}" for port, unit in own.items() if unit):
-                    found.append(f"{name}: its FMU tells no units, taken as those at the other end: {said}")
+                    found.append(f"{name}: its FMU gives no units; each is taken from the other end: {said}")
             gains = [own for own in part.real_variables("parameter") if f"_{own}".endswith("_gain")]
             starts = {v.name: float(v.start or 0.0) for v in part.description.modelVariables if v.name in gains}
             if gains and not any(part.values.get(gain, starts[gain]) for gain in gains):
@@ -285,7 +285,7 @@ class Wiring:
                     after.setdefault(source, []).append(end)
         seen: set[frozenset[End]] = set()
         for first in connected:
-            # the chains from this output, which grow at their ends; all loops would be too many
+            # extend chains of outputs from this one, each only to outputs that no shorter chain reached: there can be too many
             chains, reached = [[first]], set[End]()
             for chain in chains:
                 for end in after.get(chain[-1], ()):

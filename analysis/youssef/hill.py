@@ -271,7 +271,7 @@ def hill_determinant(equation: PeriodicEquation, multiplier: int, *, order: int 
     require_sign(multiplier)
     k = _harmonics(multiplier, _order(equation, order))
     scaled = operator(equation, k) / (-equation.a.mean * (k**2 + 1.0))[:, None]
-    # real: the matrix turned about its middle is its complex conjugate
+    # the determinant is real: the matrix rotated by half a turn is its complex conjugate
     return float(np.linalg.det(scaled).real)
 
 

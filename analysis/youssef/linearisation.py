@@ -290,7 +290,7 @@ def slider_equation(
     """
     require_speed(speed)
     if parameters.slider_coulomb_friction:
-        raise InputError("slider.coulomb_friction must be 0: a linear equation cannot hold it")
+        raise InputError("slider.coulomb_friction must be 0: a linear equation cannot contain it")
     require_no_contact_friction(parameters.constants(), "a linear equation")
     if variant is not Variant.EXACT and order is not None:
         raise InputError(f"an order cannot be chosen with the variant {variant.value!r}: it has its own")

@@ -20,4 +20,4 @@ def require_five_bar(parameters: Parameters, what: str) -> None:
 def require_no_contact_friction(p: Any, what: str) -> None:
     """Raise InputError if a five-bar's constants have contact friction; ``what`` names the analysis in the message."""
     if FIVE_BAR.is_switched_on(p):
-        raise InputError(f"slider.friction_coefficient and pin.*_friction_radius must be 0: {what} cannot hold them")
+        raise InputError(f"slider.friction_coefficient and pin.*_friction_radius must be 0: {what} cannot contain them")

@@ -88,7 +88,7 @@ def ratios(parameters: FiveBarParameters) -> Ratios:
     for name in ("coupler_mass", "coupler_inertia", "rocker_cog_distance", "gravity", "slider_spring_free_position"):
         if value := getattr(parameters, name):
             raise InputError(
-                f"{name.replace('_', '.', 1)} is {value:g}: the thesis's equation can be read where this is 0 only"
+                f"{name.replace('_', '.', 1)} is {value:g}: it must be 0, as the thesis's equation is legible only then"
             )
     p = parameters.constants()
     return Ratios(

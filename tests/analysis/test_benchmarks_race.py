@@ -52,7 +52,7 @@ def test_the_same_targets_every_time() -> None:
     [("timed", "line in a third of a turn"), ("timed", "18 points"), ("function", "sine"), ("function", "waves 1")],
 )
 def test_pylinkage_is_scored_as_the_others_over_any_rotation(kind: str, name: str) -> None:
-    contest = Contest.of(target(kind, name))
+    contest = Contest.from_problem(target(kind, name))
     random = np.random.default_rng(1)
     compared = 0
     for box in contest.boxes:
@@ -68,7 +68,7 @@ def test_pylinkage_is_scored_as_the_others_over_any_rotation(kind: str, name: st
 
 @pytest.mark.slow
 def test_an_area_is_scored_by_the_measure_of_the_task() -> None:
-    contest = Contest.of(target("polygonal", "L"), on_area=True)
+    contest = Contest.from_problem(target("polygonal", "L"), on_area=True)
     assert contest.on_area
     random = np.random.default_rng(1)
     measured = charged = 0
@@ -90,7 +90,7 @@ def test_an_area_is_scored_by_the_measure_of_the_task() -> None:
 
 
 def test_linkwork_races_as_the_others_do() -> None:
-    contest = Contest.of(target("function", "sine"))
+    contest = Contest.from_problem(target("function", "sine"))
     # a search of any kind ends as soon as it has enough; least squares leave 0.0059 rad2
     trace = run_search(race.search_with_linkwork, contest, 60.0, 0.006, process_time)
     assert 0.0058 < trace.best <= 0.006
@@ -162,5 +162,5 @@ def test_the_tables_count() -> None:
 @pytest.mark.parametrize("search", ["CMA-ES", "pylinkage Nelder-Mead"])
 def test_the_searches_end_on_the_area(search: str) -> None:
     # of 1 m2 inside; at equal shares of the length the best is a circle with 0.182
-    contest = Contest.of(target("polygonal", "square"), on_area=True)
+    contest = Contest.from_problem(target("polygonal", "square"), on_area=True)
     assert run_search(RACERS[search], contest, 60.0, 0.9, process_time).best <= 0.9

@@ -53,20 +53,20 @@ def test_pylinkage_and_numpy_trace_our_curve(linkage: Linkage, branch: int) -> N
     moved = Linkage.from_vector(linkage.vector, branch).translate(0.3, -0.2)
     ours = moved.path(turn(72)) @ [1.0, 1j]
     size = moved.largest_link
-    np.testing.assert_allclose(PlacedFourBar.of(moved, 72).track()[:, 4], ours, rtol=0.0, atol=1e-9 * size)
+    np.testing.assert_allclose(PlacedFourBar.from_linkage(moved, 72).track()[:, 4], ours, rtol=0.0, atol=1e-9 * size)
     np.testing.assert_allclose(curve_by_numpy(moved, turn(72)), ours, rtol=0.0, atol=1e-12 * size)
 
 
 @pytest.mark.parametrize("linkage", PUBLISHED)
 def test_pylinkage_turns_our_rocker(linkage: Linkage) -> None:
-    track = PlacedFourBar.of(linkage, 72).track()
+    track = PlacedFourBar.from_linkage(linkage, 72).track()
     off = np.angle((track[:, 3] - track[:, 1]) * np.exp(-1j * (linkage.rocker_angle(turn(72)) + linkage.ground_angle)))
     assert np.abs(off).max() < 1e-9
 
 
 @pytest.mark.parametrize("name", ["ellipse-a", "ellipse-b", "ellipse-a-bounded", "rocker", "rocker-weighted"])
 def test_pylinkage_is_scored_as_our_simplex(name: str) -> None:
-    contest = Contest.of(PROBLEMS[name])
+    contest = Contest.from_problem(PROBLEMS[name])
     random = np.random.default_rng(1)
     compared = charged = 0
     for box in contest.boxes:
@@ -88,7 +88,7 @@ def test_pylinkage_is_scored_as_our_simplex(name: str) -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ["path-a", "path-b", "packaging"])
 def test_pylinkage_is_scored_as_our_simplex_on_paths(name: str) -> None:
-    contest = Contest.of(PROBLEMS[name])
+    contest = Contest.from_problem(PROBLEMS[name])
     linkage = good(name)
     box = next(b for b in contest.boxes if b.branch == linkage.branch)
     score = PylinkageScore(contest, box)
@@ -102,7 +102,7 @@ def test_pylinkage_is_scored_as_our_simplex_on_paths(name: str) -> None:
 
 
 def test_what_pylinkage_cannot_join_is_infinite() -> None:
-    contest = Contest.of(PROBLEMS["ellipse-a"])
+    contest = Contest.from_problem(PROBLEMS["ellipse-a"])
     box = contest.boxes[0]
     score = PylinkageScore(contest, box)
     apart = unknowns(contest, PROBLEMS["ellipse-a"].linkage)
@@ -114,7 +114,7 @@ def test_what_pylinkage_cannot_join_is_infinite() -> None:
 @pytest.mark.parametrize("name", ["ellipse-a", "rocker-weighted", "path-b", "packaging"])
 def test_a_linkage_is_measured_by_the_task(name: str) -> None:
     problem = PROBLEMS[name]
-    contest = Contest.of(problem)
+    contest = Contest.from_problem(problem)
     linkage = good(name)
     box = next(b for b in contest.boxes if b.branch == linkage.branch)
     error = contest.error(box, unknowns(contest, linkage))
@@ -134,7 +134,7 @@ def test_the_printed_packaging_machine_is_not_flat_enough() -> None:
 
 def test_a_linkage_that_violates_a_constraint_does_not_count() -> None:
     # the printed linkage of ellipse a has a transmission angle below 40 degrees
-    contest = Contest.of(PROBLEMS["ellipse-a"])
+    contest = Contest.from_problem(PROBLEMS["ellipse-a"])
     linkage = PROBLEMS["ellipse-a"].linkage
     assert linkage.least_transmission < radians(40.0)
     trace = Trace(contest, 10.0)
@@ -144,7 +144,7 @@ def test_a_linkage_that_violates_a_constraint_does_not_count() -> None:
 
 
 def test_the_clock_stops_while_measuring(monkeypatch: pytest.MonkeyPatch) -> None:
-    contest = Contest.of(PROBLEMS["rocker"])
+    contest = Contest.from_problem(PROBLEMS["rocker"])
     box = contest.boxes[0]
     values = iter([5.0, 7.0, 3.0])
 
@@ -168,7 +168,7 @@ def test_the_clock_stops_while_measuring(monkeypatch: pytest.MonkeyPatch) -> Non
 
 
 def test_what_improves_is_offered() -> None:
-    contest = Contest.of(PROBLEMS["rocker"])
+    contest = Contest.from_problem(PROBLEMS["rocker"])
     box = contest.boxes[0]
     trace = Trace(contest, 10.0)
     offered: list[float] = []
@@ -182,7 +182,7 @@ def test_what_improves_is_offered() -> None:
 
 @pytest.mark.parametrize("search", SEARCHES.values(), ids=SEARCHES.keys())
 def test_every_search_finds_a_rocker_function(search: object) -> None:
-    contest = Contest.of(PROBLEMS["rocker"])
+    contest = Contest.from_problem(PROBLEMS["rocker"])
     # a long way from the optimum of 1019, but no linkage at random does it
     trace = run_search(search, contest, 20.0, 3000.0)
     assert trace.best <= 3000.0
@@ -191,7 +191,7 @@ def test_every_search_finds_a_rocker_function(search: object) -> None:
 
 def test_function_generation_of_pylinkage_over_phases() -> None:
     # Freudenstein's equation weighs the errors otherwise: near the optimum, not at it
-    contest = Contest.of(PROBLEMS["rocker"])
+    contest = Contest.from_problem(PROBLEMS["rocker"])
     trace = run_search(search_with_freudenstein, contest, 20.0, -inf)
     assert 1019.0 < trace.best < 1300.0
 
@@ -207,7 +207,7 @@ def test_kernels_are_timed() -> None:
 
 
 def test_charges_are_those_of_our_simplex() -> None:
-    contest = Contest.of(PROBLEMS["ellipse-a"])
+    contest = Contest.from_problem(PROBLEMS["ellipse-a"])
     box = contest.boxes[0]
     x = unknowns(contest, PROBLEMS["ellipse-a"].linkage)[None, :]
     charge = PENALTY * contest.normal.weights.sum() * np.maximum(box.violations(x), 0.0).sum()

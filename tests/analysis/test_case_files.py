@@ -89,7 +89,7 @@ def test_missing_names_are_listed():
         ("case.toml", "title = ", "not valid TOML"),
         ("case.json", "{", "not valid JSON"),
         ("case.yaml", "", r"must end in \.toml or \.json"),
-        ("case.json", "[1, 2]", "must hold tables"),
+        ("case.json", "[1, 2]", "must contain tables"),
     ],
 )
 def test_files_that_cannot_be_read(tmp_path, name, text, said):

@@ -299,8 +299,8 @@ def test_build_of_a_linkage_names_what_its_file_says_of_runs_alone(linkwork, tmp
     (tmp_path / "first.toml").write_text(f'{WIPER}[initial]\ncrank_angle = "100 deg"\n')
     (tmp_path / "second.toml").write_text('linkage = "first.toml"\ncrank.length = "35 mm"\ndrive.torque = 0\n')
     for file, entries in (
-        ("first.toml", "initial.crank_angle beside it is of"),
-        ("second.toml", "initial.crank_angle, crank.length, drive.torque beside it are of"),
+        ("first.toml", "initial.crank_angle outside of this table is only"),
+        ("second.toml", "initial.crank_angle, crank.length, drive.torque outside of this table are only"),
     ):
         said = " ".join(linkwork("build", file).stderr.split())
         assert f"WiperArm starts as [linkage] of {file} says; {entries} the file's runs." in said

@@ -264,7 +264,7 @@ class TestTolerances:
         short = ("--set", "rod.length=30 in", "--offset", "20 in", "--shift", 0)
         result = linkwork("tolerances", *short, "--angle", 0, "--points", 37, "--samples", 50, "--no-plot")
         assert result.exit_code == 0
-        assert "it cannot be assembled at 0 deg: the nearest of the angles, 40 deg, is taken" in " ".join(
+        assert "the mechanism cannot be assembled at 0 deg: the nearest sampled angle, 40 deg, is used" in " ".join(
             result.stderr.split()
         )
 

@@ -261,10 +261,10 @@ def test_curve_of_four_poses_contains_the_dyads_of_five() -> None:
     [
         ([[0, 0], [1, 0], [2, 1], [3, 1], [4, 0], [5, 0]], [0.0] * 6, None, "6 poses"),
         ([[0, 0], [1, 0], [2, 1]], [0.0, 0.1, 0.2], None, "3 poses"),
-        ([[0, 0], [1, 0], [2, 1], [3, 1], [4, 0]], None, None, "poses are wanted"),
+        ([[0, 0], [1, 0], [2, 1], [3, 1], [4, 0]], None, None, "there must be points"),
         ([[0, 0], [1, 0], [2, 1], [3, 1], [4, 0]], [0.1] * 5, None, "does not turn"),
         ([[0, 0], [1, 0], [0, 0], [3, 1], [4, 0]], [0.1, 0.2, 0.1, 0.4, 0.5], None, "the same"),
-        ([[0, 0], [1, 0], [2, 1], [3, 1]], [0.1, 0.2, 0.3, 0.4], [0.0, 0.1, 0.2, 0.3], "leave them out"),
+        ([[0, 0], [1, 0], [2, 1], [3, 1]], [0.1, 0.2, 0.3, 0.4], [0.0, 0.1, 0.2, 0.3], "give poses without"),
     ],
 )
 def test_poses_that_cannot_be_taken(points: object, angle: object, rotation: object, said: str) -> None:

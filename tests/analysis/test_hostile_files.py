@@ -342,7 +342,10 @@ def test_a_command_writes_over_its_own_files_and_no_others(tmp_path):
     name, notes = write("check", "3")
     assert name == "x-2.txt"
     assert len(notes) == 1
-    assert "x.txt is not as 'linkwork check' wrote it and stays: the new file is x-2.txt; --force" in notes[0]
+    assert (
+        "x.txt was changed since 'linkwork check' wrote it, or is not its file, and is kept: the new file is x-2.txt; --force"
+        in notes[0]
+    )
     (tmp_path / "x.txt").write_text("changed by hand")
     assert write("run", "4")[0] == "x-3.txt"
     assert write("check", "5")[0] == "x-2.txt"
@@ -374,7 +377,7 @@ def test_the_option_force(tmp_path, linkwork):
     result = linkwork(*words)
     assert result.exit_code == 0
     assert "wrote out/table-3.1-2.csv" in result.stdout
-    assert "table-3.1.csv is not as 'linkwork run' wrote it and stays" in " ".join(result.stderr.split())
+    assert "table-3.1.csv was changed since 'linkwork run' wrote it" in " ".join(result.stderr.split())
     assert (tmp_path / "out" / "table-3.1.csv").read_text() == "measured for a week"
     for force in (("--force",), ()):
         result = linkwork(*words, *force)

@@ -209,7 +209,7 @@ class TestRefused:
                 syn.MaxPinForce(force=1.0),
                 {"pivot": syn.SliderUnknown(harmonics=1)},
                 InputError,
-                "its rocker pivot must be fixed",
+                "applies only to a fixed rocker pivot",
             ),
             (syn.LeastPinForce(error=0.0), {}, ParameterError, "greatest error"),
             (syn.LeastPinForce(error="1 deg"), {}, ParameterError, "greatest error"),
@@ -262,7 +262,7 @@ def test_a_case_file_asks_for_all_of_it(tmp_path: Path) -> None:
     assert isinstance(least, syn.LeastPinForce)
     assert (most.force, most.pins, least.error, least.pins) == (40.0, "BC", "2 deg", "BC")
     assert most.make == least.make == case.make == syn.MachineSpec(speed=10.0 * pi, load=(0.0, -20.0), crank_mass=0.2)
-    with pytest.raises(ParameterError, match="come with a least or greatest one"):
+    with pytest.raises(ParameterError, match="come with least_mechanical_advantage"):
         syn.read_synthesis_case(tables | {"constraints": {"mechanical_advantage_at": ["30 deg"]}}, folder=tmp_path)
     swing = {"least_transmission_angle": False, "toggle_stretched": "200 deg", "toggle_folded": ["30 deg", "40 deg"]}
     *_, toggle, other = syn.read_synthesis_case(tables | {"constraints": swing}, folder=tmp_path).constraints

@@ -760,7 +760,7 @@ def test_a_job_of_another_tab_is_followed_and_cancelled(browser: Browser, page: 
     page.click("#python summary:has-text('The FMU')")
     page.evaluate("document.querySelectorAll('#python button').forEach((one) => { one.disabled = false })")
     page.click("text=Run it beside the page")
-    page.wait_for_selector("#python .fault:has-text('a job is being done already')")
+    page.wait_for_selector("#python .fault:has-text('a job is running already')")
     page.click("text=Cancel")
     page.wait_for_selector("#python .fault:has-text('Cancelled')")
     assert studio.worker.look()["job"] == first["job"]

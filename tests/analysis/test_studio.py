@@ -125,7 +125,7 @@ def test_a_case_is_a_state_of_the_page(linkwork: Callable[..., Result], tmp_path
     [
         (["nothing.toml"], "nothing.toml"),
         (["--set", "drive.speed=3"], "name one"),
-        ([ROOT / "examples" / "torsion-bar.toml"], "inputs that are constant"),
+        ([ROOT / "examples" / "torsion-bar.toml"], "only constant inputs"),
         ([ROOT / "examples" / "ellipse.toml"], "linkwork synthesize"),
     ],
 )

@@ -309,10 +309,14 @@ class TestSearch:
 @pytest.mark.parametrize(
     ("task", "more", "message"),
     [
-        (syn.RockerFunction(angle=[0.1, 0.2, 0.4]), {"kinds": ("slider-crank",)}, "RockerFunction is of a rocker"),
-        (syn.SliderFunction(position=[0.0, 0.1, 0.2]), {"kinds": ("four-bar",)}, "SliderFunction is of a slider"),
-        (syn.QuickReturn(stroke=0.1), {"kinds": ("four-bar",)}, "QuickReturn is of the slider of a slider-crank"),
-        (syn.QuickSwing(swing=1.0), {"kinds": ("slider-crank",)}, "QuickSwing is of the rocker of a four-bar"),
+        (syn.RockerFunction(angle=[0.1, 0.2, 0.4]), {"kinds": ("slider-crank",)}, "RockerFunction needs a rocker"),
+        (syn.SliderFunction(position=[0.0, 0.1, 0.2]), {"kinds": ("four-bar",)}, "SliderFunction needs a slider"),
+        (
+            syn.QuickReturn(stroke=0.1),
+            {"kinds": ("four-bar",)},
+            "QuickReturn is a task for the slider of a slider-crank",
+        ),
+        (syn.QuickSwing(swing=1.0), {"kinds": ("slider-crank",)}, "QuickSwing is a task for the rocker of a four-bar"),
         (None, {"kinds": ("slider-crank",), "constraints": [syn.Grashof(type="crank-rocker")]}, "cannot keep Grashof"),
         (None, {"constraints": [syn.Stroke(least=0.1)]}, "a four-bar cannot keep Stroke"),
         (

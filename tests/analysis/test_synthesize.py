@@ -557,7 +557,7 @@ class TestBadInput:
                 lambda: syn.TimedPath(points=ELLIPSE[:3], rotation=[0, 2, 1]),
                 "crank rotations 1 and 2 are 2 and 1 rad: they must go one way",
             ),
-            (lambda: syn.TimedPath(points=ELLIPSE[:3], rotation=[0, 1, 7]), "no more than a turn can be asked"),
+            (lambda: syn.TimedPath(points=ELLIPSE[:3], rotation=[0, 1, 7]), "they may span one turn at most"),
             (lambda: syn.TimedPath(points=ELLIPSE[:3], weights=[1, -1, 1]), "weight 1 is -1: none may be below zero"),
             (
                 lambda: syn.TimedPath(points=ELLIPSE[:3], weights=[0, 0, 0]),
@@ -592,7 +592,7 @@ class TestBadInput:
             ({"search": {"candidates": 0}}, InputError, "0 candidates"),
             ({"search": {"n_jobs": 0}}, InputError, "0 cores"),
             ({"weights": [1.0, 2.0]}, InputError, r"weights have the shape \(2,\)"),
-            ({"constraints": ["short"]}, InputError, "constraint 'short' is none: use .*LeastTransmission"),
+            ({"constraints": ["short"]}, InputError, "'short' is not a constraint: use .*LeastTransmission"),
             ({"bounds": {"crank": (0, 1)}}, ParameterError, "no dimension 'crank'.* crank_length"),
             (
                 {"bounds": {"crank_length": (0.2, 0.1)}},
@@ -615,7 +615,7 @@ class TestBadInput:
             (
                 {"constraints": [syn.Assembly(branch=1), syn.Assembly(branch=-1)]},
                 syn.InfeasibleError,
-                "both assemblies are asked for at once",
+                "the constraints require both assemblies at once",
             ),
             (
                 {"constraints": [syn.Grashof(type="drag-link"), syn.Grashof(type="crank-rocker")]},

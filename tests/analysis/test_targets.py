@@ -548,7 +548,7 @@ def test_files_that_cannot_be_read(tmp_path: Path) -> None:
         read_points(tmp_path / "none.csv")
     with pytest.raises(InputError, match=r"'\.xls'"):
         read_points(tmp_path / "a.xls")
-    with pytest.raises(InputError, match="cannot be looked up"):
+    with pytest.raises(InputError, match="cannot be selected"):
         read_points(save(tmp_path, "a.csv", "0,0\n1,1\n"), name="curve")
     with pytest.raises(ParameterError, match="unit"):
         read_points(save(tmp_path, "a.csv", "0,0\n1,1\n"), unit="kg")

@@ -63,7 +63,7 @@ def wired(name: str, **connections: str) -> System:
         (
             {"linkage__drive__speed": "motor.rotor.speed"},
             WiringError,
-            "drive.torque and drive.speed are both connected: crank.angle is driven by one",
+            "drive.torque and drive.speed are both connected: only one may drive crank.angle",
         ),
         ({"linkage__drive__torq": "motor.shaft.exerted_torque"}, UnknownNameError, r"did you mean drive\.torque"),
         ({"linkage__drive__torque": "engine.shaft.exerted_torque"}, UnknownNameError, "motor"),
@@ -162,7 +162,7 @@ def test_an_input_of_a_case_that_varies_is_refused_unless_something_takes_its_pl
     ramp = "{ kind = 'ramp', start = '0 rpm', end = '9 rpm', from_time = '0 s', to_time = '1 s' }"
     (tmp_path / "case.toml").write_text(f"published = 'table-3.1'\n[drive]\nspeed = {ramp}", encoding="utf-8")
     part = PartTable(case="case.toml")
-    with pytest.raises(WiringError, match=r"parts.a: drive.speed of its case is no constant: connect it, or give"):
+    with pytest.raises(WiringError, match=r"parts.a: drive.speed of its case is not constant: connect it, or give"):
         _ = System(parts={"a": part}, folder=tmp_path).members
     held = System(parts={"a": replace(part, values={"drive.speed": "3 rad/s"})}, folder=tmp_path).members["a"].values
     assert (held["drive.mode"], held["drive.speed"]) == (1.0, 3.0)

@@ -131,5 +131,5 @@ def _special_places(turn: ForceTurn, units: Units) -> list[str]:
         for end in turn.limits
     ]
     if not turn.clear().any():
-        sentences.append("no crank angle is clear of these, and no force has extremes")
+        sentences.append("all crank angles are too near to these, so that no force has extremes")
     return [*sentences, *(f"masked: {text}" for text in turn.mask_reasons)]

@@ -196,7 +196,7 @@ class _MechanismOptions:
         if speed is not None and self.speed is None:
             used.append(f"a crank speed of {speed / RAD_S_PER_RPM:.6g} rpm (--speed)")
         if used:
-            note(f"the file does not say, and is taken: {', '.join(used)}")
+            note(f"used by default, as nothing else is given: {', '.join(used)}")
 
 
 def _title(units: Units, p: SliderCrankParameters, shift: float, groove: str | None) -> str:
@@ -297,7 +297,7 @@ def problem_options(points: int) -> Callable[[Command], Command]:
         @wraps(command)
         def run(*, torque: str | None, load: str | None, points: int, **options: Any) -> Any:
             if torque is not None and load is not None:
-                raise click.UsageError("give --torque, and the slider's force is sought, or --load, and the torque is")
+                raise click.UsageError("give either --torque, to find the slider force, or --load, to find the torque")
             given = {"load": quantity("0" if load is None else load, "N", "--load")}
             if torque is not None:
                 given = {"torque": quantity(torque, "N.m", "--torque")}

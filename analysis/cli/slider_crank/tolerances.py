@@ -107,7 +107,7 @@ def tolerances(
     here = f"{_degrees(turn, place):.6g} deg"
     if abs(float(turn.angle[place]) - at) > 1e-9:
         note(
-            f"it cannot be assembled at {degrees(at):.6g} deg: the nearest of the angles, {here}, is taken in its place"
+            f"the mechanism cannot be assembled at {degrees(at):.6g} deg: the nearest sampled angle, {here}, is used instead"
         )
     rows, slopes = _sensitivity_table(exact, allowed, place, units)
     headings = ("quantity", "to", "unit", f"at {here}", "greatest", "at [deg]")
@@ -143,8 +143,8 @@ def _reduce_to_turn(angle: float, chosen: MechanismChoice) -> float:
         return angle
     if chosen.groove is not None and not chosen.parameters.groove_ratio.is_integer():
         raise InputError(
-            f"--angle is {degrees(angle):.6g} deg: with groove.ratio = {chosen.parameters.groove_ratio:g} the shift is another "
-            "in every turn; give an angle from 0 to 360 deg"
+            f"--angle is {degrees(angle):.6g} deg: with groove.ratio = {chosen.parameters.groove_ratio:g} the shift differs "
+            "from turn to turn; give an angle from 0 to 360 deg"
         )
     return float(angle % tau)
 

@@ -174,7 +174,9 @@ class Constraints:
         given = {name: end for name, end in ends.items() if end is not None}
         if self.mechanical_advantage_at is not None and not given:
             raise ParameterError(
-                "constraints.mechanical_advantage_at", self.mechanical_advantage_at, "come with a least or greatest one"
+                "constraints.mechanical_advantage_at",
+                self.mechanical_advantage_at,
+                "come with least_mechanical_advantage or greatest_mechanical_advantage",
             )
         return {**given, "at": self.mechanical_advantage_at} if given else None
 

@@ -193,10 +193,10 @@ def guidance(task: Task, count: int = 6) -> Guidance | GuidanceMap:
 def _read_poses(task: Task) -> tuple[Poses, ComplexArray, FloatArray]:
     """Return the task, and the positions and angles of its four or five poses; raise InputError as `guidance` does."""
     if not isinstance(task, PrecisionPoints | Motion) or task.angle is None:
-        raise InputError(f"{type(task).__name__}: poses are wanted, points with the body's angle at each")
+        raise InputError(f"a {type(task).__name__} has no poses: there must be points, with the body's angle at each")
     if task.rotation is not None:
         raise InputError(
-            "poses at given crank rotations: closed-form guidance leaves the rotations free; leave them out"
+            "the poses have crank rotations: closed-form guidance leaves the rotations free, so give poses without"
         )
     points, angle = np.asarray(task.points), np.asarray(task.angle)
     if len(points) not in (4, 5):
@@ -366,7 +366,7 @@ def build_four_bar(task: Poses, crank: Dyad, rocker: Dyad) -> Solution:
     if linkage.turns_fully or linkage.grashof == "change-point":
         rotation = unwrap_in_order(np.angle(arm * np.conj(arm[0])))
     else:
-        # the crank swings, and never points away from D, or else never to D: there its angle is cut
+        # a crank that swings never points away from D, or never towards D: its angle may jump in that direction
         away = linkage.cosine_at_c(np.array([abs(ground) + abs(arm[0])]))[0] < -1.0
         th2 = np.angle(arm * np.conj(ground))
         th2 = th2 if away else th2 % (2.0 * pi)

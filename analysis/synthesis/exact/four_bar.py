@@ -65,8 +65,8 @@ class Generators(Exact):
 
 
 _DEPENDENT_POINTS = (
-    "the points of the function are not independent, as those of a constant, or of a rocker that turns with the crank, are "
-    "not: infinitely many linkages have them. Change a point"
+    "the points of the function are not independent, such as those of a constant, or of a rocker that turns with the crank: "
+    "infinitely many linkages pass through them. Change a point"
 )
 
 
@@ -122,7 +122,7 @@ def _count_message(n: int, free: int, mounting: bool, crank_phase: object) -> st
     unknown += ["the crank's phase"] if crank_phase is None else []
     unknown += ["the output's mounting"] if mounting else []
     more = "Leave points out" if n > free else "Add points, or fix the crank's phase or the mounting"
-    return f"{n} points of a function, and {free} unknowns ({', '.join(unknown)}): closed form needs as many. {more}"
+    return f"{n} points of a function, and {free} unknowns ({', '.join(unknown)}): a closed form needs equal numbers. {more}"
 
 
 def _rows(th2: FloatArray, th4: FloatArray) -> FloatArray:
@@ -294,7 +294,9 @@ def alternatives(solution: Solution) -> tuple[Solution, ...]:
     """
     task, linkage, rotation = solution.task, solution.linkage, solution.rotation
     if not _is_path(task):
-        raise InputError(f"{type(task).__name__}: cognates share the coupler's curve, not its angle nor the rocker's")
+        raise InputError(
+            f"a {type(task).__name__} has no cognates: they share the coupler curve, but not the links' angles"
+        )
     same, *others = cognates(linkage, rotation[0])
     stations = solution.evaluation.rotation
     if isinstance(task, TimedPath) or (isinstance(task, PrecisionPoints) and task.rotation is not None):

@@ -134,7 +134,7 @@ def quick_returns(
             )
     branches = {c.branch for c in constraints if isinstance(c, Assembly)}
     if len(branches) > 1:
-        raise InfeasibleError("both assemblies are asked for at once")
+        raise InfeasibleError("the constraints require both assemblies at once")
     cosine: Callable[[float], float]
     if isinstance(task, QuickReturn):
         ends = _dimension_ranges(task, bounds, constraints)

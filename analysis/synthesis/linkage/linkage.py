@@ -150,7 +150,7 @@ class Linkage:
     #: Types of the motion of the rocker pivot.
     pivots: ClassVar[tuple[type, ...]] = (SliderMotion, type(None))
     #: Words for reports: the driven link, its motions, and the meaning of its mechanical advantage.
-    driven: ClassVar[tuple[str, str, str]] = ("rocker", "swings", "torque of the rocker for one of the crank")
+    driven: ClassVar[tuple[str, str, str]] = ("rocker", "swings", "torque on the rocker per torque on the crank")
     #: Bars of a drawing as (layer, letters of the two pins); letters of the pins that are labelled.
     bars: ClassVar[tuple[tuple[str, str], ...]] = (("ground", "AE"), ("crank", "AB"), ("rocker", "DC"))
     letters: ClassVar[str] = "ABCD"
@@ -178,7 +178,7 @@ class Linkage:
                 raise ParameterError(name, value, "be greater than zero")
             object.__setattr__(self, name, value)
         if not isinstance(self.pivot, self.pivots):
-            raise ParameterError("pivot", self.pivot, f"be fixed, or what moves that of a {self.kind}")
+            raise ParameterError("pivot", self.pivot, f"be None or a motion that a {self.kind} can have")
         if self.branch not in (1, -1):
             raise ParameterError("branch", self.branch, "be +1 or -1")
 
@@ -517,7 +517,7 @@ class SliderCrank(Linkage):
     kind: ClassVar[Kind] = "slider-crank"
     links: ClassVar[tuple[str, ...]] = ("crank_length", "coupler_length")
     pivots: ClassVar[tuple[type, ...]] = (type(None),)
-    driven: ClassVar[tuple[str, str, str]] = ("slider", "strokes", "force of the slider for one at the crank pin")
+    driven: ClassVar[tuple[str, str, str]] = ("slider", "strokes", "force on the slider per force on the crank pin")
     bars: ClassVar[tuple[tuple[str, str], ...]] = (("ground", "AE"), ("crank", "AB"))
     letters: ClassVar[str] = "ABC"
 

@@ -358,7 +358,7 @@ def pin_forces(
         If the links cannot be joined at some crank rotation.
     """
     if linkage.pivot is not None:
-        raise ParameterError("pivot", linkage.pivot, "be fixed: of a moved one see motion.inverse_dynamics")
+        raise ParameterError("pivot", linkage.pivot, "be fixed: for a moving pivot use slider.inverse_dynamics")
     begin, end = (0.0, 2.0 * pi) if rotation is None else rotation
     if not run:
         return _evaluate_forces(linkage, make, np.linspace(begin, end, SAMPLES + 1))

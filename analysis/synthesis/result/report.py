@@ -30,8 +30,8 @@ PIVOT_ANGLES = ("guide_angle", "second_crank_phase")
 #: Error relative to the target above which a solution is called poor; improvement to suggest for each kind of linkage.
 POOR = 0.05
 _IMPROVEMENTS = {
-    "four-bar": "a geared five-bar (search.kinds) or a moved rocker pivot has more dimensions for it",
-    "slider-crank": "a four-bar or a geared five-bar (search.kinds) has more dimensions for it",
+    "four-bar": "a geared five-bar (search.kinds) or a moved rocker pivot has more dimensions to fit it",
+    "slider-crank": "a four-bar or a geared five-bar (search.kinds) has more dimensions to fit it",
     "geared-five-bar": "other ratios of its gears (search.gears), or a smoother or smaller target, may do better",
 }
 #: Step of the finite differences of exact derivatives, in rad or relative to the longest link.
@@ -407,8 +407,8 @@ def format_poor(solution: Solution) -> str:
     if solution.measures_area:
         said = f"{100.0 * share:.2g} % of the target's area is wrong"
     else:
-        of = "swing" if isinstance(task, RockerFunction) else "size"
-        said = f"the rms error is {100.0 * share:.2g} % of the target's {of}"
+        extent = "swing" if isinstance(task, RockerFunction) else "size"
+        said = f"the rms error is {100.0 * share:.2g} % of the target's {extent}"
     better = _IMPROVEMENTS[solution.linkage.kind]
     if solution.linkage.pivot is not None and solution.linkage.kind == "four-bar":
         better = "more harmonics of its pivot's motion, or a smoother or smaller target, may do better"
@@ -542,9 +542,9 @@ def _limit_lines(solution: Solution) -> str:
         lines += f"\ntime ratio of the {last}'s {motions} {ratio:.4g}"
     gained = np.abs(mechanical_advantage(linkage, np.linspace(begin, end, CLOSELY)))
     if np.isfinite(gained).any():
-        # where the links cannot be joined all the way, a toggle is on it
+        # if the links cannot be joined throughout, the range contains a toggle
         least = 0.0 if np.isnan(gained).any() else gained.min()
-        lines += f"\n{what}: {least:.3g} at least on the way"
+        lines += f"\n{what}: at least {least:.3g} during the task"
     return lines
 
 

@@ -194,7 +194,7 @@ def polish(
         kept, interrupted = _refine_in_laps(spread, begin, given, laps)
     if limits.least is not None and not interrupted:
         best = distinct_answers(feasible_answers(kept) or feasible_answers(found), ONWARDS, pivot)
-        kept, interrupted = spread("minimise_objectives", best, f"making least the {limits.least.along.name}")
+        kept, interrupted = spread("minimise_objectives", best, f"minimising the {limits.least.along.name}")
         found = [*(answer for answer in found if not answer.feasible), *kept] if kept else found
     elif limits.bounds_rotations:
         kept = [answer for answer in kept if worker.judge_start(answer.start).feasible]

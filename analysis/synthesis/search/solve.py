@@ -203,7 +203,7 @@ def synthesize(
     for number, guess in enumerate(guesses):
         if not any(limits.admits(guess.linkage) for limits in every):
             raise InputError(
-                f"guess {number} is a {guess.verdicts.grashof}: it must be of the kinds that are asked for"
+                f"guess {number} is a {guess.verdicts.grashof}: it must be of one of the kinds in the search"
             )
     found: list[tuple[Solution, ...]] = []
     exact = closed_form_solutions(task) if pivot is None else ()
@@ -242,8 +242,8 @@ def _solve_in_closed_form(
     begun: float,
 ) -> Synthesis:
     if tuple(kinds) != usual_kinds(task):
-        of = "slider of a slider-crank" if isinstance(task, QuickReturn) else "rocker of a four-bar"
-        raise InputError(f"a {type(task).__name__} is of the {of}: kinds must be {usual_kinds(task)}")
+        link = "slider of a slider-crank" if isinstance(task, QuickReturn) else "rocker of a four-bar"
+        raise InputError(f"a {type(task).__name__} is a task for the {link}: kinds must be {usual_kinds(task)}")
     found = group_similar(quick_returns(task, bounds, constraints))[: search.solutions]
     seconds = perf_counter() - begun
     return Synthesis(
@@ -325,7 +325,7 @@ def improve(
     task = _prepare_task(task, constraints, pivot)
     normal = search_form(task, pivot)
     limits = make_limits(task, normal, bounds, constraints)
-    base, *begin = (convert_to_start(of, normal, pivot) for of in (linkage, *guesses))
+    base, *begin = (convert_to_start(guess, normal, pivot) for guess in (linkage, *guesses))
     random = np.random.default_rng(search.seed)
     begin += [replace(base, pivot=random_pivot(pivot, base.q[2], normal.unit, random)) for _ in range(search.starts)]
     done = polish(normal, limits, begin, pivot=pivot, search=search)
@@ -347,7 +347,7 @@ def _prepare_task(task: Task, constraints: Sequence[Any], pivot: PivotUnknown | 
     """
     demands = [c for c in constraints if isinstance(c, Demand)] if isinstance(constraints, Sequence) else []
     if demands and pivot is not None:
-        raise InputError(f"{type(demands[0]).__name__} is about a four-bar: its rocker pivot must be fixed")
+        raise InputError(f"{type(demands[0]).__name__} applies only to a fixed rocker pivot: leave it out")
     if not any(c.seeks for c in demands):
         return task
     return replace(task, objective="worst")

@@ -285,13 +285,13 @@ def make_start(
     return Start(q=q, branch=linkage.branch, pivot=v, rotation=rotation, given=True, linkage=kind)
 
 
-def convert_to_start(of: Linkage | Solution, normal: Normal, pivot: PivotUnknown | None) -> Start:
+def convert_to_start(given: Linkage | Solution, normal: Normal, pivot: PivotUnknown | None) -> Start:
     """Convert a linkage or solution to a start, with crank rotations for untimed stations.
 
     These are the rotations of the solution, or else the rotations at which the linkage is nearest to the stations. Raises
     InputError if the rotations are not known and the path is open: nearest rotations are found for closed paths only.
     """
-    linkage, rotation = (of.linkage, of.evaluation.rotation) if isinstance(of, Solution) else (of, None)
+    linkage, rotation = (given.linkage, given.evaluation.rotation) if isinstance(given, Solution) else (given, None)
     if normal.timed:
         rotation = None
     elif rotation is None or len(rotation) != normal.n:

@@ -214,7 +214,7 @@ def mechanical_advantage(linkage: Linkage, rotation: ArrayLike) -> FloatArray:
 def _fixed_lengths(linkage: Linkage) -> tuple[float, float, float, float]:
     """Return l1 ... l4 of a four-bar or a slider-crank; raises ParameterError if the rocker pivot moves."""
     if linkage.pivot is not None:
-        raise ParameterError("pivot", linkage.pivot, "be fixed: where it moves, nothing rests in a dead centre")
+        raise ParameterError("pivot", linkage.pivot, "be fixed: with a moving pivot no link rests in a dead centre")
     return linkage.ground_length, linkage.crank_length, linkage.coupler_length, linkage.rocker_length
 
 

@@ -155,7 +155,7 @@ def make_limits(
             raise unknown_name(name, sorted(UNKNOWNS), f"dimension {name!r}, which is to have bounds")
     for c in constraints:
         if not isinstance(c, Constraint):
-            raise InputError(f"constraint {c!r} is none: use {', '.join(_constraint_names())}")
+            raise InputError(f"{c!r} is not a constraint: use {', '.join(_constraint_names())}")
     given = _dimension_ranges(task, normal, bounds, constraints)
     _check_links(given, constraints, linkage)
     _check_reach(given, normal, constraints)
@@ -170,10 +170,10 @@ def make_limits(
     over = RotationRange(turn is not None, normal.rotation, straight, linkage)
     least = [found for c in constraints if isinstance(c, Demand) and (found := c.least_function(over, normal))]
     if len(least) > 1:
-        raise InputError("more than one thing is to be minimised: a search has one objective")
+        raise InputError("more than one constraint is to be minimised: a search has one objective")
     branches = {c.branch for c in constraints if isinstance(c, Assembly)}
     if len(branches) > 1:
-        raise InfeasibleError("both assemblies are asked for at once")
+        raise InfeasibleError("the constraints require both assemblies at once")
     return Limits(
         low=(lows - shift) / scale,
         high=(highs - shift) / scale,
@@ -338,7 +338,7 @@ _SUPPORTED: Mapping[Kind, tuple[type, ...]] = {
     "geared-five-bar": _ANY,
 }
 #: Reason why a `Demand` does not apply to a five-bar.
-_NO_DEMANDS = "both its cranks turn, so that nothing of it rests, and the plant of the pin forces has no second crank"
+_NO_DEMANDS = "both its cranks turn, so that no link rests, and the plant of the pin forces has no second crank"
 
 
 def usual_kinds(task: Task) -> tuple[Kind, ...]:
@@ -387,11 +387,11 @@ def limits_by_kind(
 
 def _check_task(kind: Kind, task: Task) -> None:
     if isinstance(task, SliderFunction) and kind != "slider-crank":
-        raise InputError(f"a {type(task).__name__} is of a slider: a {kind} has none, kinds must be ('slider-crank',)")
-    if isinstance(task, RockerFunction) and kind == "slider-crank":
         raise InputError(
-            "a RockerFunction is of a rocker: a slider-crank has none; ask for a SliderFunction of its slider"
+            f"a {type(task).__name__} needs a slider, and a {kind} has none: kinds must be ('slider-crank',)"
         )
+    if isinstance(task, RockerFunction) and kind == "slider-crank":
+        raise InputError("a RockerFunction needs a rocker, and a slider-crank has none: ask for a SliderFunction")
 
 
 def _check_constraints(kind: Kind, constraints: Sequence[Any]) -> None:

@@ -148,7 +148,7 @@ class TargetPath:
         object.__setattr__(self, "points", points)
         if self.closed and self.enclosed_area <= COINCIDENT * self.length**2:
             raise InputError(
-                "the target is closed and encloses no area: a curve traced there and back is one that is not closed"
+                "the target is closed and encloses no area: give a line that is traced there and back as an open curve"
             )
 
     @classmethod
@@ -160,7 +160,7 @@ class TargetPath:
         Raises
         ------
         InputError
-            If the file cannot be read, or its points are no target.
+            If the file cannot be read, or its points are not a valid target.
         """
         points, found = read_points(path, unit=unit, name=name)
         return cls(points=points, closed=found if closed is None else closed)

@@ -87,7 +87,7 @@ def _rotation(values: ArrayLike | None, n: int) -> FloatArray:
         )
     if abs(rotation[-1] - rotation[0]) > 2.0 * pi * (1.0 + 1e-9):
         raise InputError(
-            f"crank rotations span {abs(rotation[-1] - rotation[0]):.6g} rad: no more than a turn can be asked"
+            f"crank rotations span {abs(rotation[-1] - rotation[0]):.6g} rad: they may span one turn at most"
         )
     return rotation
 
