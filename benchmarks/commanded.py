@@ -63,9 +63,15 @@ def by_fmpy(cases: list[Any]) -> list[float]:
     from fmpy import simulate_fmu
 
     def run(
-        fmu: str, of: list[Any], rated: bool, step: float, count: int, kind: str = "CoSimulation", solver: str = "Euler"
+        fmu: str,
+        command: list[Any],
+        rated: bool,
+        step: float,
+        count: int,
+        kind: str = "CoSimulation",
+        solver: str = "Euler",
     ) -> float:
-        _, speed, rate, coordinate, a, b = of
+        _, speed, rate, coordinate, a, b = command
         times = np.linspace(0.0, count * step, (count if solver == "Euler" else 100 * count) + 1)
         columns = {"time": times, speed: a + b * np.sin(20.0 * times)}
         if rated:
@@ -97,8 +103,8 @@ def by_libcosimpy(cases: list[Any]) -> list[float]:
     from libcosimpy.CosimObserver import CosimObserver
     from libcosimpy.CosimSlave import CosimLocalSlave
 
-    def run(fmu: str, of: list[Any], rated: bool, step: float, count: int) -> float:
-        _, speed, rate, coordinate, a, b = of
+    def run(fmu: str, command: list[Any], rated: bool, step: float, count: int) -> float:
+        _, speed, rate, coordinate, a, b = command
         reference = {v.name: v.valueReference for v in read_model_description(fmu).modelVariables}
         execution = CosimExecution.from_step_size(round(step * 1e9))
         slave = execution.add_local_slave(CosimLocalSlave(fmu_path=fmu, instance_name="one"))
@@ -121,8 +127,8 @@ def by_ecospy(cases: list[Any]) -> list[float]:
 
     from ecospy import EcosSimulation, EcosSimulationStructure
 
-    def run(fmu: str, of: list[Any], rated: bool, step: float, count: int) -> float:
-        _, speed, rate, coordinate, a, b = of
+    def run(fmu: str, command: list[Any], rated: bool, step: float, count: int) -> float:
+        _, speed, rate, coordinate, a, b = command
         with EcosSimulationStructure() as structure:
             structure.add_model("one", fmu)
             structure.add_parameter_set("case", {f"one::{speed}": a})
@@ -148,8 +154,8 @@ def by_cofmupy(cases: list[Any]) -> list[float]:
     sys.path.insert(0, f"{sys.prefix}/cofmupy")  # with the version of FMPy that CoFMUPy needs
     from cofmupy import Coordinator
 
-    def run(fmu: str, of: list[Any], rated: bool, step: float, count: int) -> float:
-        _, speed, rate, coordinate, a, b = of
+    def run(fmu: str, command: list[Any], rated: bool, step: float, count: int) -> float:
+        _, speed, rate, coordinate, a, b = command
         start = {"drive.speed": 5.0} | {speed: a}
         one = {"id": "one", "name": "one", "path": fmu, "initialization": start}
         coordinator = Coordinator()
@@ -173,8 +179,8 @@ def by_pathsim(cases: list[Any]) -> list[float]:
     from pathsim.blocks import Source
     from pathsim_fmi.blocks import CoSimulationFMU, ModelExchangeFMU
 
-    def run(fmu: str, of: list[Any], rated: bool, step: float, count: int, solver: str = "") -> float:
-        _, speed, rate, coordinate, a, b = of
+    def run(fmu: str, command: list[Any], rated: bool, step: float, count: int, solver: str = "") -> float:
+        _, speed, rate, coordinate, a, b = command
         start = {speed: a}
         block = ModelExchangeFMU(fmu, "one", start) if solver else CoSimulationFMU(fmu, "one", start, dt=step)
         laws = {name: (lambda t: 0.0) for name in block.fmu_wrapper.input_refs}
@@ -200,8 +206,8 @@ def by_cosimulate(cases: list[Any]) -> list[float]:
     from analysis import Function, Inputs, cosimulate
     from analysis.mechanisms import MECHANISMS
 
-    def run(fmu: str, of: list[Any], rated: bool, step: float, count: int, interface: str) -> float:
-        mechanism, _, _, coordinate, a, b = of
+    def run(fmu: str, command: list[Any], rated: bool, step: float, count: int, interface: str) -> float:
+        mechanism, _, _, coordinate, a, b = command
         parameters = next(iter(MECHANISMS[mechanism].published.values())).parameters
 
         def speed(t: float, q1: float, q2: float, v1: float, v2: float) -> float:

@@ -424,8 +424,8 @@ def _search_with_pylinkage(trace: Trace, box: BlackBox, *stages: tuple[Callable[
 
     score = PylinkageScore(trace.contest, box)
 
-    def watch_score(of: Callable[..., float]) -> Callable[..., float]:
-        value = trace.watch(box, lambda x: of(score.four_bar, x.tolist()))
+    def watch_score(function: Callable[..., float]) -> Callable[..., float]:
+        value = trace.watch(box, lambda x: function(score.four_bar, x.tolist()))
         return lambda linkage, values, coords: value(np.asarray(values))
 
     if trace.contest.on_area:

@@ -46,7 +46,7 @@ class Point(NamedTuple):
     seconds: float
 
 
-def measure_in_process(case: Case, of: str) -> list[Point]:
+def measure_in_process(case: Case, part: str) -> list[Point]:
     """Measure the compiled solver at all tolerances: the "integration" alone, or the "whole" call with all outputs."""
     inputs = Inputs(speed=case.crank_speed) if case.crank_speed else Inputs(torque=TorsionBar(torque=case.torque))
     start = InitialState(crank_speed=case.start_speed)
@@ -54,7 +54,7 @@ def measure_in_process(case: Case, of: str) -> list[Point]:
     def run(tolerance: float) -> Any:
         return simulate(case.parameters, inputs, initial=start, samples=case.times, tolerance=tolerance)
 
-    measure_time = shortest_time if of == "whole" else integration_time
+    measure_time = shortest_time if part == "whole" else integration_time
     points = []
     for tolerance in TOLERANCES.tolist():
         error = relative_error(case, run(tolerance)["slider.position"])

@@ -177,44 +177,47 @@ def last_time(rows: Iterable[Row]) -> float:
     return max(seconds for k, seconds in enumerate(TIMES) if not any(np.isnan(row.errors[k]) for row in rows))
 
 
-def by_target(rows: Iterable[Row]) -> dict[tuple[str, str], dict[str, Row]]:
+def rows_by_target(rows: Iterable[Row]) -> dict[tuple[str, str], dict[str, Row]]:
     """Return, for each target on which all searches have run, its rows by search."""
     found: dict[tuple[str, str], dict[str, Row]] = {}
     for row in rows:
         found.setdefault(row[:2], {})[row.search] = row
-    return {target: of for target, of in found.items() if set(of) == set(RACERS)}
+    return {target: by_search for target, by_search in found.items() if set(by_search) == set(RACERS)}
 
 
-def rival_error(of: Mapping[str, Row], seconds: float) -> float:
+def rival_error(by_search: Mapping[str, Row], seconds: float) -> float:
     """Return the least error of all searches except ours after a time (s); ``of`` has the rows of a target by search."""
-    return min(row.least_error(seconds) for search, row in of.items() if search != OURS)
+    return min(row.least_error(seconds) for search, row in by_search.items() if search != OURS)
 
 
-def is_ahead(of: Mapping[str, Row], seconds: float) -> bool:
+def is_ahead(by_search: Mapping[str, Row], seconds: float) -> bool:
     """Return whether no other search has a smaller error than ours; differences within `LEVEL` do not count."""
-    ours = of[OURS].least_error(seconds)
-    return isfinite(ours) and ours <= (1.0 + LEVEL) * rival_error(of, seconds)
+    ours = by_search[OURS].least_error(seconds)
+    return isfinite(ours) and ours <= (1.0 + LEVEL) * rival_error(by_search, seconds)
 
 
-def is_level(of: Mapping[str, Row], seconds: float) -> bool:
+def is_level(by_search: Mapping[str, Row], seconds: float) -> bool:
     """Return whether our search is ahead and the best other search is equal to it within `LEVEL`."""
-    return is_ahead(of, seconds) and rival_error(of, seconds) <= (1.0 + LEVEL) * of[OURS].least_error(seconds)
+    ours = by_search[OURS].least_error(seconds)
+    return is_ahead(by_search, seconds) and rival_error(by_search, seconds) <= (1.0 + LEVEL) * ours
 
 
-def has_found(of: Mapping[str, Row], search: str, seconds: float, end: float) -> bool:
+def has_found(by_search: Mapping[str, Row], search: str, seconds: float, end: float) -> bool:
     """Return whether a search is within `FOUND` of the least error that any search has at the time ``end`` (s)."""
-    return of[search].least_error(seconds) <= (1.0 + FOUND) * min(row.least_error(end) for row in of.values())
+    return by_search[search].least_error(seconds) <= (1.0 + FOUND) * min(
+        row.least_error(end) for row in by_search.values()
+    )
 
 
 def standings(rows: Sequence[Row]) -> list[list[str]]:
     """Count, for each time, the targets on which Linkwork is ahead or level, and the targets that each search has found."""
-    targets, end = by_target(rows).values(), last_time(rows)
+    targets, end = rows_by_target(rows).values(), last_time(rows)
     return [
         [
             f"{seconds:g}",
-            f"{sum(is_ahead(of, seconds) for of in targets)} of {len(targets)}",
-            str(sum(is_level(of, seconds) for of in targets)),
-            *(str(sum(has_found(of, search, seconds, end) for of in targets)) for search in RACERS),
+            f"{sum(is_ahead(by_search, seconds) for by_search in targets)} of {len(targets)}",
+            str(sum(is_level(by_search, seconds) for by_search in targets)),
+            *(str(sum(has_found(by_search, search, seconds, end) for by_search in targets)) for search in RACERS),
         ]
         for seconds in TIMES
         if seconds <= end
@@ -225,37 +228,37 @@ def finals(rows: Sequence[Row]) -> list[list[str]]:
     """List the final errors of all searches, a row for each target, with the least error in bold."""
     end = last_time(rows)
     lines = []
-    for (kind, name), of in by_target(rows).items():
-        least = min(row.least_error(end) for row in of.values())
+    for (kind, name), by_search in rows_by_target(rows).items():
+        least = min(row.least_error(end) for row in by_search.values())
 
         def cell(row: Row, least: float = least) -> str:
             value = row.least_error(end)
             text = "exact" if value <= row.exact else f"{value:.4g}" if value < inf else "none"
             return f"**{text}**" if value <= (1.0 + LEVEL) * least else text
 
-        lines.append([kind, name, *(cell(of[search]) for search in RACERS)])
+        lines.append([kind, name, *(cell(by_search[search]) for search in RACERS)])
     return lines
 
 
-def list_lost(rows: Sequence[Row]) -> list[str]:
+def list_losses(rows: Sequence[Row]) -> list[str]:
     """List the targets on which another search has a smaller final error, with the relative difference."""
     end = last_time(rows)
     return [
-        f"- {kind}, {name}: {of[OURS].least_error(end) / rival_error(of, end) - 1.0:.2%} above "
-        f"{min(of.values(), key=lambda row: row.least_error(end)).search}"
-        for (kind, name), of in by_target(rows).items()
-        if not is_ahead(of, end)
+        f"- {kind}, {name}: {by_search[OURS].least_error(end) / rival_error(by_search, end) - 1.0:.2%} above "
+        f"{min(by_search.values(), key=lambda row: row.least_error(end)).search}"
+        for (kind, name), by_search in rows_by_target(rows).items()
+        if not is_ahead(by_search, end)
     ]
 
 
-def markdown(rows: Sequence[Row], of: str) -> str:
+def markdown(rows: Sequence[Row], part: str) -> str:
     """Return a part of the page of results in Markdown: the table "standings" or "targets", or the list "lost"."""
-    if of == "lost":
-        return "\n".join(list_lost(rows) or ["None."])
+    if part == "lost":
+        return "\n".join(list_losses(rows) or ["None."])
     headings, lines = {
         "standings": (["s", "Linkwork ahead", "of these level", *RACERS], standings),
         "targets": (["kind", "target", *RACERS], finals),
-    }[of]
+    }[part]
     return "\n".join(f"| {' | '.join(line)} |" for line in (headings, ["---"] * len(headings), *lines(rows)))
 
 
@@ -263,14 +266,17 @@ def picture(rows: Sequence[Row]) -> Any:
     """Return a figure: the number of targets that each search has found over time, and final errors divided by the least."""
     from analysis.figures import Curve, Panel, plot_curves
 
-    targets, end = by_target(rows).values(), last_time(rows)
+    targets, end = rows_by_target(rows).values(), last_time(rows)
     times = [seconds for seconds in TIMES if seconds <= end]
     over_time, profile = [], []
     for search in RACERS:
         width = 2.2 if search == OURS else 1.0
-        shares = [sum(has_found(of, search, seconds, end) for of in targets) for seconds in times]
+        shares = [sum(has_found(by_search, search, seconds, end) for by_search in targets) for seconds in times]
         ratios = np.sort(
-            [of[search].least_error(end) / min(row.least_error(end) for row in of.values()) for of in targets]
+            [
+                by_search[search].least_error(end) / min(row.least_error(end) for row in by_search.values())
+                for by_search in targets
+            ]
         )
         over_time.append(Curve(x=times, y=shares, label=search, width=width))
         profile.append(Curve(x=ratios[np.isfinite(ratios)], y=1 + np.flatnonzero(np.isfinite(ratios)), width=width))

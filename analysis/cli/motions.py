@@ -126,5 +126,5 @@ def _motions(title: str, found: Sequence[Orbits], common: int) -> None:
                 f"unstable one, and these do not pair up (sum of indices {part.index}, which is {part.index_of_all} of all "
                 "motions)"
             )
-        of = "" if len(found) == 1 else f"of {format_count(periods * common, 'turn')}: "
-        say(of + sure)
+        period = "" if len(found) == 1 else f"of {format_count(periods * common, 'turn')}: "
+        say(period + sure)

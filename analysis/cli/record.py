@@ -81,8 +81,8 @@ def decrement(record: str, time: str | None, position: str | None, out: str, plo
         f"{Path(record).name}: {len(decay.time)} turning points from {decay.time[0]:.6g} to {decay.time[-1]:.6g} s",
         ("", "value", "+-", "unit"),
         [
-            (name, f"{value:.6g}", f"{error:.2g}", of)
-            for name, value, error, of in _result_rows(decay, moving, unit, size, si, options["friction"])
+            (name, f"{value:.6g}", f"{error:.2g}", its_unit)
+            for name, value, error, its_unit in _result_rows(decay, moving, unit, size, si, options["friction"])
         ],
         words=("", "unit"),
     )

@@ -69,7 +69,7 @@ def report_sensitivity(response: Any, factor: float, unit: str, path: str) -> li
     show_table(title, headings, shown, words=headings[::2] if alone else headings[2:])
     first = [f"amplitude of {what} [{length}]"] if alone else ["number of the free coordinate [1]", "amplitude [SI]"]
     headings = [f"at [{unit}]", *first]
-    headings += [f"{of} by {name} [%/%]" for of in ("place", "amplitude") for name in names]
+    headings += [f"{quantity} by {name} [%/%]" for quantity in ("place", "amplitude") for name in names]
     return [write_csv(path, dict(zip(headings, np.array(rows).T)))]
 
 

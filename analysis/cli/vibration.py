@@ -327,8 +327,8 @@ def _print_ranges_to_avoid(response: Any, factor: float, unit: str) -> None:
         if not response.maxima():
             shown = [swing_unit(response.branches[0].orbits[0], n) for n in range(len(tops))]
             places = [
-                f"{scale * value:.4g} {of}{f' of {name}' * (len(tops) > 1)}, at {factor * place:.6g} {unit}"
-                for (name, scale, of), (value, place) in zip(shown, tops)
+                f"{scale * value:.4g} {its_unit}{f' of {name}' * (len(tops) > 1)}, at {factor * place:.6g} {unit}"
+                for (name, scale, its_unit), (value, place) in zip(shown, tops)
             ]
             peak = f"the amplitude has no peak; it is greatest, {'; '.join(places)}"
         common.say(f"no {words} to avoid: one stable motion throughout, and {peak}")

@@ -63,8 +63,8 @@ def measure_work_and_errors(case: Case, tolerance: float) -> tuple[float, dict[s
     units = output_units()
     errors = dict.fromkeys(KINDS, 0.0)
     for difference in compare(right, found).differences:
-        for kind, of in KINDS.items():
-            if units[difference.name] in of and not difference.name.endswith(".residual"):
+        for kind, own in KINDS.items():
+            if units[difference.name] in own and not difference.name.endswith(".residual"):
                 errors[kind] = max(errors[kind], difference.relative)
     return found.statistics["evaluations"] / case.stop_time, errors
 
@@ -119,7 +119,7 @@ def default_rows(mechanism: Mechanism, reference: str) -> list[list[float]]:
         angles = units == "rad"
         difference[:, angles] = np.abs(np.remainder(difference[:, angles] + pi, 2.0 * pi) - pi)
         worst = (difference / scale).max(axis=0)
-        errors = [max(worst[np.isin(units, of)], default=0.0) for of in KINDS.values()]
+        errors = [max(worst[np.isin(units, own)], default=0.0) for own in KINDS.values()]
         row = [plant.evaluations / (time[-1] - time[0]), *errors]
         found.append([tolerance, *(float(f"{value:.2g}") for value in row)])
     return found

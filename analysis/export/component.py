@@ -58,8 +58,8 @@ _COMMON = {
     **dict.fromkeys(("exit-initialization-mode", "enter-event-mode"), ("", "status")),
     "update-discrete-states": ("", "result<discrete-states-info,status>"),
     **dict.fromkeys(("terminate", "reset", "enter-configuration-mode", "exit-configuration-mode"), ("", "status")),
-    **{f"get-{name}": (_REFERENCES, f"result<list<{of}>,status>") for name, of in _VALUES.items()},
-    **{f"set-{name}": (f"{_REFERENCES},values:list<{of}>", "status") for name, of in _VALUES.items()},
+    **{f"get-{name}": (_REFERENCES, f"result<list<{kind}>,status>") for name, kind in _VALUES.items()},
+    **{f"set-{name}": (f"{_REFERENCES},values:list<{kind}>", "status") for name, kind in _VALUES.items()},
     "get-number-of-variable-dependencies": ("vr:value-reference", "result<u64,status>"),
     "get-variable-dependencies": ("dependent:value-reference", "result<list<variable-dependency>,status>"),
     "get-fmu-state": ("", "result<fmu-state,status>"),
@@ -210,7 +210,7 @@ class _Types:
             return f"(enum {' '.join(map(_quote, parts))})"
         if kind == "record":
             fields = (part.partition(":") for part in parts)
-            return f"(record {' '.join(f'(field {_quote(name)} {self.define(of)})' for name, _, of in fields)})"
+            return f"(record {' '.join(f'(field {_quote(name)} {self.define(member)})' for name, _, member in fields)})"
         if kind == "result":
             return f"(result {self.define(parts[0])} (error {self.define(parts[1])}))"
         return f"({kind} {' '.join(map(self.define, parts))})"
@@ -218,7 +218,7 @@ class _Types:
     def function(self, parameters: str, result: str) -> str:
         """Return the parameters and the result of a function in the text format."""
         pairs = [part.partition(":") for part in _split(parameters)]
-        given = " ".join(f"(param {_quote(name)} {self.define(of)})" for name, _, of in pairs)
+        given = " ".join(f"(param {_quote(name)} {self.define(kind)})" for name, _, kind in pairs)
         return f"{given} (result {self.define(result)})" if result else given
 
 
@@ -244,8 +244,8 @@ def _outer_lines() -> list[str]:
     """Return the lines of the component: imports, core modules and their instances, lifted functions, exports."""
     shared: list[str] = []
     types = _Types(shared)
-    for name, of in _TYPES.items():
-        shared.append(f"(export {_quote(name)} (type ${name} (eq {types.define_named(of)})))")
+    for name, kind in _TYPES.items():
+        shared.append(f"(export {_quote(name)} (type ${name} (eq {types.define_named(kind)})))")
         types.known[name] = f"${name}"
     log = "instance-name:string,status:status,category:string,message:string"
     lines = [
@@ -282,8 +282,8 @@ def _outer_lines() -> list[str]:
         f"(export {_interface('common')} (instance $common))",
     ]
     for interface, (own, _, _) in _INTERFACES.items():
-        for name, of in own.items():
-            known.known[name] = known.define(of)
+        for name, kind in own.items():
+            known.known[name] = known.define(kind)
         given = []
         for c_name, name, parameters, result in _methods(interface):
             core, lifted = f"$core-{interface}-{c_name}", f"${interface}-{c_name}"
@@ -337,8 +337,8 @@ def _inner_lines(interface: str) -> list[str]:
     own, resource = _INTERFACES[interface][0], f"{interface}-instance"
     lines: list[str] = []
     outer, inner = _Types(lines), _Types(lines)
-    for name, of in (_TYPES | own).items():
-        lines.append(f"(import {_quote(f'type-{name}')} (type $in-{name} (eq {outer.define_named(of)})))")
+    for name, kind in (_TYPES | own).items():
+        lines.append(f"(import {_quote(f'type-{name}')} (type $in-{name} (eq {outer.define_named(kind)})))")
         outer.known[name] = f"$in-{name}"
     lines.append(f"(import {_quote(f'type-{resource}')} (type $in-{resource} (sub resource)))")
     outer.known[resource] = f"$in-{resource}"

@@ -122,9 +122,9 @@ def _additions(mechanism: Mechanism) -> list[tuple[Variable, str]]:
     rates = [(work, power, text) for work, power, _, text in WORKS]
     rates += [(f.rate, f"der({f.rate})", f"Time derivative of {f.rate}") for f in mechanism.freedoms]
     added += [
-        (Variable(name, "local", _unit_of_rate(units.get(of, "J")), text, rate_of=of), "derivative")
-        for of, name, text in rates
-        if of not in differentiated
+        (Variable(name, "local", _unit_of_rate(units.get(variable, "J")), text, rate_of=variable), "derivative")
+        for variable, name, text in rates
+        if variable not in differentiated
     ]
     text = (
         f"Event indicator: the sine that measures how far the links are from the limit of assembly, less {LIMIT_SINE:g}; "
@@ -135,8 +135,8 @@ def _additions(mechanism: Mechanism) -> list[tuple[Variable, str]]:
 
 def _unit_of_rate(unit: str) -> str:
     """Return the unit of the time derivative of a variable in ``unit``."""
-    of = UNITS[unit]
-    wanted = of._replace(s=of.s - 1, displays=())
+    base = UNITS[unit]
+    wanted = base._replace(s=base.s - 1, displays=())
     for name, candidate in UNITS.items():
         if candidate._replace(displays=()) == wanted:
             return name

@@ -145,8 +145,8 @@ def _motor_functions(mechanism: Mechanism) -> list[tuple[Any, ...]]:
     if place >= 0:
         acting[place] += casadi.substitute(torque, speed, run.x[freedoms + crank])
     slopes = casadi.substitute(trace.derivative, run.u, acting)
-    accelerations, of = slopes[freedoms : 2 * freedoms], [run.x, run.u, run.p, motor]
-    changes = [sx.sym(f"d{n}", *v.shape) for n, v in enumerate(of)]
+    accelerations, variables = slopes[freedoms : 2 * freedoms], [run.x, run.u, run.p, motor]
+    changes = [sx.sym(f"d{n}", *v.shape) for n, v in enumerate(variables)]
     angle, k = sx.sym("angle"), sx.sym("k", len(mechanism.constants._fields))
     mass = inertia_and_stiffness(mechanism, (crank,), other)(angle, 0.0, k)[0] if min(crank, other) >= 0 else sx(0.0)
     d_torque = casadi.jtimes(torque, join(motor, speed), join(d_motor, d_speed))
@@ -154,7 +154,7 @@ def _motor_functions(mechanism: Mechanism) -> list[tuple[Any, ...]]:
         ("motor", [motor, speed], torque),
         ("motor_forward", [motor, speed, d_motor, d_speed], d_torque),
         ("slopes", [*run, motor], slopes, casadi.jacobian(accelerations, run.x)[:, : 2 * freedoms]),
-        ("along", [*run, motor, *changes], casadi.jtimes(accelerations, join(*of), join(*changes))),
+        ("along", [*run, motor, *changes], casadi.jtimes(accelerations, join(*variables), join(*changes))),
         ("at_rest", [angle, k], mass),
     ]
 

@@ -123,10 +123,10 @@ def _(chart: HeatMap, figure: Figure, axis: Axes) -> None:
     norm, colours = colour_scale(chart)
     axis.set_facecolor(EMPTY)
     mesh = axis.pcolormesh(chart.x, chart.y, values, shading="nearest", rasterized=True, norm=norm, cmap=colours)
-    for of, hatch in _hatched_points(chart, values):
-        if of.any() and min(of.shape) > 1:
+    for points, hatch in _hatched_points(chart, values):
+        if points.any() and min(points.shape) > 1:
             # the level 0.5 lies halfway between hatched and other points
-            area = axis.contourf(chart.x, chart.y, of, levels=[0.5, 1.5], colors="none", hatches=[hatch])
+            area = axis.contourf(chart.x, chart.y, points, levels=[0.5, 1.5], colors="none", hatches=[hatch])
             # the hatching has the colour of the edge, which is not drawn
             area.set(edgecolor="0.45", linewidth=0.0)
     axis.grid(False)

@@ -174,17 +174,17 @@ def plot_curves(
     return draw(Picture(parts=panels, title=title, columns=columns, size=size, notes=notes))
 
 
-def register_picture(of: Callable[_Arguments, Picture]) -> Callable[_Arguments, style.Figure]:
+def register_picture(describe: Callable[_Arguments, Picture]) -> Callable[_Arguments, style.Figure]:
     """Register a function that returns the picture of a result, and return a function that draws this picture as a figure.
 
     The two functions are registered with `dispatch.picture` and `dispatch.plot`, by the type of their first argument.
     """
 
-    @wraps(of)
+    @wraps(describe)
     def plot_picture(*arguments: _Arguments.args, **options: _Arguments.kwargs) -> style.Figure:
-        return draw(of(*arguments, **options))
+        return draw(describe(*arguments, **options))
 
-    picture.register(of)
+    picture.register(describe)
     plot.register(plot_picture)
     return plot_picture
 

@@ -243,9 +243,9 @@ def _(panel: Panel, axes: _Axes) -> None:
         axes.add_shape(place, place, type="line", line={"dash": "dot", "width": 1}, label={"text": escape(text)})
     for place in panel.dashed:
         axes.add_shape(place, place, type="line", line={"dash": "dash", "width": 1})
-    for axis, of, span in (("x", axes.x, panel.x_range), ("y", axes.y, panel.y_range)):
-        of |= {"type": "log", "exponentformat": "power", "dtick": 1} if logarithmic[axis] else {}
-        of |= {"range": [at(axis, v) for v in span]} if span is not None else {}
+    for axis, axes_entry, span in (("x", axes.x, panel.x_range), ("y", axes.y, panel.y_range)):
+        axes_entry |= {"type": "log", "exponentformat": "power", "dtick": 1} if logarithmic[axis] else {}
+        axes_entry |= {"range": [at(axis, v) for v in span]} if span is not None else {}
     axes.y["title"] = {"text": _line(panel.y_label)}
     if panel.x_ticks is not None:
         axes.x["tickvals"] = list(panel.x_ticks)

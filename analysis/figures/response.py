@@ -277,7 +277,7 @@ def _is_reachable(branch: Branch, special: SpecialPoint) -> bool:
 def _branch_curves(
     numbered: Iterable[tuple[int, Branch]],
     look: _Scale,
-    of: Callable[[Branch], FloatArray],
+    quantity: Callable[[Branch], FloatArray],
     hover: Callable[[Branch, int], Mapping[str, ArrayLike]] | None = None,
     **options: Any,
 ) -> list[Curve]:
@@ -287,7 +287,7 @@ def _branch_curves(
     """
     curves: list[Curve] = []
     numbers, branches = zip(*numbered)
-    values = [of(branch) for branch in branches]
+    values = [quantity(branch) for branch in branches]
     places = [look.factor * branch.parameter for branch in branches]
     found = [v[np.isfinite(v)] for v in map(np.concatenate, (places, values))]
     sizes = [float(np.ptp(v)) or 1.0 if len(v) else 1.0 for v in found]
@@ -527,10 +527,10 @@ def _harmonics(branches: Sequence[Branch], look: _Scale, shades: Sequence[Shade]
     if y_range:
         width = look.factor * float(np.ptp(np.concatenate([branch.parameter for _, branch in single])))
         curves += _without_overlaps(letters, width, y_range[1] / y_range[0])
-    of = f",\n{format_turns(single[0][1].crank_turns)} " if len(single) < len(branches) else "\n"
+    turns = f",\n{format_turns(single[0][1].crank_turns)} " if len(single) < len(branches) else "\n"
     return Panel(
         x_label=look.axis,
-        y_label=f"harmonics of {look.what}{of}[{look.shown}]",
+        y_label=f"harmonics of {look.what}{turns}[{look.shown}]",
         curves=curves,
         logarithmic="y",
         y_range=y_range,
@@ -594,12 +594,12 @@ def _loads(branches: Sequence[Branch], look: _Scale, shades: Sequence[Shade]) ->
         Panel(
             x_label=look.axis,
             y_label=label,
-            curves=_branch_curves(enumerate(branches), look, of),
+            curves=_branch_curves(enumerate(branches), look, quantity),
             logarithmic="y",
             shades=shades,
         )
-        for label, of in rows.items()
-        if any(np.any(of(branch) > 0.0) for branch in branches)
+        for label, quantity in rows.items()
+        if any(np.any(quantity(branch) > 0.0) for branch in branches)
     ]
 
 

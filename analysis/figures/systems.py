@@ -96,9 +96,9 @@ def plot_system_run(run: SystemRun, names: Sequence[str] = (), *, title: str = "
         for place, name in zip(axes, names):
             unit, factor = display_scale(run.units[name])
             draw_over_time(place, run.time, factor * run.unwrapped(name))
-            of, _, output = name.rpartition(".")
+            part, _, output = name.rpartition(".")
             place.set_ylabel(
-                f"{style.name_in_words(of)}\n{style.name_in_words(output)}\n[{unit}]", fontsize=style.SMALL
+                f"{style.name_in_words(part)}\n{style.name_in_words(output)}\n[{unit}]", fontsize=style.SMALL
             )
         for name, power in run.powers.items():
             draw_over_time(axes[-1], run.time, power, label=f"at {style.name_in_words(name.rpartition('.')[0])}")

@@ -147,8 +147,8 @@ def _exported(case: Case, wanted: _Export) -> Answer:
     platforms = tuple(PLATFORMS) if wanted.everywhere else None
     with folder() as place:
         made = build_native(with_starts(mechanism, values), KINDS[wanted.kind], place, platforms)
-        of = f"It runs on {', '.join(PLATFORMS)}." if platforms else f"It runs on {this_platform()} alone."
-        return {"words": f"{made.name} starts with the values of the page. {of}", "files": [file(made)]}
+        hint = f"It runs on {', '.join(PLATFORMS)}." if platforms else f"It runs on {this_platform()} alone."
+        return {"words": f"{made.name} starts with the values of the page. {hint}", "files": [file(made)]}
 
 
 #: For each kind of job the class of its options, and the function that does it.

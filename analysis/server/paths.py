@@ -116,14 +116,14 @@ def linkages(case: Case, wanted: Linkages) -> Answer:
             files.append(
                 [] if shown else _files_instead_of_state(solution, wanted, Path(place) / f"linkage-{rank}", title)
             )
-        of = {solution.linkage.kind for solution in found.solutions}
+        found_kinds = {solution.linkage.kind for solution in found.solutions}
         said = (
             f"{format_count(len(rows), 'linkage')} in {found.seconds:.1f} s, the area between the curves the least first. "
             f"linkwork synthesize {_TASK} finds them again, and writes drawings, plates and a sheet of the first."
         )
         task = write_tables(Path(place) / _TASK, wanted.tables("A path that was drawn"))
         return {
-            "words": " ".join([said, *(note for kind, note in _NOTES.items() if kind in of)]),
+            "words": " ".join([said, *(note for kind, note in _NOTES.items() if kind in found_kinds)]),
             "table": {"headings": headings, "rows": rows, "files": files},
             "pictures": [_picture(solution) for solution in found.solutions],
             "states": states,

@@ -1,4 +1,4 @@
-"""Entries of the lists of figures of both theses, and the statements that each study judges."""
+"""Define the entries of the lists of figures of both theses, and read the statements that each study judges."""
 
 from __future__ import annotations
 

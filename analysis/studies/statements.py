@@ -28,13 +28,13 @@ class Source(NamedTuple):
 
     @property
     def words(self) -> str:
-        """The source in words that need no explanation, such as "the thesis, 3.2.1, line 1905"."""
+        """Return the source in words that need no explanation, such as "the thesis, 3.2.1, line 1905"."""
         place = re.sub(r"\bL(?=\d)", "line ", self.place)
         return f"{'the thesis' if self.kind == TEXT else 'the program of the thesis'}, {place}"
 
 
 def text(place: str) -> Source:
-    """Return the source of a statement that stands at a place in the thesis's text."""
+    """Return the source of a statement in the thesis's text, given its place there."""
     return Source(TEXT, place)
 
 
@@ -73,22 +73,22 @@ class Case:
 
     @property
     def holds(self) -> bool:
-        """Whether the computed value is in the allowed range."""
+        """Return whether the computed value is in the allowed range."""
         return self.computed is not None and bool(self.lower <= self.computed <= self.upper)
 
     @property
     def outcome(self) -> str:
-        """Verdict on the case: `HOLDS`, `FAILS` or `UNJUDGED`."""
+        """Return the verdict on the case: `HOLDS`, `FAILS` or `UNJUDGED`."""
         return UNJUDGED if self.computed is None else HOLDS if self.holds else FAILS
 
     @property
     def expected(self) -> str:
-        """The stated number with its unit; empty if the thesis states no number."""
+        """Return the stated number with its unit; empty if the thesis states no number."""
         return f"{self.stated} {self.unit}".rstrip() if self.stated else ""
 
     @property
     def allowed(self) -> str:
-        """The allowed range in words."""
+        """Return the allowed range in words."""
         low, high = (f"{bound:.6g}" for bound in (self.lower, self.upper))
         if self.computed is None or self.lower == self.upper:
             return low if self.computed is not None else ""
@@ -98,13 +98,13 @@ class Case:
 
     @property
     def numbers(self) -> list[str]:
-        """The stated, allowed and computed values in words."""
+        """Return the stated, allowed and computed values in words."""
         named = (("stated", self.expected), ("allowed", self.allowed), ("computed", self.found))
         return [f"{name} {value}" for name, value in named if value]
 
     @property
     def found(self) -> str:
-        """The computed value with its unit, to four digits or one more than the stated number has; empty if there is none."""
+        """Return the computed value with unit, to four digits or one more than the stated number; empty if there is none."""
         digits = max(4, 1 + len(re.sub(r"e.*|\D", "", self.stated).lstrip("0")))
         return "" if self.computed is None else f"{self.computed:.{digits}g} {self.unit}".rstrip()
 
@@ -170,7 +170,7 @@ class Statement:
 
     @property
     def outcome(self) -> str:
-        """Verdict on the statement, one of `OUTCOMES`; it holds in part if some of its cases hold."""
+        """Return the verdict on the statement, one of `OUTCOMES`; it holds in part if some of its cases hold."""
         if all(case.computed is None for case in self.cases):
             return UNJUDGED
         holding = [case.holds for case in self.cases]
@@ -178,7 +178,7 @@ class Statement:
 
     @property
     def reason(self) -> str:
-        """The reason for the verdict: the numbers of a single case, or how many cases hold and why the others do not."""
+        """Return the reason for the verdict: the numbers of a single case, or how many cases hold and why the others do not."""
         parts = []
         if len(self.cases) == 1:
             parts += self.cases[0].numbers
@@ -190,7 +190,7 @@ class Statement:
 
     @property
     def reasons_differ(self) -> bool:
-        """Whether the cases fail for different reasons, so that each case needs its own reason."""
+        """Return whether the cases fail for different reasons, so that each case needs its own reason."""
         return len({case.why for case in self.cases if not case.holds}) > 1
 
     def __str__(self) -> str:

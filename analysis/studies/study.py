@@ -47,12 +47,12 @@ class StudyResult:
 
     @property
     def title(self) -> str:
-        """Title of the study in the list of studies."""
+        """Return the title of the study in the list of studies."""
         return STUDIES[self.number]
 
     @property
     def heading(self) -> str:
-        """Heading of the plot: the figure's number and title, and the parameters that the reader has changed."""
+        """Return the heading of the plot: the figure's number and title, and the parameters that the reader has changed."""
         changes = f"; {words()}" if words() else ""
         return (f"Fig {self.number}  {self.title}" if is_figure(self.number) else self.title) + changes
 
@@ -92,9 +92,9 @@ class Study:
             for name in changes:
                 if not known:
                     raise InputError(
-                        f"figure {self.number} has no parameters that can be changed: {name} means nothing in it; those of "
+                        f"figure {self.number} has no parameters that can be changed, and so no {name}; only figures of "
                         "Youssef's chapters III and VIII and Rahman's R5 to R38 have, and analysis.youssef.slider_equation "
-                        "takes any for the equation of chapters IV and V"
+                        "takes all parameters for the equation of chapters IV and V"
                     )
                 if name not in known:
                     raise unknown_name(name, sorted(known), f"parameter {name!r} of figure {self.number}")
@@ -113,7 +113,7 @@ class Study:
         return tuple(paths)
 
 
-def padded(columns: Mapping[str, ArrayLike]) -> dict[str, NDArray[np.float64]]:
+def pad_columns(columns: Mapping[str, ArrayLike]) -> dict[str, NDArray[np.float64]]:
     """Return the columns padded with NaN to the length of the longest column."""
     arrays = {name: np.asarray(values, dtype=float) for name, values in columns.items()}
     length = max(len(values) for values in arrays.values())

@@ -63,7 +63,7 @@ def vary(parameters: T) -> T:
     return replace(parameters, **values) if values else parameters  # type: ignore[type-var]
 
 
-def compared(name: str, values: tuple[float, ...], unit: str, per: float) -> tuple[float, ...]:
+def compared_values(name: str, values: tuple[float, ...], unit: str, per: float) -> tuple[float, ...]:
     """Return the values of a parameter that a study compares, or only the reader's value if the reader has set it.
 
     ``unit`` is the parameter's SI unit; ``per`` is the factor from this unit to the unit of the values.
@@ -96,7 +96,7 @@ def cache(function: Callable[P, T]) -> Callable[P, T]:
     return cached
 
 
-def unvaried(compute: Callable[[], T]) -> Callable[[], T]:
+def ignore_changes(compute: Callable[[], T]) -> Callable[[], T]:
     """Wrap a study's function so that it ignores the reader's changes, for instance because it evaluates printed equations."""
 
     @wraps(compute)

@@ -76,11 +76,11 @@ def page_case(state: Mapping[str, Any]) -> Case:
     mechanism = MECHANISMS[name]
     values = given_values(mechanism, state.get("values"))
     whole = {v.name for v in mechanism.variables if v.kind == "Integer"}
-    of = {name: int(value) if name in whole else value for name, value in values.items()}
-    chosen = [mode.arguments[min(max(int(of[mode.name]), 0), len(mode.arguments) - 1)] for mode in mechanism.modes]
+    given = {name: int(value) if name in whole else value for name, value in values.items()}
+    chosen = [mode.arguments[min(max(int(given[mode.name]), 0), len(mode.arguments) - 1)] for mode in mechanism.modes]
     others = {name for mode in mechanism.modes for name in mode.arguments} - set(chosen)
     channels: dict[str, Any] = {
-        c.argument: of[c.name] for c in mechanism.channels if c.kind != "rate" and c.argument not in others
+        c.argument: given[c.name] for c in mechanism.channels if c.kind != "rate" and c.argument not in others
     }
     motor = {field: values[name] for name, (field, _) in motor_parameters(mechanism).items()}
     torque = next((c.argument for c in mechanism.channels if f"{c.name}.breakdown_torque" in values), None)
@@ -88,8 +88,8 @@ def page_case(state: Mapping[str, Any]) -> Case:
         channels[torque] = (channels[torque], InductionMotor(**motor))
     return Case(
         title=str(state.get("title", "")),
-        parameters=mechanism.parameters(**{field_name(n): of[n] for n in mechanism.mechanism_variables}),
-        initial=mechanism.initial(**{n: of[v.name] for n, v in mechanism.initial_variables.items()}),
+        parameters=mechanism.parameters(**{field_name(n): given[n] for n in mechanism.mechanism_variables}),
+        initial=mechanism.initial(**{n: given[v.name] for n, v in mechanism.initial_variables.items()}),
         inputs=Inputs(**dict.fromkeys(chosen, True) | channels),
         stop_time=_finite_number(state.get("duration", 1.0), "duration"),
     )

@@ -221,9 +221,14 @@ def _charts(mechanism: Mechanism) -> list[dict[str, Any]]:
     power = len(names) + 3 * len(mechanism.drawing.joints if mechanism.drawing else ())
     watt = {"unit": "W", "factor": 1.0}
 
-    def outputs(title: str, kind: str, of: list[str]) -> dict[str, Any]:
-        unit = _unit(variables[of[0]]) if of else watt
-        return {"title": title, "kind": kind, **unit, "curves": [{"name": n, "of": [names.index(n)]} for n in of]}
+    def outputs(title: str, kind: str, output_names: list[str]) -> dict[str, Any]:
+        unit = _unit(variables[output_names[0]]) if output_names else watt
+        return {
+            "title": title,
+            "kind": kind,
+            **unit,
+            "curves": [{"name": n, "of": [names.index(n)]} for n in output_names],
+        }
 
     forces = [{"name": joint, "of": [names.index(name) for name in parts]} for joint, parts in mechanism.joints.items()]
     turning = [

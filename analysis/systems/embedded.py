@@ -121,10 +121,10 @@ def _header(wiring: Wiring) -> str:
         declared.append(f"static fmi2Component {c}; /* {name} */")
         begin.append(f"NEW({kind}, {c}, {json.dumps(name)}, {json.dumps(part.description.guid)})")
         for port, value in part.values.items():
-            of = part.ports[port]
-            text = repr(float(value)) if of.type == "Real" else str(int(value))
-            type_ = of.type if of.type in ("Real", "Boolean") else "Integer"
-            begin.append(f"SET({kind}, {type_}, {c}, {of.reference}, {text}) /* {port} */")
+            variable = part.ports[port]
+            text = repr(float(value)) if variable.type == "Real" else str(int(value))
+            type_ = variable.type if variable.type in ("Real", "Boolean") else "Integer"
+            begin.append(f"SET({kind}, {type_}, {c}, {variable.reference}, {text}) /* {port} */")
         begin.append(f"ENTER({kind}, {c})")
         initialise.append(f"EXIT({kind}, {c})")
         advance.append(f"STEP({kind}, {c}, time, step)")

@@ -255,11 +255,11 @@ def _start_values(
                 if number >= own and not whole.startswith(f"{name}."):
                     continue
                 given = parameter["type_value"].parameter
-                of = given.get("unit") or ""
-                defined = values.units.units.get(of) if values.units is not None else None
+                unit = given.get("unit") or ""
+                defined = values.units.units.get(unit) if values.units is not None else None
                 base = None if defined is None or defined.base_unit is None else exponents(defined.base_unit)
                 key = whole if number < own else whole.removeprefix(f"{name}.")
-                found.setdefault(key, (given["value"], of, base))
+                found.setdefault(key, (given["value"], unit, base))
     return found
 
 

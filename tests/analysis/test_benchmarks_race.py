@@ -139,7 +139,7 @@ def test_results_are_kept_when_a_run_is_stopped(tmp_path: Path, monkeypatch: pyt
     ],
 )
 def test_who_is_ahead(ours: float, least: float, exact: float, is_ahead: bool, is_level: bool) -> None:
-    of = race.by_target(rows(ours, least, other=inf, exact=exact))["polygonal", "square"]
+    of = race.rows_by_target(rows(ours, least, other=inf, exact=exact))["polygonal", "square"]
     assert race.is_ahead(of, TIMES[-1]) is is_ahead
     assert race.is_level(of, TIMES[-1]) is is_level
 
@@ -150,7 +150,7 @@ def test_the_tables_count() -> None:
     both.append(row(OURS, 1.0, name="star"))
     *_, final = race.standings(both)
     assert final == ["10", "1 of 2", "0", "1", "0", "1", "0", "0"]
-    assert race.list_lost(both) == ["- polygonal, L: 50.00% above CMA-ES"]
+    assert race.list_losses(both) == ["- polygonal, L: 50.00% above CMA-ES"]
     page = race.markdown(both, "targets").splitlines()
     assert page[2] == "| polygonal | square | **1** | 9 | 2 | 9 | 9 |"
     assert page[3] == "| polygonal | L | 3 | 9 | **2** | 9 | 9 |"

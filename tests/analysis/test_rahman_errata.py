@@ -130,5 +130,5 @@ def test_erratum_8_the_crank_equation_is_met_whatever_the_slider_force_is() -> N
     forces = printed.joint_forces(crank, printed.bodies(parameters()), q, r, r, TORQUE_LB_IN)
     inertia = -forces["along crank"] - forces["2F2i"]
     for value in (-25.0, 0.0, 10.0):
-        f1i, f1j = printed.on_crank(np.array(0.7), forces | {"along crank": -(value + inertia)})
+        f1i, f1j = printed.crank_bearing_forces(np.array(0.7), forces | {"along crank": -(value + inertia)})
         assert -f1i * cos(0.7) - f1j * sin(0.7) - inertia == pytest.approx(value, abs=1e-12)

@@ -106,7 +106,7 @@ class TestSteadyMotion:
         turn, found, p = runs.steady_turn(runs.table_3_1(1e6), 420.0), chapter_3.parts(1e6), formulation.TABLE
 
         def potential(crank: float, u: float) -> float:
-            q, _ = formulation.closed(crank, u, 0.0, 0.0)
+            q, _ = formulation.closed_loop_state(crank, u, 0.0, 0.0)
             coupler = p.crank_length * np.sin(crank) + p.coupler_cog_distance * np.sin(q[1])
             return p.gravity * (p.coupler_mass * coupler + p.rocker_mass * p.rocker_cog_distance * np.sin(q[2]))
 
@@ -115,13 +115,13 @@ class TestSteadyMotion:
             crank, u = np.radians(turn.angle_deg[i]), turn.slider_cm[i] / 100.0
             weight = (potential(crank + 1e-5, u) - potential(crank - 1e-5, u)) / 2e-5
             assert found.gravity[i] == pytest.approx(weight, abs=1e-8)
-            w = formulation.solve_multipliers(*formulation.closed(crank, u, formulation.OMEGA, rate[i]))
+            w = formulation.solve_multipliers(*formulation.closed_loop_state(crank, u, formulation.OMEGA, rate[i]))
             assert found.whole[i] == pytest.approx(w[0], abs=1e-3)
 
     def test_distance_on_a_graph_is_square_to_the_curve(self) -> None:
         x = np.linspace(0.0, 1.0, 401)
         steep = np.sin(2.0 * np.pi * x)
-        apart = chapter_3.apart_on_the_graph(x, steep, np.sin(2.0 * np.pi * (x - 0.01)))
+        apart = chapter_3.graph_distance(x, steep, np.sin(2.0 * np.pi * (x - 0.01)))
         assert apart[0] == pytest.approx(0.01 * np.sin(np.arctan(2.0 * np.pi)), rel=0.02)
         assert apart[100] < 0.003
 
@@ -201,7 +201,7 @@ class TestFreeMotion:
         """It follows the free motion the better, the less the slider moves: at the end better than at the start."""
         angle, u = free_crank.linear_motion(k)
         of = free_crank.coast(k)["slider.position"][: len(angle)]
-        apart = np.abs(free_crank.over_turns(angle, u - of)).max(axis=1) / np.ptp(of)
+        apart = np.abs(free_crank.sample_turns(angle, u - of)).max(axis=1) / np.ptp(of)
         assert apart[-1] < 0.2 * apart[:5].max()
         assert apart.max() < 0.2
 
@@ -217,19 +217,19 @@ class TestFormulation:
     """Chapter II and section 3.1."""
 
     def test_start_is_that_of_the_independent_derivation(self) -> None:
-        w = formulation.solve_multipliers(*formulation.closed(0.0, 0.0, formulation.OMEGA, 0.0))
+        w = formulation.solve_multipliers(*formulation.closed_loop_state(0.0, 0.0, formulation.OMEGA, 0.0))
         assert w[0] == pytest.approx(published.CRANK_TORQUE_AT_START_DYN_CM * published.DYN_CM, rel=1e-9)
 
     def test_closure_shows_nothing_where_kinematics_close_the_loop(self) -> None:
-        run = formulation.integrated(4e-3)
+        run = formulation.integrate_both(4e-3)
         assert run.errors[1] > 1e-3
         assert run.unseen < 1e-12
         assert run.gap.max() > run.errors[0]
 
     def test_estimate_of_hamming_tells_the_truncation_and_no_error_of_the_start(self) -> None:
-        estimates, errors, _ = formulation.estimated()
+        estimates, errors, _ = formulation.estimated_errors()
         assert np.corrcoef(estimates, errors)[0, 1] > 0.95
-        assert formulation.estimated(1e-5)[0] == pytest.approx(estimates, abs=1e-11)
+        assert formulation.estimated_errors(1e-5)[0] == pytest.approx(estimates, abs=1e-11)
 
     @pytest.mark.parametrize(("highest", "order"), [(2, 3), (3, 4)])
     def test_series_of_order_four_needs_the_third_derivative(self, highest: int, order: int) -> None:
@@ -240,7 +240,7 @@ class TestFormulation:
         h, y = 0.1, [1.0, np.exp(-0.1) + 1e-8]
         for _ in range(400):
             y.append((y[-2] * (1.0 - h / 3.0) - 4.0 * h / 3.0 * y[-1]) / (1.0 + h / 3.0))
-        growth = formulation.parasite((1, 0, -1), (1 / 3, 4 / 3, 1 / 3), h)
+        growth = formulation.spurious_root((1, 0, -1), (1 / 3, 4 / 3, 1 / 3), h)
         assert abs(y[-1] / y[-2]) == pytest.approx(growth, rel=1e-6)
         assert growth > 1.0
 

@@ -72,8 +72,8 @@ class TestLinearised:
 
     def test_the_mended_recurrence_is_the_balance(self) -> None:
         """With 2 lambda_c k0 in place of 2 lambda_c (4.34) is the balance of (4.29); as printed it is not."""
-        assert linearised.balanced(1.2, as_printed=False) < 1e-12
-        assert linearised.balanced(1.2) > 1e-3
+        assert linearised.balance_error(1.2, as_printed=False) < 1e-12
+        assert linearised.balance_error(1.2) > 1e-3
 
     def test_the_motion_of_the_plant_meets_all_equations_of_motion(self) -> None:
         met = linearised.residuals()
@@ -83,7 +83,7 @@ class TestLinearised:
     def test_stiffness_as_printed(self) -> None:
         """H1 is three times the right one: p45 I4 sigma2 cos^2 alpha4 sin(2 alpha3) / sin^3 is right at 60 and 120 deg."""
         for inertia_ratio in (0.5, 1.0, 2.0):
-            found = linearised.coefficients(1e-4, inertia_ratio)
+            found = linearised.coefficient_ratios(1e-4, inertia_ratio)
             assert found["H1, stiffness"] == pytest.approx(3.0, abs=1e-3)
         right = slider_equation(linearised.with_crank(1e-4), 1.0).stiffness.cos[1]
         assert right == pytest.approx(1e-4 * published.P45 / 4.5, rel=1e-3)

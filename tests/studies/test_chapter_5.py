@@ -10,16 +10,16 @@ from numpy.typing import NDArray
 
 from analysis.numerics.fourier import FourierSeries
 from analysis.periodic import Drive, Stability, confirm
-from analysis.studies.youssef.chapter_5 import SAME_GROUND, closed, held, to_the_letter
-from analysis.studies.youssef.damping import by_determinant, removing, without_factor
+from analysis.studies.youssef.chapter_5 import SAME_GROUND, listed_boundaries, with_held_angles, with_same_ground
+from analysis.studies.youssef.damping import determinant_errors, equation_without_factor, removing_damper
 from analysis.studies.youssef.linearised import with_crank
 from analysis.studies.youssef.regions import (
-    appendix_3,
+    appendix_3_region,
     axis,
     crank_speed,
     equation,
-    first_order,
-    hill,
+    first_order_region,
+    hill_region,
     orbit_region,
     removing_estimate,
 )
@@ -51,7 +51,7 @@ def test_first_region(inertia_ratio: float) -> None:
     mechanism = chapter_4(inertia_ratio)
     for region, ends, tolerance in (
         (orbit_region(mechanism), published.FIRST_REGION[inertia_ratio], 5.5e-7),
-        (appendix_3(mechanism), published.FIRST_REGION_THESIS[inertia_ratio], 5.5e-6),
+        (appendix_3_region(mechanism), published.FIRST_REGION_THESIS[inertia_ratio], 5.5e-6),
     ):
         assert (region.low, region.high) == pytest.approx(ends, abs=tolerance)
 
@@ -59,15 +59,15 @@ def test_first_region(inertia_ratio: float) -> None:
 @pytest.mark.parametrize(("inertia_ratio", "known"), [(0.5, 2.71), (1.0, 2.59), (1.5, 2.48), (2.0, 2.36)])
 def test_listing_makes_the_region_about_two_and_a_half_times_too_wide(inertia_ratio: float, known: float) -> None:
     mechanism = chapter_4(inertia_ratio)
-    assert appendix_3(mechanism).width / orbit_region(mechanism).width == pytest.approx(known, abs=0.0051)
+    assert appendix_3_region(mechanism).width / orbit_region(mechanism).width == pytest.approx(known, abs=0.0051)
 
 
 def test_the_printed_coefficients_make_the_region_four_times_too_wide() -> None:
     mechanism = chapter_4(1.0)
-    printed = first_order(mechanism, Variant.PRINTED)
+    printed = first_order_region(mechanism, Variant.PRINTED)
     assert printed.width / orbit_region(mechanism).width == pytest.approx(4.1, abs=0.1)
     # (5.16) against the determinant
-    by_hill = hill(mechanism, variant=Variant.PRINTED)
+    by_hill = hill_region(mechanism, variant=Variant.PRINTED)
     assert (printed.low, printed.high) == pytest.approx((by_hill.low, by_hill.high), abs=3e-5)
 
 
@@ -81,7 +81,7 @@ def test_without_the_rate_of_the_mass_the_region_is_four_times_too_wide(inertia_
 
 
 def test_both_couplers_are_the_same_at_equal_links() -> None:
-    one, other = (orbit_region(mechanism(1.0)) for mechanism in (held, closed))
+    one, other = (orbit_region(mechanism(1.0)) for mechanism in (with_held_angles, with_same_ground))
     assert (one.low, one.high) == pytest.approx((other.low, other.high), abs=1e-9)
 
 
@@ -95,7 +95,7 @@ def test_on_the_same_ground_link_the_region_is_narrowest_at_equal_links() -> Non
 @pytest.mark.parametrize(("number", "power"), [(1, 1.0), (2, 2.0), (3, 3.0)])
 def test_width_of_a_region_starts_with_its_power_of_the_crank(number: int, power: float) -> None:
     cranks = np.geomspace(0.01, 0.03, 5)
-    widths = [hill(with_crank(sigma2), number).width for sigma2 in cranks.tolist()]
+    widths = [hill_region(with_crank(sigma2), number).width for sigma2 in cranks.tolist()]
     assert np.polyfit(np.log(cranks), np.log(widths), 1)[0] == pytest.approx(power, abs=0.05)
 
 
@@ -104,22 +104,22 @@ def test_width_of_a_region_starts_with_its_power_of_the_crank(number: int, power
     [(0.01, 1.0, False, 1.936), (0.01, 0.5, False, 1.9674), (0.01, 0.5, True, 1.9638)],
 )
 def test_axis_of_a_short_crank(sigma2: float, inertia_ratio: float, by_listing: bool, known: float) -> None:
-    of = appendix_3 if by_listing else orbit_region
+    of = appendix_3_region if by_listing else orbit_region
     assert axis(of(with_crank(sigma2, inertia_ratio))) == pytest.approx(known, abs=5e-4 if known == 1.936 else 5e-5)
 
 
 @pytest.mark.parametrize(("inertia_ratio", "listed", "true"), [(2.0, 1.8697, 1.8727), (0.5, 1.9649, 1.9655)])
 def test_axis_of_a_short_coupler_by_the_listing(inertia_ratio: float, listed: float, true: float) -> None:
-    for of, known in ((appendix_3, listed), (orbit_region, true)):
-        assert axis(of(held(0.8, inertia_ratio))) == pytest.approx(known, abs=5.1e-5)
+    for of, known in ((appendix_3_region, listed), (orbit_region, true)):
+        assert axis(of(with_held_angles(0.8, inertia_ratio))) == pytest.approx(known, abs=5.1e-5)
 
 
 def test_held_angles_need_another_ground_link() -> None:
-    assert held(1.2).ground_length > 1.05 * closed(1.2).ground_length
+    assert with_held_angles(1.2).ground_length > 1.05 * with_same_ground(1.2).ground_length
 
 
 def test_linear_equation_and_true_orbit_at_unit_inertia() -> None:
-    one, other = hill(chapter_4(1.0)), orbit_region(chapter_4(1.0))
+    one, other = hill_region(chapter_4(1.0)), orbit_region(chapter_4(1.0))
     assert (one.low, one.high) == pytest.approx((0.266630, 0.268436), abs=5.1e-7)
     assert (other.low, other.high) == pytest.approx((0.266540, 0.268367), abs=5.1e-7)
 
@@ -127,7 +127,7 @@ def test_linear_equation_and_true_orbit_at_unit_inertia() -> None:
 def test_formulas_of_the_perturbation_to_the_letter() -> None:
     """(5.16) and (5.24) to (5.26) with the coefficients of (4.29), whose h0 is 0."""
     e = slider_equation(chapter_4(1.0), 60.0, variant=Variant.PRINTED, form=Form.SERIES)
-    zeroth, first, second = to_the_letter(e)
+    zeroth, first, second = listed_boundaries(e)
     # (5.12) with its minus
     assert zeroth == pytest.approx(2 * (-2.605e-5,), abs=5.1e-9)
     assert zeroth[0] == pytest.approx(boundary_stiffnesses(e.homogeneous(), 1, count=1)[0].real, rel=1e-3)
@@ -165,7 +165,7 @@ def galerkin(inertia_ratio: float, harmonics: int) -> NDArray[np.float64]:
 def test_cut_after_the_ninth_term() -> None:
     """(5.35) as the thesis cuts it, less Hill's determinant."""
     for ratio in (0.5, 1.0, 1.5):
-        whole = hill(chapter_4(ratio))
+        whole = hill_region(chapter_4(ratio))
         assert galerkin(ratio, 2)[:2] == pytest.approx([whole.low, whole.high], abs=1e-6)
 
 
@@ -173,21 +173,21 @@ def test_by_determinant_of_the_divided_equation() -> None:
     """The third region needs the third harmonic of the coefficients, the fourth more terms."""
     wholes = hill_regions(equation(chapter_4(1.0)), 3)
     for harmonics, first, third in ((2, 4.88e-5, 0.479), (64, 4.89e-5, 0.0281)):
-        ends, errors = galerkin(1.0, harmonics).reshape(2, 2), by_determinant(harmonics)
+        ends, errors = galerkin(1.0, harmonics).reshape(2, 2), determinant_errors(harmonics)
         for number, found, known in ((1, ends[0], first), (3, ends[1], third)):
             whole = wholes[number]
             error = np.abs(found - (whole.low, whole.high)).max() / whole.width
             assert error == pytest.approx(known, rel=2e-3)
             assert errors[number] == pytest.approx(error, rel=1e-4)
-    assert by_determinant(64)[4] > 1.0
-    assert by_determinant(64, order=3)[4] < 0.01
-    assert by_determinant(2, order=8)[3] > 0.4
+    assert determinant_errors(64)[4] > 1.0
+    assert determinant_errors(64, order=3)[4] < 0.01
+    assert determinant_errors(2, order=8)[3] > 0.4
 
 
 def test_equation_without_the_factor_has_the_same_multipliers_but_for_the_factor() -> None:
     found = slider_equation(chapter_4(1.5, 0.45), crank_speed(0.27))
     whole = monodromy(found.homogeneous().stiffened(found.spring))
-    bare = monodromy(without_factor(1.5, found.damping).stiffened(found.spring))
+    bare = monodromy(equation_without_factor(1.5, found.damping).stiffened(found.spring))
     # (5.28): the determinant of the one is that of the factor, squared
     factor = np.sqrt(np.linalg.det(whole))
     assert np.sort_complex(np.linalg.eigvals(whole)) == pytest.approx(
@@ -221,7 +221,7 @@ def test_removing_damping() -> None:
     )
     for omega_c in (0.05, 0.1, 0.15):
         tip = float(np.nanmin(columns[f"I4; omega_c = {omega_c:g} 1/s; boundary 1 [1]"]))
-        assert removing("true orbit", tip).damping == pytest.approx(omega_c, abs=1e-5)
+        assert removing_damper("true orbit", tip).damping == pytest.approx(omega_c, abs=1e-5)
 
 
 def test_zeroth_boundary_parts_a_stable_region_from_falling_away() -> None:

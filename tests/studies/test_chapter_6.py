@@ -10,10 +10,10 @@ import pytest
 
 from analysis.studies.statements import near
 from analysis.studies.youssef import search
-from analysis.studies.youssef.chapter_6 import best, half_units, pairing_area, rounded, straight_error
+from analysis.studies.youssef.chapter_6 import best, half_units, pairing_area, rounding_range, straight_error
 from analysis.studies.youssef.packaging import TRAVEL_CM, straightest
 from analysis.studies.youssef.problems import PROBLEMS
-from analysis.studies.youssef.quality import arguments, both, linkages
+from analysis.studies.youssef.quality import assembly_arguments, linkages, qualities
 from analysis.synthesis import Linkage, evaluate, turn
 from tests import published
 
@@ -31,9 +31,9 @@ def test_the_combined_quality_function() -> None:
     longest = max(PROBLEMS[name].linkage.largest_link for name in ("ellipse-a", "path-a"))
     found = linkages()["ours; combined"]
     assert found.largest_link <= longest
-    assert both(found).combined == sum(both(found))
+    assert qualities(found).combined == sum(qualities(found))
     for other in ("ours; timed", "ours; path"):
-        assert both(found).combined < both(linkages()[other]).combined
+        assert qualities(found).combined < qualities(linkages()[other]).combined
 
 
 @pytest.mark.parametrize("name", ["ellipse-a", "ellipse-b", "ellipse-a-bounded"])
@@ -87,7 +87,7 @@ def test_the_straightest_travel_of_the_printed_packaging_machine() -> None:
 
 
 def test_error_over_the_rounding_of_printed_digits() -> None:
-    assert rounded("ellipse-a")[""] == pytest.approx(published.ELLIPSE_A_OVER_ROUNDING, abs=5e-3)
+    assert rounding_range("ellipse-a")[""] == pytest.approx(published.ELLIPSE_A_OVER_ROUNDING, abs=5e-3)
 
 
 @pytest.mark.slow
@@ -122,7 +122,7 @@ def test_the_argument_of_the_root_is_that_of_assembly() -> None:
     l1, l2, l3, l4 = np.random.default_rng(64).uniform(0.1, 1.0, (4, 10_000, 1))[:, :200]
     reach = np.abs(l1 - l2 * np.exp(1j * turn(72)))
     closes = (reach <= l3 + l4) & (reach >= np.abs(l3 - l4))
-    assert np.array_equal(arguments()[:200] >= 0.0, closes)
+    assert np.array_equal(assembly_arguments()[:200] >= 0.0, closes)
 
 
 class TestSearch:
@@ -159,7 +159,7 @@ class TestSearch:
         open_links = printed.copy()
         open_links[3:6] = 10.0, 10.0, 10.0
         assert not search.closes(open_links)
-        found, steps = search.admitted(open_links, printed), open_links
+        found, steps = search.admit(open_links, printed), open_links
         while not search.closes(steps):
             steps = 0.75 * steps + 0.25 * printed
         np.testing.assert_allclose(found, steps, rtol=1e-12)
@@ -173,7 +173,7 @@ class TestSearch:
 
     def test_the_bottom_next_to_the_best_linkage_is_its_error(self) -> None:
         v = self.vector(best(search.PROBLEM).linkage)
-        assert search.bottom(search.Found(v, 0.0, 0)) == pytest.approx(search.error(v), rel=1e-3)
+        assert search.minimum_error(search.Found(v, 0.0, 0)) == pytest.approx(search.error(v), rel=1e-3)
 
     def test_a_descent_has_no_bounds_of_angles(self) -> None:
         """Angles are periodic: from beyond half a turn a descent leads to the same minimum."""
@@ -182,4 +182,4 @@ class TestSearch:
         for k in (7, 8, 9):
             begun = v.copy()
             begun[k] += 0.05 - 2.0 * np.pi * np.sign(begun[k])
-            assert search.descended(begun, side)[1] == pytest.approx(search.error(v), rel=1e-3)
+            assert search.descend(begun, side)[1] == pytest.approx(search.error(v), rel=1e-3)

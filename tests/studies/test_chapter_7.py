@@ -17,12 +17,12 @@ from analysis.studies.youssef.series_2 import (
     PATH,
     PATH_SEARCHES,
     ROCKER,
+    error_range,
     linkage_error,
-    mended,
+    mended_path_linkage,
     out_of_reach,
-    over_rounding,
     path_motion,
-    printed,
+    printed_linkage,
     readings,
     rocker_motion,
     slider,
@@ -57,7 +57,7 @@ class TestControl:
 
     @pytest.mark.parametrize("harmonics", control.HARMONICS)
     def test_no_trial_cycle_is_worse_than_the_one_before(self, harmonics: int) -> None:
-        errors = [control.rms(deviation) for deviation in control.trials(harmonics)]
+        errors = [control.rms(deviation) for deviation in control.run_trials(harmonics)]
         assert (np.diff(errors) < 0.0).all()
 
 
@@ -168,12 +168,12 @@ class TestPrintedSeries:
     """The two series of the slider that the thesis prints."""
 
     def test_path_b_with_a_tenth_of_its_mean_has_the_printed_area(self) -> None:
-        linkage = mended()
+        linkage = mended_path_linkage()
         motion = slider(linkage)
         assert 100.0 * motion.series.cos == pytest.approx([0.31, 0.772, 0.568])
         assert 100.0 * motion.series.sin == pytest.approx([0.0, -0.34, -0.136])
         assert np.degrees(motion.guide_angle) == pytest.approx(-0.9)
-        least, greatest = over_rounding(PATH, linkage)
+        least, greatest = error_range(PATH, linkage)
         assert least < area(linkage) < greatest
         assert least < 4.3 < greatest < 4.8
 
@@ -182,12 +182,12 @@ class TestPrintedSeries:
         phi = np.linspace(0.0, 2.0 * pi, 9)
         th2 = phi + k.crank_phase
         wanted = 1.46 - 0.425 * np.cos(th2) - 0.256 * np.sin(th2) - 0.855 * np.cos(2 * th2) + 0.569 * np.sin(2 * th2)
-        series = slider(printed(ROCKER, turned=k.crank_phase)).series
+        series = slider(printed_linkage(ROCKER, turned=k.crank_phase)).series
         assert 100.0 * series(phi) == pytest.approx(wanted)
 
     def test_no_reading_of_the_rockers_comes_near_to_its_error(self) -> None:
         best = readings(ROCKER)[0]
-        least, greatest = over_rounding(ROCKER, best)
+        least, greatest = error_range(ROCKER, best)
         assert 8.0 * 4.8 < least < linkage_error(ROCKER, best) < greatest
 
 
@@ -195,70 +195,74 @@ class TestSeries1:
     """The mechanism with links of 0.5 and 1."""
 
     def test_the_error_by_the_plant(self) -> None:
-        found = series_1.direct()
+        found = series_1.search_directly()
         motion = slider(found.linkage)
         points = [by_the_plant(found.linkage, t, float(motion.series(t)), 0.0)[0] for t in series_1.ROTATION.tolist()]
-        assert (np.abs(np.array(points) - series_1.desired()) ** 2).sum() == pytest.approx(found.error, rel=1e-9)
+        assert (np.abs(np.array(points) - series_1.desired_points()) ** 2).sum() == pytest.approx(found.error, rel=1e-9)
 
     def test_the_equations_give_stationary_errors(self) -> None:
-        targets = series_1.desired()
-        u, upright = series_1.by_equations(series_1.ROTATION, targets)
+        targets = series_1.desired_points()
+        u, upright = series_1.solve_slider_equations(series_1.ROTATION, targets)
         assert 0 < upright.sum() < len(upright)
         near_by = series_1.variational().u[:, None] + np.array([-1e-6, 0.0, 1e-6])
         assert np.abs(u - 1.0 - near_by[:, [1]]).min(axis=1).max() < 1e-9
-        errors = np.array([np.abs(series_1.point(series_1.ROTATION, near_by[:, k]) - targets) ** 2 for k in range(3)])
+        errors = np.array(
+            [np.abs(series_1.coupler_point(series_1.ROTATION, near_by[:, k]) - targets) ** 2 for k in range(3)]
+        )
         assert np.abs(errors[2] - errors[0]).max() / 2e-6 < 1e-5
 
     def test_tangents_are_vertical_where_the_coupler_ceases_to_point_at_the_target(self) -> None:
         """The equation (7.14) has a root on one side alone; near it U goes as the root of the distance."""
         at = np.radians(series_1.vertical_tangents())
-        _, upright = series_1.by_equations(at + 1e-6, series_1.desired(at + 1e-6))
+        _, upright = series_1.solve_slider_equations(at + 1e-6, series_1.desired_points(at + 1e-6))
         assert upright.tolist() == [True, False]
         off = np.outer([-1.0, 1.0], [0.0, 1e-8, 4e-8])
         reached = at[:, None] + off
-        u, _ = series_1.by_equations(reached.ravel(), series_1.desired(reached.ravel()))
+        u, _ = series_1.solve_slider_equations(reached.ravel(), series_1.desired_points(reached.ravel()))
         change = np.ptp(u, axis=1).reshape(reached.shape)
         assert change[:, 2] / change[:, 1] == pytest.approx(2.0, rel=1e-2)
 
     def test_isochronous_curves_are_circles_about_the_crank_pin(self) -> None:
         for phi in np.radians(series_1.ISOCHRONES).tolist():
-            arc = series_1.point(np.full(9, phi), np.linspace(-0.4, 0.4, 9))
+            arc = series_1.coupler_point(np.full(9, phi), np.linspace(-0.4, 0.4, 9))
             assert np.abs(arc - 0.5 * np.exp(1j * phi)) == pytest.approx(0.5, abs=1e-12)
 
     def test_area_that_is_reached(self) -> None:
         """Against random configurations, and a sum over small squares by the kinematics of the point."""
         area = accessible_area(series_1.LINKAGE.to_five_bar(), (-0.4, 0.4), tolerance=1e-4)
         random = np.random.default_rng(72)
-        z = series_1.point(random.uniform(0.0, 2.0 * pi, 5000), random.uniform(-0.4, 0.4, 5000))
+        z = series_1.coupler_point(random.uniform(0.0, 2.0 * pi, 5000), random.uniform(-0.4, 0.4, 5000))
         rings = np.concatenate([*area.outer, *area.holes]) @ np.array([1.0, 1j])
         inside = area.contains(z.real, z.imag)
         assert max((np.abs(rings - p).min() for p in z[~inside]), default=0.0) < 2e-3
         h = 4e-3
         phi, u = np.meshgrid(np.linspace(0.0, 2.0 * pi, 4001), np.linspace(-0.4, 0.4, 801))
-        z = series_1.point(phi.ravel(), u.ravel())
+        z = series_1.coupler_point(phi.ravel(), u.ravel())
         squares = np.unique(np.floor(np.column_stack([z.real, z.imag]) / h), axis=0)
         # squares on the edge count whole
         assert h * h * len(squares) == pytest.approx(area.area, rel=0.04)
 
     @pytest.mark.parametrize("limits", series_1.LIMITS)
     def test_enclosed_area_is_what_is_reached_and_the_hole(self, limits: tuple[float, float]) -> None:
-        area = series_1.reach(*limits)
+        area = series_1.reached_area(*limits)
         holes = 0.0
         for ring in area.holes:
             w = ring @ np.array([1.0, 1j])
             holes += abs(0.5 * (w.conj() * np.roll(w, -1)).imag.sum())
-        assert series_1.enclosed(*limits) == pytest.approx(area.area + holes, rel=2e-3)
+        assert series_1.enclosed_area(*limits) == pytest.approx(area.area + holes, rel=2e-3)
 
     def test_no_motion_is_nearer_than_the_variational_one(self) -> None:
         least = series_1.variational().error
-        assert (least <= series_1.direct().evaluation.errors + 1e-9).all()
+        assert (least <= series_1.search_directly().evaluation.errors + 1e-9).all()
         for k in (0, 20, 41):
-            found, _ = series_1.nearest(float(series_1.ROTATION[k]), complex(series_1.desired()[k]))
+            found, _ = series_1.least_distance(float(series_1.ROTATION[k]), complex(series_1.desired_points()[k]))
             assert least[k] == pytest.approx(found, abs=1e-3)
 
     @pytest.mark.slow
     def test_a_weight_moves_error_out_of_p1_p2(self) -> None:
-        (inside, outside), (even, rest) = map(series_1.squared_errors, (series_1.direct(5.0), series_1.direct()))
+        (inside, outside), (even, rest) = map(
+            series_1.squared_errors, (series_1.search_directly(5.0), series_1.search_directly())
+        )
         assert inside < even
         assert outside > rest
 

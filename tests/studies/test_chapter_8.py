@@ -56,7 +56,7 @@ class TestPulses:
     @pytest.mark.parametrize("order", [1, 2, 8])
     def test_a_harmonic_is_averaged_over_the_pitch(self, order: int) -> None:
         angle = np.linspace(0.0, 2.0 * np.pi, 14401)
-        pulses = instruments.speed_by_pulses(44.0 * (1.0 + 1e-3 * np.cos(order * angle)))
+        pulses = instruments.pulse_speeds(44.0 * (1.0 + 1e-3 * np.cos(order * angle)))
         # sin(x)/x of half the pitch
         found = 2.0 * np.abs(np.fft.rfft(pulses)[order]) / len(pulses)
         assert found == pytest.approx(0.044 * np.sinc(order / 60.0), rel=1e-3)
@@ -64,7 +64,7 @@ class TestPulses:
     def test_speed_by_the_energy(self) -> None:
         """Kinetic energy gained from the least to the greatest speed is the work of the torques in between."""
         inertia = 2e-2
-        speed, torque = instruments.speed_of_crank(inertia), rigs.turn("A", instruments.PULSED)["drive.applied_torque"]
+        speed, torque = instruments.crank_speed(inertia), rigs.turn("A", instruments.PULSED)["drive.applied_torque"]
         low, high = int(speed[:-1].argmin()), int(speed[:-1].argmax())
         between = np.arange(low, high if high > low else high + len(torque)) % len(torque)
         work = (torque.mean() - torque[between]).sum() * 2.0 * np.pi / len(torque)
@@ -110,10 +110,10 @@ class TestRig1:
     @pytest.mark.parametrize("spring", ["A", "B"])
     def test_maxima_of_the_amplitude(self, spring: str) -> None:
         right = published.LOCAL_MAXIMUM_RPM[spring.lower()].right
-        assert rigs.near_fraction(spring, 2)[0] == pytest.approx(right, abs=0.5)
+        assert rigs.maximum_near_fraction(spring, 2)[0] == pytest.approx(right, abs=0.5)
 
     def test_minimum_of_the_amplitude(self) -> None:
-        lowest = rigs.between(rigs.motions("A").minima(), 320.0, 420.0)[0]
+        lowest = rigs.only_extremum(rigs.motions("A").minima(), 320.0, 420.0)[0]
         assert lowest == pytest.approx(published.MINIMUM_RPM["a"].right, abs=0.5)
 
     @pytest.mark.parametrize("order", [2, 3])
@@ -134,14 +134,14 @@ class TestRig1:
         assert rigs.peak_rise("B", 3) == pytest.approx(top / low - 1.0, rel=1e-3)
 
     def test_motions_of_spring_a_do_not_depend_on_the_history(self) -> None:
-        up, down = (rig_1.swept("A", rising).amplitude for rising in (True, False))
+        up, down = (rig_1.sweep_speed("A", rising).amplitude for rising in (True, False))
         np.testing.assert_allclose(up, down[::-1], atol=1e-6)
         assert rigs.largest_multiplier("A", rigs.SLOWEST, rigs.FASTEST["A"]) < 1.0
 
     def test_sweeps_jump_at_the_fold_and_double_at_the_doubling(self) -> None:
         (fold,), doublings = speeds_of(Crossing.FOLD), speeds_of(Crossing.PERIOD_DOUBLING)
-        (jump,) = (jump.speed / published.RPM for jump in rig_1.swept("B", True).jumps)
-        falling = rig_1.swept("B", False)
+        (jump,) = (jump.speed / published.RPM for jump in rig_1.sweep_speed("B", True).jumps)
+        falling = rig_1.sweep_speed("B", False)
         doubled = max(s for s, turns in zip(falling.speed / published.RPM, falling.turns) if turns == 2)
         assert jump == pytest.approx(fold, abs=rig_1.STEP)
         assert doubled == pytest.approx(max(doublings), abs=rig_1.STEP)
@@ -165,8 +165,8 @@ class TestRig1:
         assert run.amplitude == pytest.approx(100.0 * upper.amplitude, abs=1e-4)
 
     def test_sweeps_part_between_the_doubling_and_the_fold(self) -> None:
-        rising, falling = rig_1.swept("B", True).amplitude, rig_1.swept("B", False).amplitude[::-1]
-        speeds = rig_1.swept("B", True).speed / published.RPM
+        rising, falling = rig_1.sweep_speed("B", True).amplitude, rig_1.sweep_speed("B", False).amplitude[::-1]
+        speeds = rig_1.sweep_speed("B", True).speed / published.RPM
         (fold,), doubling = speeds_of(Crossing.FOLD), max(speeds_of(Crossing.PERIOD_DOUBLING))
         both = (speeds > doubling) & (speeds < fold)
         assert (falling[both] > 2.0 * rising[both]).all()
@@ -205,18 +205,18 @@ class TestFriction:
     def test_amplitudes_without_friction_are_those_of_the_branch(self) -> None:
         branch = rigs.motions("A").branches[0]
         expected = 100.0 * np.interp(rigs.GRID["A"], rigs.rpm(branch), branch.amplitude)
-        np.testing.assert_allclose(rigs.over_speed("A", 0.0), expected, rtol=1e-2)
+        np.testing.assert_allclose(rigs.friction_amplitudes("A", 0.0), expected, rtol=1e-2)
 
     @pytest.mark.long
     @pytest.mark.parametrize("spring", ["A", "B"])
     def test_friction_lowers_the_amplitude(self, spring: str) -> None:
-        sizes = [rigs.over_speed(spring, c).max() for c in rig_1.COEFFICIENTS]
+        sizes = [rigs.friction_amplitudes(spring, c).max() for c in rig_1.COEFFICIENTS]
         assert (np.diff(sizes) < 0.0).all()
 
     @pytest.mark.long
     def test_no_coefficient_moves_the_local_maximum_towards_290_rpm(self) -> None:
         half = (rigs.GRID["A"] > 250.0) & (rigs.GRID["A"] < 340.0)
-        places = [rigs.GRID["A"][half][rigs.over_speed("A", c)[half].argmax()] for c in rig_1.COEFFICIENTS]
+        places = [rigs.GRID["A"][half][rigs.friction_amplitudes("A", c)[half].argmax()] for c in rig_1.COEFFICIENTS]
         assert (np.diff(places) >= 0.0).all()
         assert places[0] == pytest.approx(296.0, abs=2.5)
 
@@ -237,10 +237,10 @@ class TestRig2:
     @pytest.mark.parametrize("spring", ["C", "D"])
     def test_the_measured_natural_frequencies_are_those_of_the_resonance(self, spring: str) -> None:
         measured = published.NATURAL_RPM[f"rig-2-spring-{spring.lower()}"].thesis
-        assert rigs.near_fraction(spring, 1)[0] == pytest.approx(measured, abs=5.0)
+        assert rigs.maximum_near_fraction(spring, 1)[0] == pytest.approx(measured, abs=5.0)
 
     def test_the_second_harmonic_makes_the_lower_maximum(self) -> None:
-        of = rigs.turn("C", rigs.near_fraction("C", 2)[0])
+        of = rigs.turn("C", rigs.maximum_near_fraction("C", 2)[0])
         assert rigs.harmonic(of, 2) > rigs.harmonic(of, 1)
 
     def test_pin_forces_of_a_run(self) -> None:

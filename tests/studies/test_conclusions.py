@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from analysis.studies.statements import HOLDS, Statement
-from analysis.studies.youssef.conclusions import decay, spacings
-from analysis.studies.youssef.conclusions_linear import introduction, linearised
+from analysis.studies.youssef.conclusions import decay, maxima_spacings
+from analysis.studies.youssef.conclusions_linear import judge_introduction, judge_linearised
 
 from .results import check, expected
 
@@ -19,7 +19,7 @@ def test_verdicts() -> None:
     check("conclusions")
 
 
-@pytest.mark.parametrize("part", [introduction, linearised])
+@pytest.mark.parametrize("part", [judge_introduction, judge_linearised])
 def test_verdicts_on_the_linear_equation(part: Callable[[], tuple[Statement, ...]]) -> None:
     """Those that take no run of the mechanism."""
     for s in part():
@@ -31,7 +31,7 @@ def test_verdicts_on_the_linear_equation(part: Callable[[], tuple[Statement, ...
 
 def test_spacings_are_those_of_the_maxima_between_the_samples() -> None:
     angle = np.linspace(0.0, 30.0, 700)
-    assert spacings(angle, np.cos(0.9 * angle)) == pytest.approx(400.0, abs=0.01)
+    assert maxima_spacings(angle, np.cos(0.9 * angle)) == pytest.approx(400.0, abs=0.01)
 
 
 def test_the_transient_of_a_launch_is_no_decay() -> None:

@@ -20,7 +20,7 @@ from analysis.slider_crank.dual_dynamics import Binor
 from analysis.studies import ENTRIES, RAHMAN
 from analysis.studies.rahman import closure, forces, method, rates
 from analysis.studies.rahman import figures as rahman
-from analysis.studies.rahman.printed import CRANK_AT_SPEED, GENERAL, dependable, joint_rates, turn
+from analysis.studies.rahman.printed import CRANK_AT_SPEED, GENERAL, close_loop_combined, joint_rates, turn
 from analysis.studies.rahman.table import (
     CAPTIONS,
     COMPONENTS,
@@ -430,7 +430,7 @@ class TestStatements:
     def test_all_forces_by_dual_vectors(self, case: Case) -> None:
         """The joint forces of the plant against those by dual vectors, which share no equation with it."""
         mechanism, shift = parameters(case.offset_in, case.twist_deg), case.shift_in * INCH
-        clear_of = rahman.clear(case)
+        clear_of = rahman.clear_mask(case)
         angles = np.degrees(THETA)[clear_of]
         turned = follow(mechanism, np.radians(np.arange(0.0, 361.0, 20.0)), shift)
         closed = close(mechanism, np.radians(angles), shift, turned.at((angles // 20.0).astype(int)))
@@ -460,7 +460,7 @@ class TestMethod:
         ids=["S1", "232", "310"],
     )
     def test_what_the_iteration_leaves(self, case: Case, rotation: float, error: float) -> None:
-        found = method.followed(case)
+        found = method.case_turn(case)
         assert np.max(found.rotation_deg) == pytest.approx(rotation, abs=0.005)
         assert np.max(found.error_in) == pytest.approx(error, abs=0.005)
 
@@ -481,10 +481,10 @@ class TestMethod:
     @pytest.mark.slow
     def test_davidon_fletcher_powell_ends_at_a_least_error_which_is_not_zero(self) -> None:
         """In the plane it closes the loop. With the twist it ends lower than the printed iteration, and the loop stays open."""
-        flat, _, settled = dependable(parameters(10.0), 0.0)
+        flat, _, settled = close_loop_combined(parameters(10.0), 0.0)
         assert settled
         assert flat.max() < 1e-9
-        rotation, position, _ = dependable(parameters(20.0, 232.0), 0.0)
+        rotation, position, _ = close_loop_combined(parameters(20.0, 232.0), 0.0)
         assert rotation.max() > 20.0
         assert position.max() > 1.0
 
@@ -522,7 +522,7 @@ class TestMethod:
         assert -moment == pytest.approx([0.0, -mass * g3 * acceleration, 0.0])
 
     def test_a_loop_that_is_open_meets_eqs_22(self) -> None:
-        b = closure._rotation_that_meets_22()
+        b = closure._rotation_solving_22()
         assert b @ b.T == pytest.approx(np.eye(3), abs=1e-12)
         assert [b[1, 0] + b[0, 0] + b[1, 1], b[2, 0] + b[0, 0] + b[2, 2], b[2, 1] + b[1, 1] + b[2, 2]] == pytest.approx(
             [2.0] * 3, abs=1e-12
@@ -533,7 +533,7 @@ class TestMethod:
         found = forces.planar_forces(erratum_5=True, erratum_6=True)
         plane = Case("", 10.0, 0.0, 270.0)
         for symbol in ("1F1i", "1F1j", "2F2i", "2F2j", "3F3i", "3F3j", "4F4i", "4F4k"):
-            away = (found[symbol] - rahman.values(plane, COMPONENTS[symbol]))[rahman.clear(plane)]
+            away = (found[symbol] - rahman.values(plane, COMPONENTS[symbol]))[rahman.clear_mask(plane)]
             assert np.abs(away).max() < 6e-10
 
 

@@ -17,8 +17,8 @@ from ...slider_crank import Settled, assembly_margin, close, constant_shift, gre
 from ...slider_crank.closure import chain, equations, planar, residuals
 from ...units import INCH
 from ..statements import Statement, at_least, at_most, near, text
-from ..study import Study, StudyResult, padded
-from ..variation import cache, unvaried
+from ..study import Study, StudyResult, pad_columns
+from ..variation import cache, ignore_changes
 from .figures import (
     ALL,
     ANGLE,
@@ -38,9 +38,9 @@ from .method import (
     SHIFT,
     FloatArray,
     H,
+    case_turn,
     difference,
     draw,
-    followed,
     links,
 )
 from .printed import (
@@ -49,14 +49,14 @@ from .printed import (
     MAX_STEPS,
     STEP,
     STEP_DEG,
-    dependable,
+    close_loop_combined,
     turn,
 )
 from .table import IDEAL, TWISTS_REACHED_DEG, Case
 
 #: Rows and columns of the entries 21, 31 and 32, the right sides of eqs 20.
 _BELOW = ([1, 2, 2], [0, 0, 1])
-#: Planar mechanisms of section 3.1, and what they are called in the labels of cases.
+#: Planar mechanisms of section 3.1, and their names in the labels of cases.
 PLANES = tuple(Case("", a4, 0.0, 270.0) for a4 in (0.0, 10.0, 20.0, 30.0))
 IN_PLANE, OUT_OF_IT = "in the plane, a4 = 0, 10, 20, 30 in", f"out of the plane, the {len(OUT)} cases of the graphs"
 #: Shifts (in) at which the iteration is tried, runs at each, and differences of their starts (rad, in).
@@ -98,7 +98,7 @@ def _matrices_error() -> float:
     return max(difference(Dual(np.array(x), np.array(y)), m) for (x, y), m in zip(printed, right))
 
 
-def _rotation_that_meets_22() -> FloatArray:
+def _rotation_solving_22() -> FloatArray:
     """Return a rotation, not the identity, for which the right sides of eq 22 vanish."""
 
     def sides(vector: FloatArray) -> list[float]:
@@ -198,9 +198,9 @@ def _joint_freedoms() -> tuple[tuple[int, int], ...]:
     return tuple(ranks)
 
 
-def _twisted_settles(twist_deg: float) -> bool:
+def _settles_with_twist(twist_deg: float) -> bool:
     """Return whether the iteration converges at every angle of a turn at a4 = 20 in and S1 = 0 with a twist alpha4 (deg)."""
-    return bool(followed(Case("", 20.0, 0.0, twist_deg)).settled.all())
+    return bool(case_turn(Case("", 20.0, 0.0, twist_deg)).settled.all())
 
 
 def _settled_shares(a4: float) -> dict[float, float]:
@@ -213,13 +213,13 @@ def _settled_shares(a4: float) -> dict[float, float]:
 def _limits() -> tuple[Statement, ...]:
     """Judge the limits of S1 and alpha4 that section 3.2 states of the iteration."""
     shares = {a4: _settled_shares(a4) for a4 in (0.0, 10.0, 20.0, 30.0)}
-    last = {a4: max(s1 for s1, share in of.items() if share > 0.0) for a4, of in shares.items()}
+    last = {a4: max(s1 for s1, share in settled.items() if share > 0.0) for a4, settled in shares.items()}
     always = max(s1 for s1 in shares[30.0] if all(share == 1.0 for less, share in shares[30.0].items() if less <= s1))
-    within = float(np.mean([_twisted_settles(twist) for twist in np.linspace(*TWISTS_REACHED_DEG, 7).tolist()]))
+    within = float(np.mean([_settles_with_twist(twist) for twist in np.linspace(*TWISTS_REACHED_DEG, 7).tolist()]))
     twists = []
     for which, limit, way in zip(("least", "greatest"), TWISTS_REACHED_DEG, (-1.0, 1.0)):
         found = limit
-        while _twisted_settles(found + way):
+        while _settles_with_twist(found + way):
             found += way
         twists.append(near(f"{which} alpha4", f"{limit:g}", found, 1.0, "deg"))
     place, step = text("section 3.2, L1121"), "0.5 in, the step of the limits"
@@ -307,9 +307,9 @@ def _mechanism_limits() -> tuple[Statement, Statement]:
 def _detection_errors() -> tuple[float, float]:
     """Return the fractions of shifts at which the iteration fails, and at which it accepts an open loop.
 
-    The crank turns fully at all of these shifts. They go in steps of 2 in from 0 to the greatest such shift, at a4 = 0, 10, 20
-    and 30 in. The iteration runs at every 30 deg from the planar estimate. It fails if it does not converge at one of these
-    angles. It accepts an open loop if it converges at all of them and the loop is open at one.
+    The crank turns fully at all of these shifts. They increase from 0 to the greatest such shift in steps of 2 in, at a4 = 0,
+    10, 20 and 30 in. The iteration runs at every 30 deg from the planar estimate. It fails if it does not converge at one of
+    these angles. It accepts an open loop if it converges at all of them and the loop is open at one.
     """
     missed: list[bool] = []
     wrong: list[bool] = []
@@ -345,7 +345,7 @@ def endings(cases: tuple[Case, ...], offs: tuple[float, ...] = (0.0,), small: fl
 
 def _steps_from_near(case: Case, small: float) -> FloatArray:
     """Return the numbers of corrections at the crank angles where the iteration starts within 20 deg of its result."""
-    found = followed(case, small)
+    found = case_turn(case, small)
     changes = np.degrees(np.abs(np.diff(found.unknowns[:, 0, :4], axis=0))).max(-1)
     return np.asarray(found.steps[1:, 0][changes <= 20.0])
 
@@ -401,13 +401,13 @@ def _condition(case: Case) -> float:
     return least
 
 
-def _apart_from_the_inverse(case: Case) -> float:
+def _inverse_difference(case: Case) -> float:
     """Return the greatest entry of Delta - A^-1 V for Delta = (A'A)^-1 A'V, over the first corrections of a turn.
 
     A^-1 is the name of (A'A)^-1 A' in L457. A first correction is one from the solution at the previous angle.
     """
     angle, shift = np.radians(GRID_DEG), np.full(GRID_DEG.size, case.shift_in * INCH)
-    start = np.roll(followed(case).unknowns[:, 0], 1, axis=0) * [1.0, 1.0, 1.0, 1.0, INCH]
+    start = np.roll(case_turn(case).unknowns[:, 0], 1, axis=0) * [1.0, 1.0, 1.0, 1.0, INCH]
     loop = chain(parameters(case.offset_in, case.twist_deg), angle, shift, start)
     matrix, right = equations(*loop, INCH, "printed")
     transposed, right = np.swapaxes(matrix, -1, -2), right[..., None]
@@ -486,14 +486,14 @@ def _matrices() -> tuple[Statement, ...]:
 
 @cache
 def _combined(case: Case) -> tuple[FloatArray, FloatArray, bool]:
-    return dependable(parameters(case.offset_in, case.twist_deg), case.shift_in)
+    return close_loop_combined(parameters(case.offset_in, case.twist_deg), case.shift_in)
 
 
 def _step() -> tuple[Statement, ...]:
     """Judge the equations of a step of the iteration, eqs 19a to 23a."""
     rank, order = _independent()
     least = min(float(_combined(case)[0].max()) for case in OPEN)
-    half_turn, open_22 = np.diag([1.0, -1.0, -1.0]), _rotation_that_meets_22()
+    half_turn, open_22 = np.diag([1.0, -1.0, -1.0]), _rotation_solving_22()
     open_deg = np.degrees(Rotation.from_matrix(open_22).magnitude())
     return (
         Statement(
@@ -537,7 +537,7 @@ def _step() -> tuple[Statement, ...]:
             "difference of the two sides, A^-1 being what L457 gives, greatest of the first corrections of a turn; "
             f"{OPEN[0].name}, lengths in inches",
             ROUNDING,
-            (nothing("the two sides", _apart_from_the_inverse(OPEN[0])),),
+            (nothing("the two sides", _inverse_difference(OPEN[0])),),
             "A is 6 x 5, so that Delta need not meet eq 23 itself",
         ),
     )
@@ -547,7 +547,7 @@ def _ends() -> tuple[Statement, ...]:
     """Judge the displacements at the end of the iteration, and the estimates at its start."""
     determined = []
     for case in (PLANE, *OPEN):
-        found = followed(case)
+        found = case_turn(case)
         determined += [
             nothing(f"loop open, {case.name}", found.rotation_deg, "deg"),
             nothing(f"error of S4, {case.name}", found.error_in, "in"),
@@ -632,7 +632,7 @@ def closure() -> StudyResult:
     """Compute the closure error at the end of the iteration over a turn, and judge the statements on the loop closure."""
     columns = {ANGLE: GRID_DEG}
     for case in OPEN:
-        found = followed(case)
+        found = case_turn(case)
         columns[f"rotation left as printed; {case.name} [deg]"] = found.rotation_deg[:, 0]
         columns[f"error of S4 as printed; {case.name} [in]"] = found.error_in[:, 0]
         rotation, error, _ = _combined(case)
@@ -648,10 +648,10 @@ def closure() -> StudyResult:
         assignment=f"The iteration runs round the turn by {STEP_DEG:g} deg, from the planar estimate at theta1 = 0 and then "
         f"from the angle before. It settles where a correction is below {STEP:g} rad and {STEP:g} in, within {MAX_STEPS} "
         "corrections: our choice, since the thesis gives neither the step, the accuracy nor the number.",
-        columns=padded(columns),
+        columns=pad_columns(columns),
         statements=(_detection(), *_matrices(), *_step(), *_ends(), *_limits(), *_convergence()),
     )
 
 
 #: The study by its name.
-STUDIES = {"rahman-closure": Study("rahman-closure", unvaried(closure), draw)}
+STUDIES = {"rahman-closure": Study("rahman-closure", ignore_changes(closure), draw)}

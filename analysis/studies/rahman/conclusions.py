@@ -6,9 +6,9 @@ import numpy as np
 
 from ..statements import Statement, at_least, near, text
 from ..study import Study, StudyResult
-from ..variation import unvaried
+from ..variation import ignore_changes
 from .closure import endings
-from .figures import ALL, FROM_DEAD, NOTHING, ROUNDING, FloatArray, clear, nothing, values
+from .figures import ALL, FROM_DEAD, NOTHING, ROUNDING, FloatArray, clear_mask, nothing, values
 from .forces import PLANAR, planar_forces
 from .method import OUT, PLANE
 from .table import COMPONENTS
@@ -21,14 +21,14 @@ def _design() -> tuple[Statement, ...]:
     inertial = {s: right[s] - static[s] for s in PLANAR}
     printed = planar_forces(erratum_5=False, erratum_6=False)
 
-    def error(of: dict[str, FloatArray]) -> float:
-        """Return the greatest error by the printed equations of the components in ``of``, each relative to its greatest there.
+    def error(correct: dict[str, FloatArray]) -> float:
+        """Return the greatest error of the printed equations over the components of ``correct``, relative to their maxima.
 
-        Components that vanish in ``of`` are left out.
+        Components that vanish in ``correct`` are left out.
         """
-        sizes = {s: np.abs(x)[clear(PLANE)].max() for s, x in of.items()}
+        sizes = {s: np.abs(x)[clear_mask(PLANE)].max() for s, x in correct.items()}
         return max(
-            float(np.abs(printed[s] - right[s])[clear(PLANE)].max() / size)
+            float(np.abs(printed[s] - right[s])[clear_mask(PLANE)].max() / size)
             for s, size in sizes.items()
             if size > NOTHING
         )
@@ -125,4 +125,4 @@ def conclusions() -> StudyResult:
 
 
 #: The study by its name.
-STUDIES = {"rahman-conclusions": Study("rahman-conclusions", unvaried(conclusions))}
+STUDIES = {"rahman-conclusions": Study("rahman-conclusions", ignore_changes(conclusions))}

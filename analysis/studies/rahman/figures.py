@@ -29,17 +29,17 @@ from ...units import INCH
 from ..rules import ABOUT, ABOUT_DEG
 from ..statements import Case as Judged
 from ..statements import Statement, at_least, at_most, near, text
-from ..study import Study, StudyResult, padded
+from ..study import Study, StudyResult, pad_columns
 from ..variation import cache, vary
 from .printed import (
     CRANK_AT_SPEED,
     GENERAL,
+    bearing_moments,
     bodies,
+    crank_bearing_forces,
     joint_accelerations,
     joint_forces,
     joint_rates,
-    on_bearing,
-    on_crank,
 )
 from .table import (
     COMPONENTS,
@@ -135,7 +135,7 @@ def position(case: Case) -> FloatArray:
 
 
 @cache
-def clear(case: Case) -> NDArray[np.bool_]:
+def clear_mask(case: Case) -> NDArray[np.bool_]:
     """Return a mask over `ANGLES_DEG`, True at the whole degrees that are `CLEAR_DEG` or more from a dead centre."""
     # an angle at exactly this distance is clear, whatever its rounding
     return np.asarray((ANGLES_DEG % 1.0 == 0.0) & turn(case).clear(CLEAR_DEG - 1e-6))
@@ -143,7 +143,7 @@ def clear(case: Case) -> NDArray[np.bool_]:
 
 def greatest(case: Case, quantity: FloatArray) -> float:
     """Return the greatest magnitude of a quantity over the turn, clear of the dead centres."""
-    return float(np.abs(quantity[clear(case)]).max())
+    return float(np.abs(quantity[clear_mask(case)]).max())
 
 
 def spikes_deg(case: Case, component: Component) -> FloatArray:
@@ -274,26 +274,30 @@ def _bearing_moments() -> tuple[Statement, ...]:
     shifted = [case for case in ALL if case.shift_in]
     unshifted = [case for case in cases if not case.shift_in]
     none = [
-        nothing(f"{symbol}; {case.name}", greatest(case, of[case]), "lb.in")
-        for symbol, of in moments.items()
+        nothing(f"{symbol}; {case.name}", greatest(case, sizes[case]), "lb.in")
+        for symbol, sizes in moments.items()
         for case in unshifted
     ]
     # eqs 69p and 69q with the printed inertia forces in a general position, at any crank angle and shift
     rates = joint_rates(CRANK_AT_SPEED, GENERAL)
     seconds = joint_accelerations(CRANK_AT_SPEED, GENERAL, rates)
     forces = joint_forces(CRANK_AT_SPEED, bodies(parameters()), GENERAL, rates, seconds, TORQUE)
-    (i, j), (about_i, about_j) = on_crank(np.array(0.9), forces), on_bearing(np.array(0.9), 3.5, forces)
+    (i, j), (about_i, about_j) = (
+        crank_bearing_forces(np.array(0.9), forces),
+        bearing_moments(np.array(0.9), 3.5, forces),
+    )
     by_hand = (nothing("1T1i; 69q", about_i + j * 3.5, "lb.in"), nothing("1T1j; 69p", about_j - i * 3.5, "lb.in"))
     by_forces = [
         nothing(
             f"{symbol}; right forces",
-            max(greatest(c, of[c] + sign * c.shift_in * values(c, COMPONENTS[force])) for c in shifted),
+            max(greatest(c, sizes[c] + sign * c.shift_in * values(c, COMPONENTS[force])) for c in shifted),
             "lb.in",
         )
-        for (symbol, of), sign, force in zip(moments.items(), (1.0, -1.0), ("1F1j", "1F1i"))
+        for (symbol, sizes), sign, force in zip(moments.items(), (1.0, -1.0), ("1F1j", "1F1i"))
     ]
     extra = [
-        at_least(symbol, NOTHING, min(greatest(c, of[c]) for c in shifted), "lb.in") for symbol, of in moments.items()
+        at_least(symbol, NOTHING, min(greatest(c, sizes[c]) for c in shifted), "lb.in")
+        for symbol, sizes in moments.items()
     ]
     return (
         Statement(
@@ -457,7 +461,7 @@ def compute(number: str) -> StudyResult:
         number=number,
         claim=claim,
         assignment=assignment,
-        columns=padded(columns),
+        columns=pad_columns(columns),
         statements=_JUDGED[number]() if number in _JUDGED else (),
         see="" if number in ("R5", "R8", CONSTANT) else _judging_figures(number, symbols),
     )
@@ -512,7 +516,7 @@ def draw(result: StudyResult) -> Figure:
     panels: list[Panel] = []
     for symbol, label, unit in shown or [("S4", "slider position $S_4$", "in")]:
         names = {case: _curve_name(symbol, case, unit) for case, *_ in looks}
-        low, high = _y_range(result.columns[name][clear(case)] for case, name in names.items())
+        low, high = _y_range(result.columns[name][clear_mask(case)] for case, name in names.items())
         curves = []
         for case, legend, colour, line in looks:
             x, y = _interrupted_curve(result, case, names[case])

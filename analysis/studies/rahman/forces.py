@@ -15,8 +15,8 @@ from ...units import INCH
 from ..rules import ABNORMAL, ABOUT_DEG, VERY_CLOSE_DEG
 from ..statements import Case as Judged
 from ..statements import Statement, at_least, at_most, text
-from ..study import Study, StudyResult, padded
-from ..variation import unvaried
+from ..study import Study, StudyResult, pad_columns
+from ..variation import ignore_changes
 from .figures import (
     ANGLE,
     ANGLES_DEG,
@@ -25,7 +25,7 @@ from .figures import (
     NOTHING,
     ROUNDING,
     TORQUE,
-    clear,
+    clear_mask,
     nothing,
     values,
 )
@@ -41,9 +41,9 @@ from .method import (
     ROW_F,
     SHIFT,
     FloatArray,
+    case_turn,
     difference,
     draw,
-    followed,
     joints,
     links,
 )
@@ -54,7 +54,9 @@ from .printed import (
     Bodies,
     Crank,
     Joints,
+    bearing_moments,
     bodies,
+    crank_bearing_forces,
     crank_momentum,
     forward_momentum_rates,
     forward_rod_momentum,
@@ -66,11 +68,9 @@ from .printed import (
     joint_accelerations,
     joint_forces,
     joint_rates,
-    later,
     momenta,
     momentum_rates,
-    on_bearing,
-    on_crank,
+    state_later,
     velocities,
 )
 from .table import COMPONENTS, Case
@@ -99,7 +99,7 @@ def planar_forces(case: Case = PLANE, *, erratum_5: bool, erratum_6: bool, share
         r = joint_rates(CRANK_AT_SPEED, q)
         seconds = joint_accelerations(CRANK_AT_SPEED, q, r)
         found = joint_forces(CRANK_AT_SPEED, b, q, r, seconds, TORQUE, erratum_5=erratum_5)
-    found["1F1i"], found["1F1j"] = on_crank(angle, found)
+    found["1F1i"], found["1F1j"] = crank_bearing_forces(angle, found)
     return found
 
 
@@ -139,13 +139,13 @@ def _balances() -> tuple[float, ...]:
             (crank, rod, slider), (Dual(first, moment), Dual(second), Dual(third)), (second, third, fourth), inertia
         )
     ]
-    at = clear(PLANE)
+    at = clear_mask(PLANE)
     return tuple(float(max(np.abs(x.real[at]).max(), np.abs(x.dual[at]).max())) for x in left)
 
 
 def _clear_joints(case: Case) -> Joints:
     """Return the joint values at the end of the printed iteration, at the angles where sin theta2 is not near 0."""
-    q = joints(followed(case).unknowns[:, 0])
+    q = joints(case_turn(case).unknowns[:, 0])
     return Joints(*(x[np.abs(np.sin(q.th2)) > CLEAR_SINE] for x in q))
 
 
@@ -272,7 +272,7 @@ def _momenta() -> tuple[Statement, ...]:
 
 
 def _rate(h: Dual) -> Dual:
-    """Return the time derivative of a dual vector, given its value at the imaginary time of `later`."""
+    """Return the time derivative of a dual vector, given its value at the imaginary time of `state_later`."""
     return Dual(h.real.imag / 1e-20, h.dual.imag / 1e-20)
 
 
@@ -282,7 +282,7 @@ def _momentum_rates() -> tuple[Statement, ...]:
     # the rates of eqs 54 to 56, and the momenta whose rates they should be, a moment later
     seconds = joint_accelerations(MOVING, GENERAL, r)
     of_rates = Crank(CRANK, ROD, MOVING.acceleration, MOVING.shift_acceleration)
-    crank, q, rate = later(MOVING, GENERAL, r, seconds)
+    crank, q, rate = state_later(MOVING, GENERAL, r, seconds)
     rod_rate, slider_rate = forward_momentum_rates(MOVING, b, GENERAL, r, seconds, G3)
     forward = {
         "eq 54": (crank_momentum(of_rates, b), crank_momentum(crank, b)),
@@ -329,13 +329,13 @@ def _inertia() -> tuple[Statement, ...]:
     """Judge the inertia forces of eqs 59 to 61, and the balances of eqs 62 to 64 that they enter."""
     b, r = _unequal(), joint_rates(MOVING, GENERAL)
     a = joint_accelerations(MOVING, GENERAL, r)
-    accelerations = map(_rate, velocities(*later(MOVING, GENERAL, r, a)))
+    accelerations = map(_rate, velocities(*state_later(MOVING, GENERAL, r, a)))
     printed = zip(
         velocities(MOVING, GENERAL, r), momenta(MOVING, b, GENERAL, r), momentum_rates(MOVING, b, GENERAL, r, a)
     )
     inertia = [
-        difference(inertia_force(*of), binor.rate(of[0], acceleration))
-        for of, binor, acceleration in zip(printed, _binors(b), accelerations)
+        difference(inertia_force(*momentum), binor.rate(momentum[0], acceleration))
+        for momentum, binor, acceleration in zip(printed, _binors(b), accelerations)
     ]
     return (
         Statement(
@@ -361,7 +361,7 @@ def _inertia() -> tuple[Statement, ...]:
     )
 
 
-def _unsolved() -> FloatArray:
+def _solution_residuals() -> FloatArray:
     """Return the residuals (3, 2, 3) of eqs 62 to 64 with the forces by eqs 69a to 69q.
 
     The axes are the link, the real or dual part, and the coordinate axis.
@@ -370,8 +370,8 @@ def _unsolved() -> FloatArray:
     r = joint_rates(crank, GENERAL)
     a = joint_accelerations(crank, GENERAL, r)
     f = joint_forces(crank, b, GENERAL, r, a, TORQUE)
-    f |= dict(zip(("1F1i", "1F1j"), on_crank(np.array(AT), f)))
-    f |= dict(zip(("1T1i", "1T1j"), on_bearing(np.array(AT), SHIFT, f))) | {"1T1k": np.array(TORQUE)}
+    f |= dict(zip(("1F1i", "1F1j"), crank_bearing_forces(np.array(AT), f)))
+    f |= dict(zip(("1T1i", "1T1j"), bearing_moments(np.array(AT), SHIFT, f))) | {"1T1k": np.array(TORQUE)}
     # 1F1k is 0, as are the moments in the ball joints
     joint = [Dual(*(np.array([f.get(f"{n}{x}{n}{axis}", 0.0) for axis in "ijk"]) for x in "FT")) for n in (1, 2, 3, 4)]
     inertia = inertia_forces(crank, b, GENERAL, r, a)
@@ -379,7 +379,7 @@ def _unsolved() -> FloatArray:
     return np.array([[x.real, x.dual] for x in left])
 
 
-def _expanded() -> dict[str, FloatArray]:
+def _expansion_differences() -> dict[str, FloatArray]:
     """Return the differences of eqs 62a to 64f, as printed, from eqs 62 to 64 for given forces, by the equations' names."""
     th1, shift, (th2, eta2, th3, eta3, _) = AT, SHIFT, (float(value) for value in GENERAL)
     (s, s2, se, s3, sh), (c, c2, ce, c3, ch) = (f([th1, th2, eta2, th3, eta3]) for f in (np.sin, np.cos))
@@ -413,7 +413,7 @@ def _expanded() -> dict[str, FloatArray]:
 
 def _expansion(general: dict[str, FloatArray]) -> tuple[Statement, ...]:
     """Judge eqs 62a to 64f, and their solution by eqs 69a to 69q; ``general`` are its forces in a general position."""
-    unsolved = _unsolved()
+    unsolved = _solution_residuals()
     # 63d is the moment about j, 63e the force along k
     unmet = unsolved[1, [1, 0], [1, 2]]
     unsolved[1, [1, 0], [1, 2]] = 0.0
@@ -425,7 +425,7 @@ def _expansion(general: dict[str, FloatArray]) -> tuple[Statement, ...]:
             "difference from eqs 62 to 64 with the matrices of eqs 1 to 3, any forces and moments in a general position, "
             "lengths in inches",
             ROUNDING,
-            tuple(nothing(words, size, "lb") for words, size in _expanded().items()),
+            tuple(nothing(words, size, "lb") for words, size in _expansion_differences().items()),
             f"erratum 9: 1F1j for 1F1i in 62c, {MAYBE}",
         ),
         Statement(
@@ -457,13 +457,13 @@ def _expansion(general: dict[str, FloatArray]) -> tuple[Statement, ...]:
 
 def _slider_force(right: dict[str, FloatArray]) -> tuple[Statement, ...]:
     """Judge 2F2i by eq 69h, and its improvement by eq 69k; ``right`` are the correct forces in the plane."""
-    angle, at = np.radians(ANGLES_DEG), clear(PLANE)
+    angle, at = np.radians(ANGLES_DEG), clear_mask(PLANE)
     s, c, inertia = np.sin(angle), np.cos(angle), -(right["along crank"] + right["2F2i"])
     wrong = dict(right)
     wrong["2F2i"] = right["2F2i"] + 1.0
     for _ in range(10):
         wrong["along crank"] = -(wrong["2F2i"] + inertia)
-        i, j = on_crank(angle, wrong)
+        i, j = crank_bearing_forces(angle, wrong)
         off = i * c + j * s + wrong["2F2i"] + inertia
         wrong["2F2i"] = -i * c - j * s - inertia
     left = float(np.abs(wrong["2F2i"] - right["2F2i"])[at].max())
@@ -552,12 +552,12 @@ def forces() -> StudyResult:
     planes = [Case("", a4, 0.0, 270.0) for a4 in (0.0, 10.0, 20.0, 30.0)]
     for case, (words, (five, six)) in product(planes, errata.items()):
         found = planar_forces(case, erratum_5=five, erratum_6=six)
-        apart = [np.abs(found[s] - values(case, COMPONENTS[s]))[clear(case)].max() for s in PLANAR]
+        apart = [np.abs(found[s] - values(case, COMPONENTS[s]))[clear_mask(case)].max() for s in PLANAR]
         wrong[words] = max(wrong[words], *map(float, apart))
         if case.offset_in == PLANE.offset_in:
             columns[f"4F4k {words} [lb]"] = found["4F4k"]
             mended = found
-    flat = max(float(np.max(followed(case).error_in)) for case in planes)
+    flat = max(float(np.max(case_turn(case).error_in)) for case in planes)
     worst = (
         "greatest difference of a joint force from that by Newton and Euler (our model) in the plane, a4 = 0, 10, 20, 30 in, "
         f"{FROM_DEAD}"
@@ -568,7 +568,7 @@ def forces() -> StudyResult:
     return StudyResult(
         number="rahman-forces",
         claim="Rahman states: in the plane the program gives the same as the complex algebra method.",
-        columns=padded(columns),
+        columns=pad_columns(columns),
         statements=(
             Statement(
                 "The program was first tested for the planar case and the results found to be same as that obtained "
@@ -599,4 +599,4 @@ def forces() -> StudyResult:
 
 
 #: The study by its name.
-STUDIES = {"rahman-forces": Study("rahman-forces", unvaried(forces), draw)}
+STUDIES = {"rahman-forces": Study("rahman-forces", ignore_changes(forces), draw)}

@@ -16,7 +16,7 @@ from ...numerics.dual import Dual, about_i, about_j, about_k
 from ..rules import ABOUT_DEG
 from ..study import StudyResult
 from ..variation import cache
-from .figures import ALL, ANGLE, clear, printed, printed_symbol
+from .figures import ALL, ANGLE, clear_mask, printed, printed_symbol
 from .printed import CRANK_AT_SPEED, GENERAL, STEP, Joints, Turn, turn
 from .table import IDEAL, Case
 
@@ -46,7 +46,7 @@ MAYBE = "so in our scan; the print may be right"
 H, ROUGH = 1e-6, 1e-7
 
 
-def followed(case: Case, small: float = STEP) -> Turn:
+def case_turn(case: Case, small: float = STEP) -> Turn:
     """Run the iteration over a turn for the mechanism of a case; see `turn`."""
     return _followed(*case[1:], small)
 
@@ -92,7 +92,7 @@ def draw(result: StudyResult) -> Figure:
     for unit, label in _SHOWN.items():
         shown = {name: column for name, column in result.columns.items() if name.endswith(unit) and name != ANGLE}
         # the forces are infinite at the dead centres
-        inside = clear(PLANE) if unit == "[lb]" else slice(None)
+        inside = clear_mask(PLANE) if unit == "[lb]" else slice(None)
         limit = 1.05 * max((float(np.nanmax(np.abs(column[inside]))) for column in shown.values()), default=0.0)
         labels = {name: printed(name.removesuffix(f" {unit}").removeprefix(f"{label} ")) for name in shown}
         said = {curve.label for panel in panels for curve in panel.curves}

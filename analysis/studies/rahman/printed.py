@@ -75,7 +75,7 @@ def turn(p: SliderCrankParameters, shift_in: ArrayLike, *, small: float = STEP, 
     return found
 
 
-def dependable(p: SliderCrankParameters, shift_in: float) -> tuple[FloatArray, FloatArray, bool]:
+def close_loop_combined(p: SliderCrankParameters, shift_in: float) -> tuple[FloatArray, FloatArray, bool]:
     """Close the loop at every second angle of `GRID_DEG` by Newton-Raphson and Davidon-Fletcher-Powell steps combined our way.
 
     The thesis prints the Newton-Raphson steps only (eqs 7 to 26); its reference 12, on the combination, was not at hand. A
@@ -152,7 +152,7 @@ CRANK_AT_SPEED = Crank(12.0, 50.0, CRANK_SPEED)
 GENERAL = Joints(*(np.array(value) for value in (2.1, 0.35, -1.3, 0.2, 40.0)))
 
 
-def later(c: Crank, q: Joints, r: Joints, a: Joints) -> tuple[Crank, Joints, Joints]:
+def state_later(c: Crank, q: Joints, r: Joints, a: Joints) -> tuple[Crank, Joints, Joints]:
     """Return the crank, the joint values and their rates an imaginary time of 1e-20j s later.
 
     The imaginary part of any function of the results, divided by 1e-20, is its time derivative without rounding error.
@@ -480,7 +480,9 @@ def inertia_force(velocity: Dual, momentum: Dual, rate: Dual) -> Dual:
 
 def inertia_forces(c: Crank, b: Bodies, q: Joints, r: Joints, a: Joints) -> list[Dual]:
     """Return the inertia forces f1, f2 and f3 by eqs 49a, 52a, 53a, 54 and 57 to 61."""
-    return [inertia_force(*of) for of in zip(velocities(c, q, r), momenta(c, b, q, r), momentum_rates(c, b, q, r, a))]
+    return [
+        inertia_force(*body) for body in zip(velocities(c, q, r), momenta(c, b, q, r), momentum_rates(c, b, q, r, a))
+    ]
 
 
 def joint_forces(
@@ -513,16 +515,16 @@ def joint_forces(
     return f
 
 
-def on_crank(angle: FloatArray, f: dict[str, FloatArray]) -> tuple[FloatArray, FloatArray]:
+def crank_bearing_forces(angle: FloatArray, f: dict[str, FloatArray]) -> tuple[FloatArray, FloatArray]:
     """Return the forces 1F1i and 1F1j (lb) by eqs 69i and 69j; ``f`` has the forces that these equations need."""
     s, c = np.sin(angle), np.cos(angle)
     return f["along crank"] * c - f["across crank"] * s, f["along crank"] * s + f["across crank"] * c
 
 
-def on_bearing(angle: FloatArray, shift_in: float, f: dict[str, FloatArray]) -> tuple[FloatArray, FloatArray]:
+def bearing_moments(angle: FloatArray, shift_in: float, f: dict[str, FloatArray]) -> tuple[FloatArray, FloatArray]:
     """Return the moments 1T1i and 1T1j (lb.in) by eqs 69q and 69p.
 
     The equations take the axial force 1F1k as 0, as the thesis has it for a constant shift.
     """
-    (i, j), s, c = on_crank(angle, f), np.sin(angle), np.cos(angle)
+    (i, j), s, c = crank_bearing_forces(angle, f), np.sin(angle), np.cos(angle)
     return -j * shift_in - f["f1xd"] * c + f["f1yd"] * s, i * shift_in - f["f1xd"] * s - f["f1yd"] * c

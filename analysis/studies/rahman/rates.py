@@ -12,8 +12,8 @@ from ...slider_crank.closure import planar
 from ...units import INCH
 from ..rules import ABNORMAL, ABOUT_DEG, VERY_CLOSE_DEG
 from ..statements import Statement, at_least, at_most, near, text
-from ..study import Study, StudyResult, padded
-from ..variation import unvaried
+from ..study import Study, StudyResult, pad_columns
+from ..variation import ignore_changes
 from . import method, printed
 from .figures import (
     ANGLE,
@@ -33,7 +33,7 @@ def row_f(case: Case) -> tuple[method.FloatArray, method.FloatArray]:
 
     Each residual has a value at every angle of the turn.
     """
-    p, q = parameters(case.offset_in, case.twist_deg), method.joints(method.followed(case).unknowns[:, 0])
+    p, q = parameters(case.offset_in, case.twist_deg), method.joints(method.case_turn(case).unknowns[:, 0])
     lacking = printed.loop_rates(printed.CRANK_AT_SPEED, q, printed.joint_rates(printed.CRANK_AT_SPEED, q))[5]
     shift = np.full(printed.GRID_DEG.size, case.shift_in * INCH)
     mended = printed.mended_row(p, np.radians(printed.GRID_DEG), shift, q, CRANK_SPEED)
@@ -94,7 +94,7 @@ def _rows(crank: printed.Crank, q: printed.Joints) -> tuple[method.FloatArray, m
     return np.stack([printed.loop_rates(crank, q, printed.Joints(*unit)) - right for unit in np.eye(5)], -1), right
 
 
-def _of_frames() -> tuple[Statement, ...]:
+def _frame_velocities() -> tuple[Statement, ...]:
     """Judge the velocities of eqs 30 to 36, 44 and 45."""
     return (
         Statement(
@@ -187,7 +187,7 @@ def _derivatives() -> tuple[Statement, ...]:
     of_28a, of_28b = _sinusoidal()
     found = printed.joint_rates(method.MOVING, printed.GENERAL)
     seconds = printed.joint_accelerations(method.MOVING, printed.GENERAL, found)
-    quicker, moved, _ = printed.later(method.MOVING, printed.GENERAL, found, seconds)
+    quicker, moved, _ = printed.state_later(method.MOVING, printed.GENERAL, found, seconds)
     rough = max(abs(float(a - b.imag / 1e-20)) for a, b in zip(seconds, printed.joint_rates(quicker, moved)))
     return (
         Statement(
@@ -244,7 +244,7 @@ def _near_dead_centres(case: Case, q: printed.Joints, angles_deg: method.FloatAr
     }
 
 
-def _ended(case: Case, angles_deg: method.FloatArray, start: method.FloatArray) -> method.FloatArray:
+def _iteration_end(case: Case, angles_deg: method.FloatArray, start: method.FloatArray) -> method.FloatArray:
     """Return the unknowns (n, 5) at the end of the printed iteration at n crank angles, given a start for each angle."""
     p, unit = parameters(case.offset_in, case.twist_deg), [1.0, 1.0, 1.0, 1.0, INCH]
     shift = case.shift_in * INCH
@@ -252,13 +252,13 @@ def _ended(case: Case, angles_deg: method.FloatArray, start: method.FloatArray) 
     return np.asarray(ended.unknowns / unit)
 
 
-def _ended_on_turn(case: Case) -> method.FloatArray:
+def _iteration_end_on_turn(case: Case) -> method.FloatArray:
     """Return the unknowns at the end of the printed iteration at every half degree of a turn.
 
     The iteration starts from the solution at the last multiple of five degrees.
     """
-    starts = np.repeat(method.followed(case).unknowns[:, 0], round(2.0 * printed.STEP_DEG), axis=0)
-    return _ended(case, ANGLES_DEG[:-1], starts)
+    starts = np.repeat(method.case_turn(case).unknowns[:, 0], round(2.0 * printed.STEP_DEG), axis=0)
+    return _iteration_end(case, ANGLES_DEG[:-1], starts)
 
 
 def _zeros(
@@ -271,7 +271,7 @@ def _zeros(
     zeros, start = angles_deg[at], unknowns[at]
     while step > 1e-5 * BESIDE_DEG:
         step *= 0.5
-        before = np.sin(_ended(case, zeros + step, start)[:, 0]) * sine[at] > 0.0
+        before = np.sin(_iteration_end(case, zeros + step, start)[:, 0]) * sine[at] > 0.0
         zeros = np.where(before, zeros + step, zeros)
     return zeros, start
 
@@ -282,7 +282,7 @@ def _beside_zeros(
     """Return the angles (deg) `BESIDE_DEG` before and after each zero of sin theta2, and the unknowns there."""
     zeros, start = _zeros(case, angles_deg, unknowns)
     beside = np.concatenate([zeros - BESIDE_DEG, zeros + BESIDE_DEG])
-    return beside, _ended(case, beside, np.tile(start, (2, 1)))
+    return beside, _iteration_end(case, beside, np.tile(start, (2, 1)))
 
 
 def _roundoff(q: printed.Joints) -> float:
@@ -329,7 +329,7 @@ def _denominators() -> Statement:
 def _abnormal() -> Statement:
     """Judge the cause that section 3.2 gives for the spikes, in the case whose dead centres lie near 100 and 300 deg."""
     case, angles = OFFSETS[1], ANGLES_DEG[:-1]
-    unknowns = _ended_on_turn(case)
+    unknowns = _iteration_end_on_turn(case)
     beside, closest = _beside_zeros(case, angles, unknowns)
     ratios = _near_dead_centres(case, method.joints(np.concatenate([unknowns, closest])), np.append(angles, beside))
     th2 = np.abs((np.degrees(closest[: closest.shape[0] // 2, 0]) + 180.0) % 360.0 - 180.0)
@@ -363,10 +363,10 @@ def rates() -> StudyResult:
     return StudyResult(
         number="rahman-rates",
         claim="Rahman states: eqs 39 to 43 give all velocities of the joints, and eqs 38a to 42a their accelerations.",
-        columns=padded(columns),
-        statements=(*_of_frames(), *_solved(), *_derivatives(), _denominators(), _abnormal()),
+        columns=pad_columns(columns),
+        statements=(*_frame_velocities(), *_solved(), *_derivatives(), _denominators(), _abnormal()),
     )
 
 
 #: The study by its name.
-STUDIES = {"rahman-rates": Study("rahman-rates", unvaried(rates), method.draw)}
+STUDIES = {"rahman-rates": Study("rahman-rates", ignore_changes(rates), method.draw)}

@@ -17,8 +17,8 @@ from ...units import CM_PER_METRE, RAD_S_PER_RPM
 from ...youssef import balance
 from ..rules import ABOUT, ABOUT_DEG, ALIKE, READ_DEG, SLIGHTLY
 from ..statements import Case, Statement, at_least, at_most, near, text
-from ..study import Study, StudyResult, padded, result_curves
-from ..variation import cache, compared
+from ..study import Study, StudyResult, pad_columns, result_curves
+from ..variation import cache, compared_values
 from . import free_crank
 from .runs import (
     ALIKE_WORDS,
@@ -26,7 +26,7 @@ from .runs import (
     SPEED,
     STIFFNESSES,
     SteadyTurn,
-    from_line,
+    distance_from_line,
     greatest,
     greatest_ratio,
     least,
@@ -109,17 +109,17 @@ class Drift:
 
     @property
     def until_collinear(self) -> NDArray[np.float64]:
-        """Slider position (cm), NaN from the moment the links are collinear."""
+        """Return the slider position (cm), NaN from the moment at which the links are collinear."""
         return np.where(self.turns > self.collinear_turn, np.nan, self.slider_cm)
 
     @property
     def _last(self) -> int:
-        """Number of the last whole turn before the links are collinear, at most `DRAWN_TURNS`."""
+        """Return the number of the last whole turn before the links are collinear, at most `DRAWN_TURNS`."""
         return int(np.fmin(DRAWN_TURNS, self.collinear_turn))
 
     @property
     def _ends(self) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
-        """Numbers of the turns after the transient, and the slider position (cm) at the end of each.
+        """Return the numbers of the turns after the transient, and the slider position (cm) at the end of each.
 
         If no turn follows the transient, all turns are used, from number 0.
         """
@@ -129,18 +129,18 @@ class Drift:
 
     @property
     def line(self) -> tuple[float, float]:
-        """Least-squares line through the drift after the transient: slope (cm per turn) and position at crank angle 0 (cm)."""
+        """Return the least-squares line of the drift after the transient: slope (cm per turn), value at crank angle 0 (cm)."""
         rate, start = np.polyfit(*self._ends, 1)
         return float(rate), float(start)
 
     @property
     def rate(self) -> float:
-        """Drift per turn after the transient (cm); see `line`."""
+        """Return the drift per turn after the transient (cm); see `line`."""
         return self.line[0]
 
     @property
     def bend(self) -> float:
-        """Greatest distance of the slider from the least-squares line at the ends of turns, relative to its range there."""
+        """Return the greatest distance of the drift at the ends of turns from the least-squares line, relative to its range."""
         turns, ends = self._ends
         return float(np.abs(ends - np.polyval(np.polyfit(turns, ends, 1), turns)).max() / np.ptp(ends))
 
@@ -155,14 +155,14 @@ class Drift:
 
     @property
     def unsteadiest(self) -> float:
-        """Greatest `unsteadiness` of the turns after the transient, up to `DRAWN_TURNS`."""
+        """Return the greatest `unsteadiness` of the turns after the transient, up to `DRAWN_TURNS`."""
         return max(self.unsteadiness(n) for n in range(TRANSIENT_TURNS + 1, self._last))
 
     @property
     def transient(self) -> float:
-        """Number of turns before the first that is like the next.
+        """Return the number of turns before the first turn that is like the next one.
 
-        If the motion never becomes steady, the turn at which the links become collinear, or else `DRAWN_TURNS`.
+        If the motion never becomes steady, return the turn at which the links become collinear, or else `DRAWN_TURNS`.
         """
         end = float(np.nan_to_num(self.collinear_turn, nan=DRAWN_TURNS))
         return next((n - 1 for n in range(1, int(end)) if self.unsteadiness(n) <= ALIKE), end)
@@ -215,7 +215,7 @@ def drift_result() -> StudyResult:
         number="3.2",
         claim="Without a spring the slider has a transient of two turns, then a steady motion about a linear drift; "
         "the weaker the damper, the sooner the links come collinear.",
-        columns=padded(columns),
+        columns=pad_columns(columns),
         statements=(
             Statement(
                 "The first of these is a transient region of duration approximately two cycles.",
@@ -271,7 +271,7 @@ def weightless_result() -> StudyResult:
     return StudyResult(
         number="3.3",
         claim="Without gravity M, the rate of the drift, is slightly reduced.",
-        columns=padded(columns),
+        columns=pad_columns(columns),
         statements=(
             Statement(
                 "It is clear from this figure that because the gravitational forces are eliminated the value of M in "
@@ -324,7 +324,7 @@ def draw_drift(result: StudyResult) -> Figure:
 
 
 @cache
-def from_rest(stiffness: float) -> Trajectory:
+def run_from_rest(stiffness: float) -> Trajectory:
     """Run three turns from the thesis's start, th2 = u = u' = 0."""
     inputs = Inputs(speed=SPEED * RAD_S_PER_RPM)
     return simulate(table_3_1(stiffness), inputs, stop_time=3.0 * PERIOD, step=PERIOD / 360.0)
@@ -336,7 +336,7 @@ def _steady(stiffness: float) -> SteadyTurn:
 
 def springs() -> tuple[float, ...]:
     """Return the spring stiffnesses (dyn/cm) that Fig 3.4 compares, or only the reader's stiffness if the reader has set it."""
-    return compared("slider.stiffness", STIFFNESSES, "N/m", DYN_PER_CM_PER_NEWTON_PER_METRE)
+    return compared_values("slider.stiffness", STIFFNESSES, "N/m", DYN_PER_CM_PER_NEWTON_PER_METRE)
 
 
 def steady_result() -> StudyResult:
@@ -344,7 +344,7 @@ def steady_result() -> StudyResult:
     turns = {k: _steady(k) for k in springs()}
     columns = {ANGLE: next(iter(turns.values())).angle_deg}
     columns |= {f"slider position u; {_k(k)} [cm]": turn.slider_cm for k, turn in turns.items()}
-    starts = {k: from_rest(k) for k in turns}
+    starts = {k: run_from_rest(k) for k in turns}
     columns[TURNS] = np.linspace(0.0, 3.0, len(next(iter(starts.values()))))
     columns |= {f"u from the start; {_k(k)} [cm]": CM_PER_METRE * run["slider.position"] for k, run in starts.items()}
     return StudyResult(
@@ -352,7 +352,7 @@ def steady_result() -> StudyResult:
         assignment='The scan has "220" for the crank angle of the least position (L1962): read as 22 deg.',
         claim="After a turn of transient the slider swings steadily between its start and the crank shaft; a stiffer "
         "spring moves the mean position towards the start, and the least position to a smaller crank angle.",
-        columns=padded(columns),
+        columns=pad_columns(columns),
         # the statements compare the three springs
         statements=(*_steady_statements(), *_shape_statements()) if springs() == STIFFNESSES else (),
     )
@@ -365,7 +365,7 @@ def _steady_statements() -> list[Statement]:
     means = {k: turn.slider_cm[:-1].mean() for k, turn in turns.items()}
     first, second = (
         {k: np.abs(u[k] - turn.slider_cm[:-1:4]).max() / np.ptp(turn.slider_cm) for k, turn in turns.items()}
-        for u in ({k: CM_PER_METRE * from_rest(k)["slider.position"][n : n + 360] for k in turns} for n in (0, 360))
+        for u in ({k: CM_PER_METRE * run_from_rest(k)["slider.position"][n : n + 360] for k in turns} for n in (0, 360))
     )
     change, shaft = (
         max(t.change / np.ptp(t.slider_cm) for t in turns.values()),
@@ -444,7 +444,7 @@ def _shape_statements() -> list[Statement]:
         u = _steady(k).slider_cm
         high, low = int(u.argmax()), int(u.argmin())
         part = np.tile(u[:-1], 2)[high : high + (low - high) % (len(u) - 1) + 1]
-        varies[k] = from_line(np.linspace(0.0, 1.0, len(part)), (part - part[0]) / (part[-1] - part[0]))
+        varies[k] = distance_from_line(np.linspace(0.0, 1.0, len(part)), (part - part[0]) / (part[-1] - part[0]))
     return [
         Statement(
             "The rate of change of the slider position is approximately the same for all the response curves between "
@@ -563,8 +563,8 @@ def parts(stiffness: float) -> Parts:
     return Parts(whole, whole - unaccelerated, whole - weightless)
 
 
-def by_position(soft: float, stiff: float) -> NDArray[np.float64]:
-    """Return the part (N.m) of the difference in steady torque between two springs that is due to the slider's position alone.
+def position_torque(soft: float, stiff: float) -> NDArray[np.float64]:
+    """Return the part (N.m) of the difference in steady torque between two springs that only the slider's position causes.
 
     It is the mean of two differences in which only the position changes: one with u' and u'' of the softer spring, the other
     with those of the stiffer spring.
@@ -580,9 +580,7 @@ def damper_torque(stiffness: float) -> NDArray[np.float64]:
     return table_3_1(stiffness).slider_damping * slider_motion(stiffness)[1] ** 2 / (SPEED * RAD_S_PER_RPM)
 
 
-def apart_on_the_graph(
-    x: NDArray[np.float64], one: NDArray[np.float64], other: NDArray[np.float64]
-) -> NDArray[np.float64]:
+def graph_distance(x: NDArray[np.float64], one: NDArray[np.float64], other: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return the distance of each point of the curve ``one`` from the nearest point of the curve ``other``.
 
     Both curves have the abscissas ``x`` and the period 1.
@@ -627,11 +625,11 @@ def _torque_curves() -> list[Statement]:
     angle, torque, places = _torques()
     away = np.min([np.abs((angle - at + 180.0) % 360.0 - 180.0) for at in places.values()], axis=0)
     # in the last part of the turn the torques only fall
-    reversals = [np.interp(0.0, -of[1320:], angle[1320:]) - 360.0 for of in torque]
+    reversals = [np.interp(0.0, -curve[1320:], angle[1320:]) - 360.0 for curve in torque]
     changes = np.abs(np.diff(torque, axis=1)).argmax(axis=1)
     steepest = (0.5 * (angle[changes] + angle[changes + 1]) + 180.0) % 360.0 - 180.0
     curves = torque / np.ptp(torque)
-    seen = [apart_on_the_graph(angle / 360.0, curves[i], curves[j]) for i, j in ((0, 1), (0, 2), (1, 2))]
+    seen = [graph_distance(angle / 360.0, curves[i], curves[j]) for i, j in ((0, 1), (0, 2), (1, 2))]
     extremes = {"greatest": torque.max(axis=1), "least": torque.min(axis=1)}
     return [
         Statement(
@@ -680,7 +678,7 @@ def _torque_causes() -> list[Statement]:
     differences = {
         "acceleration": stiff.acceleration - soft.acceleration,
         "inertial loads": whole - (stiff.gravity - soft.gravity),
-        "position": by_position(STIFFNESSES[0], STIFFNESSES[-1]),
+        "position": position_torque(STIFFNESSES[0], STIFFNESSES[-1]),
         "damper": damper_torque(STIFFNESSES[-1]) - damper_torque(STIFFNESSES[0]),
     }
     at = {f"{name} torque": round(place / (angle[1] - angle[0])) for name, place in places.items()}

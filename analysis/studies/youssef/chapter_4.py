@@ -165,7 +165,7 @@ def range_above(level: float, speeds: NDArray[np.float64], curve: NDArray[np.flo
     return float(np.ptp(crossed))
 
 
-def growth(n: int) -> list[Case]:
+def judge_growth(n: int) -> list[Case]:
     """Judge whether the amplitude of the n-th harmonic and the width of its resonance grow with I4."""
     columns, word = undamped_columns(n), ("first", "second")[n - 1]
     curves = [columns[f"I4 = {ratio:g}; corrected [1]"] for ratio in INERTIA_RATIOS]
@@ -250,7 +250,7 @@ def compute_first() -> StudyResult:
                 "from 31 rad/s, and range of speeds in which they exceed a level, relative to those at the next smaller I4, "
                 "least; speeds and levels are ours",
                 SIGN,
-                (*growth(1), *growth(2)),
+                (*judge_growth(1), *judge_growth(2)),
             ),
             Statement(
                 "THIS PROG. I[NVE]STIG[A]TES RESONANCE IN PRES[EN]CE [O]F DAMPING",
@@ -427,7 +427,7 @@ def free_frequency(inertia_ratio: float, omega_c: float) -> float:
     return float(speed * (2.0 - turns))
 
 
-def flattening(inertia_ratio: float, times: float) -> float:
+def flattening_damper(inertia_ratio: float, times: float) -> float:
     """Find the omega_c (1/s) at which the peak of the first harmonic is so many times its amplitude `OUTSIDE` above it."""
 
     def excess(omega_c: float) -> float:
@@ -437,7 +437,7 @@ def flattening(inertia_ratio: float, times: float) -> float:
     return float(brentq(excess, 0.1, 12.0, xtol=1e-6))
 
 
-def one_mass(speeds: NDArray[np.float64], inertia_ratio: float, omega_c: float) -> NDArray[np.float64]:
+def one_mass_amplitude(speeds: NDArray[np.float64], inertia_ratio: float, omega_c: float) -> NDArray[np.float64]:
     """Return the amplitude of a single mass on a spring at the speeds (rad/s), under the first harmonic of the force.
 
     The mass and the spring follow from the mean values of M and K.
@@ -448,17 +448,17 @@ def one_mass(speeds: NDArray[np.float64], inertia_ratio: float, omega_c: float) 
     return amplitude
 
 
-def from_one_mass(inertia_ratio: float, omega_c: float) -> float:
-    """Return the greatest difference between the first harmonic and the amplitude of `one_mass`, relative to the peak."""
+def one_mass_difference(inertia_ratio: float, omega_c: float) -> float:
+    """Return the greatest difference between the first harmonic and `one_mass_amplitude`, relative to the peak."""
     at, height = peak(1, inertia_ratio, omega_c)
     # closer about the peak, where the difference is greatest
     speeds = np.append(CLOSE, at + np.arange(-0.2, 0.2, 0.002))
-    apart = harmonic(1, speeds, inertia_ratio, omega_c) - one_mass(speeds, inertia_ratio, omega_c)
+    apart = harmonic(1, speeds, inertia_ratio, omega_c) - one_mass_amplitude(speeds, inertia_ratio, omega_c)
     return float(np.abs(apart).max() / height)
 
 
 @cache
-def damped(inertia_ratio: float) -> dict[str, float]:
+def damper_effects(inertia_ratio: float) -> dict[str, float]:
     """Return the effects of the dampers at an inertia ratio, by name; `_curves` and `_dampers` judge these effects."""
     weak, strong = (harmonic(1, SPEEDS, inertia_ratio, d) for d in (DAMPERS[0], STRONGEST))
     (at, height), (at_strong, _) = (peak(1, inertia_ratio, d) for d in (DAMPERS[0], STRONGEST))
@@ -471,7 +471,7 @@ def damped(inertia_ratio: float) -> dict[str, float]:
         "second harmonic": np.abs(seconds[1] - seconds[0]).max() / second_height,
         "of the free motion": free_frequency(inertia_ratio, STRONGEST) - free_frequency(inertia_ratio, DAMPERS[0]),
         "of the peak": at_strong - at,
-        "one mass": max(from_one_mass(inertia_ratio, d) for d in DAMPERS),
+        "one mass": max(one_mass_difference(inertia_ratio, d) for d in DAMPERS),
     }
 
 
@@ -497,7 +497,7 @@ def compute_damped(number: str, inertia_ratio: float) -> StudyResult:
 
 def _curves() -> tuple[Statement, ...]:
     """Judge the statements on the curves of Fig 4.6 and 4.7."""
-    both = {f"I4 = {ratio:g}": damped(ratio) for ratio in DAMPED_RATIOS}
+    both = {f"I4 = {ratio:g}": damper_effects(ratio) for ratio in DAMPED_RATIOS}
     return (
         Statement(
             "The amplitude of oscillation is not affected, on the scale of the graph, outside the resonance region.",
@@ -527,8 +527,8 @@ def _curves() -> tuple[Statement, ...]:
 
 def _dampers() -> tuple[Statement, ...]:
     """Judge the statements on the dampers of Fig 4.6 and 4.7."""
-    both = {f"I4 = {inertia:g}": damped(inertia) for inertia in DAMPED_RATIOS}
-    high, low = ([flattening(inertia, times) for times in TIMES] for inertia in DAMPED_RATIOS)
+    both = {f"I4 = {inertia:g}": damper_effects(inertia) for inertia in DAMPED_RATIOS}
+    high, low = ([flattening_damper(inertia, times) for times in TIMES] for inertia in DAMPED_RATIOS)
     ratio = 0.5 * STRONGEST / OMEGA_K
     return (
         Statement(

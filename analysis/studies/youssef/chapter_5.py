@@ -36,7 +36,7 @@ from ..rules import ABOUT, ALIKE, SMALL
 from ..statements import Case, Statement, at_least, at_most, listing, near, text
 from ..study import Study, StudyResult
 from .linearised import with_crank
-from .regions import LOOKS, WAYS, appendix_3, axis, equation, hill, orbit_region
+from .regions import LOOKS, WAYS, appendix_3_region, axis, equation, hill_region, orbit_region
 from .runs import SIGN
 
 FINDINGS = """\
@@ -62,7 +62,7 @@ it."""
 
 #: Inertia ratios of appendix 3 whose regions are compared.
 COMPARED = (0.5, 1.0, 1.5)
-#: What a tolerance of the axis refers to, in words.
+#: Tolerance of the axis A, in words.
 OF_AXIS = f"{ABOUT:g} of 2 - A, the rule for *approximately*; {ABOUT:g} of A itself would admit any region"
 
 
@@ -90,7 +90,7 @@ class Sweep:
 def regions(name: str) -> dict[str, list[Region]]:
     """Return the regions along a sweep, a list for each method and for each of the further mechanisms, by name."""
     sweep = SWEEPS[name]
-    found = {way: [of(sweep.mechanism(x)) for x in sweep.values] for way, of in WAYS.items()}
+    found = {way: [method(sweep.mechanism(x)) for x in sweep.values] for way, method in WAYS.items()}
     for way, mechanism in (sweep.further or {}).items():
         found[way] = [orbit_region(mechanism(x)) for x in sweep.values]
     return found
@@ -156,7 +156,7 @@ def judge_inertia(found: Mapping[str, Sequence[Region]]) -> tuple[Statement, ...
     true, ratios = found["true orbit"], np.array(SWEEPS["5.1"].values)
     middles = np.array([0.5 * (region.low + region.high) for region in true]) - 0.25
     bent = np.abs(middles - middles[-1] / ratios[-1] * ratios).max() / middles[-1]
-    listed, linear = appendix_3(chapter_4(0.5)), hill(chapter_4(0.5))
+    listed, linear = appendix_3_region(chapter_4(0.5)), hill_region(chapter_4(0.5))
     return (
         Statement(
             "As is clearly seen the region is narrow and its width increases with increase of I4.",
@@ -179,7 +179,7 @@ def judge_inertia(found: Mapping[str, Sequence[Region]]) -> tuple[Statement, ...
             f"{ALIKE:g}, the rule for *linear*; 1e-5 for A = 2, above rounding errors; {SIGN}",
             (
                 at_most("distance from the line", ALIKE, bent),
-                near("A at I4 = 0", "2", axis(hill(chapter_4(0.0))), 1e-5),
+                near("A at I4 = 0", "2", axis(hill_region(chapter_4(0.0))), 1e-5),
                 at_most("growth of A, greatest", 0.0, np.diff(axes(true)).max()),
             ),
         ),
@@ -189,7 +189,7 @@ def judge_inertia(found: Mapping[str, Sequence[Region]]) -> tuple[Statement, ...
             "number of boundaries with the Floquet multiplier 1 below the second region; greatest size of a multiplier at 1.5 "
             "times this boundary, the most, and at half of it, the least, of I4 = 0.5, 1 and 1.5; right linear equation",
             "none: it is one boundary or it is not, and stability decides, but for rounding errors of 1e-9",
-            zeroth_boundary(),
+            judge_zeroth_boundary(),
             "below it, which is at higher speeds, the slider falls away",
         ),
         Statement(
@@ -200,7 +200,7 @@ def judge_inertia(found: Mapping[str, Sequence[Region]]) -> tuple[Statement, ...
             "region's width, (5.13) to the boundary itself; the greatest of I4 = 0.5, 1 and 1.5. Signs that our scan lacks "
             "follow from (5.2), (5.11) and (5.23)",
             f"{SMALL:g}, the rule for *small*: the next order",
-            formulas(),
+            judge_formulas(),
         ),
         Statement(
             "THIS PROG. INV[E]STIGATES STABILITY IN ABSENCE [O]F DAMPING",
@@ -217,7 +217,7 @@ def judge_inertia(found: Mapping[str, Sequence[Region]]) -> tuple[Statement, ...
     )
 
 
-def to_the_letter(given: SliderEquation) -> tuple[tuple[float, float], ...]:
+def listed_boundaries(given: SliderEquation) -> tuple[tuple[float, float], ...]:
     """Return the boundaries (low, high) in lambda_k^2 of regions 0 to 2 by (5.13), (5.16) and (5.26), with h0 = 0.
 
     Region 0 is the zeroth boundary, given twice.
@@ -236,7 +236,7 @@ def to_the_letter(given: SliderEquation) -> tuple[tuple[float, float], ...]:
     return tuple(((middle - half) / s.mean, (middle + half) / s.mean) for middle, half in zip(middles, halves))
 
 
-def zeroth_boundary() -> tuple[Case, ...]:
+def judge_zeroth_boundary() -> tuple[Case, ...]:
     """Judge the number of boundaries near lambda_k^2 = 0, and the multipliers on both sides of the zeroth boundary."""
     counts: list[int] = []
     sides: dict[float, list[float]] = {1.5: [], 0.5: []}
@@ -253,12 +253,12 @@ def zeroth_boundary() -> tuple[Case, ...]:
     )
 
 
-def formulas() -> tuple[Case, ...]:
+def judge_formulas() -> tuple[Case, ...]:
     """Judge the perturbation formulas by Hill's determinant: their greatest errors for the inertia ratios `COMPARED`."""
     errors: dict[str, list[float]] = {}
     for ratio in COMPARED:
         given = slider_equation(chapter_4(ratio), 1.0, variant=Variant.PRINTED, form=Form.SERIES)
-        (zeroth, _), *regions = to_the_letter(given)
+        (zeroth, _), *regions = listed_boundaries(given)
         right = hill_regions(given.homogeneous(), 2)
         below = boundary_stiffnesses(given.homogeneous(), 1, count=1)[0].real
         errors.setdefault("(5.13)", []).append(abs(zeroth / below - 1.0))
@@ -316,14 +316,14 @@ def judge_crank(found: Mapping[str, Sequence[Region]]) -> tuple[Statement, ...]:
     )
 
 
-def held(sigma3: float, inertia_ratio: float = 2.0) -> FiveBarParameters:
+def with_held_angles(sigma3: float, inertia_ratio: float = 2.0) -> FiveBarParameters:
     """Return the mechanism with sigma3 = l3/l4 and the thesis's link angles; its ground link and guide direction follow."""
-    mechanism = closed(sigma3, inertia_ratio)
+    mechanism = with_same_ground(sigma3, inertia_ratio)
     ground = rect(mechanism.coupler_length, pi / 3.0) - rect(mechanism.rocker_length, 2.0 * pi / 3.0)
     return replace(mechanism, ground_length=abs(ground), slider_guide_angle=-phase(ground))
 
 
-def closed(sigma3: float, inertia_ratio: float = 2.0) -> FiveBarParameters:
+def with_same_ground(sigma3: float, inertia_ratio: float = 2.0) -> FiveBarParameters:
     """Return the mechanism with another coupler length, sigma3 = l3/l4, and an unchanged ground link."""
     mechanism = chapter_4(inertia_ratio)
     return replace(mechanism, coupler_length=sigma3 * mechanism.rocker_length)
@@ -338,12 +338,13 @@ def judge_coupler(found: Mapping[str, Sequence[Region]]) -> tuple[Statement, ...
     widest = float(widths(found["true orbit"]).max())
     over_crank = widest / float(widths(regions("5.2")["true orbit"]).max())
     over_narrow, over_wide = (widest / x for x in widest_by_inertia().values())
-    at_half = axis(orbit_region(held(0.8, 0.5)))
+    at_half = axis(orbit_region(with_held_angles(0.8, 0.5)))
     both = {"angles held": found["true orbit"], "same ground link": found[SAME_GROUND]}
     seconds, listed = (
         {
             number: max(
-                hill(p, 2, variant).width / hill(p, 1, variant).width for p in map(sweep.mechanism, sweep.values)
+                hill_region(p, 2, variant).width / hill_region(p, 1, variant).width
+                for p in map(sweep.mechanism, sweep.values)
             )
             for number, sweep in SWEEPS.items()
         }
@@ -356,7 +357,7 @@ def judge_coupler(found: Mapping[str, Sequence[Region]]) -> tuple[Statement, ...
             "growth of the width from one sigma3 to the next, the greatest of 0.8 to 1.2 in steps of 0.025; true periodic "
             "motion",
             SIGN,
-            tuple(at_most(words, 0.0, np.diff(widths(of)).max()) for words, of in both.items()),
+            tuple(at_most(words, 0.0, np.diff(widths(found_regions)).max()) for words, found_regions in both.items()),
             "on the same ground link the region widens beyond about equal links",
         ),
         Statement(
@@ -368,10 +369,10 @@ def judge_coupler(found: Mapping[str, Sequence[Region]]) -> tuple[Statement, ...
             f"half a unit of the last digit; {OF_AXIS}",
             tuple(
                 case
-                for words, of in both.items()
+                for words, found_regions in both.items()
                 for case in (
-                    near(f"A; {words}", "1.96", axes(of)[0]),
-                    at_most(f"range; {words}", ABOUT, np.ptp(axes(of)) / (2.0 - axes(of)[0])),
+                    near(f"A; {words}", "1.96", axes(found_regions)[0]),
+                    at_most(f"range; {words}", ABOUT, np.ptp(axes(found_regions)) / (2.0 - axes(found_regions)[0])),
                 )
             ),
             f"at I4 = 0.5, which the listing has (L8641), A is {at_half:.4f} with the angles held",
@@ -433,7 +434,7 @@ SWEEPS = {
             symbol="sigma3",
             label="coupler's length sigma3 = l3/l4",
             values=np.linspace(0.8, 1.2, 17).tolist(),
-            mechanism=held,
+            mechanism=with_held_angles,
             claim="The first region of instability in lambda_k^2 over sigma3; sigma2 = 0.05, I4 = 2.",
             judge=judge_coupler,
             assignment=(
@@ -441,7 +442,7 @@ SWEEPS = {
                 "and rocker (L8641-8688), to which another ground link and an inclined guide belong at every sigma3. We also "
                 "vary the coupler on the same ground link."
             ),
-            further={SAME_GROUND: closed},
+            further={SAME_GROUND: with_same_ground},
         ),
     )
 }

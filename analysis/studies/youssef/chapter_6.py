@@ -38,7 +38,7 @@ from ...synthesis import (
 from ...units import CM_PER_METRE
 from ..rules import ALIKE
 from ..statements import Case, Statement, at_least, at_most, near, text
-from ..study import Study, StudyResult, padded
+from ..study import Study, StudyResult, pad_columns
 from .problems import AREA_N, DEG2_PER_RAD2, PROBLEMS, WEIGHT, N, ellipse, rocker_function
 
 FINDINGS = """\
@@ -108,7 +108,9 @@ def share_of_stated(name: str) -> float:
     """Return the printed linkage's error divided by the stated error, for the reading that brings this ratio nearest to 1."""
     p = PROBLEMS[name]
     assert p.error is not None
-    return min((error / p.error for error in by_readings(name, p.linkage).values()), key=lambda share: abs(share - 1.0))
+    return min(
+        (error / p.error for error in errors_by_reading(name, p.linkage).values()), key=lambda share: abs(share - 1.0)
+    )
 
 
 def our_error(name: str) -> float:
@@ -133,7 +135,7 @@ NO_DIGIT = "no rounding gives it, nor any other digit in a single place"
 NUMBERS = tuple(n for n in range(18, 361) if 720 % n == 0)
 
 
-def by_readings(name: str, linkage: Linkage) -> dict[str, float]:
+def errors_by_reading(name: str, linkage: Linkage) -> dict[str, float]:
     """Return the error of a linkage (unit of print) for each reading of the text.
 
     Only the rocker functions have more than one reading.
@@ -167,8 +169,8 @@ def half_units(linkage: Linkage) -> FloatArray:
     return si * [0.5 * 10.0 ** int(x.as_tuple().exponent) if x else 0.0 for x in digits]
 
 
-def rounded(name: str) -> dict[str, tuple[float, float]]:
-    """Return the least and the greatest error that a printed linkage can have, for each reading (see `by_readings`).
+def rounding_range(name: str) -> dict[str, tuple[float, float]]:
+    """Return the least and the greatest error that a printed linkage can have, for each reading (see `errors_by_reading`).
 
     Each printed dimension may be off by up to half a unit of its last digit.
     """
@@ -179,13 +181,15 @@ def rounded(name: str) -> dict[str, tuple[float, float]]:
         off[8] = 0.0
     # the extremes of a nearly linear change are at the corners, or near the middle
     corners = {tuple(off * signs) for signs in product((-1.0, 1.0), repeat=len(off))} | {(0.0,) * len(off)}
-    errors = [by_readings(name, Linkage.from_vector(p.linkage.vector + np.array(change), 1)) for change in corners]
+    errors = [
+        errors_by_reading(name, Linkage.from_vector(p.linkage.vector + np.array(change), 1)) for change in corners
+    ]
     return {reading: (min(e[reading] for e in errors), max(e[reading] for e in errors)) for reading in errors[0]}
 
 
-def as_stated(label: str, stated: str, name: str, why: str = "no rounding gives it") -> Case:
-    """Judge whether a stated error lies in one of the ranges of `rounded`; the range that comes nearest to the error counts."""
-    ranges, wanted = rounded(name), float(stated)
+def judge_stated_error(label: str, stated: str, name: str, why: str = "no rounding gives it") -> Case:
+    """Judge whether a stated error lies in one of the ranges of `rounding_range`; the range nearest to the error counts."""
+    ranges, wanted = rounding_range(name), float(stated)
     near_by = {reading: float(np.clip(wanted, *span)) for reading, span in ranges.items()}
     reading = min(near_by, key=lambda r: abs(near_by[r] - wanted))
     least, greatest = ranges[reading]
@@ -208,7 +212,7 @@ def _ellipse_a() -> tuple[Statement, ...]:
             f"sum of the squared distances of the printed linkage at {N} crank angles, {ROUNDED}; for *favourably* the rms "
             "distance over the ellipse's longer semi-axis",
             f"{HALF}; {ALIKE:g}, the rule for *the same*",
-            (as_stated("error", "0.889", "ellipse-a", NO_DIGIT), at_most("rms distance", ALIKE, rms)),
+            (judge_stated_error("error", "0.889", "ellipse-a", NO_DIGIT), at_most("rms distance", ALIKE, rms)),
         ),
     )
 
@@ -223,7 +227,7 @@ def _ellipse_b() -> tuple[Statement, ...]:
             "that of Fig 6.4, both as printed",
             f"{HALF}; at least 1, the rule for *greater*",
             (
-                as_stated("error", "4.001", "ellipse-b", NO_DIGIT),
+                judge_stated_error("error", "4.001", "ellipse-b", NO_DIGIT),
                 at_least("over that of (a)", 1.0, printed_error("ellipse-b") / printed_error("ellipse-a")),
             ),
         ),
@@ -232,7 +236,7 @@ def _ellipse_b() -> tuple[Statement, ...]:
 
 def _bounded() -> tuple[Statement, ...]:
     p = PROBLEMS["ellipse-a-bounded"]
-    (least, greatest), (least_a, greatest_a) = rounded("ellipse-a-bounded")[""], rounded("ellipse-a")[""]
+    (least, greatest), (least_a, greatest_a) = rounding_range("ellipse-a-bounded")[""], rounding_range("ellipse-a")[""]
     increases = least - greatest_a, greatest - least_a
 
     def outside(linkage: Linkage) -> int:
@@ -260,7 +264,7 @@ def _bounded() -> tuple[Statement, ...]:
             f"{ROUNDED}; increase over that of Fig 6.4, likewise",
             HALF,
             (
-                as_stated("error", "53.6", "ellipse-a-bounded", NO_DIGIT),
+                judge_stated_error("error", "53.6", "ellipse-a-bounded", NO_DIGIT),
                 near(
                     f"increase; rounded up or down {increases[0]:.2f} to {increases[1]:.2f}",
                     "52.7",
@@ -282,7 +286,10 @@ def _rocker() -> tuple[Statement, ...]:
             "error of the printed linkages, each of their printed numbers rounded up or down, by that reading of "
             "those named above that comes nearest to the stated error",
             HALF,
-            (as_stated("unweighted", "700.0", "rocker"), as_stated("weighted", "35.0", "rocker-weighted")),
+            (
+                judge_stated_error("unweighted", "700.0", "rocker"),
+                judge_stated_error("weighted", "35.0", "rocker-weighted"),
+            ),
         ),
     )
 
@@ -352,12 +359,12 @@ def _paths() -> tuple[Statement, ...]:
             f"area between the curves of the printed linkages, {AREA_N} points on each, with X0 = 15.485 cm for (a) and l4 = "
             f"184.443 cm for (b) (erratum 11), {ROUNDED}",
             f"0.05 cm2, {HALF}",
-            (as_stated("(a)", "2.3", "path-a", NO_DIGIT), as_stated("(b)", "12.6", "path-b")),
+            (judge_stated_error("(a)", "2.3", "path-a", NO_DIGIT), judge_stated_error("(b)", "12.6", "path-b")),
         ),
     )
 
 
-def over_least() -> dict[str, float]:
+def ratios_to_least() -> dict[str, float]:
     """Return the ratio of the printed linkage's error to ours for each figure.
 
     The printed linkage has its misprint mended; ours has no link longer than the longest printed link.
@@ -529,7 +536,7 @@ def window_sums(linkage: Linkage) -> tuple[float, float]:
 
 
 @cache
-def mounted() -> Solution:
+def mounted_solution() -> Solution:
     """Return our linkage for the weighted rocker function if the output may be mounted on the rocker at any angle."""
     p = PROBLEMS["rocker-weighted"]
     task = rocker_function(N, weighted=True, mounting=True)
@@ -546,7 +553,7 @@ def rocker_columns(name: str) -> dict[str, FloatArray]:
     assert isinstance(p.task, RockerFunction)
     linkages, tasks = {"printed": p.linkage, "ours": best(name).linkage}, {"fixed": p.task}
     if name == "rocker-weighted":
-        linkages["mounted"], tasks["mounted"] = mounted().linkage, replace(p.task, mounting=True)
+        linkages["mounted"], tasks["mounted"] = mounted_solution().linkage, replace(p.task, mounting=True)
     phi = np.linspace(0.0, 2.0 * pi, 361)
     target = 70.0 + 100.0 * np.abs(np.sin(0.5 * phi))
     columns = {"crank rotation [deg]": np.degrees(phi), "target angle [deg]": target}
@@ -624,7 +631,7 @@ def compute(number: str) -> StudyResult:
         number=number,
         claim=row.claim,
         assignment=row.reading,
-        columns=padded(rocker_columns(row.problem) if rocker else path_columns(row.problem)),
+        columns=pad_columns(rocker_columns(row.problem) if rocker else path_columns(row.problem)),
         statements=row.statements(),
         see=row.see,
     )

@@ -27,7 +27,7 @@ from ...synthesis import Linkage, Search, SliderMotion, SliderUnknown, Solution,
 from ...youssef import AccessibleArea, accessible, accessible_area
 from ..rules import READ
 from ..statements import Case, Statement, at_least, at_most, near, text
-from ..study import Study, StudyResult, padded
+from ..study import Study, StudyResult, pad_columns
 
 FINDINGS = """\
 The chapter claims that a four-bar whose rocker pivot slides under control reaches every point within the envelope of its
@@ -86,31 +86,31 @@ UPRIGHT = 0.999
 PRECISION, BETWEEN = 5, (-0.4, -0.2, 0.2, 0.4)
 
 
-def point(rotation: FloatArray, u: ArrayLike) -> ComplexArray:
+def coupler_point(rotation: FloatArray, u: ArrayLike) -> ComplexArray:
     """Return the coupler point P (l3, complex) at crank rotations (rad) with the slider at u = U - 1."""
     u = np.asarray(u, dtype=float) + np.zeros_like(rotation)
     return np.asarray(LINKAGE.path(rotation, (u, np.zeros_like(u))) @ np.array([1.0, 1j]))
 
 
-def desired(rotation: FloatArray = ROTATION) -> ComplexArray:
+def desired_points(rotation: FloatArray = ROTATION) -> ComplexArray:
     """Return the desired points: P at U = 0.8 + 0.4 |sin th2|, with 0.05 sin th2 rad added to the crank rotation."""
-    return point(rotation + 0.05 * np.sin(rotation), 0.4 * np.abs(np.sin(rotation)) - 0.2)
+    return coupler_point(rotation + 0.05 * np.sin(rotation), 0.4 * np.abs(np.sin(rotation)) - 0.2)
 
 
 def task(weights: ArrayLike | None = None) -> TimedPath:
     """Return the desired points as a synthesis task."""
-    return TimedPath(points=np.column_stack([desired().real, desired().imag]), weights=weights)
+    return TimedPath(points=np.column_stack([desired_points().real, desired_points().imag]), weights=weights)
 
 
 @cache
 def variational(n: int = 72) -> VariationalMotion:
     """Return the variational motion: the slider positions of least error at n crank rotations."""
-    wanted = desired(turn(n))
+    wanted = desired_points(turn(n))
     return variational_motion(LINKAGE, turn(n), np.column_stack([wanted.real, wanted.imag]))
 
 
 @cache
-def direct(weight: float = 1.0) -> Solution:
+def search_directly(weight: float = 1.0) -> Solution:
     """Return the best series of eleven terms of the slider motion by the direct search, with a weight on p1 p2."""
     unknown = SliderUnknown(harmonics=HARMONICS, guide_angle=(0.0, 0.0))
     return slider_motion(task(np.where(WITHIN, weight, 1.0)), LINKAGE, unknown, search=Search(starts=4)).best
@@ -128,7 +128,7 @@ def squared_errors(found: Solution) -> tuple[float, float]:
     return float(squares[WITHIN].sum()), float(squares[~WITHIN].sum())
 
 
-def with_all_terms(curves: int = 20, seed: int = 11) -> float:
+def all_terms_excess(curves: int = 20, seed: int = 11) -> float:
     """Return the greatest value of e_F / e_V - 1 over random desired curves.
 
     e_F and e_V are the sums of squared errors of a Fourier series and of the variational motion. The series has as many terms
@@ -139,15 +139,15 @@ def with_all_terms(curves: int = 20, seed: int = 11) -> float:
     random, steps, found = np.random.default_rng(seed), turn(73), []
     rotation = steps + 0.02
     for _ in range(curves):
-        places = point(rotation, random.uniform(-0.3, 0.3, rotation.size))
+        places = coupler_point(rotation, random.uniform(-0.3, 0.3, rotation.size))
         wanted = places + 0.1 * (random.normal(size=rotation.size) + 1j * random.normal(size=rotation.size))
         best = variational_motion(LINKAGE, rotation, np.column_stack([wanted.real, wanted.imag]))
         u = FourierSeries.from_samples(best.u)(steps)
-        found.append(float((np.abs(point(rotation, u) - wanted) ** 2).sum() / best.squared_error - 1.0))
+        found.append(float((np.abs(coupler_point(rotation, u) - wanted) ** 2).sum() / best.squared_error - 1.0))
     return max(found)
 
 
-def in_line(rotation: FloatArray, target: ComplexArray) -> tuple[FloatArray, FloatArray]:
+def pointing_positions(rotation: FloatArray, target: ComplexArray) -> tuple[FloatArray, FloatArray]:
     """Return a and b of U = a +- sqrt(b), eq (7.14): the slider positions at which the coupler points at the target."""
     l2, l3, l4 = LINKAGE.crank_length, LINKAGE.coupler_length, LINKAGE.rocker_length
     th3 = np.angle(target - l2 * np.exp(1j * rotation))
@@ -160,20 +160,20 @@ def vertical_tangents() -> list[float]:
 
     def square(angle: float) -> float:
         at = np.array([angle])
-        return float(in_line(at, desired(at))[1][0])
+        return float(pointing_positions(at, desired_points(at))[1][0])
 
     return [
         degrees(brentq(square, *ends)) for ends in pairwise(TURN.tolist()) if square(ends[0]) * square(ends[1]) < 0.0
     ]
 
 
-def by_equations(rotation: FloatArray, target: ComplexArray) -> tuple[FloatArray, NDArray[np.bool_]]:
+def solve_slider_equations(rotation: FloatArray, target: ComplexArray) -> tuple[FloatArray, NDArray[np.bool_]]:
     """Solve eq (7.14) for U with both signs of its square root, or (7.15) where (7.14) has no real root.
 
     Returns U, shape (n, 2), and a mask of the points where (7.15) is used.
     """
     l2, l3, l4 = LINKAGE.crank_length, LINKAGE.coupler_length, LINKAGE.rocker_length
-    first, square = in_line(rotation, target)
+    first, square = pointing_positions(rotation, target)
     upright = square < 0.0
     # (7.15), the rocker at th4 = 90 deg
     second = l2 * np.cos(rotation)
@@ -201,26 +201,26 @@ def path_curve(result: StudyResult, name: str, label: str = "", **look: object) 
 
 def family() -> StudyResult:
     """Compute Fig 7.2: coupler curves, isochronous curves, and the share of the enclosed area that P reaches."""
-    areas = {limits: reach(*limits) for limits in LIMITS}
+    areas = {limits: reached_area(*limits) for limits in LIMITS}
     columns: dict[str, FloatArray] = {}
     for u in FAMILY:
-        columns |= xy(f"U = {u:g}", point(TURN, u - 1.0))
+        columns |= xy(f"U = {u:g}", coupler_point(TURN, u - 1.0))
     for angle in ISOCHRONES:
-        arc = point(np.full(41, radians(angle)), np.linspace(FAMILY[0] - 1.0, FAMILY[-1] - 1.0, 41))
+        arc = coupler_point(np.full(41, radians(angle)), np.linspace(FAMILY[0] - 1.0, FAMILY[-1] - 1.0, 41))
         columns |= xy(f"th2 = {angle} deg", arc)
     shown = areas[LIMITS[0]]
     for k, ring in enumerate((*shown.outer, *shown.holes)):
         columns |= xy(f"boundary {k}", ring @ np.array([1.0, 1j]))
-    kept, changed = between_precision_points()
+    kept, changed = departures_from_path()
     phi, along = (x.ravel() for x in np.meshgrid(TURN, ALONG))
-    radii = np.abs(point(phi, along) - LINKAGE.crank_length * np.exp(1j * phi))
+    radii = np.abs(coupler_point(phi, along) - LINKAGE.crank_length * np.exp(1j * phi))
     off_arc = np.abs(radii - LINKAGE.point_distance).max()
     return StudyResult(
         number="7.2",
         claim="With the slider free P reaches any point on or within the outer boundaries of the family of coupler curves.",
         assignment="Links of series 1 (L5720): l2 = r = 0.5, l3 = l4 = 1. The values of U are lost: 0.6 to 1.4 are our choice; "
         "the crank turns fully from -1.5 to 1.5 but at +-0.5.",
-        columns=padded(columns),
+        columns=pad_columns(columns),
         statements=(
             Statement(
                 "If, however, a second input is established to which a controller is attached the output may be modified, "
@@ -247,7 +247,7 @@ def family() -> StudyResult:
                     near(
                         f"U from {low:g} to {high:g}",
                         1.0,
-                        area.area / enclosed(low, high),
+                        area.area / enclosed_area(low, high),
                         0.01,
                         why="what all curves of the family go round is out of reach",
                     )
@@ -270,12 +270,12 @@ def family() -> StudyResult:
 
 
 @cache
-def reach(low: float, high: float) -> AccessibleArea:
+def reached_area(low: float, high: float) -> AccessibleArea:
     """Return the area that P reaches with U between two limits."""
     return accessible_area(LINKAGE.to_five_bar(), (low - 1.0, high - 1.0), tolerance=1e-4)
 
 
-def enclosed(low: float, high: float) -> float:
+def enclosed_area(low: float, high: float) -> float:
     """Return the area that the coupler curves for U between two limits enclose together.
 
     It is the union of the areas within 21 of these curves and of the area that P reaches, which covers the space between the 21
@@ -283,19 +283,19 @@ def enclosed(low: float, high: float) -> float:
     """
     import shapely
 
-    found = reach(low, high)
+    found = reached_area(low, high)
     rings = [shapely.LinearRing(ring) for ring in (*found.outer, *found.holes)]
     shapes = [shapely.build_area(shapely.GeometryCollection(rings))]
     # dense at 0 and 180 deg, where P swings round B within half a degree at U near 0.5 and -0.5
     turned = TURN[:-1] - 0.5 * np.sin(2.0 * TURN[:-1])
     for u in np.linspace(low, high, 21):
-        z = point(turned, u - 1.0)
+        z = coupler_point(turned, u - 1.0)
         line = shapely.LinearRing(np.column_stack([z.real, z.imag]))
         shapes += shapely.get_parts(shapely.polygonize([shapely.node(line)])).tolist()
     return float(shapely.union_all(shapes).area)
 
 
-def between_precision_points() -> tuple[float, float]:
+def departures_from_path() -> tuple[float, float]:
     """Return how far (in l3) P departs from its path for U = 1 if the slider moves between the precision points.
 
     The amplitudes of the slider are `BETWEEN`. The first result is the greatest departure at a precision point. For the
@@ -303,7 +303,7 @@ def between_precision_points() -> tuple[float, float]:
     the least of these.
     """
     change = np.sin(0.5 * PRECISION * TURN) ** 2
-    away = np.max([np.abs(point(TURN, a * change) - point(TURN, 0.0)) for a in BETWEEN], axis=0)
+    away = np.max([np.abs(coupler_point(TURN, a * change) - coupler_point(TURN, 0.0)) for a in BETWEEN], axis=0)
     kept = away[:: (TURN.size - 1) // PRECISION].max()
     return float(kept), float(away[:-1].reshape(PRECISION, -1).max(axis=1).min())
 
@@ -327,11 +327,11 @@ def draw_family(result: StudyResult) -> Figure:
 
 def curve_wanted() -> StudyResult:
     """Compute Fig 7.4: the desired curve, and whether P can reach its points."""
-    z = desired()
+    z = desired_points()
     reached = accessible(LINKAGE.to_five_bar(), (FAMILY[0] - 1.0 - 1e-9, FAMILY[-1] - 1.0 + 1e-9), z.real, z.imag)
     columns = {"crank rotation [deg]": np.degrees(ROTATION), **xy("desired", z)}
     for u in (FAMILY[0], FAMILY[-1]):
-        columns |= xy(f"U = {u:g}", point(TURN, u - 1.0))
+        columns |= xy(f"U = {u:g}", coupler_point(TURN, u - 1.0))
     assert reached.all()
     return StudyResult(
         number="7.4",
@@ -340,7 +340,7 @@ def curve_wanted() -> StudyResult:
             "The curve is lost. Ours: where P is at U = 0.8 + 0.4 |sin th2| with the crank 0.05 sin th2 rad ahead, at 72 "
             "crank angles; p1 p2 from 150 to 210 deg."
         ),
-        columns=padded(columns),
+        columns=pad_columns(columns),
         statements=(
             Statement(
                 "It is time dependent and is obtained from within the envelope shown in Fig. (7.2).",
@@ -353,7 +353,7 @@ def curve_wanted() -> StudyResult:
 
 def draw_wanted(result: StudyResult) -> Figure:
     """Draw the desired points between the outermost coupler curves of the family."""
-    z = desired()
+    z = desired_points()
     marks = {"p1": int(np.argmax(WITHIN)), "p2": int(np.nonzero(WITHIN)[0][-1])}
     curves = [
         path_curve(result, f"U = {u:g}", f"U = {u:g}", colour=colour, width=0.9)
@@ -365,7 +365,7 @@ def draw_wanted(result: StudyResult) -> Figure:
     return plot_curves([plane(curves)], title=result.heading, size=(6.6, 4.4))
 
 
-def nearest(rotation: float, target: complex) -> tuple[float, float]:
+def least_distance(rotation: float, target: complex) -> tuple[float, float]:
     """Return the least distance of P from a target at a crank rotation, over the slider `POSITIONS` and both assemblies.
 
     The second result is the distance that P moves from this nearest point to the adjacent slider position.
@@ -381,12 +381,12 @@ def nearest(rotation: float, target: complex) -> tuple[float, float]:
 
 def two_positions() -> StudyResult:
     """Compute Fig 7.5: both positions of the rocker at a crank angle. Judge (7.14) and (7.15) with random points."""
-    found, (u, _) = variational(), by_equations(ROTATION, desired())
+    found, (u, _) = variational(), solve_slider_equations(ROTATION, desired_points())
     k = 60
     pin = LINKAGE.crank_length * np.exp(1j * ROTATION[k])
-    joint = pin + LINKAGE.coupler_length * np.exp(1j * np.angle(desired()[k] - pin))
+    joint = pin + LINKAGE.coupler_length * np.exp(1j * np.angle(desired_points()[k] - pin))
     columns = {"crank rotation [deg]": np.degrees(ROTATION), "U [l3]": found.u + 1.0}
-    columns |= xy("links", np.array([0.0, pin, joint])) | xy("desired", desired()[[k]])
+    columns |= xy("links", np.array([0.0, pin, joint])) | xy("desired", desired_points()[[k]])
     for name, end in zip(("U1", "U2"), u[k]):
         columns |= xy(name, np.array([joint, end + 0j]))
     return StudyResult(
@@ -395,7 +395,7 @@ def two_positions() -> StudyResult:
         assignment=f"{SERIES_1} The figure is drawn with the crank at {degrees(ROTATION[k]):.0f} deg. The statements are "
         f"judged with {ROTATION.size} random points, one at each crank angle by {360 / ROTATION.size:g} deg, no farther from A "
         "than l3 along either axis.",
-        columns=padded(columns),
+        columns=pad_columns(columns),
         statements=_positions(),
     )
 
@@ -404,9 +404,9 @@ def _positions() -> tuple[Statement, ...]:
     """Judge (7.14) and (7.15) with random points."""
     targets = np.random.default_rng(75).uniform(-1.0, 1.0, (ROTATION.size, 2))
     places = targets @ np.array([1.0, 1j])
-    missing = in_line(ROTATION, places)[1] < 0.0
+    missing = pointing_positions(ROTATION, places)[1] < 0.0
     pins = LINKAGE.crank_length * np.exp(1j * ROTATION)
-    least, moved = np.transpose([nearest(*at) for at in zip(ROTATION.tolist(), places.tolist())])
+    least, moved = np.transpose([least_distance(*at) for at in zip(ROTATION.tolist(), places.tolist())])
     off = np.abs(np.abs(places - pins) - LINKAGE.point_distance)[~missing] - least[~missing]
     anywhere = variational_motion(LINKAGE, ROTATION, targets, assemblies=(1, -1), closed=False)
     upright = np.sin(anywhere.rocker_angle[missing])
@@ -417,7 +417,11 @@ def _positions() -> tuple[Statement, ...]:
     )
     # (7.15) has no real U where the upright rocker cannot be assembled
     with np.errstate(invalid="ignore"):
-        arms = by_equations(ROTATION[missing], places[missing])[0] + 1j * LINKAGE.rocker_length - pins[missing, None]
+        arms = (
+            solve_slider_equations(ROTATION[missing], places[missing])[0]
+            + 1j * LINKAGE.rocker_length
+            - pins[missing, None]
+        )
     reached = pins[missing, None] + LINKAGE.point_distance / LINKAGE.coupler_length * arms
     by_7_15 = np.abs(reached - places[missing, None]).min(axis=1) - least[missing]
     fine = "1e-3 l3: where the error is least, P moves by at most {:.2g} l3 from one position to the next"
@@ -508,21 +512,22 @@ def columns_of_motions() -> dict[str, FloatArray]:
     fine = variational(720)
     u = {"variational": np.append(fine.u, fine.u[0])}
     errors = {"variational": variational().error}
-    for name, found in (("direct", direct()), ("weighted", direct(WEIGHT))):
+    for name, found in (("direct", search_directly()), ("weighted", search_directly(WEIGHT))):
         u[name], errors[name] = slider(found.linkage).series(TURN), found.evaluation.errors
     columns = {"rotation [deg]": np.degrees(TURN), "points' rotation [deg]": np.degrees(ROTATION)}
     for name in u:
         columns |= {
             f"U {name} [l3]": u[name] + 1.0,
             f"error {name} [l3]": errors[name],
-            **xy(name, point(TURN, u[name])),
+            **xy(name, coupler_point(TURN, u[name])),
         }
-    return padded(columns | xy("desired", desired()))
+    return pad_columns(columns | xy("desired", desired_points()))
 
 
 def _unweighted() -> tuple[Statement, ...]:
     """Return the statements on Fig 7.6 to 7.8."""
     vertical = " and ".join(f"{at:.1f}" for at in vertical_tangents())
+    excess = search_directly().error / variational().squared_error
     return (
         Statement(
             "Different initial guesses of the coefficients produced different optima.",
@@ -533,8 +538,7 @@ def _unweighted() -> tuple[Statement, ...]:
             "The variational method located the true global optimum which the direct search located as best as an "
             "eleven-term Fourier series could provide.",
             text("7.3.1, L5764"),
-            why=f"{LOST}; with ours the best eleven terms have {direct().error / variational().squared_error:.2f} times the "
-            "squared error of the variational motion",
+            why=f"{LOST}; with ours the best eleven terms have {excess:.2f} times the squared error of the variational motion",
         ),
         Statement(
             "If an infinite number of terms were used the direct search would have led to the variational results.",
@@ -543,7 +547,7 @@ def _unweighted() -> tuple[Statement, ...]:
             "each, over that of the variational method, less 1; 20 random curves of 73 points (ours), greatest",
             "1e-9, the rounding",
             (
-                at_most("the best series", 1e-9, with_all_terms()),
+                at_most("the best series", 1e-9, all_terms_excess()),
                 Case(label="the series found", computed=None, why="no search has infinitely many coefficients"),
             ),
         ),
@@ -574,7 +578,9 @@ def _unweighted() -> tuple[Statement, ...]:
 
 def _weighted() -> tuple[Statement, ...]:
     """Return the statements on Fig 7.9 and 7.10."""
-    inside, outside = (new / old for new, old in zip(squared_errors(direct(WEIGHT)), squared_errors(direct())))
+    inside, outside = (
+        new / old for new, old in zip(squared_errors(search_directly(WEIGHT)), squared_errors(search_directly()))
+    )
     return (
         Statement(
             "The direct search permits an easier use of stricter error conditions or constraints at some portion of a desired "
@@ -606,7 +612,7 @@ def draw_motions(result: StudyResult, names: tuple[str, ...], what: str) -> Figu
         target = path_curve(result, "desired", "desired", colour=TARGET, line="", marker=".")
         curves = [target, *(path_curve(result, name, **look[name]) for name in names)]
         ends = np.nonzero(WITHIN)[0][[0, -1]]
-        z = desired()[ends]
+        z = desired_points()[ends]
         curves.append(Curve(x=z.real, y=z.imag, label="p1 and p2", line="", marker="s", colour=COLOURS[3]))
         return plot_curves([plane(curves)], title=result.heading, size=(6.6, 4.2))
     x = c["rotation [deg]" if what == "U" else "points' rotation [deg]"]

@@ -77,7 +77,7 @@ class Turns:
             (speed,) = self.speeds
             turns["friction"] = rigs.turn(self.spring, speed, slider_friction_coefficient=rigs.SLIGHT)
         columns = {"crank angle [deg]": np.linspace(0.0, 360.0, len(rigs.slider(next(iter(turns.values())))))}
-        columns |= {f"slider position u; {name} [cm]": rigs.slider(of) for name, of in turns.items()}
+        columns |= {f"slider position u; {name} [cm]": rigs.slider(found) for name, found in turns.items()}
         return StudyResult(
             number=self.number,
             claim=self.claim,
@@ -110,7 +110,7 @@ class Turns:
 
     @property
     def study(self) -> Study:
-        """The study of the figure."""
+        """Return the study of the figure."""
         return Study(self.number, self.compute, self.draw)
 
 
@@ -120,7 +120,7 @@ SPEEDS = {"A": (240.0, 260.0, 280.0, 300.0, 360.0, 500.0), "B": (500.0, 540.0, 5
 OF_FIGURES = {s: sorted({*SPEEDS[s], *rig_1.COMPARED[s]}) for s in "AB"}
 #: Tolerance of a speed that is printed in tens of rpm.
 TENS = "5 rpm, half a unit of the last digit of a speed in tens"
-#: Which speed is compared with the stated one, in words.
+#: Choice of the speed that is compared with the stated one, in words.
 NEAREST = "a stated speed is compared with the nearest within the rounding of the printed stiffness"
 
 
@@ -242,11 +242,13 @@ def _fig_8_14() -> tuple[Statement, ...]:
 
 def _amplitude_a() -> Statement:
     """Judge the amplitude over the speed with spring A."""
-    tops, _ = np.transpose([rigs.near_half("A", stiffness) for stiffness in rigs.rounded("A")])
-    top, low = rigs.near_half("A", rigs.rig("A").slider_stiffness)
+    tops, _ = np.transpose([rigs.extrema_near_half("A", stiffness) for stiffness in rigs.stiffness_range("A")])
+    top, low = rigs.extrema_near_half("A", rigs.rig("A").slider_stiffness)
     # the stiffness that puts the maximum as low as its tolerance allows
     least = 290.0 - 5.0
-    soft = brentq(lambda stiffness: rigs.near_half("A", stiffness)[0] - least, *rigs.rounded("A"), xtol=1.0)
+    soft = brentq(
+        lambda stiffness: rigs.extrema_near_half("A", stiffness)[0] - least, *rigs.stiffness_range("A"), xtol=1.0
+    )
     return Statement(
         "The amplitude of oscillations increases as the speed increases up to 290 RPM, i.e. half the natural frequency, "
         "where it reaches a maximum after which the amplitude decreases with increase of speed up to 345 RPM beyond "
@@ -262,7 +264,7 @@ def _amplitude_a() -> Statement:
             near(
                 f"speed of the minimum, the maximum at {least:g} rpm or more",
                 "345",
-                rigs.near_half("A", soft)[1],
+                rigs.extrema_near_half("A", soft)[1],
                 unit="rpm",
                 why="no one stiffness gives both speeds",
             ),
@@ -327,8 +329,8 @@ def _fig_8_15() -> tuple[Statement, ...]:
 
 def _fig_8_16() -> tuple[Statement, ...]:
     four = sum(rigs.peaks(rigs.turn("B", speed)) == 4 for speed in SPEEDS["B"])
-    top = rigs.near_fraction("B", 2)[0]
-    tops, _ = np.transpose([rigs.near_half("B", stiffness) for stiffness in rigs.rounded("B")])
+    top = rigs.maximum_near_fraction("B", 2)[0]
+    tops, _ = np.transpose([rigs.extrema_near_half("B", stiffness) for stiffness in rigs.stiffness_range("B")])
     fractions = [(s, order, part) for s in "AB" for order, part in ((3, "a third"), (4, "a quarter"))]
     higher = []
     for s in "AB":
@@ -418,9 +420,9 @@ def _fig_8_17() -> tuple[Statement, ...]:
     )
 
 
-def _fall_angle(of: Turn) -> float:
+def _fall_angle(found: Turn) -> float:
     """Return the crank angle (deg) from the last maximum of the slider position in a turn to the minimum after it."""
-    rising = np.diff(rigs.slider(of)) > 0.0
+    rising = np.diff(rigs.slider(found)) > 0.0
     tops, lows = (np.flatnonzero(x & ~np.roll(x, -1)) for x in (rising, ~rising))
     return float(((lows - tops[-1]) % len(rising)).min()) * 360.0 / len(rising)
 
@@ -448,8 +450,8 @@ def _fig_8_18() -> tuple[Statement, ...]:
     # about the greatest ratio in steps of 1 rpm
     about = {s: np.clip(speeds[ratio.argmax()] + np.arange(-10.0, 11.0), *RUN).tolist() for s, ratio in ratios.items()}
     most = {
-        s: max(rigs.harmonic(rigs.turn(s, w), 2) / rigs.harmonic(rigs.turn(s, w), 1) for w in of)
-        for s, of in about.items()
+        s: max(rigs.harmonic(rigs.turn(s, w), 2) / rigs.harmonic(rigs.turn(s, w), 1) for w in harmonics)
+        for s, harmonics in about.items()
     }
     higher = {s: max(rigs.overtones(rigs.turn(s, w)) for w in speeds) for s in "CD"}
     largest = max(rigs.largest_multiplier(s, *RUN) for s in "CD")
@@ -457,7 +459,7 @@ def _fig_8_18() -> tuple[Statement, ...]:
         s: np.array([np.fft.rfft(rigs.slider(rigs.turn(s, w))[:-1])[1] / (0.5 * rigs.SAMPLES) for w in speeds])
         for s in "CD"
     }
-    shift = {s: _phase_range(of) for s, of in first.items()}
+    shift = {s: _phase_range(harmonics) for s, harmonics in first.items()}
     why = "near half the natural frequency the second harmonic has its resonance"
     almost = f"{ABOUT:g}, the rule for *almost*"
     return (
@@ -507,9 +509,9 @@ def _fig_8_18() -> tuple[Statement, ...]:
     )
 
 
-def _phase_range(of: NDArray[np.complex128]) -> float:
+def _phase_range(harmonics: NDArray[np.complex128]) -> float:
     """Return the range of the phase (deg) of complex amplitudes over the speed."""
-    return float(np.degrees(np.ptp(np.unwrap(np.angle(of)))))
+    return float(np.degrees(np.ptp(np.unwrap(np.angle(harmonics)))))
 
 
 def _like_one_mass(

@@ -22,19 +22,19 @@ from .chapter_3 import (
     DAMPINGS,
     FEWEST_TURNS,
     TRANSIENT_TURNS,
-    apart_on_the_graph,
     drift,
-    from_rest,
+    graph_distance,
+    run_from_rest,
 )
-from .chapter_6 import TABLE, over_least, share_of_stated
-from .conclusions_linear import introduction, linearised
-from .formulation import multipliers, shown_by_closure
-from .free_crank import TORQUES, Turns, accelerated, launch, run_peak
+from .chapter_6 import TABLE, ratios_to_least, share_of_stated
+from .conclusions_linear import judge_introduction, judge_linearised
+from .formulation import judge_closure, judge_multipliers
+from .free_crank import TORQUES, Turns, launch, run_acceleration, run_peak
 from .problems import AREA_N, PROBLEMS
 from .rig_2 import RANGE, length, linear_motion
 from .rigs import LOST, amplitude, overtones, turn
 from .runs import SPEED, STIFFNESSES, plain, steady_turn, table_3_1
-from .series_2 import out_of_reach, reduced, reduced_further, shares_of_stated
+from .series_2 import best_error_ratios, error_ratios, out_of_reach, shares_of_stated
 
 NUMBER = "conclusions"
 #: Longer semi-axes of the ellipses that links move along (cm): those of paths (a) and (b), and one between.
@@ -48,7 +48,7 @@ DAMPED, FREE = 3e4, 3.0
 MOST_TURNS = 80
 
 
-def spacings(angle: NDArray[np.float64], rate: NDArray[np.float64]) -> NDArray[np.float64]:
+def maxima_spacings(angle: NDArray[np.float64], rate: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return the crank angles (deg) between successive maxima of the slider position after th2 = 1 rad.
 
     The maxima are where the slider's ``rate`` falls through zero.
@@ -87,7 +87,7 @@ def collinear_turn(damping: float) -> float:
     return run.events[0].time / period if run.events else np.nan
 
 
-def of_ellipse(semi_axis: float) -> float:
+def ellipse_error(semi_axis: float) -> float:
     """Return the least area between an ellipse and the coupler curve of path (b)'s links, relative to the ellipse's area.
 
     ``semi_axis`` is in cm. The rocker pivot moves with five harmonics.
@@ -101,9 +101,9 @@ def of_ellipse(semi_axis: float) -> float:
     )
 
 
-def kinematics() -> tuple[Statement, ...]:
+def judge_kinematics() -> tuple[Statement, ...]:
     """Judge the conclusions on synthesis and control."""
-    ratios = over_least()
+    ratios = ratios_to_least()
     shares = [*(share_of_stated(row.problem) for row in TABLE.values()), *shares_of_stated().values()]
     kept = sum(share <= 1.0 + ABOUT for share in shares)
     return (
@@ -120,7 +120,7 @@ def kinematics() -> tuple[Statement, ...]:
             "area between an ellipse and the curve of the links printed for path (b), mended, over that of the ellipse: three "
             "of a family, the longer semi-axis 10 to 15 cm; five harmonics of the slider, a stroke of at most 25 cm (all ours)",
             f"{ALIKE:g}, the rule for *the same*",
-            tuple(at_most(name, ALIKE, of_ellipse(axis_cm)) for name, axis_cm in ELLIPSES.items()),
+            tuple(at_most(name, ALIKE, ellipse_error(axis_cm)) for name, axis_cm in ELLIPSES.items()),
         ),
         Statement(
             "[A] proper control of the slider enabled modifications and more accurate generation of outputs than could "
@@ -131,8 +131,8 @@ def kinematics() -> tuple[Statement, ...]:
             "L5935",
             SEEN_FALL,
             (
-                at_most("printed links, the most of eight", 1.0 - ALIKE, max(reduced().values())),
-                at_most("best links, the most of seven", 1.0 - ALIKE, max(reduced_further().values())),
+                at_most("printed links, the most of eight", 1.0 - ALIKE, max(error_ratios().values())),
+                at_most("best links, the most of seven", 1.0 - ALIKE, max(best_error_ratios().values())),
             ),
         ),
         Statement(
@@ -187,7 +187,7 @@ def kinematics() -> tuple[Statement, ...]:
     )
 
 
-def equations() -> tuple[Statement, ...]:
+def judge_equations() -> tuple[Statement, ...]:
     """Judge the conclusions on the equations of motion and their integration."""
     return (
         Statement(
@@ -197,7 +197,7 @@ def equations() -> tuple[Statement, ...]:
             "multipliers of (3.1) less the force at pin C and the crank torque by our equations of motion, which have no "
             "multipliers, relative to the greatest; the most of those at Fig 3.1",
             "1e-9, above rounding errors",
-            (at_most("multipliers", 1e-9, max(case.computed or 0.0 for case in multipliers())),),
+            (at_most("multipliers", 1e-9, max(case.computed or 0.0 for case in judge_multipliers())),),
             "what is said of the methods is judged at L1334 to 1407",
         ),
         Statement(
@@ -207,18 +207,19 @@ def equations() -> tuple[Statement, ...]:
             "*better* is read as in 3.1 (L1744): the closure of the loop then shows the error. Greatest failure of closure "
             "over the greatest error of u, by the method and in the motions of that row",
             "1 to 100, ours as there: the check shows an error, and no more than a hundred times as large as it is",
-            shown_by_closure(),
+            judge_closure(),
         ),
     )
 
 
-def constant_speed() -> tuple[Statement, ...]:
+def judge_constant_speed() -> tuple[Statement, ...]:
     """Judge the conclusions on the motion at a constant speed of the crank."""
     seen, differs = springs_on_torque()
     steady = {k: steady_turn(table_3_1(k), SPEED) for k in STIFFNESSES}
     starts = [
-        np.abs(CM_PER_METRE * from_rest(k)["slider.position"][:360] - of.slider_cm[:-1:4]).max() / np.ptp(of.slider_cm)
-        for k, of in steady.items()
+        np.abs(CM_PER_METRE * run_from_rest(k)["slider.position"][:360] - steady_k.slider_cm[:-1:4]).max()
+        / np.ptp(steady_k.slider_cm)
+        for k, steady_k in steady.items()
     ]
     return (
         Statement(
@@ -241,8 +242,8 @@ def constant_speed() -> tuple[Statement, ...]:
             (
                 at_least("transient, least of the springs", ALIKE, min(starts)),
                 *(
-                    at_most(f"periodic; k = {plain(k)} dyn/cm", ALIKE, of.change / np.ptp(of.slider_cm))
-                    for k, of in steady.items()
+                    at_most(f"periodic; k = {plain(k)} dyn/cm", ALIKE, steady_k.change / np.ptp(steady_k.slider_cm))
+                    for k, steady_k in steady.items()
                 ),
             ),
         ),
@@ -285,15 +286,15 @@ def springs_on_torque() -> tuple[float, float]:
     """
     soft, stiff = (steady_turn(table_3_1(k), SPEED) for k in (STIFFNESSES[0], STIFFNESSES[-1]))
     torques = np.array([soft.torque, stiff.torque])
-    seen = apart_on_the_graph(soft.angle_deg / 360.0, *torques / np.ptp(torques))
+    seen = graph_distance(soft.angle_deg / 360.0, *torques / np.ptp(torques))
     return float(seen.max()), float(np.ptp(torques, axis=0).max() / np.abs(soft.torque).max())
 
 
-def launched() -> tuple[Statement, ...]:
+def judge_launches() -> tuple[Statement, ...]:
     """Judge the conclusions on the motion after a launch by a torque."""
     runs = [launch(*which) for which in LAUNCHES]
-    maxima = [spacings(run["crank.angle"], run["slider.velocity"]) for run in runs]
-    fastest = max(run_peak(accelerated(*which)).angle for which in LAUNCHES)
+    maxima = [maxima_spacings(run["crank.angle"], run["slider.velocity"]) for run in runs]
+    fastest = max(run_peak(run_acceleration(*which)).angle for which in LAUNCHES)
     damped = max(decay(*which, DAMPED) for which in LAUNCHES)
     undamped = min(decay(*which, 0.0) for which in LAUNCHES if which not in FOLDING)
     return (
@@ -312,7 +313,7 @@ def launched() -> tuple[Statement, ...]:
                     near(
                         f"period, {when} maxima",
                         360.0,
-                        max((of[part].mean() for of in maxima), key=lambda x: abs(x - 360.0)),
+                        max((angles[part].mean() for angles in maxima), key=lambda x: abs(x - 360.0)),
                         ABOUT_DEG,
                         "deg",
                         why="a transient comes first",
@@ -337,10 +338,12 @@ def launched() -> tuple[Statement, ...]:
     )
 
 
-def experiment() -> tuple[Statement, ...]:
+def judge_experiment() -> tuple[Statement, ...]:
     """Judge the conclusions on the experiment."""
     turns = {(s, w): turn(s, w) for s in "CD" for w in RANGE}
-    error = max(abs(length(s) * linear_motion(s, w).amplitude / amplitude(of) - 1.0) for (s, w), of in turns.items())
+    error = max(
+        abs(length(s) * linear_motion(s, w).amplitude / amplitude(found) - 1.0) for (s, w), found in turns.items()
+    )
     return (
         Statement(
             "It was found that good agreement existed between the two in both phase and amplitude [of the numerical solutions "
@@ -375,13 +378,13 @@ def compute() -> StudyResult:
             "7034, 7041, 7045, 7061, 7065, 7096, 7108, 7128, 7130, 7136, 7140."
         ),
         statements=(
-            *introduction(),
-            *kinematics(),
-            *equations(),
-            *constant_speed(),
-            *launched(),
-            *linearised(),
-            *experiment(),
+            *judge_introduction(),
+            *judge_kinematics(),
+            *judge_equations(),
+            *judge_constant_speed(),
+            *judge_launches(),
+            *judge_linearised(),
+            *judge_experiment(),
         ),
     )
 

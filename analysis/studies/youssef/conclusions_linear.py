@@ -18,9 +18,9 @@ from ...youssef import HarmonicMotion, harmonic_balance, resonance, slider_equat
 from ..rules import ABOUT, ALIKE, SMALL
 from ..statements import Case, Statement, at_least, at_most, near, text
 from .chapter_4 import AT_PEAKS, DAMPERS, range_above
-from .chapter_5 import closed, held
+from .chapter_5 import with_held_angles, with_same_ground
 from .linearised import with_crank
-from .regions import axis, hill, removing_estimate
+from .regions import axis, hill_region, removing_estimate
 
 OMEGA_K = sqrt(SQUARE_OF_OMEGA_K)
 #: Inertia ratios of the stability, and of the resonance with its dampers omega_c (1/s) and speeds (rad/s).
@@ -39,7 +39,7 @@ SIGN = "none, the sign decides"
 
 
 @cache
-def short_crank(inertia_ratio: float, damper: float, most: int) -> tuple[HarmonicMotion, ...]:
+def short_crank_motions(inertia_ratio: float, damper: float, most: int) -> tuple[HarmonicMotion, ...]:
     """Return the motion u/l4 of chapter IV's mechanism at each of the `SPEEDS`, with the harmonics up to ``most``."""
     found = slider_equation(chapter_4(inertia_ratio), 1.0)
     return tuple(
@@ -49,12 +49,12 @@ def short_crank(inertia_ratio: float, damper: float, most: int) -> tuple[Harmoni
 
 
 def harmonic(order: int, inertia_ratio: float, damper: float, most: int = 2) -> NDArray[np.float64]:
-    """Return the amplitude of one harmonic of u/l4 at each of the `SPEEDS`; see `short_crank`."""
-    return np.array([motion.harmonic(order) for motion in short_crank(inertia_ratio, damper, most)])
+    """Return the amplitude of one harmonic of u/l4 at each of the `SPEEDS`; see `short_crank_motions`."""
+    return np.array([motion.harmonic(order) for motion in short_crank_motions(inertia_ratio, damper, most)])
 
 
 @cache
-def unlike_oscillator(inertia_ratio: float) -> tuple[float, float]:
+def oscillator_differences(inertia_ratio: float) -> tuple[float, float]:
     """Compare the motion with that of a damped oscillator under a force that grows with the square of the speed.
 
     The oscillator has the mean values of M and K, and the force that fits the first harmonic at the mean of all speeds. The
@@ -66,25 +66,25 @@ def unlike_oscillator(inertia_ratio: float) -> tuple[float, float]:
         mass = found.mass.mean - found.stiffness.mean
         stiffness = np.abs(SQUARE_OF_OMEGA_K / SPEEDS**2 - mass + 1j * damper / SPEEDS)
         first = harmonic(1, inertia_ratio, damper)
-        both = np.array([motion.amplitude for motion in short_crank(inertia_ratio, damper, 2)])
+        both = np.array([motion.amplitude for motion in short_crank_motions(inertia_ratio, damper, 2)])
         oscillator = np.average(first * stiffness, weights=np.gradient(SPEEDS)) / stiffness
         compared.append([np.abs(size / oscillator - 1.0).max() for size in (first, both)])
     one, two = np.max(compared, axis=0).tolist()
     return one, two
 
 
-def like_oscillator(why: str = "") -> tuple[Case, ...]:
-    """Judge whether the slider moves as a damped oscillator does; see `unlike_oscillator`."""
-    found = np.max([unlike_oscillator(i) for i in RESONANT], axis=0)
+def judge_oscillator(why: str = "") -> tuple[Case, ...]:
+    """Judge whether the slider moves as a damped oscillator does; see `oscillator_differences`."""
+    found = np.max([oscillator_differences(i) for i in RESONANT], axis=0)
     return tuple(at_most(name, ABOUT, x, why=why) for name, x in zip(("first harmonic", "both harmonics"), found))
 
 
 def width(parameters: FiveBarParameters, number: int = 1) -> float:
     """Return the width in lambda_k^2 of the region of instability with the given number, by Hill's determinant."""
-    return hill(parameters, number).width
+    return hill_region(parameters, number).width
 
 
-def removed(mechanisms: Iterable[FiveBarParameters]) -> float:
+def removing_damping_ratio(mechanisms: Iterable[FiveBarParameters]) -> float:
     """Return the damping ratio that removes the first four regions of instability of all given mechanisms.
 
     It is relative to the critical damping of the mass m4 + m5 on the spring.
@@ -92,15 +92,15 @@ def removed(mechanisms: Iterable[FiveBarParameters]) -> float:
     return max(removing_estimate(p, number) for p in mechanisms for number in range(1, 5)) / (2.0 * OMEGA_K)
 
 
-def second_region(inertia_ratio: float) -> float:
+def second_region_width(inertia_ratio: float) -> float:
     """Return the width in lambda_k^2 of the region of instability at the natural frequency, relative to that at twice it."""
     parameters = chapter_4(inertia_ratio)
     return width(parameters, 2) / width(parameters)
 
 
-def only() -> tuple[Case, Case]:
+def judge_single_region() -> tuple[Case, Case]:
     """Judge whether there is a region of instability near twice the natural frequency only."""
-    least = min(map(second_region, RATIOS))
+    least = min(map(second_region_width, RATIOS))
     return (
         near("speed of the region over the natural frequency", 2.0, twice_natural(), 2.0 * ABOUT),
         at_most("region at the natural frequency", SMALL, least, why="without a damper there is one too"),
@@ -112,7 +112,7 @@ def twice_natural() -> float:
 
     The result is that of the inertia ratio in `RATIOS` for which it is farthest from 2.
     """
-    found = [axis(hill(chapter_4(i))) * OMEGA_K / natural_frequency(chapter_4(i)) for i in RATIOS]
+    found = [axis(hill_region(chapter_4(i))) * OMEGA_K / natural_frequency(chapter_4(i)) for i in RATIOS]
     return max(found, key=lambda x: abs(x - 2.0))
 
 
@@ -121,13 +121,13 @@ def _listed(values: Iterable[float]) -> str:
     return f"{', '.join(first)} and {last}"
 
 
-def introduction() -> tuple[Statement, ...]:
+def judge_introduction() -> tuple[Statement, ...]:
     """Judge the statements of section 8.0 on the theory."""
     removing = {
-        "rocker's inertia": removed(map(chapter_4, RATIOS)),
-        "crank": removed(map(with_crank, CRANKS)),
-        "coupler, angles held": removed(map(held, COUPLERS)),
-        "coupler, same ground link": removed(map(closed, COUPLERS)),
+        "rocker's inertia": removing_damping_ratio(map(chapter_4, RATIOS)),
+        "crank": removing_damping_ratio(map(with_crank, CRANKS)),
+        "coupler, angles held": removing_damping_ratio(map(with_held_angles, COUPLERS)),
+        "coupler, same ground link": removing_damping_ratio(map(with_same_ground, COUPLERS)),
     }
     return (
         Statement(
@@ -139,8 +139,8 @@ def introduction() -> tuple[Statement, ...]:
             f"{ABOUT:g}, the rule for *similar* and, of 2, for *near*, for *vicinity* too; {SMALL:g}, the rule for "
             "*negligible*, for a region that is not counted",
             (
-                *like_oscillator("near half the natural frequency the second harmonic has its own resonance"),
-                *only(),
+                *judge_oscillator("near half the natural frequency the second harmonic has its own resonance"),
+                *judge_single_region(),
             ),
         ),
         Statement(
@@ -156,7 +156,7 @@ def introduction() -> tuple[Statement, ...]:
     )
 
 
-def linearised() -> tuple[Statement, ...]:
+def judge_linearised() -> tuple[Statement, ...]:
     """Judge the conclusions on the linear equation and its stability."""
     return (*_on_resonance(), *_on_stability())
 
@@ -170,9 +170,9 @@ def _on_resonance() -> tuple[Statement, ...]:
     bend = np.abs(speeds - np.polyval(np.polyfit(RATIOS, speeds, 1), RATIOS)).max() / np.ptp(speeds)
     # by damper, then by inertia
     curves = [[first[i, damper] for i in RESONANT] for damper in (WEAK, STRONG)]
-    tops = np.array([[of.max() for of in row] for row in curves])
-    wide = np.array([[range_above(LARGE, SPEEDS, of) for of in row] for row in curves])
-    half = [range_above(0.5 * of.max(), SPEEDS, of) for of in curves[-1]]
+    tops = np.array([[curve.max() for curve in row] for row in curves])
+    wide = np.array([[range_above(LARGE, SPEEDS, curve) for curve in row] for row in curves])
+    half = [range_above(0.5 * curve.max(), SPEEDS, curve) for curve in curves[-1]]
     return (
         Statement(
             "Results for a short crank showed similarity to a damped second order linear system behaviour.",
@@ -181,7 +181,7 @@ def _on_resonance() -> tuple[Statement, ...]:
             "unbalance, relative to it; means of M and K, the unbalance that fits the first harmonic on the average; the most "
             f"of I4 = 0.5, 1 and 1.5, {DAMPERS_WORDS}, {SPEEDS_WORDS}; {RIGHT}",
             f"{ABOUT:g}, the rule for *similar*",
-            like_oscillator(),
+            judge_oscillator(),
             "near half the natural frequency the second harmonic, judged next, has its own resonance",
         ),
         Statement(
@@ -228,9 +228,9 @@ def _on_resonance() -> tuple[Statement, ...]:
 def _on_stability() -> tuple[Statement, ...]:
     """Judge the conclusions on the regions of instability."""
     by_crank = [width(with_crank(s)) for s in CRANKS]
-    by_coupler = [width(closed(s)) for s in COUPLERS]
+    by_coupler = [width(with_same_ground(s)) for s in COUPLERS]
     by_inertia = [width(chapter_4(i)) for i in RATIOS]
-    narrow = max(2.0 * width(p) / (hill(p).low + hill(p).high) for p in map(chapter_4, RATIOS))
+    narrow = max(2.0 * width(p) / (hill_region(p).low + hill_region(p).high) for p in map(chapter_4, RATIOS))
     return (
         Statement(
             "The stability analysis showed a narrow region of instability in the [vicinity of w = 2wn] only, where [wn is "
@@ -240,7 +240,7 @@ def _on_stability() -> tuple[Statement, ...]:
             "this frequency, with the mean mass, the farthest from 2; for *only*, width of the region at the natural frequency "
             f"over that of this one, the least; I4 = 0.25 to 2, without a damper, {RIGHT}",
             f"{SMALL:g}, the rule for *small*, for *narrow* too; {ABOUT:g} of 2, the rule for *near*, for *vicinity* too",
-            (at_most("width", SMALL, narrow), *only()),
+            (at_most("width", SMALL, narrow), *judge_single_region()),
         ),
         Statement(
             "Instability of the slider motion was shown to increase with increase of crank length, decrease of coupler "
@@ -258,7 +258,9 @@ def _on_stability() -> tuple[Statement, ...]:
                     -np.diff(by_coupler).max(),
                     why="on the same ground link the region is narrowest where coupler and rocker are about equal",
                 ),
-                at_least("shorter coupler, angles held", 0.0, -np.diff([width(held(s)) for s in COUPLERS]).max()),
+                at_least(
+                    "shorter coupler, angles held", 0.0, -np.diff([width(with_held_angles(s)) for s in COUPLERS]).max()
+                ),
                 at_least("larger inertia", 0.0, np.diff(by_inertia).min()),
             ),
         ),

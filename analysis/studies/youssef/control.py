@@ -31,13 +31,13 @@ from ...synthesis import Linkage, turn
 from ...units import CM_PER_METRE
 from ..rules import ALIKE, READ, SEEN_FALL
 from ..statements import Case, Statement, at_least, at_most, text
-from ..study import Study, StudyResult, padded
-from .chapter_6 import over_least
+from ..study import Study, StudyResult, pad_columns
+from .chapter_6 import ratios_to_least
 from .chapter_7 import slider
 from .problems import PROBLEMS
 from .runs import SPEED as TURN_RPM
 from .runs import steady_turn, table_3_1
-from .series_2 import PATH, ROCKER, linkage_error, mended, path_motion, readings, rocker_motion
+from .series_2 import PATH, ROCKER, linkage_error, mended_path_linkage, path_motion, readings, rocker_motion
 
 NUMBER = "control"
 #: Crank speed (rad/s).
@@ -100,7 +100,7 @@ def run(
 
 
 @cache
-def trials(harmonics: int) -> tuple[NDArray[np.float64], ...]:
+def run_trials(harmonics: int) -> tuple[NDArray[np.float64], ...]:
     """Run the trial cycles; return the deviation of the slider from the desired motion over the last turn of each run (m).
 
     After each cycle, the Fourier series of the deviation with this number of harmonics is subtracted from the stored motion.
@@ -130,7 +130,7 @@ def error_on_machine(stored: FourierSeries, load: tuple[float, float] = LOAD, sp
     return linkage_error(ROCKER, move_slider(FourierSeries.from_samples(found, max(HARMONICS))))
 
 
-def searched() -> tuple[float, float]:
+def search_on_machine() -> tuple[float, float]:
     """Minimise the weighted error of the rocker function in runs of the plant, by a downhill simplex.
 
     The unknowns are the mean and two harmonics of the slider motion. Returns the errors (deg2) with the slider at rest and at
@@ -156,7 +156,7 @@ def cam(series: FourierSeries) -> Cam:
     """Return the smallest cam with a pressure angle within `PRESSURE`; ``series`` is the motion of its roller (m)."""
     angle = np.linspace(0.0, 2.0 * pi, 3601)
     slope = series.derivative()
-    lift, rate, change = (CM_PER_METRE * of(angle) for of in (series, slope, slope.derivative()))
+    lift, rate, change = (CM_PER_METRE * function(angle) for function in (series, slope, slope.derivative()))
     lift = lift - lift.min()
     # |r'| / r = tan of the pressure angle
     r = (np.abs(rate) / tan(PRESSURE) - lift).max() + lift
@@ -188,7 +188,7 @@ def compute() -> StudyResult:
         }
     columns["trial cycle [1]"] = np.arange(1.0, TRIALS + 1.0)
     for n in HARMONICS:
-        columns[f"rms deviation; {n} harmonics [mm]"] = np.array([1e3 * rms(deviation) for deviation in trials(n)])
+        columns[f"rms deviation; {n} harmonics [mm]"] = np.array([1e3 * rms(deviation) for deviation in run_trials(n)])
     for name, found_cam in cams.items():
         columns |= {f"cam of {name}; x [cm]": found_cam.curve.real, f"cam of {name}; y [cm]": found_cam.curve.imag}
     return StudyResult(
@@ -199,14 +199,16 @@ def compute() -> StudyResult:
         f"{SPEED * 30.0 / pi:.0f} rpm, moved by the best two harmonics of Fig 7.11; feedback every {1e3 * PERIOD:g} ms with a "
         f"bandwidth of {BANDWIDTH:g} rad/s. The machine differs from the controller's model: twice the friction, coupler and "
         f"slider a tenth heavier, a load of ({LOAD[0]:g}, {LOAD[1]:g}) N at the rocker's pin.",
-        columns=padded(columns),
-        statements=(*off_line(runs["feed-forward"], cams), *on_line(runs["feedback"]), *strategy()),
+        columns=pad_columns(columns),
+        statements=(*judge_off_line(runs["feed-forward"], cams), *judge_on_line(runs["feedback"]), *judge_strategy()),
     )
 
 
-def off_line(open_loop: TrackingResult, cams: Mapping[str, Cam]) -> tuple[Statement, ...]:
+def judge_off_line(open_loop: TrackingResult, cams: Mapping[str, Cam]) -> tuple[Statement, ...]:
     """Judge the statements on drives without feedback (7.1.1), given such a run and the cams of Fig 7.11 and 7.12."""
-    fixed, one_harmonic = (linkage_error(ROCKER, of) for of in (PROBLEMS[ROCKER].linkage, rocker_motion(1).linkage))
+    fixed, one_harmonic = (
+        linkage_error(ROCKER, moved) for moved in (PROBLEMS[ROCKER].linkage, rocker_motion(1).linkage)
+    )
     return (
         Statement(
             "An intermittent or continuous drive coupled to the primary input by means of direct mechanical connections, "
@@ -237,7 +239,7 @@ def off_line(open_loop: TrackingResult, cams: Mapping[str, Cam]) -> tuple[Statem
             "damper and the forces of the links, over l4",
             f"more than {READ:g}, what a graph can be read to",
             (
-                at_least("spring, continuous", READ, on_a_spring()),
+                at_least("spring, continuous", READ, spring_range()),
                 Case(label="latch, intermittent", computed=None, why="no example is given"),
                 Case(label="advantages and disadvantages", computed=None, why="there is no measure of them"),
             ),
@@ -258,7 +260,7 @@ def off_line(open_loop: TrackingResult, cams: Mapping[str, Cam]) -> tuple[Statem
     )
 
 
-def on_a_spring() -> float:
+def spring_range() -> float:
     """Return the range of u over l4 in the steady turn of chapter III, whose slider moves on a spring alone."""
     mechanism = table_3_1(1e6)
     return float(np.ptp(steady_turn(mechanism, TURN_RPM).slider_cm)) / (CM_PER_METRE * mechanism.rocker_length)
@@ -269,9 +271,9 @@ def relative_deviation(found: TrackingResult) -> float:
     return rms(found.error) / float(np.ptp(machine().motion(np.linspace(0.0, 2.0 * pi, 721))))
 
 
-def on_line(closed: TrackingResult) -> tuple[Statement, ...]:
+def judge_on_line(closed: TrackingResult) -> tuple[Statement, ...]:
     """Judge the statements on drives with feedback and on those that adapt (7.1.2 to 7.3.1), given a run with feedback."""
-    at_rest, least = searched()
+    at_rest, least = search_on_machine()
     changes = ((CHANGED, SPEED), (LOAD, 0.5 * SPEED), (LOAD, 2.0 * SPEED))
     before = error_on_machine(machine().motion)
     loaded, slower, faster = (error_on_machine(machine().motion, *change) / before for change in changes)
@@ -338,13 +340,13 @@ def on_line(closed: TrackingResult) -> tuple[Statement, ...]:
     )
 
 
-def strategy() -> tuple[Statement, ...]:
+def judge_strategy() -> tuple[Statement, ...]:
     """Judge the statements on the strategy of search (7.4)."""
     fixed, least = linkage_error(ROCKER, PROBLEMS[ROCKER].linkage), linkage_error(ROCKER, rocker_motion(2).linkage)
     fixed_path, least_path = linkage_error(PATH, PROBLEMS[PATH].linkage), linkage_error(PATH, path_motion(2).linkage)
-    ratios = over_least() | {
+    ratios = ratios_to_least() | {
         "Fig 7.11": linkage_error(ROCKER, readings(ROCKER)[0]) / least,
-        "Fig 7.12": linkage_error(PATH, mended()) / least_path,
+        "Fig 7.12": linkage_error(PATH, mended_path_linkage()) / least_path,
     }
     return (
         Statement(

@@ -31,10 +31,10 @@ from ...youssef import (
 )
 from ..rules import ALIKE, SMALL
 from ..statements import Case, Statement, at_least, at_most, listing, near, text
-from ..study import Study, StudyResult, padded
-from .chapter_5 import COMPARED, SWEEPS, closed, held
+from ..study import Study, StudyResult, pad_columns
+from .chapter_5 import COMPARED, SWEEPS, with_held_angles, with_same_ground
 from .linearised import with_crank
-from .regions import appendix_3, crank_speed, equation, first_order, hill, removing_estimate
+from .regions import appendix_3_region, crank_speed, equation, first_order_region, hill_region, removing_estimate
 from .runs import ALIKE_WORDS, SIGN
 
 #: omega_c (1/s) that removes the region up to I4 = 1.5, as stated.
@@ -74,7 +74,7 @@ def damped_region(omega_c: float) -> Chart:
 
 
 @cache
-def removing(motion: str, inertia_ratio: float) -> RemovingDamping:
+def removing_damper(motion: str, inertia_ratio: float) -> RemovingDamping:
     """Find the damper omega_c (1/s) that removes the first region at an inertia ratio, by one of the `MOTIONS`."""
 
     def test(lambda_k2: float, omega_c: float) -> float:
@@ -83,9 +83,9 @@ def removing(motion: str, inertia_ratio: float) -> RemovingDamping:
     return removing_damping(test, BOX.x, RANGE, samples=12)
 
 
-def removing_most(motion: str) -> float:
-    """Return the greatest damper omega_c (1/s) that is needed to remove the first region up to I4 = 1.5; see `removing`."""
-    return max(removing(motion, x).damping for x in RATIOS.tolist() if x <= 1.5)
+def greatest_removing_damper(motion: str) -> float:
+    """Return the greatest damper omega_c (1/s) by `removing_damper` that the first region needs up to I4 = 1.5."""
+    return max(removing_damper(motion, x).damping for x in RATIOS.tolist() if x <= 1.5)
 
 
 def multiplier(inertia_ratio: float, omega_c: float, speed: float) -> float:
@@ -103,32 +103,32 @@ def region_width(found: Chart, value: float) -> float:
     return float(np.ptp(roots)) if len(roots) else 0.0
 
 
-def divided(found: PeriodicEquation, harmonics: int) -> PeriodicEquation:
+def divide_by_mass(found: PeriodicEquation, harmonics: int) -> PeriodicEquation:
     """Return an equation divided by its mass, as in (5.27), with the given number of harmonics kept in the quotients."""
     mass = found.a(ANGLES)
     b, c, factor = (FourierSeries.from_samples(x(ANGLES) / mass, harmonics) for x in (found.b, found.c, found.factor))
     return PeriodicEquation(a=FourierSeries.constant(1.0), b=b, c=c, factor=factor)
 
 
-def without_factor(inertia_ratio: float, lambda_c: float) -> PeriodicEquation:
+def equation_without_factor(inertia_ratio: float, lambda_c: float) -> PeriodicEquation:
     """Return the equation (5.29) of chi, derived from the correct linear equation.
 
     Here zeta is chi times the factor exp(-1/2 int psi1).
     """
     found = replace(slider_equation(chapter_4(inertia_ratio), crank_speed(0.25)), damping=lambda_c)
-    whole = divided(found.homogeneous(), ALL_HARMONICS)
+    whole = divide_by_mass(found.homogeneous(), ALL_HARMONICS)
     psi1, psi2 = whole.b, whole.c
     rest = psi2(ANGLES) - 0.5 * psi1.derivative()(ANGLES) - 0.25 * psi1(ANGLES) ** 2
     return replace(whole, b=FourierSeries.constant(0.0), c=FourierSeries.from_samples(rest, ALL_HARMONICS))
 
 
-def shifts() -> tuple[Case, ...]:
+def judge_shifts() -> tuple[Case, ...]:
     """Judge how the stated damper shifts regions 1 to 4 of (5.30) and changes their widths, for the I4 `COMPARED`."""
     found: list[tuple[float, float, float]] = []
     for ratio in COMPARED:
-        for n, free in hill_regions(without_factor(ratio, 0.0), 4).items():
+        for n, free in hill_regions(equation_without_factor(ratio, 0.0), 4).items():
             lambda_c = STATED / crank_speed(free.low)
-            damped = without_factor(ratio, lambda_c)
+            damped = equation_without_factor(ratio, lambda_c)
             region, k0 = hill_regions(damped, 4)[n], damped.factor.mean
             shift = 0.5 * (region.low + region.high - free.low - free.high)
             found.append((shift * k0 / (0.25 * lambda_c**2 * k0**2), shift / free.low, region.width / free.width))
@@ -154,24 +154,24 @@ def narrowing(charts: Mapping[float, Chart], inertia_ratio: float) -> float:
     return float(np.diff(at)[at[:-1] > 0.0].max())
 
 
-def outside(omega_c: float) -> float:
+def growth_outside_region(omega_c: float) -> float:
     """Return the greatest real part s1 of Lambda (5.32) outside the first region, for the I4 `COMPARED` and a damper (1/s)."""
     sizes: list[float] = []
     for ratio in COMPARED:
-        region = hill(chapter_4(ratio))
+        region = hill_region(chapter_4(ratio))
         places = 0.2, region.low - 0.5 * region.width, region.high + 0.5 * region.width, 0.35
         sizes += [multiplier(ratio, omega_c, crank_speed(lambda_k2)) for lambda_k2 in places]
     return float(np.log(max(sizes)) / (2.0 * pi))
 
 
-def by_determinant(harmonics: int, order: int = 2) -> dict[int, float]:
+def determinant_errors(harmonics: int, order: int = 2) -> dict[int, float]:
     """Return the errors of regions 1 to 4 by the determinant (5.35) at I4 = 1, relative to the regions' widths.
 
     The coefficients of the divided equation (5.27) are cut after the given number of harmonics, and the solution (5.31) after
     the harmonic ``order``: nine terms at 2. Each error is the greater of the region's two boundaries.
     """
     exact = equation(chapter_4(1.0))
-    cut = divided(exact, harmonics)
+    cut = divide_by_mass(exact, harmonics)
     # the first boundary with the multiplier 1 is the zeroth
     even, odd = (boundary_stiffnesses(cut, m, count=c, order=order).real for m, c in ((1, 5), (-1, 4)))
     ends = {1: odd[:2], 2: even[1:3], 3: odd[2:], 4: even[3:]}
@@ -198,7 +198,7 @@ def judge_damper(charts: Mapping[float, Chart]) -> tuple[Statement, ...]:
             "k0 over the stated quantity; shift over lambda_k^2; width over that without. The farthest of I4 = 0.5, 1 and "
             "1.5; right linear equation",
             f"{ALIKE_WORDS}; {SMALL:g} for the shift over lambda_k^2, the rule for *small*",
-            shifts(),
+            judge_shifts(),
         ),
         Statement(
             "As would be expected the region is decreased in width as [omega_c] is increased.",
@@ -217,7 +217,7 @@ def judge_damper(charts: Mapping[float, Chart]) -> tuple[Statement, ...]:
             "none: the sign decides, and whether the region is removed",
             (
                 at_least("growth", 0.0, np.diff(tips).min()),
-                at_most("omega_c", "0.45", removing_most("true orbit"), "1/s"),
+                at_most("omega_c", "0.45", greatest_removing_damper("true orbit"), "1/s"),
             ),
         ),
         Statement(
@@ -229,8 +229,15 @@ def judge_damper(charts: Mapping[float, Chart]) -> tuple[Statement, ...]:
             "none: it is removed or it is not",
             (
                 at_most("Fig 5.2", "0.45", max(removing_estimate(with_crank(x)) for x in crank), "1/s"),
-                at_most("Fig 5.3; angles held", "0.45", max(removing_estimate(held(x)) for x in coupler), "1/s"),
-                at_most("Fig 5.3; same ground link", "0.45", max(removing_estimate(closed(x)) for x in coupler), "1/s"),
+                at_most(
+                    "Fig 5.3; angles held", "0.45", max(removing_estimate(with_held_angles(x)) for x in coupler), "1/s"
+                ),
+                at_most(
+                    "Fig 5.3; same ground link",
+                    "0.45",
+                    max(removing_estimate(with_same_ground(x)) for x in coupler),
+                    "1/s",
+                ),
             ),
             "on the same ground link the region is wider",
         ),
@@ -259,12 +266,12 @@ def judge_determinant() -> tuple[Statement, ...]:
     """Judge the statements on the method (5.31) to (5.35) and on its program."""
     dampers = {f"omega_c = {DAMPERS[2]:g} 1/s": DAMPERS[2], "without a damper, as in 5.3.3 e": 0.0}
     ways: dict[str, tuple[Variant, Callable[[FiveBarParameters], Region]]] = {
-        "right equation": (Variant.EXACT, partial(first_order, variant=Variant.EXACT)),
-        "listings": (Variant.FORTRAN, appendix_3),
+        "right equation": (Variant.EXACT, partial(first_order_region, variant=Variant.EXACT)),
+        "listings": (Variant.FORTRAN, appendix_3_region),
     }
     apart, shares = {}, []
     for name, (variant, perturbed) in ways.items():
-        pairs = [(hill(p, variant=variant), perturbed(p)) for p in map(chapter_4, COMPARED)]
+        pairs = [(hill_region(p, variant=variant), perturbed(p)) for p in map(chapter_4, COMPARED)]
         # at I4 = 0 the region begins at lambda_k^2 = 1/4
         scale = pairs[-1][0].high - 0.25
         for end in ("low", "high"):
@@ -278,7 +285,7 @@ def judge_determinant() -> tuple[Statement, ...]:
             "greatest real part s1 of Lambda outside the first region: half a width from it and at lambda_k^2 = 0.2 and 0.35, "
             "I4 = 0.5, 1 and 1.5, right linear equation. Where it is 0, some s2 satisfies (5.35)",
             "below 0 by more than 1e-9, above rounding errors",
-            tuple(at_most(name, -1e-9, outside(omega_c)) for name, omega_c in dampers.items()),
+            tuple(at_most(name, -1e-9, growth_outside_region(omega_c)) for name, omega_c in dampers.items()),
             "without a damper s1 is 0 at every stable speed, not at the boundaries alone",
         ),
         Statement(
@@ -292,7 +299,7 @@ def judge_determinant() -> tuple[Statement, ...]:
             tuple(
                 at_most(f"region {n}; {name}", SMALL, x)
                 for name, harmonics in (("as in (4.29)", LISTED_HARMONICS), ("all harmonics", ALL_HARMONICS))
-                for n, x in by_determinant(harmonics).items()
+                for n, x in determinant_errors(harmonics).items()
             ),
             "to derive more harmonics, which the third region needs, or more terms, which the fourth does, is extra work",
         ),
@@ -318,7 +325,14 @@ def judge_determinant() -> tuple[Statement, ...]:
             "*investigates* is read as finds right: omega_c that removes the first region up to I4 = 1.5, by the equation of "
             "the listing (its cut after nine terms does not change these digits) and by the true periodic motion",
             "0.0005 1/s, to which the listing's value is found",
-            (near("", f"{removing_most('listing of appendix 4'):.3f}", removing_most("true orbit"), unit="1/s"),),
+            (
+                near(
+                    "",
+                    f"{greatest_removing_damper('listing of appendix 4'):.3f}",
+                    greatest_removing_damper("true orbit"),
+                    unit="1/s",
+                ),
+            ),
             "its regions are too wide (errata 2, 16, 17, 20)",
         ),
     )
@@ -329,7 +343,9 @@ def compute() -> StudyResult:
     charts = {omega_c: damped_region(omega_c) for omega_c in DAMPERS}
     columns = {"I4 [1]": RATIOS}
     for motion in MOTIONS:
-        columns[f"removing omega_c; {motion} [1/s]"] = np.array([removing(motion, x).damping for x in RATIOS.tolist()])
+        columns[f"removing omega_c; {motion} [1/s]"] = np.array(
+            [removing_damper(motion, x).damping for x in RATIOS.tolist()]
+        )
     for omega_c, found in charts.items():
         for n, boundary in enumerate(found.boundaries, start=1):
             name = f"omega_c = {omega_c:g} 1/s; boundary {n} [1]"
@@ -339,7 +355,7 @@ def compute() -> StudyResult:
         claim="omega_c = mu/(m4 + m5) narrows the region, and 0.45 1/s removes it up to I4 = 1.5.",
         assignment="The dampers of the regions, 0, 0.05, 0.1 and 0.15 1/s, are ours; the damper that removes the region is "
         "found at I4 = 0.25 to 2 in steps of 0.25.",
-        columns=padded(columns),
+        columns=pad_columns(columns),
         statements=(*judge_damper(charts), *judge_determinant()),
     )
 

@@ -81,7 +81,9 @@ def solve_multipliers(q: ArrayLike, qd: ArrayLike, torque: float | None = None) 
     return unknowns
 
 
-def closed(crank: float, u: float, speed: float, velocity: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def closed_loop_state(
+    crank: float, u: float, speed: float, velocity: float
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Return q and q' of the closed loop, eqs (2.1) and (2.4), at a crank angle, u and their rates (SI)."""
     p = TABLE.constants()
     g = kinematics.position(crank, u, p)
@@ -96,9 +98,9 @@ def all_derivatives(t: float, y: NDArray[np.float64]) -> NDArray[np.float64]:
     return np.array([*y[3:], w[5], w[4], w[3]])
 
 
-def slider_alone(t: float, y: NDArray[np.float64]) -> NDArray[np.float64]:
+def slider_derivatives(t: float, y: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return y' of y = (u, u'), with th3 and th4 from the closure of the loop: the second approach of section 3.1."""
-    return np.array([y[1], solve_multipliers(*closed(OMEGA * t, y[0], OMEGA, y[1]))[3]])
+    return np.array([y[1], solve_multipliers(*closed_loop_state(OMEGA * t, y[0], OMEGA, y[1]))[3]])
 
 
 class Integrated(NamedTuple):
@@ -117,17 +119,19 @@ class Integrated(NamedTuple):
 
 
 @cache
-def integrated(step: float) -> Integrated:
+def integrate_both(step: float) -> Integrated:
     """Integrate the motion from rest by the two approaches of section 3.1, by Hamming's method with a constant step (s)."""
     options = {"method": Hamming, "first_step": step, "max_step": step, "rtol": 1e3, "atol": 1e9}
-    q, qd = closed(0.0, 0.0, OMEGA, 0.0)
+    q, qd = closed_loop_state(0.0, 0.0, OMEGA, 0.0)
     first, second = (
         solve_ivp(f, (0.0, STOP), start, **options)
-        for f, start in ((all_derivatives, [*q[1:], *qd[1:]]), (slider_alone, [0.0, 0.0]))
+        for f, start in ((all_derivatives, [*q[1:], *qd[1:]]), (slider_derivatives, [0.0, 0.0]))
     )
-    error, other = (CM_PER_METRE * float(np.abs(u - exact()(first.t)[0]).max()) for u in (first.y[2], second.y[0]))
-    again = np.transpose([closed(OMEGA * t, u, OMEGA, 0.0)[0] for t, u in zip(second.t, second.y[0])])
-    gaps = (opening(np.array([OMEGA * first.t, *first.y[:3]])), opening(again))
+    error, other = (
+        CM_PER_METRE * float(np.abs(u - exact_motion()(first.t)[0]).max()) for u in (first.y[2], second.y[0])
+    )
+    again = np.transpose([closed_loop_state(OMEGA * t, u, OMEGA, 0.0)[0] for t, u in zip(second.t, second.y[0])])
+    gaps = (closure_error(np.array([OMEGA * first.t, *first.y[:3]])), closure_error(again))
     slider = (second.t, CM_PER_METRE * second.y[0])
     return Integrated(first.t, gaps[0], (error, other), float(gaps[1].max()), slider)
 
@@ -137,20 +141,20 @@ def bar_torque(crank: float) -> float:
     return TORQUE * max(1.0 - crank, 0.0)
 
 
-def launch_all(t: float, y: NDArray[np.float64]) -> NDArray[np.float64]:
+def launch_derivatives(t: float, y: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return y' of y = (q, q') in a launch: the first approach of 3.1."""
     w = solve_multipliers(y[:4], y[4:], bar_torque(y[0]))
     return np.array([*y[4:], w[0], *w[:2:-1]])
 
 
-def launch_reduced(t: float, y: NDArray[np.float64]) -> NDArray[np.float64]:
+def reduced_launch_derivatives(t: float, y: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return y' of y = (th2, u, th2', u') in a launch with the loop closed by its kinematics: the second approach."""
-    w = solve_multipliers(*closed(*y), bar_torque(y[0]))
+    w = solve_multipliers(*closed_loop_state(*y), bar_torque(y[0]))
     return np.array([*y[2:], w[0], w[3]])
 
 
 @cache
-def launched(step: float) -> tuple[float, tuple[float, float]]:
+def integrate_launch(step: float) -> tuple[float, tuple[float, float]]:
     """Integrate a launch by both approaches; return the greatest closure error (cm) by the first, and the errors of u (cm).
 
     The errors are the greatest errors by the first and by the second approach, as in `Integrated`.
@@ -158,12 +162,15 @@ def launched(step: float) -> tuple[float, tuple[float, float]]:
     options = {"method": Hamming, "first_step": step, "max_step": step, "rtol": 1e3, "atol": 1e9}
     first, second = (
         solve_ivp(f, (0.0, STOP), start, **options)
-        for f, start in ((launch_all, np.concatenate(closed(0.0, 0.0, 0.0, 0.0))), (launch_reduced, np.zeros(4)))
+        for f, start in (
+            (launch_derivatives, np.concatenate(closed_loop_state(0.0, 0.0, 0.0, 0.0))),
+            (reduced_launch_derivatives, np.zeros(4)),
+        )
     )
     error, other = (
         CM_PER_METRE * float(np.abs(u - exact_launch()(first.t)[1]).max()) for u in (first.y[3], second.y[1])
     )
-    return float(opening(first.y[:4]).max()), (error, other)
+    return float(closure_error(first.y[:4]).max()), (error, other)
 
 
 @cache
@@ -171,51 +178,53 @@ def exact_launch() -> Callable[[NDArray[np.float64]], NDArray[np.float64]]:
     """Return a function that gives (th2, u, th2', u') in SI at times (s) of a launch, accurate to 1e-7 cm."""
     solution: Callable[[NDArray[np.float64]], NDArray[np.float64]]
     solution = solve_ivp(
-        launch_reduced, (0.0, STOP), np.zeros(4), method="DOP853", rtol=1e-10, atol=1e-12, dense_output=True
+        reduced_launch_derivatives, (0.0, STOP), np.zeros(4), method="DOP853", rtol=1e-10, atol=1e-12, dense_output=True
     ).sol
     return solution
 
 
-def shown_by_closure() -> tuple[Case, ...]:
+def judge_closure() -> tuple[Case, ...]:
     """Judge whether the closure error by the first approach shows the error of u, at constant speed and in a launch."""
-    runs = {step: integrated(step) for step in STEPS}
+    runs = {step: integrate_both(step) for step in STEPS}
     shown = {_step(step): run.gap.max() / run.errors[0] for step, run in runs.items()}
     for step in STEPS:
-        gap, errors = launched(step)
+        gap, errors = integrate_launch(step)
         shown[f"launch; {_step(step)}"] = gap / errors[0]
     return tuple(Case(label=label, computed=x, lower=1.0, upper=100.0, why=KINK) for label, x in shown.items())
 
 
 @cache
-def exact(start: float = 0.0) -> Callable[[NDArray[np.float64]], NDArray[np.float64]]:
+def exact_motion(start: float = 0.0) -> Callable[[NDArray[np.float64]], NDArray[np.float64]]:
     """Return a function of times (s) that gives (u, u') in SI, accurate to rounding, from rest at u = ``start`` (m)."""
     options = {"method": "DOP853", "rtol": 1e-12, "atol": 1e-14, "dense_output": True}
     solution: Callable[[NDArray[np.float64]], NDArray[np.float64]]
-    solution = solve_ivp(slider_alone, (0.0, STOP), [start, 0.0], **options).sol
+    solution = solve_ivp(slider_derivatives, (0.0, STOP), [start, 0.0], **options).sol
     return solution
 
 
 def change_on_halving(step: float) -> float:
     """Return the greatest change of u (cm) if the step of the second approach is halved."""
-    (times, u), (finer, other) = (integrated(h).slider for h in (step, 0.5 * step))
+    (times, u), (finer, other) = (integrate_both(h).slider for h in (step, 0.5 * step))
     return float(np.abs(u - np.interp(times, finer, other)).max())
 
 
-def estimated(start: float = 0.0, unit: float = 0.0) -> tuple[NDArray[np.float64], ...]:
+def estimated_errors(start: float = 0.0, unit: float = 0.0) -> tuple[NDArray[np.float64], ...]:
     """Return estimated errors of u, true errors of u, and roundings of u (all in m), for single steps of Hamming's method.
 
     The estimate is 9/121 (p - c). Each step has the length `STEP` and begins with the exact motion from rest at ``start`` (m).
     If ``unit`` is not zero, u and u' at the beginning are rounded to multiples of it; the roundings are these changes of u.
     """
     h, t = STEP, np.linspace(0.0, STOP, round(STOP / STEP) + 1)
-    exactly = exact(start)(t).T
+    exactly = exact_motion(start)(t).T
     back = unit * np.round(exactly / unit) if unit else exactly
-    f = np.array([slider_alone(*point) for point in zip(t.tolist(), back)])
+    f = np.array([slider_derivatives(*point) for point in zip(t.tolist(), back)])
     difference, found = np.zeros(2), []
     for i in range(3, len(t) - 1):
         p = back[i - 3] + 4.0 * h / 3.0 * (2.0 * f[i] - f[i - 1] + 2.0 * f[i - 2])
         m = p - 112.0 / 121.0 * difference
-        c = (9.0 * back[i] - back[i - 2]) / 8.0 + 3.0 * h / 8.0 * (slider_alone(t[i + 1], m) + 2.0 * f[i] - f[i - 1])
+        c = (9.0 * back[i] - back[i - 2]) / 8.0 + 3.0 * h / 8.0 * (
+            slider_derivatives(t[i + 1], m) + 2.0 * f[i] - f[i - 1]
+        )
         difference = p - c
         found.append((9.0 / 121.0 * difference[0], exactly[i + 1, 0] - c[0]))
     # the first step has no difference before it
@@ -258,41 +267,41 @@ def runge_kutta(
 
 
 @cache
-def by_runge_kutta(
+def integrate_by_runge_kutta(
     step: float, first: bool = False, stages: tuple[tuple[float, float], ...] = CLASSICAL
 ) -> NDArray[np.float64]:
     """Integrate the motion by Runge-Kutta's method; return the state after each step.
 
     The equations are those of the second approach of section 3.1, or of the first if ``first``.
     """
-    q, qd = closed(0.0, 0.0, OMEGA, 0.0)
-    f, start = (all_derivatives, [*q[1:], *qd[1:]]) if first else (slider_alone, [0.0, 0.0])
+    q, qd = closed_loop_state(0.0, 0.0, OMEGA, 0.0)
+    f, start = (all_derivatives, [*q[1:], *qd[1:]]) if first else (slider_derivatives, [0.0, 0.0])
     n = round(STOP / step)
     return runge_kutta(f, start, STOP / n, n, stages).states
 
 
 def integration_error(u: NDArray[np.float64]) -> float:
     """Return the greatest error (cm) of u (m), given at evenly spaced times from 0 to `STOP`."""
-    return CM_PER_METRE * float(np.abs(u - exact()(np.linspace(0.0, STOP, len(u)))[0]).max())
+    return CM_PER_METRE * float(np.abs(u - exact_motion()(np.linspace(0.0, STOP, len(u)))[0]).max())
 
 
-def of_runge_kutta(step: float) -> float:
+def runge_kutta_estimate_ratio(step: float) -> float:
     """Return the greatest error of u by Runge-Kutta's method relative to its estimate by halving the step.
 
     The estimate is the greatest change of u divided by 1 - 1/16. The motion is integrated by the second approach.
     """
-    u, halved = by_runge_kutta(step)[:, 0], by_runge_kutta(0.5 * step)[::2, 0]
+    u, halved = integrate_by_runge_kutta(step)[:, 0], integrate_by_runge_kutta(0.5 * step)[::2, 0]
     return integration_error(u) / (CM_PER_METRE * float(np.abs(u - halved).max()) / (1.0 - 2.0**-4))
 
 
-def with_slip(step: float) -> float:
+def slip_ratio(step: float) -> float:
     """Return the greatest closure error divided by the greatest error of u if Runge-Kutta's method has the wrong stages `SLIP`.
 
     The motion is integrated by the first approach.
     """
-    states = by_runge_kutta(step, True, SLIP)
+    states = integrate_by_runge_kutta(step, True, SLIP)
     crank = OMEGA * np.linspace(0.0, STOP, len(states))
-    return float(opening(np.array([crank, *states[:, :3].T])).max()) / integration_error(states[:, 2])
+    return float(closure_error(np.array([crank, *states[:, :3].T])).max()) / integration_error(states[:, 2])
 
 
 def stable_steps(rate: complex, steps: int = 400) -> tuple[float, float]:
@@ -333,7 +342,7 @@ def order_of_series(highest: int) -> float:
     return log2(errors[0] / errors[1])
 
 
-def opening(q: NDArray[np.float64]) -> NDArray[np.float64]:
+def closure_error(q: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return the closure error (cm), eq (2.1), for each column of q, shape (4, n)."""
     lengths = np.array([TABLE.crank_length, TABLE.coupler_length, -TABLE.rocker_length])
     gap: NDArray[np.float64] = CM_PER_METRE * np.abs(lengths @ np.exp(1j * q[:3]) - TABLE.ground_length - q[3])
@@ -345,14 +354,21 @@ def evaluations_a_step() -> float:
     counts = []
     for stop in (0.4, 0.5):
         found = solve_ivp(
-            slider_alone, (0.0, stop), [0.0, 0.0], method=Hamming, first_step=1e-3, max_step=1e-3, rtol=1e3, atol=1e9
+            slider_derivatives,
+            (0.0, stop),
+            [0.0, 0.0],
+            method=Hamming,
+            first_step=1e-3,
+            max_step=1e-3,
+            rtol=1e3,
+            atol=1e9,
         )
         counts.append((found.nfev, len(found.t)))
     (fewer, short), (more, long) = counts
     return float((more - fewer) / (long - short))
 
 
-def parasite(past: ArrayLike, rates: ArrayLike, h: float) -> float:
+def spurious_root(past: ArrayLike, rates: ArrayLike, h: float) -> float:
     """Return the greatest modulus of a corrector's spurious roots on y' = -y with a step h.
 
     The spurious roots are all but the one near exp(-h). ``past`` and ``rates`` are the corrector's coefficients of y and of y'.
@@ -361,7 +377,7 @@ def parasite(past: ArrayLike, rates: ArrayLike, h: float) -> float:
     return float(np.abs(np.delete(roots, np.abs(roots - np.exp(-h)).argmin())).max())
 
 
-def multipliers() -> tuple[Case, ...]:
+def judge_multipliers() -> tuple[Case, ...]:
     """Compare the multipliers with torque and force of the plant, at constant speed and under a torque."""
     worst: dict[str, float] = {}
     force = {"force at C in y": ("pin.C.fy", 1), "force at C in x": ("pin.C.fx", 2)}
@@ -371,7 +387,7 @@ def multipliers() -> tuple[Case, ...]:
     ):
         run = simulate(TABLE, inputs, stop_time=0.3, step=0.003)
         for i in range(1, len(run)):
-            where = closed(
+            where = closed_loop_state(
                 *(run[name][i] for name in ("crank.angle", "slider.position", "crank.speed", "slider.velocity"))
             )
             w = solve_multipliers(*where, None if inputs.speed is not None else run["drive.applied_torque"][i])
@@ -383,7 +399,7 @@ def multipliers() -> tuple[Case, ...]:
 
 def compute() -> StudyResult:
     """Judge chapter II and section 3.1, and compute the closure error of the loop over time."""
-    found = {_step(step): integrated(step) for step in STEPS}
+    found = {_step(step): integrate_both(step) for step in STEPS}
     columns = {"time [s]": found[_step(STEPS[0])].times}
     for label, run in found.items():
         columns[f"failure of closure; {label} [cm]"] = np.interp(columns["time [s]"], run.times, run.gap)
@@ -400,7 +416,7 @@ def compute() -> StudyResult:
                 "have none, relative to the greatest of each; Table 3.1, k = 1e6 dyn/cm, mu = 3e4 dyn.s/cm, 0.3 s from u = u' "
                 "= 0, at 420 rpm and, by 3.2.2, with T0 = 1e8 dyn.cm",
                 f"{ROUNDING:g}, above rounding errors",
-                multipliers(),
+                judge_multipliers(),
                 "where our scan differs, (3.8) has the minus of l2 cos theta2 as in (4.10), and (3.10) has k for k2",
             ),
             *_closure_statements(),
@@ -416,8 +432,12 @@ def _step(step: float) -> str:
 
 def _closure_statements() -> list[Statement]:
     """Judge section 3.1: what the closure of the loop shows of the error."""
-    found, long, label = {_step(step): integrated(step) for step in STEPS}, integrated(LONG_STEP), _step(LONG_STEP)
-    travel = CM_PER_METRE * float(np.ptp(exact()(np.linspace(0.0, STOP, 2001))[0]))
+    found, long, label = (
+        {_step(step): integrate_both(step) for step in STEPS},
+        integrate_both(LONG_STEP),
+        _step(LONG_STEP),
+    )
+    travel = CM_PER_METRE * float(np.ptp(exact_motion()(np.linspace(0.0, STOP, 2001))[0]))
     return [
         Statement(
             "The accuracy or even the debugging of the integration procedure may then be examined by simple checks on loop "
@@ -428,8 +448,8 @@ def _closure_statements() -> list[Statement]:
             "Runge-Kutta's method with a slip of ours, its last stage at mid-step",
             "1 to 100, ours: the check shows an error, and no more than a hundred times as large as it is",
             (
-                *shown_by_closure(),
-                Case(label=f"a slip; {_step(STEP)}", computed=with_slip(STEP), lower=1.0, upper=100.0),
+                *judge_closure(),
+                Case(label=f"a slip; {_step(STEP)}", computed=slip_ratio(STEP), lower=1.0, upper=100.0),
             ),
         ),
         Statement(
@@ -471,7 +491,7 @@ def _closure_statements() -> list[Statement]:
                 *(at_most(name, 1.0, run.errors[1] / run.gap.max()) for name, run in found.items()),
                 *(
                     at_most(f"launch; {_step(step)}", 1.0, errors[1] / gap, why=KINK)
-                    for step, (gap, errors) in ((step, launched(step)) for step in STEPS)
+                    for step, (gap, errors) in ((step, integrate_launch(step)) for step in STEPS)
                 ),
             ),
         ),
@@ -480,18 +500,18 @@ def _closure_statements() -> list[Statement]:
 
 def _one_step_statements() -> list[Statement]:
     """Judge section 2.4 on the Runge-Kutta methods and on series."""
-    halved = max(max(ratio, 1.0 / ratio) for ratio in map(of_runge_kutta, STEPS))
+    halved = max(max(ratio, 1.0 / ratio) for ratio in map(runge_kutta_estimate_ratio, STEPS))
     classical, hamming = stable_steps(1j)
     # as many evaluations: twice the step, with four a step instead of two
     dearer = {
         f"{approach} approach, Hamming's {_step(step)}": integration_error(
-            by_runge_kutta(2.0 * step, i == 0)[:, 2 - 2 * i]
+            integrate_by_runge_kutta(2.0 * step, i == 0)[:, 2 - 2 * i]
         )
-        / integrated(step).errors[i]
+        / integrate_both(step).errors[i]
         for i, approach in enumerate(("first", "second"))
         for step in (STEPS[1], STEPS[-1])
     }
-    used = runge_kutta(slider_alone, [0.0, 0.0], STEP, 1).evaluations
+    used = runge_kutta(slider_derivatives, [0.0, 0.0], STEP, 1).evaluations
     return [
         Statement(
             "Their [the Runge-Kutta methods'] serious drawbacks are, firstly, the lack of simple means of estimating the "
@@ -553,12 +573,12 @@ def _one_step_statements() -> list[Statement]:
 
 def _hamming_statements() -> list[Statement]:
     """Judge section 2.4 on the predictor-corrector methods."""
-    order = np.log2(integrated(STEPS[-1]).errors[1] / integrated(0.5 * STEPS[-1]).errors[1])
-    estimates, errors, _ = estimated()
-    rounded, _, roundings = estimated(unit=UNIT)
+    order = np.log2(integrate_both(STEPS[-1]).errors[1] / integrate_both(0.5 * STEPS[-1]).errors[1])
+    estimates, errors, _ = estimated_errors()
+    rounded, _, roundings = estimated_errors(unit=UNIT)
     truncation = float(np.abs(estimates).max() / np.abs(errors).max())
     roundoff = float(np.std(rounded - estimates) / np.std(roundings))
-    inherent = float(np.abs(estimated(START_ERROR)[0] - estimates).max()) / START_ERROR
+    inherent = float(np.abs(estimated_errors(START_ERROR)[0] - estimates).max()) / START_ERROR
     return [
         Statement(
             "They [the predictor-corrector methods] provide an easy estimate of the errors, inherent, roundoff or "
@@ -590,7 +610,7 @@ def _hamming_statements() -> list[Statement]:
                 at_most(
                     "convergent",
                     1.0,
-                    parasite((1, 0, -1), (1 / 3, 4 / 3, 1 / 3), 0.1),
+                    spurious_root((1, 0, -1), (1 / 3, 4 / 3, 1 / 3), 0.1),
                     why="Milne's corrector is weakly unstable",
                 ),
             ),

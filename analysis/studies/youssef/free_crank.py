@@ -27,14 +27,14 @@ from ...run import Event, Inputs, TorsionBar, Trajectory, simulate
 from ...units import CM_PER_METRE, RAD_S_PER_RPM
 from ..rules import ABOUT, ALIKE, SMALL
 from ..statements import Case, Statement, at_least, at_most, near, text
-from ..study import Study, StudyResult, padded
+from ..study import Study, StudyResult, pad_columns
 from ..variation import cache
 from .runs import (
     ALIKE_WORDS,
     SIGN,
     SPEED,
     STIFFNESSES,
-    from_line,
+    distance_from_line,
     greatest,
     greatest_ratio,
     plain,
@@ -83,12 +83,12 @@ def launch(
 
 
 def release_time(torque: float, stiffness: float = 1e6, stop_time: float = 1.0) -> float:
-    """Return the time from rest to th2 = 1 rad (s); infinite if the crank falls back before it gets there."""
+    """Return the time from rest to th2 = 1 rad (s); infinite if the crank falls back before this angle."""
     events = launch(torque, stiffness, stop_time).events
     return events[0].time if events else np.inf
 
 
-def accelerated(torque: float, stiffness: float = 1e6) -> Trajectory:
+def run_acceleration(torque: float, stiffness: float = 1e6) -> Trajectory:
     """Run a launch up to th2 = 1 rad, where its torque ends."""
     return launch(torque, stiffness, release_time(torque, stiffness), 1000)
 
@@ -165,7 +165,7 @@ class Turns:
 
     @property
     def shown(self) -> int:
-        """Number of turns up to the first whose mean crank speed is below `HARMONIC_SPEED`, this turn included."""
+        """Return the number of turns up to the first whose mean crank speed is below `HARMONIC_SPEED`, this turn included."""
         return 1 + int(np.argmax(self.speed < HARMONIC_SPEED))
 
 
@@ -211,10 +211,10 @@ def settling(torque: float, stiffness: float) -> Settling:
 
 def turn_by_turn(run: Trajectory, output: str, start: float) -> NDArray[np.float64]:
     """Sample an output over each whole turn from the crank angle ``start`` (rad), shape (turns, SAMPLES)."""
-    return over_turns(run["crank.angle"], run[output], start)
+    return sample_turns(run["crank.angle"], run[output], start)
 
 
-def over_turns(angle: NDArray[np.float64], values: NDArray[np.float64], start: float = 0.0) -> NDArray[np.float64]:
+def sample_turns(angle: NDArray[np.float64], values: NDArray[np.float64], start: float = 0.0) -> NDArray[np.float64]:
     """Sample values, given at crank angles (rad), over each whole turn from the angle ``start``, shape (turns, SAMPLES)."""
     marks = np.arange(start, angle[-1], 2.0 * pi)
     grid = marks[:-1, None] + np.linspace(0.0, 2.0 * pi, SAMPLES, endpoint=False)
@@ -249,7 +249,9 @@ def _launch_result(
     columns = {TIME: next(iter(runs.values())).time}
     columns |= {f"{name}; {label} [{unit}]": factor * run[output] for label, run in runs.items()}
     columns |= {f"end of the torque; {label} [s]": np.array([run.events[0].time]) for label, run in runs.items()}
-    return StudyResult(number=number, claim=claim, assignment=UNSAID, columns=padded(columns), statements=statements)
+    return StudyResult(
+        number=number, claim=claim, assignment=UNSAID, columns=pad_columns(columns), statements=statements
+    )
 
 
 def draw_launches(values: Sequence[float], legend: str, result: StudyResult) -> Figure:
@@ -281,7 +283,8 @@ RISE = (
 def _rise_cases(runs: Mapping[str, Trajectory]) -> tuple[Case, ...]:
     """Judge whether the crank speed rises linearly, and whether it peaks before the torque ends."""
     bows = [
-        at_most(f"distance from a line; {label}", ALIKE, from_line(*_rise_to_peak(run))) for label, run in runs.items()
+        at_most(f"distance from a line; {label}", ALIKE, distance_from_line(*_rise_to_peak(run)))
+        for label, run in runs.items()
     ]
     angle = max(run_peak(run).angle for run in runs.values())
     return (*bows, at_most("crank angle of the peak, greatest", 1.0, angle, "rad"))
@@ -377,7 +380,7 @@ def launch_speeds() -> StudyResult:
     """Compute the crank speed after launches with the three torques."""
     runs = _torque_runs()
     undamped = {label: _launches(torque, 1e6) for label, torque in zip(runs, TORQUES)}
-    rises = {label: accelerated(torque) for label, torque in zip(runs, TORQUES)}
+    rises = {label: run_acceleration(torque) for label, torque in zip(runs, TORQUES)}
     return _launch_result(
         "3.6",
         "The speed rises linearly until the torque no longer accelerates the crank, then swings and decays.",
@@ -515,7 +518,7 @@ def launch_positions() -> StudyResult:
 
 def launch_speeds_by_spring() -> StudyResult:
     """Compute the crank speed after launches with the three springs."""
-    rises = {label: accelerated(1e8, k) for label, k in zip(_spring_runs(), STIFFNESSES)}
+    rises = {label: run_acceleration(1e8, k) for label, k in zip(_spring_runs(), STIFFNESSES)}
     speeds = np.array([run["crank.speed"] for run in rises.values()])
     loads = np.array([np.hypot(run["pin.C.fx"], run["pin.C.fy"]) for run in rises.values()])
     undamped = {label: _launches(1e8, k) for label, k in zip(rises, STIFFNESSES)}
@@ -559,10 +562,10 @@ def launch_speeds_by_spring() -> StudyResult:
 def launch_positions_by_spring() -> StudyResult:
     """Compute the slider position after launches with the three springs."""
     runs = _spring_runs()
-    apart = np.ptp([accelerated(1e8, k)["slider.position"] for k in STIFFNESSES], axis=0).max()
-    apart /= np.ptp([accelerated(1e8, k)["slider.position"] for k in STIFFNESSES])
+    apart = np.ptp([run_acceleration(1e8, k)["slider.position"] for k in STIFFNESSES], axis=0).max()
+    apart /= np.ptp([run_acceleration(1e8, k)["slider.position"] for k in STIFFNESSES])
     settled, by_torque = [settling(1e8, k) for k in STIFFNESSES], [settling(torque, 1e6) for torque in TORQUES]
-    times = {name: [x.time for x in of] for name, of in (("springs", settled), ("torques", by_torque))}
+    times = {name: [x.time for x in settlings] for name, settlings in (("springs", settled), ("torques", by_torque))}
     return _launch_result(
         "3.10",
         "The slider moves alike with all springs while the torque acts; a transient follows, whose duration depends "
@@ -789,7 +792,7 @@ def soft_phase_plane() -> StudyResult:
             "effect",
             (
                 *(at_least(label, SMALL, drawn_harmonics(k).min()) for label, k in BOTH.items()),
-                *(at_least(f"non-linear; {label}", 1.0 + ALIKE, beyond_linear(k)) for label, k in BOTH.items()),
+                *(at_least(f"non-linear; {label}", 1.0 + ALIKE, harmonics_over_linear(k)) for label, k in BOTH.items()),
             ),
             "the equation linear in u has these harmonics too: the geometry of the linkage forces them",
         ),
@@ -847,10 +850,10 @@ def drawn_harmonics(stiffness: float) -> NDArray[np.float64]:
     return higher_harmonics(turn_by_turn(run, "slider.position", 0.0))[: Turns.of(run).shown]
 
 
-def beyond_linear(stiffness: float) -> float:
+def harmonics_over_linear(stiffness: float) -> float:
     """Return the greatest ratio of `drawn_harmonics` to the higher harmonics of the linear motion in the same turn."""
     found = drawn_harmonics(stiffness)
-    return float((found / higher_harmonics(over_turns(*linear_motion(stiffness)))[: len(found)]).max())
+    return float((found / higher_harmonics(sample_turns(*linear_motion(stiffness)))[: len(found)]).max())
 
 
 def stiff_phase_plane() -> StudyResult:
@@ -906,7 +909,7 @@ def stiff_phase_plane() -> StudyResult:
             f"{1.0 + ALIKE:g}, the rule for *the same*, for a non-linearity",
             (
                 Case(label="resonance", computed=resonance / half, lower=1.0 - lowered, upper=1.0),
-                at_least("non-linearity", 1.0 + ALIKE, beyond_linear(STIFF)),
+                at_least("non-linearity", 1.0 + ALIKE, harmonics_over_linear(STIFF)),
             ),
             "the equation linear in u has it too: the second harmonic of the force meets the natural frequency",
         ),

@@ -11,7 +11,7 @@ from ...figures import COLOURS, Curve, Figure, Panel, plot_curves
 from ...units import CM_PER_METRE, RAD_S_PER_RPM
 from ..rules import READ
 from ..statements import Statement, near, text
-from ..study import Study, StudyResult, padded, result_curves
+from ..study import Study, StudyResult, pad_columns, result_curves
 from .rigs import LOST, rig, turn
 
 # --- 8.4: crank speed from the widths of the photocell's pulses
@@ -22,7 +22,7 @@ HOLES, INERTIAS = 60, (5e-3, 2e-2)
 PULSED = 420.0
 
 
-def speed_of_crank(inertia: float) -> NDArray[np.float64]:
+def crank_speed(inertia: float) -> NDArray[np.float64]:
     """Return the crank speed (rad/s) over a turn under a constant drive torque, for a crank inertia (kg.m2).
 
     The torque that the links need is that of the steady motion at `PULSED` rpm.
@@ -33,7 +33,7 @@ def speed_of_crank(inertia: float) -> NDArray[np.float64]:
     return np.asarray(np.sqrt((PULSED * RAD_S_PER_RPM) ** 2 + 2.0 * (energy - energy.mean()) / inertia))
 
 
-def speed_by_pulses(speed: NDArray[np.float64]) -> NDArray[np.float64]:
+def pulse_speeds(speed: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return the mean speeds between successive holes (rad/s), from the times at which the holes pass the photocell."""
     angle = np.linspace(0.0, 2.0 * pi, len(speed))
     time = np.append(0.0, np.cumsum(0.5 * (1.0 / speed[1:] + 1.0 / speed[:-1]) * np.diff(angle)))
@@ -43,8 +43,8 @@ def speed_by_pulses(speed: NDArray[np.float64]) -> NDArray[np.float64]:
 
 def compute_pulses() -> StudyResult:
     """Compute the crank speed over a turn, and the speed that the widths of the pulses give."""
-    speeds = {inertia: speed_of_crank(inertia) for inertia in INERTIAS}
-    pulses = {inertia: speed_by_pulses(speed) for inertia, speed in speeds.items()}
+    speeds = {inertia: crank_speed(inertia) for inertia in INERTIAS}
+    pulses = {inertia: pulse_speeds(speed) for inertia, speed in speeds.items()}
     crank_angle = np.linspace(0.0, 360.0, len(speeds[INERTIAS[0]]))
     columns = {"crank angle [deg]": crank_angle, "place of a pulse [deg]": (np.arange(HOLES) + 0.5) * 360.0 / HOLES}
     for inertia in INERTIAS:
@@ -56,7 +56,7 @@ def compute_pulses() -> StudyResult:
         claim="The widths of the pulses of a photocell behind sixty holes show whether the speed varies within a turn.",
         assignment="No moment of inertia of crank and flywheels is printed: two are tried out, driven by a constant torque, "
         f"with spring A about {PULSED:g} rpm; the torque of the links is that at this speed.",
-        columns=padded(columns),
+        columns=pad_columns(columns),
         statements=(
             Statement(
                 "Since each pulse corresponds to a hole a comparison of the width of each shows whether the speed varies "

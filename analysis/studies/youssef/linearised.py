@@ -82,7 +82,7 @@ def _by_print(sigma2: float, zeta: float) -> tuple[NDArray[np.float64], NDArray[
     return by_rocker / (COUPLER * sin(a4 - a3)), by_coupler / sin(a4 - a3)
 
 
-def eliminations(sigma2: float) -> dict[str, float]:
+def elimination_residuals(sigma2: float) -> dict[str, float]:
     """Return the greatest residuals of (4.5) and (4.7) over a turn, relative to sigma2, for xi3 and xi4 by (4.8)."""
     zeta = 0.5 * sigma2
     (alpha, a3, a4), (xi3, xi4) = datum(sigma2, sigma3=COUPLER), _by_print(sigma2, zeta)
@@ -129,7 +129,7 @@ def residuals() -> dict[str, float]:
     return worst
 
 
-def coefficients(sigma2: float, inertia_ratio: float = 1.0) -> dict[str, float]:
+def coefficient_ratios(sigma2: float, inertia_ratio: float = 1.0) -> dict[str, float]:
     """Return the coefficients of (4.21) as printed, each divided by the correct coefficient of first order.
 
     The printed coefficients are evaluated at the datum of (4.1).
@@ -172,7 +172,7 @@ def _first_order_quotient(part: FourierSeries, by: FourierSeries) -> tuple[float
     return mean, *((x[1] - mean * y[1]) / by.mean for x, y in ((part.cos, by.cos), (part.sin, by.sin)))
 
 
-def expansion(sigma2: float) -> dict[str, NDArray[np.float64]]:
+def expansion_errors(sigma2: float) -> dict[str, NDArray[np.float64]]:
     """Return the errors of the expansions (4.23) to (4.28) of the quotients in (4.21), as printed, by name.
 
     Each error is given by the magnitudes of its complex Fourier coefficients: mean, first and second harmonic; shape (3,).
@@ -215,7 +215,7 @@ def recurrence(equation: SliderEquation, mean: float) -> tuple[NDArray[np.float6
     return np.array(a), np.array(right)
 
 
-def balanced(omega_c: float, as_printed: bool = True) -> float:
+def balance_error(omega_c: float, as_printed: bool = True) -> float:
     """Return the greatest relative error of the solution of (4.34), compared with the balance of (4.29), at `BALANCED_AT`.
 
     If ``as_printed`` is False, (4.34) has lambda_c k0 in place of lambda_c.
@@ -241,7 +241,7 @@ def compute() -> StudyResult:
     }
     columns = {"crank angle [deg]": np.degrees(TURN)}
     for i, name in enumerate(("inertia M", "stiffness K", "force F")):
-        columns |= {f"{name}; {way} [1]": of[i](TURN) for way, of in ways.items()}
+        columns |= {f"{name}; {way} [1]": parts[i](TURN) for way, parts in ways.items()}
     return StudyResult(
         number="4.2",
         claim="The equations (4.1) to (4.35), one by one, each against the plant or the equations before it.",
@@ -285,7 +285,7 @@ def _kinematics() -> list[Statement]:
             f"{ROUNDING:g}, above rounding errors; 2, the first order that is neglected in (4.4), and 0.05, as an order is "
             "a whole number",
             (
-                *(at_most(f"residual of {name}", ROUNDING, x) for name, x in eliminations(SHORT[0]).items()),
+                *(at_most(f"residual of {name}", ROUNDING, x) for name, x in elimination_residuals(SHORT[0]).items()),
                 *(near(f"order of the error of {name}", 2.0, x, 0.05) for name, x in zip(("xi3", "xi4"), orders)),
             ),
         ),
@@ -320,7 +320,7 @@ def _equation() -> list[Statement]:
                     Case(label=name, computed=None, why="its sign cannot be read, its size is right")
                     if name.startswith("P1")
                     else near(name, 1.0, x, LIMIT, why="three times too large")
-                    for name, x in coefficients(SHORT[1]).items()
+                    for name, x in coefficient_ratios(SHORT[1]).items()
                 ),
                 near("zeta' without a damper", 1.0, 0.0, LIMIT, why="M' zeta' is missing"),
             ),
@@ -331,7 +331,7 @@ def _equation() -> list[Statement]:
 
 def _simplification() -> list[Statement]:
     """Judge section 4.3: the expansion in epsilon, eqs (4.22) to (4.28)."""
-    longer, shorter = (expansion(x) for x in SHORT)
+    longer, shorter = (expansion_errors(x) for x in SHORT)
     left = {name: np.log2(longer[name] / shorter[name]) for name in longer}
     return [
         Statement(
@@ -380,7 +380,7 @@ def _balance() -> list[Statement]:
             text("4.4.1, eqs (4.30) to (4.33), L2988-3049"),
             f"{solution}; without a damper; signs that the scan of (4.32) has lost are those of (4.34)",
             f"{ROUNDING:g}, above rounding errors",
-            (at_most("", ROUNDING, balanced(0.0)),),
+            (at_most("", ROUNDING, balance_error(0.0)),),
         ),
         Statement(
             "Assuming a solution of [zeta] as described in (4.30) and substituting it in equation (4.29), then multiplying "
@@ -389,7 +389,7 @@ def _balance() -> list[Statement]:
             text("4.4.2, eqs (4.34), (4.35), L3053-3099"),
             f"{solution}; with omega_c = 1.2 1/s, the greatest of appendix 2",
             f"{ROUNDING:g}, above rounding errors",
-            (at_most("", ROUNDING, balanced(1.2)),),
+            (at_most("", ROUNDING, balance_error(1.2)),),
             "2 lambda_c and 4 lambda_c stand for 2 lambda_c k0 and 4 lambda_c k0",
         ),
     ]

@@ -16,7 +16,7 @@ from ...synthesis import Straightness, straight_parts, turn
 from ...units import CM_PER_METRE
 from ..rules import ALIKE
 from ..statements import Statement, at_most, text
-from ..study import Study, StudyResult, padded
+from ..study import Study, StudyResult, pad_columns
 from .chapter_6 import (
     FOUND,
     PRINTED,
@@ -76,7 +76,7 @@ def compute() -> StudyResult:
             "The figure with region and points is missing in our copy; the target drawn is the polygon of the ten points of "
             "the program (L9021)."
         ),
-        columns=padded(columns),
+        columns=pad_columns(columns),
         statements=(
             Statement(
                 "A packaging machine in the form of a four bar is required to generate a path which is acceptable anywhere "

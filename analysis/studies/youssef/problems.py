@@ -73,7 +73,7 @@ class PublishedProblem:
 
     @property
     def linkage(self) -> syn.Linkage:
-        """The printed linkage with its misprints mended, if it has any."""
+        """Return the printed linkage with its misprints mended, if it has any."""
         return self.mended or self.printed
 
     def convert(self, error: float) -> float:

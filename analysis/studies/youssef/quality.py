@@ -24,7 +24,7 @@ from ...synthesis import LINKS, USUAL, LargestLink, Linkage, UntimedPath, area_d
 from ...units import CM_PER_METRE
 from ..rules import ALIKE
 from ..statements import Case, Statement, at_least, at_most, near, text
-from ..study import Study, StudyResult, padded
+from ..study import Study, StudyResult, pad_columns
 from .chapter_6 import SEARCH, TABLE, TRANSMISSION, FloatArray, best, printed_error
 from .problems import AREA_N, CM2_PER_M2, PROBLEMS
 
@@ -49,18 +49,18 @@ class Quality(NamedTuple):
 
     @property
     def combined(self) -> float:
-        """Sum of both quality functions (cm2)."""
+        """Return the sum of both quality functions (cm2)."""
         return self.timed + self.area
 
 
-def both(linkage: Linkage) -> Quality:
+def qualities(linkage: Linkage) -> Quality:
     """Return both quality functions of a linkage for ellipse (a)."""
     assert isinstance(PATH.task, UntimedPath)
     area = area_difference(linkage.path(turn(AREA_N)), PATH.task.path)
     return Quality(TIMED.convert(evaluate(TIMED.task, linkage).error), CM2_PER_M2 * area)
 
 
-def in_time(linkage: Linkage) -> Linkage:
+def with_best_phase(linkage: Linkage) -> Linkage:
     """Return the linkage with the crank phase that makes its error for the timed ellipse least."""
 
     def error(phase: float) -> float:
@@ -85,7 +85,7 @@ def least_combined(start: Linkage) -> Linkage:
         found = linkage(x)
         if found.largest_link > LONGEST or degrees(found.least_transmission) < TRANSMISSION:
             return REFUSED
-        return both(found).combined
+        return qualities(found).combined
 
     x = start.vector / unit
     for size in SIZE / 2.0 ** np.arange(ROUNDS):
@@ -94,7 +94,7 @@ def least_combined(start: Linkage) -> Linkage:
     return linkage(x)
 
 
-def below(name: str) -> float:
+def descent_error(name: str) -> float:
     """Return the error (unit of print) at the end of a descent that starts from the printed linkage of a problem."""
     p, longest = PROBLEMS[name], PROBLEMS[name].linkage.largest_link
     unit = np.append(np.full(7, longest), np.ones(3))
@@ -119,50 +119,55 @@ def linkages() -> dict[str, Linkage]:
     """
     limits = (*USUAL, LargestLink(length=LONGEST))
     timed = synthesize(TIMED.task, TIMED.bounds, limits, search=SEARCH).best.linkage
-    ours = {"ours; timed": timed, "ours; path": in_time(best("path-a").linkage)}
+    ours = {"ours; timed": timed, "ours; path": with_best_phase(best("path-a").linkage)}
     starts = (*ours.values(), best("ellipse-a").linkage)
-    found = min(map(least_combined, starts), key=lambda linkage: both(linkage).combined)
-    return {"printed; timed": TIMED.linkage, "printed; path": in_time(PATH.linkage), **ours, "ours; combined": found}
+    found = min(map(least_combined, starts), key=lambda linkage: qualities(linkage).combined)
+    return {
+        "printed; timed": TIMED.linkage,
+        "printed; path": with_best_phase(PATH.linkage),
+        **ours,
+        "ours; combined": found,
+    }
 
 
-def arguments(seed: int = 64) -> FloatArray:
+def assembly_arguments(seed: int = 64) -> FloatArray:
     """Return the argument of the square root in (6.12) for random four-bars at 72 crank angles, shape (SAMPLES, 72)."""
     l1, l2, l3, l4 = np.random.default_rng(seed).uniform(0.1, 1.0, (4, SAMPLES, 1))
     span = l1**2 + l2**2 - 2.0 * l1 * l2 * np.cos(turn(72))
     return np.asarray(4.0 * l4**2 * span - (l3**2 - l4**2 - span) ** 2)
 
 
-def least_away_from_ends() -> int:
+def count_least_inside() -> int:
     """Count the random four-bars whose argument (6.12) is least at a crank angle other than 0 or 180 deg."""
-    found = arguments()
+    found = assembly_arguments()
     return int((found.min(axis=1) < found[:, [0, 36]].min(axis=1) - 1e-12).sum())
 
 
-def wrong_by_extremes() -> int:
-    """Count the random four-bars for which a test at 0 and 180 deg is wrong on whether they close at all crank angles."""
-    closes = arguments() >= 0.0
+def count_wrong_extremes() -> int:
+    """Count the random four-bars for which a test at 0 and 180 deg misjudges whether they close at all crank angles."""
+    closes = assembly_arguments() >= 0.0
     return int((closes[:, [0, 36]].all(axis=1) != closes.all(axis=1)).sum())
 
 
-def late_violations() -> int:
+def count_late_violations() -> int:
     """Count the random four-bars that close at the first crank angle, but not at every later one."""
-    found = arguments()
+    found = assembly_arguments()
     return int(((found[:, 0] >= 0.0) & (found < 0.0).any(axis=1)).sum())
 
 
 def compute() -> StudyResult:
     """Compute both quality functions of the linkages, and judge the statements."""
-    q = {name: both(linkage) for name, linkage in linkages().items()}
+    q = {name: qualities(linkage) for name, linkage in linkages().items()}
     found, timed, path = q["ours; combined"], q["ours; timed"], q["ours; path"]
     columns = {
         f"{name} {what} [cm2]": [getattr(value, what)] for name, value in q.items() for what in ("timed", "area")
     }
-    ratios = {f"Fig {n}": printed_error(row.problem) / below(row.problem) for n, row in TABLE.items()}
+    ratios = {f"Fig {n}": printed_error(row.problem) / descent_error(row.problem) for n, row in TABLE.items()}
     return StudyResult(
         number=NUMBER,
         claim="The quality functions of function and path generation may be combined into one; ellipse (a).",
         assignment="The thesis gives no example: problem, equal weights and the limit of the links are our choice.",
-        columns=padded(columns),
+        columns=pad_columns(columns),
         statements=(
             Statement(
                 "In path generation it is clear that minimisation of the above quality function would yield a [minimum] error. "
@@ -194,7 +199,7 @@ def compute() -> StudyResult:
                 f"number of {SAMPLES} random four-bars, lengths from 0.1 to 1, for which C of (6.12) is less at another of 72 "
                 "crank angles",
                 "none of a count",
-                (near("least elsewhere", 0.0, least_away_from_ends(), 0.0),),
+                (near("least elsewhere", 0.0, count_least_inside(), 0.0),),
                 "it is so for all lengths, since C has -4 l1^2 l2^2 times the square of Coswt",
             ),
             Statement(
@@ -207,8 +212,8 @@ def compute() -> StudyResult:
                 "number for which (6.14) and these angles disagree; values of C that (b) takes over those of (a)",
                 "one, enough for *may be*; none of a count; at most 1, since (b) is preferable",
                 (
-                    at_least("violated at later stages", 1.0, late_violations()),
-                    near("(6.14) disagrees", 0.0, wrong_by_extremes(), 0.0),
+                    at_least("violated at later stages", 1.0, count_late_violations()),
+                    near("(6.14) disagrees", 0.0, count_wrong_extremes(), 0.0),
                     at_most("values of C", 1.0, 2.0 / 72.0),
                 ),
             ),

@@ -47,7 +47,7 @@ def equation(
     return slider_equation(undamped, crank_speed(0.25), variant=variant, form=form).homogeneous()
 
 
-def hill(parameters: FiveBarParameters, number: int = 1, variant: Variant = Variant.EXACT) -> Region:
+def hill_region(parameters: FiveBarParameters, number: int = 1, variant: Variant = Variant.EXACT) -> Region:
     """Return the region of instability N = ``number`` by Hill's determinant, eq (5.35)."""
     return hill_regions(equation(parameters, variant), number)[number]
 
@@ -56,22 +56,22 @@ def hill(parameters: FiveBarParameters, number: int = 1, variant: Variant = Vari
 def orbit_region(parameters: FiveBarParameters) -> Region:
     """Return the first region of the true periodic orbit; the search starts near the region of the linear equation."""
     test = orbit_test(lambda lambda_k2, _: (parameters, Drive(speed=crank_speed(lambda_k2))), -1)
-    linear = hill(parameters)
+    linear = hill_region(parameters)
     found = scan(lambda x: test(x, 0.0), linear.low - 0.5 * linear.width, linear.high + 0.5 * linear.width, samples=8)
     low, high = found.roots.tolist()
     return Region(number=1, low=low, high=high)
 
 
-def first_order(parameters: FiveBarParameters, variant: Variant) -> Region:
+def first_order_region(parameters: FiveBarParameters, variant: Variant) -> Region:
     """Return the first region by eq (5.16), with the coefficients of a variant of the equation."""
     region = perturbed_region(equation(parameters, variant, Form.SERIES), 1, order=1)
     assert region is not None, "there is no damping"
     return region
 
 
-def appendix_3(parameters: FiveBarParameters) -> Region:
+def appendix_3_region(parameters: FiveBarParameters) -> Region:
     """Return the first region by eq (5.16) as listed in appendix 3: no 1/k0 in the half width, and a sine for a cosine."""
-    region = first_order(parameters, Variant.APPENDIX_3)
+    region = first_order_region(parameters, Variant.APPENDIX_3)
     middle = 0.5 * (region.low + region.high)
     half = 0.5 * region.width * equation(parameters, Variant.APPENDIX_3, Form.SERIES).factor.mean
     return Region(number=1, low=middle - half, high=middle + half)
@@ -80,9 +80,9 @@ def appendix_3(parameters: FiveBarParameters) -> Region:
 #: Methods that compute the first region, by their names in columns and legends.
 WAYS: Mapping[str, Callable[[FiveBarParameters], Region]] = {
     "true orbit": orbit_region,
-    "linear equation": hill,
-    "(4.21) as printed": partial(first_order, variant=Variant.PRINTED),
-    "listing of appendix 3": appendix_3,
+    "linear equation": hill_region,
+    "(4.21) as printed": partial(first_order_region, variant=Variant.PRINTED),
+    "listing of appendix 3": appendix_3_region,
 }
 LOOKS = {"true orbit": "-", "linear equation": "--", "(4.21) as printed": ":", "listing of appendix 3": "-."}
 
@@ -90,4 +90,4 @@ LOOKS = {"true orbit": "-", "linear equation": "--", "(4.21) as printed": ":", "
 def removing_estimate(parameters: FiveBarParameters, number: int = 1) -> float:
     """Estimate the damper omega_c (1/s) that removes a region of the corrected linear equation, from the region's width."""
     found = equation(parameters)
-    return perturbed_removing_damping(found, number) * crank_speed(hill(parameters, number).low)
+    return perturbed_removing_damping(found, number) * crank_speed(hill_region(parameters, number).low)

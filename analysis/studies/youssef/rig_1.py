@@ -11,7 +11,7 @@ from ...periodic import SpecialPoint, Sweep, sweep
 from ...units import CM_PER_METRE, RAD_S_PER_RPM
 from ..rules import ABOUT_DEG, ALIKE, SLIGHTLY
 from ..statements import Case, Statement, at_least, at_most, text
-from ..study import Study, StudyResult, padded, result_curves
+from ..study import Study, StudyResult, pad_columns, result_curves
 from ..variation import cache
 from .rigs import (
     FASTEST,
@@ -22,9 +22,9 @@ from .rigs import (
     amplitude,
     branch_columns,
     curves_over_speed,
+    friction_amplitudes,
     marks,
     motions,
-    over_speed,
     resonant_b,
     rig,
     slider,
@@ -45,7 +45,7 @@ NAMES = ("below resonance", "lower branch", "upper branch", "period of two turns
 
 
 @cache
-def swept(spring: str, rising: bool) -> Sweep:
+def sweep_speed(spring: str, rising: bool) -> Sweep:
     """Sweep the speed up or down in steps: with spring A over all speeds, with spring B about resonance."""
     low, step = (SLOWEST, 25.0) if spring == "A" else (SPLIT, STEP)
     speeds = np.arange(low, FASTEST[spring] + 1.0, step) * RAD_S_PER_RPM
@@ -63,7 +63,7 @@ def compute_rig_1() -> StudyResult:
     for name, branch in zip(NAMES, motions("B").branches + resonant_b().branches):
         columns |= branch_columns(branch, f"spring B; {name}")
     for name, rising in (("rising speed", True), ("falling speed", False)):
-        found = swept("B", rising)
+        found = sweep_speed("B", rising)
         columns[f"speed; {name} [rpm]"] = found.speed / RAD_S_PER_RPM
         columns[f"amplitude; {name} [cm]"] = CM_PER_METRE * found.amplitude.filled(np.nan)
     special = special_points()
@@ -76,7 +76,7 @@ def compute_rig_1() -> StudyResult:
         number="rig-1-resonance",
         claim="With spring A there is one motion at each speed; with spring B resonance leans over, and below its peak two "
         "stable motions exist at a time.",
-        columns=padded(columns),
+        columns=pad_columns(columns),
         statements=(
             Statement(
                 "Due to practical difficulties, namely the large amplitudes of oscillations near the natural frequencies, "
@@ -151,7 +151,7 @@ COMPARED = {"A": (390.0, 420.0, 450.0), "B": (600.0, 660.0, 720.0)}
 SHOWN = {"A": 420.0, "B": 660.0}
 
 
-def lowered(coefficient: float) -> NDArray[np.float64]:
+def amplitude_decrease(coefficient: float) -> NDArray[np.float64]:
     """Return the decrease of the amplitude (cm) by friction in the guide, with spring A at the speeds `COMPARED`."""
     return np.array(
         [
@@ -162,14 +162,14 @@ def lowered(coefficient: float) -> NDArray[np.float64]:
 
 
 def spread_beyond_constant(coefficient: float) -> float:
-    """Return how the decrease of the amplitude varies with the speed, over how it does with constant friction.
+    """Return the variation of the amplitude's decrease with the speed, divided by that with constant friction.
 
-    Each is the greatest decrease over the least, in cm, with spring A at the speeds `COMPARED`. The constant friction is the
-    coefficient times the mean of the guide's force over these turns without friction.
+    A variation is the greatest decrease over the least, in cm, with spring A at the speeds `COMPARED`. The constant friction
+    is the coefficient times the mean of the guide's force over these turns without friction.
     """
     constant = coefficient * float(np.mean([np.abs(turn("A", w)["slider.guide_force"]).mean() for w in COMPARED["A"]]))
     even = [amplitude(turn("A", w)) - amplitude(turn("A", w, slider_coulomb_friction=constant)) for w in COMPARED["A"]]
-    varying = lowered(coefficient)
+    varying = amplitude_decrease(coefficient)
     return float(varying.max() / varying.min() * min(even) / max(even))
 
 
@@ -178,7 +178,7 @@ def slight_coefficients() -> tuple[float, float]:
     smooth = np.array([amplitude(turn("A", w)) for w in COMPARED["A"]])
 
     def beyond(coefficient: float, part: float) -> float:
-        return float((lowered(coefficient) / smooth).max()) - part
+        return float((amplitude_decrease(coefficient) / smooth).max()) - part
 
     ends = 0.5 * SLIGHT, 3.0 * SLIGHT
     least, most = (float(brentq(beyond, *ends, args=(part,), xtol=1e-4)) for part in (ALIKE, SLIGHTLY))
@@ -193,15 +193,18 @@ def lag(spring: str, speed: float, coefficient: float) -> float:
     return (shift + 180.0) % 360.0 - 180.0
 
 
-def over_damper(speed: float, coefficient: float) -> NDArray[np.float64]:
+def friction_force_ratios(speed: float, coefficient: float) -> NDArray[np.float64]:
     """Return the guide's friction over the damper's force, with spring A: by the mean and by the greatest force in a turn."""
-    of = turn("A", speed, slider_friction_coefficient=coefficient)
-    forces = coefficient * np.abs(of["slider.guide_force"]), rig("A").slider_damping * np.abs(of["slider.velocity"])
+    steady = turn("A", speed, slider_friction_coefficient=coefficient)
+    forces = (
+        coefficient * np.abs(steady["slider.guide_force"]),
+        rig("A").slider_damping * np.abs(steady["slider.velocity"]),
+    )
     friction, viscous = (np.array([f.mean(), f.max()]) for f in forces)
     return np.asarray(friction / viscous)
 
 
-def from_constant(speed: float, coefficient: float) -> float:
+def difference_from_constant(speed: float, coefficient: float) -> float:
     """Return the greatest difference of u with friction by a coefficient from u with constant friction, with spring A.
 
     The constant friction is the mean over a turn without friction. The result is relative to the amplitude without friction.
@@ -220,7 +223,7 @@ def compute_friction() -> StudyResult:
     for s in "AB":
         columns[f"speed; spring {s} [rpm]"] = GRID[s]
         for c in COEFFICIENTS:
-            columns[f"amplitude; coefficient {c:g}; spring {s} [cm]"] = over_speed(s, c)
+            columns[f"amplitude; coefficient {c:g}; spring {s} [cm]"] = friction_amplitudes(s, c)
             columns[f"u; coefficient {c:g}; spring {s} [cm]"] = slider(turn(s, SHOWN[s], slider_friction_coefficient=c))
     columns["crank angle [deg]"] = np.linspace(0.0, 360.0, len(slider(turn("A", SHOWN["A"]))))
     ends = slight_coefficients()
@@ -232,7 +235,7 @@ def compute_friction() -> StudyResult:
             f"{100.0 * ALIKE:g} to {100.0 * SLIGHTLY:g} % off the amplitude with spring A at 390, 420 and 450 rpm, a slight "
             "variation. Each case has the end of this range and the speed that count against the sentence."
         ),
-        columns=padded(columns),
+        columns=pad_columns(columns),
         statements=_friction(ends),
     )
 
@@ -244,7 +247,7 @@ def _friction(ends: tuple[float, float]) -> tuple[Statement, ...]:
     greatest = {w: np.abs(f).max() for w, f in force.items()}
     apart = max(np.abs(f - turn("A", w)["pin.D.fy"]).max() / greatest[w] for w, f in force.items())
     # by coefficient, then by measure
-    rubbed = np.array([np.max([over_damper(w, c) for w in COMPARED["A"]], axis=0) for c in ends])
+    rubbed = np.array([np.max([friction_force_ratios(w, c) for w in COMPARED["A"]], axis=0) for c in ends])
     return (
         Statement(
             "[That the phase is almost in total agreement while the amplitude shows slight variations] may be explained by "
@@ -297,7 +300,7 @@ def _friction(ends: tuple[float, float]) -> tuple[Statement, ...]:
                     min(map(spread_beyond_constant, ends)),
                     why="that by a constant friction varies as much",
                 ),
-                at_least("difference, within a cycle", ALIKE, min(from_constant(w, c) for w, c in each)),
+                at_least("difference, within a cycle", ALIKE, min(difference_from_constant(w, c) for w, c in each)),
             ),
         ),
         Statement(

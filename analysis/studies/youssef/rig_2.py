@@ -16,7 +16,7 @@ from ...units import CM_PER_METRE, RAD_S_PER_RPM
 from ...youssef import HarmonicMotion, Variant, slider_equation, two_harmonics
 from ..rules import ABOUT, ALIKE, SMALL
 from ..statements import Case, Statement, at_least, at_most, near, text
-from ..study import Study, StudyResult, padded
+from ..study import Study, StudyResult, pad_columns
 from ..variation import cache
 from . import rigs
 
@@ -49,7 +49,7 @@ def length(spring: str) -> float:
 def compute_resonance(number: str, spring: str) -> StudyResult:
     """Compute the amplitude over the speed by the full equations and by two harmonics of the linear equation."""
     (branch,), l4 = rigs.motions(spring).branches, length(spring)
-    place, _ = rigs.near_fraction(spring, 1)
+    place, _ = rigs.maximum_near_fraction(spring, 1)
     speeds = np.unique(np.append(CURVE, place)).tolist()
     columns = {
         "speed; full equations [rpm]": rigs.rpm(branch),
@@ -60,7 +60,7 @@ def compute_resonance(number: str, spring: str) -> StudyResult:
     return StudyResult(
         number=number,
         claim=f"Theory and experiment agree up to resonance, {NATURAL[spring][0]} rpm; beyond it theory is smaller.",
-        columns=padded(columns),
+        columns=pad_columns(columns),
         statements=_resonance() if spring == "C" else (),
         see="" if spring == "C" else "8.19",
     )
@@ -76,7 +76,7 @@ def width(spring: str, linear: Variant | None = None, /, **changes: float) -> fl
     if linear:
         sizes = np.array([linear_motion(spring, speed, linear).amplitude for speed in speeds.tolist()])
     else:
-        sizes = rigs.follow(spring, speeds.tolist(), **changes)
+        sizes = rigs.follow_amplitude(spring, speeds.tolist(), **changes)
     fine = np.linspace(speeds[0], speeds[-1], 80001)
     # the force on the slider grows with the square of the speed
     shape = CubicSpline(speeds, sizes / speeds**2)(fine)
@@ -98,7 +98,7 @@ def _resonance() -> tuple[Statement, ...]:
         ]
     beyond = " and ".join(f"{', '.join(f'{w:g}' for w in speeds)} rpm with {s}" for s, speeds in BEYOND.items())
     natural = {s: rigs.natural_speed(s) for s in "CD"}
-    around = {s: [rigs.natural_speed(s, slider_stiffness=k) for k in rigs.rounded(s)] for s in "CD"}
+    around = {s: [rigs.natural_speed(s, slider_stiffness=k) for k in rigs.stiffness_range(s)] for s in "CD"}
     error = {
         s: max(abs(length(s) * linear_motion(s, w).amplitude / rigs.amplitude(rigs.turn(s, w)) - 1.0) for w in RANGE)
         for s in "CD"
@@ -147,7 +147,13 @@ def _resonance() -> tuple[Statement, ...]:
             "speed of the greatest amplitude by the full equations",
             f"{100 * ABOUT:g} %, the rule for *in the region of*",
             tuple(
-                near(f"spring {s}", NATURAL[s][0], rigs.near_fraction(s, 1)[0], ABOUT * float(NATURAL[s][0]), "rpm")
+                near(
+                    f"spring {s}",
+                    NATURAL[s][0],
+                    rigs.maximum_near_fraction(s, 1)[0],
+                    ABOUT * float(NATURAL[s][0]),
+                    "rpm",
+                )
                 for s in "CD"
             ),
         ),
@@ -269,7 +275,7 @@ def compute_harmonics() -> StudyResult:
     return StudyResult(
         number="8.21",
         claim="The second harmonic is smaller than the first by a factor of 50.",
-        columns=padded(columns),
+        columns=pad_columns(columns),
         statements=(
             Statement(
                 "There were no experimentally observable changes in the amplitude of oscillations at quarter, third and "
@@ -363,7 +369,7 @@ def compute_forces() -> StudyResult:
         number="rig-2-forces",
         claim="At low speed every force of this horizontal machine grows with the square of the speed; resonance adds most to "
         "pin D.",
-        columns=padded(columns),
+        columns=pad_columns(columns),
     )
 
 

@@ -72,7 +72,7 @@ def natural_speed(spring: str, **changes: float) -> float:
     return natural_frequency(rig(spring, **changes)) / RAD_S_PER_RPM
 
 
-def rounded(spring: str) -> tuple[float, float]:
+def stiffness_range(spring: str) -> tuple[float, float]:
     """Return the least and the greatest stiffness (N/m) that rounds to the printed one."""
     printed = rig(spring).slider_stiffness
     return printed - HALF_DIGIT, printed + HALF_DIGIT
@@ -111,9 +111,9 @@ def turn(spring: str, speed: float, **changes: float) -> Turn:
     return orbit(rig(spring, **changes), speed, start).turn(SAMPLES)
 
 
-def slider(of: Turn) -> NDArray[np.float64]:
+def slider(motion: Turn) -> NDArray[np.float64]:
     """Return the slider position over a turn (cm), with its first value repeated at the end."""
-    u = CM_PER_METRE * of["slider.position"]
+    u = CM_PER_METRE * motion["slider.position"]
     return np.append(u, u[0])
 
 
@@ -125,9 +125,9 @@ def complex_stiffness(p: FiveBarParameters, rates: NDArray[np.float64]) -> NDArr
     return np.asarray(p.slider_stiffness - mean_effective_mass(p) * rates**2 + 1j * p.slider_damping * rates)
 
 
-def amplitude(of: Turn) -> float:
+def amplitude(motion: Turn) -> float:
     """Return the amplitude (cm): half the range of the slider position."""
-    return 0.5 * float(np.ptp(slider(of)))
+    return 0.5 * float(np.ptp(slider(motion)))
 
 
 def count_sign_changes(x: NDArray[np.float64]) -> int:
@@ -135,14 +135,14 @@ def count_sign_changes(x: NDArray[np.float64]) -> int:
     return int(np.sum(np.sign(x) != np.sign(np.roll(x, 1))))
 
 
-def peaks(of: Turn) -> int:
+def peaks(motion: Turn) -> int:
     """Count the maxima and minima of the slider position over a turn, both together, as the thesis does."""
-    return count_sign_changes(np.diff(slider(of)))
+    return count_sign_changes(np.diff(slider(motion)))
 
 
-def harmonic(of: Turn, order: int) -> float:
+def harmonic(motion: Turn, order: int) -> float:
     """Return the amplitude (cm) of a harmonic of the slider position; order 1 has one cycle per turn of the crank."""
-    return CM_PER_METRE * float(of.harmonic("slider.position", order))
+    return CM_PER_METRE * float(motion.harmonic("slider.position", order))
 
 
 @cache
@@ -159,27 +159,27 @@ def rpm(branch: Branch) -> NDArray[np.float64]:
     return branch.parameter / RAD_S_PER_RPM
 
 
-def between(extrema: Sequence[Extremum], low: float, high: float) -> tuple[float, float]:
+def only_extremum(extrema: Sequence[Extremum], low: float, high: float) -> tuple[float, float]:
     """Return speed (rpm) and amplitude (cm) of the only extremum between two speeds (rpm)."""
     (found,) = (e for e in extrema if low < e.parameter / RAD_S_PER_RPM < high)
     return found.parameter / RAD_S_PER_RPM, CM_PER_METRE * found.amplitude
 
 
-def near_fraction(spring: str, order: int) -> tuple[float, float]:
+def maximum_near_fraction(spring: str, order: int) -> tuple[float, float]:
     """Return speed (rpm) and amplitude (cm) of the amplitude's maximum near 1/order of the natural frequency."""
     place = natural_speed(spring) / order
-    return between(motions(spring).maxima(), 0.9 * place, 1.1 * place)
+    return only_extremum(motions(spring).maxima(), 0.9 * place, 1.1 * place)
 
 
-def near_half(spring: str, stiffness: float) -> tuple[float, float]:
+def extrema_near_half(spring: str, stiffness: float) -> tuple[float, float]:
     """Return the speeds (rpm) of the amplitude's maximum near half the natural frequency and of the next minimum.
 
     ``stiffness`` is that of the spring (N/m).
     """
     place = 0.5 * natural_speed(spring, slider_stiffness=stiffness)
-    of = response(spring, 0.9 * place, 1.4 * place, COARSE, slider_stiffness=stiffness)
-    top, _ = between(of.maxima(), 0.9 * place, 1.1 * place)
-    return top, between(of.minima(), top, 1.4 * place)[0]
+    found = response(spring, 0.9 * place, 1.4 * place, COARSE, slider_stiffness=stiffness)
+    top, _ = only_extremum(found.maxima(), 0.9 * place, 1.1 * place)
+    return top, only_extremum(found.minima(), top, 1.4 * place)[0]
 
 
 def peak_rise(spring: str, order: int) -> float:
@@ -196,19 +196,19 @@ def peak_rise(spring: str, order: int) -> float:
     return tops[0].amplitude / lows[0].amplitude - 1.0 if lows else 0.0
 
 
-def overtones(of: Turn) -> float:
+def overtones(motion: Turn) -> float:
     """Return the greatest of the harmonics 3 to 6 divided by the greater of the harmonics 1 and 2."""
-    first, second, *higher = (harmonic(of, n) for n in range(1, 7))
+    first, second, *higher = (harmonic(motion, n) for n in range(1, 7))
     return max(higher) / max(first, second)
 
 
 @cache
-def over_speed(spring: str, coefficient: float) -> NDArray[np.float64]:
+def friction_amplitudes(spring: str, coefficient: float) -> NDArray[np.float64]:
     """Return the amplitude (cm) at the speeds of `GRID` with a coefficient of friction in the guide."""
-    return follow(spring, GRID[spring].tolist(), slider_friction_coefficient=coefficient)
+    return follow_amplitude(spring, GRID[spring].tolist(), slider_friction_coefficient=coefficient)
 
 
-def follow(spring: str, speeds: Sequence[float], **changes: float) -> NDArray[np.float64]:
+def follow_amplitude(spring: str, speeds: Sequence[float], **changes: float) -> NDArray[np.float64]:
     """Return the amplitude (cm) at each speed (rpm) with changes of the rig.
 
     Each motion is found from the motion at the previous speed.

@@ -74,12 +74,12 @@ class SteadyTurn:
 
     @property
     def amplitude(self) -> float:
-        """Half the distance between the least and the greatest slider position (cm)."""
+        """Return half the distance between the least and the greatest slider position (cm)."""
         return 0.5 * float(np.ptp(self.slider_cm))
 
     @property
     def peaks(self) -> int:
-        """Number of maxima and minima of the slider position over the turn, both together."""
+        """Return the number of maxima and minima of the slider position over the turn, both together."""
         rise = np.diff(self.slider_cm)
         return int(np.sum(np.sign(rise) != np.sign(np.roll(rise, 1))))
 
@@ -142,6 +142,6 @@ def greatest_ratio(values: NDArray[np.float64]) -> float:
     return float((values[1:] / values[:-1]).max())
 
 
-def from_line(x: NDArray[np.float64], y: NDArray[np.float64]) -> float:
+def distance_from_line(x: NDArray[np.float64], y: NDArray[np.float64]) -> float:
     """Return the greatest distance in y between a curve from (0, 0) to (1, 1) and the best line parallel to its chord."""
     return 0.5 * float(np.ptp(y - x))

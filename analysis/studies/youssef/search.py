@@ -25,7 +25,7 @@ from ...synthesis import RockerFunction, TargetPath, UntimedPath, area_differenc
 from ...units import CM_PER_METRE
 from ..rules import ALIKE, SMALL
 from ..statements import Case, Statement, at_least, at_most, near, text
-from ..study import Study, StudyResult, padded
+from ..study import Study, StudyResult, pad_columns
 from .chapter_6 import PRINTED, TARGET, FloatArray, our_error, pairing_area
 from .problems import PROBLEMS, N, ellipse
 
@@ -94,7 +94,7 @@ def closes(v: FloatArray) -> bool:
     return all(4.0 * l4**2 * d**2 >= (l3**2 - l4**2 - d**2) ** 2 for d in (l1 + l2, l1 - l2))
 
 
-def admitted(v: FloatArray, towards: FloatArray) -> FloatArray:
+def admit(v: FloatArray, towards: FloatArray) -> FloatArray:
     """Put a set of parameters onto its bounds, and move it by quarters ``towards`` another set until its links close."""
     v = np.clip(v, LOW, HIGH)
     while not closes(v):
@@ -102,7 +102,7 @@ def admitted(v: FloatArray, towards: FloatArray) -> FloatArray:
     return v
 
 
-def drawn(random: np.random.Generator) -> FloatArray:
+def draw_set(random: np.random.Generator) -> FloatArray:
     """Draw a random set of parameters by (6.11)."""
     return np.asarray(LOW + (HIGH - LOW) * np.sin(random.uniform(0.0, 2.0 * pi, LOW.size)) ** 2)
 
@@ -111,13 +111,13 @@ def starting_sets(random: np.random.Generator, first: list[FloatArray]) -> Float
     """Return starting sets, one more than there are parameters: the sets ``first``, then random sets by (6.11)."""
     sets = list(first)
     while not sets:
-        sets = [v for v in [drawn(random)] if closes(v)]
+        sets = [v for v in [draw_set(random)] if closes(v)]
     while len(sets) <= LOW.size:
-        sets.append(admitted(drawn(random), np.mean(sets, axis=0)))
+        sets.append(admit(draw_set(random), np.mean(sets, axis=0)))
     return np.array(sets)
 
 
-def downhill(of: Error, sets: FloatArray, free: list[int] | None = None) -> Found:
+def downhill(error_of: Error, sets: FloatArray, free: list[int] | None = None) -> Found:
     """Minimise an error by the downhill simplex from given vertices until (6.15) holds.
 
     For (6.15) each parameter is tested by itself, as in the program (L9669). ``free`` are the indices of the parameters that
@@ -127,8 +127,8 @@ def downhill(of: Error, sets: FloatArray, free: list[int] | None = None) -> Foun
     v = sets[: moves.size + 1].copy()
     fixed = np.delete(np.arange(LOW.size), moves)
     v[:, fixed] = v[0, fixed]
-    v[1:] = [admitted(x, v[0]) for x in v[1:]]
-    e = np.array([of(x) for x in v])
+    v[1:] = [admit(x, v[0]) for x in v[1:]]
+    e = np.array([error_of(x) for x in v])
     count = len(e)
     while count < MOST:
         worst, least = int(e.argmax()), int(e.argmin())
@@ -136,12 +136,12 @@ def downhill(of: Error, sets: FloatArray, free: list[int] | None = None) -> Foun
         if e[worst] - e[least] <= EPS * e[least] and near_by.all():
             break
         centre = (v.sum(axis=0) - v[worst]) / moves.size
-        trial = admitted(2.0 * centre - v[worst], v[worst])
-        found = of(trial)
+        trial = admit(2.0 * centre - v[worst], v[worst])
+        found = error_of(trial)
         count += 1
         if found < e[least]:
-            far = admitted(2.0 * trial - v[worst], trial)
-            further = of(far)
+            far = admit(2.0 * trial - v[worst], trial)
+            further = error_of(far)
             count += 1
             v[worst], e[worst] = (far, further) if further < found else (trial, found)
         elif found <= np.partition(e, -2)[-2]:
@@ -149,14 +149,14 @@ def downhill(of: Error, sets: FloatArray, free: list[int] | None = None) -> Foun
         else:
             if found <= e[worst]:
                 v[worst], e[worst] = trial, found
-            trial = admitted(0.5 * (centre + v[worst]), v[worst])
-            found = of(trial)
+            trial = admit(0.5 * (centre + v[worst]), v[worst])
+            found = error_of(trial)
             count += 1
             if found <= e[worst]:
                 v[worst], e[worst] = trial, found
             else:
-                v = np.array([admitted(x, v[least]) for x in 0.5 * (v + v[least])])
-                e = np.array([of(x) for x in v])
+                v = np.array([admit(x, v[least]) for x in 0.5 * (v + v[least])])
+                e = np.array([error_of(x) for x in v])
                 count += len(e)
     return Found(v[e.argmin()], float(e.min()), count)
 
@@ -177,7 +177,7 @@ def searches() -> dict[str, tuple[Found, ...]]:
 
 
 @cache
-def ranked() -> tuple[tuple[Found, ...], ...]:
+def run_ranked() -> tuple[tuple[Found, ...], ...]:
     """Run the searches that are compared by rank, and return the results of each kind.
 
     The kinds are: from random sets; with 12 points first; with five parameters first; with nine; with 36 points first.
@@ -205,13 +205,15 @@ def rocker_error(v: FloatArray) -> float:
     return min(errors)
 
 
-def work(of: Error, free: list[int] | None = None) -> FloatArray:
+def count_evaluations(error_of: Error, free: list[int] | None = None) -> FloatArray:
     """Return the numbers of evaluations that the minimisation of another error takes from the same random sets.
 
     ``free`` are the indices of the parameters that may change, by default all.
     """
     random = np.random.default_rng(62)
-    return np.array([downhill(of, starting_sets(random, []), free).evaluations for _ in range(SEARCHES)], dtype=float)
+    return np.array(
+        [downhill(error_of, starting_sets(random, []), free).evaluations for _ in range(SEARCHES)], dtype=float
+    )
 
 
 def _points_first(random: np.random.Generator, n: int = FEWER_POINTS) -> Found:
@@ -234,23 +236,23 @@ def _second_search(first: Found, share: float, random: np.random.Generator) -> F
     return then._replace(evaluations=then.evaluations + round(share * first.evaluations))
 
 
-def descended(v: FloatArray, side: int, n: int = N) -> tuple[FloatArray, float]:
+def descend(v: FloatArray, side: int, n: int = N) -> tuple[FloatArray, float]:
     """Return the parameters and the error (cm2) at the end of a least-squares descent, by closure ``side``, with n points."""
     inside = np.clip(v, FREE_LOW + 1e-9, FREE_HIGH - 1e-9)
     end = least_squares(lambda v: residuals(v, n)[side], inside, bounds=(FREE_LOW, FREE_HIGH), xtol=1e-12, ftol=1e-12)
     return end.x, 2.0 * float(end.cost)
 
 
-def bottom(found: Found) -> float:
+def minimum_error(found: Found) -> float:
     """Return the error (cm2) of the minimum near the end of a search; NaN if the descent ends where the links do not close."""
-    v, error = descended(found.parameters, int(np.argmin([away @ away for away in residuals(found.parameters)])))
+    v, error = descend(found.parameters, int(np.argmin([away @ away for away in residuals(found.parameters)])))
     return error if closes(v) else np.nan
 
 
 def minima(n: int) -> FloatArray:
     """Return the errors of the minima to which descents from random sets lead with n points, if more than `APART` apart."""
     random = np.random.default_rng(612)
-    ends = [descended(v, side, n) for v in (drawn(random) for _ in range(DESCENTS)) for side in (0, 1)]
+    ends = [descend(v, side, n) for v in (draw_set(random) for _ in range(DESCENTS)) for side in (0, 1)]
     errors = np.sort([error * N / n for v, error in ends if closes(v)])
     return np.asarray(errors[np.append(True, np.diff(errors) > APART)])
 
@@ -281,10 +283,10 @@ def compute() -> StudyResult:
     )
 
 
-def reached(ends: tuple[Found, ...], plain: tuple[Found, ...], *, quickly: bool) -> NDArray[np.bool_]:
-    """Return for each search whether it reaches the best end of those from random sets ``plain``.
+def reaches_best(ends: tuple[Found, ...], plain: tuple[Found, ...], *, quickly: bool) -> NDArray[np.bool_]:
+    """Return for each search whether it reaches the best end of the searches ``plain`` from random sets.
 
-    With ``quickly`` it must not take more evaluations than their median.
+    With ``quickly`` it must also take no more evaluations than the median of ``plain``.
     """
     best = min(end.error for end in plain)
     usual = np.median([end.evaluations for end in plain]) if quickly else np.inf
@@ -294,7 +296,7 @@ def reached(ends: tuple[Found, ...], plain: tuple[Found, ...], *, quickly: bool)
 def judge_located(found: Mapping[str, tuple[Found, ...]]) -> tuple[Statement, ...]:
     """Judge what the searches locate, and whether located minima help a fresh search."""
     plain = found[PLAIN]
-    ends, bottoms = np.array([end.error for end in plain]), np.array([bottom(end) for end in plain])
+    ends, bottoms = np.array([end.error for end in plain]), np.array([minimum_error(end) for end in plain])
     usual = np.median([end.evaluations for end in plain])
     return (
         Statement(
@@ -328,7 +330,7 @@ def judge_located(found: Mapping[str, tuple[Found, ...]]) -> tuple[Statement, ..
             "among the sets of each",
             ALL,
             (
-                near("reached", 1.0, reached(found[KNOWN], plain, quickly=False).mean(), 0.0),
+                near("reached", 1.0, reaches_best(found[KNOWN], plain, quickly=False).mean(), 0.0),
                 near("quickly", 1.0, np.mean([end.evaluations <= usual for end in found[KNOWN]]), 0.0),
             ),
             "the ends included need not be near the best",
@@ -357,11 +359,15 @@ def judge_minima() -> Statement:
 
 def judge_techniques() -> tuple[Statement, ...]:
     """Judge the techniques of beginning with fewer points or with fewer parameters, by rank tests."""
-    plain, points, five, nine, half = (np.array([(end.error, end.evaluations) for end in ends]).T for ends in ranked())
+    plain, points, five, nine, half = (
+        np.array([(end.error, end.evaluations) for end in ends]).T for ends in run_ranked()
+    )
 
     def by_chance(with_it: FloatArray, name: str) -> tuple[Case, ...]:
         """Judge if a technique lowers the errors and the evaluations, compared with searches from random sets."""
-        chances = (float(mannwhitneyu(of, than, alternative="less").pvalue) for of, than in zip(with_it, plain))
+        chances = (
+            float(mannwhitneyu(improved, than, alternative="less").pvalue) for improved, than in zip(with_it, plain)
+        )
         return tuple(
             at_most(f"{name}; {what} by chance", CHANCE, chance)
             for what, chance in zip(("errors lower", "evaluations fewer"), chances)
@@ -397,7 +403,7 @@ def judge_all_techniques(found: Mapping[str, tuple[Found, ...]]) -> Statement:
     """Judge whether the techniques locate the global minimum quickly."""
     plain = found[PLAIN]
     techniques = {name: ends for name, ends in found.items() if name not in (PLAIN, KNOWN)}
-    slowly = " and ".join(str(reached(ends, plain, quickly=False).sum()) for ends in techniques.values())
+    slowly = " and ".join(str(reaches_best(ends, plain, quickly=False).sum()) for ends in techniques.values())
     return Statement(
         "These techniques have, in all cases tried, located the global minimum quickly and efficiently.",
         text("6.3.1, L4365-4369"),
@@ -405,7 +411,9 @@ def judge_all_techniques(found: Mapping[str, tuple[Found, ...]]) -> Statement:
         "best end from random sets, the thesis's global optimum (L4338), with no more evaluations in both steps than the "
         "median from random sets",
         ALL,
-        tuple(near(name, 1.0, reached(ends, plain, quickly=True).mean(), 0.0) for name, ends in techniques.items()),
+        tuple(
+            near(name, 1.0, reaches_best(ends, plain, quickly=True).mean(), 0.0) for name, ends in techniques.items()
+        ),
         f"{slowly} of {SEARCHES} reach it at all; the cases that the thesis tried are not named",
     )
 
@@ -413,7 +421,7 @@ def judge_all_techniques(found: Mapping[str, tuple[Found, ...]]) -> Statement:
 def judge_sets() -> Statement:
     """Judge the statement on random sets by (6.11)."""
     random = np.random.default_rng(611)
-    sets = np.array([drawn(random) for _ in range(SETS)])
+    sets = np.array([draw_set(random) for _ in range(SETS)])
     return Statement(
         "The remaining sets are then obtained using the following equation [(6.11)] where ... X is any real random number. "
         "This generates quickly and efficiently all the sets of required initial values and ensures that they satisfy all "
@@ -440,7 +448,7 @@ def judge_time(found: Mapping[str, tuple[Found, ...]]) -> Statement:
         "and of those with located minima among their sets",
         LEVEL,
         (
-            at_most("form of the output", CHANCE, mannwhitneyu(work(rocker_error, ROCKER), plain).pvalue),
+            at_most("form of the output", CHANCE, mannwhitneyu(count_evaluations(rocker_error, ROCKER), plain).pvalue),
             at_most("quality of the guess", CHANCE, mannwhitneyu(known, plain).pvalue),
             Case(label="compilation", computed=None, why="the machine, an IBM 360/67 (L1293), is not at hand"),
         ),
@@ -488,7 +496,7 @@ def compute_closures() -> StudyResult:
         number="6.3",
         claim="The area between curves is that of triangles between their points; of two closures the better is taken.",
         assignment="The plot has path (a), the printed linkage.",
-        columns=padded(columns),
+        columns=pad_columns(columns),
         statements=(*judge_area(), judge_closures()),
     )
 

@@ -37,9 +37,9 @@ from ...synthesis import (
 from ...units import CM_PER_METRE
 from ..rules import ALIKE, SEEN_FALL, VERY_CLOSE_DEG
 from ..statements import Statement, at_least, at_most, near, text
-from ..study import Study, StudyResult, padded
-from .chapter_6 import ROUNDED, TABLE, best, by_readings, half_units
-from .chapter_7 import LIMITS, enclosed, reach, slider
+from ..study import Study, StudyResult, pad_columns
+from .chapter_6 import ROUNDED, TABLE, best, errors_by_reading, half_units
+from .chapter_7 import LIMITS, enclosed_area, reached_area, slider
 from .problems import PROBLEMS, WEIGHT, ellipse, packaging_path
 
 FloatArray = NDArray[np.float64]
@@ -95,7 +95,7 @@ def linkage_error(name: str, linkage: Linkage) -> float:
     return PROBLEMS[name].linkage_error(linkage)
 
 
-def printed(
+def printed_linkage(
     name: str, *, mean: float = 1.0, sines: float = 1.0, sign: float = 1.0, turned: float = 0.0, along: float = 1.0
 ) -> Linkage:
     """Return the printed linkage with the printed slider motion, in one of the readings that the text leaves open.
@@ -130,13 +130,13 @@ def readings(name: str) -> list[Linkage]:
     k = PROBLEMS[name].linkage
     signs = (1.0, -1.0)
     found = [
-        printed(name, mean=mean, sines=sines, sign=sign, turned=turned, along=along)
+        printed_linkage(name, mean=mean, sines=sines, sign=sign, turned=turned, along=along)
         for mean, sines, sign, turned, along in product((1.0, 0.1, 0.0), signs, signs, (0.0, k.crank_phase), signs)
     ]
     return sorted((one for one in found if np.isfinite(linkage_error(name, one))), key=partial(linkage_error, name))
 
 
-def in_window(linkage: Linkage) -> float:
+def window_error(linkage: Linkage) -> float:
     """Return the rms error of the rocker angle (deg) within the weighted window."""
     p = PROBLEMS[ROCKER]
     assert isinstance(p.task, RockerFunction)
@@ -156,7 +156,7 @@ def wanted_angle() -> FloatArray:
 
 
 @cache
-def reduced() -> Mapping[str, float]:
+def error_ratios() -> Mapping[str, float]:
     """Return the error with two harmonics of the slider divided by that with a fixed pivot, for each problem of chapter VI.
 
     The linkages are the printed ones.
@@ -168,8 +168,8 @@ def reduced() -> Mapping[str, float]:
 
 
 @cache
-def reduced_further() -> Mapping[str, float]:
-    """Return the ratios of `reduced` with our best linkages, for the problems that have a figure in chapter VI."""
+def best_error_ratios() -> Mapping[str, float]:
+    """Return the ratios of `error_ratios` with our best linkages, for the problems that have a figure in chapter VI."""
     return {row.problem: _error_ratio(PROBLEMS[row.problem].task, best(row.problem).linkage) for row in TABLE.values()}
 
 
@@ -205,12 +205,14 @@ def _rocker() -> tuple[Statement, ...]:
     p = PROBLEMS[ROCKER]
     assert isinstance(p.task, RockerFunction)
     angles, joined = len(np.asarray(p.task.weights)), readings(ROCKER)
-    best_reading, span = joined[0], over_rounding(ROCKER, joined[0])
-    fixed = by_readings(ROCKER, p.linkage)
-    least_read, reading = min((value, name) for of in joined for name, value in by_readings(ROCKER, of).items())
+    best_reading, span = joined[0], error_range(ROCKER, joined[0])
+    fixed = errors_by_reading(ROCKER, p.linkage)
+    least_read, reading = min(
+        (value, name) for each in joined for name, value in errors_by_reading(ROCKER, each).items()
+    )
     kept = linkage_error(ROCKER, p.linkage)
     raised = linkage_error(ROCKER, best_reading) / kept
-    lowered = linkage_error(PATH, mended()) / linkage_error(PATH, PROBLEMS[PATH].linkage)
+    lowered = linkage_error(PATH, mended_path_linkage()) / linkage_error(PATH, PROBLEMS[PATH].linkage)
     two, three = (linkage_error(ROCKER, rocker_motion(n).linkage) for n in (2, 3))
     fewer = f"{SEEN_FALL}: a freedom more cannot raise the least error"
     # the most that (7.18) has: A0, A1, A2, B1, B2 and the guide's angle
@@ -240,7 +242,11 @@ def _rocker() -> tuple[Statement, ...]:
                     why="the series printed for the rocker function raises the error",
                 ),
                 at_most("path (b), printed series", 1.0 - ALIKE, lowered),
-                *(at_most(NAMES[name], 1.0 - ALIKE, share) for name, share in reduced().items() if name not in SERIES),
+                *(
+                    at_most(NAMES[name], 1.0 - ALIKE, share)
+                    for name, share in error_ratios().items()
+                    if name not in SERIES
+                ),
             ),
         ),
         Statement(
@@ -249,7 +255,7 @@ def _rocker() -> tuple[Statement, ...]:
             "error of the rocker angle within the weighted portion, rms, with the printed series in its best reading, see "
             "L5965",
             f"{VERY_CLOSE_DEG:g} deg, the rule for *very close*",
-            (at_most("printed series", VERY_CLOSE_DEG, in_window(best_reading), "deg"),),
+            (at_most("printed series", VERY_CLOSE_DEG, window_error(best_reading), "deg"),),
             "the printed series does not give the stated 4.8 deg2 either",
         ),
         Statement(
@@ -327,18 +333,18 @@ def out_of_reach(quarter: int = 20000) -> float:
     return p.convert(Polygon(ellipse(15.0, 4 * quarter)).difference(reach).area)
 
 
-def mended() -> Linkage:
+def mended_path_linkage() -> Linkage:
     """Return the linkage of path (b) with the printed series and A0 = 0.31 cm."""
-    return printed(PATH, mean=0.1)
+    return printed_linkage(PATH, mean=0.1)
 
 
 def shares_of_stated() -> dict[str, float]:
     """Return the error with each printed series divided by the stated error, in the best reading or with A0 mended."""
-    linkages = {ROCKER: readings(ROCKER)[0], PATH: mended()}
+    linkages = {ROCKER: readings(ROCKER)[0], PATH: mended_path_linkage()}
     return {name: linkage_error(name, linkage) / STATED[name] for name, linkage in linkages.items()}
 
 
-def over_rounding(name: str, found: Linkage) -> tuple[float, float]:
+def error_range(name: str, found: Linkage) -> tuple[float, float]:
     """Return the least and the greatest error with a printed series if each printed number is rounded up or down.
 
     ``found`` is the linkage with this series.
@@ -365,7 +371,7 @@ def moved_path() -> StudyResult:
     p = PROBLEMS[PATH]
     assert isinstance(p.task, UntimedPath)
     found = {n: path_motion(n) for n in PATH_SEARCHES}
-    linkages = {"fixed": p.linkage, "printed": mended()} | {f"{n}": s.linkage for n, s in found.items()}
+    linkages = {"fixed": p.linkage, "printed": mended_path_linkage()} | {f"{n}": s.linkage for n, s in found.items()}
     points = np.asarray(p.task.path.points)
     columns = {
         "crank rotation [deg]": np.degrees(TURN),
@@ -382,15 +388,15 @@ def moved_path() -> StudyResult:
     return StudyResult(
         number="7.12",
         claim="The slider moved by two harmonics brings the area between path (b) and the curve from 12.6 to 4.3 cm2.",
-        columns=padded(columns),
+        columns=pad_columns(columns),
         statements=_path(),
     )
 
 
 def _path() -> tuple[Statement, ...]:
     """Judge the statements on Fig 7.12."""
-    to_the_letter = replace(printed(PATH), rocker_length=PROBLEMS[PATH].printed.rocker_length)
-    span = over_rounding(PATH, mended())
+    to_the_letter = replace(printed_linkage(PATH), rocker_length=PROBLEMS[PATH].printed.rocker_length)
+    span = error_range(PATH, mended_path_linkage())
     return (
         Statement(
             "The error is 4.3 cm2 as compared with 12.6 cm2 in chapter 6.",
@@ -429,13 +435,16 @@ def _path() -> tuple[Statement, ...]:
                     near(
                         f"anywhere within, U from {low:g} to {high:g}",
                         1.0,
-                        reach(low, high).area / enclosed(low, high),
+                        reached_area(low, high).area / enclosed_area(low, high),
                         0.01,
                         why="the envelope has a hole, see Fig 7.2",
                     )
                     for low, high in LIMITS
                 ),
-                *(at_most(NAMES[name], 1.0 - ALIKE, reduced()[name]) for name in ("path-a", "path-b", "packaging")),
+                *(
+                    at_most(NAMES[name], 1.0 - ALIKE, error_ratios()[name])
+                    for name in ("path-a", "path-b", "packaging")
+                ),
             ),
         ),
     )

@@ -241,8 +241,8 @@ def _sample_shapes(unit: FloatArray, limits: Limits) -> FloatArray:
 def _ratio_ranges(limits: Limits) -> FloatArray:
     """Return the least and the greatest value of each sampled ratio of links, shape (3, 2), within the links' bounds."""
     own = _SHAPES[limits.linkage.kind]
-    base, of = own.base, own.others
-    given = np.column_stack([limits.low[of] / limits.high[base], limits.high[of] / limits.low[base]])
+    base, others = own.base, own.others
+    given = np.column_stack([limits.low[others] / limits.high[base], limits.high[others] / limits.low[base]])
     ranges = np.array(own.ranges)
     both = np.column_stack([np.maximum(given[:, 0], ranges[:, 0]), np.minimum(given[:, 1], ranges[:, 1])])
     # an offset may be zero

@@ -105,8 +105,8 @@ class Synthesis(NotebookResult):
         For a variant, ``variant of`` is the rank of the solution that represents it; otherwise it is 0.
         """
         columns = solution_columns(self.with_variants)
-        of = [float(rank) for rank, s in enumerate(self.solutions, start=1) for _ in s.variants]
-        return {"rank": columns["rank"], "variant of": [0.0] * len(self.solutions) + of} | columns
+        ranks = [float(rank) for rank, s in enumerate(self.solutions, start=1) for _ in s.variants]
+        return {"rank": columns["rank"], "variant of": [0.0] * len(self.solutions) + ranks} | columns
 
     @property
     def with_variants(self) -> tuple[Solution, ...]:
