@@ -52,7 +52,10 @@ def _wiring(file: str, fmi: str = "2") -> Wiring:
 @click.argument("file", required=False, type=click.Path(dir_okay=False))
 @common.report_errors
 def new(name: str | None, file: str | None) -> None:
-    """Write the description of the example system NAME; without NAME list the example systems."""
+    """Write the description of the example system NAME.
+
+    Without NAME, list the example systems.
+    """
     from ..files import read_tables, unknown_name, write_text
     from ..systems import library
 
@@ -77,7 +80,10 @@ def new(name: str | None, file: str | None) -> None:
 @common.out_option(help="Folder for the archive.")
 @common.report_errors
 def build(file: str, fmi: str, out: str) -> None:
-    """Build the FMUs of a system and write it as an SSP 1.0 archive; with --fmi 3 as SSP 2.0."""
+    """Build the FMUs of a system and write it as an SSP archive.
+
+    The archive is of SSP 1.0, with --fmi 3 of SSP 2.0.
+    """
     from ..systems import write_ssp
 
     common.say(f"wrote {write_ssp(_wiring(file, fmi), common.output_folder(out) / f'{Path(file).stem}.ssp')}")
@@ -109,7 +115,10 @@ def run(
     out: str,
     plot: bool,
 ) -> None:
-    """Run a system: print a table of its connected outputs, and write all outputs as CSV and a plot."""
+    """Run a system, print its connected outputs and draw them.
+
+    All outputs are written as CSV.
+    """
     from ..files import write_csv
     from ..systems import run_system
     from ..units import display_scale
@@ -221,9 +230,9 @@ def draw(file: str, out: str) -> None:
 @common.out_option(help="Folder in which the host's folder is made.")
 @common.report_errors
 def host(file: str, out: str) -> None:
-    """Build a system as one C program for real-time targets, without heap and without Python.
+    """Build a system as one C program for real-time targets.
 
-    The program reports the step times and the missed deadlines.
+    The program uses neither a heap nor Python. It reports the step times and the missed deadlines.
     """
     from ..systems import build_host
 

@@ -185,7 +185,7 @@ def test_stability_judges_before_it_asks_for_an_axis_that_nobody_chose(linkwork)
 
 
 def test_every_summary_is_a_sentence_that_is_not_cut(linkwork):
-    for group in ([], ["slider-crank"]):
+    for group in ([], ["slider-crank"], ["system"]):
         listed = linkwork(*group, "--help").output.partition("Commands:")[2].split("\n  ")[1:]
         assert len(listed) > 4
         assert all(" ".join(line.split()).endswith(".") and "..." not in line for line in listed)
@@ -303,7 +303,7 @@ def test_build_of_a_linkage_names_what_its_file_says_of_runs_alone(linkwork, tmp
         ("second.toml", "initial.crank_angle, crank.length, drive.torque outside of this table are only"),
     ):
         said = " ".join(linkwork("build", file).stderr.split())
-        assert f"WiperArm starts as [linkage] of {file} says; {entries} the file's runs." in said
+        assert f"WiperArm starts with the values in [linkage] of {file}; {entries} for runs of the file." in said
 
 
 def test_examples_are_copied_once(linkwork, tmp_path):

@@ -440,7 +440,7 @@ def test_alternatives_of_a_closed_path_turn_fully() -> None:
 
 def test_what_has_no_cognates() -> None:
     task = syn.RockerFunction(angle=[1.0, 1.2, 1.3], rotation=[0.0, 0.2, 0.4])
-    with pytest.raises(InputError, match="share the coupler's curve"):
+    with pytest.raises(InputError, match="share the coupler curve"):
         syn.alternatives(syn.Solution.from_linkage(task, FOUR_BAR))
     with pytest.raises(ParameterError, match="point_distance"):
         syn.cognates(syn.Linkage(**FOUR_BAR.values() | {"point_distance": 0.0}))

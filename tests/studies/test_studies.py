@@ -85,7 +85,7 @@ class TestVariation:
             ("R6", "guide.twist", "compares values of guide.twist itself"),
             ("3.5", "slider.stiffness", "compares values of slider.stiffness itself"),
             ("rahman-forces", "rod.length", "has no parameters that can be changed"),
-            ("4.5", "crank.length", "slider_equation takes any for the equation of chapters IV"),
+            ("4.5", "crank.length", "slider_equation takes all parameters for the equation of chapters IV"),
         ],
     )
     def test_a_parameter_without_meaning_is_refused(self, tmp_path: Path, number: str, name: str, words: str) -> None:
