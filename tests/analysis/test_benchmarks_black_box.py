@@ -116,19 +116,6 @@ class TestGrading:
         assert np.all(np.diff(np.array(charges)[~joined]) < 0.0)
         assert np.abs(np.diff(charges)).max() < 0.2 * np.ptp(charges)
 
-    def test_what_cannot_be_joined_is_stretched_along_the_line_from_b_to_d(self) -> None:
-        black = box(TASK)
-        q = black._linkages(unknowns(black, self.APART))
-        phi = np.array([[2.5, 3.5]])
-        coupler, rocker = black._directions(q, phi)
-        dx, dy = black._pins(q, phi)
-        c = q[0, 4] * coupler
-        np.testing.assert_allclose((c * (dx - 1j * dy)).imag, 0.0, atol=1e-12)
-        np.testing.assert_allclose(c - q[0, 5] * rocker, dx + 1j * dy, atol=1e-12)
-        # equal power: |BC|^2 - l3^2 = |DC|^2 - l4^2
-        power = [np.abs(link) ** 2 * q[0, k] ** 2 - q[0, k] ** 2 for link, k in ((coupler, 4), (rocker, 5))]
-        np.testing.assert_allclose(power[0], power[1], atol=1e-12)
-
     def test_at_the_limit_of_assembly_the_quality_is_continuous(self) -> None:
         # l1 + l2 = l3 + l4 at half a turn
         limit = replace(self.APART, rocker_length=0.3)

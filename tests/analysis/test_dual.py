@@ -158,19 +158,6 @@ def test_what_has_no_derivative_is_refused() -> None:
         float(Dual(1.0))  # type: ignore[arg-type]
 
 
-def test_several_directions_at_once() -> None:
-    a, b = np.array([0.3, 0.7, 1.1]), np.array([2.0, 1.5, 0.4])
-    x, y = variables(a, b)
-    f = np.sin(x) * y**2 + x / y
-    assert f.shape == (3,)
-    np.testing.assert_allclose(f.dual, [np.cos(a) * b**2 + 1.0 / b, 2.0 * np.sin(a) * b - a / b**2], rtol=1e-14)
-    np.testing.assert_allclose(f[1].dual, f.dual[:, 1])
-    # they go through vectors and matrices as well
-    turned = apply(about_k(x), stack([y, 0.0 * y, 0.0 * y]))
-    np.testing.assert_allclose(turned.dual[0], np.stack([-b * np.sin(a), b * np.cos(a), 0 * a], -1), rtol=1e-14)
-    np.testing.assert_allclose(turned.dual[1], np.stack([np.cos(a), np.sin(a), 0 * a], -1), rtol=1e-14)
-
-
 @pytest.mark.parametrize("size", [1, 2, 3, 5])
 def test_directions_are_no_axis_of_the_numbers(size: int) -> None:
     """Two numbers with two directions meet arrays of as many elements, fewer and more: by differences of the real parts."""

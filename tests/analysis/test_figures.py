@@ -11,13 +11,12 @@ import matplotlib
 import numpy as np
 import pytest
 from matplotlib.animation import PillowWriter
-from matplotlib.colors import TwoSlopeNorm
 from matplotlib.path import Path as Path2D
 from matplotlib.text import Text
 from PIL import Image
 
 from analysis import Inputs, figures, simulate, simulate_many
-from analysis.figures import Curve, Panel, charts
+from analysis.figures import Curve, Panel
 from analysis.figures.animation import gif
 from analysis.figures.curves import Arrow, Label
 from analysis.files import WritingError, save_figure
@@ -149,15 +148,6 @@ def test_texts_of_a_run_cover_neither_each_other_nor_its_curves(run) -> None:
             assert not any(path.intersects_bbox(box, filled=False) for box in boxes)
 
 
-def test_panels_beside_the_mechanism_fill_both_columns(run) -> None:
-    *panels, mechanism = figures.plot(run).axes
-    width = {"left": 0.0, "right": 0.0}
-    for axis in (*panels, mechanism):
-        box = axis.get_position()
-        width["left" if box.x0 < 0.5 else "right"] += box.height
-    assert width["left"] > 0.7 * width["right"]
-
-
 def test_of_a_tracking_run_what_is_zero_is_said_and_not_drawn() -> None:
     time = np.linspace(0.0, 1.0, 50)
     loop = SimpleNamespace(time=time, force=np.sin(time))
@@ -165,13 +155,6 @@ def test_of_a_tracking_run_what_is_zero_is_said_and_not_drawn() -> None:
     figure = figures.plot_tracking(run)
     assert labels_of(figure) == ["slider error [mm]", "control force [N]"]
     assert "coupler point error" in figure.get_supxlabel()
-
-
-def test_ticks_of_a_scale_are_on_both_sides_of_its_middle() -> None:
-    ticks = charts._ticks(TwoSlopeNorm(1.0, 0.03, 24.7))
-    assert 1.0 in ticks
-    assert sum(tick < 1.0 for tick in ticks) >= 2
-    assert sum(tick > 1.0 for tick in ticks) >= 2
 
 
 def test_outputs_have_a_panel_each(run) -> None:

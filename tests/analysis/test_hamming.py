@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from fractions import Fraction as F
 from itertools import pairwise
 from math import cos, pi, sin
 from typing import Any
@@ -67,40 +66,12 @@ def test_predictor_and_corrector_have_the_errors_that_the_modifier_takes_out() -
     assert error == pytest.approx(unit / 40 / size, rel=1e-9)
 
 
-def test_modified_value_is_exact_where_the_predictor_is_not() -> None:
-    # 112/121 of p - c takes the predictor's whole error out: the corrector's slope is taken there
-    y = np.poly1d([1, 0, 0, 0, 0, 0])
-    solver = with_exact_back_values(y, 0.25)
-    places: list[float] = []
-
-    def f(t: float, m: np.ndarray) -> np.ndarray:
-        places.append(float(m[0]))
-        return np.array([y.deriv()(t)])
-
-    solver.fun = f
-    solver._hamming(0.55)
-    assert places[0] == pytest.approx(y(0.55), rel=1e-12)
-    assert len(places) == 2
-
-
 @pytest.mark.parametrize("power", range(6))
 def test_step_is_exact_on_powers_up_to_the_fifth(power: int) -> None:
     y = np.poly1d([1] + [0] * power)
     solver = with_exact_back_values(y, 0.25)
     _, new, _ = solver._hamming(0.55)
     assert new.y[0] == pytest.approx(y(0.55), rel=1e-12)
-
-
-def test_step_is_not_exact_on_the_sixth_power() -> None:
-    y = np.poly1d([1] + [0] * 6)
-    _, new, _ = with_exact_back_values(y, 0.25)._hamming(0.55)
-    assert abs(new.y[0] - y(0.55)) > 1e-4
-
-
-def test_estimate_of_p_minus_c_is_that_of_the_step_before() -> None:
-    h = 0.25
-    solver = with_exact_back_values(np.poly1d([1, 0, 0, 0, 0, 0]), h)
-    assert solver._estimate()[0] == pytest.approx(-121 / 360 * 120.0 * h**5, rel=1e-10)
 
 
 @pytest.mark.parametrize("power", range(7))
@@ -114,18 +85,6 @@ def test_halving_interpolates_powers_up_to_the_sixth_exactly(power: int) -> None
     assert [point.f[0] for point in solver._back] == pytest.approx(
         [y.deriv()(t - k * h / 2) for k in range(4)], abs=1e-12
     )
-
-
-def test_halving_formulas_in_fractions() -> None:
-    # Hermite interpolation through y_0 .. y_-3 and f_0 .. f_-2: exact on t^0 .. t^6, which determines the seven weights
-    for place, ys, fs in (
-        (F(-1, 2), (80, 135, 40, 1), (-15, 90, 15)),
-        (F(-3, 2), (12, 135, 108, 1), (-3, -54, 27)),
-    ):
-        for n in range(7):
-            total = sum(F(w, 256) * F(-k) ** n for k, w in enumerate(ys))
-            total += sum(F(w, 256) * n * F(-k) ** (n - 1) for k, w in enumerate(fs) if n > 0)
-            assert total == place**n
 
 
 def test_doubling_takes_every_other_back_value() -> None:
@@ -147,17 +106,6 @@ def test_order_with_fixed_steps() -> None:
     counts = np.array([100, 160, 250, 400, 640, 1000])
     errors = [np.abs(fixed(pendulum, (0.0, 10.0), START, n).y[:, -1] - EXACT_10).max() for n in counts]
     assert slope(10.0 / counts, errors) == pytest.approx(5.0, abs=0.35)
-
-
-def test_error_estimate_is_of_local_order_five() -> None:
-    # that of a method of order 4: the difference of predictor and corrector
-    sizes, estimates = np.array([0.2, 0.1, 0.05, 0.025]), []
-    for h in sizes:
-        solver = Hamming(pendulum, 0.0, START, 10.0, first_step=h, max_step=h, **LOOSE)
-        while solver.t < 2.0 - 1e-9:
-            solver.step()
-        estimates.append(np.abs(solver._p_minus_c).max())
-    assert slope(sizes, estimates) == pytest.approx(5.0, abs=0.3)
 
 
 def test_start_is_no_worse_than_what_follows() -> None:
@@ -211,12 +159,6 @@ def test_step_is_halved_where_it_gets_quick_and_doubled_after() -> None:
     assert solver.doublings >= 3
     exact = solve_ivp(bump, (0.0, 10.0), [1.0], method="DOP853", rtol=1e-12, atol=1e-13, max_step=0.1).y[0, -1]
     assert solver.y[0] == pytest.approx(exact, abs=1e-5)
-
-
-def test_steps_are_powers_of_two_of_each_other() -> None:
-    result = solve_ivp(bump, (0.0, 10.0), [1.0], method=Hamming, rtol=1e-6, atol=1e-6, first_step=2.0**-6)
-    exponents = np.log2(np.diff(result.t)[:-1])
-    assert exponents == pytest.approx(np.round(exponents), abs=1e-9)
 
 
 def test_jump_of_the_right_hand_side_starts_anew() -> None:
@@ -293,22 +235,6 @@ def test_events_and_recorded_times() -> None:
     assert len(result.t_events[0]) >= 2
     for t in result.t_events[0]:
         assert abs(exact_at(t)[0]) < 1e-6
-
-
-def test_complex_states() -> None:
-    result = solve_ivp(
-        lambda t, y: 1j * y, (0.0, 10.0), [1.0 + 0j, 1j], method=Hamming, t_eval=[2.5, 10.0], rtol=1e-9, atol=1e-9
-    )
-    assert result.y[0] == pytest.approx(np.exp(1j * result.t), abs=1e-6)
-    assert result.y[1] == pytest.approx(1j * np.exp(1j * result.t), abs=1e-6)
-
-
-def test_vectorised_right_hand_side() -> None:
-    def f(t: float, y: np.ndarray) -> np.ndarray:
-        return np.vstack([y[1], -y[0]])
-
-    result = solve_ivp(f, (0.0, 5.0), [0.0, 1.0], method=Hamming, rtol=1e-9, atol=1e-9, vectorized=True)
-    assert result.y[0, -1] == pytest.approx(sin(5.0), abs=1e-7)
 
 
 def test_end_that_is_no_multiple_of_the_step() -> None:

@@ -8,6 +8,7 @@ import itertools
 import math
 import re
 import sys
+from collections.abc import Callable
 from dataclasses import replace
 from fractions import Fraction
 from pathlib import Path
@@ -422,6 +423,10 @@ MISTAKES = [
     ("bodies/rocker/section", {"kind": "tube", "outer": "5 mm", "inner": "6 mm", "material": "steel"},
      "linkage.bodies.rocker.section.inner is 0.006"),
     ("freedoms/again", {"joint": "A"}, "linkage.freedoms.again is of A"),
+    ("bodies/crank", {"points": {"A": [0, 0], "B": [0, 0]}, "mass": 1.0, "inertia": 1e-3},
+     "linkage.bodies.crank.points.B is where A is"),
+    ("bodies/rocker", {"bar": ["D", "C"], "length": 0.12, "section": {"kind": "plate", "thickness": 0.005, "material": "steel",
+     "corners": [[0, 0], [1, 1], [1, 0], [0, 1]]}}, "its edges cross"),
     ("name", "rahman-ideal", "linkage.name is rahman-ideal: it must not be that of a published set of slider-crank"),
     ("name", "five-bar-slider", "linkage.name is five-bar-slider: its FMU would be called FiveBarSlider, as that of five-bar"),
 ]  # fmt: skip
@@ -459,15 +464,6 @@ def test_a_free_body_without_mass_is_named(tmp_path):
         Package(read_description(data)).mechanism(tmp_path)
 
 
-def test_corners_in_no_order_are_named() -> None:
-    plate = {"kind": "plate", "thickness": 0.005, "material": "steel", "corners": [[0, 0], [1, 1], [1, 0], [0, 1]]}
-    built = (
-        linkage("bow", ground={"A": (0, 0)}).body("sheet", points={"A": (0, 0)}, section=plate).freedom("sheet", "A")
-    )
-    with pytest.raises(ParameterError, match=r"linkage\.bodies\.sheet\.section\.corners is .*: its edges cross"):
-        built.mechanism()
-
-
 def test_every_dyad_has_a_transmission_angle() -> None:
     """At whose sine zero it locks: of a slider-crank from rod and guide, of a rod in a swivel from rod and line of pins."""
     built = linkage("crosshead", ground={"A": (0, 0), "O": (0, 0.02), "S": (0.25, 0)})
@@ -497,55 +493,6 @@ def test_a_rack_ends_what_a_wheel_can_turn() -> None:
     assert found.open == (False, False)
     # the pins are sqrt(0.35^2 - 0.12^2) apart along the rack at most
     assert found.high - found.low == pytest.approx(2.0 * math.sqrt(0.35**2 - 0.12**2) / 0.02, rel=1e-2)
-
-
-def test_two_joints_between_two_bodies_are_named() -> None:
-    built = linkage("held", ground={"A": (0, 0), "O": (0.2, 0)}).body("arm", bar=("A", "B"), length=0.1, mass=1.0)
-    built.body("block", points={"F": (0, 0)}, mass=1.0).slide("one", body="block", through="O").slide(
-        "two", body="block", through="O"
-    )
-    built.body("tip", bar=("B", "C"), length=0.1, mass=1.0).body("end", bar=("C", "D"), length=0.1, mass=1.0)
-    with pytest.raises(LinkworkError, match=r"linkage\.bodies\.block is joined to ground twice, by one and by two"):
-        built.mechanism()
-
-
-def test_a_body_of_no_length_is_named() -> None:
-    built = linkage("pointed", ground={"A": (0, 0), "D": (0.15, 0)}).body(
-        "crank", points={"A": (0, 0), "B": (0, 0)}, mass=1.0, inertia=1e-3
-    )
-    built.body("coupler", bar=("B", "C"), length=0.15, mass=1.0).body("rocker", bar=("D", "C"), length=0.1, mass=1.0)
-    with pytest.raises(LinkworkError, match=r"linkage\.bodies\.crank\.points\.B is where A is"):
-        built.freedom("crank", "A").mechanism()
-
-
-def test_a_mate_for_each_surplus_is_the_smallest() -> None:
-    """Of a parallelogram with a third crank, the crank is named, not the coupler."""
-    built = linkage("third", ground={"A": (0, 0), "D": (0.15, 0), "E": (0.075, 0)})
-    for name, bar in (("a", ("A", "B")), ("d", ("D", "C")), ("e", ("E", "M"))):
-        built.body(name, bar=bar, length=0.05, mass=1.0)
-    built.body("c", points={"B": (0, 0), "C": (0.15, 0), "M": (0.075, 0)}, mass=1.0, inertia=1e-3)
-    with pytest.raises(LinkworkError, match=r"without linkage\.bodies\.e it has 1"):
-        built.freedom("a", "A").mechanism()
-
-
-def test_only_what_fails_is_blamed_for_accelerations() -> None:
-    """The massless body, not the sound law beside it."""
-    built = linkage("massless", ground={"A": (0, 0)}).body("crank", bar=("A", "B"), length=0.05, mass=1.0, inertia=1e-3)
-    built.body("pendulum", bar=("B", "Q"), length=0.1).freedom("crank", "A", speed="100 rpm").freedom("pendulum", "B")
-    built.spring("wind", at="A", law="2*sin(x)")
-    with pytest.raises(
-        LinkworkError, match=r"numbers: the mass or inertia of linkage\.bodies\.pendulum must be another"
-    ):
-        built.mechanism()
-
-
-def test_a_slot_out_of_reach_is_called_a_slot() -> None:
-    built = linkage("short", ground={"A": (0, 0), "E": (0.3, 0)}).body("crank", bar=("A", "B"), length=0.05, mass=1.0)
-    built.body("lever", bar=("E", "F"), length=0.1, mass=1.0).slot(
-        "S", pin="F", on="crank", through="A", direction="90 deg"
-    )
-    with pytest.raises(LinkworkError, match=r"linkage\.slots\.S"):
-        built.freedom("crank", "A").mechanism()
 
 
 def test_an_input_of_a_body_and_a_freedom_of_its_name_have_arguments_of_their_own() -> None:
@@ -708,11 +655,6 @@ def test_the_builder_takes_numbers_and_arrays_of_numpy() -> None:
     assert read_description({**made, "freedoms": {"swing": "A"}}).ground == {"A": (0.0, 0.1)}
 
 
-def test_a_name_that_is_no_constant_of_a_law_is_named() -> None:
-    with pytest.raises(LinkworkError, match=r"wind\.law is 'a \* x \*\* 3'.*: a is none of them.*constants = \{ a = "):
-        wheel("nameless", law="a*x**3", constants={"b": 1.0}).mechanism()
-
-
 def wheel(name: str, **changes: Any) -> Any:
     """A driven wheel with a pendulum on its rim."""
     built = linkage(name, ground={"A": (0, 0)}, **changes.pop("more", {}))
@@ -768,14 +710,6 @@ def test_a_linkage_whose_freedoms_are_all_commanded_has_no_linear_model() -> Non
         linearise(known.parameters, made.state(known.initial), Inputs(speed=0.0))
 
 
-def test_a_freedom_at_a_pin_of_three_bodies_names_them() -> None:
-    for joint in ("Q", "Q2"):
-        built = wheel("crowded", stiffness="0.01 N*m/rad").body("bob", bar=("Q", "S"), length="0.1 m", mass=0.1)
-        built.freedom("bob", joint)
-        with pytest.raises(LinkworkError, match="of the pin Q of drum, pendulum, bob: it must be of one of two bodies"):
-            built.mechanism()
-
-
 def test_powers_that_are_not_whole_have_no_complex_value() -> None:
     assert laws.expression("-x**1.5 + x**-1.5 + 2**x", False, "law") == "-pow(x, 1.5) + pow(x, -1.5) + pow(2, x)"
     written = laws.expression("a*x**2 - 3*x**-1 + (x - 1)**(2*x**1.5)", False, "law")
@@ -794,20 +728,6 @@ def test_laws_have_max_min_and_abs(x: float) -> None:
     assert eval(written, vars(math) | known) == pytest.approx(eval(formula, known), rel=1e-14, abs=1e-15)
     with pytest.raises(ParameterError, match="be a formula in x, v"):
         laws.law("max(x)", "law")
-
-
-def test_springs_without_a_length_are_named() -> None:
-    built = wheel("drawn", stiffness="0.01 N*m/rad").body("cart", points={"C": (0, 0)}, mass=1.0)
-    built.slide("G", body="cart", through="A").freedom("cart", "G", driven=False)
-    built.spring("k", between=("A", "C"), stiffness="10 N/m")
-    with pytest.raises(LinkworkError, match=r"the length of linkage\.springs\.k, which has no direction at 0 m"):
-        built.mechanism()
-
-
-def test_a_freedom_and_a_body_have_one_torque() -> None:
-    built = wheel("twice", stiffness="0.01 N*m/rad", more={"torques": ["pendulum"]})
-    with pytest.raises(LinkworkError, match=r"two inputs would be called pendulum\.torque"):
-        built.mechanism()
 
 
 def test_a_cylinder_called_like_a_body_has_its_own_force() -> None:
@@ -1064,33 +984,85 @@ def test_two_shafts_on_one_axis_are_joined_by_a_freedom_or_by_bodies() -> None:
     np.testing.assert_allclose(angles[0], angles[1], atol=1e-7)
 
 
-def test_a_gear_on_a_rocker_is_refused_with_the_reason() -> None:
+def crowded(joint: str) -> Any:
+    """A freedom at a pin of three bodies, by the name of the pin or of one of its joints."""
+    built = wheel("crowded", stiffness="0.01 N*m/rad").body("bob", bar=("Q", "S"), length="0.1 m", mass=0.1)
+    return built.freedom("bob", joint)
+
+
+def held() -> Any:
+    built = linkage("held", ground={"A": (0, 0), "O": (0.2, 0)}).body("arm", bar=("A", "B"), length=0.1, mass=1.0)
+    built.body("block", points={"F": (0, 0)}, mass=1.0).slide("one", body="block", through="O")
+    built.slide("two", body="block", through="O")
+    return built.body("tip", bar=("B", "C"), length=0.1, mass=1.0).body("end", bar=("C", "D"), length=0.1, mass=1.0)
+
+
+def third_crank() -> Any:
+    """A parallelogram with a third crank, which is named, and not the coupler."""
+    built = linkage("third", ground={"A": (0, 0), "D": (0.15, 0), "E": (0.075, 0)})
+    for name, bar in (("a", ("A", "B")), ("d", ("D", "C")), ("e", ("E", "M"))):
+        built.body(name, bar=bar, length=0.05, mass=1.0)
+    coupler = {"B": (0, 0), "C": (0.15, 0), "M": (0.075, 0)}
+    return built.body("c", points=coupler, mass=1.0, inertia=1e-3).freedom("a", "A")
+
+
+def massless() -> Any:
+    """A massless body, which is blamed, and not the sound law beside it."""
+    built = linkage("massless", ground={"A": (0, 0)}).body("crank", bar=("A", "B"), length=0.05, mass=1.0, inertia=1e-3)
+    built.body("pendulum", bar=("B", "Q"), length=0.1).freedom("crank", "A", speed="100 rpm").freedom("pendulum", "B")
+    return built.spring("wind", at="A", law="2*sin(x)")
+
+
+def short_slot() -> Any:
+    built = linkage("short", ground={"A": (0, 0), "E": (0.3, 0)}).body("crank", bar=("A", "B"), length=0.05, mass=1.0)
+    built.body("lever", bar=("E", "F"), length=0.1, mass=1.0)
+    return built.slot("S", pin="F", on="crank", through="A", direction="90 deg").freedom("crank", "A")
+
+
+def spring_without_length() -> Any:
+    built = wheel("drawn", stiffness="0.01 N*m/rad").body("cart", points={"C": (0, 0)}, mass=1.0)
+    built.slide("G", body="cart", through="A").freedom("cart", "G", driven=False)
+    return built.spring("k", between=("A", "C"), stiffness="10 N/m")
+
+
+def toothed_rocker() -> Any:
     built = linkage("sector", ground={"A": (0, 0), "D": (0.15, 0), "H": (0.3, 0)})
     built.body("crank", bar=("A", "B"), length=0.05).body("coupler", bar=("B", "C"), length=0.15)
     built.body("rocker", bar=("D", "C"), length=0.12, mass=1.0).body("pinion", points={"H": (0, 0)}, mass=1.0)
-    built.gear("Z", bodies=("rocker", "pinion"), ratio=-2.0).freedom("crank", "A")
-    with pytest.raises(
-        LinkworkError, match=r"by linkage\.gears\.Z pinion is in the teeth of rocker, whose angle must follow"
-    ):
-        built.mechanism()
+    return built.gear("Z", bodies=("rocker", "pinion"), ratio=-2.0).freedom("crank", "A")
 
 
-def test_friction_at_a_pin_of_three_bodies_says_what_to_do() -> None:
+def rubbed_pin() -> Any:
     built = linkage("rubbed", ground={"A": (0, 0), "D": (0.15, 0), "H": (0.3, 0)}, friction={"B2": "1 mm"})
     built.body("crank", bar=("A", "B"), length=0.05).body("rocker", bar=("D", "C"), length=0.12, mass=1.0)
     built.body("coupler", bar=("B", "C"), length=0.15).body("other", bar=("B", "G"), length=0.3)
-    built.body("lever", bar=("H", "G"), length=0.1).freedom("crank", "A")
-    with pytest.raises(
-        LinkworkError, match="B is of crank, coupler, other: give the other a point of its own at the same"
-    ):
-        built.mechanism()
+    return built.body("lever", bar=("H", "G"), length=0.1).freedom("crank", "A")
 
 
-def test_a_slot_whose_two_pins_coincide_has_no_direction() -> None:
+def folded_slot() -> Any:
     built = linkage("folded", ground={"A": (0, 0), "D": ("100 mm", 0)}).body("crank", bar=("A", "B"), length="100 mm")
     built.body("lever", points={"D": (0, 0)}, mass=1.0, inertia=0.01).slot("S", pin="B", on="lever", through="D")
-    built.freedom("crank", "A", start="1e-9 rad")
-    with pytest.raises(
-        LinkworkError, match=r"linkage\.slots\.S has no direction at the start: the pins . and . are at one"
-    ):
-        built.mechanism()
+    return built.freedom("crank", "A", start="1e-9 rad")
+
+
+#: Linkages that are refused, and the sentence; those that are one entry of the four-bar are among `MISTAKES`.
+REFUSED = [
+    (held, r"linkage\.bodies\.block is joined to ground twice, by one and by two"),
+    (third_crank, r"without linkage\.bodies\.e it has 1"),
+    (massless, r"numbers: the mass or inertia of linkage\.bodies\.pendulum must be another"),
+    (short_slot, r"linkage\.slots\.S"),
+    (lambda: crowded("Q"), "of the pin Q of drum, pendulum, bob: it must be of one of two bodies"),
+    (lambda: crowded("Q2"), "of the pin Q of drum, pendulum, bob: it must be of one of two bodies"),
+    (lambda: wheel("nameless", law="a*x**3", constants={"b": 1.0}), r"wind\.law is .*: a is none of them.*constants = \{ a = "),
+    (spring_without_length, r"the length of linkage\.springs\.k, which has no direction at 0 m"),
+    (lambda: wheel("twice", damping=1.0, more={"torques": ["pendulum"]}), r"two inputs would be called pendulum\.torque"),
+    (toothed_rocker, r"by linkage\.gears\.Z pinion is in the teeth of rocker, whose angle must follow"),
+    (rubbed_pin, "B is of crank, coupler, other: give the other a point of its own at the same"),
+    (folded_slot, r"linkage\.slots\.S has no direction at the start: the pins . and . are at one"),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("make", "said"), REFUSED)
+def test_what_is_refused_is_named(make: Callable[[], Any], said: str) -> None:
+    with pytest.raises(LinkworkError, match=said):
+        make().mechanism()

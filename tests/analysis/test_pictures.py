@@ -16,7 +16,6 @@ from matplotlib.text import Annotation
 from analysis import figures
 from analysis.figures import Curve, HeatMap, Panel, Picture, html
 from analysis.figures.curves import Arrow, Label, Shade
-from analysis.libraries import MissingLibraryError
 from analysis.periodic import Basins, Crossing, Response, Risk
 
 from .periodic_branches import branch, hysteresis, response
@@ -247,17 +246,6 @@ def test_page_has_all_that_a_panel_may_have() -> None:
     assert note["text"] == "a note"
     assert (arrow["y"], arrow["ay"], arrow["ayref"]) == (2.0, 0.0, "y")
     assert (label["y"], label["text"]) == (1.0, "a<br>label")
-
-
-def test_without_plotly_there_is_a_sentence(folded: Response, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("analysis.libraries.find_spec", lambda name: None)
-    with pytest.raises(MissingLibraryError, match="pip install 'plotly"):
-        figures.to_html(folded)
-
-
-def test_a_result_without_a_description_is_refused() -> None:
-    with pytest.raises(figures.DrawingError, match="type dict have no picture to be described"):
-        figures.to_html({})
 
 
 # Maps

@@ -101,13 +101,6 @@ class TestMechanism:
         assert not any("S_1" in text for text in said)
         assert {"$i_1$", "$j_1$", "$k_1$", "$i_4$", "$j_4$", "$k_4$"} <= set(said)
 
-    @pytest.mark.parametrize("spot", rahman.SPOTS)
-    def test_the_slider_position_is_the_published_one(self, spot) -> None:
-        p = parameters(spot.offset_in, spot.twist_deg)
-        said = texts_of(plot_mechanism(p, radians(30.0), spot.shift_in * INCH, unit="in"))
-        assert f"slider $S_4$ = {spot.position_in:.4g} in" in said
-        assert (f"$S_1$ = {spot.shift_in:g} in" in said) == (spot.shift_in != 0.0)
-
     def test_the_unit_is_that_of_all_lengths(self) -> None:
         said = texts_of(plot_mechanism(OFFSET, 0.5, 0.1, unit="mm"))
         assert "$a_4$ = 254 mm" in said

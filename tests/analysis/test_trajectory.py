@@ -94,19 +94,6 @@ def test_data_frame(trajectory: Trajectory) -> None:
     assert np.array_equal(frame["pin.B.fy"].to_numpy(), trajectory["pin.B.fy"])
 
 
-def test_plot_shows_the_outputs_with_their_units(trajectory: Trajectory) -> None:
-    figure = figures.plot(trajectory, ["slider.position", "crank.speed", "pin.A.fx"], title="three")
-    assert isinstance(figure, figures.Figure)
-    assert [axis.get_ylabel() for axis in figure.axes] == [
-        "slider position\n[mm]",
-        "crank speed\n[rpm]",
-        "pin A fx\n[N]",
-    ]
-    (line,) = figure.axes[0].lines
-    assert np.array_equal(line.get_xdata(), trajectory.time)
-    assert np.allclose(line.get_ydata(), 1e3 * trajectory["slider.position"], rtol=1e-15)
-
-
 def test_angles_are_unwrapped_where_their_turns_can_be_counted() -> None:
     """An angle that wraps goes on past pi; one that is sampled too rarely, a counted angle and all else stay as they are."""
     turned = np.linspace(3.0, -8.0, 12)
