@@ -112,7 +112,7 @@ def probe(of: str, page: str) -> str:
     from analysis.probe.faults import ACCEPT, FAULTS
 
     if of == "checks":
-        return _markdown("| check | what it looks at |", ((f"`{name}`", check.title) for name, check in CHECKS.items()))
+        return _markdown("| check | what it tests |", ((f"`{name}`", check.title) for name, check in CHECKS.items()))
     whats: dict[str, dict[str | None, list[str]]] = {}
     for functions, what, accepted, _ in FAULTS:
         whats.setdefault(functions, {}).setdefault(accepted, []).append(what)
