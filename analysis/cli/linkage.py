@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 import click
 
+from ..display import format_count
 from .common import out_option, report_errors, say, show_table
 
 if TYPE_CHECKING:
@@ -57,8 +58,8 @@ def _print_structure(package: Package) -> None:
     d, structure = package.description, package.structure
     lost = 3 * len(structure.bodies) - len(structure.freedoms)
     say(
-        f"{d.title or d.name}: {len(d.bodies)} moving bodies, {len(structure.joints)} joints; "
-        f"3 x {len(structure.bodies)} - {lost} = {len(structure.freedoms)} freedoms by Gruebler's count"
+        f"{d.title or d.name}: {format_count(len(d.bodies), 'moving body')}, {format_count(len(structure.joints), 'joint')}; "
+        f"3 x {len(structure.bodies)} - {lost} = {format_count(len(structure.freedoms), 'freedom')} by Gruebler's count"
     )
     rows = []
     steps = [s for step in structure.steps for s in (step.inner_dyads if isinstance(step, Dyad) else (step,))]
