@@ -153,15 +153,15 @@ class Evolution:
         span = tau if self.normal.closed else float(x[-1])
         return evaluate(self.task, make_linkage(start, self.normal), np.linspace(0.0, span, self.normal.n)).error
 
-    def run(self, random: np.random.Generator, over: Callable[[], bool]) -> float:
-        """Make one run of evolution, until it converges or ``over`` returns true, and continue with a simplex.
+    def run(self, random: np.random.Generator, has_expired: Callable[[], bool]) -> float:
+        """Make one run of evolution until it converges or ``has_expired`` returns true; improve the result by a simplex.
 
         Returns the least error (m2).
         """
         found = evolve(
             self.box,
             random,
-            lambda intermediate_result: over(),
+            lambda intermediate_result: has_expired(),
             lambda x: self.areas(np.ascontiguousarray(x)),
             maxiter=GENERATIONS,
             tol=1e-4,
@@ -178,12 +178,12 @@ def search_with_evolution(task: UntimedPath, constraints: Sequence[Constraint], 
         search.areas(search.box.low[None, :])
     begun, best, runs = process_time(), inf, count()
 
-    def over() -> bool:
+    def has_expired() -> bool:
         return process_time() - begun > budget
 
-    while not over():
+    while not has_expired():
         number = next(runs)
-        best = min(best, searches[number % len(searches)].run(np.random.default_rng([0, number]), over))
+        best = min(best, searches[number % len(searches)].run(np.random.default_rng([0, number]), has_expired))
     return best
 
 

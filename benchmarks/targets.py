@@ -122,9 +122,9 @@ def function_target(function: Any, low: float, high: float, output_deg: float = 
 
 
 def rise_and_dwell() -> RockerFunction:
-    """Return a task with a cycloidal rise of the rocker by 40 degrees over 120 degrees of the crank, and a like return to zero.
+    """Return a task for a rocker that rises by 40 degrees, dwells, returns to zero, and dwells again.
 
-    A dwell over 60 degrees of the crank follows each.
+    Rise and return are cycloidal and take 120 degrees of the crank each, the dwells 60 degrees.
     """
     t = np.degrees(turn(72))
     up = np.clip(t / 120.0, 0.0, 1.0) - np.clip((t - 180.0) / 120.0, 0.0, 1.0)

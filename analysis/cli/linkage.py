@@ -71,8 +71,8 @@ def _print_structure(package: Package) -> None:
         elif isinstance(step, GearStep):
             rows.append((step.body, "gear", f"pinned at {step.pin.name}, geared to {step.mate}"))
         elif isinstance(step, RackStep):
-            by = "rack" if step.turns else "gear"
-            rows.append((step.body, step.rack, f"held at {step.joint.name}, moved by the {by} {step.mate}"))
+            driver = "rack" if step.turns else "gear"
+            rows.append((step.body, step.rack, f"held at {step.joint.name}, moved by the {driver} {step.mate}"))
         else:
             freedom = package.interface.drives[step.freedom]
             driven = f", driven as {freedom.table}" if freedom.table else ""

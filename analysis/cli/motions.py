@@ -114,9 +114,9 @@ def _motions(title: str, found: Sequence[Orbits], common: int) -> None:
         word = orbit.verdict().stability
         stays = word is not Stability.UNSTABLE
         number += stays
-        size_of_it = f"{size * orbit.amplitude:.5g} {unit} of {what}{format_rounds(orbit.rounds, ', ')}"
+        amplitude = f"{size * orbit.amplitude:.5g} {unit} of {what}{format_rounds(orbit.rounds, ', ')}"
         shown = str(number) if stays else ""
-        rows.append((shown, str(orbit.crank_turns), size_of_it, word.value, f"{orbit.largest:.6g}"))
+        rows.append((shown, str(orbit.crank_turns), amplitude, word.value, f"{orbit.largest:.6g}"))
     show_table(title, headings, rows, words=("stability",))
     for periods, part in enumerate(found, start=1):
         sure = "two methods found the same motions" if part.agreed else "two methods differ: there may be more motions"

@@ -251,10 +251,8 @@ def _print_branches(title: str, response: Any, factor: float, unit: str) -> None
         ends = "closed" if branch.closed else ends
         rows.append((str(number), str(branch.crank_turns), str(len(branch)), begins, ends, shares, "; ".join(events)))
     family = response.family
-    over = "speed" if speed_names(find_mechanism(family.parameters)) == (family.name,) else family.name
-    table = (
-        f"{title}: how it moves at each {over}, and where that jumps or becomes unstable (branches of periodic motions)"
-    )
+    varied = "speed" if speed_names(find_mechanism(family.parameters)) == (family.name,) else family.name
+    table = f"{title}: how it moves at each {varied}, and where that jumps or becomes unstable (branches of periodic motions)"
     common.show_table(table, headings, rows, words=headings[-1:])
 
 

@@ -32,7 +32,7 @@ from linkwork.wrapper import (
 class Row(NamedTuple):
     """A variable of a controller: a parameter, an input, an output, or a local variable, which is a state.
 
-    ``rule``, a key of `RULES`, is a condition on a parameter besides being finite.
+    ``rule``, a key of `RULES`, is a condition on a parameter; all parameters must be finite.
     """
 
     name: str

@@ -225,12 +225,12 @@ def _(panel: Panel, axes: _Axes) -> None:
             axes.add_shape(shade.low, shade.high, **look, **entry)
     logarithmic = {axis: axis in panel.logarithmic for axis in "xy"}
 
-    def at(axis: str, value: float) -> float:
+    def axis_value(axis: str, value: float) -> float:
         """Return a value as Plotly expects it in annotations and ranges: its logarithm if the axis is logarithmic."""
         return log10(value) if logarithmic[axis] else value
 
     for arrow in panel.arrows:
-        x, begin, end = at("x", arrow.x), at("y", arrow.begin), at("y", arrow.end)
+        x, begin, end = axis_value("x", arrow.x), axis_value("y", arrow.begin), axis_value("y", arrow.end)
         axes.add_arrow(x, end, ax=x, ay=begin, ayref="y", arrowhead=2, arrowwidth=1.5)
     along = [float(x) for curve in panel.curves for x in np.ravel(curve.x) if isfinite(x)]
     close = _CLOSE * (max(along) - min(along)) if along else 0.0
@@ -238,14 +238,16 @@ def _(panel: Panel, axes: _Axes) -> None:
         # of two labels near each other the higher one has its text above the other's
         level = sum(bool(abs(other.x - label.x) < close and other.y < label.y) for other in panel.labels)
         text_at = {"ax": 45, "ay": -_ABOVE - _LINE_HEIGHT * level}
-        axes.add_arrow(at("x", label.x), at("y", label.y), label.text, **text_at, arrowhead=0, arrowwidth=1)
+        axes.add_arrow(
+            axis_value("x", label.x), axis_value("y", label.y), label.text, **text_at, arrowhead=0, arrowwidth=1
+        )
     for text, place in (panel.verticals or {}).items():
         axes.add_shape(place, place, type="line", line={"dash": "dot", "width": 1}, label={"text": escape(text)})
     for place in panel.dashed:
         axes.add_shape(place, place, type="line", line={"dash": "dash", "width": 1})
     for axis, axes_entry, span in (("x", axes.x, panel.x_range), ("y", axes.y, panel.y_range)):
         axes_entry |= {"type": "log", "exponentformat": "power", "dtick": 1} if logarithmic[axis] else {}
-        axes_entry |= {"range": [at(axis, v) for v in span]} if span is not None else {}
+        axes_entry |= {"range": [axis_value(axis, v) for v in span]} if span is not None else {}
     axes.y["title"] = {"text": _line(panel.y_label)}
     if panel.x_ticks is not None:
         axes.x["tickvals"] = list(panel.x_ticks)

@@ -63,18 +63,20 @@ def joint_positions(mechanism: Mechanism, parameters: Any, coordinates: Array) -
     return {joint.name: 1e3 * found[:, n, :2] for n, joint in enumerate(drawing.joints)}
 
 
-def draw(axis: Axes, mechanism: Mechanism, parameters: Any, at: dict[str, Array], *, letters: bool = True) -> None:
+def draw(
+    axis: Axes, mechanism: Mechanism, parameters: Any, positions: dict[str, Array], *, letters: bool = True
+) -> None:
     """Draw a mechanism at its first configuration, and the paths of its points over all other configurations.
 
-    ``at`` has the positions of the joints as `joint_positions` returns them.
+    ``positions`` are the positions of the joints as `joint_positions` returns them.
     """
     drawing = mechanism.drawing
     assert drawing is not None
-    now = {name: path[0] for name, path in at.items()}
-    everything = np.concatenate(list(at.values()))
+    now = {name: path[0] for name, path in positions.items()}
+    everything = np.concatenate(list(positions.values()))
     unit = 0.03 * float(np.nanmax(np.ptp(everything[np.isfinite(everything).all(axis=1)], axis=0)))
     for name in drawing.paths:
-        axis.plot(*at[name][1:].T, color=TRACE, linewidth=THIN, zorder=2)
+        axis.plot(*positions[name][1:].T, color=TRACE, linewidth=THIN, zorder=2)
     colours = cycle(COLOURS)
     for part in drawing.parts:
         if not part.where or getattr(parameters, field_name(part.where), 0.0) != 0.0:

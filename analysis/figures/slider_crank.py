@@ -84,15 +84,15 @@ def _largest(curves: Iterable[Any]) -> float:
     return max(float(np.nanmax(np.abs(np.ma.filled(values, np.nan)), initial=0.0)) for values in curves)
 
 
-def _constant_text(curves: Mapping[str, Any], unit: str, one: float) -> str:
+def _constant_text(curves: Mapping[str, Any], unit: str, factor: float) -> str:
     """Return the value of a curve as text with unit if the curve is constant and the only one; otherwise an empty text.
 
-    ``one`` is the size of ``unit`` in SI.
+    ``factor`` is the size of ``unit`` in SI.
     """
     values = np.concatenate([np.array(np.ma.filled(given, np.nan)) for given in curves.values()])
     values = values[np.isfinite(values)]
     constant = len(curves) == 1 and len(values) and np.ptp(values) <= _ZERO * np.abs(values).max()
-    return f"{values[0] / one:.4g} {unit}" if constant else ""
+    return f"{values[0] / factor:.4g} {unit}" if constant else ""
 
 
 def _marked_angles(turn: ForceTurn) -> dict[str, float]:
@@ -101,17 +101,19 @@ def _marked_angles(turn: ForceTurn) -> dict[str, float]:
     return marks | {f"limit of assembly {np.degrees(end):.1f}°": np.degrees(end) for end in turn.limits}
 
 
-def _force_panel(turn: ForceTurn, title: str, si: str, unit: str, one: float, components: Mapping[str, Any]) -> Panel:
+def _force_panel(
+    turn: ForceTurn, title: str, si: str, unit: str, factor: float, components: Mapping[str, Any]
+) -> Panel:
     """Return a panel of the curves ``components``, given in SI by label, over the turn.
 
-    ``si`` is their unit in SI, ``unit`` the unit on the axis, and ``one`` the size of ``unit`` in SI.
+    ``si`` is their unit in SI, ``unit`` the unit on the axis, and ``factor`` the size of ``unit`` in SI.
     """
     angle = np.degrees(turn.angle)
     grows = si != "m"
     poles = turn.singularities if grows and turn.sought == SLIDER_FORCE else ()
     curves, inside = [], []
     for label, given in components.items():
-        values = np.array(np.ma.filled(given, np.nan)) / one
+        values = np.array(np.ma.filled(given, np.nan)) / factor
         inside.append(values[np.isfinite(values) & (turn.clear() | (not grows))])
         # a gap at each pole, where a curve changes its sign
         values[[int(np.argmin(np.abs(turn.angle - place.crank_angle))) for place in poles]] = np.nan
@@ -172,9 +174,9 @@ def plot_tolerances(
     turn = found.turn
     if len(turn) < 2:
         raise InputError(f"a band over the turn needs two angles at least, not {len(turn)}")
-    at = found.place(quantity, angle)
+    index = found.place(quantity, angle)
     si = QUANTITIES[quantity]
-    unit, one = shown_units(units)[si]
+    unit, factor = shown_units(units)[si]
     name = quantity.replace(".", " ").replace("_", " ")
     most = int(found.not_assembled.max())
     lost = f"at worst {most / found.samples:.2%} of them cannot be assembled, and are left out"
@@ -186,23 +188,23 @@ def plot_tolerances(
         above, below = np.ravel(figure.subfigures(2, 1, squeeze=False, height_ratios=(1.0, 1.0 + 0.03 * lines)))
         band = above.subplots()
         histogram, bars = below.subplots(1, 2, width_ratios=(3, 2))
-        _draw_band(band, found, quantity, at, one)
-        _draw_histogram(histogram, found, quantity, at, unit, one)
+        _draw_band(band, found, quantity, index, factor)
+        _draw_histogram(histogram, found, quantity, index, unit, factor)
         band.set_ylabel(f"error of {name} [{unit}]")
         histogram.set_xlabel(f"error of {name} [{unit}]")
-        _draw_shares(bars, found, quantity, at)
+        _draw_shares(bars, found, quantity, index)
         style.write_notes(below, foot)
         style.write_title(figure, title or f"Tolerances: {name}")
         return style.finish(figure)
 
 
-def _draw_band(axis: Axes, found: MonteCarlo, quantity: str, at: int, one: float) -> None:
+def _draw_band(axis: Axes, found: MonteCarlo, quantity: str, index: int, factor: float) -> None:
     turn, spread, linear = found.turn, found.spreads[quantity], found.estimates[quantity]
     angle = np.degrees(turn.angle)
     whole = _insert_breaks(angle, turn.breaks, angle)
 
     def curve(values: Any) -> FloatArray:
-        return _insert_breaks(np.ma.filled(values, np.nan) / one, turn.breaks)
+        return _insert_breaks(np.ma.filled(values, np.nan) / factor, turn.breaks)
 
     # three standard deviations of a bounded distribution can exceed its greatest error
     three = curve(np.ma.minimum(3.0 * linear.deviation, linear.worst))
@@ -221,12 +223,12 @@ def _draw_band(axis: Axes, found: MonteCarlo, quantity: str, at: int, one: float
         (spread.mean - linear.nominal, mean, "mean of the samples"),
     ):
         axis.plot(whole, curve(values), label=label, **look)
-    axis.axvline(angle[at], color=style.MARK["color"], linewidth=style.THIN, linestyle="-.")
+    axis.axvline(angle[index], color=style.MARK["color"], linewidth=style.THIN, linestyle="-.")
     for pole in found.poles(quantity):
         axis.axvline(np.degrees(pole), color=style.MARK["color"], linewidth=style.THIN, linestyle=":")
     # at each angle the largest departure that is not NaN, if there is one
     departures = [low, lower, upper, high, linear.worst]
-    reach = np.fmax.reduce([np.abs(np.ma.filled(values, np.nan)) for values in departures], axis=0) / one
+    reach = np.fmax.reduce([np.abs(np.ma.filled(values, np.nan)) for values in departures], axis=0) / factor
     middle = float(np.nanmedian(reach))
     cut = float(np.nanmax(reach)) > _PEAK * middle > 0.0
     if cut:
@@ -243,15 +245,16 @@ def _insert_breaks(values: FloatArray, breaks: Sequence[int], fill: FloatArray |
     return np.insert(values, after, np.nan if fill is None else fill[after])
 
 
-def _draw_histogram(axis: Axes, found: MonteCarlo, quantity: str, at: int, unit: str, one: float) -> None:
+def _draw_histogram(axis: Axes, found: MonteCarlo, quantity: str, index: int, unit: str, factor: float) -> None:
     spread, linear = found.spreads[quantity], found.estimates[quantity]
-    nominal = float(linear.nominal[at])
-    edges = (spread.edges[at] - nominal) / one
+    nominal = float(linear.nominal[index])
+    edges = (spread.edges[index] - nominal) / factor
     width = edges[1] - edges[0]
-    share = spread.counts[at] / (found.samples - found.not_assembled[at] - found.undetermined[at])
+    share = spread.counts[index] / (found.samples - found.not_assembled[index] - found.undetermined[index])
     axis.stairs(share, edges, fill=True, color=_SAMPLES, alpha=0.35, label="samples")
     deviation, of_samples, second = (
-        float(np.ma.filled(x[at], np.nan)) / one for x in (linear.deviation, spread.deviation, linear.second_deviation)
+        float(np.ma.filled(x[index], np.nan)) / factor
+        for x in (linear.deviation, spread.deviation, linear.second_deviation)
     )
     # a distribution narrower than a bin is drawn as a line
     if deviation > width:
@@ -273,8 +276,8 @@ def _draw_histogram(axis: Axes, found: MonteCarlo, quantity: str, at: int, unit:
     axis.set_xlim(edges[0], edges[-1])
     axis.set_ylim(0.0, 1.5 * float(share.max()))
     axis.set_title(
-        f"at {np.degrees(found.turn.angle[at]):.4g} deg, nominal {_number_text(nominal / one, 6)} {unit}; "
-        f"{share.sum():.1%} of the samples" + " that can be assembled" * bool(found.not_assembled[at]),
+        f"at {np.degrees(found.turn.angle[index]):.4g} deg, nominal {_number_text(nominal / factor, 6)} {unit}; "
+        f"{share.sum():.1%} of the samples" + " that can be assembled" * bool(found.not_assembled[index]),
         fontsize=style.PLAIN,
     )
     axis.legend(loc="upper left")

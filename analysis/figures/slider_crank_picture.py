@@ -176,7 +176,7 @@ class _Scene:
         self.covered = np.empty((0, 2))
         self.lines: list[FloatArray] = []
 
-    def at(self, slide: float, x: float = 0.0, y: float = 0.0) -> FloatArray:
+    def guide_point(self, slide: float, x: float = 0.0, y: float = 0.0) -> FloatArray:
         """Return the point (3,), in the ground frame, at a slider position, displaced by x and y along i and j of frame 4."""
         return np.asarray(self.foot + np.array([x, y, -slide]) @ self.frame4)
 
@@ -190,7 +190,7 @@ class _Scene:
         ring = self.a1 * np.column_stack([np.cos(turn), np.sin(turn), 0.0 * turn])
         points = [ring + np.array([0.0, 0.0, z]) for z in (self.low_shift, self.high_shift)]
         points += [np.array([[0.0, 0.0, self.low_shift - 3.0 * u], [0.0, 0.0, self.high_shift + 7.0 * u]])]
-        points += [np.array([self.at(slide, x) for slide in self._rail for x in (0.0, self.side * 2.6 * u)])]
+        points += [np.array([self.guide_point(slide, x) for slide in self._rail for x in (0.0, self.side * 2.6 * u)])]
         points += [self.foot + 2.9 * u * np.vstack([self.frame4, np.eye(3)])]
         shown = self.page(np.concatenate(points))
         room = np.array([3.4 * u, 2.2 * u])
@@ -253,7 +253,7 @@ class _Scene:
         dashes = {"linestyle": (0, (9, 2, 2, 2)), "linewidth": style.HAIR, "color": "0.4", "zorder": 1}
         self._line(axis, [[0, 0, self.low_shift - 4.0 * u], [0, 0, self.high_shift + 8.0 * u]], **dashes)
         ends = min(self.least - 2.3 * u, -1.5 * u), max(self.most + 2.6 * u, 1.5 * u)
-        self._line(axis, [self.at(slide) for slide in ends], **dashes)
+        self._line(axis, [self.guide_point(slide) for slide in ends], **dashes)
         turn = np.linspace(0.0, 2.0 * pi, 181)
         ring = self.a1 * np.column_stack([np.cos(turn), np.sin(turn), 0.0 * turn])
         self._line(axis, ring + pose.centre, color="0.6", linewidth=style.THIN, linestyle=":", zorder=1)
@@ -319,10 +319,12 @@ class _Scene:
         labels += [
             _Label(0.55 * pose.crank_pin + 0.45 * pose.centre, f"crank $a_1$ = {length(self.a1)}", "#8C3D00"),
             _Label(0.5 * (pose.crank_pin + pose.slider_pin), f"rod $a_2$ = {length(self.a2)}", "#00507F"),
-            _Label(self.at(pose.slide, self.side * 2.2 * u), f"slider $S_4$ = {length(pose.slide)}", "#3F4A52"),
+            _Label(
+                self.guide_point(pose.slide, self.side * 2.2 * u), f"slider $S_4$ = {length(pose.slide)}", "#3F4A52"
+            ),
             _Label(np.array([0.0, 0.0, self.high_shift + 3.8 * u]), "bearing", "#3F4A52"),
             _Label(np.array([0.0, 0.0, self.low_shift - 4.0 * u]), "crank axis", size=small),
-            _Label(self.at(max(self.most + 2.6 * u, 1.5 * u)), "guide", size=small),
+            _Label(self.guide_point(max(self.most + 2.6 * u, 1.5 * u)), "guide", size=small),
             _Label(self.foot, rf"$\alpha_4$ = {degrees(self.parameters.guide_twist):.4g}°", _TWIST),
         ]
         for part in self.parts:

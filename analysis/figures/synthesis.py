@@ -72,13 +72,13 @@ def _draw_line(axis: Axes, points: Any, **options: Any) -> None:
     axis.plot(*np.array(points).T, **look | options)
 
 
-def _draw_support(axis: Axes, at: FloatArray, unit: float) -> None:
+def _draw_support(axis: Axes, pin: FloatArray, unit: float) -> None:
     """Draw the bearing of a fixed pin."""
-    foot, half = at[1] - 1.5 * unit, 0.85 * unit
-    corners = np.array([at, [at[0] - half, foot], [at[0] + half, foot]])
+    foot, half = pin[1] - 1.5 * unit, 0.85 * unit
+    corners = np.array([pin, [pin[0] - half, foot], [pin[0] + half, foot]])
     axis.add_patch(Polygon(corners, facecolor="0.92", edgecolor=style.GROUND, linewidth=style.THIN, zorder=5))
-    _draw_line(axis, [(at[0] - 1.3 * unit, foot), (at[0] + 1.3 * unit, foot)], linewidth=style.THIN, zorder=5)
-    for x in np.linspace(at[0] - 0.9 * unit, at[0] + 1.3 * unit, 5):
+    _draw_line(axis, [(pin[0] - 1.3 * unit, foot), (pin[0] + 1.3 * unit, foot)], linewidth=style.THIN, zorder=5)
+    for x in np.linspace(pin[0] - 0.9 * unit, pin[0] + 1.3 * unit, 5):
         _draw_line(axis, [(x, foot), (x - 0.5 * unit, foot - 0.5 * unit)], linewidth=style.HAIR, zorder=5)
 
 
@@ -154,25 +154,25 @@ def _draw_slider(
     axis.add_patch(Polygon(block, facecolor=style.BLOCK, edgecolor=style.SLIDER, linewidth=style.LINE, zorder=4))
 
 
-def _write_letters(axis: Axes, scene: syn.LinkageScene, at: Mapping[str, FloatArray], unit: float) -> None:
+def _write_letters(axis: Axes, scene: syn.LinkageScene, pins: Mapping[str, FloatArray], unit: float) -> None:
     """Write each pin's letter where it is farthest from links, supports, curve and other letters."""
-    names = [n for n in scene.pin_letters if n in at]
-    lines = [(at["A"], at["B"]), (at["B"], at["C"]), (at["C"], at["D"]), (at["A"], at["E"])]
-    if "P" in at:
-        lines += [(at["B"], at["P"]), (at["C"], at["P"])]
-    fixed = [at["A"], at["E"] if scene.second_crank else at["D"]]
+    names = [n for n in scene.pin_letters if n in pins]
+    lines = [(pins["A"], pins["B"]), (pins["B"], pins["C"]), (pins["C"], pins["D"]), (pins["A"], pins["E"])]
+    if "P" in pins:
+        lines += [(pins["B"], pins["P"]), (pins["C"], pins["P"])]
+    fixed = [pins["A"], pins["E"] if scene.second_crank else pins["D"]]
     # height and foot of the bearings
     lines += [(pin, pin - np.array([0.0, 2.0 * unit])) for pin in fixed]
     lines += [(pin - np.array([1.8, 1.7]) * unit, pin + np.array([1.5, -1.7]) * unit) for pin in fixed]
     if scene.guide is not None:
         lines.append((MM_PER_METRE * scene.guide[0], MM_PER_METRE * scene.guide[1]))
     if scene.second_crank:
-        lines.append((at["E"], at["D"]))
-    marks = [at[n] for n in names]
+        lines.append((pins["E"], pins["D"]))
+    marks = [pins[n] for n in names]
     curves = [MM_PER_METRE * p for p in (*scene.curves, scene.traced_curve, scene.target) if p is not None]
     drawn = [MultiLineString(lines), *(MultiPoint(curve[np.isfinite(curve).all(axis=1)]) for curve in curves)]
     for name in names:
-        place = roomiest_position(at[name], 1.5 * unit, drawn, marks)
+        place = roomiest_position(pins[name], 1.5 * unit, drawn, marks)
         axis.text(place[0], place[1], name, ha="center", va="center", fontsize=style.LETTER, zorder=11)
         marks.append(place)
 

@@ -279,7 +279,7 @@ def to_dxf(drawing: Drawing, unit: str = "mm") -> str:
             entry.rgb = (layer.colour >> 16, layer.colour >> 8 & 255, layer.colour & 255)
     space = document.modelspace()
 
-    def at(point: Point) -> Point:
+    def in_units(point: Point) -> Point:
         return point[0] / metre, point[1] / metre
 
     order = list(drawing.layers)
@@ -287,9 +287,9 @@ def to_dxf(drawing: Drawing, unit: str = "mm") -> str:
     for shape in sorted(shapes, key=lambda one: order.index(one.layer)):
         own = {"layer": shape.layer}
         if isinstance(shape, Line):
-            space.add_line(at(shape.start), at(shape.end), dxfattribs=own)
+            space.add_line(in_units(shape.start), in_units(shape.end), dxfattribs=own)
         elif isinstance(shape, Circle):
-            space.add_circle(at(shape.centre), shape.radius / metre, dxfattribs=own)
+            space.add_circle(in_units(shape.centre), shape.radius / metre, dxfattribs=own)
         else:
             bulges = shape.bulges or [0.0] * len(shape.points)
             points = [(x, y, bulge) for (x, y), bulge in zip((shape.points / metre).tolist(), bulges)]
@@ -298,8 +298,8 @@ def to_dxf(drawing: Drawing, unit: str = "mm") -> str:
         height = dimension.height / metre
         sizes = {"dimtxt": 1.0, "dimasz": 1.0, "dimexo": 0.5, "dimexe": 0.5, "dimgap": 0.3}
         space.add_aligned_dim(
-            at(dimension.start),
-            at(dimension.end),
+            in_units(dimension.start),
+            in_units(dimension.end),
             dimension.offset / metre,
             text=_label(dimension, metre),
             override={name: share * height for name, share in sizes.items()}
@@ -307,9 +307,9 @@ def to_dxf(drawing: Drawing, unit: str = "mm") -> str:
             dxfattribs={"layer": dimension.layer},
         ).render()
     for text in drawing.texts:
-        place = {"layer": text.layer, "insert": at(text.position)}
+        place = {"layer": text.layer, "insert": in_units(text.position)}
         space.add_text(text.text, height=text.height / metre, dxfattribs=place)
-    (left, bottom), (right, top) = (at(corner) for corner in drawing.extents)
+    (left, bottom), (right, top) = (in_units(corner) for corner in drawing.extents)
     space.reset_extents((left, bottom, 0.0), (right, top, 0.0))
     document.header.custom_vars.append("Title", drawing.title)
     height = 1.1 * max(top - bottom, 0.5 * (right - left))

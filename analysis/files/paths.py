@@ -110,7 +110,7 @@ def check_plain(path: Path) -> None:
     mode = os.stat(path).st_mode
     if not stat.S_ISREG(mode):
         kinds = ((stat.S_ISDIR, "a folder"), (stat.S_ISFIFO, "a pipe"), (stat.S_ISSOCK, "a socket"))
-        what = next((words for is_it, words in kinds if is_it(mode)), "a device")
+        what = next((words for is_kind, words in kinds if is_kind(mode)), "a device")
         raise InputError(f"{path} is {what}: it must be a file")
 
 

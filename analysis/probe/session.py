@@ -77,7 +77,7 @@ class Library:
 
 
 class Session:
-    """An instance of an FMU, or the attempt to make one.
+    """An instance of an FMU, which may not exist if the FMU refused to make it.
 
     Parameters
     ----------

@@ -111,15 +111,17 @@ class JoinedSystem:
             put = [casadi.vertcat(*u) if u else casadi.SX(0, 1), casadi.DM(model.modes), own]
             numbers = [casadi.DM([*model.p, model.energy])]
 
-            def of(what: Any, s: Any = s, put: Any = put, numbers: Any = numbers) -> Any:
+            def insert(what: Any, s: Any = s, put: Any = put, numbers: Any = numbers) -> Any:
                 return casadi.substitute([what], [s.u, s.modes, s.x, s.p], [*put, *numbers])[0]
 
-            slope = casadi.vertsplit(of(model.traced.derivative))
+            slope = casadi.vertsplit(insert(model.traced.derivative))
             for freedom in model.commanding_inputs():
                 slope[n + freedom] = casadi.SX(0)
             states.append(x)
             slopes += slope
-            outputs |= {End(name, out): v for out, v in zip(m.output_names, casadi.vertsplit(of(model.traced.outputs)))}
+            outputs |= {
+                End(name, out): v for out, v in zip(m.output_names, casadi.vertsplit(insert(model.traced.outputs)))
+            }
         open_ends = [end for end in wires if end.part in self.models]
         found = self._solve_connections(casadi, [wires[end] for end in open_ends], [outputs[end] for end in open_ends])
         self.names = list(outputs)

@@ -444,7 +444,7 @@ def _newton(
     basis = _basis(order)
     scale = p.l4 * (p.m45 * speed**2 + p.k)
 
-    def at(x: NDArray[np.float64]) -> tuple[Balance, NDArray[np.float64]]:
+    def residual(x: NDArray[np.float64]) -> tuple[Balance, NDArray[np.float64]]:
         """Return the plant's balance at the samples and the harmonics of the force; ``x`` has the position's coefficients."""
         u, v, a = basis.value @ x, speed * (basis.rate @ x), speed**2 * (basis.curvature @ x)
         plant = balance(basis.angle, u, v, a, speed, p, load)
@@ -452,7 +452,7 @@ def _newton(
 
     first = start.to_order(order)
     x = np.append(first.cos, first.sin[1:])
-    plant, unbalanced = at(x)
+    plant, unbalanced = residual(x)
     size = np.inf
     for iteration in range(1, MOST_ITERATIONS + 1):
         jacobian = basis.projection @ (
@@ -468,7 +468,7 @@ def _newton(
         last = size <= tolerance * p.l4
         for halving in range(MOST_HALVINGS + 1):
             try:
-                tried = at(x + 0.5**halving * step)
+                tried = residual(x + 0.5**halving * step)
             except AssemblyError:
                 continue
             # the last step may only increase the residual by rounding

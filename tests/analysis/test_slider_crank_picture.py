@@ -51,7 +51,7 @@ class TestProjection:
         assert np.linalg.norm(pose.crank_pin - pose.centre) == pytest.approx(1e3 * p.crank_length)
         assert np.linalg.norm(pose.slider_pin - pose.crank_pin) == pytest.approx(1e3 * p.rod_length)
         # the slider pin is on the guide, at its position
-        assert scene.at(pose.slide) == pytest.approx(pose.slider_pin, abs=1e-6)
+        assert scene.guide_point(pose.slide) == pytest.approx(pose.slider_pin, abs=1e-6)
 
     def test_azimuth_turns_from_j_to_k(self) -> None:
         scene, _ = scene_of(OFFSET, 0.5, 0.0, (0.0, 0.0))

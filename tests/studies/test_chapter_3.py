@@ -142,7 +142,7 @@ class TestFreeMotion:
             },
             time=0.2 * (angle - 0.5) + 0.01 * np.cos(angle),
         )
-        turns = free_crank.Turns.of(run, start=0.5)
+        turns = free_crank.Turns.from_run(run, start=0.5)
         assert turns.speed == pytest.approx([5.0] * 3, rel=1e-6)
         assert turns.speed_range == pytest.approx([0.4] * 3, rel=1e-3)
         assert turns.velocity_range == pytest.approx([4.0] * 3, rel=1e-3)

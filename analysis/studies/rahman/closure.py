@@ -343,7 +343,7 @@ def endings(cases: tuple[Case, ...], offs: tuple[float, ...] = (0.0,), small: fl
     return ended
 
 
-def _steps_from_near(case: Case, small: float) -> FloatArray:
+def _steps_after_near_starts(case: Case, small: float) -> FloatArray:
     """Return the numbers of corrections at the crank angles where the iteration starts within 20 deg of its result."""
     found = case_turn(case, small)
     changes = np.degrees(np.abs(np.diff(found.unknowns[:, 0, :4], axis=0))).max(-1)
@@ -585,7 +585,7 @@ def _convergence() -> tuple[Statement, ...]:
         for small in (STEP, LOOSE)
         for where, steps in (
             (IN_PLANE, [found.steps for found in endings(PLANES, fair, small)]),
-            (OUT_OF_IT, [_steps_from_near(case, small) for case in OUT]),
+            (OUT_OF_IT, [_steps_after_near_starts(case, small) for case in OUT]),
         )
     }
     place = text("section 3.3, L1131")

@@ -156,9 +156,9 @@ def spikes_deg(case: Case, component: Component) -> FloatArray:
     size = np.minimum(np.abs(value[changes]), np.abs(value[changes + 1]))
     found = []
     for at in changes[size > SPIKE * greatest(case, values(case, component))].tolist():
-        near_it = slice(at - 1, at + 3)
-        reciprocal = value[at] / value[near_it]
-        found.append(np.polyfit(reciprocal, angle[near_it], 3)[-1])
+        window = slice(at - 1, at + 3)
+        reciprocal = value[at] / value[window]
+        found.append(np.polyfit(reciprocal, angle[window], 3)[-1])
     return np.array(found)
 
 

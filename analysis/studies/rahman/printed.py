@@ -76,37 +76,37 @@ def turn(p: SliderCrankParameters, shift_in: ArrayLike, *, small: float = STEP, 
 
 
 def close_loop_combined(p: SliderCrankParameters, shift_in: float) -> tuple[FloatArray, FloatArray, bool]:
-    """Close the loop at every second angle of `GRID_DEG` by Newton-Raphson and Davidon-Fletcher-Powell steps combined our way.
+    """Close the loop at every second angle of `GRID_DEG` by Newton-Raphson and Davidon-Fletcher-Powell steps.
 
-    The thesis prints the Newton-Raphson steps only (eqs 7 to 26); its reference 12, on the combination, was not at hand. A
-    step by eq 23a is taken if it halves the sum of squares of eq 25, with lengths in inches; otherwise a
-    Davidon-Fletcher-Powell step reduces that sum. The start is the planar estimate, then the solution at the previous angle.
-    Returns the rotation by which the loop is open (deg) and the error of S4 (in) at each angle, and whether the last step was
-    small at every angle.
+    The rule that combines them is ours: the thesis prints the Newton-Raphson steps only (eqs 7 to 26), and its reference 12,
+    on the combination, was not at hand. A step by eq 23a is taken if it halves the sum of squares of eq 25, with lengths in
+    inches; otherwise a Davidon-Fletcher-Powell step reduces that sum. The start is the planar estimate, then the solution at
+    the previous angle. Returns the rotation by which the loop is open (deg) and the error of S4 (in) at each angle, and
+    whether the last step was small at every angle.
     """
     unit, angles = np.array([1.0, 1.0, 1.0, 1.0, INCH]), np.radians(GRID_DEG[::2])
     away = 1e-6 * np.concatenate([np.zeros((1, 5)), np.eye(5), -np.eye(5)])
     q, ended, settled = planar(p, angles[:1])[0] / unit, [], True
     for angle in angles:
 
-        def at(q: FloatArray, angle: float = angle) -> tuple[FloatArray, FloatArray, float, FloatArray]:
+        def linearise(q: FloatArray, angle: float = angle) -> tuple[FloatArray, FloatArray, float, FloatArray]:
             """Return A and V of eqs 24 and 25, the sum of squares of V, and its gradient."""
             th, s1 = np.full(len(away), angle), np.full(len(away), shift_in * INCH)
             matrix, right = equations(*chain(p, th, s1, (q + away) * unit), INCH, "printed")
             sums = np.sum(right**2, -1)
             return matrix[0], right[0], float(sums[0]), (sums[1:6] - sums[6:]) / 2e-6
 
-        matrix, right, error, slope = at(q)
+        matrix, right, error, slope = linearise(q)
         metric: FloatArray = np.empty(0)
         for _ in range(MAX_STEPS):
             step = np.linalg.pinv(matrix) @ right
-            new = at(q + step)
+            new = linearise(q + step)
             if new[2] <= 0.5 * error:
                 metric = np.empty(0)
             else:
                 metric = metric if metric.size else np.asarray(np.linalg.pinv(matrix.T @ matrix))
                 step = -metric @ slope
-                while (new := at(q + step))[2] > error and np.abs(step).max() > STEP:
+                while (new := linearise(q + step))[2] > error and np.abs(step).max() > STEP:
                     step *= 0.5
                 change = new[3] - slope
                 turned = metric @ change

@@ -237,10 +237,10 @@ def _near_dead_centres(case: Case, q: printed.Joints, angles_deg: method.FloatAr
     The second rates are those of eqs 38a to 42a.
     """
     found = printed.joint_accelerations(printed.CRANK_AT_SPEED, q, printed.joint_rates(printed.CRANK_AT_SPEED, q))
-    close_by = np.min([np.abs(angles_deg - at) for at in dead_centres_deg(case)], axis=0) < ABOUT_DEG
+    is_close = np.min([np.abs(angles_deg - at) for at in dead_centres_deg(case)], axis=0) < ABOUT_DEG
     sizes = {name: np.abs(second) for name, second in found._asdict().items()}
     return {
-        name: float(x[close_by].max() / x[~close_by].max()) for name, x in sizes.items() if x[~close_by].max() > NOTHING
+        name: float(x[is_close].max() / x[~is_close].max()) for name, x in sizes.items() if x[~is_close].max() > NOTHING
     }
 
 

@@ -171,8 +171,8 @@ def judge_growth(n: int) -> list[Case]:
     curves = [columns[f"I4 = {ratio:g}; corrected [1]"] for ratio in INERTIA_RATIOS]
     ratios = [np.min((larger / smaller)[APART]) for smaller, larger in pairwise(curves)]
     level = LARGE if n == 1 else 0.1 * LARGE
-    near_it = np.arange(28.0, 34.0, 0.02) if n == 1 else np.arange(14.8, 16.2, 0.01)
-    widths = [range_above(level, near_it, harmonic(n, near_it, ratio)) for ratio in INERTIA_RATIOS]
+    speeds = np.arange(28.0, 34.0, 0.02) if n == 1 else np.arange(14.8, 16.2, 0.01)
+    widths = [range_above(level, speeds, harmonic(n, speeds, ratio)) for ratio in INERTIA_RATIOS]
     return [
         at_least(f"{word} harmonic outside the resonances", 1.0, min(ratios)),
         at_least(
@@ -187,15 +187,13 @@ def listed_cases() -> tuple[Case, ...]:
     """Compare the equation of appendix 2 with the correct one: peaks of both harmonics with the listing's first damper."""
     cases = []
     for n, ratio in product((1, 2), DAMPED_RATIOS):
-        (at, by_listing), (right_at, right) = (
+        (listed_speed, listed), (speed, correct) = (
             peak(n, ratio, DAMPERS[0], variant) for variant in (Variant.FORTRAN, Variant.EXACT)
         )
         word = ("first", "second")[n - 1]
         if n == 1:
-            cases.append(near(f"speed of the peak; I4 = {ratio:g}", f"{at:.4f}", right_at, HALF_STEP, "rad/s"))
-        cases.append(
-            near(f"peak of the {word} harmonic; I4 = {ratio:g}", f"{by_listing:.4g}", right, ABOUT * by_listing)
-        )
+            cases.append(near(f"speed of the peak; I4 = {ratio:g}", f"{listed_speed:.4f}", speed, HALF_STEP, "rad/s"))
+        cases.append(near(f"peak of the {word} harmonic; I4 = {ratio:g}", f"{listed:.4g}", correct, ABOUT * listed))
     return tuple(cases)
 
 

@@ -224,8 +224,8 @@ def listed_boundaries(given: SliderEquation) -> tuple[tuple[float, float], ...]:
     """
     s, k = given.spring_factor, given.stiffness.to_order(2)
 
-    def amplitudes(n: int, at: float) -> tuple[float, float]:
-        return at * s.cos[n] / s.mean + k.cos[n], at * s.sin[n] / s.mean + k.sin[n]
+    def amplitudes(n: int, lambda_k2: float) -> tuple[float, float]:
+        return lambda_k2 * s.cos[n] / s.mean + k.cos[n], lambda_k2 * s.sin[n] / s.mean + k.sin[n]
 
     (n1, n2), (m1, m2) = (amplitudes(n, 1.0) for n in (1, 2))
     p, r = (n2**2 - 5.0 * n1**2) / 12.0 + m1 / 2.0, (n1**2 - 5.0 * n2**2) / 12.0 - m1 / 2.0

@@ -190,13 +190,13 @@ def rounding_range(name: str) -> dict[str, tuple[float, float]]:
 def judge_stated_error(label: str, stated: str, name: str, why: str = "no rounding gives it") -> Case:
     """Judge whether a stated error lies in one of the ranges of `rounding_range`; the range nearest to the error counts."""
     ranges, wanted = rounding_range(name), float(stated)
-    near_by = {reading: float(np.clip(wanted, *span)) for reading, span in ranges.items()}
-    reading = min(near_by, key=lambda r: abs(near_by[r] - wanted))
+    nearest = {reading: float(np.clip(wanted, *span)) for reading, span in ranges.items()}
+    reading = min(nearest, key=lambda r: abs(nearest[r] - wanted))
     least, greatest = ranges[reading]
     return near(
         f"{label}{reading}; rounded up or down {least:.2f} to {greatest:.2f}",
         stated,
-        near_by[reading],
+        nearest[reading],
         unit=PROBLEMS[name].unit,
         why=why,
     )

@@ -63,7 +63,7 @@ def decay(torque: float, stiffness: float, damping: float) -> float:
 
     The first two turns are left out: they have the transient of the launch, which also decays without a damper.
     """
-    swing = Turns.of(launch(torque, stiffness, FREE, 6000, damping), start=1.0).slider_range[TRANSIENT_TURNS:]
+    swing = Turns.from_run(launch(torque, stiffness, FREE, 6000, damping), start=1.0).slider_range[TRANSIENT_TURNS:]
     half = swing.size // 2
     return float(swing[half:].mean() / swing[:half].mean())
 

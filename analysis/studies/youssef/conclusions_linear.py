@@ -57,9 +57,9 @@ def harmonic(order: int, inertia_ratio: float, damper: float, most: int = 2) -> 
 def oscillator_differences(inertia_ratio: float) -> tuple[float, float]:
     """Compare the motion with that of a damped oscillator under a force that grows with the square of the speed.
 
-    The oscillator has the mean values of M and K, and the force that fits the first harmonic at the mean of all speeds. The
-    results are the greatest differences from its amplitude, relative to it, of the first harmonic and of the amplitude by both
-    harmonics. Each is the greater result of two dampers.
+    The oscillator has the mean values of M and K; its force is fitted to the first harmonic over all speeds. Returns the
+    greatest difference of the first harmonic from the oscillator's amplitude, relative to that amplitude, and the same for
+    the amplitude by both harmonics; each is the greater result of two dampers.
     """
     found, compared = slider_equation(chapter_4(inertia_ratio), 1.0), []
     for damper in (WEAK, STRONG):
@@ -110,7 +110,7 @@ def judge_single_region() -> tuple[Case, Case]:
 def twice_natural() -> float:
     """Return the speed in the middle of the first region divided by the natural frequency.
 
-    The result is that of the inertia ratio in `RATIOS` for which it is farthest from 2.
+    Of the inertia ratios in `RATIOS` the one whose result is farthest from 2 is taken.
     """
     found = [axis(hill_region(chapter_4(i))) * OMEGA_K / natural_frequency(chapter_4(i)) for i in RATIOS]
     return max(found, key=lambda x: abs(x - 2.0))

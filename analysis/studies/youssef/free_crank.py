@@ -144,7 +144,7 @@ class Turns:
     energy_share: NDArray[np.float64]
 
     @classmethod
-    def of(cls, run: Trajectory, start: float = 0.0) -> Turns:
+    def from_run(cls, run: Trajectory, start: float = 0.0) -> Turns:
         """Divide a run into turns and return their statistics; the first turn begins at the crank angle ``start`` (rad)."""
         angle = run["crank.angle"]
         times = np.interp(np.arange(start, angle[-1], 2.0 * pi), angle, run.time)
@@ -193,7 +193,7 @@ def settling(torque: float, stiffness: float) -> Settling:
     """
     launched, steady = launch(torque, stiffness), coast(stiffness, rpm=RELEASED[stiffness])
     (after, turns), (known, waves) = (
-        (Turns.of(run, 1.0), turn_by_turn(run, "slider.position", 1.0)) for run in (launched, steady)
+        (Turns.from_run(run, 1.0), turn_by_turn(run, "slider.position", 1.0)) for run in (launched, steady)
     )
     found = []
     for speed, turn in zip(after.speed, turns):
@@ -313,7 +313,7 @@ def _rise_to_peak(run: Trajectory) -> tuple[NDArray[np.float64], NDArray[np.floa
 
 def _swing_cases(runs: Mapping[str, Trajectory], start: float) -> tuple[Case, ...]:
     """Judge whether the speed of a free crank swings within each turn and its mean falls from turn to turn."""
-    turns = [Turns.of(run, start) for run in runs.values()]
+    turns = [Turns.from_run(run, start) for run in runs.values()]
     return (
         at_least("range over the mean in a turn, least", ALIKE, min((t.speed_range / t.speed).min() for t in turns)),
         at_most("mean relative to the turn before, greatest", 1.0, max(greatest_ratio(t.speed) for t in turns)),
@@ -322,7 +322,7 @@ def _swing_cases(runs: Mapping[str, Trajectory], start: float) -> tuple[Case, ..
 
 def _second_halves(runs: Sequence[Trajectory], start: float) -> list[NDArray[np.float64]]:
     """Return the mean speeds of the turns in the second half of each run, the same turns of all, relative to its first turn."""
-    speeds = [Turns.of(run, start).speed for run in runs]
+    speeds = [Turns.from_run(run, start).speed for run in runs]
     count = min(map(len, speeds))
     return [speed[count // 2 : count] / speed[0] for speed in speeds]
 
@@ -471,7 +471,7 @@ def launch_positions() -> StudyResult:
     """Compute the slider position after launches with the three torques."""
     runs = _torque_runs()
     largest = max(float(np.abs(run["slider.position"]).max()) for run in runs.values())
-    *lesser, shift = (abs(Turns.of(run, 1.0).slider.mean()) for run in runs.values())
+    *lesser, shift = (abs(Turns.from_run(run, 1.0).slider.mean()) for run in runs.values())
     shaft = -CM_PER_METRE * table_3_1(0.0).ground_length
     return _launch_result(
         "3.8",
@@ -623,7 +623,7 @@ def _coast_result(
     number: str, claim: str, run: Trajectory, columns: Mapping[str, NDArray[np.float64]], *statements: Statement
 ) -> StudyResult:
     """Build the result of a free motion from its columns, up to the last turn that the figure shows."""
-    turns = Turns.of(run)
+    turns = Turns.from_run(run)
     last = int(np.searchsorted(run.time, turns.ends[turns.shown - 1]))
     return StudyResult(
         number=number,
@@ -655,7 +655,7 @@ def free_speed(number: str, stiffness: float) -> StudyResult:
 
 def _free_swings() -> Statement:
     """Judge what Fig 3.11 and 3.12 show according to the thesis."""
-    turns = {label: Turns.of(coast(k)) for label, k in BOTH.items()}
+    turns = {label: Turns.from_run(coast(k)) for label, k in BOTH.items()}
     return Statement(
         "Both figures show that (1) The crank speed behaviour is oscillatory (2) The amplitude of oscillations "
         "decreases with crank angle and (3) The mean position of oscillation reduces with crank angle.",
@@ -680,7 +680,7 @@ def _free_causes() -> Statement:
     undamped = {label: (coast(k, 0.0), coast(k)) for label, k in BOTH.items()}
     swings = [
         at_most(f"change of the energy; {label}", 0.5, t.energy_share[: t.shown].max())
-        for label, t in ((label, Turns.of(coast(k))) for label, k in BOTH.items())
+        for label, t in ((label, Turns.from_run(coast(k))) for label, k in BOTH.items())
     ]
     return Statement(
         "The oscillatory behaviour of the speed is due to the non-linearities of the system and the reduction in "
@@ -719,7 +719,7 @@ def _phase_plane(number: str, stiffness: float, *statements: Statement) -> Study
 
 def order_of_chords(run: Trajectory) -> float:
     """Return the order, in the sampling step, with which the distance between phase-plane curve and chords decreases."""
-    turns = Turns.of(run)
+    turns = Turns.from_run(run)
     shown = run.time < turns.ends[turns.shown - 1]
     u, v = (run[f"slider.{name}"][shown] for name in ("position", "velocity"))
     z = u / np.ptp(u) + 1j * v / np.ptp(v)
@@ -729,7 +729,7 @@ def order_of_chords(run: Trajectory) -> float:
 
 def soft_phase_plane() -> StudyResult:
     """Compute the phase plane with the soft spring, and judge the statements on Fig 3.13 and 3.14."""
-    turns = {label: Turns.of(coast(k)) for label, k in BOTH.items()}
+    turns = {label: Turns.from_run(coast(k)) for label, k in BOTH.items()}
     drift, distance = (
         a / b for a, b in zip(*((np.ptp(t.slider[: t.shown]), abs(t.slider[0])) for t in turns.values()))
     )
@@ -802,13 +802,13 @@ def soft_phase_plane() -> StudyResult:
 @cache
 def linear_motion(stiffness: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Integrate the slider's equation, linearised about u = u' = 0, along the free crank's motion; return th2 (rad), u (m)."""
-    run, p, turns = coast(stiffness), table_3_1(stiffness).constants(), Turns.of(coast(stiffness))
+    run, p, turns = coast(stiffness), table_3_1(stiffness).constants(), Turns.from_run(coast(stiffness))
     # half a turn beyond those that are drawn
     n = int(np.searchsorted(run["crank.angle"], 2.0 * pi * (turns.shown + 0.5)))
     time, crank = run.time[:n], [run[f"crank.{name}"][:n] for name in ("angle", "speed", "acceleration")]
 
-    def acceleration(at: Sequence[float], u: float, v: float) -> float:
-        angle, speed, rate = at
+    def acceleration(crank_state: Sequence[float], u: float, v: float) -> float:
+        angle, speed, rate = crank_state
         g = kinematics.position(angle, u, p)
         inputs = dynamics.NO_INPUTS._replace(speed_drive=1.0, acceleration=rate)
         return dynamics.motion(
@@ -847,7 +847,7 @@ def higher_harmonics(turns: NDArray[np.float64]) -> NDArray[np.float64]:
 def drawn_harmonics(stiffness: float) -> NDArray[np.float64]:
     """Return the `higher_harmonics` of u in each turn that the figure shows."""
     run = coast(stiffness)
-    return higher_harmonics(turn_by_turn(run, "slider.position", 0.0))[: Turns.of(run).shown]
+    return higher_harmonics(turn_by_turn(run, "slider.position", 0.0))[: Turns.from_run(run).shown]
 
 
 def harmonics_over_linear(stiffness: float) -> float:
@@ -858,7 +858,7 @@ def harmonics_over_linear(stiffness: float) -> float:
 
 def stiff_phase_plane() -> StudyResult:
     """Compute the phase plane with the stiff spring, whose higher harmonics the thesis explains by a resonance."""
-    soft, stiff = (Turns.of(coast(k)) for k in (SOFT, STIFF))
+    soft, stiff = (Turns.from_run(coast(k)) for k in (SOFT, STIFF))
     # the mean speed falls from turn to turn
     seen = [float(np.interp(-HARMONIC_SPEED, -t.speed, t.second / t.first)) for t in (stiff, soft)]
     # the speeds at which the second harmonic is greatest: over the first, and over its force

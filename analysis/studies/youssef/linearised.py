@@ -166,10 +166,10 @@ def constant_parts() -> dict[str, float]:
     return found
 
 
-def _first_order_quotient(part: FourierSeries, by: FourierSeries) -> tuple[float, float, float]:
+def _first_order_quotient(part: FourierSeries, divisor: FourierSeries) -> tuple[float, float, float]:
     """Return the mean and the first cosine and sine coefficients of the quotient of two series, to first order."""
-    mean = part.mean / by.mean
-    return mean, *((x[1] - mean * y[1]) / by.mean for x, y in ((part.cos, by.cos), (part.sin, by.sin)))
+    mean = part.mean / divisor.mean
+    return mean, *((x[1] - mean * y[1]) / divisor.mean for x, y in ((part.cos, divisor.cos), (part.sin, divisor.sin)))
 
 
 def expansion_errors(sigma2: float) -> dict[str, NDArray[np.float64]]:
@@ -360,8 +360,8 @@ def _simplification() -> list[Statement]:
             "3; 0.05, as an order is a whole number",
             tuple(
                 at_least(f"{part}; {name}", 2.95, x, why="the mean has a part of second order too")
-                for part, orders_of in left.items()
-                for name, x in zip(("mean", "first harmonic", "second harmonic"), orders_of)
+                for part, orders in left.items()
+                for name, x in zip(("mean", "first harmonic", "second harmonic"), orders)
             ),
         ),
     ]

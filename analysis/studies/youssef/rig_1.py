@@ -194,7 +194,7 @@ def lag(spring: str, speed: float, coefficient: float) -> float:
 
 
 def friction_force_ratios(speed: float, coefficient: float) -> NDArray[np.float64]:
-    """Return the guide's friction over the damper's force, with spring A: by the mean and by the greatest force in a turn."""
+    """Return the ratio of the guide's friction to the damper's force, both as means and as maxima of a turn, with spring A."""
     steady = turn("A", speed, slider_friction_coefficient=coefficient)
     forces = (
         coefficient * np.abs(steady["slider.guide_force"]),

@@ -95,7 +95,7 @@ def closes(v: FloatArray) -> bool:
 
 
 def admit(v: FloatArray, towards: FloatArray) -> FloatArray:
-    """Put a set of parameters onto its bounds, and move it by quarters ``towards`` another set until its links close."""
+    """Clip a set of parameters to its bounds; move it ``towards`` another set, a quarter each time, until its links close."""
     v = np.clip(v, LOW, HIGH)
     while not closes(v):
         v = np.clip(0.75 * v + 0.25 * towards, LOW, HIGH)
@@ -132,8 +132,8 @@ def downhill(error_of: Error, sets: FloatArray, free: list[int] | None = None) -
     count = len(e)
     while count < MOST:
         worst, least = int(e.argmax()), int(e.argmin())
-        near_by = np.abs(v[worst] - v[least]) <= EPS * np.abs(v[least])
-        if e[worst] - e[least] <= EPS * e[least] and near_by.all():
+        is_close = np.abs(v[worst] - v[least]) <= EPS * np.abs(v[least])
+        if e[worst] - e[least] <= EPS * e[least] and is_close.all():
             break
         centre = (v.sum(axis=0) - v[worst]) / moves.size
         trial = admit(2.0 * centre - v[worst], v[worst])
@@ -206,7 +206,7 @@ def rocker_error(v: FloatArray) -> float:
 
 
 def count_evaluations(error_of: Error, free: list[int] | None = None) -> FloatArray:
-    """Return the numbers of evaluations that the minimisation of another error takes from the same random sets.
+    """Return the numbers of evaluations in searches that minimise ``error_of`` from the usual random sets.
 
     ``free`` are the indices of the parameters that may change, by default all.
     """
@@ -363,10 +363,11 @@ def judge_techniques() -> tuple[Statement, ...]:
         np.array([(end.error, end.evaluations) for end in ends]).T for ends in run_ranked()
     )
 
-    def by_chance(with_it: FloatArray, name: str) -> tuple[Case, ...]:
+    def by_chance(technique: FloatArray, name: str) -> tuple[Case, ...]:
         """Judge if a technique lowers the errors and the evaluations, compared with searches from random sets."""
         chances = (
-            float(mannwhitneyu(improved, than, alternative="less").pvalue) for improved, than in zip(with_it, plain)
+            float(mannwhitneyu(improved, reference, alternative="less").pvalue)
+            for improved, reference in zip(technique, plain)
         )
         return tuple(
             at_most(f"{name}; {what} by chance", CHANCE, chance)

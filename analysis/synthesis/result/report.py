@@ -107,40 +107,40 @@ def derivatives(solution: Solution) -> tuple[list[str], FloatArray, FloatArray, 
     return _names(linkage, normal), *_residuals(linkage, normal, at, isinstance(task, UntimedPath)), weights
 
 
-def _residuals(linkage: Linkage, normal: Normal, at: FloatArray, across: bool) -> tuple[FloatArray, FloatArray]:
-    """Compute the derivatives of the m residuals by the k dimensions, (m, k), and the residuals, (m,), at rotations ``at``.
+def _residuals(linkage: Linkage, normal: Normal, rotation: FloatArray, across: bool) -> tuple[FloatArray, FloatArray]:
+    """Compute the derivatives of the m residuals by the k dimensions, (m, k), and the residuals, (m,), at rotations.
 
     The residuals of points come first, then those of angles. The residuals of points are in x and y or, if ``across``, along
     the normals of the curve.
     """
-    columns = [column for _, _, column in _pivot_dimensions(linkage, at)]
+    columns = [column for _, _, column in _pivot_dimensions(linkage, rotation)]
     angular = normal.angle is not None
     parts, blocks = [], []
     if normal.points is not None:
         points = normal.places
-        place, jacobian = linkage.path_jacobian(at)
+        place, jacobian = linkage.path_jacobian(rotation)
         left = place @ np.array([1.0, 1j]) - points
         both = jacobian[:, 0] + 1j * jacobian[:, 1]
-        still = [np.zeros(len(at), dtype=complex)] if angular else []
+        still = [np.zeros(len(rotation), dtype=complex)] if angular else []
         whole = np.vstack([both[: len(PLACES)], *still, *[bx * both[10] + by * both[11] for bx, by in columns]]).T
         if linkage.point_is_pin:
             # the coupler point is the pin C: the coupler's length moves it
             whole[:, PLACES.index("coupler_length")] += whole[:, PLACES.index("point_distance")]
         if across:
-            rate = path_rate(linkage, at, both)
+            rate = path_rate(linkage, rotation, both)
             normals = 1j * rate / np.abs(rate)
             parts, blocks = [(left * normals.conj()).real], [(whole * normals.conj()[:, None]).real]
         else:
             parts, blocks = [left.real, left.imag], [whole.real, whole.imag]
     if angular:
         which = 1 if normal.of_rocker else 0
-        angles, jacobian = linkage.link_jacobian(at)
+        angles, jacobian = linkage.link_jacobian(rotation)
         turned = 0.0 if normal.of_rocker else linkage.ground_angle
         left_angle = angles[which] + linkage.output_angle + turned - normal.angle
         own = np.vstack(
             [
                 jacobian[: len(PLACES), which],
-                np.ones(len(at)),
+                np.ones(len(rotation)),
                 *[bx * jacobian[10, which] + by * jacobian[11, which] for bx, by in columns],
             ]
         ).T
@@ -194,15 +194,13 @@ def round_dimensions(solution: Solution, length: float | None = None, angle: flo
             raise InputError(f"step of {what} is {step}: it must be greater than zero")
     linkage = solution.linkage
     steps = {name: angle if name in (*ANGLES, *PIVOT_ANGLES) else length for name in _manufactured_dimensions(linkage)}
-    rounded_to = linkage
+    rounded = linkage
     for name, value in _manufactured_dimensions(linkage).items():
         whole = round(value / steps[name])
         # a link is not rounded to zero
-        rounded_to = _replace_dimension(
-            rounded_to, name, steps[name] * (max(whole, 1) if _is_link(linkage, name) else whole)
-        )
-    error = evaluate(solution.task, rounded_to, solution.evaluation.rotation).error
-    return Rounding(linkage=rounded_to, error=error, expected=_expected_error(solution, steps))
+        rounded = _replace_dimension(rounded, name, steps[name] * (max(whole, 1) if _is_link(linkage, name) else whole))
+    error = evaluate(solution.task, rounded, solution.evaluation.rotation).error
+    return Rounding(linkage=rounded, error=error, expected=_expected_error(solution, steps))
 
 
 def _expected_error(solution: Solution, steps: Mapping[str, float]) -> float:
@@ -303,22 +301,22 @@ def _names(linkage: Linkage, normal: Normal) -> list[str]:
     return [*PLACES, *mounted, *(name for name, _, _ in _pivot_dimensions(linkage, np.zeros(1)))]
 
 
-def _pivot_dimensions(linkage: Linkage, at: FloatArray) -> list[tuple[str, float, tuple[FloatArray, FloatArray]]]:
-    """Return name, value and derivatives of x and y of D, at rotations ``at``, for each dimension of a moving pivot."""
+def _pivot_dimensions(linkage: Linkage, rotation: FloatArray) -> list[tuple[str, float, tuple[FloatArray, FloatArray]]]:
+    """Return name, value and derivatives of x and y of D, at crank rotations, for each dimension of a moving pivot."""
     pivot = linkage.pivot
     if isinstance(pivot, SliderMotion):
-        c, s, u = np.cos(pivot.guide_angle), np.sin(pivot.guide_angle), pivot.series(at)
+        c, s, u = np.cos(pivot.guide_angle), np.sin(pivot.guide_angle), pivot.series(rotation)
         own, first, along = "slider", 0, (c, s)
         found = [("guide_angle", pivot.guide_angle, (-s * u, c * u))]
     elif isinstance(pivot, SecondCrank):
-        c, s = np.cos(pivot.angle(at)), np.sin(pivot.angle(at))
+        c, s = np.cos(pivot.angle(rotation)), np.sin(pivot.angle(rotation))
         # the mean of the series is part of the phase
         own, first, along = "second_crank", 1, (-pivot.length * s, pivot.length * c)
         found = [(SECOND_LENGTH, pivot.length, (c, s)), ("second_crank_phase", pivot.phase, along)]
     else:
         return []
     for k in range(first, pivot.series.order + 1):
-        waves = (("cos", pivot.series.cos[k], np.cos(k * at)), ("sin", pivot.series.sin[k], np.sin(k * at)))
+        waves = (("cos", pivot.series.cos[k], np.cos(k * rotation)), ("sin", pivot.series.sin[k], np.sin(k * rotation)))
         for kind, value, wave in waves[: 1 if k == 0 else 2]:
             found.append((f"{own} {kind} {k}", float(value), (along[0] * wave, along[1] * wave)))
     return found

@@ -489,14 +489,14 @@ def angle_at_c(linkage: Linkage, rotation: FloatArray) -> FloatArray:
     return angle
 
 
-def path_rate(linkage: Linkage, at: FloatArray, both: NDArray[np.complex128]) -> NDArray[np.complex128]:
-    """Return the derivative of the coupler point with respect to the crank rotation, at the rotations ``at`` (m/rad).
+def path_rate(linkage: Linkage, rotation: FloatArray, both: NDArray[np.complex128]) -> NDArray[np.complex128]:
+    """Return the derivative of the coupler point with respect to the crank rotation, at crank rotations (m/rad).
 
     The motion of the pivot is included. ``both`` has the derivatives of the coupler point that `Linkage.path_jacobian` returns,
     as complex numbers x + iy; the result is complex, too.
     """
     step = 1e-6
-    ahead, behind = linkage.displacement(at + step), linkage.displacement(at - step)
+    ahead, behind = linkage.displacement(rotation + step), linkage.displacement(rotation - step)
     vx, vy = ((a - b) / (2.0 * step) for a, b in zip(ahead, behind))
     rate: NDArray[np.complex128] = linkage.turns * both[PLACES.index("crank_phase")] + vx * both[10] + vy * both[11]
     return rate
