@@ -305,7 +305,7 @@ def test_verdicts() -> None:
 
 
 def test_verdict_is_no_boolean() -> None:
-    with pytest.raises(VerdictError, match="no yes or no"):
+    with pytest.raises(VerdictError, match="no truth value"):
         bool(verdict([0.5]))
     with pytest.raises(TypeError):
         assert not verdict([0.5])

@@ -125,7 +125,7 @@ def test_on_which_side_of_a_fold_the_motions_are() -> None:
     # the branch comes from lower speeds and turns back to them
     assert form.words == "both motions at lower values"
     assert form.uncertainty < 0.01 * abs(form.coefficient)
-    with pytest.raises(InputError, match="no old motion"):
+    with pytest.raises(InputError, match="no motion from which"):
         confirm_form(family, fold, form)
 
 

@@ -81,7 +81,7 @@ def follow_crossing(
         An orbit on the curve, or close to it.
     kind : Crossing
     place : (float, float)
-        The point of the plane at which the orbit is.
+        Values of the two parameters for this orbit.
     x, y : (float, float)
         Ranges of the two parameters, which form the box.
     first, greatest, widest : float
@@ -281,7 +281,7 @@ def orbit_test(operation: Plane, multiplier: int, *, start: ArrayLike | None = N
 
 
 class RemovalError(LinkworkError):
-    """The damping that removes a region of instability does not lie in the given range."""
+    """The damping that removes a region of instability is not in the given range."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

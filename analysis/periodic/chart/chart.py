@@ -153,7 +153,7 @@ class StabilityChart(NotebookResult):
     box : Box
         Ranges of the two parameters, in SI.
     grid : Grid
-        Largest Floquet multiplier of the true orbit.
+        Largest Floquet multiplier of the mechanism's own orbit, called the true orbit, at each point.
     boundaries : tuple of TracedBoundary
         Boundaries of the true orbit, of other motions, and of the motions given in ``beside``.
     removals : tuple of str
@@ -338,7 +338,7 @@ class _Survey:
     ) -> StabilityChart:
         """Return the complete chart: find the boundaries of all motions, make the long runs, and compute removing dampings.
 
-        ``around`` is the coexisting motions, if they were sought; ``steps`` gives the texts of the progress bars.
+        ``around`` are the coexisting motions, if they were sought; ``steps`` gives the texts of the progress bars.
         """
         true = orbit_monodromy(self.operation, start=self.start, near=self.grid)
         # at a fold the true orbit ends, and its test function with it: folds are found on branches
@@ -360,7 +360,7 @@ class _Survey:
         return self.result(around, removals)
 
     def result(self, around: Coexistence | None, removals: tuple[str, ...] = ()) -> StabilityChart:
-        """Return the chart as far as it has been computed; ``around`` is the coexisting motions, if they were sought."""
+        """Return the chart as far as it has been computed; ``around`` are the coexisting motions, if they were sought."""
         return StabilityChart(
             axes=self.axes,
             box=self.box,
@@ -452,8 +452,8 @@ class _Survey:
             self.problems.append(f"{what} is not followed: {lost[0].message}")
             return
         own = np.mean([_belongs(self.grid, orbit, at) for orbit, at in zip(curve.orbits, curve.points.tolist())])
-        # if two folds meet in a cusp, the grid's motion ends at only one of them: a part of the curve is enough; near a jump a
-        # coarse grid may have the other motion
+        # of two folds that meet in a cusp the grid's motion ends at only one: a part of the curve that belongs to it is enough;
+        # other curves need more than half, as a coarse grid may contain another motion near a jump
         true = own > 0.0 if curve.kind is Crossing.FOLD else own > 0.5
         self.traced.append(
             TracedBoundary(
@@ -518,7 +518,7 @@ class _Survey:
         region = f"{boundary.kind.value}{whose} from {other.format_value(low)} to {other.format_value(high)}"
         if top > greatest - 1e-6 * size:
             return f"{region}: still there at {up.format_value(greatest)}"
-        by_points = f"{region}: goes up to {self.damping} = {top:.4g} {up.si}, by its points"
+        by_points = f"{region}: reaches {self.damping} = {top:.4g} {up.si} at the highest point of its boundary"
         if boundary.motion != TRUE_ORBIT:
             return by_points
         # a range of the other parameter that contains this region and no other

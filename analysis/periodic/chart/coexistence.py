@@ -100,9 +100,9 @@ class Coexistence:
         """Greatest amplitude of the stable motions at each point, shape (ny, nx)."""
         return self._extreme(np.ma.max)
 
-    def _extreme(self, of: Callable[..., Any]) -> np.ma.MaskedArray[Any, np.dtype[np.float64]]:
+    def _extreme(self, reduce: Callable[..., Any]) -> np.ma.MaskedArray[Any, np.dtype[np.float64]]:
         stable = np.ma.masked_where(~self._is_stable, self.amplitude)
-        return np.ma.masked_invalid(of(stable, axis=2).filled(np.nan))
+        return np.ma.masked_invalid(reduce(stable, axis=2).filled(np.nan))
 
     def to_csv(self, path: str | Path) -> Path:
         """Write the grid as a CSV table with one row per point, in SI units."""
@@ -152,7 +152,7 @@ def coexistence(
     InputError
         If an axis is empty or not finite, or there are no cores.
     ParameterError
-        If a text on an axis is no quantity.
+        If a text on an axis is not a quantity.
     GridInterrupted
         On Ctrl-C.
     """
@@ -255,10 +255,10 @@ class Basins(NotebookResult):
 
     @property
     def held(self) -> tuple[str, ...]:
-        """FMI names of the coordinates and rates that all starts have from the first motion.
+        """FMI names of the coordinates and rates that are the same at all starts, those of the first motion.
 
-        A motion that differs from the first one only in these may be out of reach: a pendulum that hangs exactly still does not
-        begin to swing, but by rounding.
+        A motion that differs from the first motion only in these may not be reached: a pendulum exactly at rest begins to swing
+        only because of rounding errors.
         """
         plane = [name for name, _ in self._components()]
         return tuple(name for name, _ in self.motions[0].flow.components if name not in plane)
@@ -302,7 +302,7 @@ def basins(
         Number of initial states along each axis.
     coordinate : str, optional
         FMI name of the free coordinate that varies with its rate, such as "swing.angle"; all other components of y are those of
-        the first motion. By default that in which the stable motions differ most; the first one if a range is given.
+        the first motion. By default the coordinate in which the stable motions differ most; if a range is given, the first.
     position, rate : (float, float), optional
         Ranges of the coordinate and of its rate at crank angle 0, in SI or as text such as "5 mm"; by default one and a half
         times the range in which the motions found move, as far as the links can be joined.
@@ -316,10 +316,10 @@ def basins(
     Raises
     ------
     InputError
-        If the drive is no `Drive`, there is no stable motion or no such coordinate, a range does not increase, or there are no
-        cores.
+        If the drive is not a `Drive`, there is no stable motion or no such coordinate, a range does not increase, or there are
+        no cores.
     ParameterError
-        If a range is not two quantities, or ``points`` is no whole number.
+        If a range is not two quantities, or ``points`` is not a whole number.
     GridInterrupted
         On Ctrl-C; the same call, made again, continues from the rows that were finished.
 
@@ -342,7 +342,7 @@ def basins(
     motions = found.stable
     if not motions:
         of, also = describe_turns(drive.flow(find_mechanism(parameters)), turns), unsought_hint(parameters, drive)
-        raise InputError(f"there is no stable motion of {of} here: no start ends in one{also}")
+        raise InputError(f"no stable motion of {of} was found here, so that there are no basins{also}")
     if coordinate is None and position is None and rate is None:
         place = _most_different([_path(orbit) for orbit in motions], motions[0].scale)
     default = _default_plane(parameters, drive, motions[0], np.vstack([_path(orbit) for orbit in found.orbits]), place)
@@ -368,15 +368,15 @@ def basins(
 
 
 def find_coordinate(flow: Flow, name: str | None) -> int:
-    """Return the index in y of a free coordinate by its FMI name, by default of the first.
+    """Return the index in y of the free coordinate with this FMI name, or of the first free coordinate if the name is None.
 
-    Raises InputError if there is none of this name, or none at all beside the crank.
+    Raises InputError if no free coordinate has this name, or if nothing but the crank is free.
     """
     free = [component for component, _ in flow.components[: flow.size // 2]]
     if not free:
         raise InputError(
-            f"no coordinate of the {flow.mechanism.name} is free beside the crank, so that starts differ in the crank speed "
-            "alone: find_orbits finds its motions from a start"
+            f"the {flow.mechanism.name} has no free coordinate other than the crank's angle, so that starts differ only in the "
+            "crank speed: use find_orbits to find the motions from a start"
         )
     if name is not None and name not in free:
         raise unknown_name(name, free, f"free coordinate {name!r}")
@@ -384,7 +384,7 @@ def find_coordinate(flow: Flow, name: str | None) -> int:
 
 
 def _path(orbit: PeriodicOrbit) -> FloatArray:
-    """Return samples of y over the period, shape (m, n); angles begin at most half a turn from where the mechanism starts."""
+    """Return samples of y over the period, shape (m, n), with angles that begin at most half a turn from `Flow.rest`."""
     flow, n = orbit.flow, SAMPLES * orbit.turns
     y = orbit.sample(np.linspace(0.0, flow.period * orbit.turns, n, endpoint=False))[:, list(flow.places)]
     whole = np.divide(y[0] - flow.rest, flow.ways, out=np.zeros(flow.size), where=flow.ways > 0.0)
@@ -392,10 +392,10 @@ def _path(orbit: PeriodicOrbit) -> FloatArray:
 
 
 def _most_different(moved: Sequence[FloatArray], scale: FloatArray) -> int:
-    """Return the index of the coordinate in which motions differ most, it or its rate.
+    """Return the index of the coordinate for which motions differ most, in the coordinate or in its rate.
 
-    The measure is the range of all motions together over that of the one that moves least: beyond all bounds for a pendulum
-    that hangs still in one motion and swings in another, which a start with the pendulum at rest does not reach.
+    The measure is the range of all motions together, divided by the range of the motion that moves least. It is very large for
+    a pendulum that hangs still in one motion and swings in another; starts with the pendulum at rest do not lead to the latter.
     """
     least = np.min([np.ptp(y, axis=0) for y in moved], axis=0)
     ratio, half = (np.ptp(np.vstack(moved), axis=0) + _REST * scale) / (least + _REST * scale), len(scale) // 2
@@ -405,10 +405,11 @@ def _most_different(moved: Sequence[FloatArray], scale: FloatArray) -> int:
 def _default_plane(
     parameters: Parameters, drive: Drive, first: PeriodicOrbit, moved: FloatArray, place: int
 ) -> tuple[tuple[float, float], tuple[float, float]]:
-    """Return the ranges of a coordinate and of its rate: `_WIDTH` times those in which the motions move.
+    """Return the ranges of a coordinate and of its rate: `_WIDTH` times the ranges over which the motions move.
 
-    The coordinate stays where the links can be joined. An angle that goes beyond half a turn has the whole turn, and what is at
-    rest in all motions the range of the assembly; its rate has that of an oscillation with this amplitude at the crank's speed.
+    The range of the coordinate is cut where the links cannot be joined. It is the full range of assembly, centred on the
+    initial value, if the coordinate is at rest in all motions, or is an angle whose range would be cut. A rate that is zero in
+    all motions has the range of an oscillation over the coordinate's range at the crank's speed.
     """
     lowest, highest = (float(side[place]) for side in assembly_ranges(parameters, drive, first.start))
     rest, scale, rates = float(first.flow.rest[place]), first.scale, place + len(first.start) // 2
@@ -430,7 +431,8 @@ def describe_turns(flow: Flow, turns: int) -> str:
 def _ends(point: OperatingPoint, known: FloatArray, place: int, across: FloatArray, rate: float) -> FloatArray:
     """Return for each start of a row an index into ``known``: the motion on which the mechanism settles; or LOST or UNSETTLED.
 
-    A start has from ``across``, shape (points,), the coordinate with the index ``place`` in y, and the initial rate ``rate``.
+    A start is the first known motion with other values of one coordinate and its rate: the coordinate with the index ``place``
+    in y is one value of ``across``, shape (points,); the rate is ``rate`` at all starts of the row.
     """
     starts = np.tile(known[0], (len(across), 1))
     starts[:, place], starts[:, point.flow.size // 2 + place] = across, rate

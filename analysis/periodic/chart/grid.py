@@ -206,7 +206,7 @@ def grid(
     InputError
         If an axis is empty or not finite, or there are no cores.
     ParameterError
-        If the parameters at a point are not valid, or a text on an axis is no quantity.
+        If the parameters at a point are not valid, or a text on an axis is not a quantity.
     GridInterrupted
         On Ctrl-C.
     """
@@ -243,7 +243,7 @@ def grid_points(
 ) -> tuple[FloatArray, FloatArray, list[PointRow], FloatArray]:
     """Return the values of x and y of a grid, its rows of operating points, and the guesses for each row, shape (k, n).
 
-    Raises InputError if an axis is empty or not finite, ParameterError if a text on an axis is no quantity.
+    Raises InputError if an axis is empty or not finite, ParameterError if a text on an axis is not a quantity.
     """
     if isinstance(operation, NamedPlane):
         mechanism = find_mechanism(operation.parameters)

@@ -4,6 +4,9 @@ Along a row the orbits change smoothly: a polynomial through the previous orbits
 collocation corrects the prediction. Collocation may fail because of friction, a torque, the limit of assembly or a fold. The
 orbit is then found by shooting: from the orbit of the neighbour on the left, of the neighbour on the right, or from other
 guesses.
+
+In all functions ``section`` is a `Section`, ``points`` are `Points`, ``search`` is a `Search`; work space is ``desk`` (of the
+collocation), ``room`` and ``carry`` (of `advance`), v (`Tracks`) and ``tables`` (arrays that must stay alive).
 """
 
 from __future__ import annotations

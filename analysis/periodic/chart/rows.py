@@ -72,7 +72,7 @@ def point_row(points: Sequence[OperatingPoint], start: FloatArray) -> PointRow:
     """
     if any(point.flow is not points[0].flow for point in points):
         raise InputError(
-            "a row has both drives by speed and by torque, or other modes or ratios: it must have one kind"
+            "the points of a row differ in the kind of drive (speed or torque), in modes or in ratios: these must be the same"
         )
     return PointRow(
         points[0],

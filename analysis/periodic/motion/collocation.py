@@ -11,6 +11,9 @@ coefficients over each element is a measure of the error.
 
 Vector instructions linearise LANES elements at once. In an array "in lanes", element e has lane ``e % LANES`` of row
 ``e // LANES``. Unused lanes of the last row repeat the last element.
+
+In all functions ``section`` is a `kernels.Section`, ``desk`` the work space `Desk`; y and w are the unknowns in lanes, of all
+elements, ``row`` is the index of a row, m the number of elements.
 """
 
 from __future__ import annotations
@@ -43,8 +46,8 @@ TAIL = np.ascontiguousarray(_COEFFICIENTS[-2:])
 #: Greatest size of the highest Legendre coefficients, relative to the square root of the integrator's tolerance: the error at
 #: the ends of the elements is about the square of that size.
 DECAY = 200.0
-#: Greatest number of corrections, and greatest size of the first one relative to the scale: a motion farther away is no
-#: neighbour.
+#: Greatest number of corrections, and greatest size of the first correction relative to the scale: a larger one means that the
+#: motion is not a neighbour.
 _CORRECTIONS, _FAR = 8, 1.0
 
 
@@ -267,7 +270,7 @@ def _close_row(row, unit, y, w, desk):
                 store(desk.ends[row], i, load(y[row], i) + h * unit * start + coordinate)
                 store(desk.ends[row], f + i, start + rate)
             elif j <= n:
-                # with constant rates the derivatives are the identity, and h unit of a coordinate by its rate
+                # the part that constant rates give: the identity, and h unit for a coordinate with respect to its rate
                 k = j - 1
                 store(desk.matrices[row], i * n + k, coordinate + (1.0 if k == i else 0.0))
                 if k == f + i:

@@ -47,7 +47,7 @@ GROWTH, AIM, PLACES = 1e3, 10.0, 64
 #: Least number of pieces in a turn.
 _FEWEST = 8
 #: Collocation: calls that use shooting after collocation has failed; elements in a turn at first; greatest number of elements
-#: for each piece, in addition to eight times the first number; calls after which the elements are chosen anew.
+#: for each piece, in addition to eight times the first number; calls after which the elements are chosen again.
 _PAUSE, _ELEMENTS, _MOST, _RENEWED = 16, 8, 8, 64
 #: Clearance to the limit of assembly below which shooting takes over: between the nodes the links may come nearer.
 _NEAR = 1e-2
@@ -73,7 +73,7 @@ class OrbitError(LinkworkError):
         self.residual = residual
         self.iterations = iterations
         place = ", ".join(f"{n} = {value:.6g} {unit}" for (n, unit), value in zip(flow.components, self.start))
-        reached = f"it misses its start by {residual:.2e} after {iterations} corrections, from"
+        reached = f"the motion misses its start by {residual:.2e} after {iterations} corrections, from"
         closed = reached if np.isfinite(residual) else "the motion ends within the first period from"
         super().__init__(f"no periodic motion found: {reason}; {closed} {place}")
 
@@ -222,14 +222,14 @@ def operating_point(parameters: Parameters, drive: Drive) -> OperatingPoint:
     if changed and not _repeats(point):
         values = " and ".join(f"{name} is {getattr(parameters, field_name(name))}" for name in changed)
         raise InputError(
-            f"{values}: the period of a {mechanism.name} is that of its description, after which this one is not the same; "
-            "describe it with its own values"
+            f"{values}: with these values the {mechanism.name} does not repeat after its period, which follows from the values "
+            "of its description; describe it with the new values"
         )
     if coupled and not _repeats(point):
         raise InputError(
-            f"a spring joins {' and '.join(coupled)}, which every common period of this drive winds up further: give commanded "
-            "cranks speeds that do not wind it up; if one of them is free, describe the coupling at a pin, at = NAME, whose "
-            f"freedom is the twist, or in Python say how often each turns for each turn of the crank, as in ratios = "
+            f"a spring couples {' and '.join(coupled)}, and every common period of this drive winds it up further: give "
+            "commanded cranks speeds that do not wind it up; if one of the two is free, describe the coupling at a pin, at = "
+            "NAME, whose freedom is the twist, or in Python give its turns per turn of the crank, such as ratios = "
             f"{{{coupled[-1]!r}: 1}}"
         )
     return point

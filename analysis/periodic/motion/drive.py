@@ -31,12 +31,12 @@ from ...run import (
 from ...units import Amount, in_si
 from .flow import Crank, Flow, find_crank, find_turning_freedom, flow
 
-#: Relative size of changes of the accelerations by a turn, and size of errors of a ratio of turns, that are rounding.
+#: Size below which two quantities are rounding errors: relative change of accelerations by a turn, error of a ratio of turns.
 _NO_SPRING = 1e-7
 #: Advice in messages about a negative speed.
 _MIRROR = (
-    "; for a crank that turns the other way describe the mirror image: y and angles, that of gravity too, with the opposite "
-    "sign, and assemblies to match"
+    "; for a crank that turns the other way describe the mirror image: change the signs of y and of all angles, also that of "
+    "gravity, and adapt the assemblies"
 )
 #: A torque on the crank: constant, a motor's, or both.
 Torque = float | InductionMotor | Sequence[float | InductionMotor]
@@ -48,7 +48,7 @@ class VaryingInputError(InputError):
     def __init__(self, channel: str, value: object) -> None:
         self.channel = channel
         super().__init__(
-            f"{channel} is a {type(value).__name__}: what acts on a periodic motion must be constant, or an induction motor"
+            f"{channel} is a {type(value).__name__}: every input of a periodic motion must be constant, or an induction motor"
         )
 
 
@@ -61,7 +61,7 @@ class NothingFreeError(InputError):
     def __init__(self, mechanism: str, force: str) -> None:
         self.force = force
         other = force and f", or another freedom by a force, such as {force} = 0"
-        super().__init__(f"nothing of the {mechanism} is free at a prescribed speed: drive it by a torque{other}")
+        super().__init__(f"no freedom of the {mechanism} is free at a prescribed speed: drive it by a torque{other}")
 
 
 @in_si(speed="rad/s", torque="N.m", forces=variable_units, held=variable_units, speeds=variable_units)
@@ -154,7 +154,7 @@ class Drive:
             if not isfinite(value):
                 raise InputError(f"{name} is {value}: it must be a finite number")
         if self.speed is not None and (self.torque != 0.0 or self.motor is not None):
-            raise InputError("both a speed and a torque are given: an orbit has either")
+            raise InputError("both a speed and a torque are given: give only one of them")
 
     @property
     def speed_drive(self) -> bool:
@@ -218,7 +218,7 @@ class Drive:
         crank, ratios = self.reference(mechanism), self.ratios_by_freedom(mechanism)
         if (crank.command if self.speed_drive else crank.torque) is None:
             what = "speed of" if self.speed_drive else "torque on"
-            raise InputError(f"a {mechanism.name} has no input for the {what} its crank: drive it otherwise")
+            raise InputError(f"a {mechanism.name} has no input for the {what} its crank: choose another kind of drive")
         chosen = self.arguments(mechanism)
         modes = tuple(mode.arguments.index(chosen[mode.name]) for mode in mechanism.modes)
         freedoms = mechanism.freedoms
@@ -309,7 +309,7 @@ class Drive:
         coordinates = [f.coordinate for f in mechanism.freedoms]
         for name in self.held:
             if name not in coordinates or coordinates.index(name) in (crank.freedom, *made.free):
-                raise InputError(f"{name} is no coordinate of the {mechanism.name} that is held in this drive")
+                raise InputError(f"{name} is not a coordinate of the {mechanism.name} that is held in this drive")
         held = (self.held.get(name, 0.0) for name in coordinates)
         return np.array([*u, *motors, *held, *(float(ratios.get(n, 0)) for n in made.others)])
 
@@ -332,7 +332,7 @@ class Drive:
 
 
 def _read_ratio(name: str, value: object) -> Fraction:
-    """Return the ratio of turns of ``name`` as a fraction; raise InputError if it is no finite number."""
+    """Return the ratio of turns of ``name`` as a fraction; raise InputError if it is not a finite number."""
     if isinstance(value, Fraction):
         return value
     if isinstance(value, (bool, str)) or not isinstance(value, SupportsFloat) or not isfinite(value):
@@ -354,9 +354,10 @@ def _coupled_ratios(
 ) -> dict[int, Fraction]:
     """Return the turns of coupled rotations, per turn of the crank, that do not wind up the springs that couple them.
 
-    A whole turn of one of these rotations changes the accelerations by the spring alone. ``turning`` are the other rotations
-    with their ratios, the crank included; keys are indices of degrees of freedom. What does not turn is left out. The values
-    are those of the first published set; under a nonlinear law both ends of the spring must turn equally often.
+    A whole turn of one of these rotations changes the accelerations only through the spring. ``turning`` are the other
+    rotations with their ratios, the crank included; keys are indices of degrees of freedom. Coupled rotations that do not turn
+    are left out of the result, which holds for the parameters of the first published set; under a nonlinear law both ends of
+    the spring must turn equally often.
     """
     if not coupled:
         return {}
@@ -370,9 +371,10 @@ def _coupled_ratios(
         return np.array(mechanism.equations.derivative(tuple(state.tolist()), i, p))[size : 2 * size]
 
     def winding(number: int) -> NDArray[np.float64]:
-        """Return the change of the accelerations by one turn of a degree of freedom: half of that from -1 to 1 periods.
+        """Return the change of the accelerations by one turn of a degree of freedom, as a central difference over two periods.
 
-        So two bodies that turn alike wind up a spring oppositely under any law, also if it is twisted at the start.
+        With a central difference two bodies that turn equally have opposite effects on a spring between them, under any law and
+        also if the spring is twisted at the start.
         """
         return (accelerations(number, 1.0) - accelerations(number, -1.0)) / (
             2.0 * _whole_turns(mechanism.freedoms[number])
@@ -416,7 +418,7 @@ def _arguments(
     others = {f.mode.name: f.mode for n, f in enumerate(mechanism.freedoms) if f.mode and n != crank}
     for name, value in modes:
         if name not in others or value not in range(len(others[name].values)):
-            raise InputError(f"{name} = {value} is no mode of a {mechanism.name} that a drive can have")
+            raise InputError(f"{name} = {value} is not a mode of a {mechanism.name} that a drive can have")
     for number, freedom in enumerate(mechanism.freedoms):
         if (mode := freedom.mode) is None:
             continue
@@ -427,7 +429,7 @@ def _arguments(
         kind = "command" if number == crank and speed_drive else "force"
         acts = kind in names and (number == crank or names[kind].name in acting)
         if not acts and number in turning:
-            # a crank with a ratio but without a force is commanded, if its speed can be
+            # a crank with a ratio but without a force is commanded, if its speed can be prescribed
             kind, acts = ("command", True) if "command" in names else (kind, kind in names)
         found[mode.name] = names[kind].argument if acts else mode.arguments[mode.default]
     return found
@@ -487,7 +489,7 @@ def steady_drive(
     VaryingInputError
         If an input varies.
     InputError
-        If nothing drives the crank, or if a degree of freedom that is no crank is commanded at a speed other than zero.
+        If nothing drives the crank, or if a degree of freedom that is not a crank is commanded at a speed other than zero.
     """
     mechanism = find_mechanism(parameters)
     inputs, initial = check_run(mechanism, inputs, initial)
@@ -513,12 +515,12 @@ def steady_drive(
         turns = channel.freedom in mechanism.cyclic_freedoms
         if channel.kind == "command" and not turns and constant.get(channel.name, 0.0) != 0.0:
             raise InputError(
-                f"{channel.argument} is {constant[channel.name]}: a motion that goes on so is not periodic"
+                f"{channel.argument} is {constant[channel.name]}: with this constant speed the motion is not periodic"
             )
     parts = () if torque is None else tuple(torque) if isinstance(torque, Sequence) else (torque,)
     motors += [part for part in parts if isinstance(part, InductionMotor)]
     if len(motors) > 1:
-        raise InputError(f"{len(motors)} motors: an orbit has one at most")
+        raise InputError(f"{len(motors)} motors drive the crank: there must be at most one")
     free = flow(mechanism, tuple(modes.values()), crank.freedom).free
     other = {n: f for n, f in enumerate(mechanism.freedoms) if n not in (crank.freedom, *free)}
     angle = float(getattr(initial, mechanism.freedoms[crank.freedom].initial[0]))

@@ -74,7 +74,7 @@ class StabilityVerdict:
 
     def __bool__(self) -> NoReturn:
         raise VerdictError(
-            f"a verdict ({self}) is no yes or no: compare .stability with STABLE, UNSTABLE or MARGINAL, or use .margin"
+            f"a verdict ({self}) has no truth value: compare .stability with STABLE, UNSTABLE or MARGINAL, or use .margin"
         )
 
     def __str__(self) -> str:
@@ -204,4 +204,4 @@ def crossing_test(monodromy: NDArray[np.float64], crossing: Crossing | int) -> N
 def require_sign(multiplier: int) -> None:
     """Raise `InputError` if a multiplier is neither +1 nor -1."""
     if multiplier not in (1, -1):
-        raise InputError(f"multiplier is {multiplier}: the boundaries sought are those of +1 or -1")
+        raise InputError(f"multiplier is {multiplier}: it must be +1 or -1")

@@ -204,7 +204,7 @@ class Flow:
         return max(1, round(self.period / (2.0 * pi)))
 
     def turn(self, place: int) -> float:
-        """Return the rotation (rad) after which the freedom whose coordinate is component ``place`` of y is back."""
+        """Return the rotation (rad) after which a freedom is in the same position; ``place`` is the index of its angle in y."""
         return self.mechanism.freedoms[self.free[place]].period
 
     def addresses(self, *which: int, switched: bool = False) -> NDArray[np.int64]:

@@ -5,6 +5,9 @@ the coordinates of the free degrees of freedom other than the crank, their rates
 over a period is the Poincare map of the section at crank angle 0. The columns of dy/dy0, and if wanted dy/dlambda for a
 parameter lambda, are integrated with y. The right-hand sides and their exact derivatives are traced from the equations
 (`flow`). The integrator is that of `simulate`.
+
+In all functions ``section`` is a `Section`; z is y followed by the columns of its derivatives; ``room`` is the work space
+`Room`; ``carry`` has the step size to try next (rad) and the number of steps; ``hunt`` is a `Hunt`.
 """
 
 from __future__ import annotations
@@ -335,7 +338,7 @@ def continue_newton(section, most, status, z, hunt):
     if not taken:
         numbers[_FRACTION] *= 0.5
         if numbers[_FRACTION] < _LEAST_FRACTION:
-            # smaller ones that do not fall are errors of the integrator: of steep friction, or the kinks of a force law
+            # corrections below NOISE stop falling at the integrator's error, under steep friction or at kinks of a force law
             if status == DONE and numbers[_SIZE] > NOISE:
                 return DIVERGED
             return status
@@ -434,13 +437,13 @@ def solve(section, end, most, start, z, report):
     end : float
         Crank angle at the end of the period (rad).
     most : int
-        Iterations at most.
+        Greatest number of iterations.
     start : ndarray, shape (n,)
         Guess of y at crank angle 0; overwritten, with the solution if the status is DONE.
     z : ndarray, shape (n (1 + n),)
-        Written: y at the end of the period and the monodromy matrix by columns, of the last iterate.
+        Output: y at the end of the period and the monodromy matrix by columns, of the last iterate.
     report : ndarray, shape (3,)
-        Written: residual |y(end) - y(0)| relative to the scale before the last correction, iterations, steps.
+        Output: residual |y(end) - y(0)| relative to the scale before the last correction, iterations, steps.
 
     Returns
     -------
@@ -533,7 +536,7 @@ def sample(section, stations, starts, angles, rows):
     angles : ndarray, shape (m,)
         Crank angles of the samples.
     rows : ndarray, shape (m, states + inputs)
-        Written: state of a run and channels at each angle.
+        Output: state of a run and channels at each angle.
     """
     n = starts.shape[1]
     room = make_room(section, 0)
@@ -584,7 +587,7 @@ def segments(section, angles, starts, rows):
     starts : ndarray, shape (k, n)
         y at the beginning of each piece.
     rows : ndarray, shape (k, n (1 + columns))
-        Written: y at the end of each piece; if columns is n or more, dy/dy0 by columns; if columns is n + 1, dy/dlambda.
+        Output: y at the end of each piece; if columns is n or more, dy/dy0 by columns; if columns is n + 1, dy/dlambda.
 
     Returns
     -------

@@ -58,7 +58,7 @@ EVEN_PIECES = 12
 SETS, STARTS = 4, 64
 #: Newton iterations at most.
 MOST_ITERATIONS = 40
-#: Turns for which a motion is followed if Newton's method fails from the guess, and the change per turn that ends it.
+#: Turns for which a motion is followed if Newton's method fails from the guess, and change per turn below which it is steady.
 SETTLING_TURNS, SETTLED = 200, 1e-4
 #: Samples of a turn for amplitudes and harmonics.
 SAMPLES = 256
@@ -632,7 +632,9 @@ def rest_guess(
         speed = begins if begins > 0.0 else None
         if speed is None and drive.motor is None:
             name = mechanism.freedoms[flow.crank].initial[1]
-            raise InputError(f"under a torque the crank's speed is guessed: give initial.{name}, above zero{other}")
+            raise InputError(
+                f"under a torque a guess of the crank's speed is needed: give initial.{name}, above zero{other}"
+            )
     guess = first_guess(flow, drive, None, speed)
     # the angle of another crank minus its ratio times the crank angle
     guess[: len(flow.free)] = [state[n] - ratios.get(n, 0) * state[flow.crank] for n in flow.free]
@@ -646,7 +648,7 @@ def require_turns(turns: int, point: OperatingPoint | None = None, start: FloatA
     This is checked if an operating point and a start are given.
     """
     if turns < 1 or turns != int(turns):
-        raise InputError(f"turns is {turns}: a period has a whole number of them, at least one")
+        raise InputError(f"turns is {turns}: it must be a whole number, at least one")
     if point is None or start is None:
         return
     mechanism, flow = point.mechanism, point.flow

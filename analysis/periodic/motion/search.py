@@ -42,9 +42,10 @@ from .orbit import (
 )
 
 FloatArray = NDArray[np.float64]
-#: Turns for which a motion is integrated to the next steady motion at most, and the change per turn below which it is steady.
+#: Greatest number of turns for which a motion is integrated to the next steady motion, and change per turn below which it is
+#: steady.
 JUMP_TURNS, SETTLED = 5000, 1e-9
-#: Relative change of the amplitude from one speed to the next beyond which the step is halved, and halvings at most.
+#: Relative change of the amplitude from one speed to the next beyond which the step is halved, and greatest number of halvings.
 FAR, HALVINGS = 0.25, 6
 #: Periods, in turns, that a steady motion may have.
 PERIODS = (1, 2, 3, 4)
@@ -255,7 +256,7 @@ def _settle(point: OperatingPoint, state: FloatArray) -> PeriodicOrbit:
     raise OrbitError(reason, point.flow, start, residual, 0)
 
 
-#: Starts of each of the two methods in a round, and rounds at most.
+#: Number of starts of each of the two methods in a round, and greatest number of rounds.
 MANY, DEFLATED, ROUNDS = 64, 16, 2
 #: Distance, relative to the scale, below which a motion that a search without deflation approaches counts as known.
 _NEAR = 1e-4

@@ -2,7 +2,7 @@
 
 Each lane has its own start, tolerance, step size and end; mechanism and drive are the same. A kernel starts a motion in each
 lane, steps all lanes until one motion ends, and then starts another motion in the lane of this motion. The integrator is that
-of `kernels.advance`.
+of `kernels.advance`. In all functions ``section`` is a `kernels.Section`, and v the work space `Tracks`.
 """
 
 from __future__ import annotations

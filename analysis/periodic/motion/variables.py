@@ -79,7 +79,9 @@ def default_variable(mechanism: Mechanism, drive: Drive | None = None) -> str:
     """
     name = speed_name(mechanism, drive)
     if name is None:
-        raise InputError(f"the crank of a {mechanism.name} has no speed that can be prescribed: name what varies")
+        raise InputError(
+            f"the crank of a {mechanism.name} has no speed that can be prescribed: name the parameter that varies"
+        )
     return name
 
 
@@ -255,7 +257,7 @@ def plane(parameters: Parameters, drive: Drive, x: str, y: str) -> Plane:
     for name in (x, y):
         require_variable(parameters, drive, name)
     if {x, y} <= set(speed_names(find_mechanism(parameters))):
-        raise InputError(f"{x} and {y} keep their ratio: one of them can be an axis")
+        raise InputError(f"{x} and {y} keep their ratio: only one of them can be an axis")
     return NamedPlane(parameters, drive, x, y)
 
 

@@ -32,7 +32,7 @@ from .branch import Branch
 HALF_POWER = 1.0 / sqrt(2.0)
 #: Least prominence, relative to the height, at which a peak counts.
 _PROMINENCE = 1e-3
-#: Relative difference up to which two arcs are one curve, followed twice; share of the scale up to which a value is an error.
+#: Relative difference up to which two arcs are one curve that was followed twice; share of the scale that counts as an error.
 _SAME, _NOISE = 1e-2, 1e-7
 #: Relative rounding error of the parameter; share of the range below which an interval does not count: such a short interval
 #: arises because a doubled branch begins a step beyond its doubling.
@@ -54,7 +54,7 @@ class Risk(Enum):
 class Avoided:
     """A range of the parameter (rad/s if it is a speed) that a machine should avoid, and the reason.
 
-    ``of`` is the short name of the coordinate whose resonance it is, if several are free.
+    ``of`` is the short name of the coordinate that resonates; it is empty if only one coordinate is free.
     """
 
     low: float
@@ -351,7 +351,7 @@ def extrema(branch: Branch, sign: int = 1) -> tuple[Extremum, ...]:
             if prominence < _PROMINENCE * abs(amplitude[i]):
                 continue
             a, c = sorted((float(branch.parameter[i - 1]), float(branch.parameter[i + 1])))
-            # at a fold the parameter turns back: this is no extremum over the parameter
+            # at a fold the parameter turns back: this is not an extremum over the parameter
             if not a < branch.parameter[i] < c:
                 continue
             place, orbit = _locate_extremum(branch, i, a, c, sign, number)

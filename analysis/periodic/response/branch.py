@@ -227,7 +227,7 @@ def follow(
     Raises
     ------
     ContinuationError
-        If the orbit is no member of the family.
+        If the orbit does not belong to the family.
     """
     settings = _settings(low, high, greatest, most_points)
     follower = _follower(family, orbit, settings)
@@ -259,13 +259,14 @@ def switch(
     Raises
     ------
     InputError
-        If the point is no period doubling.
+        If the point is not a period doubling.
     ContinuationError
         If no point on the new branch is found.
     """
     if doubling.kind is not Crossing.PERIOD_DOUBLING:
         raise InputError(
-            f"the point at {doubling.parameter:.9g} is a {doubling.kind.value}: only a period doubling has a branch"
+            f"the point at {doubling.parameter:.9g} is a {doubling.kind.value}: only a period doubling has a branch of twice "
+            "the period"
         )
     orbit = doubling.orbit
     settings = _settings(low, high, greatest, most_points)
@@ -281,9 +282,7 @@ def switch(
         # a step back to the undoubled branch does not count
         if taken is not None and abs(float((taken.y / scale - orbit.start / scale) @ (vector / scale))) > 0.5 * length:
             return _branch(family, doubled.turns, follower, taken, watch, stop, largest)
-    raise ContinuationError(
-        f"the motion of twice the period is not met next to {family.format_value(doubling.parameter)}"
-    )
+    raise ContinuationError(f"no motion of twice the period was found near {family.format_value(doubling.parameter)}")
 
 
 def follow_both(family: Family, orbit: PeriodicOrbit, value: float, *, low: float, high: float, **how: Any) -> Branch:
@@ -353,9 +352,7 @@ def reason_to_leave(point: Point, largest: float = GREATEST_MULTIPLIER) -> str:
     """Return the reason why a branch must not be followed beyond a point; empty if there is none."""
     orbit = point.data
     if orbit.largest > largest:
-        return (
-            f"beyond, a disturbance grows more than {largest:g} times in each period (the largest Floquet multiplier)"
-        )
+        return f"beyond this point a disturbance grows more than {largest:g} times per period (the largest Floquet multiplier)"
     sine = orbit.clearance(64) if orbit.least_clearance is None else orbit.least_clearance
     if sine < LEAST_SINE:
         return f"the links come near to the limit of assembly (sine of the angle to it {sine:.3g})"
@@ -477,7 +474,7 @@ def _special_points(
                 span = " and ".join(family.format_value(p.parameter) for p in (before, after))
                 problems.append(f"the {kind.value} between {span} is not located: {error}")
                 continue
-            # two real multipliers with the product 1 are no torus point
+            # two real multipliers with the product 1 are not a torus point
             if kind is Crossing.TORUS and abs(point.data.multipliers[0].imag) < 1e-6:
                 continue
             found.append((i, s, SpecialPoint(kind=kind, parameter=point.parameter, orbit=point.data, after=passed + i)))

@@ -112,9 +112,9 @@ def mean_effective_mass(parameters: Parameters) -> float:
 def natural_frequency(parameters: Parameters) -> float:
     """Compute the natural frequency (rad/s) of the only degree of freedom that is not a crank, from its mean effective mass.
 
-    It is that of its spring alone, such as ``slider.stiffness``, with the degree of freedom held where this spring is free; it
-    leaves out gravity and all forces. `analysis.linear.natural_modes` has the natural frequencies of every mechanism, about its
-    equilibrium.
+    Only the spring of this degree of freedom counts, such as ``slider.stiffness``, and the mass is averaged with this spring
+    free; gravity and all other forces are ignored. `analysis.linear.natural_modes` computes the natural frequencies of every
+    mechanism about its equilibrium.
 
     Raises
     ------
@@ -294,9 +294,9 @@ def frequency_response(
     start : array_like, optional
         Guess of the orbit's start at the low end; see `find_orbit`.
     doublings : int
-        How often the period is doubled: 1 for the motions of twice the period from each period doubling, 2 for the motions of
-        four times the period as well, and so on. Branches of four times the period and more end when their largest multiplier
-        passes `STRAYED`.
+        Number of successive doublings of the period: 1 for the motions of twice the period from each period doubling, 2 for
+        the motions of four times the period as well, and so on. Branches of four times the period and more end when their
+        largest multiplier passes `STRAYED`.
     most_points : int
         Greatest number of points of a branch.
     greatest_step : float
@@ -543,7 +543,7 @@ def with_isolas(
     Raises
     ------
     InputError
-        If ``response`` is no `Response`, or ``places`` or ``turns`` is less than one.
+        If ``response`` is not a `Response`, or ``places`` or ``turns`` is less than one.
     ResponseInterrupted
         On Ctrl-C, with the branches followed so far.
 

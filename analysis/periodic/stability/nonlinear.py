@@ -62,8 +62,8 @@ _LOCATED = 1e-2
 #: Relative uncertainty of a coefficient above which its sign is not settled.
 UNSETTLED = 0.5
 _UNSETTLED = "not settled"
-#: Run that confirms a normal form: least and greatest distance of the multiplier from the unit circle; square of the distance
-#: from the motion of the branch that is wanted; periods of the run.
+#: Run that confirms a normal form: least and greatest distance of the multiplier from the unit circle; wanted square of the
+#: distance from the motion of the branch; periods of the run.
 _BEYOND, _SMALL, _TURNS = (2e-3, 2e-2), 0.04, 6000
 FloatArray = NDArray[np.float64]
 Form = Callable[..., NDArray[np.complex128]]
@@ -97,23 +97,24 @@ class Forms(NamedTuple):
 
     Attributes
     ----------
-    of : callable
+    function : callable
         The map, from shape (n,) to (n,).
     matrix : ndarray, shape (n, n)
         First derivative of the map at zero.
     """
 
-    of: Callable[[FloatArray], FloatArray]
+    function: Callable[[FloatArray], FloatArray]
     matrix: FloatArray
 
     def second_form(self, x: FloatArray, h: float) -> FloatArray:
         """Return the second derivative B(x, x) by finite differences with the step h."""
-        return (self.of(h * x) + self.of(-h * x) - 2.0 * self.of(0.0 * x)) / h**2
+        f = self.function
+        return (f(h * x) + f(-h * x) - 2.0 * f(0.0 * x)) / h**2
 
     def third_form(self, x: FloatArray, h: float) -> FloatArray:
         """Return the third derivative C(x, x, x) by finite differences with the step h."""
-        of = self.of
-        return (of(2.0 * h * x) - 2.0 * of(h * x) + 2.0 * of(-h * x) - of(-2.0 * h * x)) / (2.0 * h**3)
+        f = self.function
+        return (f(2.0 * h * x) - 2.0 * f(h * x) + 2.0 * f(-h * x) - f(-2.0 * h * x)) / (2.0 * h**3)
 
     def complex_forms(self, h: float) -> tuple[Form, Form]:
         """Return the functions B(u, v) and C(u, v, w) of complex vectors, by polarisation of the real forms."""
@@ -178,16 +179,16 @@ def normal_form(family: Family, special: SpecialPoint) -> NormalForm:
     OrbitError
         If the integration over a period, from a start next to the orbit, fails.
     """
-    of = _forms(special.orbit)
+    forms = _forms(special.orbit)
     multiplier = complex(special.orbit.multipliers[0])
     crossing = {Crossing.FOLD: 1.0, Crossing.PERIOD_DOUBLING: -1.0}.get(special.kind, multiplier / abs(multiplier))
     if np.abs(special.orbit.multipliers - crossing).min() > _LOCATED:
         return NormalForm(kind=special.kind, coefficient=0.0, uncertainty=np.inf, words=_UNSETTLED)
-    coefficient, uncertainty = _extrapolate_coefficient(lambda h: form_coefficient(of, special.kind, multiplier, h))
+    coefficient, uncertainty = _extrapolate_coefficient(lambda h: form_coefficient(forms, special.kind, multiplier, h))
     if not uncertainty < UNSETTLED * abs(coefficient):
         words = _UNSETTLED
     elif special.kind is Crossing.FOLD:
-        words = f"both motions at {'lower' if coefficient * _slope(family, of, special) > 0.0 else 'higher'} values"
+        words = f"both motions at {'lower' if coefficient * _slope(family, forms, special) > 0.0 else 'higher'} values"
     else:
         gentle = coefficient > 0.0 if special.kind is Crossing.PERIOD_DOUBLING else coefficient < 0.0
         words = "supercritical" if gentle else "subcritical"
@@ -221,23 +222,24 @@ def _extrapolate_coefficient(at: Callable[[float], float]) -> tuple[float, float
     return min(found, key=lambda pair: pair[1] / max(abs(pair[0]), 1e-300))
 
 
-def form_coefficient(of: Forms, kind: Crossing, multiplier: complex, h: float) -> float:
+def form_coefficient(forms: Forms, kind: Crossing, multiplier: complex, h: float) -> float:
     """Compute the coefficient of a normal form by Kuznetsov's equation (5.25), (5.27) or (5.28): see `NormalForm`.
 
     Parameters
     ----------
-    of : Forms
+    forms : Forms
+        Derivatives of the map at the special point.
     kind : Crossing
     multiplier : complex
         For a torus: one multiplier of the pair on the unit circle.
     h : float
         Step of the finite differences.
     """
-    matrix, unit = of.matrix, np.eye(len(of.matrix))
+    matrix, unit = forms.matrix, np.eye(len(forms.matrix))
     if kind is Crossing.TORUS:
         v, left, found = _eigenvectors(matrix, complex(multiplier.real, abs(multiplier.imag)))
         turn = found / abs(found)
-        b, c = of.complex_forms(h)
+        b, c = forms.complex_forms(h)
         inner = (
             c(v, v, v.conj())
             + 2.0 * b(v, np.linalg.solve(unit - matrix, b(v, v.conj())))
@@ -247,22 +249,22 @@ def form_coefficient(of: Forms, kind: Crossing, multiplier: complex, h: float) -
     sign = 1.0 if kind is Crossing.FOLD else -1.0
     right, left, _ = _eigenvectors(matrix, sign)
     q, p = (np.array(vector.real, dtype=float) for vector in (right, left))
-    second = of.second_form(q, h)
+    second = forms.second_form(q, h)
     if kind is Crossing.FOLD:
         return float(0.5 * p @ second)
     # B(q, w) by polarisation, with w scaled to the length of q
     w = np.linalg.solve(unit - matrix, second)
     length = float(np.linalg.norm(w)) or 1.0
-    mixed = length * (of.second_form(q + w / length, h) - of.second_form(q - w / length, h)) / 4.0
-    return float(p @ (of.third_form(q, h) + 3.0 * mixed)) / 6.0
+    mixed = length * (forms.second_form(q + w / length, h) - forms.second_form(q - w / length, h)) / 4.0
+    return float(p @ (forms.third_form(q, h) + 3.0 * mixed)) / 6.0
 
 
-def _slope(family: Family, of: Forms, special: SpecialPoint) -> float:
+def _slope(family: Family, forms: Forms, special: SpecialPoint) -> float:
     """Return the derivative of the map over a period with respect to the parameter, at a fold.
 
     The derivative is projected on the left eigenvector.
     """
-    _, p, _ = _eigenvectors(of.matrix, 1.0)
+    _, p, _ = _eigenvectors(forms.matrix, 1.0)
     point, start = operating_point(*family.operation(special.parameter)), special.orbit.start
     reach = 1e-3 * max(abs(special.parameter), 1e-9)
     direction = family.direction(special.parameter, special.parameter - reach, special.parameter + reach)
@@ -304,7 +306,7 @@ def confirm_form(family: Family, special: SpecialPoint, form: NormalForm) -> For
         If the motion of the branch is unstable on neither side.
     """
     if special.kind is Crossing.FOLD:
-        raise InputError("beyond a fold there is no old motion to deviate from")
+        raise InputError("beyond a fold the branch has no motion from which a run could deviate")
     step = 1e-3 * max(abs(special.parameter), 1e-9)
     sides: list[tuple[float, PeriodicOrbit]] = []
     for sign in (-1.0, 1.0):
@@ -394,7 +396,7 @@ class Confirmation:
 #: Initial distance of a long run from the orbit, relative to the scale of y; least and greatest distance at which growth is
 #: measured.
 DISTURBANCE, NOISE, LINEAR = 1e-5, 1e-8, 1e-2
-#: Deviation below which it counts as zero.
+#: Size below which a deviation counts as zero.
 TINY = 1e-300
 #: Least and greatest number of turns of a run.
 FEWEST_TURNS, MOST_TURNS = 1000, 20_000
@@ -439,7 +441,8 @@ def confirm(
     """
     if (turns is not None and turns < 20) or not NOISE < disturbance < LINEAR:
         raise InputError(
-            f"{turns} turns from a disturbance of {disturbance}: 20 and more, and between {NOISE:g} and {LINEAR:g}"
+            f"{turns} turns from a disturbance of {disturbance}: there must be at least 20 turns, and the disturbance must be "
+            f"between {NOISE:g} and {LINEAR:g}"
         )
     orbit = newton_orbit(parameters, drive, start=start)
     verdict = orbit.verdict(tolerance)
