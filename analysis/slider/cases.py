@@ -39,8 +39,8 @@ class SliderTable:
     Attributes
     ----------
     harmonics : tuple of int
-        Numbers of harmonics, increasing. There is one search for each number; it starts from the solutions of the search
-        before.
+        Numbers of harmonics, increasing. There is one search for each number; it starts from the solutions of the previous
+        search.
     links : str
         "kept", or "free" if the links are optimised together with the motion.
     guide_angle, position, stroke, speed, acceleration
@@ -442,6 +442,6 @@ def linkage_from_csv(path: str | Path, rank: int = 1) -> syn.Linkage:
         values["branch"] = int(float(row["branch"]))
     except (KeyError, TypeError, ValueError, OverflowError) as error:
         raise InputError(
-            f"{path} is no list of linkages as 'linkwork synthesize' writes it ({type(error).__name__}: {error})"
+            f"{path} is not a list of linkages written by 'linkwork synthesize' ({type(error).__name__}: {error})"
         ) from None
     return syn.Linkage(**values)

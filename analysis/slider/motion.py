@@ -98,7 +98,8 @@ def slider_motion(
     asked = {c.branch for c in constraints if isinstance(c, Assembly)}
     if asked - {given.branch}:
         raise InputError(
-            f"assembly {asked.pop():+d} is asked of a linkage that is assembled {given.branch:+d}: turn it over first"
+            f"the constraints require assembly {asked.pop():+d}, but the linkage has assembly {given.branch:+d}: turn it over "
+            "first"
         )
     return improve(
         task,
@@ -113,9 +114,10 @@ def slider_motion(
 
 
 def greatest_derivative(linkage: Linkage, order: int) -> float:
-    """Return the greatest magnitude over a turn of d^order u/dphi^order, slider position by crank rotation (m/rad^order).
+    """Return the greatest magnitude over a turn of the derivative of this order of the slider position (m/rad^order).
 
-    Order 0 is the position itself. If no slider moves the pivot, the result is 0.
+    The derivative is with respect to the crank rotation; order 0 is the position itself. If no slider moves the pivot, the
+    result is 0.
     """
     if not isinstance(linkage.pivot, SliderMotion):
         return 0.0

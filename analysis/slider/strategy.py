@@ -205,7 +205,7 @@ def simplest_mechanism(
 
 @dataclass(eq=False)
 class _Trials:
-    """Mechanisms tried so far; the other fields are the arguments of `simplest_mechanism`."""
+    """State of the search: the mechanisms tried so far, as ``steps``, and the arguments of `simplest_mechanism`."""
 
     task: Task
     tolerance: float
@@ -255,7 +255,12 @@ class _Trials:
         """Record a mechanism and why it is accepted or rejected; return its best solution, None if there is no solution."""
         if found is None:
             self.steps.append(
-                Step(mechanism=mechanism, solution=None, value=inf, reason="none keeps the constraints: moved on")
+                Step(
+                    mechanism=mechanism,
+                    solution=None,
+                    value=inf,
+                    reason="no solution satisfies the constraints: rejected",
+                )
             )
             return None
         solution = found.best
@@ -270,7 +275,7 @@ class _Trials:
             else f"{said} is {value / self.tolerance:.3g} times the tolerance {self._text(self.tolerance)}"
         )
         reason += f", with {defects}" if defects else ""
-        reason += ": taken" if self._met else ": moved on" if found.complete else ": stopped"
+        reason += ": accepted" if self._met else ": rejected" if found.complete else ": stopped"
         self.steps.append(Step(mechanism=mechanism, solution=solution, value=value, reason=reason))
         return solution
 

@@ -224,7 +224,8 @@ def track(
     plant : FiveBarParameters, optional
         Parameters of the plant; by default those of the controller's model.
     load : (float, float) or function of the crank angle
-        Load on the plant at P (N), held over each period at its value in the middle; the feed-forward uses `controller.load`.
+        Load on the plant at P (N), constant over each sampling period, with its value at the middle of the period; the
+        feed-forward uses `controller.load`.
     initial : InitialState, optional
         Initial state; by default the slider is on the reference at crank angle 0.
     fmu : path, optional
@@ -282,7 +283,7 @@ def track(
 
 
 def _point_error(parameters: FiveBarParameters, loop: LoopResult) -> FloatArray:
-    """Return the distance of P from the model's P on the reference (m), shape (n,)."""
+    """Return the distance of the plant's P from the P of the model on the reference (m), shape (n,)."""
     assert loop.trajectory is not None
     p = parameters.constants()
     wanted = [

@@ -200,7 +200,7 @@ class _Problem:
             wanted = target.real - k.output_angle - self.guide_angle
             own, other, offset = l4, l3, -b.imag
 
-        # angles from the guide of the target link and the other link where the error is stationary
+        # x, y: angles of the target link and of the other link, from the guide, at which the error is stationary
         sine = (own * np.sin(wanted) + offset) / other
         side = np.arcsin(np.clip(sine, -1.0, 1.0))
         x, y = [wanted, wanted], [side, pi - side]
@@ -211,7 +211,7 @@ class _Problem:
             for angle in (side, pi - side):
                 x.append(angle)
                 y.append(np.full_like(angle, way * 0.5 * pi))
-                # a minimum if the link would come nearer by turning on, where the other link cannot follow
+                # a minimum if only turning the target link further, which the other link prevents, would reduce the error
                 turning_on = way * np.cos(angle) * np.sin(angle - wanted)
                 minimal.append((np.abs(sine) <= 1.0) & (turning_on <= ROUNDING))
         coupler, rocker = np.array((x, y) if path else (y, x))
@@ -393,7 +393,7 @@ def _describe_unreachable(problem: _Problem, phi: FloatArray, n: int) -> str:
     reach = " or ".join(f"from {start[worst]:.6g} to {end[worst]:.6g} m" for start, end in spans)
     return (
         f"{where}: at {phi[worst]:.6g} rad the slider has to be {reach}, and the stroke, from {low:.6g} to {high:.6g} m, "
-        f"misses that by {gap[worst]:.3g} m"
+        f"ends {gap[worst]:.3g} m away from there"
     )
 
 
@@ -468,7 +468,7 @@ def _choose_minima(
         before[k] = ways.argmin(axis=1)
         total = ways.min(axis=1) + cost[:, k]
     if not closed:
-        # the step back to the first rotation does not count
+        # no cost for the step back to the first rotation
         step[-1] = 0.0
     first, row = np.unravel_index(int((total + step[-1].T).argmin()), (m, m))
     choice = np.empty(n, dtype=int)

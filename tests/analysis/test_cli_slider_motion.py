@@ -213,8 +213,8 @@ def test_the_strategy_stops_where_it_is_good_enough_and_says_why(linkwork, tmp_p
     assert result.exit_code == 0, result.output
     words = " ".join(result.output.replace("│", " ").split())
     assert "four-bar worst" in words
-    assert "times the tolerance 0.01 mm: moved on" in words
-    assert "is within 0.01 mm: taken" in words
+    assert "times the tolerance 0.01 mm: rejected" in words
+    assert "is within 0.01 mm: accepted" in words
     assert "five-bar" not in words
     assert (tmp_path / "out" / "motion.csv").exists()
     by_error = strategy | {"criterion": "error", "tolerance": "1e-6 mm^2"}

@@ -431,5 +431,5 @@ def test_bad_input_is_named() -> None:
 
 
 def test_an_assembly_that_contradicts_the_linkage_is_refused() -> None:
-    with pytest.raises(InputError, match="assembly -1 is asked of a linkage that is assembled"):
+    with pytest.raises(InputError, match="require assembly -1, but the linkage has assembly"):
         slider_motion(WEIGHTED.task, PRINTED, SliderUnknown(harmonics=1), constraints=(Assembly(branch=-1),))

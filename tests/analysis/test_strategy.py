@@ -64,7 +64,7 @@ def test_a_four_bar_is_enough_for_what_one_traces() -> None:
     assert found.chosen.solution is not None
     assert found.chosen.solution.linkage.pivot is None
     assert found.chosen.value == found.chosen.solution.error <= 0.01 * MM2
-    assert found.chosen.reason.endswith("is within 0.01 mm2: taken")
+    assert found.chosen.reason.endswith("is within 0.01 mm2: accepted")
 
 
 def test_a_slider_where_a_four_bar_is_not_enough() -> None:
@@ -88,7 +88,7 @@ def test_a_slider_where_a_four_bar_is_not_enough() -> None:
     )
     for step in found.steps[:-1]:
         ratio = step.value / (0.01 * MM2)
-        assert f"is {ratio:.3g} times the tolerance 0.01 mm2: moved on" in step.reason
+        assert f"is {ratio:.3g} times the tolerance 0.01 mm2: rejected" in step.reason
 
 
 def test_gears_where_a_slider_is_not_enough() -> None:
@@ -137,7 +137,7 @@ def test_what_none_can_do_is_answered_with_the_nearest() -> None:
     )
     assert not found.met
     assert len(found.steps) == 4
-    assert all(step.reason.endswith("moved on") for step in found.steps)
+    assert all(step.reason.endswith("rejected") for step in found.steps)
     assert found.chosen.value == min(step.value for step in found.steps)
     assert found.chosen.value < found.steps[0].value
     # constraints hold for every mechanism
@@ -174,7 +174,7 @@ def test_the_worst_error_as_the_criterion_and_the_angles_of_a_rocker() -> None:
         search=Search(starts=2),
     )
     assert len(error.steps) == 1
-    assert f"is within {degrees(degrees(1.0)):.4g} deg2: taken" in str(error)
+    assert f"is within {degrees(degrees(1.0)):.4g} deg2: accepted" in str(error)
 
 
 def test_the_stroke_is_kept() -> None:
@@ -199,7 +199,7 @@ def test_without_a_solution_a_step_has_none() -> None:
     assert [step.solution is None for step in found.steps] == [False, False, True, True, True]
     for step in found.steps[2:]:
         assert step.value == inf
-        assert step.reason == "none keeps the constraints: moved on"
+        assert step.reason == "no solution satisfies the constraints: rejected"
     assert not found.met
     assert found.chosen is found.steps[1]
 
@@ -246,7 +246,7 @@ def test_a_mechanism_with_a_defect_is_not_taken() -> None:
     )
     for step in found.steps:
         if step.solution is not None and not step.solution.verdicts.sound and step.value <= 2e-3:
-            assert " defect: moved on" in step.reason
+            assert " defect: rejected" in step.reason
     assert not any(step.reason.endswith("taken") for step in found.steps if not step.solution.verdicts.sound)
     assert not found.met or found.chosen.solution.verdicts.sound
 
@@ -269,7 +269,7 @@ def test_defects_are_named_and_what_is_sound_comes_first(monkeypatch: pytest.Mon
 
     monkeypatch.setattr(strategy_module, "synthesize", defective)
     found = strategy(BASE, 0.01 * MM2, harmonics=1, ratios=(), starts=2)
-    assert found.steps[0].reason.endswith("is within 0.01 mm2, with a circuit defect and a branch defect: moved on")
+    assert found.steps[0].reason.endswith("is within 0.01 mm2, with a circuit defect and a branch defect: rejected")
     assert len(found.steps) == 2
     steps = (step_of({"circuit": False}, 1.0), step_of({}, 3.0), step_of({}, 2.0))
     assert Strategy(steps=steps, met=False, tolerance=0.1, criterion="error").chosen is steps[2]
@@ -316,7 +316,7 @@ def test_interrupted_it_keeps_its_steps(monkeypatch: pytest.MonkeyPatch, stop: i
         return
     assert len(kept.steps) == stop + best
     assert all(step.solution is not None for step in kept.steps)
-    assert kept.steps[-1].reason.endswith("stopped" if best else "moved on")
+    assert kept.steps[-1].reason.endswith("stopped" if best else "rejected")
     assert kept.chosen.value == min(step.value for step in kept.steps)
 
 
