@@ -70,7 +70,8 @@ class WholeTurns:
     def _without_turns(self, x: NDArray[np.float64], u: NDArray[np.float64], way: NDArray[np.float64]) -> Any:
         """Return the state x less multiples of ``way``; None if the mechanism does not behave the same there.
 
-        Where a spring between turning bodies is twisted by the difference of their turns, the same multiple is taken of all.
+        The same multiple is subtracted from all angles if a spring between turning bodies is twisted by the difference of their
+        turns.
         """
         turning = way > 0.0
 

@@ -69,7 +69,7 @@ def takes_published(**fills: Fill) -> Callable[[_Function], _Function]:
                 value: Any = bound.get(name)
                 own_each = several and isinstance(value, (list, tuple))
                 if own_each and len(value) != len(sets):
-                    raise InputError(f"{name} has {len(value)} entries for {len(sets)} sets: give one, or as many")
+                    raise InputError(f"{name} has {len(value)} entries for {len(sets)} sets: give one, or one for each")
                 values = value if own_each else [value] * len(sets)
                 filled = [v if known is None else fill(known, v) for known, v in zip(sets, values)]
                 bound[name] = filled if several else filled[0]

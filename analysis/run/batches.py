@@ -165,7 +165,7 @@ def _load_or_solve(task: Task, prepared: PreparedBatch, interrupts: Sequence[boo
                 save_array(path, kept)
             except OSError as error:
                 warnings.warn(
-                    f"{path} cannot be written ({error}): its runs are in memory alone", RuntimeWarning, stacklevel=3
+                    f"{path} cannot be written ({error}): its runs are only in memory", RuntimeWarning, stacklevel=3
                 )
     return kept
 

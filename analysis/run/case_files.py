@@ -257,7 +257,9 @@ def with_case_file_names(data: Mapping[str, Any], mechanism: Mechanism) -> dict[
         if name == channel.name or not isinstance(inner, Mapping) or leaf not in inner:
             continue
         if name in result:
-            raise InputError(f"{channel.name} is {name} in case files, and that is given, too: leave out one of them")
+            raise InputError(
+                f"{channel.name} is called {name} in case files, and both are given: leave out one of them"
+            )
         result |= {name: inner[leaf], table: {key: value for key, value in inner.items() if key != leaf}}
     return result
 

@@ -1,4 +1,4 @@
-"""Cautions about a run: it is stiff, its energy balance misses more than the tolerance promises, or a spring slips a turn."""
+"""Cautions about a run: it is stiff, its energy residual exceeds the tolerance, or the twist of a spring slips a turn."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ _STABLE = 2.0
 #: Least phase angle (rad) of the fastest vibration in a step at which the vibration limits the step: usually about 1.
 _FOLLOWED = 0.3
 #: Largest residual of the energy balance without a caution: the first number times tolerance times greatest energy, but at most
-#: the second times greatest energy. In place of the first number a usual run has 2, a run of 2000 revolutions 12.
+#: the second times greatest energy. For comparison with the first number: a usual run has 2, a run of 2000 revolutions 12.
 _RESIDUAL, _MOST = 1e4, 0.05
 
 
@@ -70,7 +70,7 @@ def is_too_slow(steps: Any, passed: Any, span: float, most: int) -> Any:
 
 @lru_cache(maxsize=64)
 def _twists(mechanism: Mechanism) -> dict[str, int]:
-    """Return the index of the output that is the twist of each spring whose whole turns nothing counts, by spring."""
+    """Return the index of the output that is the twist of a spring, by spring, for all springs whose turns are not counted."""
     names = mechanism.output_names
     return {v.of: names.index(v.name) for v in mechanism.variables if v.role == "twist"}
 
@@ -86,8 +86,8 @@ def twists(mechanism: Mechanism, time: NDArray[np.float64], values: NDArray[np.f
         if len(jumps):
             found.append(f"{name} at t = {time[jumps[0] + 1]:.4g} s")
     return (
-        f"the torque of {' and '.join(found)} jumps, where its angle passes half a turn either way: nothing counts the whole "
-        "turns there, as a freedom at the pin would"
+        f"the torque of {' and '.join(found)} jumps, because its angle passes plus or minus half a turn: whole turns of this "
+        "angle are not counted; a freedom at the pin would count them"
         if found
         else ""
     )
@@ -114,6 +114,6 @@ def energy_balance(names: Sequence[str], values: NDArray[np.float64], tolerance:
     if residual <= min(_RESIDUAL * tolerance, _MOST) * size:
         return ""
     return (
-        f"the balance of energy misses {residual:.3g} J where the greatest energy is {size:.3g} J, more than the tolerance "
+        f"the residual of the energy balance is {residual:.3g} J at a greatest energy of {size:.3g} J, more than the tolerance "
         f"{tolerance:g} promises (masses of very different sizes?): take a smaller tolerance"
     )

@@ -79,7 +79,7 @@ def check(
         As for `simulate` and `cosimulate`.
     """
     if interface not in CHECKED:
-        raise InputError(f"interface is {interface!r}: a check is of {' or '.join(CHECKED)}")
+        raise InputError(f"interface is {interface!r}: it must be {' or '.join(CHECKED)}")
     held = interface == "co-simulation"
     common: dict[str, Any] = {
         "initial": case.initial,

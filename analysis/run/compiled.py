@@ -4,7 +4,7 @@ The integrator is DOP853 (`linkwork.tableau`) with its interpolant of order 7, t
 inputs are evaluated inside the loop. The solver knows no mechanism: it calls the equations, which are machine code, by their
 addresses (`equations.machine`), and so is compiled only once for all mechanisms. A run is integrated over one interval of
 smooth inputs after the other. An interval ends at a break of the inputs, at a point at which they are sampled and held, or at
-the release of the torsion bar.
+the release of the torsion bar. In all functions ``motion`` is the run in progress, a `records.Motion`, and h a step size (s).
 """
 
 from __future__ import annotations

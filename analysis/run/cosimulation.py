@@ -328,7 +328,7 @@ def compare(a: Trajectory, b: Trajectory, *, tolerance: float = 1e-6) -> Compari
     Raises
     ------
     InputError
-        If ``a`` or ``b`` is no run, or the times or the outputs of the runs differ.
+        If ``a`` or ``b`` is not a run, or the times or the outputs of the runs differ.
 
     Examples
     --------
@@ -338,9 +338,9 @@ def compare(a: Trajectory, b: Trajectory, *, tolerance: float = 1e-6) -> Compari
     True
     """
     for name, run in (("a", a), ("b", b)):
-        require_kind(run, Trajectory, name, "a run, as simulate('table-3.1')")
+        require_kind(run, Trajectory, name, "a run, such as simulate('table-3.1')")
     if a.names != b.names:
-        raise InputError("the runs cannot be compared: they have not the same outputs, and are of different mechanisms")
+        raise InputError("the runs cannot be compared: their outputs differ, because they are of different mechanisms")
     n = int(np.count_nonzero(np.isin(a.time, b.time)))
     if a.status == b.status != 0 and max(len(a), len(b)) <= n + 1:
         a, b = replace(a, time=a.time[:n], values=a.values[:n]), replace(b, time=b.time[:n], values=b.values[:n])

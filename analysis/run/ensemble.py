@@ -40,7 +40,7 @@ from .varied import vary as varied_sets
 
 #: Largest number of samples in a batch, if the caller does not choose the size of batches.
 _SAMPLES_OF_BATCH = 1 << 16
-#: The same for a graphics processor, which is busy with thousands of runs only.
+#: The same for a graphics processor, which needs thousands of runs at once to be fast.
 _SAMPLES_ON_DEVICE = 1 << 22
 
 
@@ -91,9 +91,9 @@ class Ensemble:
         missing = int(np.count_nonzero(self.status == NOT_RUN))
         early = int(np.count_nonzero(self.status)) - missing
         over = f"{len(self.time)} samples from {self.time[0]:.4g} to {self.time[-1]:.4g} s"
-        ended = "all complete" if not early else f"{early} of them ended early, as messages says"
+        ended = "all complete" if not early else f"{early} of them ended early: see messages"
         if missing:
-            ended = f"{missing} of them not run to the end, as interrupted" + (f", {ended}" if early else "")
+            ended = f"{missing} of them interrupted before their end" + (f", {ended}" if early else "")
         return f"<Ensemble: {format_count(len(self), 'run')} of {over}, {ended}>"
 
     def __len__(self) -> int:
@@ -145,7 +145,7 @@ class EnsembleInterrupted(Interrupted):
 
 
 class EnsembleBroken(LinkworkError):
-    """Error of an ensemble whose workers failed, for example as they were killed; ``ensemble`` has the results so far."""
+    """Error of an ensemble whose workers failed, for example were killed; ``ensemble`` has the results so far."""
 
     def __init__(self, ensemble: Ensemble, folder: Path | None, error: WorkersLost) -> None:
         self.ensemble = ensemble
@@ -467,5 +467,5 @@ def _one_per_run(value: Any, count: int, what: str) -> Any:
     if value is None or not isinstance(value, Sequence):
         return [value] * count
     if len(value) != count:
-        raise InputError(f"{len(value)} {what} for {count} sets of parameters: give one, or as many")
+        raise InputError(f"{len(value)} {what} for {count} sets of parameters: give one, or one for each")
     return value if isinstance(value, VariedSequence) else list(value)

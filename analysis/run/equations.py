@@ -143,7 +143,7 @@ def expressions(mechanism: Mechanism, switched: bool = False) -> TracedEquations
     energy = casadi.SX.sym("start_energy")
     values, channels = tuple(casadi.vertsplit(x)), tuple(casadi.vertsplit(u)) if mechanism.channels else ()
 
-    def of(what: str, *arguments: Any) -> Any:
+    def trace(what: str, *arguments: Any) -> Any:
         result = call(what, *arguments)
         column = casadi.densify(casadi.vertcat(*result) if isinstance(result, tuple) else casadi.SX(result))
         # float(symbol), which the functions of math and NumPy call, is NaN
@@ -154,7 +154,7 @@ def expressions(mechanism: Mechanism, switched: bool = False) -> TracedEquations
                 leaves.instruction_id(i) == casadi.OP_CONST and np.isnan(leaves.instruction_constant(i)) for i in codes
             ):
                 raise LinkworkError(
-                    f"the {what} of {mechanism.name}, number {n}, is no expression in its arguments: {_ALLOWED}"
+                    f"the {what} of {mechanism.name}, number {n}, is not an expression of its arguments: {_ALLOWED}"
                 )
         return column
 
@@ -163,17 +163,17 @@ def expressions(mechanism: Mechanism, switched: bool = False) -> TracedEquations
             return functions.find(getattr(mechanism.equations, what))(*arguments)
         except RuntimeError as error:
             raise LinkworkError(
-                f"the {what} of {mechanism.name} cannot be traced, as where it branches on its arguments: {_ALLOWED}"
+                f"the {what} of {mechanism.name} cannot be traced, perhaps because it branches on its arguments: {_ALLOWED}"
             ) from error
 
     applied = call("apply_inputs", tuple(casadi.vertsplit(modes)) if mechanism.modes else (), channels, k)
     return TracedEquations(
         Symbols(x, modes, u, casadi.vertcat(p, energy)),
-        of("derivative", values, applied, k),
-        of("outputs", values, applied, energy, k),
-        of("clearance", values, applied, k),
-        of("jump", values, applied, channels, k),
-        of("energy", call("start", values, applied, k), k),
+        trace("derivative", values, applied, k),
+        trace("outputs", values, applied, energy, k),
+        trace("clearance", values, applied, k),
+        trace("jump", values, applied, channels, k),
+        trace("energy", call("start", values, applied, k), k),
     )
 
 
@@ -226,7 +226,7 @@ def machine(mechanism: Mechanism, switched: bool = False, lanes: int = 1) -> Mac
 
 @cache
 def compile_outputs(mechanism: Mechanism, switched: bool, columns: tuple[int, ...], lanes: int) -> MachineCode:
-    """Compile a function ``chosen`` that computes only the outputs with the indices ``columns``: it is faster."""
+    """Compile a function ``chosen`` that computes only the outputs with the indices ``columns``, which is faster."""
     from ..numerics.codegen import MAKING, MachineCode
 
     traces = expressions(mechanism, switched)

@@ -41,7 +41,7 @@ class Event:
     Notes
     -----
     If the value jumps across the level because an input jumps, the event happens at the jump. A value that starts on the level
-    is no event. Of several crossings within a quarter of an integrator's step some may be missed.
+    is not an event. Of several crossings within a quarter of an integrator's step some may be missed.
     """
 
     name: str

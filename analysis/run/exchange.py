@@ -21,7 +21,7 @@ from .sampling import name_channels, release, sample
 #: Largest number of CVode's steps between two samples.
 MOST_STEPS = 100_000
 
-#: Function of CVode that FMPy does not offer: sets a time beyond which no step goes, as an input jumps there.
+#: Function of CVode that FMPy does not offer: sets a time, at which an input jumps, beyond which no step goes.
 _set_stop_time = sundials_cvode.CVodeSetStopTime
 _set_stop_time.argtypes = [c_void_p, sunrealtype]
 _set_stop_time.restype = c_int

@@ -62,8 +62,8 @@ def unpacking_folder() -> str:
         if folder and os.access(folder, os.W_OK) and not re.search("%(?!20)", Path(folder).absolute().as_uri()):
             return folder
     raise CosimulationError(
-        f"an FMU cannot be unpacked in {here}: of the characters in the folder's name PythonFMU's library reads letters from a "
-        "to z, digits, spaces and - . _ ~ alone; set TMPDIR to another folder"
+        f"an FMU cannot be unpacked in {here}: PythonFMU's library reads only letters from a to z, digits, spaces and - . _ ~ "
+        "in a folder's name; set TMPDIR to another folder"
     )
 
 
@@ -244,7 +244,7 @@ class _Reader:
         names = [name.strip() for name in names]
         if len(names) < 2 or len(set(names)) < len(names) or not rows or any(len(row) != len(names) for row in rows):
             raise ExperimentError(
-                f"{self.fmu}: {place} must be CSV with different names in its first row, the time first, and rows as long"
+                f"{self.fmu}: {place} must be CSV with different names in its first row, the time first, and equally long rows"
             )
         values = [tuple(self._number(cell, f"a cell of {place}") for cell in row) for row in rows]
         table = np.array(values, dtype=[(name, float) for name in names])
@@ -292,7 +292,7 @@ def verify(fmu: str | Path, *, allowed: float | None = None) -> Iterator[Outcome
         extract(str(fmu), folder)
         if [place.name for place in Path(folder).glob("binaries/*")] == [FOLDER]:
             raise ExperimentError(
-                f"{fmu} is a WebAssembly component alone, and FMPy, which runs the experiments, needs a library for this "
+                f"{fmu} has only a WebAssembly component, but FMPy, which runs the experiments, needs a library for this "
                 "platform: 'linkwork check --all --fmu' runs the component on all standard cases"
             )
         for experiment in experiments:

@@ -72,7 +72,7 @@ def list_interfaces(fmu: str | Path) -> dict[str, str]:
     Raises
     ------
     CosimulationError
-        If the file is no FMU.
+        If the file is not an FMU.
     """
     description = _description(fmu)
     kinds: dict[str, type[_Instance]] = {"co-simulation": FmuRun, "model-exchange": FmuModel}

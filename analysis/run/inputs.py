@@ -216,7 +216,7 @@ def _check_channel(name: str, value: Any) -> None:
     kinds = _SIGNALS if name in on_shafts else _SIGNALS[:-2]
     for part in parts:
         if not isinstance(part, kinds):
-            also = "; a motor drives a freedom that turns" if isinstance(part, _SIGNALS) else ""
+            also = "; a motor can only drive a freedom that turns" if isinstance(part, _SIGNALS) else ""
             raise InputError(
                 f"{name} is {part!r}: it must be a number, a signal of analysis.run.signals, or a Function{also}"
             )
@@ -226,7 +226,7 @@ def _check_channel(name: str, value: Any) -> None:
             raise InputError(f"{name} is {part}: it must be a finite number")
     for kind in (TorsionBar, InductionMotor, Function):
         if sum(isinstance(part, kind) for part in parts) > 1:
-            raise InputError(f"{name} has more than one {kind.__name__}: one can be in force at a time")
+            raise InputError(f"{name} has more than one {kind.__name__}: only one can act at a time")
 
 
 def parameter_readers(mechanism: Mechanism) -> dict[str, files.Reader]:
@@ -273,7 +273,7 @@ def speed_ratio(name: str, value: float, reference: str, speed: float) -> Fracti
     Raises
     ------
     InputError
-        If the ratio is no such fraction.
+        If the ratio is not such a fraction.
     """
     ratio = Fraction(value / speed).limit_denominator(MOST_TURNS)
     if abs(ratio * speed - value) > 1e-9 * abs(value) or (value != 0.0 and ratio == 0):
@@ -416,7 +416,7 @@ def encode(inputs: Inputs, mechanism: Mechanism) -> Encoded:
         elif isinstance(part, (TorsionBar, InductionMotor)):
             if signals[n][1] not in mechanism.torques:
                 raise InputError(
-                    f"{signals[n][0]} of a {mechanism.name} is no torque on a freedom that turns: {part!r} is"
+                    f"{signals[n][0]} of a {mechanism.name} is {part!r}: only a torque on a freedom that turns can be that"
                 )
             law = laws[mechanism.torques.index(signals[n][1])]
             if isinstance(part, TorsionBar):

@@ -1,4 +1,7 @@
-"""Locate events in the steps of a compiled run: the limit of assembly, the release of torsion bars, events of the user."""
+"""Locate events in the steps of a compiled run: the limit of assembly, the release of torsion bars, events of the user.
+
+In all functions ``motion`` is the run in progress, a `records.Motion`, e the index of an event, and h a step size (s).
+"""
 
 from __future__ import annotations
 
@@ -26,7 +29,7 @@ from .records import (
 from .sources import is_bar_unwound
 from .stepping import NODES, interpolant, interpolate, stage
 
-#: Largest number of events of one kind in a step, each in its own part of the step; the begin of an interval may add one.
+#: Largest number of events of one kind in a step, each in its own part of the step; the beginning of an interval may add one.
 EVENTS_PER_STEP = 4
 #: Fraction of a step within which an event counts as simultaneous with the end of the run or the release.
 SAME = 1e-9

@@ -223,7 +223,7 @@ class March:
         return Ending
 
     def outputs(self, x: NDArray[np.float64], held: Any) -> tuple[float, ...]:
-        """Return the outputs at a state; all are NaN if the equations have no value there, as where a spring's law has none."""
+        """Return the outputs at a state; all are NaN if the equations have no value there, for example a spring's law."""
         try:
             found: tuple[float, ...] = self.equations.outputs(tuple(x), held, self.energy, self.of.p)
         except (ArithmeticError, ValueError):
@@ -334,7 +334,7 @@ class March:
         # SciPy reports an event whose function starts at zero: the first value gets the sign of the values that follow
         x1 = x0 + 1e-6 * (stop - t0) * self._derivative(t0, x0, stop)
 
-        def of(event: Event, start: float) -> Callable[[float, NDArray[np.float64]], float]:
+        def watch(event: Event, start: float) -> Callable[[float, NDArray[np.float64]], float]:
             def value(t: float, x: NDArray[np.float64]) -> float:
                 if t == t0:
                     gap = start or self._gap(event, t0 + 1e-6 * (stop - t0), x1, self._inputs(t0, x1, stop))
@@ -346,4 +346,4 @@ class March:
             value.direction = event.direction  # type: ignore[attr-defined]
             return value
 
-        return watched + [(event, of(event, start)) for event, start in zip(self.of.events, self._gaps or [])]
+        return watched + [(event, watch(event, start)) for event, start in zip(self.of.events, self._gaps or [])]

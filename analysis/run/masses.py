@@ -100,12 +100,12 @@ def _section_entries(link: Link, flat: Mapping[str, Any]) -> dict[str, Any]:
 def resolve_sections(mechanism: Mechanism, flat: Mapping[str, Any], base: Parameters | None) -> dict[str, Any]:
     """Return the values of a file, by dotted name, with sections of links replaced by masses, centres and inertias.
 
-    A mass given besides a section is taken as weighed: centre and radius of gyration are still those of the section.
+    A mass given in addition to a section is taken as weighed: centre and radius of gyration are still those of the section.
 
     Raises
     ------
     ParameterError
-        If a section is wrong, or a centre or an inertia is given besides a section.
+        If a section is wrong, or a centre or an inertia is given in addition to a section.
     """
     result = dict(flat)
     units = {v.name: v.unit for v in mechanism.mechanism_variables.values()}

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
 #: Default of the largest number of steps of a run.
 MOST_STEPS = 100_000_000
-#: Default of the largest number of samples of a run: more probably come from a wrong unit and would not fit into memory.
+#: Default of the largest number of samples of a run: a larger one probably comes from a wrong unit and fills the memory.
 _SAMPLES = 20_000_000
 SCIPY_METHODS = ("RK23", "RK45", "DOP853", "Radau", "BDF", "LSODA")
 
@@ -49,8 +49,8 @@ def sample_times(stop_time: Amount, step: Amount, start_time: Amount = 0.0) -> N
     ratio = (stop_time - start_time) / step
     if not ratio <= (most := limit("SAMPLES", _SAMPLES)):
         raise InputError(
-            f"a run from {start_time} s to {stop_time} s in steps of {step} s has {ratio:.3g} samples: more than {most} are "
-            "taken where LINKWORK_MAX_SAMPLES in the environment is greater"
+            f"a run from {start_time} s to {stop_time} s in steps of {step} s has {ratio:.3g} samples: at most {most} are "
+            "allowed, unless the environment variable LINKWORK_MAX_SAMPLES is greater"
         )
     apart = ulp(max(abs(start_time), abs(stop_time)))
     if step < 2.0 * apart:
@@ -59,7 +59,7 @@ def sample_times(stop_time: Amount, step: Amount, start_time: Amount = 0.0) -> N
             "twice that"
         )
     whole = round(ratio)
-    # a remainder larger than rounding errors, which at late times are those of the times, makes a last, shorter step
+    # a remainder larger than rounding errors (at late times, those of the times themselves) makes a last, shorter step
     count = whole if whole > 0 and abs(ratio - whole) <= max(1e-6, apart / step) else int(ratio) + 1
     times: NDArray[np.float64] = start_time + step * np.arange(count + 1, dtype=float)
     times[-1] = stop_time
@@ -226,4 +226,4 @@ def _check_samples(times: NDArray[np.float64]) -> NDArray[np.float64]:
 def _check_hold(hold: float, times: NDArray[np.float64]) -> None:
     grid = times[0] + hold * np.arange(len(times))
     if not hold > 0.0 or np.any(np.abs(grid[:-1] - times[:-1]) > 1e-9 * max(hold, 1e-3 * abs(times[-1]))):
-        raise InputError(f"inputs held over {hold} s: the recorded times must be the same multiples of it")
+        raise InputError(f"inputs held over {hold} s: the recorded times must be this step apart")

@@ -23,7 +23,7 @@ from .masses import describe_masses, trace_masses
 if TYPE_CHECKING:
     import pandas
 
-#: Greatest change of an angle from one sample to the next with which its turns are counted (rad).
+#: Greatest change of an angle from one sample to the next up to which its turns are counted (rad).
 _DENSE = 0.5 * pi
 
 
@@ -134,10 +134,10 @@ class Trajectory(NotebookResult):
             raise unknown_name(name, self.names, f"output {name!r}") from None
 
     def unwrapped(self, name: str) -> NDArray[np.float64]:
-        """Return the column of an output; an angle that leaps by a full turn goes on instead, as of an arm that swings past pi.
+        """Return the column of an output without the jumps of an angle by a full turn, as when an arm swings past pi.
 
-        The samples must be so dense that the angle changes by less than a quarter of a turn from each to the next. If it does
-        not, its turns cannot be counted, and it is returned as it is. The first value is the same.
+        The samples must be so dense that the angle changes by less than a quarter of a turn from each to the next; otherwise
+        its turns cannot be counted, and the column is returned unchanged. The first value is never changed.
         """
         return unwrap(name, self[name])
 
@@ -161,7 +161,7 @@ class Trajectory(NotebookResult):
 
 
 def unwrap(name: str, values: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the values over time of the output of that name without leaps by a full turn; see `Trajectory.unwrapped`."""
+    """Return the values of the output ``name`` over time without jumps by a full turn; see `Trajectory.unwrapped`."""
     if name not in wrapping_outputs():
         return values
     followed = np.unwrap(values)

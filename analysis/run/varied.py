@@ -78,13 +78,13 @@ def vary(parameters: Parameters, inputs: Any, values: Mapping[str, Any]) -> tupl
     own = {field.name for field in fields(mechanism.parameters)}
     channels = {name: c.argument for c in mechanism.channels if c.kind != "rate" for name in (c.name, c.argument)}
     if not isinstance(inputs, Inputs | None):
-        raise InputError("with vary there is one object of inputs for all: vary can hold values of constant inputs")
+        raise InputError("with vary inputs must be one object for all sets: give the values of constant inputs in vary")
     of_sets: dict[str, NDArray[np.float64]] = {}
     of_inputs: dict[str, NDArray[np.float64]] = {}
     for name, given in values.items():
         field = field_name(name)
         if field in of_sets or channels.get(name) in of_inputs:
-            raise InputError(f"vary has {name} twice, by its FMI name and by that in Python: give one of them")
+            raise InputError(f"vary has {name} twice, by its FMI name and by its name in Python: give one of them")
         if field in own:
             of_sets[field] = _column(name, given, partial(_read_parameter, parameters, field))
         elif name in channels:
@@ -94,7 +94,7 @@ def vary(parameters: Parameters, inputs: Any, values: Mapping[str, Any]) -> tupl
     lengths = {name: len(column) for name, column in (of_sets | of_inputs).items()}
     if len(set(lengths.values())) != 1:
         told = ", ".join(f"{length} of {name}" for name, length in lengths.items()) or "nothing"
-        raise InputError(f"vary has {told}: it needs as many values of each")
+        raise InputError(f"vary has {told}: it needs the same number of values of each")
     count = next(iter(lengths.values()))
     sets: Sequence[Any] = [parameters] * count
     if of_sets:

@@ -343,5 +343,5 @@ def test_an_input_that_is_given_for_itself_may_have_its_fmi_name():
     case = read_case(data, folder=Path())
     assert (case.inputs.parts("force"), case.parameters.slider_damping) == ((3.0,), 5.0)
     assert read_case(data, folder=Path(), overrides={"force": "4 N"}).inputs.parts("force") == (4.0,)
-    with pytest.raises(InputError, match=r"slider\.force is force in case files, and that is given, too"):
+    with pytest.raises(InputError, match=r"slider\.force is called force in case files, and both are given"):
         read_case(data | {"force": "4 N"}, folder=Path())

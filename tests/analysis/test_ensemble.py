@@ -224,13 +224,13 @@ def test_what_varies_is_checked_and_names_the_set(values: dict[str, Any], error:
 
 def test_one_set_without_what_varies_is_refused() -> None:
     for names in (["table-3.1"] * 3, [TABLE_3_1] * 3):
-        with pytest.raises(InputError, match=r"2 .*for 3 sets.*: give one, or as many"):
+        with pytest.raises(InputError, match=r"2 .*for 3 sets.*: give one, or one for each"):
             simulate_many(names, initial=[{}, {}], **OPTIONS)
     with pytest.raises(InputError, match="it must be a list, or vary must say what differs"):
         simulate_many(TABLE_3_1, **OPTIONS)
     with pytest.raises(InputError, match="one set of parameters"):
         simulate_many([TABLE_3_1], vary={"torque": [1.0]}, **OPTIONS)
-    with pytest.raises(InputError, match="one object of inputs"):
+    with pytest.raises(InputError, match="one object for all sets"):
         simulate_many(TABLE_3_1, [Inputs()], vary={"torque": [1.0]}, **OPTIONS)
 
 
@@ -430,11 +430,9 @@ def test_an_interrupt_is_heard_and_keeps_what_was_done(n_jobs: int | None, tmp_p
     assert many.messages[7] == "not run: interrupted"
     assert many[2].status == -1
     over = "8 runs of 101 samples from 0 to 10 s"
-    assert repr(many) == f"<Ensemble: {over}, 6 of them not run to the end, as interrupted>"
+    assert repr(many) == f"<Ensemble: {over}, 6 of them interrupted before their end>"
     ended = replace(many, status=np.array([0, 3] + [-1] * 6))
-    assert repr(ended).endswith(
-        "6 of them not run to the end, as interrupted, 1 of them ended early, as messages says>"
-    )
+    assert repr(ended).endswith("6 of them interrupted before their end, 1 of them ended early: see messages>")
     # the short one is there, what was cut off is not
     assert len(list(tmp_path.iterdir())) == 2
 

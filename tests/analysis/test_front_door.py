@@ -323,7 +323,7 @@ def test_other_results_say_what_they_are() -> None:
         assert len(repr(result)) < 400
         assert min(picture_in(result._repr_html_())) > 200
     runs = simulate_many(["table-3.1"] * 2, Inputs(force=-2e3), stop_time="1 s")
-    assert repr(runs) == ("<Ensemble: 2 runs of 1001 samples from 0 to 1 s, 2 of them ended early, as messages says>")
+    assert repr(runs) == ("<Ensemble: 2 runs of 1001 samples from 0 to 1 s, 2 of them ended early: see messages>")
     forces = simulate_many(["table-3.1"], stop_time=0.01, outputs=["pin.A.fx"])
     assert "complete; masses" in repr(forces[0])
 

@@ -422,7 +422,7 @@ def by_numpy(x: Any, i: Any, p: Any) -> Any:
 
 
 @pytest.mark.parametrize(
-    ("derivative", "said"), [(branching, "branches on its arguments"), (by_numpy, "is no expression")]
+    ("derivative", "said"), [(branching, "branches on its arguments"), (by_numpy, "is not an expression")]
 )
 def test_equations_that_cannot_be_traced_are_named(derivative: Any, said: str) -> None:
     module = sys.modules[__name__]
