@@ -35,8 +35,10 @@ else:
     control = lazy("control")
 
 
-#: What a design is of, in messages.
-_MODEL = "a LinearModel, as linearise('table-3.1', rest.state, rest.inputs) with rest = find_equilibrium('table-3.1')"
+#: Model that a design needs, in messages.
+_MODEL = (
+    "a LinearModel, such as linearise('table-3.1', rest.state, rest.inputs) with rest = find_equilibrium('table-3.1')"
+)
 
 
 class DesignError(LinkworkError):
@@ -149,10 +151,10 @@ class Design:
         Raises
         ------
         DesignError
-            If the law has integral action, as the integral is no function of the plant's state.
+            If the law has integral action, because the integral is not a function of the plant's state.
         """
         if self.integral_gain:
-            raise DesignError("a law with integral action is no function of the state: run it with control_loop")
+            raise DesignError("a law with integral action is not a function of the state: run it with control_loop")
         gains = tuple(self.plant_values(self.gains).tolist())
         there: float = si(reference, variable_unit(self.model.mechanism, self.coordinate), "reference")
         step = there - float(self.target[self.plant.place])
@@ -211,7 +213,7 @@ def _design(method: str, model: LinearModel, channel: str | None, gains: FloatAr
         if freedoms[n].period and model.state[len(freedoms) + n] != 0.0:
             raise DesignError(
                 f"{method}: {freedoms[n].coordinate} is free and turns at {model.state[len(freedoms) + n]:.4g} rad/s: "
-                "a law that holds it needs an equilibrium"
+                "linearise the mechanism about an equilibrium instead"
             )
     if not (np.all(np.isfinite(gains)) and isfinite(integral_gain)):
         raise DesignError(f"{method}: the gains {gains} and {integral_gain} are not finite")
@@ -229,7 +231,7 @@ def _design(method: str, model: LinearModel, channel: str | None, gains: FloatAr
         still = np.linalg.solve(border, np.append(np.zeros(n), 1.0))
     except np.linalg.LinAlgError:
         raise DesignError(
-            f"{method}: no {plant.channel} holds {freedoms[plant.freedom].coordinate} elsewhere"
+            f"{method}: no constant {plant.channel} holds {freedoms[plant.freedom].coordinate} at another position"
         ) from None
     gain, phase, _, _, crossings, _ = control.stability_margins(loop, returnall=True)
     phase, crossings = np.atleast_1d(np.radians(phase)), np.atleast_1d(crossings)
@@ -308,7 +310,7 @@ def design_lqr(
     n = len(names)
     if weights.shape != (n, n):
         raise DesignError(
-            f"weights of shape {weights.shape}: there must be {n}, of {', '.join(names)}, or a square of them"
+            f"weights of shape {weights.shape}: they must be {n} numbers, for {', '.join(names)}, or an {n} by {n} matrix"
         )
     if not np.all(np.isfinite(weights)) or np.linalg.eigvalsh(0.5 * (weights + weights.T))[0] < 0.0:
         raise DesignError(f"weights {weights.tolist()}: they must be finite and none below zero")
@@ -366,7 +368,7 @@ def design_pid(
     require_kind(model, LinearModel, "model", _MODEL)
     if len(model.layout.free) != 1:
         raise DesignError(
-            f"a PID places the three poles of one freedom: with {len(model.layout.free)} free ones use design_lqr"
+            f"a PID places the three poles of one freedom, but {len(model.layout.free)} freedoms are free here: use design_lqr"
         )
     if (poles is None) == (bandwidth is None):
         raise DesignError("a PID needs either its poles or its bandwidth")

@@ -195,7 +195,7 @@ class _Balance:
             mode = mechanism.modes[0]
             raise InputError(
                 f"no freedom of the {mechanism.name} is free: there is no equilibrium to be found; "
-                f"{mode.arguments[0]}=0.0 in the place of {mode.arguments[1]} frees one"
+                f"{mode.arguments[0]}=0.0 instead of {mode.arguments[1]} frees one"
             )
         scale = np.array(mechanism.error_scale(parameters, tuple(still[0].tolist())))[list(its.free)]
         return cls(

@@ -379,11 +379,11 @@ class _Fmu(_DrivenPlant):
 
 
 def _channel(mechanism: Mechanism, name: str) -> Channel:
-    """Return the channel with an FMI name; raise InputError if the channel is no force on a degree of freedom."""
+    """Return the channel with an FMI name; raise InputError if the channel is not a force on a degree of freedom."""
     for channel in mechanism.channels:
         if channel.name == name and channel.kind == "force" and channel.freedom >= 0:
             return channel
-    raise InputError(f"the controller acts by {name!r}, which is no force on a freedom of the {mechanism.name}")
+    raise InputError(f"the controller acts by {name!r}, which is not a force on a freedom of the {mechanism.name}")
 
 
 @takes_published(inputs=complete_inputs, initial=complete_initial_state)
@@ -437,7 +437,7 @@ def control_loop(
     inputs, initial = check_run(mechanism, inputs, initial)
     channel = _channel(mechanism, controller.channel)
     if channel.argument in inputs:
-        raise InputError(f"{channel.argument} is among the inputs, but it is the controller's")
+        raise InputError(f"{channel.argument} is among the inputs, but the controller sets it")
     # an argument that is given, even as 0, chooses the mode in which it acts
     inputs = inputs.replace(**{channel.argument: 0.0})
     times = sample_times(stop_time, controller.period)
@@ -562,7 +562,7 @@ def predict_loop(
     Raises
     ------
     InputError
-        If an argument is not usable, or the model is about a single state that is no equilibrium.
+        If an argument is not usable, or the model is about a single state that is not an equilibrium.
     """
     n = model.A.shape[-1]
     start = np.zeros(n) if deviation is None else np.array(deviation, dtype=float)
@@ -570,7 +570,7 @@ def predict_loop(
         raise InputError(f"a deviation of shape {start.shape}: it must be {n} finite numbers")
     channel = _channel(model.mechanism, controller.channel)
     if controller.channel not in model.input_names:
-        raise InputError(f"the controller acts by {controller.channel}, which is no input of the model")
+        raise InputError(f"the controller acts by {controller.channel}, which is not an input of the model")
     if isinstance(model, LinearModel):
         _check_rest(model)
     times = sample_times(stop_time, controller.period)
@@ -587,13 +587,15 @@ def _check_rest(model: LinearModel) -> None:
     moving = np.maximum(np.abs(model.acceleration), np.abs(model.state[n : 2 * n])) / scale
     if moving.max() > AT_REST * max(1.0, stiffness):
         raise InputError(
-            f"the model is about a state that moves, by {mechanism.freedoms[int(moving.argmax())].rate} above all: predict "
-            "about an equilibrium, or about a periodic motion by its PeriodicModel"
+            f"the model is about a state that is not at rest, most of all in {mechanism.freedoms[int(moving.argmax())].rate}: "
+            "use a model about an equilibrium, or the PeriodicModel of a periodic motion"
         )
 
 
 def largest_difference(first: LoopResult, second: LoopResult) -> float:
     """Return the largest difference (m) between the controlled coordinates of two runs of the same length."""
     if first.time.shape != second.time.shape:
-        raise InputError(f"runs of {len(first.time)} and {len(second.time)} samples: there must be as many in both")
+        raise InputError(
+            f"runs of {len(first.time)} and {len(second.time)} samples: both runs must have the same number"
+        )
     return float(np.abs(first.position - second.position).max())

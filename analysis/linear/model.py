@@ -123,7 +123,7 @@ def missing_outputs(mechanism: Mechanism) -> Mapping[str, str]:
     of_the_run = casadi.vertcat(x[2 * len(mechanism.freedoms) :], p[-1])
     integrals = casadi.which_depends(traces.outputs, of_the_run, 1, True)
     found = {
-        name: "an integral over the run, no function of the state"
+        name: "an integral over the run, not a function of the state"
         for name, integral in zip(mechanism.output_names, integrals)
         if integral
     }
@@ -380,7 +380,7 @@ def constant_inputs(mechanism: Mechanism, modes: Modes, channels: ArrayLike) -> 
     values = dict(zip((channel.argument for channel in mechanism.channels), np.asarray(channels, float).tolist()))
     forces = {mechanism.channels[n].argument for n in layout(mechanism, modes).forces}
     acting = {name: values[name] for name in forces if values[name] != 0.0}
-    # an argument that chooses a mode but is no channel is a flag, such as groove
+    # an argument that chooses a mode but is not a channel is a flag, such as groove
     chosen = [mode.arguments[value] for mode, value in zip(mechanism.modes, modes)]
     return Inputs(**acting | {name: values.get(name, True) for name in chosen})
 
@@ -498,7 +498,7 @@ def linearise(parameters: Parameters, state: ArrayLike, inputs: Inputs | None = 
     mechanism = find_mechanism(parameters)
     states = full_states(mechanism, np.atleast_2d(np.asarray(state, dtype=float)))
     if len(states) != 1:
-        raise InputError(f"{len(states)} states: one is linearised about here, many by linearise_orbit")
+        raise InputError(f"{len(states)} states: linearise takes one state; linearise_orbit takes many")
     modes, channels = sample_channels(mechanism, inputs, np.zeros(1), states)
     arrays = evaluate(parameters, modes, states, channels)
     return LinearModel(

@@ -25,7 +25,7 @@ from .periodic import common_period
 #: Least imaginary part of a pole that oscillates, relative to the largest pole: a neutral coordinate has a double pole at zero,
 #: which rounding splits.
 OSCILLATES = 1e-7
-#: Likeness to a mode that has not oscillated yet; a shape less like all known modes begins a new one.
+#: Likeness (from 0 to 1) below which a shape is that of a new mode, because it is not like any known mode.
 _NEW = 0.5
 
 
@@ -118,7 +118,7 @@ def natural_modes(
     Raises
     ------
     InputError
-        If an input is not constant, or no coordinate is free beside the held crank.
+        If an input is not constant, or no coordinate other than the held crank is free.
     AssemblyError, EquilibriumError
         If the links cannot be joined at a position, or no equilibrium is found there.
 
@@ -139,7 +139,7 @@ def natural_modes(
     if set(layout(mechanism, tuple(inputs.modes(mechanism).values())).free) <= speeds.keys():
         forces = [c.argument for c in mechanism.channels if c.kind == "force" and speeds.get(c.freedom) == 0.0]
         raise InputError(
-            f"no coordinate of the {mechanism.name} is free beside the held crank, to vibrate"
+            f"no coordinate of the {mechanism.name} other than the held crank is free to vibrate"
             + "".join(f"; a force, such as {force} = 0, frees one" for force in forces[:1])
         )
     # a force on a held degree of freedom does not act
@@ -187,7 +187,7 @@ def _decompose(equilibria: tuple[Equilibrium, ...], matrices: Matrices) -> Natur
         oscillating = oscillating[np.argsort(np.abs(poles[oscillating]))]
         shapes = vectors[j, :size, oscillating].T
         energies = (shapes.conj() * (mass @ shapes)).real
-        # modal assurance: the share of the kinetic energy of one shape that the other one has
+        # modal assurance criterion: 1 for equal shapes, 0 for shapes that are orthogonal with respect to the mass matrix
         products = np.outer((known.conj() * (mass @ known)).real.sum(axis=0), energies.sum(axis=0))
         likeness = np.full(products.shape, _NEW)
         np.divide(np.abs(known.conj().T @ mass @ shapes) ** 2, products, out=likeness, where=products > 0.0)

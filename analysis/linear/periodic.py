@@ -228,7 +228,7 @@ def linearise_orbit(
     mechanism = find_mechanism(parameters)
     if isinstance(motion, Orbit):
         if inputs is not None or period is not None:
-            raise InputError("an orbit has its own inputs and period: they cannot be given beside it")
+            raise InputError("an orbit has its own inputs and period: they cannot be given as well")
         turn = motion.turn(samples)
         states, channels = _resample(mechanism, turn)
         modes, period = turn.modes, turn.period
@@ -255,7 +255,7 @@ def _turn_time(mechanism: Mechanism, modes: Modes, states: FloatArray) -> float:
         rate, speed = states[:, len(mechanism.freedoms) + n], float(states[0, len(mechanism.freedoms) + n])
         if mechanism.freedoms[n].period and speed != 0.0 and np.ptp(rate) <= 1e-9 * abs(speed):
             return mechanism.freedoms[n].period / abs(speed)
-    raise InputError("the period must be given: it follows from the states at a constant prescribed speed alone")
+    raise InputError("the period must be given: only at a constant prescribed speed does it follow from the states")
 
 
 def _resample(mechanism: Mechanism, turn: Turn) -> tuple[FloatArray, FloatArray]:

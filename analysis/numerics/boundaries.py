@@ -165,7 +165,9 @@ def find_minimum(
 
 def _samples(low: float, high: float, count: int) -> NDArray[np.float64]:
     if not (isfinite(low) and isfinite(high) and low < high) or count < 3:
-        raise InputError(f"a line from {low} to {high} with {count} samples: it needs a length and three samples")
+        raise InputError(
+            f"a line from {low} to {high} with {count} samples: it must have a length and at least three samples"
+        )
     return np.linspace(low, high, count)
 
 
@@ -346,13 +348,13 @@ def trace(test: Test, seed: tuple[float, float], box: Box, *, step: float = 0.02
     try:
         start = follower.start(place[:1], float(place[1]), 1, across / (float(np.hypot(*across)) or 1.0))
     except ContinuationError as error:
-        raise InputError(f"no boundary within {step:g} of the box of the seed {seed}: {error}") from None
+        raise InputError(f"no boundary is within {step:g} of the box's sides from the seed {seed}: {error}") from None
     found = np.array([start.y[0], start.parameter])
     if len(sides) == 1:
         found[sides[0]] = place[sides[0]]
         start = replace(start, y=found[:1], parameter=float(found[1]))
     if (np.abs(found - place) > step * box.size).any() or follower.is_beyond(start):
-        raise InputError(f"no boundary within {step:g} of the box of the seed {seed}")
+        raise InputError(f"no boundary is within {step:g} of the box's sides from the seed {seed}")
     if start.orientation < 0.0:
         start = start.with_opposite_tangent()
     way, *curves = follower.follow_both(start)
@@ -417,7 +419,7 @@ def chart(
         If both numbers of lines are zero, or one is 1: the position of a single line would be arbitrary.
     """
     if 1 in lines or min(lines) < 0 or lines == (0, 0):
-        raise InputError(f"lines is {lines}: none or two and more of each kind, and at least one kind")
+        raise InputError(f"lines is {lines}: each number must be 0 or at least 2, and one of them above 0")
     gaps: list[Gap] = []
     candidates: list[tuple[int, tuple[float, float]]] = []
     for side, count in enumerate(lines):

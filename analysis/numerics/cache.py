@@ -26,7 +26,7 @@ def cache_root() -> Path:
 def code_folder(name: str) -> Path:
     """Return a folder for files that are loaded as code, below `cache_root` or below a temporary folder.
 
-    A folder to which other users can write is not used, as we could be made to run their code; a message on standard error
+    A folder to which other users can write is not used, because they could make us run their code; a message on standard error
     says so once.
     """
     user = os.getuid() if hasattr(os, "getuid") else 0
@@ -42,13 +42,13 @@ def code_folder(name: str) -> Path:
 
 
 def lock_folder(folder: Path) -> FileLock:
-    """Return a lock on a folder of the cache, to use in ``with``: one process at a time holds it."""
+    """Return a lock on a folder of the cache, for a ``with`` statement: only one process at a time can have it."""
     return FileLock(folder.with_suffix(".lock"))
 
 
 @contextmanager
 def written_whole(path: Path) -> Iterator[Path]:
-    """Yield a path to write to beside ``path``; at the end it is renamed, so that no process sees a file half written."""
+    """Yield a temporary path beside ``path``; its file is renamed to ``path`` at the end: no process sees it half written."""
     part = path.with_name(f"{path.name}.{os.getpid()}.part")
     try:
         yield part
@@ -71,7 +71,7 @@ def keep(path: Path, content: bytes) -> None:
 
 
 def load_or_make(path: Path, make: Callable[[], bytes]) -> bytes:
-    """Return the content kept at a path of the cache, or newly made; its hash is checked, as code that is damaged crashes."""
+    """Return the content kept at a path of the cache; if it is missing or its hash is wrong, make and keep it."""
     with suppress(OSError):
         digest, content = (kept := path.read_bytes())[:32], kept[32:]
         if hashlib.sha256(content).digest() == digest:

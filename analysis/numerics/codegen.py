@@ -59,7 +59,7 @@ _ALIVE: list[Any] = []
 
 
 class MachineCode:
-    """Machine code of CasADi functions, kept in memory until the process ends, as a caller may hold an address.
+    """Machine code of CasADi functions, kept in memory until the process ends, because callers keep its addresses.
 
     Parameters
     ----------
@@ -180,8 +180,8 @@ def _prepare() -> None:
 class Writer:
     """Translator of one CasADi function into LLVM code, added to a module.
 
-    The arguments are those of `MachineCode`; ``own`` is true if the functions of `lanes` replace those of the C library for one
-    lane, too.
+    The arguments are those of `MachineCode`; ``own`` is true if the functions of `lanes` replace those of the C library even
+    with one lane.
     """
 
     def __init__(
@@ -373,7 +373,7 @@ _PART: dict[str, Any] = {
 part = njit(**_PART)
 #: The same for functions that make no arrays: counting the references to their arguments would cost more than their work.
 inner = njit(**_PART, _nrt=False)
-#: The same for functions whose value lives no longer than their caller: they become a part of it before Numba types it.
+#: The same for functions whose value is valid only within their caller: Numba inlines them before it infers types.
 inline = njit(**_PART, _nrt=False, inline="always")
 
 
@@ -465,7 +465,7 @@ class Kernel:
 
     def carry(self) -> Path:
         """Compile the kernel for any processor, write the code to `carried_path`, and return that path."""
-        made, path = self._dispatcher(linking.NotingCompiler), self.carried_path
+        made, path = self._dispatcher(linking.PortableCompiler), self.carried_path
         made.compile(*self.signature)
         path.parent.mkdir(exist_ok=True)
         store_file(path, linking.portable_code(made))
@@ -489,10 +489,10 @@ class Kernel:
 
     @cached_property
     def unchecked(self) -> Callable[..., Any]:
-        """Return the machine code, which takes arguments of other types for what they are not.
+        """Return the machine code without the check of argument types: it misreads arguments of other types.
 
-        Numba compares the types of the arguments with the signature, which takes 7 us. In the tests that is done here, too.
-        To find the machine code Numba compares the types of the signature, which takes 26 us: it is found once.
+        Numba's comparison of the arguments with the signature takes 7 us; the tests make it here, too. Finding the machine code
+        takes 26 us, and is therefore done once.
         """
         (made,) = self.compiled.overloads.values()
         return made.entry_point  # type: ignore[no-any-return]

@@ -64,13 +64,13 @@ class Reason(Enum):
     CLOSED = "it is closed"
     TIP = "it turns too sharply to follow, or meets another boundary"
     NO_VALUE = "the test function has no value beyond"
-    LENGTH = "it is longer than is followed"
-    LEFT = "it is left"
+    LENGTH = "it has more points than are followed"
+    LEFT = "the caller stopped it"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class End:
-    """An end of a curve in a plane: the reason, the last point, and the message that goes with the reason, if there is one."""
+    """An end of a curve in a plane: the reason, the last point, and further details of the reason, if there are any."""
 
     reason: Reason
     point: tuple[float, float]
@@ -362,7 +362,7 @@ class Follower:
             tuple(points),
             tuple(steps),
             Reason.LENGTH,
-            f"it is followed over {settings.most_points} points and no further",
+            f"it is followed over {settings.most_points} points only",
         )
 
     def follow_both(
@@ -390,7 +390,7 @@ class Follower:
             found = self._step(point, s, bend)
             if isinstance(found, _Failure):
                 raise ContinuationError(
-                    f"no point {s:.3g} beyond the parameter {point.parameter:.9g} within a step taken: {found.text}"
+                    f"no point found {s:.3g} along the step from the parameter {point.parameter:.9g}: {found.text}"
                 )
             return self._point(found, point.tangent)
 

@@ -25,7 +25,7 @@ from linkwork.errors import InputError
 LEAST_SWING = 0.1
 #: Half width of the parabola fitted at a turning point, as a fraction of half a period: a cosine is a parabola to 0.03 % there.
 _WINDOW = 1.0 / 6.0
-#: Rounds in which parabolas with a jump of their curvature, and the friction that makes it, are found from each other.
+#: Rounds of the iteration between the friction and the parabolas, whose curvature jumps by an amount that depends on friction.
 _ROUNDS = 4
 #: Largest deviation of the time between turning points from half a period, as a fraction of half a period.
 _UNEVEN = 0.5
@@ -165,8 +165,8 @@ def fit_decay(
     if np.abs(spaces / half - 1.0).max() > _UNEVEN:
         gap = int(np.argmax(np.diff(t)))
         raise InputError(
-            f"the record's turning points lie {spaces.min():.3g} to {spaces.max():.3g} s apart, which is no free oscillation: "
-            "begin after the impulse, and where noise makes turning points of its own, ask for a greater least swing"
+            f"the record's turning points are {spaces.min():.3g} to {spaces.max():.3g} s apart, so it is not a free "
+            "oscillation: begin after the impulse and, if noise causes turning points, choose a greater least swing"
             + (
                 f"; there is no sample from {t[gap]:.6g} to {t[gap + 1]:.6g} s"
                 if t[gap + 1] - t[gap] > 0.5 * half
@@ -194,7 +194,7 @@ def _check_record(time: ArrayLike, position: ArrayLike) -> tuple[NDArray[np.floa
     if t.ndim != 1 or t.shape != x.shape:
         raise InputError(f"time has the shape {t.shape}, position {x.shape}: they must be lists of one length")
     if not len(t):
-        raise InputError("the record has no times: is there nothing left of it?")
+        raise InputError("the record is empty: does the chosen span of time contain samples?")
     for name, values in (("time", t), ("position", x)):
         if not np.isfinite(values).all():
             raise InputError(f"{name} has {int((~np.isfinite(values)).sum())} values that are not finite")
@@ -226,8 +226,8 @@ def _vertex(
 ) -> tuple[float, float]:
     """Return the vertex (time, position) of a parabola fitted to the samples within ``reach`` of a turning point.
 
-    The parabola is fitted to at least three samples. Its curvature is 1 + ``jump`` times the mean one before the vertex, and
-    1 - ``jump`` times the mean one after it.
+    The parabola is fitted to at least three samples. Its curvature is the mean curvature times (1 + ``jump``) before the
+    vertex, and times (1 - ``jump``) after it.
     """
     first, last = np.searchsorted(t, (t[turn] - reach, t[turn] + reach))
     near = slice(max(min(int(first), turn - 1), 0), max(int(last), turn + 2))
@@ -258,8 +258,8 @@ def _fit(tops: NDArray[np.float64], friction: bool) -> Decay:
         return np.asarray(offset + sides * ((size + constant) * q**n - constant))
 
     size = (height[0] - height[1]) / (1.0 + exp(-start))
-    # in units of the first amplitude, so that the tolerances of the fit are relative; not by Levenberg and Marquardt as MINPACK
-    # has it, which finds no covariance where the guess is already the result
+    # in units of the first amplitude, so that the tolerances of the fit are relative; MINPACK's Levenberg-Marquardt method is
+    # not used, because it finds no covariance if the guess is already the result
     unit = np.array([abs(size), 1.0, abs(size), abs(size)])[: 4 if friction else 3]
     guess = np.array([size, start, height[0] - size, 0.0])[: unit.size] / unit
     try:

@@ -36,11 +36,11 @@ from .lanes import DOUBLE, Vector
 
 _LONG = ir.IntType(64)
 _TABLE = _LONG.as_pointer()
-#: The oldest devices for which code is made, those that CUDA 13 still has (Turing), and their year.
+#: The oldest devices for which code is made (Turing, the oldest that CUDA 13 supports), and their year.
 ARCHITECTURE, _YEAR = "sm_75", 2018
 _MEMORY = "if it lacks memory, a smaller batch may fit"
 _TRIPLE = "nvptx64-nvidia-cuda"
-#: Threads of a block; the registers of a device suffice for few, as a run needs many.
+#: Threads of a block: few, because a run needs many registers.
 _THREADS = 64
 #: Name of the function through which a kernel is called.
 ENTRY = "linkwork_run"
@@ -126,10 +126,10 @@ def compile_kernel(function: Any) -> tuple[bytes, str]:
 
     def make() -> bytes:
         made = njit(
-            error_model="numpy", no_cpython_wrapper=True, no_cfunc_wrapper=True, pipeline_class=linking.UnmadeCompiler
+            error_model="numpy", no_cpython_wrapper=True, no_cfunc_wrapper=True, pipeline_class=linking.LlvmCompiler
         )(function)
         made.compile(signature)
-        return pickle.dumps(linking.unmade_code(made))
+        return pickle.dumps(linking.llvm_code(made))
 
     with MAKING:
         code, name = pickle.loads(
@@ -281,7 +281,7 @@ class Cuda:
         with TemporaryDirectory() as folder:
             path = Path(folder, "kernel.ptx")
             store_file(path, compile_to_ptx(compile_kernel(function), equations))
-            with _errors(cupy, f"it must be of {_YEAR} or later, with a driver of its time"):
+            with _errors(cupy, f"it must be from {_YEAR} or later, with a driver that is not older"):
                 self._run = cupy.RawModule(path=str(path)).get_function(ENTRY)
 
     def load(self, kind: Any, arguments: Any) -> LoadedKernel:

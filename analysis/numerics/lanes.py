@@ -29,7 +29,7 @@ BOUNDS = {
 #: Angle (rad) beyond which the C library computes the sine: 1.7e8 turns; up to it the argument reduction is exact.
 GREATEST_ANGLE = 2.0**30
 
-# adding this number rounds to an integer, which the last bits of the sum then are; subtracting it gives the integer as a double
+# adding this number rounds a double to an integer, in the last bits of the sum; subtracting it gives the integer as a double
 _ROUNDER = 1.5 * 2.0**52
 _ROUNDER_BITS = 0x4338000000000000
 # pi / 2 as a sum of three doubles; log 2 as a sum of two, the first of which ends with 21 zero bits
@@ -346,7 +346,7 @@ def power(x: Vector, y: Vector) -> Vector:
     shifted = y + _ROUNDER
     odd = build.icmp_unsigned("!=", build.and_(shifted.bits(), x.longs(1)), x.longs(0))
     result = _exp(y * _log(x.absolute()))
-    # of negative numbers there are whole powers
+    # negative numbers have only whole powers
     whole = (-result).where(odd, result).where((shifted - _ROUNDER).equals(y), x._make(x.as_vector(nan)))
     return one.where(y.equals(0.0), whole.where(x < 0.0, result))
 

@@ -68,9 +68,9 @@ class _Part(JITCodeLibrary):
 class _Whole(JITCodeLibrary):
     """Code of a kernel with all functions that it calls, optimised without copies of loop bodies.
 
-    LLVM copies the body of a loop, unrolled and with vectors, for the case that the loop is long. In kernels it is as long as a
-    state or a row of elements, and where vectors are worth it kernels use them explicitly. The copies take a third of the
-    compile time and do not make kernels faster.
+    LLVM copies the body of a loop, unrolled and with vectors, for the case that the loop is long. Loops of kernels are short,
+    as long as a state or a row of elements, and kernels use vectors explicitly where these help. The copies take a third of
+    the compile time and do not make kernels faster.
     """
 
     def _optimize_final_module(self) -> None:
@@ -104,7 +104,7 @@ class PartCompiler(KernelCompiler):
         super().__init__(typing_context, context, library or _Part(context.codegen(), "part"), *rest)
 
 
-class _Noted(_Whole):
+class _Portable(_Whole):
     """Code of a kernel together with its form before optimisation, which is valid for any processor."""
 
     def _optimize_final_module(self) -> None:
@@ -112,37 +112,37 @@ class _Noted(_Whole):
         super()._optimize_final_module()
 
 
-class NotingCompiler(KernelCompiler):
+class PortableCompiler(KernelCompiler):
     """Compiler of kernels that also keeps their code for any processor."""
 
     def __init__(self, typing_context: Any, context: Any, library: Any, *rest: Any) -> None:
-        library = _Noted(context.codegen(), "kernel")
+        library = _Portable(context.codegen(), "kernel")
         library.enable_object_caching()
         super().__init__(typing_context, context, library, *rest)
 
 
-class _Unmade(_Part):
+class _Unfinished(_Part):
     """Code of a kernel for another device, kept in its form before optimisation; no machine code of this processor is made."""
 
     def _optimize_final_module(self) -> None:
         self.noted = self._final_module.as_bitcode()
 
 
-class UnmadeCompiler(KernelCompiler):
+class LlvmCompiler(KernelCompiler):
     """Compiler of kernels for another device."""
 
     def __init__(self, typing_context: Any, context: Any, library: Any, *rest: Any) -> None:
-        super().__init__(typing_context, context, _Unmade(context.codegen(), "kernel"), *rest)
+        super().__init__(typing_context, context, _Unfinished(context.codegen(), "kernel"), *rest)
 
 
-def unmade_code(dispatcher: Any) -> tuple[bytes, str]:
-    """Return the LLVM code of a kernel that `UnmadeCompiler` has compiled, and the name of its function there."""
+def llvm_code(dispatcher: Any) -> tuple[bytes, str]:
+    """Return the LLVM code of a kernel that `LlvmCompiler` has compiled, and the name of its function there."""
     (result,) = dispatcher.overloads.values()
     return result.library.noted, result.fndesc.llvm_func_name
 
 
 def portable_code(dispatcher: Any) -> bytes:
-    """Return the code for any processor of a kernel that `NotingCompiler` has compiled."""
+    """Return the code for any processor of a kernel that `PortableCompiler` has compiled."""
     (result,) = dispatcher.overloads.values()
     (name, *_), *rest = result._reduce()
     rest[_ANNOTATION] = ""  # a text with the paths of the sources
@@ -204,7 +204,7 @@ def _read_verified(path: Path) -> bytes:
     whole = path.read_bytes()
     content = whole[:-_DIGEST]
     if sha256(content).digest() != whole[-_DIGEST:]:
-        raise ValueError(f"the bytes of {path.name} do not have their hash")
+        raise ValueError(f"{path.name} is damaged: its bytes do not match the hash at its end")
     return content
 
 

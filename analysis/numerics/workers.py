@@ -187,11 +187,11 @@ def run_in_parallel(
                 if attempt == RETRIES:
                     numbers = ", ".join(str(number + 1) for number in list(todo)[:5])
                     raise WorkersLost(
-                        f"workers were killed {attempt + 1} times, as where memory runs out: {len(todo)} of {len(items)} "
+                        f"workers were killed {attempt + 1} times, perhaps for lack of memory: {len(todo)} of {len(items)} "
                         f"parts are not done, {numbers}{' ...' if len(todo) > 5 else ''}"
                     ) from error
                 warnings.warn(
-                    f"a worker was killed: {len(todo)} of {len(items)} parts are given out again",
+                    f"a worker was killed: {len(todo)} of {len(items)} parts are repeated",
                     RuntimeWarning,
                     stacklevel=2,
                 )
@@ -227,7 +227,7 @@ def _run_in_cluster(tasks: Sequence[_Task], backend: Any) -> Generator[Any, None
     if guilty:
         numbers = ", ".join(str(number + 1) for _, number, *_ in guilty)
         raise WorkersLost(
-            f"every worker that began part {numbers} of {len(tasks)} was killed, as where memory runs out"
+            f"every worker that began part {numbers} of {len(tasks)} was killed, perhaps for lack of memory"
         )
 
 

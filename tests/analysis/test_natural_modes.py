@@ -173,10 +173,12 @@ def test_modes_are_followed_where_their_frequencies_cross_and_one_is_overdamped_
 def test_a_crank_alone_has_no_natural_frequency_and_no_basins(tmp_path: Path) -> None:
     case = load_case(write(tmp_path, CRANK))
     for inputs in (case.inputs, Inputs(torque=0.0)):
-        with pytest.raises(InputError, match="no coordinate of the one-crank is free beside the held crank"):
+        with pytest.raises(InputError, match="no coordinate of the one-crank other than the held crank is free"):
             natural_modes(case.parameters, inputs)
     for name in (None, "crank.angle"):
-        with pytest.raises(InputError, match="no coordinate of the one-crank is free beside the crank, so that starts"):
+        with pytest.raises(
+            InputError, match="one-crank has no free coordinate other than the crank's angle, so that starts"
+        ):
             basins(case.parameters, Drive(torque=0.1), start=(5.0,), coordinate=name)
 
 

@@ -110,7 +110,7 @@ def test_an_error_of_the_work_is_raised_as_it_is(n_jobs: int) -> None:
 
 def test_what_a_killed_worker_had_is_done_again(tmp_path: Path) -> None:
     work = partial(kill_once, caller=os.getpid(), mark=tmp_path / "killed")
-    with pytest.warns(RuntimeWarning, match=r"a worker was killed: \d of 8 parts are given out again"):
+    with pytest.warns(RuntimeWarning, match=r"a worker was killed: \d of 8 parts are repeated"):
         found = dict(run_in_parallel(work, range(8), n_jobs=2))
     assert found == {n: n * n for n in range(8)}
 
@@ -161,7 +161,7 @@ def hand_over(_: int, caller: int, mark: Path) -> KilledOnce:
 
 def test_a_worker_killed_as_it_hands_over_is_noticed(tmp_path: Path) -> None:
     work = partial(hand_over, caller=os.getpid(), mark=tmp_path / "killed")
-    with pytest.warns(RuntimeWarning, match=r"a worker was killed: \d of 3 parts are given out again"):
+    with pytest.warns(RuntimeWarning, match=r"a worker was killed: \d of 3 parts are repeated"):
         found = dict(run_in_parallel(work, range(3), n_jobs=2))
     assert sorted(found) == [0, 1, 2]
 
