@@ -174,7 +174,7 @@ class Builder:
     def _add(self, table: str, name: str, **entries: Any) -> Builder:
         named = self.tables.setdefault(table, {})
         if name in named:
-            raise InputError(f"{self!r} has {table}.{name} already: another one needs a name of its own")
+            raise InputError(f"{self!r} already has {table}.{name}: choose another name")
         named[name] = _without_none(entries)
         return self
 

@@ -44,7 +44,7 @@ class Contacts:
         ]
         arguments = "b: Places, m: tuple[Mass, ...], units: tuple[Rubbing, ...], matrix: tuple[tuple[float, ...], ...]"
         signature = f"responses({arguments}, held_ones: tuple[float, ...], p: Constants)"
-        doc = "Return the changes of these forces with friction by a force of 1 N in each of the joints."
+        doc = "Return how the friction that a force of 1 N in each joint causes changes the forces in these joints."
         yield function(f"{signature} -> tuple[tuple[tuple[float, float], ...], ...]", doc, rows)
 
     def _unit_friction(self) -> str:
@@ -68,6 +68,6 @@ class Contacts:
                 on = {first: one, second: other}
             wrenches = "".join(f"{on.get(body, 'none')}, " for body in self.motion.bodies)
             units.append(f"    Rubbing(({wrenches}), {rub} * {slip}),")
-        doc = "Compute the friction in the joints for forces of 1 N in them."
+        doc = "Compute the friction that a force of 1 N in each joint causes."
         signature = "rubbing(b: Places, p: Constants) -> tuple[Rubbing, ...]"
         return function(signature, doc, [*rows, "return (", *units, ")"])

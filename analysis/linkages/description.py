@@ -195,7 +195,7 @@ class Spring:
         A pin or a slide.
     bodies : tuple of str
         Two bodies, which need not be joined. The twist is the angle of the second body relative to the first, minus the angle
-        ``free``. Whole turns count if the angles of both follow from the freedoms alone, as of cranks, gears and the ground;
+        ``free``. Whole turns count if the angles of both follow from the freedoms alone, such as those of cranks and gears;
         otherwise the twist is at most half a turn in either direction.
     stiffness, damping : float
         Stiffness and damping in N/m and N.s/m; of a torsion spring in N.m/rad and N.m.s/rad.

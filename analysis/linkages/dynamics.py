@@ -36,7 +36,7 @@ class Motion:
         self.description, self.structure, self.interface = interface.description, interface.structure, interface
         self.n = len(interface.drives)
         self.along = springs_by_freedom(self.description, interface)
-        self.counted, self.middled = counted, interface.middled(counted)
+        self.counted, self.centred = counted, interface.centred_springs(counted)
         self.bodies = self.structure.bodies
         self.reactions: list[Reaction] = []
         #: steps with racks, in the order in which their forces are computed
@@ -72,7 +72,7 @@ class Motion:
                     if name in self.counted:
                         rows.append(f"{stretch} = {self.counted[name].angle}{f'{free}_angle' if free else ''}")
                     else:
-                        middle = f"p.{name}_MIDDLE + " if name in self.middled else ""
+                        middle = f"p.{name}_MIDDLE + " if name in self.centred else ""
                         angle = f"p.{name}_COS, p.{name}_SIN" if free or middle else "1.0, 0.0"
                         rows.append(f"{stretch} = {middle}turn_difference({one}, {other}, {angle})")
                     rows.append(f"{rate} = {other}.w - {one}.w")
@@ -185,12 +185,14 @@ class Motion:
             f"return AppliedForces(wrenches, along, {' + '.join(lost) or '0.0'}, {' + '.join(gained) or '0.0'})"
         )
         yield from self.laws()
-        doc = "Forces on the bodies and along the freedoms, power lost in dampers and friction, and of the loads (W)."
+        doc = "Forces on the bodies and along the freedoms, powers (W) lost in dampers and friction and gained from loads."
         fields = {"wrenches": "tuple[Wrench, ...]", "along": "tuple[float, ...]", "lost": "float", "gained": "float"}
         yield record("AppliedForces", doc, fields)
         s = "s: Springs, " if self.description.springs else ""
         signature = f"applied_forces(b: Places, m: tuple[Mass, ...], {s}i: Applied, p: Constants) -> AppliedForces"
-        yield function(signature, "Compute what acts on the bodies and along the freedoms, but for the drives.", rows)
+        yield function(
+            signature, "Compute the forces on the bodies and along the freedoms, except those of the drives.", rows
+        )
 
     def masses(self) -> str:
         """Write the function that returns the mass properties of all bodies."""
@@ -315,12 +317,14 @@ class Motion:
             else:
                 values.append(f"{drive.name}_load")
         loads = [load.field for load in self.interface.loads]
-        doc = "Loads along the freedoms, whether their rates are commanded, their accelerations then; other loads."
+        doc = "For each freedom its load, whether its rate is commanded, the commanded acceleration; then the other loads."
         yield record("Applied", doc, dict.fromkeys((*fields, *loads), "float"))
         rows = [f"{tuple_source(modes)} = modes"] if modes else []
         rows += [f"{tuple_source((*names, *loads))} = u", f"return Applied({', '.join((*values, *loads))})"]
         signature = "apply_inputs(modes: tuple[float, ...], u: tuple[float, ...], p: Constants) -> Applied"
-        yield function(signature, "Return what acts on the linkage from the values of the modes and the inputs.", rows)
+        yield function(
+            signature, "Return the loads and the commanded rates for values of the modes and the inputs.", rows
+        )
 
     def _commanded_rates(self) -> tuple[str, str]:
         """Return the expressions of two tuples with an entry for each freedom.

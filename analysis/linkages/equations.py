@@ -405,9 +405,10 @@ class Twist(NamedTuple):
 
 
 def counted_twists(interface: Interface) -> dict[str, Twist]:
-    """Return, by its name, the twist of each torsion spring about a freedom's pin, or between two bodies whose turns count.
+    """Return the twist of each torsion spring whose whole turns are counted, by the name of the spring.
 
-    The turns count of bodies whose angles are linear in the coordinates: the ground, bodies that freedoms turn, and gears.
+    They are counted if the spring acts about the pin of a freedom, or between two bodies whose angles are linear in the
+    coordinates: the ground, bodies that freedoms turn, and gears.
     """
     poses = PoseWriter(interface)
     _ = list(poses.blocks())

@@ -117,7 +117,7 @@ def _constant(value: Any, name: str) -> tuple[float, str]:
             return quantity(value, unit, name), unit
         except ParameterError:
             continue
-    raise ParameterError(name, value, f"be a number in SI, or a quantity with a unit, as of {', '.join(_UNITS[1:])}")
+    raise ParameterError(name, value, f"be a number in SI, or a quantity of the kind of {', '.join(_UNITS[1:])}")
 
 
 def check_law(law: Law, known: Mapping[str, Any], name: str) -> None:
@@ -131,7 +131,9 @@ def check_law(law: Law, known: Mapping[str, Any], name: str) -> None:
     for own in known:
         if own in ("x", "v", "pow", *FUNCTIONS) or not re.fullmatch("[a-z][a-z0-9_]*", own):
             where = f"{name.rpartition('.')[0]}.constants.{own}"
-            raise ParameterError(where, known[own], "have a name of small letters that is no function, x or v")
+            raise ParameterError(
+                where, known[own], "have a name of lower-case letters that is neither a function nor x or v"
+            )
 
 
 def is_periodic(law: Law, known: Mapping[str, tuple[float, str]]) -> bool:

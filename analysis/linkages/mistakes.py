@@ -94,7 +94,7 @@ def _bodies(d: Description) -> Found:
             if own in body.points:
                 yield f"bodies.{name}.points.{own}", "is an end of the bar", "each point must be given once"
     if d.bodies and not any(body.mass or body.section for body in d.bodies.values()):
-        yield "bodies", "have no mass", "one at least must have a mass or a section"
+        yield "bodies", "have no mass", "at least one of them must have a mass or a section"
 
 
 def _gears(d: Description, owners: Mapping[str, set[str]]) -> Found:
@@ -148,10 +148,10 @@ def _freedoms(d: Description, owners: Mapping[str, set[str]]) -> Found:
         if freedom.joint in taken and len(joined) <= 2:
             yield (
                 f"freedoms.{name}",
-                f"is of {freedom.joint}, as {taken[freedom.joint]} is",
-                "it must be of another joint",
+                f"is at {freedom.joint}, as {taken[freedom.joint]} is",
+                "it must be at another joint",
             )
         taken[freedom.joint] = name
         if name in d.bodies and len(joined) == 2 and name not in joined:
             pair = " and ".join(sorted(joined))
-            yield f"freedoms.{name}", f"is of {freedom.joint}, which joins {pair}", f"it must not be called {name}"
+            yield f"freedoms.{name}", f"is at {freedom.joint}, which joins {pair}", f"it must not be called {name}"

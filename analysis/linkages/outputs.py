@@ -69,7 +69,7 @@ class Outputs:
             yield Output(f"{drive.name}.acceleration", f"{rate_unit}2", "Its acceleration", of, f"m.accelerations[{k}]")
         for k, drive in enumerate(self.interface.drives):
             if drive.table:
-                text = f"The {drive.load} that drives {drive.name}: given, or what holds the commanded rate"
+                text = f"The {drive.load} that drives {drive.name}: given, or as the commanded rate requires"
                 role = f'role="drive", of="{drive.coordinate}"'
                 yield Output(f"{drive.table}.applied_{drive.load}", drive.load_unit, text, role, f"m.loads[{k}]")
         taken = {drive.coordinate for drive in self.interface.drives}
@@ -90,7 +90,7 @@ class Outputs:
         for name, spring in self.description.springs.items():
             shown = f"*POSITION, {_DEGREES}"
             if name not in self.motion.counted:
-                shown = shown if name in self.motion.middled else _WRAPPED
+                shown = shown if name in self.motion.centred else _WRAPPED
                 shown += f', role="twist", of="{name}"' if needs_turns(spring) else ""
             if spring.between:
                 free = f" + p.{name}_free_length" if is_given(spring.free) else ""

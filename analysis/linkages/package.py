@@ -45,7 +45,7 @@ from __future__ import annotations
 
 
 class Constants(NamedTuple):
-    """The parameters, and what follows from them."""
+    """The parameters, and constants computed from them."""
 
 {constants}
 
@@ -78,7 +78,7 @@ class Parameters(CheckedParameters):
 {fields}
 
     def constants(self) -> equations.Constants:
-        """Return what the equations use."""
+        """Return the constants of the equations."""
         return equations.Constants(
 {values}
         )
@@ -98,7 +98,7 @@ VARIABLES = (
 
 
 def check_assembly(x: tuple[float, ...], p: equations.Constants) -> None:
-    """Make sure that the bodies can be joined."""
+    """Check that the bodies can be joined at the state x."""
     planar.check_clearance(equations.places, x, p, MECHANISM.describe_state(x))
 
 
@@ -223,7 +223,7 @@ class Package:
         made: Mechanism = importlib.import_module(self.name).MECHANISM
         for other in MECHANISMS.values():
             if other.name != name and other.fmu == made.fmu:
-                of = f"its FMU would be called {made.fmu}, as that of {other.name}"
+                of = f"its FMU would be called {made.fmu}, like that of {other.name}"
                 raise LinkageError(f"linkage.name is {name}: {of}; it must have another name")
         start = made.published[name]
         try:
@@ -231,7 +231,7 @@ class Package:
         except AssemblyError as error:
             signs = ", linkage.assembly" if any(dyad.has_two_assemblies for dyad in self.structure.dyads) else ""
             raise LinkageError(
-                f"{error}{self._unreachable(made)}: the start in linkage.freedoms{signs} or the lengths must be others"
+                f"{error}{self._unreachable(made)}: change the start in linkage.freedoms{signs} or the lengths"
             ) from None
         self._check_lines(made)
         self._check_motion(made)
@@ -276,8 +276,8 @@ class Package:
                     name, pins = dyad.inner.name, " and ".join(side.joint.name for side in dyad.sides)
                     table = "slots" if name in self.description.slots else "slides"
                     raise LinkageError(
-                        f"linkage.{table}.{name} has no direction at the start: the pins {pins} are at one place; the start in "
-                        "linkage.freedoms, linkage.assembly or the lengths must be others"
+                        f"linkage.{table}.{name} has no direction at the start: the pins {pins} are at one place; change the "
+                        "start in linkage.freedoms, linkage.assembly or the lengths"
                     )
 
     def _check_motion(self, made: Mechanism) -> None:
@@ -304,7 +304,7 @@ class Package:
         light = light or [name for name, body in bodies if not (body.inertia or body.section or body.bar)]
         masses = f"the mass or inertia of {' or '.join(f'linkage.bodies.{name}' for name in light) or 'a body'}"
         causes = " or ".join(laws or (masses,))
-        raise LinkageError(f"the accelerations at the start are no finite numbers: {causes} must be another")
+        raise LinkageError(f"the accelerations at the start are not finite numbers: change {causes.removesuffix(',')}")
 
     def _has_force(self, made: Mechanism, name: str) -> bool:
         """Return whether the law of a spring has a finite value at the start."""
@@ -336,13 +336,13 @@ class Package:
             if min(abs(angle - free), abs(angle % tau - free)) > pi + 1e-9:
                 raise LinkageError(
                     f"linkage.springs.{name}.free is {degrees(free):.6g} deg, and the angle at the start "
-                    f"{degrees(angle):.6g} deg: where no freedom counts the turns a spring is twisted the shorter way, here by "
-                    f"{degrees(shorter):.6g} deg; it must be {degrees(angle - shorter):.6g} deg, or the pin a freedom"
+                    f"{degrees(angle):.6g} deg: as no freedom counts whole turns, the spring is twisted the shorter way, by "
+                    f"{degrees(shorter):.6g} deg; set free to {degrees(angle - shorter):.6g} deg, or make the pin a freedom"
                 )
 
     def _described_angles(self, equations: str) -> dict[str, float]:
-        """Return the angles of the springs of `Interface.middled` in the described pose (rad); empty if there is none."""
-        names = self.motion.middled
+        """Return the angles, in the described pose, of the springs of `Interface.centred_springs` (rad), by their names."""
+        names = self.motion.centred
         if not names:
             return {}
         module: dict[str, Any] = {"__name__": self.description.name}

@@ -127,14 +127,15 @@ class Interface:
         return f"{of}{body}_frame.turn" if body != GROUND else f"fixed_direction(1.0, 0.0, {len(self.drives)})"
 
     def twisted_bodies(self, spring: Spring) -> tuple[str, ...]:
-        """Return the two bodies between which a spring is twisted; empty if it is no torsion spring."""
+        """Return the two bodies between which a spring is twisted; empty if it is not a torsion spring."""
         joint = self.structure.joints.get(spring.at)
         return spring.bodies or (joint.bodies if isinstance(joint, Pin) else ())
 
-    def middled(self, counted: Container[str]) -> list[str]:
-        """Return the torsion springs whose law is of an angle that nothing counts, and that have no free angle.
+    def centred_springs(self, counted: Container[str]) -> list[str]:
+        """Return the torsion springs with a force law, without a free angle, and whose whole turns are not counted.
 
-        The angle is within half a turn of that in the description, so that the torque does not jump at 180 deg.
+        The angle x of such a law is kept within half a turn of the angle in the described pose, not of zero, so that the torque
+        does not jump at 180 deg.
         """
         return [
             name
@@ -388,13 +389,13 @@ def _mass(name: str, body: Body) -> _Mass | None:
                 f"{where} has a section: its centre of mass and inertia follow from it, and must not be given"
             )
         if not body.bar and not body.section.corners:
-            raise LinkageError(f"{where}.section is none of a plate: the body must have a bar and its length")
+            raise LinkageError(f"{where}.section is not a plate: the body must have a bar and its length")
         try:
             mass, centre, inertia = body.section.properties(body.length)
         except ParameterError as error:
             raise ParameterError(f"{where}.section.corners", error.value, error.requirement) from None
         x, y = (0 if abs(c) < 1e-12 else float(c) for c in centre)
-        # a mass given beside a section was weighed; the radius of gyration remains that of the section
+        # a mass given together with a section was weighed; the radius of gyration remains that of the section
         own = mass if body.mass is None else body.mass
         return _Mass(float(own), (x, y), float(inertia * own / mass))
     if body.mass is None:
@@ -421,7 +422,7 @@ def _spring(name: str, description: Description, structure: Structure, drive: Dr
     if (bool(spring.between), bool(spring.at), bool(spring.bodies)).count(True) != 1:
         raise LinkageError(
             f"{where} is between {spring.between or 'nothing'}, at {spring.at or 'nothing'} and of the bodies "
-            f"{spring.bodies or 'none'}: it must have one of these"
+            f"{spring.bodies or 'none'}: it must have exactly one of between, at and bodies"
         )
     joint = structure.joints.get(spring.at)
     if spring.at and (joint is None or len(joint.bodies) != 2):

@@ -185,7 +185,7 @@ def joints(description: Description) -> dict[str, Joint]:
         _check_line(f"linkage.slides.{name}", (slide.on, slide.body), slide.through, owners, known)
         if slide.body in (GROUND, slide.on):
             raise LinkageError(
-                f"linkage.slides.{name}.body is {slide.body}: it must be a moving body other than that of the line"
+                f"linkage.slides.{name}.body is {slide.body}: it must be a moving body other than the body with the line"
             )
     for name, slot in description.slots.items():
         _check_line(f"linkage.slots.{name}", (slot.on,), slot.through, owners, known)
@@ -292,8 +292,8 @@ def _check_pairs(found: Mapping[str, Joint]) -> None:
             if pair in joined:
                 one, other = sorted(pair, key=lambda body: body == GROUND)
                 raise LinkageError(
-                    f"linkage.bodies.{one} is joined to {other} twice, by {joined[pair]} and by {name}: then neither moves "
-                    "against the other; one of these joints must go"
+                    f"linkage.bodies.{one} is joined to {other} twice, by {joined[pair]} and by {name}: then neither can move "
+                    "relative to the other; remove one of these joints"
                 )
             joined[pair] = name
 
@@ -308,7 +308,7 @@ def analyse(description: Description) -> Structure:
         bodies whose poses do not follow, and other possible choices of freedoms.
     """
     if not description.bodies:
-        raise LinkageError("linkage.bodies has none: one at least must move")
+        raise LinkageError("linkage.bodies is empty: there must be at least one moving body")
     found = joints(description)
     lost, moving = lost_freedoms(description, found), len(description.bodies) + len(description.slots)
     count = _count_freedoms(description)
@@ -329,7 +329,7 @@ def analyse(description: Description) -> Structure:
         freedoms = _propose_freedoms(description, found, count)
     if len(freedoms) != count:
         raise LinkageError(
-            f"{says}, but linkage.freedoms has {len(freedoms)} ({', '.join(freedoms)}): they must be as many"
+            f"{says}, but linkage.freedoms has {len(freedoms)} ({', '.join(freedoms)}): the two numbers must be equal"
         )
     for name, freedom in freedoms.items():
         # the second force of a pin C of three bodies is called C2
@@ -341,15 +341,15 @@ def analyse(description: Description) -> Structure:
             raise unknown_name(freedom.joint, found, f"joint {freedom.joint}, of linkage.freedoms.{name}")
         if len(found[of].bodies) != 2:
             raise LinkageError(
-                f"the freedom {name} is of the pin {of} of {', '.join(found[of].bodies)}: it must be of one of two bodies; "
-                "give the others a point of another name there"
+                f"the freedom {name} is at the pin {of} of {', '.join(found[of].bodies)}: it must be at a joint of two bodies; "
+                "give the other bodies a point of another name there"
             )
     steps, left = _solve(description, found, [f.joint for f in freedoms.values()])
     if left:
         others = [" and ".join(some) for some in islice(_choices(description, found, count), 3)]
         driven = "a driven spring drives another joint"
-        hint = f"; these joints as freedoms would do: {' or '.join(others)}; {driven}" if others else ""
-        why = _teeth_hint(description, left) or "are no dyads: they do not follow one pair after the other"
+        hint = f"; possible freedoms are the joints {' or '.join(others)}; {driven}" if others else ""
+        why = _teeth_hint(description, left) or "are not dyads: their poses do not follow one pair after the other"
         raise LinkageError(
             f"with {', '.join(f.joint for f in freedoms.values())} as freedoms the bodies {', '.join(left)} {why}"
             f"{hint or ', nor with any other joints as freedoms'}"
@@ -366,8 +366,8 @@ def _teeth_hint(description: Description, left: list[str]) -> str:
         for body, mate in (pair, pair[::-1]):
             if body in left and mate not in left:
                 return (
-                    f"cannot follow: by {where} {body} is in the teeth of {mate}, whose angle must follow from the freedoms "
-                    "alone, as that of a crank or of a gear on one, and not through a dyad, as that of a rocker"
+                    f"do not follow: by {where} {body} meshes with {mate}, whose angle must follow directly from the freedoms, "
+                    "like the angle of a crank or of a gear on a crank, and not through a dyad, like the angle of a rocker"
                 )
     return ""
 
@@ -386,7 +386,7 @@ def _propose_freedoms(description: Description, found: Mapping[str, Joint], coun
     """Return the first set of freedoms that determines the poses of all bodies, each named after its joint's second body."""
     for some in _choices(description, found, count):
         return {found[name].bodies[1]: FreedomTable(joint=name) for name in some}
-    raise LinkageError(f"{description.name} is no chain of dyads, whatever joints are taken as freedoms")
+    raise LinkageError(f"{description.name} is not a chain of dyads, whatever joints are taken as freedoms")
 
 
 def _tree(root: str, found: Mapping[str, Joint], freed: list[str]) -> list[FreedomStep]:

@@ -39,7 +39,7 @@ section = {{ kind = "bar", width = "20 mm", thickness = "5 mm", material = "stee
 bar = ["B", "C"]
 length = "150 mm"
 points = {{ P = ["75 mm", "60 mm"] }}       # further points in the body's own axes
-mass = "0.4 kg"                           # in the place of a section
+mass = "0.4 kg"                           # instead of a section
 cog = ["75 mm", "20 mm"]                  # centre of mass; left out: the middle of the bar
 inertia = "1.2e-3 kg*m^2"                 # about the centre of mass
 
@@ -62,13 +62,13 @@ section = {{ kind = "rod", diameter = "12 mm", material = "aluminium" }}
 
 # [linkage.gears.Z]                       # two bodies, each pinned to the same third
 # bodies = ["crank", "wheel"]
-# ratio = -0.5                            # speed of the second by that of the first; negative for external gears
+# ratio = -0.5                            # speed of the second over speed of the first; negative for external gears
 # phase = "0 deg"                         # angle of the second at which that of the first is zero
 
 # [linkage.racks.R]                       # a toothed rack that slides on a body to which its gear is pinned
 # gear = "crank"
 # rack = "block"
-# radius = "20 mm"                        # travel by the angle of the gear: positive where the rack is on the right of it
+# radius = "20 mm"                        # travel per radian of the gear: positive if the rack is on the right of the gear
 # offset = "0 mm"                         # position of the slide at which the angle of the gear is zero
 
 [linkage.springs.return]                  # about a pin, along a slide, or between = ["P", "D"]
@@ -82,17 +82,17 @@ damping = "0.01 N*m*s/rad"
 # constants = {{ a = "3 N*m" }}             # of a law such as "a*x**3": parameters
 # driven = true                           # an input drives it: a cylinder, a linear motor
 
-# [linkage.friction]                      # that grows with the force in a joint
-# B = "0.2 mm"                            # of a pin: the friction radius, coefficient times radius of the pin
-# G = 0.1                                 # of a slide or a slot: the coefficient
+# [linkage.friction]                      # friction that grows with the force in a joint
+# B = "0.2 mm"                            # for a pin: the friction radius, coefficient times radius of the pin
+# G = 0.1                                 # for a slide or a slot: the coefficient
 
-[linkage.freedoms]                        # as many as the linkage has; left out: they are proposed
+[linkage.freedoms]                        # all freedoms of the linkage; left out: they are chosen automatically
 crank = {{ joint = "A", speed = "300 rpm" }} # start = "0 deg"; driven = true: its rate can be commanded
 
 [linkage.assembly]                        # +1 or -1: on which side a pair of bodies is joined
 C = 1
 
-# What follows is a case as for any mechanism: initial, drive, run.
+# The rest is a case as for any mechanism: initial, drive, run.
 [run]
 revolutions = 2.0
 """

@@ -34,8 +34,8 @@ class Variables:
     def __init__(self, interface: Interface, counted: Mapping[str, Twist]) -> None:
         self.description, self.structure, self.interface = interface.description, interface.structure, interface
         self.counted = counted
-        #: the angle in the description of each torsion spring of `Interface.middled` (rad)
-        self.middles = dict.fromkeys(interface.middled(counted), 0.0)
+        #: angle in the described pose of each torsion spring of `Interface.centred_springs` (rad)
+        self.middles = dict.fromkeys(interface.centred_springs(counted), 0.0)
         drives = interface.drives
         self.starts = [Start(_last(d, d.coordinate), d.unit, d.start, d.start) for d in drives]
         self.starts += [Start(_last(d, d.rate), f"{d.unit}/s", d.speed, 0.0) for d in drives]
@@ -177,7 +177,7 @@ class Variables:
                 rate = f"{d.unit}/s"
                 shown = f", {d.speed!r}{display_argument(rate)}"
                 yield _input(f"{table}.speed", rate, f"Commanded rate of {d.name}", d.rate, shown)
-                text = "Rate of the commanded rate over a step"
+                text = "Time derivative of the commanded rate over a step"
                 yield _input(f"{table}.acceleration", f"{rate}2", text, f"{d.name}.acceleration")
         for load in self.interface.loads:
             yield _input(load.name, load.unit, load.text)

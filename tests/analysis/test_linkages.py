@@ -428,7 +428,7 @@ MISTAKES = [
     ("bodies/rocker", {"bar": ["D", "C"], "length": 0.12, "section": {"kind": "plate", "thickness": 0.005, "material": "steel",
      "corners": [[0, 0], [1, 1], [1, 0], [0, 1]]}}, "its edges cross"),
     ("name", "rahman-ideal", "linkage.name is rahman-ideal: it must not be that of a published set of slider-crank"),
-    ("name", "five-bar-slider", "linkage.name is five-bar-slider: its FMU would be called FiveBarSlider, as that of five-bar"),
+    ("name", "five-bar-slider", "its FMU would be called FiveBarSlider, like that of five-bar"),
 ]  # fmt: skip
 
 
@@ -962,7 +962,7 @@ def test_a_spring_whose_turns_nothing_counts_is_named_where_its_torque_jumps(met
     built.spring("hair", at="D", stiffness="0.1 N*m/rad").freedom("crank", "A", speed="60 rpm").mechanism()
     run = simulate("drag-link", stop_time=1.0, **({} if method == "compiled" else {"method": method}))
     assert "hair at t = 0." in run.message
-    assert "nothing counts the whole turns" in run.message
+    assert "whole turns of this angle are not counted" in run.message
 
 
 def test_two_shafts_on_one_axis_are_joined_by_a_freedom_or_by_bodies() -> None:
