@@ -266,7 +266,7 @@ def joint_loads(closure: Closure, *, torque: Any = None, slider_force: Any = Non
         If the torque is given at a dead centre.
     """
     if (torque is None) == (slider_force is None):
-        raise InputError("give either the torque, and the slider's force is sought, or the slider's force, not both")
+        raise InputError("give either the torque (the slider's force is then computed) or the slider's force, not both")
     p = closure.parameters
     n = closure.crank_angle.size
     moving = rates(closure, **motion)
@@ -443,7 +443,7 @@ def compare(turn: ForceTurn) -> Comparison:
     sought = turn.sought == SLIDER_FORCE
     if sought and has_shaft_groove(turn.law):
         raise InputError(
-            "the dual-number method seeks the slider's force of a shift that is driven apart from the crank: give the load, "
+            "the dual-number method computes the slider's force only if the shift has a drive of its own: give the load, "
             "or a groove that is not in the shaft"
         )
     good = ~np.ma.getmaskarray(turn.slider_force)

@@ -391,7 +391,7 @@ def force_turn(
     ------
     InputError
         If the parameters are not those of a slider-crank, both ``load`` and ``torque`` are given, a value is not finite or has
-        the wrong shape, or ``shift`` is no `ShiftLaw`.
+        the wrong shape, or ``shift`` is not a `ShiftLaw`.
     AssemblyError
         If the rod does not reach the guide at some angle; the message gives the ranges in which it does. With ``partial`` only
         if it reaches the guide at no angle.
@@ -407,12 +407,12 @@ def force_turn(
         parameters,
         SliderCrankParameters,
         "parameters",
-        "SliderCrankParameters or a set of them, as 'rahman-ideal'; simulate has the joint forces of any mechanism",
+        "SliderCrankParameters or a set of them, such as 'rahman-ideal'; simulate has the joint forces of any mechanism",
     )
     if crank_speed is None:
         raise InputError("the crank speed is missing: only a published set brings its own")
     if load is not None and torque is not None:
-        raise InputError("both load and torque are given: give the one, and the other is sought")
+        raise InputError("both load and torque are given: give one of them, and the other is computed")
     if not isinstance(shift, ShiftLaw):
         raise InputError(
             f"the shift is {shift!r}: it must be a law of the shift, such as ConstantShift(0.01) or GrooveShift(0.01, 2.0)"

@@ -180,7 +180,10 @@ class _Zero(NamedTuple):
 
 
 class _Change(NamedTuple):
-    """D, A, B of the module (``square``, ``pull``, ``along``) at the middle of a piece, and bounds of their changes in it."""
+    """D, A, B of the module docstring (``square``, ``pull``, ``along``) at the middle of a piece, and bounds of their changes.
+
+    The bounds (``*_spread``) are for changes from the middle to any point of the piece.
+    """
 
     square: float
     pull: float

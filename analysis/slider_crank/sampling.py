@@ -37,7 +37,7 @@ from .tolerances import (
     tolerance_effects,
 )
 
-#: Percentiles of a Monte Carlo: those of the normal distribution at -3, -2, 0, 2, 3 standard deviations.
+#: Percentiles of the samples: the shares (%) of a normal distribution below -3, -2, 0, 2, 3 standard deviations.
 PERCENTILES = (0.13498980316300957, 2.275013194817921, 50.0, 97.72498680518208, 99.86501019683699)
 #: Error of the linear estimate, relative to the standard deviation, above which it is reported.
 OFF = 0.05
@@ -112,7 +112,7 @@ class MonteCarlo:
             for name, spread in self.spreads.items()
         )
         lost = int((self.not_assembled + self.undetermined).max(initial=0))
-        left_out = f"; up to {lost} samples left out, as notes() says" if lost else ""
+        left_out = f"; up to {lost} samples left out: see notes()" if lost else ""
         return (
             f"<MonteCarlo: {self.samples} samples of seed {self.seed} at {len(self.turn)} crank angles; standard deviations "
             f"{spreads}{left_out}>"
@@ -264,10 +264,10 @@ def monte_carlo(
     Raises
     ------
     InputError
-        If ``turn`` is no `ForceTurn`; if there is no tolerance, or two of the same name; if samples are invalid: a length not
-        above zero, or a crank inertia below the least that its mass allows.
+        If ``turn`` is not a `ForceTurn`; if there is no tolerance, or two of the same name; if samples are invalid: a length
+        not above zero, or a crank inertia below the least that its mass allows.
     ParameterError
-        If there is no such quantity, or ``samples`` is no whole number of at least two, or ``seed`` none of at least zero.
+        If there is no such quantity, ``samples`` is not a whole number above one, or ``seed`` not a whole number above -1.
 
     Examples
     --------
@@ -331,7 +331,8 @@ def _sample_angles(
 ) -> list[_Draws]:
     """Draw all samples, the same in each worker process, and evaluate them at the angles with the indices ``places``.
 
-    To draw the samples in each process is faster than to send them."""
+    Drawing the samples in each process is faster than sending them.
+    """
     generator = np.random.default_rng(seed)
     errors = {t.name: t.draw(generator, samples) for t in tolerances}
     _check_samples(turn.parameters, errors)
@@ -423,7 +424,7 @@ def _check_samples(parameters: SliderCrankParameters, drawn: Mapping[str, FloatA
         names = [n for n in ("crank.inertia", "crank.mass", "crank.cog_x", "crank.cog_y") if n in drawn]
         raise InputError(
             f"the tolerance of {' and that of '.join(names)} is too wide: in {wrong} of {drawn[names[0]].size} samples "
-            "crank.inertia is less than crank.mass * (crank.cog_x^2 + crank.cog_y^2), which it holds"
+            "crank.inertia is less than crank.mass * (crank.cog_x^2 + crank.cog_y^2), its least possible value"
         )
 
 

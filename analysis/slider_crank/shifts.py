@@ -123,7 +123,7 @@ class GrooveShift:
             return mobility.groove_shift(
                 replace(parameters, groove_amplitude=float(self.amplitude), groove_ratio=float(self.ratio))
             )
-        except ParameterError:  # alpha is no ratio of small whole numbers
+        except ParameterError:  # alpha is not a ratio of small whole numbers
             return None
 
 
@@ -178,8 +178,8 @@ class TimeShift:
         w = np.unique(speed)
         if w.size != 1 or w[0] == 0.0 or np.any(acceleration):
             raise InputError(
-                "a shift by time needs a crank speed that is constant and not 0 rad/s, to tell the time of each angle; "
-                "give the law by the angle"
+                "a shift given over time needs a constant crank speed other than 0 rad/s, which gives the time of each angle; "
+                "use an AngleShift instead"
             )
         time = angle / w[0]
         return ShiftMotion(*(np.asarray(f(time)) for f in (self.value, self.velocity, self.acceleration)))

@@ -245,7 +245,7 @@ def undetermined_mask(turn: ForceTurn, quantity: str) -> NDArray[np.bool_]:
 def check_names(names: Sequence[str], known: Collection[str], kind: str) -> None:
     """Check that quantities or errors of these names exist.
 
-    Raises UnknownNameError if one does not, and InputError if a text is in the place of a list.
+    Raises UnknownNameError if one does not, and InputError if a text is given instead of a list.
     """
     if isinstance(names, str):
         raise InputError(f"{kind} is {names!r}: it must be a list of names, such as [{names!r}]")
@@ -284,7 +284,7 @@ class Tolerance:
         If there is no such error.
     InputError
         If not exactly one of half width and standard deviation is given, if it is not a finite number above zero, or if the
-        distribution is none of the three.
+        distribution is not one of the three.
     """
 
     name: str
@@ -377,7 +377,7 @@ def tolerance_effects(
     Raises
     ------
     InputError
-        If ``turn`` is no `ForceTurn`, or there is no tolerance, or two of the same name.
+        If ``turn`` is not a `ForceTurn`, or there is no tolerance, or two of the same name.
     ParameterError
         If there is no such quantity.
 
@@ -429,13 +429,13 @@ def tolerance_effects(
 
 def require_turn(turn: ForceTurn) -> None:
     """Raise InputError unless ``turn`` is a slider-crank over a turn, the only mechanism with tolerances."""
-    wanted = "what force_turn returns, as force_turn('rahman-ideal'): only SliderCrankParameters have tolerances"
+    wanted = "what force_turn returns, such as force_turn('rahman-ideal'): only SliderCrankParameters have tolerances"
     require_kind(turn, ForceTurn, "turn", wanted)
 
 
 def check_tolerances(tolerances: Sequence[Tolerance]) -> tuple[str, ...]:
     """Return the names of the tolerances; raise InputError if there is none, or two have the same name."""
-    wanted = "a list of Tolerance, as [Tolerance('rod.length', half_width='0.5 mm')]"
+    wanted = "a list of Tolerance, such as [Tolerance('rod.length', half_width='0.5 mm')]"
     require_kind(tolerances, Sequence, "tolerances", wanted)
     for number, one in enumerate(tolerances, start=1):
         require_kind(one, Tolerance, f"tolerance {number}", wanted)

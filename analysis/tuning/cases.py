@@ -28,7 +28,7 @@ def _objective(value: Any, name: str) -> str:
     words = text(value, name)
     if words != _LEAST_CHANGE and not words.startswith(_LEAST):
         raise ParameterError(
-            name, value, f"be {_LEAST_CHANGE!r}, or {_LEAST!r} and a parameter, as 'least slider.damping'"
+            name, value, f"be {_LEAST_CHANGE!r}, or {_LEAST!r} and a parameter, such as 'least slider.damping'"
         )
     return words
 

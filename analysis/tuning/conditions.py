@@ -98,7 +98,7 @@ class Spot(NamedTuple):
     level: float
     turns: int  # number of common periods in the period
     ratios: Mapping[str, Any]  # ratios of the drive
-    coordinate: int = 0  # free coordinate whose amplitude is greatest there, of a resonance
+    coordinate: int = 0  # at a resonance: index of the free coordinate whose amplitude is greatest
 
 
 def known_spot(wish: Wish, x: FloatArray, orbit: PeriodicOrbit, coordinate: int = 0) -> Spot:

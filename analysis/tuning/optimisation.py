@@ -265,7 +265,7 @@ def tune(wish: Wish, *, progress: bool = False) -> Tuned:
     Raises
     ------
     InputError
-        If ``wish`` is no `Wish`.
+        If ``wish`` is not a `Wish`.
     OrbitError
         If there is no periodic motion to begin with at either end of the range.
 
@@ -279,7 +279,7 @@ def tune(wish: Wish, *, progress: bool = False) -> Tuned:
     >>> tuned.met, f"{tuned.values[0]:.1f} N/m"
     (True, '4153.3 N/m')
     """
-    require_kind(wish, Wish, "wish", "a Wish, as Wish(parameters='rig-2-spring-c', speeds=..., change=...)")
+    require_kind(wish, Wish, "wish", "a Wish, such as Wish(parameters='rig-2-spring-c', speeds=..., change=...)")
     search = _Search(wish)
     zero = np.zeros(len(wish.names))
     start = np.clip(zero, wish.scale_changes(wish.low), wish.scale_changes(wish.high))

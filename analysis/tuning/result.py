@@ -163,11 +163,11 @@ class Verification:
 
     def __str__(self) -> str:
         chart = f"largest multiplier {self.largest:.6g} at {self.place}"
-        several = "one stable motion at most at each"
+        several = "at most one stable motion at each"
         if self.several:
             several = f"two stable ones at {self.several}"
         return (
-            f"response followed anew over {format_count(self.orbits, 'motion')}; row of a chart at {self.charted} points: "
+            f"response followed again over {format_count(self.orbits, 'motion')}; row of a chart at {self.charted} points: "
             f"{chart}; all motions sought at {self.sought}: {several}"
         )
 

@@ -190,12 +190,12 @@ class Wish:
                 raise ParameterError(name, getattr(self, name), "be at least zero and less than one")
         if not (self.no_resonance or self.no_jump or self.judges_stability or self.limits):
             raise InputError(
-                "nothing is wished: say no_resonance, no_jump, no_unstable or least_margin, or give a limit of an output"
+                "there is no requirement: give no_resonance, no_jump, no_unstable, least_margin or a limit of an output"
             )
         if self.least:
             put("least", _find_changeable_name(mechanism, self.least))
             if self.least not in self.names:
-                raise InputError(f"{self.least} is to be least, but may not be changed: name it in change")
+                raise InputError(f"{self.least} is to be minimised, but may not be changed: name it in change")
         self._check_bounds()
 
     def _check_bounds(self) -> None:
@@ -324,15 +324,15 @@ class Wish:
 
 
 def require_free(mechanism: Mechanism, drive: Drive) -> None:
-    """Raise InputError if no degree of freedom is free: the motion is then prescribed, and there is none to be followed."""
+    """Raise InputError if no degree of freedom is free, because the whole motion is then prescribed."""
     try:
         drive.flow(mechanism)
     except NothingFreeError as error:
         free = error.force and f", or free a freedom by a force, such as {error.force} = 0"
         raise InputError(
-            f"the speed prescribes all that moves in a {mechanism.name}, so that nothing can vibrate: tuning needs a free "
-            "freedom. Peaks of outputs then follow from runs alone: compare the values that may be changed by simulate_many "
-            "with vary, or by linkwork run --set; or drive the crank by a torque or a motor, with over and between instead of "
+            f"the speed prescribes the whole motion of a {mechanism.name}, so that nothing can vibrate, but tuning needs a "
+            "freedom that is not prescribed. Peaks of outputs can be found by runs: vary the parameters by simulate_many with "
+            "vary, or by linkwork run --set; or drive the crank by a torque or a motor, with over and between instead of "
             f"speeds{free}"
         ) from None
 
@@ -369,7 +369,7 @@ def _changes(operation: Operation, over: str, given: Any) -> tuple[Change, ...]:
     for change in changes:
         require_variable(*operation, change.name)
         if change.name == over:
-            raise ParameterError(f"change.{over}", over, "be something else: the range is of it")
+            raise ParameterError(f"change.{over}", over, "not be changed: the range is that of this quantity")
     return changes
 
 

@@ -335,7 +335,7 @@ def test_what_is_met_already_is_not_changed():
 
 
 def test_a_motion_that_the_speed_prescribes_is_refused_with_what_works_instead():
-    said = r"the speed prescribes all that moves in a slider-crank.* simulate_many .* axial\.force = 0"
+    said = r"the speed prescribes the whole motion of a slider-crank.* simulate_many .* axial\.force = 0"
     limit = {"output": "drive.applied_torque", "below": "1 N*m"}
     with pytest.raises(InputError, match=said):
         Wish(parameters=SPRUNG, speeds=(10.0, 12.0), change={"crank.length": "5 %"}, limits=[Limit(**limit)])
@@ -351,7 +351,7 @@ def test_a_motion_that_the_speed_prescribes_is_refused_with_what_works_instead()
 @pytest.mark.parametrize(
     ("of", "kind", "words"),
     [
-        ({}, InputError, "nothing is wished"),
+        ({}, InputError, "there is no requirement"),
         ({"no_jump": True, "speeds": None}, InputError, "give the range"),
         ({"no_jump": True, "speeds": None, "over": "drive.speed"}, InputError, "give the range"),
         ({"no_jump": True, "between": (1.0, 2.0), "over": "drive.torque"}, InputError, "give the range"),
@@ -484,7 +484,7 @@ def test_command_writes_the_changed_case(run):
     result = run()
     assert result.exit_code == 0, result.output
     assert "slider.damping" in result.output
-    assert "verified: response followed anew" in result.output
+    assert "verified: response followed again" in result.output
     made = load_case("out/case-tuned.toml")
     assert find_orbit(made.parameters, speed="600 rpm").largest == pytest.approx(0.75, abs=1e-3)
     assert made.parameters == replace(RIG_2, slider_damping=made.parameters.slider_damping)
