@@ -12,7 +12,7 @@ FRICTION_RATE = 0.1
 FRICTION_FORCE = 1e-2
 #: Greatest norm of the response of the contact forces to friction at which a motion is followed: at 1 the links may jam.
 MOST_RESPONSE = 0.8
-#: Sweeps of Newton's method for the forces of contacts with friction, before the last.
+#: Steps of Newton's method for the forces of contacts with friction, before the last step.
 SWEEPS = 4
 
 Vector = tuple[float, float]

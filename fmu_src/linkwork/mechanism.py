@@ -53,7 +53,7 @@ class Freedom(NamedTuple):
     period : float
         Increase of the coordinate after which the mechanism is in the same configuration; 0 if there is none.
     swings : bool
-        Whether the degree of freedom is a rotation that nothing drives, as of a pendulum, and therefore no crank.
+        Whether the degree of freedom is a rotation that nothing drives, such as that of a pendulum; it is then not a crank.
     coupled : bool
         Whether a spring joins the rotation to others: a whole turn of it alone winds the spring up.
     """

@@ -24,7 +24,7 @@ def fmi_name(field_name: str) -> str:
 
 
 def field_name(name: str) -> str:
-    """Return the field of a mechanism's parameters that holds the FMI parameter ``name``."""
+    """Return the name of the field, of a mechanism's parameters, for the FMI parameter ``name``."""
     return name.replace(".", "_", 1)
 
 

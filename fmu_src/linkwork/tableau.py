@@ -6,7 +6,7 @@ DOP853. The numbers are printed there; `tests/plant/test_tableau.py` checks them
 
 from __future__ import annotations
 
-#: Stages of one step; stage 13 of a step is stage 1 of the next; stages 14 to 16 serve the dense output alone.
+#: Stages of one step; stage 13 of a step is stage 1 of the next; stages 14 to 16 are only for the dense output.
 STAGES = 12
 
 #: Order of the method, and of its combined error estimate in the step size, which the step size control uses as exponent.

@@ -65,9 +65,9 @@ ROLES = {
     "transmission": ("output", "transmission angle: the links lock where its sine is zero"),
     "twist": (
         "output",
-        "angle of a spring whose whole turns nothing counts: its torque jumps where it passes half a turn",
+        "angle of a spring whose whole turns are not counted: the torque jumps at half a turn",
     ),
-    "residual": ("output", "zero but for error"),
+    "residual": ("output", "zero apart from numerical errors"),
 }
 
 

@@ -71,4 +71,4 @@ def read_state(state: bytes) -> dict[str, Any]:
         saved = json.loads(text.decode("utf-8") + "}")
     except (ValueError, RecursionError) as error:
         return {"damaged": repr(error)}
-    return saved if isinstance(saved, dict) else {"damaged": "it is not one of a Linkwork slave"}
+    return saved if isinstance(saved, dict) else {"damaged": "it is not the state of a Linkwork slave"}

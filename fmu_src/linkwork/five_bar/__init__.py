@@ -20,9 +20,9 @@ MECHANISM = Mechanism(
         "counter-clockwise. Pin forces: A of the ground on the crank, B of the crank on the coupler, C of the rocker on "
         "the coupler, D of the slider on the rocker; slider.guide_force is the guide's force on the slider.",
         "drive.mode 0: drive.torque acts on the crank. drive.mode 1: over a step the crank turns at drive.speed + "
-        "drive.acceleration (t - t_n), and drive.applied_torque is the torque that takes. Where the commanded speed jumps, "
-        "the slider's generalised momentum is conserved and the slider velocity jumps with it; a slave that is not given "
-        "drive.speed again starts the next step from the same drive.speed.",
+        "drive.acceleration (t - t_n), and drive.applied_torque is the torque that this requires. Where the commanded speed "
+        "jumps, the slider's generalised momentum is conserved, and the slider velocity jumps too; if drive.speed is not set "
+        "again, the next step starts from the same drive.speed.",
     ),
     parameters=FiveBarParameters,
     initial=InitialState,

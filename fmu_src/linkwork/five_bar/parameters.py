@@ -60,7 +60,7 @@ def _crank_inertia_of_mass(p: FiveBarParameters) -> float:
     return p.crank_mass * p.crank_cog_distance * p.crank_cog_distance * (1.0 - 1e-12)
 
 
-def _slider_mass_above_none(p: FiveBarParameters) -> float:
+def _least_slider_mass(p: FiveBarParameters) -> float:
     return 1e-300 - p.rocker_mass
 
 
@@ -86,7 +86,7 @@ _RULES = Rules(
             _crank_inertia_of_mass,
             "be at least crank.mass * crank.cog_distance^2 = %g kg.m2: it is taken about the shaft A",
         ),
-        LowerBound("slider_mass", _slider_mass_above_none, "be greater than zero where rocker.mass is zero"),
+        LowerBound("slider_mass", _least_slider_mass, "be greater than zero where rocker.mass is zero"),
     ),
 )
 

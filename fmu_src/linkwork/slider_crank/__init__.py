@@ -17,19 +17,19 @@ MECHANISM = Mechanism(
     notes=(
         "A spatial slider-crank: the crank turns about its axis and shifts along it, a rod between two ball joints moves "
         "a slider on a straight guide that is offset from the crank axis and twisted against it. Crank angle and axial "
-        "shift are the two freedoms; the rod's spin about its own line is idle and taken as none.",
+        "shift are the two freedoms; the rod's spin about its own line has no effect and is taken as zero.",
         "z runs along the crank axis, x along the common normal of axis and guide, away from the guide where "
         "guide.offset is positive; the crank points along x at crank.angle 0 and turns about z. The guide passes through "
-        "(-guide.offset, 0, 0); the slider position increases along (0, -sin, -cos) of guide.twist. bearing: all that "
-        "the ground exerts on the crank, moments about the origin; crank_pin: force of the crank on the rod; slider_pin: "
+        "(-guide.offset, 0, 0); the slider position increases along (0, -sin, -cos) of guide.twist. bearing: total force "
+        "and moment on the crank from the ground, about the origin; crank_pin: force of the crank on the rod; slider_pin: "
         "of the slider on the rod; guide: of the guide on the slider. Vectors are in the ground frame.",
         "drive.mode 0: drive.torque acts on the crank. drive.mode 1: over a step the crank turns at drive.speed + "
-        "drive.acceleration (t - t_n), and drive.applied_torque is the torque that takes. axial.mode 0: axial.force acts "
-        "along the axis. axial.mode 1: over a step the crank shifts at axial.speed + axial.acceleration (t - t_n), from "
-        "initial.shift_position; axial.applied_force is the force that takes. axial.mode 2: a groove in the shaft makes "
-        "the shift groove.amplitude sin(groove.ratio crank.angle). Where a commanded speed jumps, the generalised momentum "
-        "of the other freedom is conserved, if nothing drives that one; a slave that is not given a speed again starts "
-        "the next step from the same one.",
+        "drive.acceleration (t - t_n), and drive.applied_torque is the torque that this requires. axial.mode 0: axial.force "
+        "acts along the axis. axial.mode 1: over a step the crank shifts at axial.speed + axial.acceleration (t - t_n), from "
+        "initial.shift_position; axial.applied_force is the force that this requires. axial.mode 2: a groove in the shaft "
+        "makes the shift groove.amplitude sin(groove.ratio crank.angle). Where a commanded speed jumps, the generalised "
+        "momentum of the other freedom is conserved, unless that freedom is commanded too or coupled by the groove; if a "
+        "speed is not set again, the next step starts from the same speed.",
     ),
     parameters=SliderCrankParameters,
     initial=InitialState,
@@ -40,7 +40,7 @@ MECHANISM = Mechanism(
             "shift.position",
             "shift.velocity",
             ("shift_position", "shift_velocity"),
-            # without any of them the shift is held as it is: commanded at rest
+            # without any of these inputs the shift keeps its initial value: its commanded speed is zero
             Mode("axial.mode", ("force", "speed", "groove"), ("axial_force", "shift_speed", "groove"), default=1),
         ),
     ),
