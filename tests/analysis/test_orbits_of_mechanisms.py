@@ -221,7 +221,7 @@ def test_what_cannot_be_periodic_is_refused() -> None:
         find_orbit(grooved, Inputs(groove=True), torque=1.0, start=(5.0,))
     for given, message in (
         ({"forces": FREE, "modes": {"axial.mode": 1}}, r"axial\.force does not act: axial\.mode is speed"),
-        ({"held": {"crank.angle": 1.0}}, r"crank\.angle is no coordinate .* that is held"),
+        ({"held": {"crank.angle": 1.0}}, r"crank\.angle is not a coordinate .* that is held"),
         ({"modes": {"axial.mode": 3}}, r"axial\.mode = 3 is not a mode"),
         ({"modes": {"drive.mode": 0}}, r"drive\.mode = 0 is not a mode"),
     ):
