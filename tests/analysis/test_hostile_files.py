@@ -178,7 +178,7 @@ def test_a_run_of_too_many_samples_is_refused(monkeypatch):
         with pytest.raises(InputError, match=r"at most 20000000 are allowed, .* LINKWORK_MAX_SAMPLES"):
             simulate(TABLE_3_1, **times)
     monkeypatch.setenv("LINKWORK_MAX_SAMPLES", "10")
-    with pytest.raises(InputError, match=r"has 11 samples: more than 10"):
+    with pytest.raises(InputError, match=r"has 11 samples: at most 10"):
         simulate(TABLE_3_1, stop_time=0.011)
 
 

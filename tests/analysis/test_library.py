@@ -301,7 +301,7 @@ def test_another_ratio_with_another_period_is_refused():
     known, (name,) = made.first_set.parameters, made.names("ratio")
     assert name in made.position_parameters
     for value in (-1.5, -0.25, -2.01):
-        with pytest.raises(InputError, match="describe it with its own values"):
+        with pytest.raises(InputError, match="describe it with the new values"):
             operating_point(replace(known, **{field_name(name): value}), drive)
     for value in (-3.0, -25.0, 15.0, 1.0):
         assert operating_point(replace(known, **{field_name(name): value}), drive).flow.base == 1
