@@ -825,7 +825,9 @@ def test_a_coupling_of_gears_counts_their_turns() -> None:
 def test_a_coupling_has_periodic_motions_in_which_both_its_ends_turn() -> None:
     made = coupled("periodic-coupling").mechanism()
     speed = 2.0 * math.pi
-    with pytest.raises(InputError, match=r"a spring couples rotor\.angle and drum\.angle.*ratios = \{'drum\.angle': 1\}"):
+    with pytest.raises(
+        InputError, match=r"a spring couples rotor\.angle and drum\.angle.*ratios = \{'drum\.angle': 1\}"
+    ):
         newton_orbit(made.first_set.parameters, Drive(speed=speed, ratios={"drum.angle": 2}))
     for drive in (Drive(speed=speed, ratios={"drum.angle": 1}), Drive(speed=speed)):
         orbit = newton_orbit(made.first_set.parameters, drive)
