@@ -26,7 +26,7 @@ def read_description(tables: Mapping[str, Any]) -> Description:
     Raises
     ------
     ParameterError
-        With the place in the file of the first entry that is unknown, missing or wrong.
+        If an entry is unknown, missing or wrong; the message gives its place in the file.
     """
     return files.read(Description, tables, LINKAGE)
 

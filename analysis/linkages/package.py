@@ -436,7 +436,7 @@ def _imports(body: str) -> str:
 
 
 def _error_scale(drives: tuple[Drive, ...], length: float, mass: float) -> str:
-    """Write the function that returns, for each state, the magnitude below which the integrator's tolerance is absolute."""
+    """Write the function that returns, for each component of the state, the magnitude below which its error is absolute."""
     squares = " + ".join(f"x[{len(drives) + k}] * x[{len(drives) + k}]" for k, d in enumerate(drives) if d.turns)
     coordinates = ", ".join("1.0" if d.turns else repr(length) for d in drives)
     rates = ", ".join("speed" if d.turns else f"{length!r} * speed" for d in drives)

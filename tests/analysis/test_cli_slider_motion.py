@@ -357,7 +357,7 @@ def test_ctrl_c_in_the_strategy_keeps_its_steps(linkwork, tmp_path, monkeypatch)
         ({"linkage": LINKAGE | {"crank_lenght": 1.0}}, "linkage.crank_length"),
         ({"linkage": LINKAGE | {"branch": 2}}, "branch"),
         ({"linkage": {"file": "nowhere.csv"}}, "nowhere.csv"),
-        ({"linkage": {"file": "case.toml"}}, "no list of linkages"),
+        ({"linkage": {"file": "case.toml"}}, "not a list of linkages"),
         ({"bounds": {"crank_length": "5 cm"}}, "bounds.crank_length"),
         ({"load": {"fx": "2 N"}}, "drive.speed"),
         ({"tracking": {}}, "drive.speed"),
@@ -400,7 +400,7 @@ def test_a_list_of_linkages_is_checked(tmp_path) -> None:
         linkage_from_csv(good, 99)
     text = good.read_text(encoding="utf-8")
     good.write_text(text.replace("crank_length [m]", "crank"), encoding="utf-8")
-    with pytest.raises(InputError, match="no list of linkages"):
+    with pytest.raises(InputError, match="not a list of linkages"):
         linkage_from_csv(good)
 
 

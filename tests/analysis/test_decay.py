@@ -131,7 +131,7 @@ T = np.linspace(0.0, 0.8, 401)
         (T, T, "0 turning points"),
         (T, free(T)[::-1], "do not decay"),
         (T, np.random.default_rng(0).standard_normal(len(T)), "s apart"),
-        ([], [], "no times"),
+        ([], [], "record is empty"),
     ],
 )
 def test_what_is_no_decay(time: object, position: object, words: str) -> None:
@@ -255,7 +255,7 @@ class TestCommand:
             (("--position", "v"), "there is no column 'v' in record.csv"),
             (("--time", "u", "--position", "t"), "time does not increase"),
             (("--from", "700 s"), "turning points"),
-            (("--from", "9000 s"), "no times"),
+            (("--from", "9000 s"), "record is empty"),
             (("--unit", "kg"), "--unit"),
             (("--time-unit", "mm"), "--time-unit"),
             (("--mass", "600 mm"), "--mass"),

@@ -188,7 +188,7 @@ def test_no_library_no_device_and_its_errors_are_told(monkeypatch: pytest.Monkey
     old = none.cupy(None)
     monkeypatch.setattr(old, "RawModule", lambda path: (_ for _ in ()).throw(none.Error("no kernel image")))
     monkeypatch.setitem(sys.modules, "cupy", old)
-    with pytest.raises(LinkworkError, match=r"failed \(no kernel image\): it must be of 2018 or later"):
+    with pytest.raises(LinkworkError, match=r"failed \(no kernel image\): it must be from 2018 or later"):
         simulate_many(TABLE_3_1, vary=SOFTER, stop_time=0.1, device="cuda")
     on_device.solver.cache_clear()
 

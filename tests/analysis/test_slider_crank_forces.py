@@ -430,7 +430,7 @@ def test_csv(tmp_path: Path) -> None:
         ({"angles": [[0.0], [1.0, 2.0]]}, "angles"),
         ({"shift": 3.5}, r"shift is 3.5.*ConstantShift"),
         ({"shift": constant_shift(0.1)}, "ConstantShift"),
-        ({"shift": TimeShift(np.sin, np.cos, np.sin), "crank_speed": 0.0}, "not 0 rad/s"),
+        ({"shift": TimeShift(np.sin, np.cos, np.sin), "crank_speed": 0.0}, "other than 0 rad/s"),
         ({"shift": TimeShift(np.sin, np.cos, np.sin), "crank_acceleration": 1.0}, "constant"),
     ],
 )
