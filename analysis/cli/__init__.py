@@ -41,7 +41,7 @@ COMMANDS = {
     "studio": ("studio", "Open a page on which a mechanism moves and can be dragged."),
     "synthesize": ("design", "Find linkages for a path, a function or a motion."),
     "system": ("system", "Wire FMUs to a system: run, check, draw, write SSP."),
-    "tune": ("tuning", "Find the least change that frees a range of speeds."),
+    "tune": ("tuning", "Find the least change that removes resonances from a range."),
     "verify": ("verify", "Run the experiments that an FMU carries, and compare."),
 }
 

@@ -22,13 +22,13 @@ if TYPE_CHECKING:
     "--turns",
     default=4,
     type=click.IntRange(1, 16),
-    help="Greatest number of turns in a period of the motions sought; of gears or several cranks, of common periods.",
+    help="Greatest number of turns in a period of the motions sought; for gears or several cranks, number of common periods.",
 )
 @click.option("--points", default=200, type=click.IntRange(2, 4000), help="Number of starts along each axis.")
 @click.option(
     "--coordinate",
     metavar="NAME",
-    help="Free coordinate whose plane is drawn; by default that in which the motions differ most, or the first with a range.",
+    help="Free coordinate whose plane is drawn; by default the one in which motions differ most, or the first with a range given.",
 )
 @click.option("--position", nargs=2, metavar="FROM TO", help="Range of the coordinate, such as '-5 cm' '5 cm'.")
 @click.option("--rate", nargs=2, metavar="FROM TO", help="Range of the rate of this coordinate.")

@@ -29,11 +29,11 @@ from .common import (
 @click.argument("record", type=click.Path(exists=True, dir_okay=False))
 @click.option("--time", "time", metavar="NAME", help="Column of the times; by default the first.")
 @click.option("--position", metavar="NAME", help="Column of the positions; by default the second.")
-@click.option("--time-unit", help="Unit of the times; by default that in the column's heading, or s.")
+@click.option("--time-unit", help="Unit of the times; by default the unit in the column's heading, or s.")
 @click.option(
     "--unit",
-    help="Unit of the positions, a length or an angle; by default that in the column's heading, or m. It affects the force "
-    "of friction only.",
+    help="Unit of the positions, a length or an angle; by default the unit in the column's heading, or m. It affects only "
+    "the force of friction.",
 )
 @click.option("--from", "first", metavar="TIME", help="Ignore samples before this time, such as '0.2 s': the impulse.")
 @click.option("--to", "last", metavar="TIME", help="Ignore samples after this time.")

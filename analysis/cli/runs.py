@@ -210,7 +210,7 @@ def _with_magnitudes(result: Any) -> Iterator[tuple[str, Any, str]]:
 @click.option(
     "--fmu",
     type=click.Path(dir_okay=False),
-    help="The FMU to check; by default those of every kind of each case's mechanism in build, such as build/FiveBarSlider.fmu.",
+    help="The FMU to check; by default the FMUs of each case's mechanism in the folder build, such as build/FiveBarSlider.fmu.",
 )
 @click.option("--interface", "only", help="co-simulation or model-exchange; by default all that the FMU has.")
 @click.option(
@@ -516,8 +516,8 @@ def _print_fmu(path: Path) -> None:
 @click.command()
 @click.argument("numbers", nargs=-1)
 @common.out_option("out/figures", help="Folder.")
-@common.set_option("rod.length='45 in'; bare numbers are in SI. The verdicts are then on the changed mechanism")
-@click.option("--list", "listing", is_flag=True, help="Only list the figures, with what each is about.")
+@common.set_option("rod.length='45 in'; bare numbers are in SI. The verdicts then apply to the changed mechanism")
+@click.option("--list", "listing", is_flag=True, help="Only list the figures, with their titles and statements.")
 @common.report_errors
 def figures(numbers: Sequence[str], out: str, settings: Sequence[str], listing: bool) -> None:
     """Make the figures of the theses: plots, CSV, and each statement of the thesis with a verdict. Also draw the linkage.

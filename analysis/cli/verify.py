@@ -11,7 +11,9 @@ from .common import CHECK_FAILED, console, print_error, report_errors, show_tabl
 
 @click.command()
 @click.argument("fmu", type=click.Path(exists=True, dir_okay=False))
-@tolerance_option(help="Greatest relative difference; by default that of the FMU, or 100 times the solver's tolerance.")
+@tolerance_option(
+    help="Greatest relative difference; by default the one stated in the FMU, or 100 times the solver's tolerance."
+)
 @click.option("--rebuild", is_flag=True, help="Compile an FMU of Linkwork again from its own sources, and compare.")
 @report_errors
 def verify(fmu: str, tolerance: float | None, rebuild: bool) -> None:

@@ -68,7 +68,11 @@ def _require_range(parameters: Any, low: float, high: float, name: str, first: s
 )
 @common.plot_option
 @common.html_option
-@click.option("--sensitivity", is_flag=True, help="Report the parameters that move each maximum, fold and so on most.")
+@click.option(
+    "--sensitivity",
+    is_flag=True,
+    help="Report which parameters have the greatest effect on each maximum, fold and so on.",
+)
 def resonance(
     chosen: CaseChoice,
     vary: str | None,

@@ -183,7 +183,7 @@ def extrema_near_half(spring: str, stiffness: float) -> tuple[float, float]:
 
 
 def peak_rise(spring: str, order: int) -> float:
-    """Return the relative excess of the amplitude's maximum near 1/order of the natural frequency over the next minimum.
+    """Return the amplitude's maximum near 1/order of the natural frequency divided by the next minimum, minus 1.
 
     The result is 0 without such a maximum.
     """
