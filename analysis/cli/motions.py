@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 @click.option(
     "--coordinate",
     metavar="NAME",
-    help="Free coordinate whose plane is drawn; by default the one in which motions differ most, or the first with a range given.",
+    help="Free coordinate to draw; by default the one in which the motions differ most, or the first if a range is given.",
 )
 @click.option("--position", nargs=2, metavar="FROM TO", help="Range of the coordinate, such as '-5 cm' '5 cm'.")
 @click.option("--rate", nargs=2, metavar="FROM TO", help="Range of the rate of this coordinate.")
