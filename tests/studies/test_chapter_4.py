@@ -8,7 +8,7 @@ import pytest
 from analysis.studies.rules import SMALL
 from analysis.studies.youssef import chapter_4 as study
 from analysis.studies.youssef import conclusions_linear, linearised
-from analysis.youssef import Variant, nonlinear_harmonic_balance, resonance, slider_equation
+from analysis.youssef import Variant, nonlinear_harmonic_balance, slider_equation
 from linkwork.five_bar.published import chapter_4
 from tests import published
 
@@ -18,16 +18,6 @@ from .results import check, every
 @every("4.")
 def test_verdicts_plot_and_data(number: str) -> None:
     check(number)
-
-
-def test_published_resonances() -> None:
-    """The lower roots of the listing and of the right equation, and the listing's upper one at I4 = 1.5."""
-    for ratio, values in published.RESONANCE.items():
-        listed, right = (resonance(chapter_4(ratio), variant=v)[0] for v in (Variant.FORTRAN, Variant.EXACT))
-        assert listed == pytest.approx(values.thesis, abs=5.1e-5)
-        assert right == pytest.approx(values.right, abs=5.1e-5)
-    upper = resonance(chapter_4(1.5), variant=Variant.FORTRAN)[1]
-    assert upper == pytest.approx(published.UPPER_RESONANCE_THESIS, abs=5.1e-5)
 
 
 def test_second_harmonic_is_the_plants() -> None:

@@ -9,9 +9,8 @@ import pytest
 from numpy.typing import NDArray
 
 from analysis.numerics.fourier import FourierSeries
-from analysis.periodic import Drive, Stability, confirm
 from analysis.studies.youssef.chapter_5 import SAME_GROUND, listed_boundaries, with_held_angles, with_same_ground
-from analysis.studies.youssef.damping import determinant_errors, equation_without_factor, removing_damper
+from analysis.studies.youssef.damping import determinant_errors, equation_without_factor
 from analysis.studies.youssef.linearised import with_crank
 from analysis.studies.youssef.regions import (
     appendix_3_region,
@@ -21,7 +20,6 @@ from analysis.studies.youssef.regions import (
     first_order_region,
     hill_region,
     orbit_region,
-    removing_estimate,
 )
 from analysis.youssef import (
     Form,
@@ -33,27 +31,13 @@ from analysis.youssef import (
     slider_equation,
 )
 from linkwork.five_bar.published import chapter_4
-from tests import published
 
-from .results import check, every, result, statement
-
-#: Long runs at I4 = 1.5: omega_c (1/s) and lambda_k^2.
-LONG_DAMPED = ((0.1, 0.2761), (0.1, 0.2785), (0.2, 0.2761))
+from .results import check, every, result
 
 
 @every("5.")
 def test_verdicts_plot_and_data(number: str) -> None:
     check(number)
-
-
-@pytest.mark.parametrize("inertia_ratio", published.FIRST_REGION)
-def test_first_region(inertia_ratio: float) -> None:
-    mechanism = chapter_4(inertia_ratio)
-    for region, ends, tolerance in (
-        (orbit_region(mechanism), published.FIRST_REGION[inertia_ratio], 5.5e-7),
-        (appendix_3_region(mechanism), published.FIRST_REGION_THESIS[inertia_ratio], 5.5e-6),
-    ):
-        assert (region.low, region.high) == pytest.approx(ends, abs=tolerance)
 
 
 @pytest.mark.parametrize(("inertia_ratio", "known"), [(0.5, 2.71), (1.0, 2.59), (1.5, 2.48), (2.0, 2.36)])
@@ -193,35 +177,6 @@ def test_equation_without_the_factor_has_the_same_multipliers_but_for_the_factor
     assert np.sort_complex(np.linalg.eigvals(whole)) == pytest.approx(
         np.sort_complex(factor * np.linalg.eigvals(bare)), rel=1e-7
     )
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize(
-    ("inertia_ratio", "omega_c", "lambda_k2"),
-    [(1.0, 0.0, 0.2662), (1.0, 0.0, 0.26745), (1.0, 0.0, 0.2695), *((1.5, c, x) for c, x in LONG_DAMPED)],
-)
-def test_long_runs(inertia_ratio: float, omega_c: float, lambda_k2: float) -> None:
-    """The nonlinear mechanism from close to its periodic motion: growth by the multiplier, or bounded."""
-    run = confirm(chapter_4(inertia_ratio, omega_c), Drive(speed=crank_speed(lambda_k2)), turns=2000)
-    if run.verdict.stability is Stability.MARGINAL:
-        assert run.deviations.max() < 2.0
-    else:
-        assert run.growth == pytest.approx(1.0 - run.verdict.margin, abs=1e-5)
-
-
-@pytest.mark.slow
-def test_removing_damping() -> None:
-    """By the true orbit, as by the width; at the tip of a boundary it is the boundary's."""
-    (by_listing,) = statement("5.4", "THIS PROG.").cases
-    assert float(by_listing.stated) == pytest.approx(published.REMOVING_DAMPING_THESIS, abs=5e-4)
-    assert by_listing.computed == pytest.approx(published.REMOVING_DAMPING, abs=5e-4)
-    columns = result("5.4").columns
-    assert columns["removing omega_c; true orbit [1/s]"][5] == pytest.approx(
-        removing_estimate(chapter_4(1.5)), rel=0.03
-    )
-    for omega_c in (0.05, 0.1, 0.15):
-        tip = float(np.nanmin(columns[f"I4; omega_c = {omega_c:g} 1/s; boundary 1 [1]"]))
-        assert removing_damper("true orbit", tip).damping == pytest.approx(omega_c, abs=1e-5)
 
 
 def test_zeroth_boundary_parts_a_stable_region_from_falling_away() -> None:
