@@ -3,9 +3,9 @@
     python -m benchmarks.fmu
 
 The mechanism is Table 3.1 at 420 rpm, with steps of 1 ms. In each step all inputs are set and all outputs read. For comparison,
-a trivial slave of PythonFMU has as many variables and does nothing, and the smallest native FMU is a pendulum. Each number is
-the best of several runs. The evaluations of the right-hand side in a step are counted, and timed in a C loop of their own at
-the states at which the steps evaluate them.
+a trivial slave of PythonFMU has the same number of variables and does nothing, and the smallest native FMU is a pendulum. Each
+number is the best of several runs. The evaluations of the right-hand side in a step are counted, and timed in a C loop of their
+own at the states at which the steps evaluate them.
 """
 
 from __future__ import annotations

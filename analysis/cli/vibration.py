@@ -214,7 +214,7 @@ def _range_ends(
 ) -> tuple[float, float]:
     """Return the ends of the range to follow, in SI; by default a range of speeds around the natural frequencies (rad/s).
 
-    These are the frequency of the spring alone, if there is one, or else those of ``modes``, in the mean over a turn.
+    The natural frequency is that of the spring alone, ``natural``; without it the mean frequencies of ``modes`` are used.
     """
     from ..periodic import parameter_unit, speed_names
 

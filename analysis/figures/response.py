@@ -69,8 +69,8 @@ class _Scale:
     """Units and names with which parameter and amplitude are shown.
 
     ``factor`` converts the parameter from SI to its display ``unit``. ``scale`` converts the amplitude from SI to its display
-    unit ``shown``; ``what`` is the short name of the amplitude, ``name`` the long name, ``column`` that in the
-    columns of a branch.
+    unit ``shown``; ``what`` is the short name of the amplitude, ``name`` the long name, ``column`` the name
+    in the columns of a branch.
     """
 
     family: Family

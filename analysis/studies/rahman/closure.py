@@ -175,7 +175,7 @@ def _independent() -> tuple[int, float]:
 def _joint_freedoms() -> tuple[tuple[int, int], ...]:
     """Return the rotations and translations of each joint 1 to 4 by eqs 1 to 4.
 
-    The rank of the derivatives of the joint's matrix counts both, that of the real parts the rotations alone.
+    The rank of the derivatives of the joint's matrix is the number of both, the rank of the real parts that of the rotations.
     """
 
     def ball(th: float, eta: float) -> Dual:

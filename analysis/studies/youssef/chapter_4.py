@@ -75,8 +75,8 @@ DAMPERS = tuple(0.2 * n for n in range(1, 7))
 COMPARED_AT = 0.45
 #: Order of the balance by which harmonics above the second are judged.
 MANY = 10
-#: Speeds (rad/s) so close to each other at the resonances of the first three harmonics that peaks are right to 0.1 %, and
-#: these among others.
+#: Speeds (rad/s) at the resonances of the first three harmonics, so close to each other that peaks are right to 0.1 %;
+#: speeds over the whole range, which include these.
 AT_PEAKS = np.concatenate([np.arange(low, high, 0.002) for low, high in ((9.9, 10.7), (15.0, 15.8), (30.0, 31.3))])
 EVERY = np.unique(np.append(np.arange(9.0, 40.05, 0.1), AT_PEAKS).round(3))
 #: Amplitude above which a speed lies in the region of resonance, and distance (rad/s) from the peak beyond which it lies

@@ -110,7 +110,7 @@ def judge_single_region() -> tuple[Case, Case]:
 def twice_natural() -> float:
     """Return the speed in the middle of the first region divided by the natural frequency.
 
-    Of the inertia ratios in `RATIOS` the one whose result is farthest from 2 is taken.
+    The inertia ratio, of those in `RATIOS`, is the one with the result farthest from 2.
     """
     found = [axis(hill_region(chapter_4(i))) * OMEGA_K / natural_frequency(chapter_4(i)) for i in RATIOS]
     return max(found, key=lambda x: abs(x - 2.0))

@@ -502,7 +502,7 @@ def _one_step_statements() -> list[Statement]:
     """Judge section 2.4 on the Runge-Kutta methods and on series."""
     halved = max(max(ratio, 1.0 / ratio) for ratio in map(runge_kutta_estimate_ratio, STEPS))
     classical, hamming = stable_steps(1j)
-    # as many evaluations: twice the step, with four a step instead of two
+    # the same number of evaluations: four instead of two per step, and steps twice as long
     dearer = {
         f"{approach} approach, Hamming's {_step(step)}": integration_error(
             integrate_by_runge_kutta(2.0 * step, i == 0)[:, 2 - 2 * i]
