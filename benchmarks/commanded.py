@@ -350,7 +350,7 @@ def markdown(table: Table) -> str:
 if __name__ == "__main__":
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     names = tuple(dict.fromkeys(row.master for row in ROWS))
-    parser.add_argument("--master", choices=names, action="append", help="this master alone (repeatable)")
+    parser.add_argument("--master", choices=names, action="append", help="run only this master (repeatable)")
     parser.add_argument("--fmus", type=Path, help="folder of FMUs that are built already")
     chosen = parser.parse_args()
     with tempfile.TemporaryDirectory() as place:

@@ -99,8 +99,10 @@ def measure_other_masters(steps: Sequence[float], stop_time: float, out: Path) -
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--system", choices=tuple(library()), action="append", help="this system alone (repeatable)")
-    parser.add_argument("--masters", action="store_true", help="the other masters alone")
+    parser.add_argument(
+        "--system", choices=tuple(library()), action="append", help="measure only this system (repeatable)"
+    )
+    parser.add_argument("--masters", action="store_true", help="measure only the other masters")
     parser.add_argument("--decades", type=int, default=4, help="decades of steps (default: %(default)s)")
     parser.add_argument("--out", type=Path, default=Path("out"), help="folder of the plots (default: %(default)s)")
     options = parser.parse_args()

@@ -241,8 +241,8 @@ def main(path: Path, names: Sequence[str], budget: float) -> None:
 
 if __name__ == "__main__":
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--budget", type=float, default=BUDGET, help="time of the processor for evolution (s)")
-    parser.add_argument("--target", choices=tuple(targets()), action="append", help="this target alone (repeatable)")
+    parser.add_argument("--budget", type=float, default=BUDGET, help="processor time of evolution (s)")
+    parser.add_argument("--target", choices=tuple(targets()), action="append", help="run only this target (repeatable)")
     parser.add_argument("--results", type=Path, default=RESULTS, help="CSV file with the results")
     given = parser.parse_args()
     main(given.results, given.target or tuple(targets()), given.budget)

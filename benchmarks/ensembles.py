@@ -114,8 +114,10 @@ def report_memory(count: int) -> None:
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--runs", type=int, default=400, help="how many (default: %(default)s)")
-    parser.add_argument("--disk", action="store_true", help="instead the peak of memory of runs that are kept on disk")
+    parser.add_argument("--runs", type=int, default=400, help="number of runs (default: %(default)s)")
+    parser.add_argument(
+        "--disk", action="store_true", help="measure instead the peak memory of runs whose results are kept on disk"
+    )
     options = parser.parse_args()
     n = options.runs
     if options.disk:
@@ -123,7 +125,17 @@ def main() -> None:
         return
     stiffness, some = 500.0 + 1000.0 * np.arange(n) / n, range(0, n, max(1, n // FEW))
     drives = {"speed": 0.5 * SPEED * (1.0 + np.arange(n) / n), "torque": 10.0 * np.arange(n) / n}
-    columns = ("alone", "one by one", "in lanes", "of it compiled", "alone", "one by one", "compiled", "CPU", "clock")
+    columns = (
+        "alone",
+        "one by one",
+        "in lanes",
+        "compiled part",
+        "alone",
+        "one by one",
+        "compiled parts",
+        "CPU",
+        "clock",
+    )
     table = Table(f"{n} runs", *columns, title="microseconds a run; ratios to lanes; two threads")
     for length, stop_time in LENGTHS.items():
         for drive, values in drives.items():

@@ -73,7 +73,7 @@ def linkages(names: list[str]) -> Table:
     table = Table(title="from file; seconds by the clock, of the processor; compilations")
     for heading in (
         "",
-        *("nothing carried", "s", "compiled"),
+        *("no kernels", "s", "compiled"),
         *("empty cache", "s", "compiled"),
         *("another before", "s", "compiled"),
         *("again", "s", "compiled"),
@@ -104,7 +104,7 @@ def main() -> None:
     table = Table(title="seconds by the clock, of the processor; compilations")
     for heading in (
         "",
-        *("nothing carried", "s", "compiled"),
+        *("no kernels", "s", "compiled"),
         *("first", "s", "compiled"),
         *("again", "s", "compiled"),
     ):

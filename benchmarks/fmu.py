@@ -246,7 +246,7 @@ def main() -> None:
         **seconds,
         f"{counted:.2f} bare right-hand sides of {bare * 1e9:.0f} ns": (counted * bare, None),
         "the plant in plain Python, without FMI": (None, least_measurement(time_plain_step)),
-        "in process, compiled, inputs held likewise": (None, least_measurement(time_compiled_step)),
+        "in process, compiled, with held inputs too": (None, least_measurement(time_compiled_step)),
     }
     for what, pair in rows.items():
         table.add_row(what, *("" if value is None else f"{value * 1e6:.2f}" for value in pair))

@@ -139,7 +139,9 @@ def turns_table(turns: float, tolerances: Sequence[float] = TOLERANCES) -> Table
 
     Angles are relative to the result of the balanced method at the tightest tolerance.
     """
-    out = Table("mechanism", "tolerance", "method", "energy residual", "angle, off (rad)", title=f"{turns:g} turns")
+    out = Table(
+        "mechanism", "tolerance", "method", "energy residual", "error of the angle (rad)", title=f"{turns:g} turns"
+    )
     for mechanism in FREE:
         reference = None
         for tolerance in sorted(tolerances):
@@ -155,7 +157,7 @@ def turns_table(turns: float, tolerances: Sequence[float] = TOLERANCES) -> Table
 
 def times_table() -> Table:
     """Tabulate runs that start at 1e9 s."""
-    out = Table("what acts", "tolerance", "difference", "times the steps", title=f"from {LATE:g} s on, beside from 0")
+    out = Table("inputs", "tolerance", "difference", "ratio of steps", title=f"runs from {LATE:g} s on and from 0")
     for what in ACTING:
         for tolerance in TOLERANCES:
             difference, steps = compare_late_run(what, tolerance=tolerance)
@@ -211,8 +213,12 @@ TABLES = {"turns": turns_table, "times": times_table, "angles": angles_table, "f
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("table", choices=TABLES)
-    parser.add_argument("--turns", type=float, default=1e5, help="of the table of turns (default: %(default)g)")
-    parser.add_argument("--tolerances", type=float, nargs="+", default=TOLERANCES, help="of the table of turns")
+    parser.add_argument(
+        "--turns", type=float, default=1e5, help="number of turns, for the table of turns (default: %(default)g)"
+    )
+    parser.add_argument(
+        "--tolerances", type=float, nargs="+", default=TOLERANCES, help="tolerances, for the table of turns"
+    )
     given = parser.parse_args()
     made = turns_table(given.turns, given.tolerances) if given.table == "turns" else TABLES[given.table]()
     Console(width=120).print(made)

@@ -230,7 +230,7 @@ def markdown(table: Table) -> str:
 
 if __name__ == "__main__":
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--master", choices=tuple(RUNS), action="append", help="this master alone (repeatable)")
+    parser.add_argument("--master", choices=tuple(RUNS), action="append", help="run only this master (repeatable)")
     chosen = parser.parse_args().master
     with tempfile.TemporaryDirectory() as place:
         table = {master: find(master, Path(place)) for master in chosen or RUNS}

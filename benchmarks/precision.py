@@ -185,8 +185,10 @@ def cost_picture(rows: list[tuple[int, float, float]]) -> Any:
 
 def main() -> None:
     parser = ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("folder", type=Path, help="where the pictures go")
-    parser.add_argument("--runs", type=int, default=COUNTS[-1], help="most runs of an ensemble (default: %(default)s)")
+    parser.add_argument("folder", type=Path, help="folder for the pictures")
+    parser.add_argument(
+        "--runs", type=int, default=COUNTS[-1], help="greatest number of runs in an ensemble (default: %(default)s)"
+    )
     options = parser.parse_args()
     options.folder.mkdir(parents=True, exist_ok=True)
     console = Console(width=110)
@@ -194,7 +196,7 @@ def main() -> None:
     picture(found).savefig(options.folder / "work-precision.png", dpi=110)
     rows = costs(options.runs)
     cost_picture(rows).savefig(options.folder / "cost-of-runs.png", dpi=110)
-    table = Table("runs", "in lanes", "one after the other", title="time of a run, over that of one alone")
+    table = Table("runs", "in lanes", "one after the other", title="time per run, divided by that of a single run")
     for count, lanes, apart in rows:
         table.add_row(f"{count:,}", f"{lanes:.3f}", f"{apart:.3f}")
     console.print(table)

@@ -313,11 +313,9 @@ def main(path: Path, targets: Sequence[Target], searches: Sequence[str], budget:
 
 if __name__ == "__main__":
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument(
-        "--budget", type=float, default=BUDGET, help="time of the processor for each search and target (s)"
-    )
-    parser.add_argument("--target", action="append", help="this target alone (repeatable)")
-    parser.add_argument("--search", choices=tuple(RACERS), action="append", help="this search alone (repeatable)")
+    parser.add_argument("--budget", type=float, default=BUDGET, help="processor time of each search on each target (s)")
+    parser.add_argument("--target", action="append", help="run only this target (repeatable)")
+    parser.add_argument("--search", choices=tuple(RACERS), action="append", help="run only this search (repeatable)")
     parser.add_argument("--again", choices=tuple(RACERS), action="append", default=[], help="run this search afresh")
     parser.add_argument("--results", type=Path, default=RESULTS, help="CSV file with the results")
     given = parser.parse_args()

@@ -72,8 +72,8 @@ def processor() -> str:
 def main(arguments: Sequence[str] | None = None) -> None:
     """Measure and print the tables."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0] if __doc__ else "")
-    parser.add_argument("--steps", type=int, default=1_000_000, help="steps as fast as they go")
-    parser.add_argument("--seconds", type=float, default=10.0, help="length of a run at a rate")
+    parser.add_argument("--steps", type=int, default=1_000_000, help="number of steps of the run as fast as possible")
+    parser.add_argument("--seconds", type=float, default=10.0, help="length of each run at a fixed rate (s)")
     options = parser.parse_args(arguments)
     console = Console(width=120)
     wiring = load_system(library()["motor-tracking"]).wiring()
@@ -89,7 +89,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     table = Table(title=f"{wiring.title}: a communication step of the C program, microseconds, on {processor()}")
     for heading in ("run", "steps", *(p.replace("%", " %") for p in PERCENTILES)):
         table.add_column(heading, justify="left" if heading == "run" else "right")
-    rows = {f"as fast as it goes, {1e3 * wiring.step:g} ms": free}
+    rows = {f"as fast as possible, {1e3 * wiring.step:g} ms": free}
     rows |= {f"{rate / 1000:g} kHz{way}": run for (way, rate), run in paced.items()}
     for what, run in rows.items():
         table.add_row(what, f"{run['steps']:.0f}", *(f"{run[f'step_us_{p}']:.1f}" for p in PERCENTILES))

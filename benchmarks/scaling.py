@@ -90,7 +90,7 @@ def import_packages(_: int) -> None:
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--repeats", type=int, default=3, help="of each time (default: %(default)s)")
+    parser.add_argument("--repeats", type=int, default=3, help="repetitions of each measurement (default: %(default)s)")
     repeats = parser.parse_args().repeats
     backends = (None, "loky", "dask")
     places = ("one worker", "two processes", "two workers of Dask")

@@ -138,6 +138,6 @@ def main(points: int = POINTS, cores: int = 2) -> None:
 if __name__ == "__main__":
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--points", type=int, default=POINTS, help="points along each axis")
-    parser.add_argument("--cores", type=int, default=2, help="processes; the time of the processor for 1")
+    parser.add_argument("--cores", type=int, default=2, help="number of processes; with 1, processor time is measured")
     given = parser.parse_args()
     main(given.points, given.cores)

@@ -277,9 +277,7 @@ def kernel_table() -> Table:
 
 def contest_table(names: Sequence[str], budget: float, console: Console) -> Table:
     """Measure and return the second table, of the searches on the problems of chapter VI."""
-    table = Table(
-        title=f"problems of chapter VI; {budget:g} s for each search but ours; one core but where two are named"
-    )
+    table = Table(title=f"problems of chapter VI; {budget:g} s for each other search; one core unless two are named")
     for heading in ("problem", "search", "error", "s to the goal", "s to 1 % of the best", "times synthesize"):
         table.add_column(heading, justify="left" if heading in ("problem", "search") else "right")
     for name in names:
@@ -310,7 +308,7 @@ def _seconds(value: float) -> str:
 
 def start_table() -> Table:
     """Measure and return the third table, of the results from many starts."""
-    table = Table(title=f"ellipse a with bounds alone, {STARTS} starts")
+    table = Table(title=f"ellipse a with bounds only, {STARTS} starts")
     for heading in ("path", "starts", "method", "at the optimum", "ms a start", "times least squares"):
         table.add_column(heading, justify="left" if heading in ("path", "starts", "method") else "right")
     for weighted in (False, True):
@@ -352,7 +350,9 @@ def main(budget: float = BUDGET, names: Sequence[str] = tuple(PROBLEMS)) -> None
 
 if __name__ == "__main__":
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--budget", type=float, default=BUDGET, help="time of each search but ours on each problem (s)")
-    parser.add_argument("--problem", choices=tuple(PROBLEMS), action="append", help="this problem alone (repeatable)")
+    parser.add_argument("--budget", type=float, default=BUDGET, help="time of each other search on each problem (s)")
+    parser.add_argument(
+        "--problem", choices=tuple(PROBLEMS), action="append", help="run only this problem (repeatable)"
+    )
     arguments = parser.parse_args()
     main(arguments.budget, arguments.problem or tuple(PROBLEMS))
