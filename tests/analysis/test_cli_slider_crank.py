@@ -13,7 +13,6 @@ import pytest
 from matplotlib.text import Text
 
 from analysis import cli, figures
-from analysis.cli import slider_crank
 from analysis.run import save_parameters
 from analysis.slider_crank import ConstantShift, dual_dynamics, force_turn
 from analysis.units import INCH
@@ -22,8 +21,6 @@ from linkwork.slider_crank.published import CRANK_SPEED, parameters
 from tests import published_rahman as rahman
 
 from .conftest import csv
-
-COMMANDS = ("info", "forces", "tolerances", "dual", "picture")
 
 
 @pytest.fixture
@@ -39,14 +36,6 @@ def rows(output):
         if len(cells) > 1:
             found[cells[0]] = cells[1:]
     return found
-
-
-@pytest.mark.parametrize("command", [[], *([name] for name in COMMANDS)])
-def test_help_shows_examples(linkwork, command):
-    result = linkwork(*command, "--help")
-    assert result.exit_code == 0
-    assert "Examples:" in result.output
-    assert set(slider_crank.slider_crank.commands) == set(COMMANDS)
 
 
 class TestInfo:
