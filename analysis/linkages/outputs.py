@@ -64,9 +64,15 @@ class Outputs:
             shown = f"*POSITION, {_DEGREES}" if turn else "*POSITION"
             yield Output(drive.coordinate, drive.unit, text, shown, f"x[{k}]")
             shown = f'*RATE, rate_of="{drive.coordinate}"{display_argument(rate_unit)}'
-            yield Output(drive.rate, rate_unit, "Its rate", shown, f"x[{n + k}]")
+            yield Output(drive.rate, rate_unit, f"Rate of the freedom {drive.name}", shown, f"x[{n + k}]")
             of = f'rate_of="{drive.rate}"'
-            yield Output(f"{drive.name}.acceleration", f"{rate_unit}2", "Its acceleration", of, f"m.accelerations[{k}]")
+            yield Output(
+                f"{drive.name}.acceleration",
+                f"{rate_unit}2",
+                f"Acceleration of the freedom {drive.name}",
+                of,
+                f"m.accelerations[{k}]",
+            )
         for k, drive in enumerate(self.interface.drives):
             if drive.table:
                 text = f"The {drive.load} that drives {drive.name}: given, or as the commanded rate requires"
@@ -86,7 +92,8 @@ class Outputs:
             text = f"Position of the {block} on the line of {name}"
             yield Output(f"{name}.position", "m", text, "*POSITION", f"{name}_position")
             rest = f'*RATE, rate_of="{name}.position"'
-            yield Output(f"{name}.velocity", "m/s", "Its rate", rest, f"{name}_velocity")
+            text = f"Velocity of the {block} on the line of {name}"
+            yield Output(f"{name}.velocity", "m/s", text, rest, f"{name}_velocity")
         for name, spring in self.description.springs.items():
             shown = f"*POSITION, {_DEGREES}"
             if name not in self.motion.counted:
@@ -96,7 +103,7 @@ class Outputs:
                 free = f" + p.{name}_free_length" if is_given(spring.free) else ""
                 yield Output(f"{name}.length", "m", f"Length of {name}", "*POSITION", f"s.{name}_stretch{free}")
             elif spring.at and name not in self.motion.along and self.interface.twisted_bodies(spring):
-                text = f"Angle of {spring.at} from that at which {name} is free"
+                text = f"Angle of {spring.at} minus the angle at which {name} is free"
                 yield Output(spring_angle_name(self.description, name), "rad", text, shown, f"s.{name}_stretch")
             elif spring.bodies:
                 text = f"Angle by which {name} is twisted"
@@ -131,7 +138,7 @@ class Outputs:
             text = f"Angle between the {one} and the normal of the line of {dyad.sides[1].joint.name}"
             return text, f"transmission_to_normal({pins[0]}, b.at_{c}, {lines[0]})"
         if dyad.kind == "RPR":
-            text = f"Angle between the line of {c} and the normal of that from pin to pin"
+            text = f"Angle between the line of {c} and the normal of the line from pin to pin"
             return text, f"transmission_to_normal({pins[0]}, {pins[1]}, b.{c}_line)"
         if isinstance(dyad.inner, Slider):
             lines.append(f"b.{c}_line")

@@ -164,8 +164,8 @@ def choice(name: str, description: str, start: int, least: int, greatest: int) -
 
 
 def crank_start(angle: str, speed: float, replaced: str) -> tuple[Variable, Variable]:
-    """Return the parameters of the crank's angle and speed at the start; ``replaced`` says when drive.speed takes its place."""
-    text = f"Crank speed at the start; {replaced} drive.speed takes its place"
+    """Return the parameters of the crank's angle and speed at the start; ``replaced`` says when drive.speed replaces it."""
+    text = f"Crank speed at the start; replaced by drive.speed {replaced}"
     return (
         Variable("initial.crank_angle", "parameter", "rad", "Crank angle at the start", angle, display="deg"),
         Variable("initial.crank_speed", "parameter", "rad/s", text, rf"\dot{angle}", speed, display="rpm"),
@@ -185,7 +185,7 @@ def speed_inputs(angle: str, start: float) -> tuple[Variable, Variable]:
 def crank_outputs(angle: str) -> tuple[Variable, Variable, Variable]:
     """Return the outputs of angle, speed and acceleration of the crank; ``angle`` is the symbol of the crank angle."""
     return (
-        output("crank.angle", "rad", "Crank angle, counted on over full turns", angle, *POSITION, display="deg"),
+        output("crank.angle", "rad", "Crank angle, continuous over full turns", angle, *POSITION, display="deg"),
         output("crank.speed", "rad/s", "Crank speed", rf"\dot{angle}", *RATE, display="rpm", rate_of="crank.angle"),
         output("crank.acceleration", "rad/s2", "Crank acceleration", rf"\ddot{angle}", rate_of="crank.speed"),
     )
@@ -196,7 +196,7 @@ def energy_outputs(potential: str, dissipated: str, supplied: str) -> tuple[Vari
 
     The arguments say in words where potential energy, dissipated work and supplied work come from.
     """
-    balance = "Energy balance: gained plus dissipated less supplied; zero but for error"
+    balance = "Energy balance: gained plus dissipated less supplied; zero apart from numerical errors"
     return (
         output("energy.kinetic", "J", "Kinetic energy of all links", "", *RATE, minimum=0.0),
         output("energy.potential", "J", f"Potential energy of {potential}", "", "state"),

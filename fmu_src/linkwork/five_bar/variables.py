@@ -37,9 +37,9 @@ PARAMETERS = (
     _centre("crank.cog_distance", "m", "Centre of mass of the crank, distance from A", "l_{G2}"),
     _centre("coupler.cog_distance", "m", "Centre of mass of the coupler, distance from the crank pin B", "l_{G3}"),
     _centre("rocker.cog_distance", "m", "Centre of mass of the rocker, distance from the slider pin D", "l_{G4}"),
-    _centre("crank.cog_angle", "rad", "Direction of the crank's centre of mass from A to B", "\\nu_2"),
-    _centre("coupler.cog_angle", "rad", "Direction of the coupler's centre of mass from B to C", "\\nu_3"),
-    _centre("rocker.cog_angle", "rad", "Direction of the rocker's centre of mass from D to C", "\\nu_4"),
+    _centre("crank.cog_angle", "rad", "Angle of the crank's centre of mass from the direction A to B", "\\nu_2"),
+    _centre("coupler.cog_angle", "rad", "Angle of the coupler's centre of mass from the direction B to C", "\\nu_3"),
+    _centre("rocker.cog_angle", "rad", "Angle of the rocker's centre of mass from the direction D to C", "\\nu_4"),
     _parameter("slider.guide_angle", "rad", "Direction of the slider's guide from the ground link", "\\alpha"),
     _parameter("slider.stiffness", "N/m", "Stiffness of the spring on the slider", "k", "stiffness", _SLIDE),
     _parameter("slider.spring_free_position", "m", "Slider position at which the spring is free", "u_0", role="spring"),
@@ -50,7 +50,7 @@ PARAMETERS = (
     _parameter(
         "slider.friction_coefficient",
         "1",
-        "Friction of the guide relative to its force, smooth about rest",
+        "Friction in the guide per unit of guide force, smooth about rest",
         "\\mu_g",
         "friction",
     )._replace(nominal=0.1),
@@ -58,14 +58,14 @@ PARAMETERS = (
         _parameter(
             f"pin.{pin}_friction_radius",
             "m",
-            f"Moment of friction in pin {pin} relative to its force: coefficient of friction times radius",
+            f"Moment of friction in pin {pin} per unit of pin force: coefficient of friction times radius",
             f"\\rho_{pin}",
             "friction",
         )._replace(nominal=1e-3)
         for pin in "ABCD"
     ),
     _parameter("coupler.point_distance", "m", "Coupler point P, distance from the crank pin B", "r"),
-    _parameter("coupler.point_angle", "rad", "Direction of the coupler point P from B to C", "a_2"),
+    _parameter("coupler.point_angle", "rad", "Angle of the coupler point P from the direction B to C", "a_2"),
     _parameter("gravity", "m/s2", "Acceleration of gravity", "g", role="gravity"),
     _parameter(
         "ground.inclination", "rad", "Angle of the ground link above the horizontal", "\\alpha_1", role="gravity"

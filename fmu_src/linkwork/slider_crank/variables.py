@@ -49,7 +49,9 @@ PARAMETERS = (
     _centre("rod.cog_distance", "m", "Centre of mass of the rod, distance from the crank pin"),
     _centre("slider.cog_x", "m", "Centre of mass of the slider from its pin, along the common normal (i of frame 4)"),
     _centre("slider.cog_y", "m", "Centre of mass of the slider from its pin, across guide and common normal (j)"),
-    _centre("slider.cog_z", "m", "Centre of mass of the slider from its pin, along the guide against its position (k)"),
+    _centre(
+        "slider.cog_z", "m", "Centre of mass of the slider from its pin, along the guide, opposite to its position (k)"
+    ),
     _parameter("slider.stiffness", "N/m", "Stiffness of the spring on the slider", "", "stiffness", "slider.position"),
     _parameter("slider.spring_free_position", "m", "Slider position at which its spring is free", role="spring"),
     _parameter("slider.damping", "N.s/m", "Viscous damping of the slider", "", "damping", "slider.position"),
@@ -62,7 +64,7 @@ PARAMETERS = (
     _parameter("shift.spring_free_position", "m", "Axial shift at which its spring is free", role="spring"),
     _parameter("shift.damping", "N.s/m", "Viscous damping of the axial shift", "", "damping", "shift.position"),
     _parameter("groove.amplitude", "m", "Amplitude of the shift that a groove makes; axial.mode 2", "S_{S1}"),
-    _parameter("groove.ratio", "1", "Periods of that shift in a turn of the crank; axial.mode 2", "\\alpha"),
+    _parameter("groove.ratio", "1", "Periods of the groove's shift per turn of the crank; axial.mode 2", "\\alpha"),
     _parameter("gravity.x", "m/s2", "Acceleration of gravity along x of the ground frame", role="gravity"),
     _parameter("gravity.y", "m/s2", "Acceleration of gravity along y of the ground frame", role="gravity"),
     _parameter(
@@ -88,7 +90,7 @@ PARAMETERS = (
         "initial.shift_position",
         "parameter",
         "m",
-        "Axial shift at the start; where axial.mode is 2 the groove's takes its place",
+        "Axial shift at the start; replaced by the groove's where axial.mode is 2",
         "S_1",
         _INITIAL.shift_position,
     ),
@@ -96,7 +98,7 @@ PARAMETERS = (
         "initial.shift_velocity",
         "parameter",
         "m/s",
-        "Axial velocity at the start; where axial.mode is 1 axial.speed takes its place, where it is 2 the groove's",
+        "Axial velocity at the start; replaced by axial.speed where axial.mode is 1, by the groove's where it is 2",
         "\\dot S_1",
     ),
     tolerance_parameter(),
@@ -120,7 +122,7 @@ INPUTS = (
         "Rate of change of the axial velocity over a step; used where axial.mode is 1",
         "\\ddot S_1",
     ),
-    Variable("slider.load", "input", "N", "Force on the slider along the guide, in the direction of its position"),
+    Variable("slider.load", "input", "N", "Force on the slider along the guide, positive where its position increases"),
 )
 
 
@@ -145,7 +147,7 @@ OUTPUTS = (
     output("slider.acceleration", "m/s2", "Slider acceleration", "\\ddot S_4", rate_of="slider.velocity"),
     *_vector("crank_pin.", "m", "Crank pin", *POSITION),
     *_vector("slider_pin.", "m", "Slider pin", *POSITION),
-    *_vector("rod.w", "rad/s", "Angular velocity of the rod, none about itself", *RATE),
+    *_vector("rod.w", "rad/s", "Angular velocity of the rod, without spin about its own line", *RATE),
     output(
         "drive.applied_torque",
         "N.m",
@@ -157,12 +159,12 @@ OUTPUTS = (
     output(
         "axial.applied_force",
         "N",
-        "Force of what drives the shift; where axial.mode is 1 or 2 the force that holds it",
+        "Axial force of the drive; where axial.mode is 1 or 2 the force that holds the shift",
         role="drive",
         of="shift.position",
     ),
-    *_vector("bearing.f", "N", "Force on the crank of bearing, axial drive, shift spring and damper together"),
-    *_vector("bearing.m", "N.m", "Moment about O on the crank of bearing, drive and groove together"),
+    *_vector("bearing.f", "N", "Total force on the crank of bearing, axial drive, shift spring and damper"),
+    *_vector("bearing.m", "N.m", "Total moment about O on the crank of bearing, drive and groove"),
     *_vector("crank_pin.f", "N", "Force of the crank on the rod"),
     *_vector("slider_pin.f", "N", "Force of the slider on the rod"),
     *_vector("guide.f", "N", "Force of the guide on the slider, across the guide"),
