@@ -115,10 +115,15 @@ def solve(
     grooved = 1.0 if groove else 0.0
     inputs = Inputs(1.0, 1.0 - grooved, grooved, 0.0, acceleration, 0.0, shift.acceleration, 0.0)
     ratio = k.kth + grooved * f.groove(angle, p).pitch * k.ks
-    load = (f.motion(q, k, x, inputs, p).torque - given) / ratio if torque else given
-    inputs = inputs._replace(load=load)
+    if not torque:
+        inputs = inputs._replace(load=given)
     m = f.motion(q, k, x, inputs, p)
-    return Solution(q, k, m, f.reactions(q, x, m, inputs, p), load, ratio)
+    if torque:
+        inputs = inputs._replace(load=(m.torque - given) / ratio)
+        loaded = f.motion(q, k, x, inputs, p)
+        # the load changes no acceleration; in their formulas an infinite one, times 0, would give NaN
+        m = m._replace(torque=loaded.torque, force=loaded.force, groove_force=loaded.groove_force)
+    return Solution(q, k, m, f.reactions(q, x, m, inputs, p), inputs.load, ratio)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -31,6 +31,7 @@ from analysis.slider_crank import (
     force_turn,
     joint_loads,
     ranges,
+    sensitivities,
 )
 from linkwork.errors import AssemblyError, InputError, ParameterError
 from linkwork.slider_crank import dynamics, kinematics
@@ -271,6 +272,13 @@ def test_at_a_dead_centre_values_are_masked_with_the_reason() -> None:
     assert "no lever" in turn.mask_reasons[0]
     assert [c.crank_angle for c in turn.dead_centres] == pytest.approx([0.5 * pi, 1.5 * pi], abs=1e-12)
     assert turn.vector("guide_moment")[90].tolist() == [0.0, 0.0, 0.0]
+    # a guide along the crank axis: the lever is exactly zero, and what needs no force is still known
+    still = force_turn(parameters(0.0, 0.0), crank_speed=CRANK_SPEED, torque=CRANK_TORQUE)
+    assert still.without_lever
+    assert abs(still.slider_acceleration).max() < 1e-12
+    assert abs(still.vector("guide_moment").filled()).max() == 0.0
+    exact = sensitivities(still, ("guide.offset",), ("slider.acceleration", "guide.mx"))
+    assert all(np.isfinite(exact.derivative(name, "guide.offset")).all() for name in exact.values)
     # with the load given the same configuration is like any other
     free = force_turn(ideal, crank_speed=CRANK_SPEED)
     assert not any(np.ma.getmaskarray(free.vector(name)).any() for name in JOINTS)
