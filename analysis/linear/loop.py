@@ -486,9 +486,9 @@ class _Linear:
         self.forces, self.own = forces, forces.index(self.mechanism.input_names.index(channel))
         still, acting = one.state[:n], one.channels[forces]
         self.motion: Callable[[float], FloatArray] = lambda t: still
-        self.acting = acting
+        self.acting: Callable[[float], FloatArray] = lambda t: acting
         if isinstance(model, PeriodicModel):
-            self.motion = model.motion()
+            self.motion, self.acting = model.motion(), model.interpolate(model.channels[:, forces])
         if isinstance(model, LinearModel) or averaged:
             a, b = one.A, one.B
             self.a: Callable[[float], FloatArray] = lambda t: a
@@ -498,7 +498,7 @@ class _Linear:
         self.rate = float(np.abs(np.linalg.eigvals(model.A)).max())
         self.x = deviation
         self.t = 0.0
-        self.w = np.zeros(len(forces))
+        self.held: dict[int, float] = {}
 
     def measure(self) -> Sequence[float]:
         values = self.motion(self.t).copy()
@@ -506,19 +506,20 @@ class _Linear:
         return [float(value) for value in values]
 
     def act(self, time: float, ahead: float, measured: Sequence[float], force: float) -> None:
-        held = self.acting.copy()
         if self.encoded is not None:
             x = np.array([*measured, 0.0, 0.0])
-            held = sample(self.encoded, time, x, self.encoded.source.laws)[self.forces]
-        held[self.own] = force
-        self.w = held - self.acting
+            self.held = dict(enumerate(sample(self.encoded, time, x, self.encoded.source.laws)[self.forces]))
+        self.held[self.own] = force
 
     def step(self, time: float, step: float) -> tuple[int, str]:
         count = max(1, ceil(step * self.rate / FINE_STEP))
         h = step / count
 
         def rates(t: float, x: FloatArray) -> FloatArray:
-            change: FloatArray = self.a(t) @ x + self.b(t)[:, : len(self.w)] @ self.w
+            # forces that are not held are those of the motion
+            held = list(self.held)
+            w = np.array(list(self.held.values())) - self.acting(t)[held]
+            change: FloatArray = self.a(t) @ x + self.b(t)[:, held] @ w
             return change
 
         for number in range(count):

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from scipy.linalg import expm
 
-from analysis import Inputs, simulate, steps
+from analysis import Harmonics, Inputs, simulate, steps
 from analysis import linear as lin
 from analysis.units import RAD_S_PER_RPM
 from linkwork.errors import InputError, ParameterError, UnknownNameError
@@ -82,6 +82,15 @@ def test_lqr_of_a_heavy_force_only_moves_the_unstable_poles() -> None:
     mirrored = np.where(model.poles.real > 0.0, -model.poles.conj(), model.poles)
     # of the two nearly equal real poles the product and sum are what is determined
     assert np.poly(design.poles) == pytest.approx(np.poly(mirrored), rel=1e-6)
+
+
+def test_lqr_weighs_outputs(hanging) -> None:
+    """H' H has zeros as eigenvalues, rounded to either side; x' Q x is that of the symmetric part of Q."""
+    rows = np.random.default_rng(0).normal(size=(8, 1, 4)) * [1.0, 30.0, 0.3, 10.0]
+    for h in rows:
+        design = lin.design_lqr(hanging, 1e6 * h.T @ h)
+        skew = np.triu(np.ones((4, 4)), 1)
+        assert lin.design_lqr(hanging, 1e6 * h.T @ h + skew - skew.T).gains == pytest.approx(design.gains, rel=1e-6)
 
 
 def test_pid_has_the_poles_asked_for(held) -> None:
@@ -349,6 +358,30 @@ def test_without_control_the_periodic_model_repeats_the_motion(resonant) -> None
     assert run.position[:100] == pytest.approx(run.position[100:200], abs=1e-12)
     motion = lin.settled_motion(p, turning, samples=100)
     assert run.position[:100] == pytest.approx(motion[:, 1], abs=1e-8)
+
+
+def test_the_loop_departs_from_a_motion_that_forces_drive() -> None:
+    """Forces of the motion that act in the loop cause no deviation; the controller's force takes the place of the motion's."""
+    p, speed = replace(TABLE_3_1, slider_damping=30.0), 20.0
+    load = Inputs(speed=speed, load_y=Harmonics(0.0, [0.5], [speed], [0.3]))
+    driven = load.replace(force=Harmonics(0.0, [0.05], [speed], [0.0]))
+    period, samples = 2.0 * pi / speed, 32
+    last = period * (10 + np.arange(samples) / samples)
+    run = simulate(p, driven, samples=np.append(0.0, last), tolerance=1e-12)
+    states = np.column_stack(
+        [run[name][1:] for name in ("crank.angle", "slider.position", "crank.speed", "slider.velocity")]
+    )
+    states[:, 0] -= 20.0 * pi
+    models = lin.linearise_orbit(p, states, driven, period=period)
+    none = {"gains": np.zeros(2), "integral_gain": 0.0, "force_slope": 0.0}
+    idle = lin.SampledController(replace(lin.design_pid(models.mean(), bandwidth=50.0), **none), period / 100.0)
+    th2, u, w2, v = states[0].tolist()
+    initial = InitialState(crank_angle=th2, slider_position=u, crank_speed=w2, slider_velocity=v)
+    loop = lin.control_loop(p, idle, 0.0, load, initial=initial, stop_time=period)
+    departed = np.abs(loop.position - [models.motion()(t)[1] for t in loop.time]).max()
+    for forces in (load, None):
+        linear = lin.predict_loop(models, idle, 0.0, forces, stop_time=period)
+        assert lin.largest_difference(loop, linear) < 0.02 * departed
 
 
 def test_the_fmu_runs_the_same_loop(fmu, held) -> None:
