@@ -201,7 +201,8 @@ class LoopResult:
         """Controlled coordinate (m) at the sampling times, shape (n,)."""
         return self.states[:, : self.states.shape[1] // 2][:, self.freedom]
 
-    def end(self, window: float) -> NDArray[np.bool_]:
+    @in_si(window="s")
+    def end(self, window: Amount) -> NDArray[np.bool_]:
         """Return a mask of the samples in a window of given length (s) at the end of the run.
 
         Raises
@@ -213,7 +214,8 @@ class LoopResult:
             raise InputError(f"the run did not reach its end: {self.message}")
         return np.asarray(self.time > self.time[-1] - window * (1.0 - 1e-9))
 
-    def metrics(self, *, band: float, start: float = 0.0, window: float | None = None) -> LoopMetrics:
+    @in_si(band="m", start="s", window="s")
+    def metrics(self, *, band: Amount, start: Amount = 0.0, window: Amount = None) -> LoopMetrics:
         """Compute settling time, overshoot, force and tracking error.
 
         Parameters
@@ -539,7 +541,7 @@ def predict_loop(
     reference: Reference,
     inputs: Inputs | None = None,
     *,
-    stop_time: float,
+    stop_time: Amount,
     deviation: ArrayLike | None = None,
     averaged: bool = False,
 ) -> LoopResult:

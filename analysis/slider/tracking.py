@@ -38,6 +38,7 @@ from ..linear import (
 )
 from ..numerics.fourier import FourierSeries
 from ..run import Function, Inputs
+from ..units import Amount, in_si
 from .inverse import FloatArray, Load, check_speed, inverse_dynamics, load_at_angle, slider_force
 
 
@@ -69,16 +70,17 @@ class TrackingController:
 
     channel = "slider.force"
 
+    @in_si(period="s", limit="N")
     def __init__(
         self,
         parameters: FiveBarParameters,
         slider: FourierSeries,
-        period: float,
+        period: Amount,
         *,
         design: Design | None = None,
         feedforward: bool = True,
         load: Load = (0.0, 0.0),
-        limit: float = inf,
+        limit: Amount = inf,
     ) -> None:
         check_period(period)
         if design is None and not feedforward:
@@ -199,10 +201,11 @@ class TrackingResult:
         )
 
 
+@in_si(crank_speed="rad/s")
 def track(
     controller: TrackingController,
     *,
-    crank_speed: float,
+    crank_speed: Amount,
     revolutions: float = 10.0,
     plant: FiveBarParameters | None = None,
     load: Load = (0.0, 0.0),

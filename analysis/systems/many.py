@@ -21,6 +21,7 @@ from ..display import format_count
 from ..files import unknown_name
 from ..numerics.workers import WorkersLost, record_interrupts, run_in_parallel
 from ..run import CosimulationError, show_progress
+from ..units import Amount, in_si
 from .master import count_steps, run_system
 from .wiring import End, Part, Wiring
 
@@ -93,14 +94,15 @@ class _Task(NamedTuple):
     run: tuple[str, float, float, int]
 
 
+@in_si(step="s", stop_time="s")
 def run_many(
     wiring: Wiring,
     vary: Mapping[str, ArrayLike],
     outputs: Sequence[str],
     *,
     coupling: str = "hold",
-    step: float | None = None,
-    stop_time: float | None = None,
+    step: Amount = None,
+    stop_time: Amount = None,
     every: int = 1,
     folder: str | Path | None = None,
     n_jobs: int | None = None,

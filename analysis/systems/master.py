@@ -22,6 +22,7 @@ from linkwork.errors import InputError
 from ..files import unknown_name
 from ..numerics.workers import record_interrupts
 from ..run import CosimulationError, RunInterrupted, show_progress, unwrap
+from ..units import Amount, in_si
 from .instances import Floats, make_instance
 from .wiring import Bond, End, Wiring
 
@@ -298,12 +299,13 @@ class _Stepper:
         self.before = error
 
 
+@in_si(step="s", stop_time="s")
 def run_system(
     wiring: Wiring,
     *,
     coupling: str = "hold",
-    step: float | None = None,
-    stop_time: float | None = None,
+    step: Amount = None,
+    stop_time: Amount = None,
     share: float | None = None,
     progress: bool = False,
 ) -> SystemRun:

@@ -132,6 +132,8 @@ def test_amounts_are_texts_with_units_and_a_name_stands_alone(held) -> None:
         lin.predict_loop(held, one, where, stop_time=0.02) for one, where in ((words, "5 mm"), (numbers, 5e-3))
     ]  # fmt: skip
     assert np.array_equal(runs[0].force, runs[1].force)
+    metrics = runs[0].metrics(band="1 mm", start="5 ms", window="4 ms")
+    assert metrics == runs[0].metrics(band=1e-3, start=5e-3, window=4e-3)
     assert np.array_equal(design.sampled_poles("1 ms"), design.sampled_poles(1e-3))
     with pytest.raises(ParameterError, match="limit is '20 mm': it must be a number in N"):
         lin.SampledController(design, 1e-3, limit="20 mm")

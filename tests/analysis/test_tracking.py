@@ -165,7 +165,7 @@ def test_feedback_alone_holds_a_still_slider_as_the_control_loop_does(model) -> 
 
 
 def test_a_controller_starts_each_run_afresh(pid) -> None:
-    controller = TrackingController(RIG, MOTION, PERIOD, design=pid)
+    controller = TrackingController(RIG, MOTION, "1 ms", design=pid, limit="2 kN")
     options = {"initial": InitialState(crank_speed=SPEED), "stop_time": 0.05}
     first, second = (control_loop(RIG, controller, 0.0, Inputs(speed=SPEED), **options).force for _ in range(2))
     assert np.array_equal(first, second)
