@@ -25,7 +25,7 @@ from linkwork.errors import InputError, LinkworkError
 from ..files import unknown_name
 from ..libraries import lazy
 from ..mechanisms import variable_unit
-from ..run import Function, require_kind
+from ..run import Function, float_array, require_kind
 from ..units import Amount, in_si, si
 from .model import FloatArray, LinearModel, LinearModelError, as_names, signal_name, sort_by_magnitude
 
@@ -304,7 +304,7 @@ def design_lqr(
             if name not in names:
                 raise unknown_name(name, names)
         q = [q.get(name, 0.0) for name in names]
-    weights = np.array(q, dtype=float)
+    weights = float_array(q, f"weights {q!r}: they must be numbers")
     if weights.ndim == 1:
         weights = np.diag(weights)
     n = len(names)
@@ -331,13 +331,13 @@ def design_lqr(
     return _design("LQR", model, plant.channel, gains[:n], float(gains[n]) if integral else 0.0)
 
 
-@in_si(bandwidth="rad/s")
+@in_si(bandwidth="rad/s", damping="1")
 def design_pid(
     model: LinearModel,
     *,
     poles: Sequence[complex] | None = None,
     bandwidth: Amount = None,
-    damping: float = 0.7,
+    damping: Amount = 0.7,
     channel: str | None = None,
 ) -> Design:
     """Design a PID controller from the three poles of the closed loop; the derivative part acts on the measured velocity.
@@ -380,7 +380,10 @@ def design_pid(
             raise DesignError(f"damping is {damping}: it must be above 0 and at most 1")
         pair = bandwidth * complex(-damping, (1.0 - damping**2) ** 0.5)
         poles = [-bandwidth, pair, pair.conjugate()]
-    wanted = np.array(poles, dtype=complex)
+    try:
+        wanted = np.array(poles, dtype=complex)
+    except (TypeError, ValueError):
+        raise DesignError(f"poles {poles!r}: they must be three complex numbers (1/s)") from None
     polynomial = np.poly(wanted) if wanted.shape == (3,) else np.array([1j])
     if not np.all(np.isreal(polynomial)) or wanted.real.max() >= 0.0:
         raise DesignError(

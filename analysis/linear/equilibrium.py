@@ -23,7 +23,7 @@ from linkwork.parameters import fmi_name
 from ..files import unknown_name
 from ..mechanisms import InitialState, Parameters, find_mechanism, variable_units
 from ..numerics import symbolic
-from ..run import Inputs, check_run, expressions, takes_published
+from ..run import Inputs, check_run, expressions, float_array, takes_published
 from ..units import Amount, in_si
 from .model import FloatArray, Layout, Modes, layout, sample_channels
 
@@ -400,9 +400,10 @@ def find_equilibrium(
     """
     if guess is not None:
         balance, coordinates = _balance_with_held(parameters, inputs, held)
-        start = np.array(guess, dtype=float)
+        wanted = f"a guess {guess}: it must be {len(coordinates)} finite numbers"
+        start = float_array(guess, wanted)
         if start.shape != coordinates.shape or not np.all(np.isfinite(start)):
-            raise InputError(f"a guess {guess}: it must be {len(coordinates)} finite numbers")
+            raise InputError(wanted)
         fixed = layout(balance.mechanism, tuple(balance.inputs.modes(balance.mechanism).values())).commanded
         start[list(fixed)] = coordinates[list(fixed)]
         state = [*start.tolist(), *[0.0] * (balance.mechanism.size - len(start))]

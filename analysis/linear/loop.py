@@ -29,13 +29,15 @@ from ..run import (
     complete_initial_state,
     complete_inputs,
     encode,
+    float_array,
+    require_kind,
     sample,
     sample_times,
     takes_published,
 )
 from ..units import Amount, in_si, si
 from .design import Design, check_period
-from .model import FloatArray, LinearModel
+from .model import FloatArray, LinearModel, sample_channels
 from .periodic import PeriodicModel
 
 #: A constant reference, or a function of time (s) that is sampled with the controller.
@@ -87,6 +89,7 @@ class SampledController:
 
     @in_si(period="s")
     def __init__(self, design: Design, period: Amount, *, limit: Amount = inf) -> None:
+        require_kind(design, Design, "design", "what design_lqr, design_pid or design_pi returns")
         limit = si(limit, variable_unit(design.model.mechanism, design.channel), "limit")
         check_period(period)
         check_limit(limit)
@@ -388,6 +391,12 @@ def _channel(mechanism: Mechanism, name: str) -> Channel:
     raise InputError(f"the controller acts by {name!r}, which is not a force on a freedom of the {mechanism.name}")
 
 
+def _check_argument(channel: Channel, inputs: Inputs) -> None:
+    """Raise InputError if the controller's channel is among the inputs."""
+    if channel.argument in inputs:
+        raise InputError(f"{channel.argument} is among the inputs, but the controller sets it")
+
+
 @takes_published(inputs=complete_inputs, initial=complete_initial_state)
 @in_si(stop_time="s")
 def control_loop(
@@ -438,8 +447,7 @@ def control_loop(
     mechanism = find_mechanism(parameters)
     inputs, initial = check_run(mechanism, inputs, initial)
     channel = _channel(mechanism, controller.channel)
-    if channel.argument in inputs:
-        raise InputError(f"{channel.argument} is among the inputs, but the controller sets it")
+    _check_argument(channel, inputs)
     # an argument that is given, even as 0, chooses the mode in which it acts
     inputs = inputs.replace(**{channel.argument: 0.0})
     times = sample_times(stop_time, controller.period)
@@ -568,17 +576,36 @@ def predict_loop(
         If an argument is not usable, or the model is about a single state that is not an equilibrium.
     """
     n = model.A.shape[-1]
-    start = np.zeros(n) if deviation is None else np.array(deviation, dtype=float)
+    wanted = f"a deviation {deviation!r}: it must be {n} finite numbers"
+    start = np.zeros(n) if deviation is None else float_array(deviation, wanted)
     if start.shape != (n,) or not np.all(np.isfinite(start)):
-        raise InputError(f"a deviation of shape {start.shape}: it must be {n} finite numbers")
+        raise InputError(wanted)
     channel = _channel(model.mechanism, controller.channel)
     if controller.channel not in model.input_names:
         raise InputError(f"the controller acts by {controller.channel}, which is not an input of the model")
     if isinstance(model, LinearModel):
         _check_rest(model)
+    if inputs is not None:
+        _check_argument(channel, inputs)
+        _check_inputs(model, inputs)
     times = sample_times(stop_time, controller.period)
     plant = _Linear(model, controller.channel, inputs, averaged, start)
     return _run_loop(plant, controller, reference, times, channel.freedom)
+
+
+def _check_inputs(model: LinearModel | PeriodicModel, inputs: Inputs) -> None:
+    """Raise InputError if an input does not act in a model, or commands another speed than that of the operating point."""
+    mechanism, its = model.mechanism, model.layout
+    for number, channel in enumerate(mechanism.channels):
+        acts = channel.freedom in its.commanded if channel.kind == "command" else number in its.forces
+        if channel.argument in inputs and not acts:
+            coordinate = mechanism.freedoms[channel.freedom].coordinate
+            how = "commanded" if channel.freedom in its.commanded else "not commanded"
+            raise InputError(
+                f"{channel.argument} is among the inputs, but {coordinate} is {how} in the model: leave it out"
+            )
+    times, states = (np.zeros(1), [model.state]) if isinstance(model, LinearModel) else (model.times, model.states)
+    sample_channels(mechanism, inputs, times, np.array(states))
 
 
 def _check_rest(model: LinearModel) -> None:

@@ -28,7 +28,7 @@ from ..files import unknown_name
 from ..libraries import lazy
 from ..mechanisms import Parameters, find_mechanism
 from ..numerics import symbolic
-from ..run import Inputs, check_run, encode, expressions, sample, takes_published
+from ..run import Inputs, check_run, encode, expressions, float_array, sample, takes_published
 
 if TYPE_CHECKING:
     import control
@@ -431,7 +431,8 @@ def full_states(mechanism: Mechanism, states: ArrayLike) -> FloatArray:
 
     Full states are returned unchanged.
     """
-    array, n = np.array(states, dtype=float), 2 * len(mechanism.freedoms)
+    message = f"the states are {states!r}: they must be numbers in SI, such as the state of an Equilibrium"
+    array, n = np.atleast_2d(float_array(states, message)), 2 * len(mechanism.freedoms)
     if array.ndim != 2 or array.shape[1] not in (n, mechanism.size) or len(array) == 0:
         raise InputError(
             f"states of shape {array.shape}: each must be all coordinates and all rates of the {mechanism.name}, {n} numbers, "
@@ -496,7 +497,7 @@ def linearise(parameters: Parameters, state: ArrayLike, inputs: Inputs | None = 
     (1, 1)
     """
     mechanism = find_mechanism(parameters)
-    states = full_states(mechanism, np.atleast_2d(np.asarray(state, dtype=float)))
+    states = full_states(mechanism, state)
     if len(states) != 1:
         raise InputError(f"{len(states)} states: linearise takes one state; linearise_orbit takes many")
     modes, channels = sample_channels(mechanism, inputs, np.zeros(1), states)

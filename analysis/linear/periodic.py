@@ -15,6 +15,7 @@ from scipy.integrate import solve_ivp
 from linkwork.errors import InputError
 from linkwork.mechanism import Mechanism
 
+from ..files import Whole
 from ..mechanisms import InitialState, Parameters, find_mechanism
 from ..numerics.fourier import trigonometric
 from ..run import Inputs, check_run, complete_initial_state, complete_inputs, simulate, speed_ratio, takes_published
@@ -335,7 +336,7 @@ def settled_motion(
     samples : int
         Number of states of the last turn, evenly spaced in time, without the end point.
     turns : int
-        Number of turns of the run.
+        Number of turns of the run, at least two.
 
     Returns
     -------
@@ -345,11 +346,14 @@ def settled_motion(
     ------
     InputError
         If the inputs are not constant or command no speed.
+    ParameterError
+        If ``samples`` or ``turns`` is no whole number, or less than 1 or 2.
     LinearModelError
         If the run ends early, or the last two turns differ by more than 1e-7 of the mechanism's scales.
     """
     mechanism = find_mechanism(parameters)
     inputs, initial = check_run(mechanism, inputs, initial)
+    samples, turns = Whole(least=1)(samples, "samples"), Whole(least=2)(turns, "turns")
     modes, n = tuple(inputs.modes(mechanism).values()), len(mechanism.freedoms)
     its = layout(mechanism, modes)
     speeds = {c.freedom: (c, getattr(inputs, c.argument)) for c in mechanism.channels if c.kind == "command"}

@@ -2,6 +2,7 @@ from .angles import repeats as repeats
 from .arguments import complete_initial_state as complete_initial_state
 from .arguments import complete_inputs as complete_inputs
 from .arguments import complete_speed as complete_speed
+from .arguments import float_array as float_array
 from .arguments import published_set as published_set
 from .arguments import require_kind as require_kind
 from .arguments import takes_published as takes_published

@@ -8,6 +8,9 @@ from inspect import signature
 from math import tau
 from typing import Any, TypeVar, cast
 
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
 from linkwork.errors import InputError
 from linkwork.mechanism import Mechanism, PublishedSet
 
@@ -87,6 +90,14 @@ def require_kind(value: Any, kind: type | tuple[type, ...], name: str, wanted: s
     if not isinstance(value, kind):
         shown = repr(value) if value is None or isinstance(value, (str, int, float)) else type(value).__name__
         raise InputError(f"{name} is {shown}: give {wanted}")
+
+
+def float_array(value: ArrayLike, message: str) -> NDArray[np.float64]:
+    """Return the value as a new array of floats; raise InputError with ``message`` if it is not numeric."""
+    try:
+        return np.array(value, dtype=float)
+    except (TypeError, ValueError, OverflowError):
+        raise InputError(message) from None
 
 
 def takes_options(kind: type) -> Callable[[_Function], _Function]:

@@ -260,7 +260,7 @@ def track(
     )
 
     def angle(t: float) -> float:
-        return start.crank_angle + crank_speed * t
+        return float(start.crank_angle + crank_speed * t)
 
     def load_part(part: int) -> Function:
         return Function(lambda t, *state: load_at_angle(load, angle(t + 0.5 * controller.period))[part])

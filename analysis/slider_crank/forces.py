@@ -33,7 +33,7 @@ from linkwork.slider_crank.parameters import Constants, SliderCrankParameters
 from linkwork.slider_crank.vectors import Vector
 
 from ..display import format_range
-from ..run import complete_speed, require_kind, takes_published
+from ..run import complete_speed, float_array, require_kind, takes_published
 from ..units import Amount, in_si
 from . import mobility
 from .mobility import DeadCentre
@@ -44,7 +44,6 @@ from .quantities import (
     MaskedArray,
     array_per_angle,
     check_joint,
-    float_array,
     masked_array,
     unit_table,
 )

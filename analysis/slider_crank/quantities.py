@@ -14,6 +14,7 @@ from linkwork.errors import InputError
 from linkwork.slider_crank.published import POUND_FORCE, POUND_INCH
 
 from ..files import unknown_name
+from ..run import float_array
 from ..units import INCH
 
 FloatArray: TypeAlias = NDArray[np.float64]
@@ -99,14 +100,6 @@ def masked_array(values: ArrayLike, where: NDArray[np.bool_]) -> MaskedArray:
     whole = np.asarray(values, dtype=float)
     mask = np.broadcast_to(where, whole.shape).copy()
     return np.ma.MaskedArray(np.where(mask, np.nan, whole), mask=mask, fill_value=np.nan)
-
-
-def float_array(value: ArrayLike, message: str) -> FloatArray:
-    """Return the value as a new array of floats; raise InputError with ``message`` if it is not numeric."""
-    try:
-        return np.array(value, dtype=float)
-    except (TypeError, ValueError, OverflowError):
-        raise InputError(message) from None
 
 
 def array_per_angle(name: str, value: ArrayLike, n: int) -> FloatArray:

@@ -35,7 +35,7 @@ from analysis.mechanisms import FIVE_BAR
 from analysis.numerics.tracing import rebind_functions
 from analysis.periodic import find_orbit
 from linkwork import friction
-from linkwork.errors import AssemblyError, InputError, UnknownNameError
+from linkwork.errors import AssemblyError, InputError, ParameterError, UnknownNameError
 from linkwork.five_bar import dynamics, kinematics
 from linkwork.five_bar.published import SETS, TABLE_3_1
 from tests.strategies import rough, seeded
@@ -473,6 +473,12 @@ def test_bad_motions_are_reported(turning) -> None:
         settled_motion(TABLE_3_1, Inputs(torque=1.0))
     with pytest.raises(LinearModelError, match=r"has not settled after 3 turns: slider\.position"):
         settled_motion(SETS["rig-2-spring-c"].parameters, Inputs(speed=40.0), turns=3)
+    with pytest.raises(ParameterError, match="turns is 1: it must be at least 2"):
+        settled_motion(TABLE_3_1, Inputs(speed=40.0), turns=1)
+    with pytest.raises(InputError, match="must be numbers in SI"):
+        linearise(TABLE_3_1, ["30 deg", 0.0, 0.0, 0.0])
+    with pytest.raises(InputError, match="2 finite numbers"):
+        find_equilibrium(TABLE_3_1, guess=["30 deg", 0.0])
 
 
 # for python-control, and drawn

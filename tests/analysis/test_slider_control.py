@@ -163,7 +163,7 @@ def test_designs_that_cannot_be(held, hanging) -> None:
         lin.design_pid(held)
     with pytest.raises(lin.DesignError, match="damping is 0"):
         lin.design_pid(held, bandwidth=1.0, damping=0.0)
-    for poles in ([-1.0, -2.0], [-1.0, -2.0 + 1.0j, -2.0], [1.0, -2.0, -3.0]):
+    for poles in ([-1.0, -2.0], [-1.0, -2.0 + 1.0j, -2.0], [1.0, -2.0, -3.0], ["-1 1/s"] * 3):
         with pytest.raises(lin.DesignError, match="poles"):
             lin.design_pid(held, poles=poles)
     with pytest.raises(UnknownNameError, match=r"crank\.speed"):
@@ -412,6 +412,17 @@ def test_bad_loops_are_reported(held) -> None:
         )
     with pytest.raises(InputError, match="2 finite"):
         lin.predict_loop(held, controller, 0.0, stop_time=0.1, deviation=[1.0])
+    with pytest.raises(InputError, match="2 finite"):
+        lin.predict_loop(held, controller, 0.0, stop_time=0.1, deviation=["1 mm", 0.0])
+    for inputs, message in (
+        (Inputs(torque=3.0), r"torque is among the inputs, but crank\.angle is commanded in the model"),
+        (Inputs(force=3.0), "force is among the inputs, but the controller sets it"),
+        (Inputs(speed=3.0), r"command drive\.speed 3, but in the state it is 0"),
+    ):
+        with pytest.raises(InputError, match=message):
+            lin.predict_loop(held, controller, 0.0, inputs, stop_time=0.1)
+    with pytest.raises(InputError, match="design is LinearModel"):
+        lin.SampledController(held, 1e-3)
     moving = lin.linearise(TABLE_3_1, (0.0, 0.0, 0.0, 0.5), HELD)
     with pytest.raises(InputError, match="PeriodicModel"):
         lin.predict_loop(moving, controller, 0.0, stop_time=0.1)
