@@ -54,7 +54,7 @@ def signal_name(name: str) -> str:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Layout:
-    """Which degrees of freedom of a mechanism are free or commanded, and which forces act, in given modes.
+    """Free and commanded degrees of freedom of a mechanism, and the forces that act, in given modes.
 
     Attributes
     ----------

@@ -132,7 +132,7 @@ class Interface:
         return spring.bodies or (joint.bodies if isinstance(joint, Pin) else ())
 
     def centred_springs(self, counted: Container[str]) -> list[str]:
-        """Return the torsion springs with a force law, without a free angle, and whose whole turns are not counted.
+        """Return the torsion springs that have a force law but no free angle, and whose whole turns are not counted.
 
         The angle x of such a law is kept within half a turn of the angle in the described pose, not of zero, so that the torque
         does not jump at 180 deg.

@@ -384,7 +384,7 @@ class Follower:
         # the parabola through the end of the step
         bend = 2.0 * (self._scale_point(beyond) - self._scale_point(point) - length * point.tangent) / length**2
 
-        def at(s: float) -> Point:
+        def find_point(s: float) -> Point:
             if s in (0.0, length):
                 return beyond if s else point
             found = self._step(point, s, bend)
@@ -394,8 +394,8 @@ class Follower:
                 )
             return self._point(found, point.tangent)
 
-        s = float(scipy.optimize.brentq(lambda s: test(at(s)), 0.0, length, xtol=1e-13, rtol=1e-14))
-        return at(s), s
+        s = float(scipy.optimize.brentq(lambda s: test(find_point(s)), 0.0, length, xtol=1e-13, rtol=1e-14))
+        return find_point(s), s
 
     def _attempt(self, last: Point, length: float, bend: Vector | None) -> tuple[Point, int] | _Failure:
         """Take a step; return the new point and the number of corrections, or a failure if the step may have left the curve."""

@@ -445,7 +445,7 @@ def encode(inputs: Inputs, mechanism: Mechanism) -> Encoded:
 
 
 def encode_once(inputs: Inputs, mechanism: Mechanism) -> Encoded:
-    """Return `encode` of inputs; the arrays of numbers and of torque laws, which cannot change, are kept with the inputs."""
+    """Return the result of `encode`; if the inputs are numbers and torque laws, which cannot change, it is cached in them."""
     if mechanism not in inputs._encoded:
         encoded = encode(inputs, mechanism)
         if not all(isinstance(p, (*NUMBER, TorsionBar, InductionMotor)) for name in inputs for p in inputs.parts(name)):

@@ -310,7 +310,7 @@ class Run:
 
 
 def make_problem(encoded: Encoded, settings: Settings, switched: bool) -> Any:
-    """Return the `Problem` of the compiled code: data that runs with the same kind of inputs have in common."""
+    """Return the `Problem` of the compiled code: the data common to all runs with the same kind of inputs."""
     return _records().Problem(
         machine(encoded.mechanism, switched).addresses,
         np.array(list(encoded.modes.values()), dtype=float),

@@ -387,18 +387,18 @@ def _locate_extremum(
             if a < place < c and sign * (now - was) > -_SAMPLED * was:
                 return place, rested
 
-    def near(value: float) -> PeriodicOrbit:
+    def nearby_orbit(value: float) -> PeriodicOrbit:
         parameters, drive = family.operation(value)
         return newton_orbit(parameters, drive, turns=orbit.turns, start=orbit.start, settle=False)
 
     try:
         best = scipy.optimize.minimize_scalar(
-            lambda value: -sign * float(near(value).amplitudes[coordinate]),
+            lambda value: -sign * float(nearby_orbit(value).amplitudes[coordinate]),
             bounds=(a, c),
             method="bounded",
             options={"xatol": 1e-6 * (c - a)},
         )
-        return float(best.x), near(float(best.x))
+        return float(best.x), nearby_orbit(float(best.x))
     except OrbitError:
         # near the limit of assembly a neighbour at a fixed parameter may not be found: keep the point itself
         return begin, orbit

@@ -146,7 +146,7 @@ def _forms(orbit: PeriodicOrbit) -> Forms:
 def _complex_form(form: Callable[..., FloatArray], count: int) -> Form:
     """Extend a real multilinear form of ``count`` vectors to complex vectors, by linearity."""
 
-    def of(*vectors: NDArray[np.complex128]) -> NDArray[np.complex128]:
+    def extended(*vectors: NDArray[np.complex128]) -> NDArray[np.complex128]:
         total = np.zeros(len(vectors[0]), dtype=complex)
         for number in range(2**count):
             parts = [(v.imag, 1j) if number >> n & 1 else (v.real, 1.0) for n, v in enumerate(vectors)]
@@ -154,7 +154,7 @@ def _complex_form(form: Callable[..., FloatArray], count: int) -> Form:
                 total += np.prod([factor for _, factor in parts]) * form(*(part for part, _ in parts))
         return total
 
-    return of
+    return extended
 
 
 def _eigenvectors(matrix: FloatArray, value: complex) -> tuple[NDArray[np.complex128], NDArray[np.complex128], complex]:
