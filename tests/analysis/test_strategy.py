@@ -22,7 +22,6 @@ from analysis.synthesis import (
     LargestLink,
     LeastTransmission,
     Linkage,
-    Motion,
     PrecisionPoints,
     RockerFunction,
     Search,
@@ -273,24 +272,6 @@ def test_defects_are_named_and_what_is_sound_comes_first(monkeypatch: pytest.Mon
     assert len(found.steps) == 2
     steps = (step_of({"circuit": False}, 1.0), step_of({}, 3.0), step_of({}, 2.0))
     assert Strategy(steps=steps, met=False, tolerance=0.1, criterion="error").chosen is steps[2]
-
-
-def test_the_worst_error_of_a_motion_counts_its_angles() -> None:
-    """Points that a linkage traces, with directions that its coupler has not."""
-    angle = BASE.coupler_angle(PHI) + 0.3 * np.sin(7.0 * PHI)
-    motion = Motion(points=BASE.path(PHI), angle=angle, rotation=PHI, length=0.1)
-    options = {
-        "bounds": links_of(BASE, 1e-3),
-        "constraints": (FullTurn(),),
-        "harmonics": 1,
-        "ratios": (),
-        "search": Search(starts=1),
-    }
-    found = simplest_mechanism(motion, 0.01, criterion="worst", **options)
-    assert not found.met
-    best = found.steps[0].solution.evaluation
-    assert found.steps[0].value == pytest.approx(np.hypot(best.errors, 0.1 * best.angle_errors).max())
-    assert best.errors.max() < 0.005 < 0.02 < found.steps[0].value
 
 
 @pytest.mark.parametrize("stop", [0, 1, 2])
