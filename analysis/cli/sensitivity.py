@@ -80,9 +80,12 @@ def _response_points(response: Any) -> Iterator[tuple[str, Any]]:
 
 
 def _elasticities(gradient: Any) -> list[float]:
-    return list(gradient.elasticities.values())
+    """Return the elasticities; NaN for a quantity that is 0, such as the amplitude of a pendulum that hangs still."""
+    return list(gradient.elasticities.values()) if gradient.value else [np.nan] * len(gradient.names)
 
 
 def _movers_text(gradient: Any) -> str:
+    if not gradient.value:
+        return ""
     shares = gradient.elasticities
     return "\n".join(f"{name} {shares[name]:+.3g}" for name in gradient.movers(_NAMED))

@@ -495,11 +495,11 @@ def _report_verdict(title: str, parameters: Any, drive: Any, start: Any) -> None
 
 
 def _print_regions(found: Any) -> None:
-    from ..periodic import TRUE_ORBIT, Crossing
+    from ..periodic import TOLERANCE, TRUE_ORBIT, Crossing
 
     x, y = found.axes
     own = {traced.kind for traced in found.boundaries if traced.motion == TRUE_ORBIT}
-    count = int(np.ma.sum(found.grid.largest > 1.0))
+    count = int(np.ma.sum(found.grid.largest > 1.0 + TOLERANCE))
     sentences = [f"at {count} of {found.grid.largest.count()} points the motion that was found is unstable"]
     if Crossing.FOLD in own:
         sentences.append("where it crosses a fold it jumps to another motion, however stable both are")

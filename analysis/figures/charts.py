@@ -179,6 +179,7 @@ def plot_stability_chart(chart: StabilityChart, *, title: str = "") -> Picture:
     looks = {
         Crossing.PERIOD_DOUBLING: ("0.1", "-", "period doubling"),
         Crossing.FOLD: (COLOURS[3], "-", "fold"),
+        Crossing.BRANCH_POINT: (COLOURS[2], "-", "branch point"),
         Crossing.TORUS: (COLOURS[1], "-", "torus"),
     }
     marks = {Crossing.PERIOD_DOUBLING: (COLOURS[2], "-1"), Crossing.FOLD: (COLOURS[4], "+1")}

@@ -60,7 +60,12 @@ _LETTER = 11.0
 FloatArray: TypeAlias = NDArray[np.float64]
 
 #: Markers and short names of the points at which a multiplier crosses the unit circle.
-_MARKERS = {Crossing.FOLD: ("s", "fold"), Crossing.PERIOD_DOUBLING: ("D", "doubling"), Crossing.TORUS: ("^", "torus")}
+_MARKERS = {
+    Crossing.FOLD: ("s", "fold"),
+    Crossing.BRANCH_POINT: ("o", "branch point"),
+    Crossing.PERIOD_DOUBLING: ("D", "doubling"),
+    Crossing.TORUS: ("^", "torus"),
+}
 _RISKS = tuple(Risk)
 
 

@@ -30,6 +30,8 @@ MOST_CORRECTIONS, HARD = 10, 5
 REACH = 0.5
 #: 1 / cos of the angle between old and new tangent above which the new tangent is computed without the old tangent.
 _OBLIQUE = 1e3
+#: Distance from the crossing of two curves of the points between which the crossing is interpolated, relative to the step.
+_ASIDE = 1e-3
 #: Factors by which a step grows and shrinks.
 GROWTH, SHRINKAGE = 1.4, 0.5
 
@@ -389,6 +391,8 @@ class Follower:
                 return beyond if s else point
             found = self._step(point, s, bend)
             if isinstance(found, _Failure):
+                found = self._interpolate_crossing(point, s, length, bend) or found
+            if isinstance(found, _Failure):
                 raise ContinuationError(
                     f"no point found {s:.3g} along the step from the parameter {point.parameter:.9g}: {found.text}"
                 )
@@ -417,6 +421,19 @@ class Follower:
         aside = np.zeros(len(point.tangent)) if bend is None else 0.5 * length**2 * bend
         aside = aside - (aside @ point.tangent) * point.tangent
         return self._correct(self._scale_point(point) + length * point.tangent, point.tangent, point, aside)
+
+    def _interpolate_crossing(self, point: Point, s: float, length: float, bend: Vector) -> _Landing | None:
+        """Return the middle between two points close to each other at which a curve crosses another, None if it is no solution.
+
+        Where two curves cross, the corrections have no unique solution.
+        """
+        before, after = (self._step(point, s + side * _ASIDE * length, bend) for side in (-1.0, 1.0))
+        if isinstance(before, _Failure) or isinstance(after, _Failure):
+            return None
+        z = 0.5 * (before.z + after.z)
+        evaluation = self._evaluate(z)
+        close = float(np.abs(self._scaled_evaluation(evaluation)[0]).max()) < NOISE
+        return _Landing(z, evaluation, MOST_CORRECTIONS) if close else None
 
     def _correct(
         self, plane: Vector, normal: Vector, last: Point | None, aside: Vector | float = 0.0

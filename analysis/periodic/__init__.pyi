@@ -87,6 +87,7 @@ from .response.advice import FoldJump as FoldJump
 from .response.advice import Risk as Risk
 from .response.advice import arcs as arcs
 from .response.advice import extrema as extrema
+from .response.advice import find_beginning as find_beginning
 from .response.advice import fold_jumps as fold_jumps
 from .response.advice import ranges_to_avoid as ranges_to_avoid
 from .response.advice import special_gradient as special_gradient

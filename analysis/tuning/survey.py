@@ -26,6 +26,7 @@ from ..periodic import (
     PeriodicOrbit,
     Response,
     SpecialPoint,
+    find_beginning,
     follow_both,
     frequency_response,
     largest_multipliers,
@@ -64,8 +65,6 @@ AT_THE_END, MARGINAL = 1e-7, 1e-6
 NO_GAP = 1e-6
 #: Number of levels at which all motions are sought, and number of points of the row of a chart.
 SOUGHT, _CHARTED = 5, 201
-#: Greatest distance of the first point of a doubled branch from its doubling, relative to the range and to the scale.
-NEXT = 0.05
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -292,9 +291,12 @@ def _tests(branch: Branch, kind: Crossing, radius: float = 1.0) -> FloatArray:
 
 
 def _kinds(branch: Branch) -> Iterator[Crossing]:
-    """Yield the kinds of crossing of the unit circle possible on a branch: a complex pair needs two multipliers."""
+    """Yield the kinds of crossing of the unit circle possible on a branch: a complex pair needs two multipliers.
+
+    At a branch point a multiplier is +1, as at a fold.
+    """
     for kind in Crossing:
-        if kind is not Crossing.TORUS or len(branch.orbits[0].start) > 1:
+        if kind is not Crossing.BRANCH_POINT and (kind is not Crossing.TORUS or len(branch.orbits[0].start) > 1):
             yield kind
 
 
@@ -310,7 +312,13 @@ def _parts(
     points: list[SpecialPoint | None] = [None, *special, None]
     if kind is Crossing.FOLD and branch.periods > 1:
         # such a branch begins, and may end, where a motion of half the period has the multiplier -1
-        points[0], points[-1] = (_find_doubling(wish, branch.orbits[i], response) for i in (0, -1))
+        width = response.high - response.low
+        points[0], points[-1] = (
+            find_beginning(
+                response.branches, Crossing.PERIOD_DOUBLING, branch.orbits[i], wish.level(branch.orbits[i]), width
+            )
+            for i in (0, -1)
+        )
     parts = [np.arange(begin + 1, end + 1) for begin, end in pairwise(ends)]
     if branch.closed and special:
         # the last point of a closed branch is its first
@@ -318,19 +326,6 @@ def _parts(
         points = [*special, special[0]]
     for number, part in enumerate(parts):
         yield points[number], part, points[number + 1]
-
-
-def _find_doubling(wish: Wish, orbit: PeriodicOrbit, response: Response) -> SpecialPoint | None:
-    """Return the period doubling near a motion from which the motion's branch begins; None if there is none."""
-    for branch in response.branches:
-        for point in branch.special if 2 * branch.turns == orbit.turns else ():
-            there = point.orbit
-            scale = motion_scales(there.parameters, there.drive, there.start)
-            away = np.abs(there.flow.remove_turns(there.start - orbit.start) / scale).max()
-            near = abs(wish.level(there) - wish.level(orbit)) < NEXT * (response.high - response.low)
-            if point.kind is Crossing.PERIOD_DOUBLING and near and away < NEXT:
-                return point
-    return None
 
 
 def _regions(wish: Wish, x: FloatArray, branch: Branch, response: Response) -> Iterator[Region]:

@@ -31,7 +31,9 @@ def orbit(
         swings=(("u", "m"),),
         scale=np.ones(2),
         periods=periods,
+        turns=periods,
         crank_turns=crank_turns,
+        flow=SimpleNamespace(remove_turns=lambda away: away),
     )
 
 

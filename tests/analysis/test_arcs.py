@@ -100,6 +100,18 @@ def test_doubled_motions_and_none() -> None:
     assert found(single, doubled, beside)[Risk.SEVERAL] == [pytest.approx((102.5, 104.0))]
 
 
+def test_a_doubled_motion_is_stable_from_its_doubling_on() -> None:
+    """Its branch is followed from a step beyond the doubling on, and to a step before the other one."""
+    doublings = [
+        (Crossing.PERIOD_DOUBLING, value, 1.0, int((value > X).sum()) - 1) for value in (98.0 + 1e-9, 102.0 - 1e-9)
+    ]
+    single = branch(X, np.ones(len(X)), np.where((X > 98.0) & (X < 102.0), 1.2, 0.9), doublings)
+    doubled = branch(np.linspace(98.01, 101.99, 50), np.full(50, 1.01), 0.9, turns=2)
+    ranges = found(single, doubled)
+    assert ranges[Risk.DOUBLED] == [(98.0 + 1e-9, 102.0 - 1e-9)]
+    assert Risk.UNSTABLE not in ranges
+
+
 def test_a_stable_stretch_between_two_unstable_ones_is_not_avoided() -> None:
     gaps = ((92.0, 95.0), (103.0, 106.0))
     multiplier = np.where(np.any([(low < X) & (high > X) for low, high in gaps], axis=0), 1.2, 0.9)

@@ -149,8 +149,8 @@ def test_a_doubled_branch_ends_where_it_meets_that_of_half_the_period(upper: Bra
     assert back.special[0].parameter == pytest.approx(again.parameter, rel=1e-9)
 
 
-def test_one_switches_at_period_doublings_only(softened: Branch) -> None:
-    with pytest.raises(InputError, match="is a fold: only a period doubling has a branch"):
+def test_one_switches_at_period_doublings_and_branch_points_only(softened: Branch) -> None:
+    with pytest.raises(InputError, match="is a fold: only at a period doubling or a branch point"):
         switch(softened.family, softened.special[0], low=100.0, high=1200.0)
 
 

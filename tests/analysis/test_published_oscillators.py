@@ -8,6 +8,7 @@ from math import pi
 import numpy as np
 import pytest
 from click.testing import Result
+from scipy.integrate import solve_ivp
 from scipy.special import mathieu_a, mathieu_b
 
 from analysis.numerics.boundaries import scan
@@ -16,6 +17,7 @@ from analysis.periodic import (
     Crossing,
     Drive,
     Family,
+    Risk,
     SpecialPoint,
     Stability,
     find_orbit,
@@ -28,12 +30,13 @@ from analysis.periodic import (
     normal_form,
     orbit_test,
     plane,
+    special_gradient,
     switch,
     with_isolas,
 )
 from analysis.periodic.motion.drive import motion_scales
 from analysis.periodic.response.advice import arcs, fold_jumps
-from linkwork.errors import InputError
+from linkwork.errors import InputError, LinkworkError
 from tests.mechanisms import torsion
 from tests.oracles import oscillator
 from tests.published import FEIGENBAUM, MATHIEU_A, MATHIEU_B, PENDULUM_DOUBLINGS
@@ -64,21 +67,25 @@ def test_multipliers_pass_the_unit_circle_at_the_characteristic_values_of_mathie
                     assert np.abs(roots - printed).min() < 0.6e-8
 
 
-def test_branches_and_boundaries_find_the_odd_characteristic_values_of_mathieu() -> None:
+def test_branches_and_boundaries_find_the_characteristic_values_of_mathieu() -> None:
     family = Family(parameters=mathieu(0.0, 1.0), drive=MATHIEU, vary="rotor.stiffness")
     branch = follow(family, newton_orbit(mathieu(-1.0, 1.0), MATHIEU), -1.0, low=-1.0, high=10.0)
-    assert {special.kind for special in branch.special} == {Crossing.PERIOD_DOUBLING}
+    odd, even = ([s for s in branch.special if (s.kind is Crossing.PERIOD_DOUBLING) is own] for own in (True, False))
+    assert {special.kind for special in even} == {Crossing.BRANCH_POINT}
     expected = [mathieu_b(1, 1.0), mathieu_a(1, 1.0), mathieu_b(3, 1.0), mathieu_a(3, 1.0)]
-    assert [special.parameter for special in branch.special] == pytest.approx(expected, abs=1e-9)
+    assert [special.parameter for special in odd] == pytest.approx(expected, abs=1e-9)
+    # the second multiplier crosses with the first: its place is as uncertain as the root of rounding
+    expected = [mathieu_a(0, 1.0), mathieu_b(2, 1.0), mathieu_a(2, 1.0)]
+    assert [special.parameter for special in even] == pytest.approx(expected, abs=1e-6)
     # between b_r and a_r the equation has solutions that grow
-    words = [branch.stability()[special.after + 1] for special in branch.special]
+    words = [branch.stability()[special.after + 1] for special in odd]
     assert words == [Stability.UNSTABLE, Stability.MARGINAL] * 2
 
     curve = follow_crossing(
         plane(mathieu(0.0, 1.0), MATHIEU, "rotor.modulation", "rotor.stiffness"),
-        branch.special[1].orbit,
+        odd[1].orbit,
         Crossing.PERIOD_DOUBLING,
-        (-2.0, branch.special[1].parameter),
+        (-2.0, odd[1].parameter),
         x=(-6.0, -1.0),
         y=(-5.0, 5.0),
     )
@@ -206,6 +213,36 @@ def cascade() -> list[Branch]:
     for _ in range(3):
         branches.append(switch(family, branches[-1].special[0], low=1.06, high=1.083, greatest=5e-3))
     return branches
+
+
+def test_the_pendulum_breaks_its_symmetry_at_a_branch_point() -> None:
+    weight, (parameters, drive) = NATURAL**2, pendulum(1.0)
+    ends = weight, 1.01 * weight
+    response = frequency_response(parameters, *ends, drive=drive, vary="rotor.excitation", doublings=0)
+    (own,) = (special for branch in response.branches for special in branch.special)
+    assert own.kind is Crossing.BRANCH_POINT
+    assert normal_form(response.family, own).words == "supercritical"
+    with pytest.raises(LinkworkError, match="branches cross"):
+        special_gradient(response.family, own)
+    # half a period of a symmetric motion ends in its mirror image; it breaks where a deviation ends in itself
+    p = own.orbit.parameters.constants()
+
+    def rates(t: float, y: np.ndarray) -> list[float]:
+        x, v, dx, dv, ex, ev = y.tolist()
+        force = p.excitation * np.cos(DRIVEN * t) - p.damping * v - p.weight * np.sin(x)
+        slope = -p.weight * np.cos(x)
+        return [v, force, dv, slope * dx - p.damping * dv, ev, slope * ex - p.damping * ev]
+
+    begin = [*own.orbit.start, 1.0, 0.0, 0.0, 1.0]
+    end = solve_ivp(rates, (0.0, pi / DRIVEN), begin, method="DOP853", rtol=1e-11, atol=1e-12).y[:, -1]
+    assert end[:2] == pytest.approx(-own.orbit.start, abs=1e-5)
+    assert np.linalg.det(end[2:].reshape(2, 2) - np.eye(2)) == pytest.approx(0.0, abs=1e-5)
+    # the machine passes it without a jump, and two mirror images are stable beyond
+    assert response.jumps == ()
+    (avoided,) = response.speeds_to_avoid
+    assert (avoided.risk, avoided.low, avoided.high) == (Risk.SEVERAL, own.parameter, ends[1])
+    stable = [branch for branch in response.branches if set(branch.stability()) == {Stability.STABLE}]
+    assert [branch.parameter[-1] for branch in stable] == 2 * [ends[1]]
 
 
 @pytest.mark.slow

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from math import hypot, pi, sqrt
 from pathlib import Path
 
@@ -10,7 +11,17 @@ import pytest
 
 from analysis import figures
 from analysis.linkages import linkage
-from analysis.periodic import Branch, Drive, Response, Risk, frequency_response, special_gradient
+from analysis.periodic import (
+    Branch,
+    Crossing,
+    Drive,
+    Response,
+    Risk,
+    Stability,
+    frequency_response,
+    normal_form,
+    special_gradient,
+)
 from analysis.run import load_case
 from analysis.run.case import Case
 from analysis.tuning import Wish, tune
@@ -152,3 +163,28 @@ def test_a_coordinate_that_does_not_move_has_no_resonance() -> None:
     response = frequency_response(made.first_set.parameters, 5.0, 30.0)
     assert not response.branches[0].amplitudes.any()
     assert response.maxima() == response.speeds_to_avoid == ()
+
+
+def test_without_damping_rounding_makes_no_torus_points(shaker: Case) -> None:
+    still = replace(shaker.parameters, side_damping=0.0, up_damping=0.0)
+    (branch,) = frequency_response(still, 300.0 * pi / 30.0, 420.0 * pi / 30.0).branches
+    assert set(branch.stability()) == {Stability.MARGINAL}
+    assert branch.special == ()
+
+
+def test_one_freedom_that_excites_itself_has_torus_points_at_a_prescribed_speed() -> None:
+    """Van der Pol's oscillator, forced: entrained between two speeds, at which the mean damping over a turn is zero."""
+    table = linkage("self-excited", ground={"O": (0, 0)}, gravity=0.0)
+    table.body("table", points={"A": (0, 0)}, mass=9.0)
+    table.body("rotor", points={"A": (0, 0)}, mass=1.0, cog=(0.02, 0), inertia=1e-3)
+    table.slide("X", body="table", through="O")
+    table.spring("spring", at="X", law="k*x - (c - d*x**2)*v", constants={"k": 1000.0, "c": 2.0, "d": 4000.0})
+    made = table.freedom("rotor", "A", speed="100 rpm").freedom("table", "X").mechanism()
+    response = frequency_response(made.first_set.parameters, 9.0, 11.0)
+    points = response.branches[0].special
+    assert [point.kind for point in points] == 2 * [Crossing.TORUS]
+    for point in points:
+        assert np.mean(point.orbit.turn()["table.position"] ** 2) == pytest.approx(2.0 / 4000.0, rel=1e-8)
+        assert normal_form(response.family, point).words == "supercritical"
+    lost = [(each.low, each.high) for each in response.speeds_to_avoid if each.risk is Risk.UNSTABLE]
+    assert lost == [(9.0, points[0].parameter), (points[1].parameter, 11.0)]

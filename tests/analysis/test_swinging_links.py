@@ -19,6 +19,8 @@ from analysis.linear import find_equilibria, find_equilibrium, linearise_orbit
 from analysis.linkages import linkage, load_linkage
 from analysis.mechanisms import PUBLISHED
 from analysis.periodic import (
+    TRUE_ORBIT,
+    Crossing,
     Drive,
     Stability,
     basins,
@@ -29,6 +31,8 @@ from analysis.periodic import (
     frequency_response,
     join_orbits,
     newton_orbit,
+    special_gradient,
+    stability_chart,
     sweep,
     unsought_hint,
     with_isolas,
@@ -79,6 +83,24 @@ def test_a_motion_is_sought_from_where_the_linkage_starts(hanging: float) -> Non
         np.testing.assert_allclose(np.sort_complex(orbit.multipliers), mathieu(speed), rtol=1e-7)
         assert orbit.amplitude == 0.0
         np.testing.assert_allclose(find_orbit(parameters, speed=speed).start, [hanging, 0.0], atol=1e-9)
+
+
+def test_a_chart_has_the_tongue_in_which_the_pendulum_swings_at_the_speed_of_the_crank() -> None:
+    parameters, names = yoke("yoke-tongue").parameters, ("drive.speed", "hinge.damping")
+    chart = stability_chart(parameters, Drive(speed=6.8), names, ((6.6, 7.2), (0.0, 1e-4)), points=3)
+    own = [traced for traced in chart.boundaries if traced.motion == TRUE_ORBIT]
+    assert [traced.kind for traced in own] == 2 * [Crossing.BRANCH_POINT]
+    for traced in own:
+        for speed, damping in traced.points[::10].tolist():
+            assert abs(mathieu(speed, damping=damping) - 1.0).min() < 1e-5
+    assert chart.problems == ()
+
+
+def test_an_amplitude_of_zero_has_no_elasticities() -> None:
+    still = replace(yoke("yoke-still").parameters, hinge_damping=1e-3)
+    response = frequency_response(still, "120 rpm", "130 rpm", doublings=0)
+    (doubling,) = response.branches[0].special
+    assert special_gradient(response.family, doubling).amplitude.value == 0.0
 
 
 def test_one_speed_is_a_sweep_too() -> None:

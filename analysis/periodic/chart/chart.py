@@ -21,11 +21,12 @@ from linkwork.mechanism import Mechanism
 from ...display import NotebookResult, format_count, format_range
 from ...files import Whole, write_csv
 from ...mechanisms import Parameters, find_mechanism
-from ...numerics.boundaries import Box, chart
+from ...numerics.boundaries import Box, chart, trace
 from ...numerics.continuation import ContinuationError, End, Reason
 from ...run import show_progress, takes_published
 from ...units import Amount, display_scale, pair
 from ..motion import (
+    TOLERANCE,
     Crossing,
     Drive,
     PeriodicOrbit,
@@ -68,7 +69,12 @@ SAME = 5e-3
 TRUE_ORBIT, OTHER_ORBIT = "true orbit", "another motion"
 #: Codes in files for a boundary's motion (0: the linear equation) and for its multiplier.
 _MOTION = {TRUE_ORBIT: 1.0, OTHER_ORBIT: 2.0}
-_MULTIPLIER = {Crossing.FOLD: 1.0, Crossing.PERIOD_DOUBLING: -1.0, Crossing.TORUS: 0.0}
+_MULTIPLIER = {
+    Crossing.FOLD: 1.0,
+    Crossing.BRANCH_POINT: 1.0,
+    Crossing.PERIOD_DOUBLING: -1.0,
+    Crossing.TORUS: 0.0,
+}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -119,8 +125,8 @@ class TracedBoundary:
         The motion that loses stability: `TRUE_ORBIT`, the motion of the grid; `OTHER_ORBIT`, another motion; or the name of a
         motion given in ``beside``.
     kind : Crossing
-        Period doubling (multiplier -1); fold (+1), beyond which the orbit does not exist; or, under a torque, torus (a complex
-        pair on the unit circle).
+        Period doubling (multiplier -1); fold (+1), beyond which the orbit does not exist; branch point (+1), beyond which it
+        exists; or torus (a complex pair on the unit circle).
     ends : (End, End)
         Why the curve ends at its first and at its last point.
     starts : ndarray, shape (n, m), or None
@@ -184,7 +190,7 @@ class StabilityChart(NotebookResult):
             for axis, (low, high) in zip(self.axes, (self.box.x, self.box.y))
         ]
         multipliers = self.grid.largest.compressed()
-        share = f", {np.mean(multipliers > 1.0):.1%} unstable" if len(multipliers) else ""
+        share = f", {np.mean(multipliers > 1.0 + TOLERANCE):.1%} unstable" if len(multipliers) else ""
         if any(traced.kind is Crossing.FOLD and traced.motion == TRUE_ORBIT for traced in self.boundaries):
             share += " but with jumps at a fold"
         return (
@@ -340,7 +346,7 @@ class _Survey:
 
         ``around`` are the coexisting motions, if they were sought; ``steps`` gives the texts of the progress bars.
         """
-        true = orbit_monodromy(self.operation, start=self.start, near=self.grid)
+        true = self.matrix()
         # at a fold the true orbit ends, and its test function with it: folds are found on branches
         tests = [(TRUE_ORBIT, true, Crossing.PERIOD_DOUBLING)]
         tests += [(name, m, kind) for name, m in beside.items() for kind in (Crossing.PERIOD_DOUBLING, Crossing.FOLD)]
@@ -358,6 +364,10 @@ class _Survey:
             self.run_three_points()
             removals = self.removals(true)
         return self.result(around, removals)
+
+    def matrix(self) -> Monodromy:
+        """Return the monodromy matrix of the grid's motion as a function of a point of the plane."""
+        return orbit_monodromy(self.operation, start=self.start, near=self.grid)
 
     def result(self, around: Coexistence | None, removals: tuple[str, ...] = ()) -> StabilityChart:
         """Return the chart as far as it has been computed; ``around`` are the coexisting motions, if they were sought."""
@@ -434,6 +444,11 @@ class _Survey:
         if self._is_known(special, place):
             return
         what = f"the {special.kind.value} at {self.place(*place)}"
+        if special.kind is Crossing.BRANCH_POINT:
+            # the equations of such a curve are singular; the grid's motion goes on beyond it, and with it the test function
+            if _belongs(self.grid, special.orbit, place):
+                self._trace_multiplier(special, place, what)
+            return
         try:
             curve = follow_crossing(
                 self.operation,
@@ -465,6 +480,17 @@ class _Survey:
             )
         )
         self.problems += [f"{what} is followed to {self.place(*end.point)} only: {end.message}" for end in lost]
+
+    def _trace_multiplier(self, special: SpecialPoint, place: tuple[float, float], what: str) -> None:
+        """Trace, by a test function, the boundary of the grid's motion through a special point."""
+        try:
+            found = trace(plane_test(self.matrix(), special.kind), place, self.box)
+        except LinkworkError as error:
+            self.problems.append(f"{what} is not followed: {error}")
+        else:
+            self.traced.append(
+                TracedBoundary(points=found.points, motion=TRUE_ORBIT, kind=special.kind, ends=found.ends)
+            )
 
     def _is_known(self, special: SpecialPoint, place: tuple[float, float]) -> bool:
         """Return whether a traced boundary of the same kind and motion passes through, or close to, a special point."""

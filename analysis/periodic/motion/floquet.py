@@ -38,13 +38,14 @@ class Stability(Enum):
 class Crossing(Enum):
     """Kind of bifurcation, given by the place at which a multiplier crosses the unit circle."""
 
-    FOLD = "fold"  # at +1: two motions of the same period meet, or a branch point
+    FOLD = "fold"  # at +1: two motions of the same period meet
+    BRANCH_POINT = "branch point"  # at +1: two branches of the same period cross
     PERIOD_DOUBLING = "period doubling"  # at -1
     TORUS = "torus"  # a complex pair
 
 
 #: The real multiplier at a crossing.
-_SIGN = {Crossing.FOLD: 1, Crossing.PERIOD_DOUBLING: -1}
+_SIGN = {Crossing.FOLD: 1, Crossing.BRANCH_POINT: 1, Crossing.PERIOD_DOUBLING: -1}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -179,10 +180,10 @@ def crossing_test(monodromy: NDArray[np.float64], crossing: Crossing | int) -> N
     ----------
     monodromy : ndarray, shape (..., n, n)
     crossing : Crossing or int
-        The crossing; the number +1 stands for a fold, -1 for a period doubling. For these two the function is det(I - Phi) or
-        det(I + Phi), with the monodromy matrix Phi: positive if all multipliers are inside the unit circle, negative if one
-        real multiplier has crossed it at +1 or -1. For a torus the function is the product of (mu_i mu_j - 1) over all pairs
-        of multipliers mu_i, mu_j.
+        The crossing; the number +1 stands for a fold or branch point, -1 for a period doubling. For these the function is
+        det(I - Phi) or det(I + Phi), with the monodromy matrix Phi: positive if all multipliers are inside the unit circle,
+        negative if one real multiplier has crossed it at +1 or -1. For a torus the function is the product of
+        (mu_i mu_j - 1) over all pairs of multipliers mu_i, mu_j.
 
     Returns
     -------
@@ -199,6 +200,13 @@ def crossing_test(monodromy: NDArray[np.float64], crossing: Crossing | int) -> N
     trace = monodromy[..., 0, 0] + monodromy[..., 1, 1]
     det = monodromy[..., 0, 0] * monodromy[..., 1, 1] - monodromy[..., 0, 1] * monodromy[..., 1, 0]
     return np.asarray(1.0 - multiplier * trace + det)
+
+
+def torus_pair(multipliers: NDArray[np.complex128]) -> tuple[complex, float]:
+    """Return one multiplier of the pair mu_i, mu_j whose product is nearest to 1, and the distance ``|mu_i mu_j - 1|``."""
+    away = {(i, j): abs(multipliers[i] * multipliers[j] - 1.0) for i in range(len(multipliers)) for j in range(i)}
+    nearest = min(away, key=away.__getitem__)
+    return complex(multipliers[nearest[0]]), float(away[nearest])
 
 
 def require_sign(multiplier: int) -> None:

@@ -26,7 +26,7 @@ from ..motion.orbit import PeriodicOrbit, newton_orbit
 from ..motion.variables import Family, parameter_value
 from ..stability.nonlinear import SpecialPoint
 from ..stability.sensitivity import PointGradient, crossing_gradient, extremum_gradient, extremum_orbit
-from .branch import Branch
+from .branch import BEGINNING, Branch
 
 #: A resonance extends to the half-power points, at which the amplitude is this share of the peak.
 HALF_POWER = 1.0 / sqrt(2.0)
@@ -144,15 +144,48 @@ class Arc:
         return bool(np.median(np.max(apart, axis=0)) < _SAME)
 
 
+def find_beginning(
+    branches: Iterable[Branch], kind: Crossing, orbit: PeriodicOrbit, value: float, width: float
+) -> SpecialPoint | None:
+    """Return the period doubling or branch point near a motion from which the motion's branch begins; None if there is none.
+
+    ``value`` is the value of the parameter at the motion, ``width`` the range of the parameter.
+    """
+    times = 2 if kind is Crossing.PERIOD_DOUBLING else 1
+    points = [s for b in branches if times * b.turns == orbit.turns for s in b.special if s.kind is kind]
+    for point in sorted(points, key=lambda point: abs(point.parameter - value)):
+        there = point.orbit
+        away = np.abs(there.flow.remove_turns(there.start - orbit.start) / there.scale).max()
+        if abs(point.parameter - value) < BEGINNING * width and away < BEGINNING:
+            return point
+    return None
+
+
 def arcs(branches: Iterable[Branch]) -> tuple[Arc, ...]:
     """Return the arcs into which branches divide, in the order of the branches."""
-    return tuple(arc for branch in branches for arc in _branch_arcs(branch))
+    branches = tuple(branches)
+    return tuple(arc for branch in branches for arc in _branch_arcs(branch, branches))
 
 
-def _branch_arcs(branch: Branch) -> list[Arc]:
-    places = [special.after + 1 for special in branch.special]
-    special = [special.orbit for special in branch.special]
-    parameter = np.insert(branch.parameter, places, [s.parameter for s in branch.special])
+def _branch_arcs(branch: Branch, branches: Sequence[Branch]) -> list[Arc]:
+    passed = [(s.after + 1, s) for s in branch.special]
+    # a branch that begins inside the range begins a step beyond a point of another one
+    others = [b for b in branches if b is not branch]
+    values = np.concatenate([b.parameter for b in branches])
+    low, high = float(values.min()), float(values.max())
+    for place, end in ((0, 0), (len(branch), -1)):
+        value = float(branch.parameter[end])
+        if branch.closed or not low < value < high:
+            continue
+        for kind in (Crossing.PERIOD_DOUBLING, Crossing.BRANCH_POINT):
+            begun = find_beginning(others, kind, branch.orbits[end], value, high - low)
+            if begun is not None:
+                passed.append((place, begun))
+                break
+    passed.sort(key=lambda entry: entry[0])
+    places = [place for place, _ in passed]
+    special = [point.orbit for _, point in passed]
+    parameter = np.insert(branch.parameter, places, [point.parameter for _, point in passed])
     amplitudes = branch.amplitudes
     if special:
         amplitudes = np.insert(amplitudes, places, [orbit.amplitudes for orbit in special], axis=0)
@@ -195,7 +228,7 @@ def fold_jumps(branches: Sequence[Branch]) -> tuple[FoldJump, ...]:
     # a motion of twice the period begins at a doubling: its branch turns back there like at a fold, but no motion ends
     born = [s.parameter for branch in branches for s in branch.special if s.kind is Crossing.PERIOD_DOUBLING]
     for branch, special in ((b, s) for b in branches for s in b.special if s.kind is Crossing.FOLD):
-        if branch.periods > 1 and any(abs(special.parameter / value - 1.0) < _ROUNDING for value in born):
+        if branch.periods > 1 and any(abs(special.parameter - value) < _ROUNDING * abs(value) for value in born):
             continue
         value, amplitude = special.parameter, special.orbit.amplitude
         for arc, (end, direction) in product(stable, ((-1, 1), (0, -1))):

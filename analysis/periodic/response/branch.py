@@ -8,7 +8,7 @@ At a period doubling, `switch` changes to the branch of motions with twice the p
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial, reduce
 from pathlib import Path
@@ -24,7 +24,7 @@ from ...files import write_csv
 from ...mechanisms import find_mechanism
 from ...numerics.continuation import ContinuationError, Curve, Follower, Point, Reason, Settings
 from ..motion.discretisation import AIM, GROWTH, PLACES, OrbitError, choose_pieces
-from ..motion.floquet import TOLERANCE, Crossing, Stability, crossing_test
+from ..motion.floquet import TOLERANCE, Crossing, Stability, crossing_test, torus_pair
 from ..motion.flow import label
 from ..motion.orbit import OrbitEquations, PeriodicOrbit, Turn
 from ..motion.variables import Family
@@ -33,8 +33,16 @@ from ..stability.nonlinear import SpecialPoint
 #: First step along a branch in scaled arc length; greatest step while the parameter hardly changes; angle between the tangents
 #: of two points (rad) up to which steps grow: 0.04 gives about 150 points on a full circle.
 _FIRST, _LONGEST, _ROUND = 5e-3, 2e-2, 0.04
-#: Distance from a period doubling at which the branch of twice the period begins, relative to the crank's length.
-_SWITCH = 2e-3
+#: Distance of a multiplier, or of the product of two, from 1 below which it is rounding.
+_AT_CROSSING = 1e-8
+#: Greatest distance of the first motion of a branch from the point at which it begins, relative to the range and to the scale.
+BEGINNING = 0.05
+#: For each kind of point at which a branch begins: period of its motions relative to that of the point, and distances of its
+#: first motion that are tried, relative to the crank's length.
+_BEGINNINGS = {
+    Crossing.PERIOD_DOUBLING: (2, (2e-3, 8e-3, 5e-4, 3.2e-2)),
+    Crossing.BRANCH_POINT: (1, (8e-3, 3.2e-2, 2e-3)),
+}
 #: A branch ends when the links come this close to the limit of assembly (least sine, as `LIMIT_SINE`), or when its largest
 #: multiplier passes this value.
 LEAST_SINE, GREATEST_MULTIPLIER = 1e-3, 1e8
@@ -236,53 +244,61 @@ def follow(
 
 def switch(
     family: Family,
-    doubling: SpecialPoint,
+    special: SpecialPoint,
     *,
     low: float,
     high: float,
+    side: float = 1.0,
     greatest: float = 2e-2,
     largest: float = GREATEST_MULTIPLIER,
     most_points: int = 5000,
     watch: Callable[[float], None] | None = None,
     stop: Callable[[PeriodicOrbit], bool] | None = None,
 ) -> Branch:
-    """Follow the branch of motions with twice the period that begins at a period doubling.
+    """Follow the branch that begins at a period doubling, of twice the period, or at a branch point, of the same period.
 
     Parameters
     ----------
     family, low, high, greatest, most_points, watch, stop
         See `follow`.
-    doubling : SpecialPoint
+    special : SpecialPoint
+    side : float
+        +1 or -1: the side of a branch point, which a branch leaves on both.
     largest : float
         The branch ends when its largest multiplier passes this value.
 
     Raises
     ------
     InputError
-        If the point is not a period doubling.
+        If the point is neither a period doubling nor a branch point.
     ContinuationError
         If no point on the new branch is found.
     """
-    if doubling.kind is not Crossing.PERIOD_DOUBLING:
+    if special.kind not in _BEGINNINGS:
         raise InputError(
-            f"the point at {doubling.parameter:.9g} is a {doubling.kind.value}: only a period doubling has a branch of twice "
-            "the period"
+            f"the point at {special.parameter:.9g} is a {special.kind.value}: only at a period doubling or a branch point does "
+            "another branch begin"
         )
-    orbit = doubling.orbit
+    orbit, (times, lengths) = special.orbit, _BEGINNINGS[special.kind]
     settings = _settings(low, high, greatest, most_points)
-    doubled = replace(orbit, turns=2 * orbit.turns, monodromy=orbit.monodromy @ orbit.monodromy)
-    follower = _follower(family, doubled, settings)
-    # every second period differs in the direction of the eigenvector of the multiplier -1
+    begun = replace(
+        orbit, turns=times * orbit.turns, monodromy=np.linalg.matrix_power(orbit.monodromy, times), stations=None
+    )
+    follower = _follower(family, begun, settings)
+    # the motions of the branch differ in the direction of the eigenvector, at a doubling every second period
     scale = follower.scale[:-1]
-    scaled = (orbit.monodromy + np.eye(len(scale))) * scale / scale[:, None]
-    vector = np.linalg.svd(scaled)[2][-1] * scale
-    base = follower.start_with_tangent(orbit.start, doubling.parameter, np.append(vector, 0.0))
-    for length in (_SWITCH, 4.0 * _SWITCH, 0.25 * _SWITCH, 16.0 * _SWITCH):
+    scaled = (orbit.monodromy - (-1.0) ** (times - 1) * np.eye(len(scale))) * scale / scale[:, None]
+    vector = side * np.linalg.svd(scaled)[2][-1] * scale
+    base = follower.start_with_tangent(orbit.start, special.parameter, np.append(vector, 0.0))
+    for length in lengths:
         taken = follower.step(base, length)
-        # a step back to the undoubled branch does not count
-        if taken is not None and abs(float((taken.y / scale - orbit.start / scale) @ (vector / scale))) > 0.5 * length:
-            return _branch(family, doubled.turns, follower, taken, watch, stop, largest)
-    raise ContinuationError(f"no motion of twice the period was found near {family.format_value(doubling.parameter)}")
+        if taken is None:
+            continue
+        away = (np.append(taken.y, taken.parameter) - np.append(orbit.start, special.parameter)) / follower.scale
+        if np.abs(away).max() < BEGINNING and (times == 1 or _half_shift(taken) @ _half_shift(taken) > length**2):
+            return _branch(family, begun.turns, follower, taken, watch, stop, largest)
+    motion = "of twice the period" if times > 1 else "that branches off"
+    raise ContinuationError(f"no motion {motion} was found near {family.format_value(special.parameter)}")
 
 
 def follow_both(family: Family, orbit: PeriodicOrbit, value: float, *, low: float, high: float, **how: Any) -> Branch:
@@ -430,19 +446,44 @@ def _meets_half(before: Point, after: Point) -> bool:
     if turns % 2 or not before.tangent[-1] * after.tangent[-1] < 0.0:
         return False
     try:
-        halves = [o.point.period(o.start, turns // 2).shift / o.scale for o in (before.data, after.data)]
+        return bool(_half_shift(before) @ _half_shift(after) < 0.0)
     except OrbitError:
         return False
-    return bool(halves[0] @ halves[1] < 0.0)
 
 
-def _tests(point: Point) -> dict[Crossing, float]:
-    """Return the test function of each kind of crossing; its sign changes where a multiplier crosses the unit circle."""
-    # det(M - 1) is also zero where two branches cross; the parameter's direction along the branch changes only at a fold
-    return {
-        kind: float(point.tangent[-1]) if kind is Crossing.FOLD else float(crossing_test(point.data.monodromy, kind))
-        for kind in Crossing
-    }
+def _half_shift(point: Point) -> NDArray[np.float64]:
+    """Return the change of y, relative to the scale, over half of the period."""
+    orbit: PeriodicOrbit = point.data
+    return np.asarray(orbit.point.period(orbit.start, orbit.turns // 2).shift / orbit.scale)
+
+
+def _turn(point: Point) -> float:
+    """Return the change of the parameter along the branch, whose sign changes where the branch turns back."""
+    return float(point.tangent[-1])
+
+
+def _crossings(before: Point, after: Point) -> Iterator[tuple[Crossing, Callable[[Point], float]]]:
+    """Yield the crossings between two neighbouring points of a branch, each with a function that is zero there."""
+    ends = before.data, after.data
+    tests = {kind: partial(_test, kind=kind) for kind in Crossing if kind is not Crossing.FOLD}
+    changed = {kind for kind, test in tests.items() if test(before) * test(after) < 0.0}
+    turned = _turn(before) * _turn(after) < 0.0
+    # where two branches cross, either the parameter turns back or det(I - M) changes its sign; at a fold both do. Without
+    # damping or stiffness multipliers lie at the crossing all along, and their rounding crosses nothing
+    settled = max(float(np.abs(end.multipliers - 1.0).min()) for end in ends) > _AT_CROSSING
+    crossed = settled and turned != (Crossing.BRANCH_POINT in changed)
+    if turned:
+        yield (Crossing.BRANCH_POINT if crossed else Crossing.FOLD), _turn
+    elif crossed:
+        yield Crossing.BRANCH_POINT, tests[Crossing.BRANCH_POINT]
+    if Crossing.PERIOD_DOUBLING in changed:
+        yield Crossing.PERIOD_DOUBLING, tests[Crossing.PERIOD_DOUBLING]
+    if Crossing.TORUS in changed and max(torus_pair(end.multipliers)[1] for end in ends) > _AT_CROSSING:
+        yield Crossing.TORUS, tests[Crossing.TORUS]
+
+
+def _test(point: Point, kind: Crossing) -> float:
+    return float(crossing_test(point.data.monodromy, kind))
 
 
 def _special_points(
@@ -455,27 +496,16 @@ def _special_points(
     passed = sum(len(piece.points) - 1 for _, piece in pieces)
     found: list[tuple[int, float, SpecialPoint]] = []
     problems: list[str] = []
-    values = [_tests(point) for point in curve.points]
-    for i, length in enumerate(curve.steps):
-        for kind in Crossing:
-            # at prescribed speed the product of the two multipliers depends only on the damping: there is no torus point
-            if (
-                kind is Crossing.TORUS
-                and curve.points[i].data.drive.speed_drive
-                and len(curve.points[i].data.start) < 3
-            ):
-                continue
-            if not values[i][kind] * values[i + 1][kind] < 0.0:
-                continue
-            before, after = curve.points[i : i + 2]
+    for i, (before, after, length) in enumerate(zip(curve.points, curve.points[1:], curve.steps)):
+        for kind, test in _crossings(before, after):
             try:
-                point, s = follower.locate(before, length, after, lambda p, kind=kind: _tests(p)[kind])  # type: ignore[misc]
+                point, s = follower.locate(before, length, after, test)
             except ContinuationError as error:
                 span = " and ".join(family.format_value(p.parameter) for p in (before, after))
                 problems.append(f"the {kind.value} between {span} is not located: {error}")
                 continue
             # two real multipliers with the product 1 are not a torus point
-            if kind is Crossing.TORUS and abs(point.data.multipliers[0].imag) < 1e-6:
+            if kind is Crossing.TORUS and abs(torus_pair(point.data.multipliers)[0].imag) < 1e-6:
                 continue
             found.append((i, s, SpecialPoint(kind=kind, parameter=point.parameter, orbit=point.data, after=passed + i)))
     return [special for _, _, special in sorted(found, key=lambda entry: entry[:2])], problems

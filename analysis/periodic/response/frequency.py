@@ -1,15 +1,17 @@
 """Compute the frequency response: at which speeds the mechanism resonates, how strongly, and with which harmonics.
 
 `frequency_response` follows the periodic motions of the full nonlinear mechanism over a range of speeds, past folds, from both
-ends of the range. At period doublings it switches to the motions of twice the period, repeatedly if wanted. `with_isolas` adds
-the motions to which none of these branches leads: closed curves over the parameter, and branches that reach neither end.
-`natural_frequency` gives the classical estimate of the resonance from the mean effective mass.
+ends of the range. At branch points it switches to the branch that crosses, and at period doublings to the motions of twice the
+period, repeatedly if wanted. `with_isolas` adds the motions to which none of these branches leads: closed curves over the
+parameter, and branches that reach neither end. `natural_frequency` gives the classical estimate of the resonance from the mean
+effective mass.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field, replace
+from functools import partial
 from itertools import product
 from math import sqrt
 from pathlib import Path
@@ -170,8 +172,9 @@ class Response(NotebookResult):
     Attributes
     ----------
     branches : tuple of Branch
-        First the branch from the low end, then the branch from the high end if it is a different one, then the branches of
-        twice the period, of four times the period and so on, then branches that are connected with none of these.
+        First the branch from the low end, then the branch from the high end if it is a different one, then branches of the same
+        period that cross these, then the branches of twice the period, of four times the period and so on, then branches that
+        are connected with none of these.
     low, high : float
         Range of the parameter.
     problems : tuple of str
@@ -342,6 +345,8 @@ def frequency_response(
         search = _Search(family, low, high, greatest_step, lambda: bool(interrupted))
         search.follow_from_both_ends(start, most_points, show)
         if not interrupted:
+            search.follow_branch_points(search.branches)
+        if not interrupted:
             search.follow_doublings(doublings)
     if not search.branches:
         raise search.failures[0]
@@ -448,6 +453,51 @@ class _Search:
                 ends.append((branch.turns, float(branch.parameter[-1]), branch.orbits[-1].start))
                 if self.stop():
                     return
+            self.follow_branch_points(doubled)
+
+    def follow_branch_points(self, branches: list[Branch]) -> None:
+        """Follow the branches that cross ``branches`` where a motion is stable, and those that cross these; add them to it."""
+        failed: list[tuple[SpecialPoint, str]] = []
+        for branch in branches:
+            for special, side in product(branch.special, (1.0, -1.0)):
+                least = min(orbit.largest for orbit in branch.orbits[special.after : special.after + 2])
+                if special.kind is not motion.Crossing.BRANCH_POINT or least > 1.0 + motion.TOLERANCE:
+                    continue
+                follow_on = partial(
+                    switch, branch.family, special, low=self.low, high=self.high, side=side, greatest=self.greatest
+                )
+                try:
+                    if self._count_passages(branches, special) > 1:
+                        continue
+                    first = follow_on(most_points=1)
+                    if self._knows(first.orbits[0], float(first.parameter[0])):
+                        continue
+                    found = follow_on(stop=lambda _: self.stop())
+                except (motion.OrbitError, ContinuationError) as error:
+                    failed.append((special, str(error)))
+                    continue
+                self._keep(found)
+                if branches is not self.branches:
+                    branches.append(found)
+                if self.stop():
+                    return
+        places = {
+            self.family.format_value(special.parameter): error
+            for special, error in failed
+            if self._count_passages(branches, special) < 2
+        }
+        self.problems += [f"the branch that crosses at {place} is not followed: {places[place]}" for place in places]
+
+    def _count_passages(self, branches: Iterable[Branch], special: SpecialPoint) -> int:
+        """Return the number of branches that pass through a special point."""
+        orbit, width = special.orbit, self.high - self.low
+
+        def is_same(other: SpecialPoint) -> bool:
+            away = orbit.flow.remove_turns(other.orbit.start - orbit.start) / orbit.scale
+            near = abs(other.parameter - special.parameter) < _SAME_POINT * width
+            return other.kind is special.kind and near and float(np.abs(away).max()) < sqrt(_SAME_POINT)
+
+        return sum(any(map(is_same, branch.special)) for branch in branches if branch.turns == orbit.turns)
 
     def seek(self, value: float, turns: int) -> None:
         """Find the motions of ``turns`` turns at a value of the parameter; follow those that lie on no known branch."""
@@ -513,6 +563,9 @@ def _passes(branch: Branch, value: float, orbit: motion.PeriodicOrbit) -> bool:
     )
 
 
+#: Distance of two values of the parameter, relative to the range, at which branches pass one special point; its square root is
+#: that of their motions, relative to the scale.
+_SAME_POINT = 1e-6
 #: Largest multiplier up to which a motion of several turns is followed.
 GREATEST_OF_SEVERAL = 100.0
 

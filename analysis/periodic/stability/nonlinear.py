@@ -25,7 +25,7 @@ from ...mechanisms import Parameters
 from ...run import simulate, takes_published
 from ..motion.discretisation import OperatingPoint, OrbitError, operating_point
 from ..motion.drive import Drive
-from ..motion.floquet import TOLERANCE, Crossing, Stability, StabilityVerdict
+from ..motion.floquet import TOLERANCE, Crossing, Stability, StabilityVerdict, torus_pair
 from ..motion.orbit import PeriodicOrbit, newton_orbit
 from ..motion.variables import Family
 
@@ -60,7 +60,7 @@ _STEP, _CERTAIN, _HALVINGS = 8e-3, 1e-2, 16
 #: assembly the multiplier may change from -1 to 1 within the rounding error of the parameter.
 _LOCATED = 1e-2
 #: Relative uncertainty of a coefficient above which its sign is not settled.
-UNSETTLED = 0.5
+UNSETTLED = 0.1
 _UNSETTLED = "not settled"
 #: Run that confirms a normal form: least and greatest distance of the multiplier from the unit circle; wanted square of the
 #: distance from the motion of the branch; periods of the run.
@@ -78,12 +78,14 @@ class NormalForm:
     kind : Crossing
     coefficient : float
         With y in units of its scale: for a fold half the second derivative along the eigenvector; for a period doubling the
-        cubic coefficient, positive if supercritical; for a torus the first Lyapunov coefficient, negative if supercritical.
+        cubic coefficient, positive if supercritical; for a branch point the cubic coefficient, for a torus the first Lyapunov
+        coefficient, negative if supercritical.
     uncertainty : float
         Change of the coefficient when the step of the finite differences is halved; infinite if the point is not located.
     words : str
-        "supercritical", "subcritical", or "not settled" if the coefficient is uncertain or the multiplier crosses the circle
-        too fast for the point to be located; for a fold, whether the two motions exist at lower or higher parameter values.
+        "supercritical", "subcritical", for a branch point without symmetry "transcritical", or "not settled" if the coefficient
+        is uncertain or the multiplier crosses the circle too fast for the point to be located; for a fold, whether the two
+        motions exist at lower or higher parameter values.
     """
 
     kind: Crossing
@@ -180,8 +182,9 @@ def normal_form(family: Family, special: SpecialPoint) -> NormalForm:
         If the integration over a period, from a start next to the orbit, fails.
     """
     forms = _forms(special.orbit)
-    multiplier = complex(special.orbit.multipliers[0])
-    crossing = {Crossing.FOLD: 1.0, Crossing.PERIOD_DOUBLING: -1.0}.get(special.kind, multiplier / abs(multiplier))
+    multiplier = torus_pair(special.orbit.multipliers)[0] if special.kind is Crossing.TORUS else 1.0
+    real = {Crossing.FOLD: 1.0, Crossing.BRANCH_POINT: 1.0, Crossing.PERIOD_DOUBLING: -1.0}
+    crossing = real.get(special.kind, multiplier / abs(multiplier))
     if np.abs(special.orbit.multipliers - crossing).min() > _LOCATED:
         return NormalForm(kind=special.kind, coefficient=0.0, uncertainty=np.inf, words=_UNSETTLED)
     coefficient, uncertainty = _extrapolate_coefficient(lambda h: form_coefficient(forms, special.kind, multiplier, h))
@@ -189,6 +192,8 @@ def normal_form(family: Family, special: SpecialPoint) -> NormalForm:
         words = _UNSETTLED
     elif special.kind is Crossing.FOLD:
         words = f"both motions at {'lower' if coefficient * _slope(family, forms, special) > 0.0 else 'higher'} values"
+    elif special.kind is Crossing.BRANCH_POINT and _is_transcritical(forms, coefficient):
+        words = "transcritical"
     else:
         gentle = coefficient > 0.0 if special.kind is Crossing.PERIOD_DOUBLING else coefficient < 0.0
         words = "supercritical" if gentle else "subcritical"
@@ -246,17 +251,33 @@ def form_coefficient(forms: Forms, kind: Crossing, multiplier: complex, h: float
             + b(v.conj(), np.linalg.solve(turn**2 * unit - matrix, b(v, v)))
         )
         return float(0.5 * (np.vdot(left, inner) / turn).real)
-    sign = 1.0 if kind is Crossing.FOLD else -1.0
-    right, left, _ = _eigenvectors(matrix, sign)
-    q, p = (np.array(vector.real, dtype=float) for vector in (right, left))
+    q, p = _real_eigenvectors(matrix, -1.0 if kind is Crossing.PERIOD_DOUBLING else 1.0)
     second = forms.second_form(q, h)
     if kind is Crossing.FOLD:
         return float(0.5 * p @ second)
-    # B(q, w) by polarisation, with w scaled to the length of q
+    # B(q, w) by polarisation, with w scaled to the length of q; at a branch point w is normal to the left eigenvector
+    if kind is Crossing.BRANCH_POINT:
+        matrix, second = matrix - np.outer(q, p), second - (p @ second) * q
     w = np.linalg.solve(unit - matrix, second)
     length = float(np.linalg.norm(w)) or 1.0
     mixed = length * (forms.second_form(q + w / length, h) - forms.second_form(q - w / length, h)) / 4.0
     return float(p @ (forms.third_form(q, h) + 3.0 * mixed)) / 6.0
+
+
+def _real_eigenvectors(matrix: FloatArray, value: float) -> tuple[FloatArray, FloatArray]:
+    """Return the right and left eigenvectors of a real eigenvalue: see `_eigenvectors`."""
+    right, left, _ = _eigenvectors(matrix, value)
+    return right.real, left.real
+
+
+#: Quadratic coefficient, relative to the root of the cubic one, above which a branch point is transcritical: zero by symmetry.
+_QUADRATIC = 1e-2
+
+
+def _is_transcritical(forms: Forms, cubic: float) -> bool:
+    """Return whether the map at a branch point has a quadratic coefficient, so that the branch goes on on both sides."""
+    whole, half = (form_coefficient(forms, Crossing.FOLD, 1.0, h) for h in (_STEP, 0.5 * _STEP))
+    return abs(half) > max(_QUADRATIC * sqrt(abs(cubic)), abs(half - whole) / UNSETTLED)
 
 
 def _slope(family: Family, forms: Forms, special: SpecialPoint) -> float:

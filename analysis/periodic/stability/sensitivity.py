@@ -202,7 +202,9 @@ class MotionGradient:
         # to first order the value of an extremum does not depend on its place
         own = solution[:, :, self.coordinate, :]
         by = [0.5 * sign * place.weights @ own[place.panel] for sign, _, place in self._swing]
-        return self._gradient(0.5 * (self._swing[0][1] - self._swing[1][1]), by[0] + by[1])
+        # an amplitude that is a rounding error is zero: see `Turn.swing_amplitude`
+        still = self.orbit.amplitudes[self.coordinate] == 0.0
+        return self._gradient(0.0 if still else 0.5 * (self._swing[0][1] - self._swing[1][1]), by[0] + by[1])
 
     def amplitude_curvature(self, along: str) -> Gradient:
         """Return the gradient of the derivative of the amplitude with respect to the parameter ``along``."""
@@ -406,6 +408,8 @@ def crossing_gradient(
         If there is no such point near the motion, or its place has no derivative: the boundary is parallel to the parameter,
         two folds meet, or two branches cross.
     """
+    if kind is Crossing.BRANCH_POINT:
+        raise LinkworkError("two branches cross: the place has no derivative, as they part when a symmetry is broken")
     others = _other_names(orbit, along, names)
     orbit = _locate_motion(
         orbit, along, _fold_step if kind is Crossing.FOLD else partial(_crossing_step, kind=kind), kind.value
@@ -539,7 +543,7 @@ def _singular_matrix(matrix: FloatArray, by: FloatArray, kind: Crossing) -> tupl
     ``matrix`` is the monodromy matrix and ``by`` its derivatives.
     """
     if kind is not Crossing.TORUS:
-        sign = 1.0 if kind is Crossing.FOLD else -1.0
+        sign = -1.0 if kind is Crossing.PERIOD_DOUBLING else 1.0
         return np.eye(len(matrix)) - sign * matrix, -sign * by
     # the second compound matrix has the products of two multipliers as eigenvalues
     i, j = np.triu_indices(len(matrix), 1)
