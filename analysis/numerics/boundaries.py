@@ -348,13 +348,15 @@ def trace(test: Test, seed: tuple[float, float], box: Box, *, step: float = 0.02
     try:
         start = follower.start(place[:1], float(place[1]), 1, across / (float(np.hypot(*across)) or 1.0))
     except ContinuationError as error:
-        raise InputError(f"no boundary is within {step:g} of the box's sides from the seed {seed}: {error}") from None
+        raise InputError(
+            f"no boundary is within {step:g}, in units of the box's sides, of the seed {seed}: {error}"
+        ) from None
     found = np.array([start.y[0], start.parameter])
     if len(sides) == 1:
         found[sides[0]] = place[sides[0]]
         start = replace(start, y=found[:1], parameter=float(found[1]))
     if (np.abs(found - place) > step * box.size).any() or follower.is_beyond(start):
-        raise InputError(f"no boundary is within {step:g} of the box's sides from the seed {seed}")
+        raise InputError(f"no boundary is within {step:g}, in units of the box's sides, of the seed {seed}")
     if start.orientation < 0.0:
         start = start.with_opposite_tangent()
     way, *curves = follower.follow_both(start)
