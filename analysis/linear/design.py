@@ -312,7 +312,7 @@ def design_lqr(
         raise DesignError(
             f"weights of shape {weights.shape}: they must be {n} numbers, for {', '.join(names)}, or an {n} by {n} matrix"
         )
-    # x' Q x is that of the symmetric part; the zeros of a product H' H, as for a weight of outputs, are rounded
+    # only the symmetric part of Q affects x' Q x; zeros of a product H' H, such as a weight of outputs, are rounded
     weights = 0.5 * (weights + weights.T)
     if not np.all(np.isfinite(weights)) or np.linalg.eigvalsh(weights)[0] < -1e-12 * np.abs(weights).max():
         raise DesignError(f"weights {weights.tolist()}: they must be finite and none below zero")

@@ -445,7 +445,7 @@ def encode(inputs: Inputs, mechanism: Mechanism) -> Encoded:
 
 
 def encode_once(inputs: Inputs, mechanism: Mechanism) -> Encoded:
-    """Return the result of `encode`; if the inputs are numbers and torque laws, which cannot change, it is cached in them."""
+    """Return the result of `encode`, cached in ``inputs`` if these have only numbers and torque laws, which cannot change."""
     if mechanism not in inputs._encoded:
         encoded = encode(inputs, mechanism)
         if not all(isinstance(p, (*NUMBER, TorsionBar, InductionMotor)) for name in inputs for p in inputs.parts(name)):

@@ -146,7 +146,7 @@ class ForceTurn:
         Torque of the drive on the crank (N.m).
     slider_force : masked array, shape (n,)
         Load on the slider (N), positive in the direction in which the slider position increases, -k of frame 4; the forces of
-        spring, damper and friction are not part of it. If it is sought, it is masked at dead centres.
+        spring, damper and friction are not part of it. A load that is sought is masked at dead centres.
     axial_force : masked array, shape (n,)
         Total force on the crank along its axis (N): drive of the shift, spring and damper together.
     applied_axial_force : masked array, shape (n,)
