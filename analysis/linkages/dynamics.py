@@ -6,10 +6,12 @@ from collections.abc import Iterator, Mapping
 from itertools import chain, count
 from typing import NamedTuple
 
+from linkwork.friction import FRICTION_FORCE
+
 from .description import BODY, GROUND, Description, Spring, is_given
 from .equations import Twist
 from .laws import expression, with_constants
-from .parameters import Interface
+from .parameters import Interface, length_and_mass
 from .structure import Dyad, FreedomStep, GearStep, Joint, Pin, RackStep, Side, Step, sliders
 from .writing import function, record, tuple_source
 
@@ -352,13 +354,15 @@ class Motion:
         ]
         wrenches, lost = "a.wrenches", "a.lost"
         if self.description.friction:
+            # 0.1 N/kg is a hundredth of the weight: 0.01 N would be more than all forces of a microscopic linkage
+            rounding = min(FRICTION_FORCE, 0.1 * length_and_mass(self.interface)[1])
             wrenches, lost = "wrenches", "lost"
             rows += [
                 "wrenches, lost = a.wrenches, a.lost",
                 "if p.rough:",
                 "    units = rubbing(b, p)",
                 "    without = contacts(forces(b, m, wrenches, e, p), b)",
-                "    sizes = contact_forces(without, responses(b, m, units, matrix, held_ones, p))",
+                f"    sizes = contact_forces(without, responses(b, m, units, matrix, held_ones, p), {rounding})",
                 "    wrenches = add_friction(wrenches, units, sizes)",
                 "    lost = lost + sum(size * unit.lost for size, unit in zip(sizes, units))",
                 f"    f = generalised_forces(m, wrenches, {self.n})",

@@ -305,20 +305,19 @@ def _joint_parameters(description: Description, structure: Structure) -> Iterato
 
 def _friction(description: Description, structure: Structure) -> Iterator[Parameter]:
     """Yield the parameters of friction that grows with the forces in joints."""
-    slots = description.slots
+    slots = {joint: slot for slot in description.slots for joint in structure.joints.values() if slot in joint.bodies}
+    usable = [n for n, j in structure.joints.items() if len(j.bodies) == 2 and not (isinstance(j, Pin) and j in slots)]
     for name, value in description.friction.items():
         joint = structure.joints.get(name)
-        if joint is None or len(joint.bodies) != 2 or (isinstance(joint, Pin) and slots.keys() & set(joint.bodies)):
-            names = ", ".join(n for n, j in structure.joints.items() if len(j.bodies) == 2 and n not in slots)
-            of = joint or structure.joints.get(name.rstrip("0123456789"))
-            shared = (
-                f"; {of.name} is of {', '.join(of.bodies)}: give the {of.bodies[-1]} a point of its own at the same place, "
-                f"such as {of.name}x"
-                if of and len(of.bodies) > 2
-                else ""
-            )
+        if joint is None or name not in usable:
+            of, reason = joint or structure.joints.get(name.rstrip("0123456789")), ""
+            if of and len(of.bodies) > 2:
+                reason = f"; {of.name} is of {', '.join(of.bodies)}: give the {of.bodies[-1]} a point of its own at the same "
+                reason += f"place, such as {of.name}x"
+            elif of in slots:
+                reason = f"; the friction of the pin {of.name} is that of its slot {slots[of]}"
             raise LinkageError(
-                f"linkage.friction has {name}: it must be a slot, or a joint of two bodies: {names}{shared}"
+                f"linkage.friction has {name}: it must be a slot, or a joint of two bodies: {', '.join(usable)}{reason}"
             )
         if isinstance(joint, Pin):
             own, unit, text = "friction_radius", "m", f"Friction radius of the pin {name}: coefficient times its radius"

@@ -8,7 +8,8 @@ from math import fabs, sqrt, tanh
 FRICTION_SPEED = 1e-3
 #: Relative angular velocity of the links of a pin (rad/s) at which its friction has reached 76 % of its level.
 FRICTION_RATE = 0.1
-#: Force F0 that rounds off the magnitude of a contact force F near zero (N): it is taken as sqrt(F^2 + F0^2).
+#: Force F0 that rounds off the magnitude of a contact force F near zero (N): it is taken as sqrt(F^2 + F0^2). A linkage
+#: described with less than 100 g has 0.1 N for each kg.
 FRICTION_FORCE = 1e-2
 #: Greatest norm of the response of the contact forces to friction at which a motion is followed: at 1 the links may jam.
 MOST_RESPONSE = 0.8
@@ -28,17 +29,20 @@ def resistance(v: float, mu: float, fc: float) -> float:
     return mu * v + fc * tanh(v / FRICTION_SPEED)
 
 
-def contact_forces(smooth: tuple[Vector, ...], response: tuple[tuple[Vector, ...], ...]) -> tuple[float, ...]:
+def contact_forces(
+    smooth: tuple[Vector, ...], response: tuple[tuple[Vector, ...], ...], rounding: float = FRICTION_FORCE
+) -> tuple[float, ...]:
     """Solve for the magnitudes s_j = sqrt(|F_j|^2 + F0^2) of the contact forces (N) with friction proportional to them.
 
     ``smooth`` are the forces without friction; ``response[k]`` has the change of each force per newton of the k-th magnitude,
-    so that F_j = smooth_j + sum_k response[k]_j s_k. Newton's method starts at the forces without friction.
+    so that F_j = smooth_j + sum_k response[k]_j s_k; ``rounding`` is F0 (N). Newton's method starts at the
+    forces without friction.
     """
-    least = FRICTION_FORCE * FRICTION_FORCE
+    least = rounding * rounding
     s = tuple(sqrt(x * x + y * y + least) for x, y in smooth)
     for _ in range(SWEEPS):
-        s = _newton_step(smooth, response, s)
-    return _newton_step(smooth, response, mark_converged(s))
+        s = _newton_step(smooth, response, s, least)
+    return _newton_step(smooth, response, mark_converged(s), least)
 
 
 def jamming_margin(response: tuple[tuple[Vector, ...], ...]) -> float:
@@ -62,11 +66,10 @@ def mark_converged(s: tuple[float, ...]) -> tuple[float, ...]:
 
 
 def _newton_step(
-    smooth: tuple[Vector, ...], response: tuple[tuple[Vector, ...], ...], s: tuple[float, ...]
+    smooth: tuple[Vector, ...], response: tuple[tuple[Vector, ...], ...], s: tuple[float, ...], least: float
 ) -> tuple[float, ...]:
-    """Take one step of Newton's method for the magnitudes ``s``; see `contact_forces`."""
+    """Take one step of Newton's method for the magnitudes ``s``, where ``least`` is F0^2; see `contact_forces`."""
     n = range(len(smooth))
-    least = FRICTION_FORCE * FRICTION_FORCE
     forces = tuple(tuple(smooth[j][c] + sum(response[k][j][c] * s[k] for k in n) for c in (0, 1)) for j in n)
     size = tuple(sqrt(x * x + y * y + least) for x, y in forces)
     # from the tangent of sqrt(|F|^2 + F0^2): size_j s_j = F_j . (smooth_j + sum_k response[k]_j s_k) + F0^2

@@ -1041,6 +1041,12 @@ def rubbed_pin() -> Any:
     return built.body("lever", bar=("H", "G"), length=0.1).freedom("crank", "A")
 
 
+def rubbed_slot() -> Any:
+    built = linkage("rubbed-slot", ground={"A": (0, 0), "D": (0, -0.2)}, friction={"B": "1 mm"})
+    built.body("crank", bar=("A", "B"), length=0.06).body("lever", bar=("D", "E"), length=0.3, mass=1.0)
+    return built.slot("S", pin="B", on="lever", through="D").freedom("crank", "A")
+
+
 def folded_slot() -> Any:
     built = linkage("folded", ground={"A": (0, 0), "D": ("100 mm", 0)}).body("crank", bar=("A", "B"), length="100 mm")
     built.body("lever", points={"D": (0, 0)}, mass=1.0, inertia=0.01).slot("S", pin="B", on="lever", through="D")
@@ -1060,6 +1066,7 @@ REFUSED = [
     (lambda: wheel("twice", damping=1.0, more={"torques": ["pendulum"]}), r"two inputs would be called pendulum\.torque"),
     (toothed_rocker, r"by linkage\.gears\.Z pinion meshes with rocker, whose angle must follow"),
     (rubbed_pin, "B is of crank, coupler, other: give the other a point of its own at the same"),
+    (rubbed_slot, "of two bodies: A, D, S; the friction of the pin B is that of its slot S"),
     (folded_slot, r"linkage\.slots\.S has no direction at the start: the pins . and . are at one"),
 ]  # fmt: skip
 
@@ -1068,3 +1075,11 @@ REFUSED = [
 def test_what_is_refused_is_named(make: Callable[[], Any], said: str) -> None:
     with pytest.raises(LinkworkError, match=said):
         make().mechanism()
+
+
+def test_friction_of_a_microscopic_linkage_is_that_of_its_joint_forces() -> None:
+    spun = linkage("spun", ground={"A": (0, 0)}, friction={"A": "1 um"})
+    spun.body("arm", bar=("A", "B"), length="40 um", mass=2e-12, inertia=1e-22)
+    spun.freedom("arm", "A", speed=1e4).mechanism()
+    held = simulate("spun", stop_time="1 ms")["drive.applied_torque"]
+    np.testing.assert_allclose(held, 1e-6 * 2e-12 * 1e4**2 * 20e-6, rtol=1e-6)

@@ -345,7 +345,7 @@ class Multipliers:
         matrix[: len(q), len(q) :] = -constraints.T
         matrix[len(q) :, : len(q)] = constraints
         wanted = np.concatenate([-d[:size, 0], [commanded[n] - d[size + n, 0] for n in held]])
-        rubbing = self.rubbing(q, v)
+        rubbing, least = self.rubbing(q, v), min(FRICTION_FORCE, 0.1 * sum(self.mass(name)[0] for name in self.bodies))
         columns = [np.concatenate([right[:, 0] + along[free].T @ loads[free], wanted])]
         columns += [np.concatenate([rub, np.zeros(len(wanted))]) for _, rub in rubbing.values()]
         responses = refined_solve(matrix, np.array(columns).T)
@@ -363,7 +363,7 @@ class Multipliers:
         def made(sizes: np.ndarray) -> np.ndarray:
             joints = joints_of(sizes)
             parts = [joints[name] if name in self.owners else joints[name][:1] for name in rubbing]
-            return np.array([np.hypot(FRICTION_FORCE, np.linalg.norm(part)) for part in parts])
+            return np.array([np.hypot(least, np.linalg.norm(part)) for part in parts])
 
         sizes = made(np.zeros(len(rubbing)))
         for _ in range(2 if rubbing else 0):
