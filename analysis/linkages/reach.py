@@ -55,20 +55,20 @@ def reach(mechanism: Mechanism, freedom: int = 0, *, most: float | None = None, 
         Index of the degree of freedom.
     most : float, optional
         Greatest distance from the start that is searched: by default half the period of the coordinate. If the coordinate is
-        not periodic, the default is four turns for an angle and 1 m for a displacement.
+        not periodic, the default is four turns for an angle, and five times the length of the linkage for a displacement.
     samples : int
         Number of positions tried on each side of the start: per half turn if the coordinate is an angle, in total if it is a
         displacement.
     """
     coordinate, period = mechanism.freedoms[freedom].coordinate, mechanism.freedoms[freedom].period
     unit = variable_unit(mechanism, coordinate)
-    if most is None:
-        most = 0.5 * period or (8.0 * pi if unit == "rad" else 1.0)
-    samples *= max(round(most / pi), 1) if unit == "rad" else 1
     known = mechanism.first_set
     p = known.parameters.constants()
     acting, x = mechanism.idle_inputs(p), list(mechanism.state(known.initial))
-    middle = x[freedom]
+    middle, length = x[freedom], mechanism.error_scale(known.parameters, tuple(x))[freedom]
+    if most is None:
+        most = 0.5 * period or (8.0 * pi if unit == "rad" else 5.0 * length)
+    samples *= max(round(most / pi), 1) if unit == "rad" else 1
 
     def margin(q: float) -> float:
         """Return the clearance to the limit of assembly at a coordinate; below -1 if the bodies do not reach each other."""
@@ -98,6 +98,7 @@ def reach(mechanism: Mechanism, freedom: int = 0, *, most: float | None = None, 
                 before = places[max(n - 2, 1)]
                 ends.append(float(scipy.optimize.brentq(lambda c: max(margin(c), -1.0), before, at, xtol=1e-9 * most)))
                 free.append(False)
+                least = 0.0
                 break
             least = min(least, lowest)
         else:
@@ -128,7 +129,9 @@ def dead_centres(package: Package, freedom: int = 0, samples: int = 720) -> list
     The other freedoms are at their start. At such a position the velocity coefficient of the body changes its sign.
     """
     made, joints = package.mechanism(), package.structure.joints.values()
-    found, known = reach(made, freedom), made.first_set
+    # a spring about its pin counts the turns of a crank, but the bodies are back after one
+    turns = package.interface.drives[freedom].turns_back
+    found, known = reach(made, freedom, most=pi * turns or None), made.first_set
     p, x = known.parameters.constants(), list(made.state(known.initial))
     own = {drive.joint for drive in package.interface.drives}
     driven = [joint for joint in joints if GROUND in joint.bodies and joint.name not in own]

@@ -552,7 +552,15 @@ def test_ranges_of_motion():
     assert reach(load_linkage(FOLDER / "bistable.toml")).turns
     cart = linkage("reach-of-a-cart", ground={"A": (0, 0)}).body("cart", points={"P": (0, 0)}, mass="1 kg")
     found = reach(cart.slide("G", body="cart", through="A").freedom("cart", "G", driven=False).mechanism())
-    assert (found.low, found.high, found.open, found.turns) == (-1.0, 1.0, (True, True), False)
+    assert (found.low, found.high, found.open, found.turns) == (-5.0, 5.0, (True, True), False)
+    for name, size in (("microscopic", 1e-8), ("gigantic", 1e2)):
+        comb = linkage(f"{name}-comb", ground={"A": (0, 0), "O": (0, 20.0 * size)})
+        comb.body("crank", bar=("A", "B"), length=50.0 * size).body("rod", bar=("B", "C"), length=150.0 * size)
+        comb.body("ram", points={"C": (0, 0)}, mass=1.0).slide("G", body="ram", through="O")
+        found = reach(comb.freedom("stroke", "G", start=120.0 * size, driven=False).mechanism())
+        ends = np.sqrt([100.0**2 - 20.0**2, 200.0**2 - 20.0**2]) * size
+        assert (found.low, found.high) == pytest.approx(ends, rel=1e-5)
+        assert (found.open, found.least) == ((False, False), 1e-3)
     # the block runs off along its line where the slot of the arm is parallel to it, which no place need hit
     slotted = linkage("slotted-arm", ground={"A": (0, 0), "O": (0, "100 mm")}).body(
         "arm", points={"A": (0, 0)}, mass=1.0
@@ -573,6 +581,9 @@ def test_dead_centres():
         inner = np.arccos((0.2**2 + reached**2 - 0.14**2) / (2.0 * 0.2 * reached))
         angles.append(np.remainder(inner + turn, 2.0 * np.pi))
     np.testing.assert_allclose(sorted(np.remainder(list(found), 2.0 * np.pi)), sorted(angles), atol=1e-9)
+    tables = tables_in(FOLDER / "watt-1.toml")
+    wound = Package(read_description(tables | {"name": "wound", "springs": {"s": {"at": "A", "stiffness": 1.0}}}))
+    assert len(dead_centres(wound)) == len(dead_centres(load_package(FOLDER / "watt-1.toml")))
     press = dead_centres(load_package(FOLDER / "toggle-press.toml"))
     run_of = run("toggle-press", **{"run.step": "1 ms"})
     turns = np.flatnonzero(np.diff(np.sign(run_of["G.velocity"])))
