@@ -16,6 +16,7 @@ from linkwork.mechanism import Mechanism
 from linkwork.variables import Variable
 
 from ..files import find_problems
+from ..run import read_experiments
 from .accuracy import to_html
 from .experiments import experiments
 
@@ -130,13 +131,14 @@ td:first-child {{ font-family: monospace; white-space: nowrap; }}
 _TRIAL = """
 import sys
 from fmpy import simulate_fmu
-result = simulate_fmu(sys.argv[1], stop_time=0.02, step_size=1e-3, output_interval=1e-3)
+stop = float(sys.argv[2])
+result = simulate_fmu(sys.argv[1], stop_time=stop, step_size=stop / 20.0, output_interval=stop / 20.0)
 assert len(result) == 21, len(result)
 """
 
 
 def run_trial(fmu: Path, script: str = _TRIAL, *arguments: str) -> None:
-    """Run the FMU with FMPy in a separate process, by default for twenty steps.
+    """Run the FMU with FMPy in a separate process, by default for twenty steps, up to 20 ms or the end of an experiment in it.
 
     Parameters
     ----------
@@ -149,12 +151,12 @@ def run_trial(fmu: Path, script: str = _TRIAL, *arguments: str) -> None:
     BuildError
         If the run fails; the message has what the run printed.
     """
-    done = subprocess.run(
-        [sys.executable, "-c", script, str(fmu), *arguments],
-        capture_output=True,
-        text=True,
-        timeout=120,
-        check=False,
-    )
+    if script is _TRIAL:
+        arguments = (repr(min(0.02, *(experiment.stop or 0.02 for experiment in read_experiments(fmu)))),)
+    command = [sys.executable, "-c", script, str(fmu), *arguments]
+    try:
+        done = subprocess.run(command, capture_output=True, text=True, timeout=120, check=False)
+    except subprocess.TimeoutExpired:
+        raise BuildError(f"{fmu.name} was built but does not run as it should: it takes longer than 120 s") from None
     if done.returncode != 0:
         raise BuildError(f"{fmu.name} was built but does not run as it should:\n{done.stdout}{done.stderr}")

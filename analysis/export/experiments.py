@@ -20,7 +20,7 @@ from typing import Any
 from xml.etree.ElementTree import Element, SubElement
 
 import linkwork
-from linkwork.errors import AssemblyError
+from linkwork.errors import AssemblyError, IntegrationError
 from linkwork.mechanism import Mechanism
 from linkwork.parameters import fmi_name
 from linkwork.plant import Plant
@@ -35,6 +35,8 @@ from .description import layered_standard, to_xml_bytes
 STEPS, ROWS, DIGITS = 100, 10, 12
 #: Greatest number of solver steps of the plant in a default experiment: more steps take seconds in plain Python.
 LONGEST = 200
+#: Number of times that the duration of a default experiment may be halved.
+HALVINGS = 40
 #: Tolerances of the reference and of the experiment; the greatest relative difference that is allowed between them.
 REFERENCE, TOLERANCE, DIFFERENCE = 1e-12, 1e-10, 1e-6
 _SSV = "http://ssp-standard.org/SSP1/SystemStructureParameterValues"
@@ -104,16 +106,17 @@ def _make_experiments(mechanism: Mechanism) -> dict[str, bytes]:
         constant = {name: float(starts[name]) for name in mechanism.input_names}
         start, end = mechanism.experiment[:2]
         halved, refused = 0, None
-        while halved < 10:
+        while halved < HALVINGS:
             try:
                 now = start + (end - start) * 0.5**halved
-                longest = LONGEST if halved < 9 else inf
+                longest = LONGEST if halved < HALVINGS - 1 else inf
                 add("default", "default experiment", starts, now, lambda number, outputs: constant, longest)
                 break
             except _TooLongError as error:
                 halved = max(halved + 1, ceil(log2((end - start) / (error.time - start))))
-            except AssemblyError as error:
-                halved, refused = halved + 1, refused or error
+            except (AssemblyError, IntegrationError) as error:
+                # a communication step that takes more than the plant's 20,000 steps is at least a hundred times too long
+                halved, refused = halved + (7 if isinstance(error, IntegrationError) else 1), refused or error
         else:
             assert refused is not None
             raise refused

@@ -51,6 +51,7 @@ from .experiments import EXPERIMENTS as EXPERIMENTS
 from .experiments import MANIFEST as MANIFEST
 from .experiments import STANDARD as STANDARD
 from .experiments import ExperimentError as ExperimentError
+from .experiments import read_experiments as read_experiments
 from .experiments import unpacking_folder as unpacking_folder
 from .experiments import verify as verify
 from .fmu import CosimulationError as CosimulationError

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from math import cos, sqrt
 from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
@@ -14,6 +15,7 @@ from click.testing import CliRunner, Result
 from analysis import cli
 from analysis.cli import CHECK_FAILED
 from analysis.export.experiments import experiments
+from analysis.linkages import linkage
 from analysis.mechanisms import MECHANISMS
 from analysis.run import EXPERIMENTS, MANIFEST, ExperimentError, verify
 from linkwork.mechanism import Mechanism
@@ -77,7 +79,7 @@ def test_every_native_fmu_passes_its_own_experiments(natives: dict[str, Path]) -
 
 
 def test_an_experiment_of_many_steps_is_shortened(monkeypatch: pytest.MonkeyPatch) -> None:
-    """So that a description with friction waits seconds for its FMU; nine halvings at most."""
+    """So that a description with friction waits seconds for its FMU; 39 halvings at most."""
 
     def end(longest: float) -> float:
         monkeypatch.setattr("analysis.export.experiments.LONGEST", longest)
@@ -87,7 +89,17 @@ def test_an_experiment_of_many_steps_is_shortened(monkeypatch: pytest.MonkeyPatc
 
     whole = pendulum.MECHANISM.experiment[1]
     assert end(1e6) == whole
-    assert end(60.0) == whole * 0.5**9
+    assert end(60.0) == whole * 0.5**39
+
+
+def test_an_experiment_of_a_microscopic_linkage_is_short() -> None:
+    built = linkage("flexure", ground={"A": (0, 0)}).body("arm", bar=("A", "B"), length="40 um", mass="1 ng")
+    built.spring("hinge", at="A", stiffness=1e-5, free=0.1).freedom("arm", "A", driven=False)
+    files = experiments(built.mechanism())
+    reference = next(text for name, text in files.items() if name.endswith("default-ref.csv")).decode().splitlines()
+    last = dict(zip(reference[0].replace('"', "").split(","), map(float, reference[-1].split(","))))
+    rate = sqrt(1e-5 / (1e-12 * 20e-6**2))
+    assert last["arm.angle"] == pytest.approx(0.1 * (1.0 - cos(rate * last["time"])), rel=1e-6)
 
 
 def test_kept_references_are_made_again_if_any_source_has_changed(
