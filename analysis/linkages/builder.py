@@ -359,7 +359,7 @@ class Builder:
         speed : optional
             Commanded rate (rad/s, m/s); for a freedom that is not driven, its initial rate.
         driven : bool, optional
-            Whether its rate can be commanded; by default only the first freedom can be.
+            Whether its rate can be commanded; by default only the first freedom with a speed can be, or else the first.
         """
         return self._add("freedoms", name, joint=joint, start=start, speed=speed, driven=driven)
 

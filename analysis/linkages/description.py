@@ -61,6 +61,13 @@ def _named_entries(reader: Any) -> Any:
 
 
 _PLACE = Many(coordinate, length=2)
+#: A direction of more than a turn is probably a number in degrees.
+_DIRECTION = Quantity(
+    "rad",
+    above=-2.001 * pi,
+    below=2.001 * pi,
+    requirement='be at most a turn; a number is in rad: for degrees write "90 deg"',
+)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -114,7 +121,7 @@ class Line:
 
     on: str = entry(_name)
     through: str = entry(_name)
-    direction: float = entry(Quantity("rad"), 0.0)
+    direction: float = entry(_DIRECTION, 0.0)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -260,7 +267,7 @@ class FreedomTable:
         Commanded rate, at the start and as long as no input changes it (rad/s, m/s). The whole number 0 means that no rate is
         commanded; "0 rpm" commands rest. For a freedom that is not driven: its initial rate.
     driven : bool
-        Whether its rate can be commanded; by default only the first freedom can be.
+        Whether its rate can be commanded; by default only the first freedom with a speed can be, or else the first.
     """
 
     joint: str = entry(_name)
@@ -321,4 +328,4 @@ class Description:
     loads: tuple[PointLoad, ...] = entry(Many(_load), ())
     torques: tuple[str, ...] = entry(Many(_name), ())
     gravity: float = entry(Quantity("m/s2", least=0.0), 0.0)
-    gravity_direction: float = entry(Quantity("rad"), -0.5 * pi)
+    gravity_direction: float = entry(_DIRECTION, -0.5 * pi)

@@ -153,9 +153,10 @@ class Interface:
 def freedoms(description: Description, structure: Structure) -> tuple[Drive, ...]:
     """Return the freedoms with their names in the FMI interface."""
     tables = structure.freedoms
-    driven = [
-        name for n, (name, table) in enumerate(tables.items()) if (n == 0 if table.driven is None else table.driven)
-    ]
+    first, *later = tables
+    if tables[first].driven is None and not is_given(tables[first].speed):
+        first = next((n for n in later if tables[n].driven is None and is_given(tables[n].speed)), first)
+    driven = [name for name, table in tables.items() if (name == first if table.driven is None else table.driven)]
     found: list[Drive] = []
     for name, table in tables.items():
         turns = isinstance(structure.joints[table.joint], Pin)

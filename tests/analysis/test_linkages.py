@@ -331,6 +331,8 @@ MISTAKES = [
     ("slides/G", {"body": "rocker"}, "linkage.slides.G.through"),
     ("slides/C", {"body": "rocker", "through": "A"}, "linkage.slides.C"),
     ("slides/G", {"body": "rocker", "through": "A", "direction": "1 m"}, "linkage.slides.G.direction"),
+    ("slides/G", {"body": "rocker", "through": "A", "direction": 90}, 'direction is 90: it must be at most a turn; a number'),
+    ("gravity_direction", -90.0, "linkage.gravity_direction is -90.0"),
     ("slots/S", {"pin": "Z", "on": "rocker", "through": "D"}, "linkage.slots.S"),
     ("slots/S", {"pin": "B", "on": "lever", "through": "D"}, "linkage.slots.S"),
     ("slots/S", {"pin": "B", "on": "rocker", "through": "B"}, "linkage.slots.S.through"),
@@ -728,6 +730,13 @@ def test_laws_have_max_min_and_abs(x: float) -> None:
     assert eval(written, vars(math) | known) == pytest.approx(eval(formula, known), rel=1e-14, abs=1e-15)
     with pytest.raises(ParameterError, match="be a formula in x, v"):
         laws.law("max(x)", "law")
+
+
+def test_the_freedom_with_a_speed_is_driven_whatever_the_order() -> None:
+    built = linkage("any-order", ground={"A": (0, 0)}).body("arm", bar=("A", "B"), length=0.1, mass=1.0)
+    built.body("bob", bar=("B", "C"), length=0.1, mass=1.0).freedom("swing", "B").freedom("arm", "A", speed=2.0)
+    assert [freedom.mode is not None for freedom in built.mechanism().freedoms] == [False, True]
+    np.testing.assert_array_equal(simulate("any-order", stop_time=0.1)["arm.speed"], 2.0)
 
 
 def test_a_cylinder_called_like_a_body_has_its_own_force() -> None:
