@@ -353,7 +353,8 @@ def find_equilibria(
         turned = one.coordinates.copy()
         for n in (balance.its.free[k] for k in balance.free):
             if period := balance.mechanism.freedoms[n].period:
-                turned[n] = 0.5 * period - (0.5 * period - turned[n]) % period
+                # half a turn to either side is the same, whatever its rounding error
+                turned[n] -= period * np.ceil(turned[n] / period - 0.5 - 1e-6)
         one = balance.solve(turned)
         places = list(balance.its.free)
         gaps = (np.sum(np.abs(one.coordinates - other.coordinates)[places] / balance.scale) for other in found)

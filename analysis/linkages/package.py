@@ -302,6 +302,7 @@ class Package:
         bodies = self.description.bodies.items()
         light = [name for name, body in bodies if not (body.mass or body.section)]
         light = light or [name for name, body in bodies if not (body.inertia or body.section or body.bar)]
+        light = light or [name for name, body in bodies if not (body.inertia or body.section)]
         masses = f"the mass or inertia of {' or '.join(f'linkage.bodies.{name}' for name in light) or 'a body'}"
         causes = " or ".join(laws or (masses,))
         raise LinkageError(f"the accelerations at the start are not finite numbers: change {causes.removesuffix(',')}")
@@ -369,12 +370,16 @@ class Package:
         blocks += Contacts(motion).blocks() if self.description.friction else ()
         # the joint forces that are outputs are known only after motion.forces()
         self.outputs = Outputs(motion)
-        names = [*(p.name for p in self.interface.parameters), *self.outputs.names()]
+        inputs = [
+            f"{d.table}.{own}" for d in self.interface.drives if d.table for own in (d.load, "speed", "acceleration")
+        ]
+        names = [*inputs, *(p.name for p in self.interface.parameters), *self.outputs.names()]
         for name in names:
             if names.count(name) > 1:
                 of = name.partition(".")[0]
                 raise LinkageError(
-                    f"two variables would be called {name}: one of the entries {of} must have another name"
+                    f"two variables would be called {name}: {of} of linkage.freedoms, linkage.bodies, linkage.springs or the "
+                    "like must have another name"
                 )
         scale = _error_scale(self.interface.drives, *length_and_mass(self.interface))
         body = "\n\n\n".join([*blocks, self.outputs.function(), scale, self.picture.positions()])

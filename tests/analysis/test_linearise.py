@@ -244,6 +244,19 @@ def test_all_equilibria_of_two_bars_that_stand_on_torsion_springs(lower: float, 
         assert min(np.abs(one.coordinates - q).max() for one in found) < 1e-6
 
 
+def test_each_equilibrium_of_a_chain_is_found_once() -> None:
+    """Each of three pendulums hangs or stands, whether its angle comes out as half a turn to the left or to the right."""
+    chain = linkage("chain", ground={"A": (0, 0)}, gravity=9.81)
+    for name, pins in zip("abc", ("AB", "BC", "CD")):
+        chain.body(f"{name}Bar", bar=tuple(pins), length=0.2, mass=0.3, inertia=1e-3)
+        chain.freedom(name, pins[0], driven=False)
+    chain.mechanism()
+    found = {tuple(np.round(one.coordinates, 6)) for one in find_equilibria("chain")}
+    straight = set(product((round(-0.5 * pi, 6), round(0.5 * pi, 6)), *2 * [(0.0, round(pi, 6))]))
+    assert {tuple(value + 0.0 for value in q) for q in found} == straight
+    assert len(find_equilibria("chain")) == 8
+
+
 def test_equilibrium_with_the_crank_held() -> None:
     held = find_equilibrium(TABLE_3_1, Inputs(force=2.0), held={"crank.angle": 0.3})
     outputs = dynamics.outputs(held.state, dynamics.Inputs(1.0, 0.0, 0.0, 2.0, 0.0, 0.0), 0.0, TABLE_3_1.constants())

@@ -429,6 +429,7 @@ MISTAKES = [
      "linkage.bodies.crank.points.B is where A is"),
     ("bodies/rocker", {"bar": ["D", "C"], "length": 0.12, "section": {"kind": "plate", "thickness": 0.005, "material": "steel",
      "corners": [[0, 0], [1, 1], [1, 0], [0, 1]]}}, "its edges cross"),
+    ("freedoms", {"drive": {"joint": "A"}}, "two variables would be called drive.speed: drive of linkage.freedoms"),
     ("name", "rahman-ideal", "linkage.name is rahman-ideal: it must not be that of a published set of slider-crank"),
     ("name", "five-bar-slider", "its FMU would be called FiveBarSlider, like that of five-bar"),
 ]  # fmt: skip
