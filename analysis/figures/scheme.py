@@ -84,7 +84,7 @@ def draw(
     shown = {name for part in drawing.parts for name in part.joints if part.kind in ("link", "pivot")} | set(
         drawing.paths
     )
-    pins = {joint.name: now[joint.name] for joint in drawing.joints if joint.name in shown}
+    pins = {joint.name: now[joint.name] for joint in drawing.joints if joint.name in shown and not joint.aid}
     for x, y in pins.values():
         axis.plot(x, y, "o", markersize=DOT, markerfacecolor="white", markeredgecolor=GROUND, zorder=6)
     if letters:
@@ -105,12 +105,11 @@ def _write_letters(axis: Axes, pins: dict[str, Array], unit: float) -> None:
     drawn = [shape for shape in (*lines, *edges) if np.isfinite(shape.bounds).all()]
     taken = list(pins.values())
     for name, pin in pins.items():
-        if not name.endswith("Block"):
-            place = roomiest_position(pin, 1.3 * unit, drawn, taken)
-            taken.append(place)
-            axis.text(
-                float(place[0]), float(place[1]), name, fontsize=SMALL, color=MARKED, ha="center", va="center", zorder=7
-            )
+        place = roomiest_position(pin, 1.3 * unit, drawn, taken)
+        taken.append(place)
+        axis.text(
+            float(place[0]), float(place[1]), name, fontsize=SMALL, color=MARKED, ha="center", va="center", zorder=7
+        )
 
 
 def _draw_part(axis: Axes, part: Part, through: Sequence[Array], unit: float, colours: Any) -> None:

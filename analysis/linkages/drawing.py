@@ -11,11 +11,12 @@ from .writing import function, quote
 
 
 class PicturePoint(NamedTuple):
-    """A point of the picture: its name, its label, and the expression of its position."""
+    """A point of the picture: its name, its label, the expression of its position, and whether it only places parts."""
 
     name: str
     text: str
     place: str
+    aid: bool = True
 
 
 class Picture:
@@ -28,7 +29,7 @@ class Picture:
         """Return the points of the picture, and its parts from the back to the front."""
         d, parts, length = self.description, [], length_and_mass(self.interface)[0]
         points = dict.fromkeys(own for of in self.interface.points.values() for own in of)
-        joints = [PicturePoint(own, f"point {own}", f"*(b.at_{own}.x, b.at_{own}.y, 0.0)") for own in points]
+        joints = [PicturePoint(own, f"point {own}", f"*(b.at_{own}.x, b.at_{own}.y, 0.0)", False) for own in points]
         lines = sliders(self.structure)
         for name, joint in lines.items():
             block, line, start, origin = (
@@ -99,12 +100,15 @@ class Picture:
         signature = "positions(x: tuple[float, ...], i: Applied, p: Constants) -> tuple[float, ...]"
         return function(signature, "Compute the places of the points of the picture.", rows)
 
-    def drag_argument(self, own: str) -> str:
-        """Return the source of the argument `Joint.moves` of the point ``own``: the parameters that change when it is dragged.
+    def drag_argument(self, point: PicturePoint) -> str:
+        """Return the source of the argument `Joint.moves` of a point: the first parameters that change when it is dragged.
 
-        The result is empty if no parameter changes.
+        A point that only places parts cannot be dragged, and has the argument `Joint.aid` instead.
         """
-        names = {p.name for p in self.interface.parameters}
+        if point.aid:
+            return "aid=True"
+        own, names = point.name, {p.name for p in self.interface.parameters}
+        moves: list[str] = []
         for body, points in self.interface.points.items():
             if own in points:
                 bar = self.description.bodies[body].bar if body in self.description.bodies else ()
@@ -118,10 +122,8 @@ class Picture:
                     and bar
                     and own == bar[1]
                 ]
-                moves = [name for name in found if name in names] + turned
-                if moves:
-                    return f", ({''.join(f'{quote(name)}, ' for name in moves[:2])})"
-        return ""
+                moves += [name for name in found if name in names] + turned
+        return f"({''.join(f'{quote(name)}, ' for name in moves[:2])})"
 
     def paths(self) -> list[str]:
         """Return the points whose paths are drawn: all points of moving bodies that are not joints.

@@ -415,7 +415,7 @@ class Package:
             channels=indent_lines(v.channels(), 8),
             positions=indent_lines(map(quote, v.position_parameters()), 8),
             joints=indent_lines(
-                (f"Joint({quote(j.name)}, {quote(j.text)}{self.picture.drag_argument(j.name)})" for j in joints), 12
+                (f"Joint({quote(j.name)}, {quote(j.text)}, {self.picture.drag_argument(j)})" for j in joints), 12
             ),
             parts=indent_lines(parts, 12),
             paths="".join(f"{quote(name)}, " for name in self.picture.paths()),

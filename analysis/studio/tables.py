@@ -5,6 +5,7 @@ from __future__ import annotations
 import base64
 import gzip
 import math
+import re
 from typing import Any
 
 from linkwork.mechanism import Mechanism, PublishedSet
@@ -62,7 +63,7 @@ def mechanism_tables(mechanism: Mechanism) -> dict[str, Any]:
         "damping": damping_name(mechanism)
         if crank >= 0 and len(mechanism.freedoms) > 1 and mechanism.names("damping")
         else "",
-        "transmission": next((names.index(name) for name in mechanism.names("transmission")), -1),
+        "transmission": [names.index(name) for name in mechanism.names("transmission")],
         "sets": [
             {"name": name, "source": known.source, "values": published_values(mechanism, known)}
             for name, known in mechanism.published.items()
@@ -187,7 +188,12 @@ def _picture(mechanism: Mechanism, reference: dict[str, int]) -> dict[str, Any]:
     number = {joint.name: n for n, joint in enumerate(drawing.joints)}
     return {
         "joints": [
-            {"name": joint.name, "text": joint.text, "moves": [reference[name] for name in joint.moves]}
+            {
+                "name": joint.name,
+                "text": joint.text,
+                "moves": [reference[name] for name in joint.moves],
+                **({"aid": True} if joint.aid else {}),
+            }
             for joint in drawing.joints
         ],
         "parts": [
@@ -235,8 +241,15 @@ def _charts(mechanism: Mechanism) -> list[dict[str, Any]]:
         name for n in mechanism.cyclic_freedoms for name in mechanism.names("drive", mechanism.freedoms[n].coordinate)
     ]
     powers = [{"name": "of drives and loads", "of": [power + 1]}, {"name": "lost", "of": [power]}]
+    # one chart for each unit; a curve that is alone has no legend
+    moving: dict[str, list[str]] = {}
+    for name in _outputs_with_rates(mechanism):
+        moving.setdefault(shown_unit(variables[name])[0], []).append(name)
     found = [
-        outputs("Motion", "motion", _outputs_with_rates(mechanism)),
+        *(
+            outputs("Motion" if len(of) > 1 else f"Motion: {re.sub('[._]', ' ', of[0])}", "motion", of)
+            for of in moving.values()
+        ),
         outputs("Torque of the drive", "motion", turning),
         {"title": "Forces in the joints", "kind": "forces", "unit": "N", "factor": 1.0, "curves": forces},
         {"title": "Power", "kind": "power", **watt, "curves": powers},

@@ -160,11 +160,14 @@ class Joint(NamedTuple):
         Description.
     moves : tuple of str
         FMI parameters, one or two, that change when the point is dragged; empty if the point cannot be dragged.
+    aid : bool
+        Whether the point only places parts: neither a pin nor its name is drawn.
     """
 
     name: str
     text: str
     moves: tuple[str, ...] = ()
+    aid: bool = False
 
 
 class Part(NamedTuple):

@@ -11,7 +11,7 @@ import {
   rowLength,
   type Source,
 } from "./tables";
-import { called, roundingSizes } from "./words";
+import { called, digits, roundingSizes } from "./words";
 
 /** Colours alone do not tell the curves apart; of each there is a colour `--curve` with its number. */
 const DASHES: number[][] = [[], [7, 3], [2, 3], [9, 3, 2, 3], [4, 2], [12, 4]];
@@ -81,9 +81,10 @@ export function makePlot(
           ...both,
           ...label,
           ...(axis.endsWith("[deg]") && { incrs: TURNS }),
-          values: (_, all) => all.map(String),
+          values: (_, all) => all.map((mark) => digits(mark, 6)),
         },
-        { ...both, size: 58 },
+        // room for two marks at least, written as all numbers of the page are
+        { ...both, size: 64, space: 20, values: (_, all) => all.map((mark) => digits(mark, 6)) },
       ],
       series: [
         { label: axis },

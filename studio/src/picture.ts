@@ -1,6 +1,6 @@
 /** The drawing of a mechanism, by its table of parts; joints are places in a row. */
 
-import { jointPlace, type Mechanism, type Part, rowLength } from "./tables";
+import { type Joint, jointPlace, type Mechanism, type Part, rowLength } from "./tables";
 import { type Point, View } from "./view";
 
 type Attributes = Record<string, string | number>;
@@ -115,7 +115,7 @@ export class Picture {
       if (part.kind === "slider") drawn.push(element("polygon", group));
       this.shapes.push({ part, group, drawn });
     }
-    this.handles = joints.map((joint, number) => this.handle(joint.name, joint.text, joint.moves, number));
+    this.handles = joints.map((joint, number) => this.handle(joint, number));
     this.svg.append(this.above);
   }
 
@@ -181,7 +181,8 @@ export class Picture {
     for (const { part, drawn } of this.shapes) for (const one of drawn) lines(one, part.text);
     this.handles.forEach((handle, number) => {
       const at = this.seen(this.row, 0, number);
-      const pin = handle.querySelector<SVGCircleElement>(".pin")!;
+      const pin = handle.querySelector<SVGCircleElement>(".pin");
+      if (!pin) return;
       const radius = pin.r.baseVal.value / this.view.scale;
       found.push({ layer: "joints", points: [at], radius });
       const [x, y] = LETTERS[number % LETTERS.length];
@@ -296,9 +297,10 @@ export class Picture {
     }
   }
 
-  private handle(name: string, text: string, moves: number[], number: number): SVGGElement {
+  private handle({ name, text, moves, aid }: Joint, number: number): SVGGElement {
     const free = moves.length > 0;
     const handle = element("g", this.svg, { class: free ? "joint" : "joint fixed", "data-joint": name });
+    if (aid) return handle;
     element("title", handle).textContent = `${name}, ${text}`;
     if (free) element("circle", handle, { r: 17, class: "reach" });
     element("circle", handle, { r: free ? 6.5 : 5, class: "pin" });

@@ -1,5 +1,7 @@
 /** A plane with axes on a canvas: curves that turn back, squares, vectors. */
 
+import { digits } from "./words";
+
 export type Interval = [number, number];
 
 const MARGIN = { left: 58, right: 12, top: 10, bottom: 40 };
@@ -70,7 +72,7 @@ export class Plane {
         [value, y[0]],
         [value, y[1]],
       ]);
-      const text = String(Number(value.toPrecision(6)));
+      const text = digits(value, 6);
       // the last one stays inside
       const most = width - c.measureText(text).width / 2;
       c.fillText(text, Math.min(this.px(value), most), height - MARGIN.bottom + 15);
@@ -81,7 +83,7 @@ export class Plane {
         [x[0], value],
         [x[1], value],
       ]);
-      c.fillText(String(Number(value.toPrecision(6))), MARGIN.left - 6, this.py(value) + 4);
+      c.fillText(digits(value, 6), MARGIN.left - 6, this.py(value) + 4);
     }
     c.textAlign = "center";
     c.fillText(names[0], MARGIN.left + room[0] / 2, height - 6);

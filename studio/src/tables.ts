@@ -36,6 +36,8 @@ export interface Joint {
   name: string;
   text: string;
   moves: number[];
+  /** Whether it only places parts, and is not drawn. */
+  aid?: boolean;
 }
 
 export interface Part {
@@ -96,7 +98,8 @@ export interface Mechanism {
   charts: Chart[];
   /** Outputs that swing with the motion. */
   moving: number[];
-  transmission: number;
+  /** Outputs that are transmission angles. */
+  transmission: number[];
   /** The reference of the stiffness of which there is a natural frequency; null: there is none. */
   natural: number | null;
   /** Name of the damping over which stability is charted. */

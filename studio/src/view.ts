@@ -85,9 +85,10 @@ export class View {
   /** All that lies between two corners (m) is seen, but for what the user has changed. */
   fit(low: Point, high: Point): void {
     const { width, height } = this.svg.getBoundingClientRect();
-    if (!(high[0] > low[0]) || width === 0) return;
+    // what lies on one line has no extent across it
+    if (!(Math.max(high[0] - low[0], high[1] - low[1]) > 0) || width === 0) return;
     const room = [Math.max(50, width - 2 * MARGIN), Math.max(50, height - 2 * MARGIN)];
-    this.whole = Math.min(room[0] / (high[0] - low[0]), room[1] / Math.max(high[1] - low[1], 1e-9));
+    this.whole = Math.min(...room.map((size, n) => size / Math.max(high[n] - low[n], 1e-9)));
     this.middle = [(low[0] + high[0]) / 2, (low[1] + high[1]) / 2];
     this.size = [width, height];
     this.svg.setAttribute("viewBox", `${-width / 2} ${-height / 2} ${width} ${height}`);

@@ -15,7 +15,7 @@ import {
 export function digits(value: number, count = 4): string {
   if (value === 0 || !Number.isFinite(value)) return String(value);
   const size = Math.abs(value);
-  if (size >= 1e6 || size < 1e-4) return value.toExponential(count - 1).replace("e+", "e");
+  if (size >= 1e6 || size < 1e-4) return Number(value.toPrecision(count)).toExponential().replace("e+", "e");
   return String(Number(value.toPrecision(count)));
 }
 
@@ -96,9 +96,14 @@ export function isDriven(m: Mechanism, values: Values): boolean {
   );
 }
 
-/** The least distance of the transmission angle from its limits, 0 and 180 deg (rad). */
-export function leastTransmission(m: Mechanism, rows: Rows): number {
-  return Math.min(...column(m, rows, m.transmission).map((angle) => Math.min(angle, Math.PI - angle)));
+/** The least distance of a transmission angle from its limits, 0 and 180 deg; of several angles, which it is. */
+function leastTransmission(m: Mechanism, rows: Rows): string {
+  const least = m.transmission.map((output) =>
+    Math.min(...column(m, rows, output).map((angle) => Math.min(angle, Math.PI - angle))),
+  );
+  const first = least.indexOf(Math.min(...least));
+  const at = least.length > 1 ? ` at ${m.outputs[m.transmission[first]].name.split(".")[0]}` : "";
+  return `least transmission angle ${digits((least[first] * 180) / Math.PI)} deg${at}`;
 }
 
 export const capital = (text: string): string => text.charAt(0).toUpperCase() + text.slice(1);
@@ -116,8 +121,7 @@ export function motionInWords(m: Mechanism, rows: Rows, orbit: Orbit, values: Va
     const whole = Math.max(...angles) - Math.min(...angles) >= m.freedoms[m.crank].period * (1 - 1e-9);
     parts.push(whole ? "turns fully" : "does not turn fully in this time");
   }
-  if (m.transmission >= 0)
-    parts.push(`least transmission angle ${digits((leastTransmission(m, rows) * 180) / Math.PI)} deg`);
+  if (m.transmission.length > 0) parts.push(leastTransmission(m, rows));
   const rounding = roundingSizes(m, rows);
   for (const output of m.moving) {
     const path = column(m, rows, output);
@@ -132,7 +136,7 @@ export function motionInWords(m: Mechanism, rows: Rows, orbit: Orbit, values: Va
   const why = isDriven(m, values)
     ? orbit.sentence.replace(REPEATED, "")
     : "the crank is driven by a torque and none is given";
-  if (!orbit.found && orbit.sentence !== rows.sentence) sentences.push(`No periodic motion: ${why}`);
+  if (!orbit.found && orbit.sentence !== rows.sentence) sentences.push(`No periodic motion found: ${why}`);
   return sentences.map((text) => `${capital(text)}.`).join(" ");
 }
 

@@ -1,6 +1,6 @@
 import assert from "node:assert/strict";
 import { test } from "node:test";
-import { viewMatrix, VIEWS } from "../src/view";
+import { View, viewMatrix, VIEWS } from "../src/view";
 
 for (const [name, angles] of Object.entries({ ...VIEWS, other: [0.3, 2.1] as [number, number] }))
   for (const planar of [true, false])
@@ -17,4 +17,12 @@ test("from the front the axis of the crank is a point, from the side it is not",
   assert.ok(Math.abs(viewMatrix(false, VIEWS.side)[2]) > 1 - 1e-12);
   const corner = viewMatrix(false, VIEWS.isometric).slice(6).map(Math.abs);
   for (const value of corner) assert.ok(Math.abs(value - Math.sqrt(1 / 3)) < 1e-12);
+});
+
+test("what lies on one line fits too", () => {
+  const box = { width: 640, height: 340 };
+  const svg = { addEventListener: () => {}, setAttribute: () => {}, getBoundingClientRect: () => box };
+  const view = new View(svg as unknown as SVGSVGElement);
+  view.fit([0, -0.1], [0, 0.1]);
+  assert.deepEqual([view.scale, view.place([0, 0.1])], [1000, [0, -100]]);
 });

@@ -36,7 +36,7 @@ export const WHEEL: Mechanism = {
   picture: { joints: [{ name: "B", text: "rim", moves: [0] }], parts: [], paths: [0], planar: true },
   charts: [],
   moving: [1],
-  transmission: -1,
+  transmission: [],
   natural: null,
   damping: "",
   sets: [],

@@ -25,6 +25,7 @@ test("numbers have the digits that people read", () => {
   assert.equal(digits(0.123456), "0.1235");
   assert.equal(digits(1234567), "1.235e6");
   assert.equal(digits(-0.00001234), "-1.234e-5");
+  assert.equal(digits(0.00002, 6), "2e-5");
   assert.equal(digits(0), "0");
   assert.equal(digits(Number.NaN), "NaN");
   assert.equal(shown(0.05, WHEEL.outputs[1]), "50 mm");
@@ -50,7 +51,7 @@ test("a motion is described by its turn and its range", () => {
   const still = rows([0, 0.1], [3, 0.1 + 1e-15]);
   assert.equal(
     motionInWords(WHEEL, still, none, {}),
-    "Does not turn fully in this time, rim position at rest. No periodic motion: it does not settle.",
+    "Does not turn fully in this time, rim position at rest. No periodic motion found: it does not settle.",
   );
   const ended = { ...whole, sentence: "the links part" };
   assert.equal(
@@ -58,6 +59,14 @@ test("a motion is described by its turn and its range", () => {
     "Comes to an end: the links part. Rim position varies by 200 mm.",
   );
   assert.equal(motionInWords(WHEEL, { ...ended, count: 0 }, none, {}), "");
+  // of several dyads the one that comes nearest to its limit
+  const dyads = ["C", "G"].map((pin) => ({ ...WHEEL.outputs[0], name: `${pin}.transmission_angle` }));
+  const two = { ...WHEEL, outputs: [...WHEEL.outputs, ...dyads], transmission: [2, 3], moving: [] };
+  const values = Float64Array.from([0, 0, 0, 0, 1, 3, 0, 0, 0, 0, 0, 1, 0, 7, 0, 2, 3.1, 0, 0, 0, 0, 0]);
+  assert.equal(
+    motionInWords(two, { values, count: 2, sentence: "" }, found, {}),
+    "Turns fully, least transmission angle 2.383 deg at G.",
+  );
   assert.match(
     motionInWords(
       WHEEL,
@@ -65,7 +74,7 @@ test("a motion is described by its turn and its range", () => {
       { ...none, sentence: "the crank is at rest: there is no periodic motion" },
       {},
     ),
-    /No periodic motion: the crank is at rest\.$/,
+    /No periodic motion found: the crank is at rest\.$/,
   );
 });
 

@@ -28,6 +28,7 @@ from analysis.studio import make_page, page_state
 from analysis.studio.tables import mechanism_tables
 from analysis.synthesis.result.described import description, drives
 from linkwork.errors import InputError
+from linkwork.limits import LIMIT_SINE
 from linkwork.mechanism import Mechanism
 from linkwork.parameters import field_name
 from tests.oracles.planar import Multipliers, Solution
@@ -548,6 +549,8 @@ def test_ranges_of_motion():
     assert not found.turns
     assert found.high == pytest.approx(2.0 * np.arccos(120.0 / 180.0), abs=1e-4)
     assert found.open == (False, False)
+    # there the bodies of the dyad are in line
+    assert found.least == pytest.approx(LIMIT_SINE)
     # an arm that nothing stops turns, though it is not driven round
     assert reach(load_linkage(FOLDER / "bistable.toml")).turns
     cart = linkage("reach-of-a-cart", ground={"A": (0, 0)}).body("cart", points={"P": (0, 0)}, mass="1 kg")
@@ -571,6 +574,16 @@ def test_ranges_of_motion():
         slotted.tables |= {"name": f"slotted-arm-{10 * start:.0f}", "freedoms": {}}
         found = reach(slotted.freedom("arm", "A", start=f"{start} deg", driven=False).mechanism())
         assert (np.rad2deg(found.low), np.rad2deg(found.high)) == pytest.approx((0.0, 180.0), abs=0.1)
+
+
+def test_a_joint_of_the_picture_moves_its_links_or_only_places_parts():
+    joints = {joint.name: joint for joint in load_linkage(FOLDER / "shaper.toml").drawing.joints}
+    assert joints["F"].moves == ("rod.length",)
+    assert {name for name, joint in joints.items() if joint.aid} == {"SBlock", "SEnd", "GBlock", "GEnd"}
+    # a pin at the ends of two links changes both, and so follows the pointer
+    joints = {joint.name: joint for joint in load_linkage(FOLDER / "watt-1.toml").drawing.joints}
+    assert joints["C"].moves == ("coupler.length", "rocker.length")
+    assert joints["B"].moves == ("crank.length", "initial.crank_angle")
 
 
 def test_dead_centres():
@@ -656,6 +669,16 @@ def test_the_studio_sorts_parameters_by_their_roles():
     }
     assert list(sections.values()) == ["Spring, damper, friction", "Gravity", "Masses", "Start"]
     assert [name for name, row in given.items() if row.get("role") == "stiffness"] == ["sheet.stiffness"]
+
+
+def test_motions_in_different_units_have_charts_of_their_own():
+    built = linkage("pendulum-on-a-cart", ground={"O": (0, 0)}, gravity=9.81)
+    built.body("cart", points={"P": (0, 0)}, mass=1.0).slide("G", body="cart", through="O")
+    built.body("arm", bar=("P", "E"), length=0.1, mass=0.1, cog=(0.05, 0), inertia=1e-4)
+    built.freedom("cart", "G", driven=False).freedom("arm", "P", driven=False)
+    charts = mechanism_tables(built.mechanism())["charts"]
+    shown = [(chart["title"], chart["unit"], chart["factor"]) for chart in charts if chart["kind"] == "motion"]
+    assert shown == [("Motion: cart position", "mm", 1e3), ("Motion: arm angle", "deg", np.rad2deg(1.0))]
 
 
 @in_browser

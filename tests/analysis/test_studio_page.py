@@ -54,6 +54,17 @@ def test_curves_are_told_apart_in_the_legend_and_axes_have_names(page: Any) -> N
 
 
 @in_browser
+def test_marks_of_axes_are_written_as_all_numbers_in_every_language(browser: Any) -> None:
+    page = browser.new_page(locale="de-DE")
+    page.goto(PAGE.as_uri())
+    page.wait_for_function("document.documentElement.dataset.ready", timeout=600_000)
+    axes = "window.studio.charts.charts.charts.map(({ plot }) => plot.axes[1]"
+    assert all(len(marks) > 1 for marks in page.evaluate(f"{axes}._values)"))
+    assert page.evaluate(f"{axes}.values(plot, [0.25, -10000, 2e6]))")[0] == ["0.25", "-10000", "2e6"]
+    page.close()
+
+
+@in_browser
 @pytest.mark.parametrize("theme", ["light", "dark"])
 def test_curves_have_the_colours_of_the_theme(browser: Any, theme: str) -> None:
     page = browser.new_page(color_scheme=theme)

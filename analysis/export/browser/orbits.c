@@ -203,7 +203,7 @@ static Reason cut(void) {
         if (command->mode >= 0 && a->modes[command->mode] != command->value) continue;
         held[command->rate - FREEDOMS] = true;
         if (command->rate != FREEDOMS + CRANK && section.u[command->input] != 0.0) {
-            snprintf(sentence, SENTENCE, "%s is not 0: a motion that goes on so is not periodic",
+            snprintf(sentence, SENTENCE, "%s is not 0: periodic motions are sought where only the crank goes on at a speed",
                      variables[input_at[command->input]].name);
             return INPUT_NOT_FINITE;
         }
