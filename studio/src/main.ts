@@ -23,6 +23,7 @@ import {
   type Source,
   type State,
   type Tables,
+  type Values,
   givenValue,
 } from "./tables";
 import { called, capital, motionInWords, roundingSizes } from "./words";
@@ -353,9 +354,14 @@ class Studio {
     const pulled = free.every((reference) => initial.has(reference));
     this.pulled ||= pulled;
     const moved = pulled ? [...initial] : free.filter((reference) => !initial.has(reference));
-    const values = Object.fromEntries(moved.map((r) => [given.get(r)!.name, this.core.given(r)]));
-    const state: State = { ...this.state, values: { ...this.state.values, ...values } };
-    return pulled ? { ...state, source: "run" } : state;
+    const named = (all: [number, number][]): Values =>
+      Object.fromEntries(all.map(([reference, value]) => [given.get(reference)!.name, value]));
+    const changed = named(moved.map((reference) => [reference, this.core.given(reference)]));
+    const state: State = { ...this.state, values: { ...this.state.values, ...changed } };
+    if (pulled) return { ...state, source: "run" };
+    // where the links cannot be joined at the start any more, a run begins at what is drawn
+    if (!this.begin(this.core, m, state).sentence) return state;
+    return { ...state, values: { ...state.values, ...named(start) } };
   }
 
   /** Show a state that comes from elsewhere, as a step that can be undone. */

@@ -6,12 +6,13 @@ import re
 from collections.abc import Iterator
 from typing import Any
 
+import numpy as np
 import pytest
 
 from analysis.studio import PAGE, opening_state, page_address
 
 from .conftest import opened
-from .test_studio import _drag, _given, _load, _pin, in_browser
+from .test_studio import _drag, _given, _load, _pin, _shown, in_browser
 
 UNDO = "!document.getElementById('undo').disabled"
 
@@ -96,6 +97,9 @@ def test_no_digit_of_a_field_is_cut(page: Any) -> None:
         ".map((one) => one.id)",
     )
     assert cut == []
+    # nor does a narrow window scroll sideways
+    page.set_viewport_size({"width": 320, "height": 568})
+    assert page.evaluate("document.documentElement.scrollWidth") == 320
 
 
 @in_browser
@@ -154,6 +158,20 @@ def test_what_is_refused_or_moves_nothing_is_no_step_to_be_undone(page: Any) -> 
     assert page.inner_text("#fault").startswith("The links cannot be joined at a crank angle of 0 deg")
     _drag(page, "C", 20.0, 0.0)
     assert page.inner_text("#fault") == "Coupler length and rocker length are locked"
+
+
+@in_browser
+def test_a_run_starts_where_links_are_dragged_to_that_cannot_be_joined_at_the_start(page: Any) -> None:
+    _load(page, opening_state())
+    page.evaluate("window.studio.go(220)")
+    _drag(page, "C", 100.0, 400.0)
+    _settle(page)
+    assert page.inner_text("#words").startswith("Comes to an end")
+    shown = _shown(page)["columns"]
+    apart = [np.hypot(*(shown[f"{start}{axis}"] - shown[f"C{axis}"] for axis in "xy")) for start in "BD"]
+    np.testing.assert_allclose(
+        np.array(apart).T, len(apart[0]) * [[_given(page, "coupler.length"), _given(page, "rocker.length")]], rtol=1e-9
+    )
 
 
 @in_browser
