@@ -163,6 +163,9 @@ class TestFreeMotion:
         frequency = 2.0 * np.pi / np.diff(crossings).mean()
         assert free_crank.half_natural_frequencies(2e6)[2 * degrees] == pytest.approx(0.5 * frequency, rel=1e-4)
 
+    def test_without_the_damper_the_mean_speed_falls_and_rises_again(self) -> None:
+        assert "between 0.64 and 1.04 of" in statement("3.12", "The oscillatory behaviour of the speed").why
+
     def test_with_the_mean_effective_mass(self) -> None:
         half = 0.5 * natural_frequency(runs.table_3_1(free_crank.STIFF))
         assert half == pytest.approx(published.HALF_NATURAL_FREQUENCY_RAD_S, abs=0.005)

@@ -32,7 +32,7 @@ from analysis.youssef import (
 )
 from linkwork.five_bar.published import chapter_4
 
-from .results import check, every, result
+from .results import check, every, result, statement
 
 
 @every("5.")
@@ -74,6 +74,12 @@ def test_on_the_same_ground_link_the_region_is_narrowest_at_equal_links() -> Non
     columns = result("5.3").columns
     low, high = (columns[f"lambda_k^2; {SAME_GROUND}; {end} [1]"] for end in ("low", "high"))
     assert columns["sigma3 [1]"][np.argmin(high - low)] == pytest.approx(1.0, abs=0.03)
+
+
+@pytest.mark.slow
+def test_varied_coupler_makes_the_widest_region_of_all_figures() -> None:
+    cases = statement("5.3", "This region is narrower").cases
+    assert [case.computed for case in cases] == pytest.approx([1.59, 1.18, 1.51], abs=0.005)
 
 
 @pytest.mark.parametrize(("number", "power"), [(1, 1.0), (2, 2.0), (3, 3.0)])

@@ -427,6 +427,13 @@ class TestMethod:
         assert np.max(found.rotation_deg) == pytest.approx(rotation, abs=0.005)
         assert np.max(found.error_in) == pytest.approx(error, abs=0.005)
 
+    @pytest.mark.long
+    def test_of_82_shifts_that_work_it_closes_the_loop_at_the_four_without_a_shift(self) -> None:
+        missed, wrong = (case.computed for case in statement("rahman-closure", "The approach is developed").cases)
+        # rounding decides whether the iteration settles at a4 = 20 in, S1 = 10 in
+        assert missed in [pytest.approx(n / 82.0) for n in (66, 67)]
+        assert missed + wrong == pytest.approx(78.0 / 82.0)
+
     @pytest.mark.slow
     @pytest.mark.parametrize(
         ("case", "printed", "mended"), list(zip(method.ROW_F, (84.0, 215.0), (40.0, 66.0))), ids=["S1", "310"]

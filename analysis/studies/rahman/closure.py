@@ -308,20 +308,17 @@ def _detection_errors() -> tuple[float, float]:
     """Return the fractions of shifts at which the iteration fails, and at which it accepts an open loop.
 
     The crank turns fully at all of these shifts. They increase from 0 to the greatest such shift in steps of 2 in, at a4 = 0,
-    10, 20 and 30 in. The iteration runs at every 30 deg from the planar estimate. It fails if it does not converge at one of
-    these angles. It accepts an open loop if it converges at all of them and the loop is open at one.
+    10, 20 and 30 in. The iteration runs round the turn as in `turn`. It fails if it does not converge at one of the angles.
+    It accepts an open loop if it converges at all of them and the loop is open at one.
     """
     missed: list[bool] = []
     wrong: list[bool] = []
     for a4 in (0.0, 10.0, 20.0, 30.0):
         p = parameters(a4)
-        shifts = np.arange(0.0, greatest_shift(p) or 0.0, 2.0 * INCH)
-        angles, each = (x.ravel() for x in np.meshgrid(np.radians(GRID_DEG[::6]), shifts))
-        found = settle(p, angles, each, rows="printed", max_steps=MAX_STEPS)
-        settled = found.settled.reshape(shifts.size, -1).all(-1)
-        is_open = found.rotation_residual.reshape(shifts.size, -1).max(-1) > NOTHING
-        missed += np.logical_not(settled).tolist()
-        wrong += np.logical_and(settled, is_open).tolist()
+        found = turn(p, np.arange(0.0, (greatest_shift(p) or 0.0) / INCH, 2.0))
+        is_open = np.radians(found.rotation_deg).max(0) > NOTHING
+        missed += np.logical_not(found.settled).tolist()
+        wrong += np.logical_and(found.settled, is_open).tolist()
     return float(np.mean(missed)), float(np.mean(wrong))
 
 
@@ -432,7 +429,7 @@ def _detection() -> Statement:
         "possible and then solve the whole problem.",
         text("abstract, L45"),
         "of the shifts at which the crank turns fully, by 2 in from 0, a4 = 0, 10, 20, 30 in, the shares at which the printed "
-        "iteration, from the planar estimate at every 30 deg, fails",
+        "iteration, from the planar estimate at theta1 = 0 and then from the angle before (L465), fails",
         f"none of a share; {NOTHING:g} rad, the rounding, of an open loop",
         (
             at_most("it does not settle at every angle", 0.0, missed),

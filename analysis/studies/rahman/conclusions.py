@@ -49,7 +49,7 @@ def _design() -> tuple[Statement, ...]:
                 nothing("for sizing, joint forces", error(right)),
                 nothing("for balancing, bearing", error({s: inertial[s] for s in ("1F1i", "1F1j")})),
             ),
-            "a1 and a2 are not varied; errata 5 and 6",
+            "a1 and a2 are not varied; errata 5 and 6: with both mended the forces are right",
         ),
         Statement(
             "This analysis can be used to determine the effect and significance of the inertia forces acting on "
@@ -59,7 +59,7 @@ def _design() -> tuple[Statement, ...]:
             f"part of it that inertia has, {FROM_DEAD}",
             ROUNDING,
             (nothing("as printed", error(inertial)),),
-            "errata 5 and 6",
+            "errata 5 and 6: with both mended the forces are right",
         ),
         Statement(
             "It is expected that this investigation will enable designers to have better insight into the "

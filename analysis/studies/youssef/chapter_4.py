@@ -286,8 +286,8 @@ def compute_second() -> StudyResult:
                 "Resonance occurs below the value of [omega] = [omega_k] and [omega] = [omega_k/2]. How much below depends on "
                 "the value of I4.",
                 text("4.5.3 a, L3188-3195"),
-                "upper roots of the determinant by the right equation at the three I4, greatest, and their change from one I4 "
-                "to the next",
+                "greatest root of the determinant of (4.33) by the right equation at I4 = 0.5, 1 and 1.5, the upper of the two "
+                "neighbouring ones at each resonance; change of this root from one I4 to the next",
                 SIGN,
                 (
                     at_most("root of the first harmonic", OMEGA_K, max(first), "rad/s"),
@@ -502,7 +502,7 @@ def _curves() -> tuple[Statement, ...]:
             text("4.5.2, L3176-3178; the same in L3203-3204"),
             f"change of the harmonics from omega_c = {DAMPERS[0]:g} to {STRONGEST:g} 1/s, relative to the peak at "
             f"{DAMPERS[0]:g} 1/s, by the right equation from 9 to 40 rad/s, farther than {OUTSIDE:g} rad/s, ours, from the "
-            "peaks; the second since L3203 has *the solution*",
+            "peaks; the second harmonic too, as L3203 says it of *the solution*",
             ALIKE_WORDS,
             tuple(
                 at_most(f"{name}; {label}", ALIKE, found[name])
@@ -553,7 +553,7 @@ def _dampers() -> tuple[Statement, ...]:
             "[I4] = 1.",
             text("4.5.2, L3182-3184"),
             "damper that lowers the peak of the first harmonic to 1.5, 2 or 5 times its amplitude "
-            f"{OUTSIDE:g} rad/s above the peak, ours, as which we read *eliminated*; at I4 = 0.5 relative to that at I4 = 1; "
+            f"{OUTSIDE:g} rad/s above the peak, our reading of *eliminated*; at I4 = 0.5 relative to that at I4 = 1; "
             "right equation",
             SIGN,
             tuple(at_most(f"{times:g} times", 1.0, less / more) for times, less, more in zip(TIMES, low, high)),

@@ -186,8 +186,9 @@ def judge_inertia(found: Mapping[str, Sequence[Region]]) -> tuple[Statement, ...
         Statement(
             "Also notice that a region was not obtained but merely a boundary of two stable regions.",
             text("5.1.1 a, L3420-3424"),
-            "number of boundaries with the Floquet multiplier 1 below the second region; greatest size of a multiplier at 1.5 "
-            "times this boundary, the most, and at half of it, the least, of I4 = 0.5, 1 and 1.5; right linear equation",
+            "number of boundaries, below the second region, at which a Floquet multiplier is 1; greater size of the two "
+            "multipliers at 1.5 times lambda_k^2 of this boundary, the most of I4 = 0.5, 1 and 1.5, and at half of it, the "
+            "least (places ours); right linear equation without a damper",
             "none: it is one boundary or it is not, and stability decides, but for rounding errors of 1e-9",
             judge_zeroth_boundary(),
             "below it, which is at higher speeds, the slider falls away",
@@ -337,7 +338,6 @@ def judge_coupler(found: Mapping[str, Sequence[Region]]) -> tuple[Statement, ...
     """Judge the statements on Fig 5.3, with constant angles as in the thesis, and with a constant ground link."""
     widest = float(widths(found["true orbit"]).max())
     over_crank = widest / float(widths(regions("5.2")["true orbit"]).max())
-    over_narrow, over_wide = (widest / x for x in widest_by_inertia().values())
     at_half = axis(orbit_region(with_held_angles(0.8, 0.5)))
     both = {"angles held": found["true orbit"], "same ground link": found[SAME_GROUND]}
     seconds, listed = (
@@ -380,14 +380,15 @@ def judge_coupler(found: Mapping[str, Sequence[Region]]) -> tuple[Statement, ...
         Statement(
             "This region is narrower than both regions of Figs. (5.1[)] and (5.2).",
             text("5.3.1, L3898-3900"),
-            "greatest width of the region, angles held, over that of each; true periodic motion",
+            "greatest width of the region, angles held, over that of each; true periodic motion. The range of I4 in Fig 5.1 is "
+            "not said: it is read, by us, as at L3882",
             SIGN,
             (
-                Case(
-                    label="Fig 5.1",
-                    computed=None,
-                    why=f"the range of I4 there is not said; it is {over_narrow:.2f} of that up to I4 = 1.5, "
-                    f"{over_wide:.2f} of that up to 2",
+                *(
+                    at_most(
+                        f"Fig 5.1, up to I4 = {most:g}", 1.0, widest / width, why="a shorter coupler widens the region"
+                    )
+                    for most, width in widest_by_inertia().items()
                 ),
                 at_most("Fig 5.2", 1.0, over_crank, why="I4 is 2 here and 1 there, and widens the region"),
             ),

@@ -228,7 +228,7 @@ def _fig_8_14() -> tuple[Statement, ...]:
             "in the crank cycle, more than one harmonic is present in the solution.",
             text("8.4.1.2, L6579"),
             f"number of the {len(shown)} speeds of Fig 8.8 to 8.10, 8.14 and 8.15 at which u has four maxima and minima "
-            "together in a turn, as which *peaks* is read, by us; second harmonic over the first, the least of all of them",
+            "together in a turn, our reading of *peaks*; second harmonic over the first, the least of all of them",
             f"more than half, as *typical* says; more than {SMALL:g}, the rule for *small*: it is seen",
             (
                 at_least("speeds with four peaks", 0.5 * len(shown), of_four),
@@ -298,7 +298,7 @@ def _fig_8_15() -> tuple[Statement, ...]:
             text("8.4.1.2, L6724"),
             "peaks of a turn, as at L6579; speed above which there are two instead of four; at 500 rpm points of inflection of "
             "a turn, of which a sine has two, and second harmonic over the first",
-            f"none of a count; {TENS}; {ABOUT:g}, the rule for *nearly* a sine, as which *sinusoidal type* is read, by us",
+            f"none of a count; {TENS}; {ABOUT:g}, the rule for *nearly* a sine, our reading of *sinusoidal type*",
             (
                 near("peaks at 240 rpm", "4", rigs.peaks(rigs.turn("A", 240.0)), 0.0),
                 near(
@@ -536,8 +536,9 @@ def _like_one_mass(
             "It also indicates that the steady state behaviour is similar to a second order [damped] mass-spring system "
             "described by [m x'' + mu x' + k x = F0 Sin (wt + phi)].",
             text("8.4.2.1, L6820"),
-            "F0, the force that gives the mean effective mass on spring and damper the first harmonic of u, 300 to 1000 rpm in "
-            "tens: the most over the least, and the range of its phase phi, both read, by us, as constant over the speed",
+            "amplitude F0 and phase phi of the force under which the mean effective mass, on this spring and damper, moves as "
+            "the first harmonic of u does, 300 to 1000 rpm in tens: greatest F0 over the least, and range of phi; we read both "
+            "as constant over the speed",
             f"{ABOUT:g} and {ABOUT_DEG:g} deg, the rule for *similar*",
             (*constant, *phase),
             "F0 grows with the square of the speed, as under an unbalance, see L6970",
@@ -545,8 +546,9 @@ def _like_one_mass(
         Statement(
             "The resonance and steady state behaviour is similar to a linear second order damped mass-spring system ...",
             text("8.4.2.2, L6970"),
-            "range of F0 (L6820) over the square of the speed, relative to its mean; amplitude of the slider over that of such "
-            "a system under an unbalance, this mean times the square: the greatest from 300 to 1000 rpm, as at L6808",
+            "F0 (L6820) over the square of the speed: its range relative to its mean; amplitude of the slider over that of "
+            "such a system under an unbalance, with a force of this mean times the square of the speed: the greatest from 300 "
+            "to 1000 rpm, as at L6808",
             f"{ABOUT:g}, the rule for *similar*",
             (*spread, *beyond),
             "near half the natural frequency the second harmonic adds to the first",

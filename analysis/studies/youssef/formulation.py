@@ -444,8 +444,8 @@ def _closure_statements() -> list[Statement]:
             "closure.",
             text("3.1, L1744-1748; the same in L1772-1782"),
             "greatest failure of closure over greatest error of u, in 0.5 s, all second derivatives integrated by Hamming's "
-            "method with a constant step; mechanism and motions of the row before; for *debugging*, at 420 rpm, by "
-            "Runge-Kutta's method with a slip of ours, its last stage at mid-step",
+            "method with a constant step; Table 3.1, k = 1e6 dyn/cm, mu = 3e4 dyn.s/cm, at 420 rpm and in a launch with T0 = "
+            "1e8 dyn.cm; for *debugging*, at 420 rpm, by Runge-Kutta's method with a slip of ours, its last stage at mid-step",
             "1 to 100, ours: the check shows an error, and no more than a hundred times as large as it is",
             (
                 *judge_closure(),

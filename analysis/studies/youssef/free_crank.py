@@ -340,6 +340,15 @@ def _damper_cases(pairs: Mapping[str, tuple[Trajectory, Trajectory]], start: flo
     return tuple(cases)
 
 
+def _undamped_range(pairs: Mapping[str, tuple[Trajectory, Trajectory]], start: float) -> str:
+    """Return the range of the mean speed of a turn without the damper, in the runs of `_damper_cases`, in words."""
+    free = np.concatenate([_second_halves(runs, start)[0] for runs in pairs.values()])
+    return (
+        f"without the damper the mean speed of a turn rises and falls between {free.min():.2f} and {free.max():.2f} of "
+        "that of the first"
+    )
+
+
 def _launches(torque: float, stiffness: float) -> tuple[Trajectory, Trajectory]:
     """Run a launch of 3 s without the damper and with it."""
     free, damped = (launch(torque, stiffness, 3.0, 6000, damping) for damping in (0.0, 3e4))
@@ -355,6 +364,8 @@ UNDAMPED = (
     "greatest mean crank speed of a turn in the second half of the free motion, relative to that of its first turn, without "
     "the damper and with it, over the turns that both have"
 )
+#: The tolerance of `_damper_cases`.
+LOSS = f"{ALIKE_WORDS}; a loss is more than that, and lasts"
 
 
 #: Label of the case on `Settling.decay`.
@@ -408,8 +419,9 @@ def launch_speeds() -> StudyResult:
             "next section.",
             text("3.2.2, L2147-2151"),
             f"{UNDAMPED}; runs of 3 s, ours",
-            f"{ALIKE_WORDS}; a loss is more than that",
+            LOSS,
             _damper_cases(undamped, 1.0),
+            _undamped_range(undamped, 1.0),
         ),
     )
 
@@ -491,8 +503,9 @@ def launch_positions() -> StudyResult:
             "The three responses show the slider oscillates between its initial position and the crank shaft and as "
             "would be expected the shift from its initial position is greatest in the highest input torque case.",
             text("3.2.2, L2159-2167"),
-            f"greatest u, relative to its greatest size in the graph; least u, which is {shaft:g} cm at the shaft; size of the "
-            "mean of u over the turns after the torque, up to 1 s, with T0 = 2e8 dyn.cm relative to the greater of both others",
+            "greatest u, relative to the greatest size of u in the graph; least u of the three, the shaft being at "
+            f"{shaft:g} cm; for *shift*, size of the mean of u over the turns after the torque, up to 1 s, with T0 = 2e8 "
+            "dyn.cm relative to the greater of the two others",
             f"{ALIKE_WORDS}; {SIGN}",
             (
                 *(
@@ -541,8 +554,9 @@ def launch_speeds_by_spring() -> StudyResult:
             text("3.2.2, L2181-2185"),
             "least range of the crank speed in a turn over its mean, up to 1 s; greatest mean speed of a turn in the second "
             "half of 3 s, ours, relative to that of the first turn, without the damper and with it, as at Fig 3.6",
-            f"{ALIKE_WORDS}; a loss is more than that",
+            LOSS,
             (_swing_cases(_spring_runs(), 1.0)[0], *_damper_cases(undamped, 1.0)),
+            _undamped_range(undamped, 1.0),
         ),
         Statement(
             "Because the speed response is the same throughout the time region in which the torque acts, it suggests "
@@ -679,18 +693,20 @@ def _free_causes() -> Statement:
     """Judge the causes that the thesis gives for what Fig 3.11 and 3.12 show."""
     undamped = {label: (coast(k, 0.0), coast(k)) for label, k in BOTH.items()}
     swings = [
-        at_most(f"change of the energy; {label}", 0.5, t.energy_share[: t.shown].max())
+        at_most(f"change of the kinetic energy; {label}", 0.5, t.energy_share[: t.shown].max())
         for label, t in ((label, Turns.from_run(coast(k))) for label, k in BOTH.items())
     ]
     return Statement(
         "The oscillatory behaviour of the speed is due to the non-linearities of the system and the reduction in "
         "speed is due to viscous dissipation of energy in the slider.",
         text("3.3, L2253-2259"),
-        "relative range of the kinetic energy in a turn over that of the crank speed squared, greatest down to "
-        f"{HARMONIC_SPEED:g} rad/s: the rest of the swing is the inertia's change with the position, as which we read *the "
-        "non-linearities*; mean speed without the damper and with it, as at Fig 3.6, in 4 s, ours",
-        f"at most half, as *due to* says; {ALIKE_WORDS}; a loss is more than that",
+        "*the non-linearities* are read as the change of the inertia with the position: relative range of the kinetic energy "
+        f"in a turn over that of the crank speed squared, greatest down to {HARMONIC_SPEED:g} rad/s, which is the part of the "
+        "swing that they leave; greatest mean speed of a turn in the second half of 4 s, ours, relative to that of the first "
+        "turn, without the damper and with it, as at Fig 3.6",
+        f"at most half, as *due to* says; {LOSS}",
         (*swings, *_damper_cases(undamped, 0.0)),
+        _undamped_range(undamped, 0.0),
     )
 
 

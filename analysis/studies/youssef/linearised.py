@@ -354,7 +354,7 @@ def _simplification() -> list[Statement]:
             "[(4.23)] ... Similarly the stiffness term may be written : [(4.25)] ... In a similar manner the right hand "
             "side may be written : [(4.27)]",
             text("4.3, eqs (4.22) to (4.28), L2853-2916"),
-            "order in sigma2, as which we take epsilon, of what (4.23) to (4.28) leave out of the quotients by D1 + E1 cos + "
+            "order in sigma2, which we take for epsilon, of what (4.23) to (4.28) leave out of the quotients by D1 + E1 cos + "
             "F1 sin in (4.21), as printed, P1 with the sign of H1: S, the factor of damper and spring, K and F; from "
             f"sigma2 = {SHORT[0]:g} to {SHORT[1]:g}; I4 = 1; b4 with k3 k6 + k4 k5, as in the listing (L8448)",
             "3; 0.05, as an order is a whole number",

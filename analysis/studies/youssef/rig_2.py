@@ -32,7 +32,9 @@ BEYOND, DAMPERS = {"C": (650.0, 700.0, 800.0, 900.0, 1000.0), "D": (890.0, 950.0
 #: Friction radius of the pins B, C and D (m): a dry bearing of PTFE, coefficient 0.05 to 0.1, on a pin of 3 to 6 mm.
 PIN_RADIUS = 3e-4
 #: How the width of a resonance is measured, in words.
-WIDTH = "width of the range of speeds at which the amplitude over the speed squared is at least 0.71 of its greatest"
+WIDTH = (
+    "width of the range of speeds at which the amplitude over the speed squared is at least 0.71 of its greatest (ours)"
+)
 
 
 @cache
