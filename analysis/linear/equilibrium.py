@@ -277,7 +277,7 @@ class _Balance:
         return (*q.tolist(), *[0.0] * (self.mechanism.size - len(q)))
 
     def starts(self, held: FloatArray) -> list[FloatArray]:
-        """Return starting points for Newton's method: the points of a grid at which the imbalance has a local minimum."""
+        """Return starting points for Newton's method: local minima of the imbalance on a grid, least ones at some angles."""
         units = {variable.name: variable.unit for variable in self.mechanism.variables}
         names = [field.name for field in fields(self.parameters)]
         lengths = [abs(getattr(self.parameters, name)) for name in names if units[fmi_name(name)] == "m"]
@@ -293,8 +293,13 @@ class _Balance:
         columns = np.tile(held[:, None], points[0].size)
         columns[np.array(self.its.free)[self.free]] = [axis.ravel() for axis in points]
         values = self.imbalance(columns).reshape(points[0].shape)
-        least = minimum_filter(values, size=3, mode=ends, cval=np.inf)
-        return list(columns[:, (np.isfinite(values) & (values <= least)).ravel()].T)
+        chosen = values <= minimum_filter(values, size=3, mode=ends, cval=np.inf)
+        others = tuple(n for n, end in enumerate(ends) if end == "constant")
+        if 0 < len(others) < len(ends):
+            # a stiff spring along another coordinate hides what a turn changes: at several angles its best place is taken, too
+            few = tuple(slice(None, None, 4 * ends.count("wrap") if end == "wrap" else None) for end in ends)
+            chosen[few] |= values[few] == values[few].min(axis=others, keepdims=True)
+        return list(columns[:, (np.isfinite(values) & chosen).ravel()].T)
 
 
 def _balance_with_held(

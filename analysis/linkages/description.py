@@ -61,12 +61,12 @@ def _named_entries(reader: Any) -> Any:
 
 
 _PLACE = Many(coordinate, length=2)
-#: A direction of more than a turn is probably a number in degrees.
+#: A direction of several turns is probably a number in degrees.
 _DIRECTION = Quantity(
     "rad",
-    above=-2.001 * pi,
-    below=2.001 * pi,
-    requirement='be at most a turn; a number is in rad: for degrees write "90 deg"',
+    above=-8.0 * pi,
+    below=8.0 * pi,
+    requirement='be less than four turns; a number is in rad: for degrees write "90 deg"',
 )
 
 

@@ -331,7 +331,7 @@ MISTAKES = [
     ("slides/G", {"body": "rocker"}, "linkage.slides.G.through"),
     ("slides/C", {"body": "rocker", "through": "A"}, "linkage.slides.C"),
     ("slides/G", {"body": "rocker", "through": "A", "direction": "1 m"}, "linkage.slides.G.direction"),
-    ("slides/G", {"body": "rocker", "through": "A", "direction": 90}, 'direction is 90: it must be at most a turn; a number'),
+    ("slides/G", {"body": "rocker", "through": "A", "direction": 90}, 'direction is 90: it must be less than four turns'),
     ("gravity_direction", -90.0, "linkage.gravity_direction is -90.0"),
     ("slots/S", {"pin": "Z", "on": "rocker", "through": "D"}, "linkage.slots.S"),
     ("slots/S", {"pin": "B", "on": "lever", "through": "D"}, "linkage.slots.S"),
