@@ -39,6 +39,8 @@ def mechanism_tables(mechanism: Mechanism) -> dict[str, Any]:
     return {
         "name": mechanism.name,
         "title": mechanism.title,
+        # a described linkage has its description as a set of its own name
+        "described": mechanism.name in mechanism.published,
         "module": base64.b64encode(gzip.compress(build_web(mechanism), 9, mtime=0)).decode(),
         "given": [_entry_rows(mechanism, entry.variable, entry.reference) for entry in given_entries(mechanism)]
         + _motor(mechanism, crank),

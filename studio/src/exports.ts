@@ -21,7 +21,10 @@ function written(number: number): string {
 
 /** The case as `linkwork run` reads it. */
 export function caseText(m: Mechanism, state: State, duration: number): string {
-  const lines = [`mechanism = ${JSON.stringify(m.name)}`, `title = ${JSON.stringify(state.title)}`];
+  const which = m.described
+    ? `linkage = ${JSON.stringify(`${m.name}.toml`)}  # the file that describes it`
+    : `mechanism = ${JSON.stringify(m.name)}`;
+  const lines = [which, `title = ${JSON.stringify(state.title)}`];
   const modes = m.given.filter((g) => g.arguments);
   const chosen = modes.map((mode) => mode.arguments![givenValue(mode, state.values)]);
   const inputs = m.given.filter((g) => g.argument !== undefined);

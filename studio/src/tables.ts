@@ -86,6 +86,8 @@ export interface Freedom {
 export interface Mechanism {
   name: string;
   title: string;
+  /** Whether a file describes it, which a case of it names. */
+  described: boolean;
   module: string;
   given: Given[];
   outputs: Output[];

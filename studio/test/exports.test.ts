@@ -18,6 +18,9 @@ test("a case has what acts, and no more", () => {
   assert.ok(pushed.includes("drive.torque = 0.5"));
   assert.ok(pushed.includes("initial.speed = 2.0"));
   assert.ok(!pushed.some((line) => line.startsWith("drive.speed")));
+  // the mechanism, or the file that describes it
+  assert.equal(driven[0], 'mechanism = "wheel"');
+  assert.match(caseText({ ...WHEEL, described: true }, STATE, 2), /^linkage = "wheel\.toml" {2}# .*\ntitle/);
 });
 
 test("a motor is written beside the torque, where there is one", () => {

@@ -8,6 +8,7 @@ const input = { text: "", section: "Drive and loads", unit: "N.m", factor: 1, st
 export const WHEEL: Mechanism = {
   name: "wheel",
   title: "Wheel",
+  described: false,
   module: "",
   given: [
     { ...plain, name: "wheel.radius", reference: 0, start: 0.1, least: 0 },

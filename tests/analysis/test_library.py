@@ -676,8 +676,11 @@ def test_motions_in_different_units_have_charts_of_their_own():
     built.body("cart", points={"P": (0, 0)}, mass=1.0).slide("G", body="cart", through="O")
     built.body("arm", bar=("P", "E"), length=0.1, mass=0.1, cog=(0.05, 0), inertia=1e-4)
     built.freedom("cart", "G", driven=False).freedom("arm", "P", driven=False)
-    charts = mechanism_tables(built.mechanism())["charts"]
-    shown = [(chart["title"], chart["unit"], chart["factor"]) for chart in charts if chart["kind"] == "motion"]
+    tables = mechanism_tables(built.mechanism())
+    assert tables["described"]
+    shown = [
+        (chart["title"], chart["unit"], chart["factor"]) for chart in tables["charts"] if chart["kind"] == "motion"
+    ]
     assert shown == [("Motion: cart position", "mm", 1e3), ("Motion: arm angle", "deg", np.rad2deg(1.0))]
 
 
