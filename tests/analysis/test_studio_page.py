@@ -238,7 +238,11 @@ def test_a_phone_scrolls_over_the_picture_and_its_controls_can_be_hit(phone: Any
     for n in range(1, 11):
         touch("Move", (x, y - 15 * n))
     touch("End")
-    page.wait_for_function("scrollY > 50")
+    # it goes on for a while after the finger is lifted
+    page.wait_for_function(
+        "() => { const last = window.last; window.last = scrollY; return scrollY > 50 && scrollY === last; }",
+        polling=100,
+    )
     # a finger that takes hold of a joint does not
     scrolled = page.evaluate("scrollY")
     before = _given(page, "coupler.point_distance")
