@@ -315,7 +315,7 @@ class TestDual:
             "--load '10 lbf' --groove shaft --set 'groove.amplitude=3 in' --set groove.ratio=2",
             "--torque '5 N*m' --groove apart --set 'groove.amplitude=3 in' --set slider.damping=100 "
             "--set slider.stiffness=200 --set slider.coulomb_friction=3 --set gravity.x=-9.81",
-            "--set 'rod.length=30 in' --offset '20 in' --load '7 N'",
+            "--set 'rod.length=30 in' --offset '20 in' --load '7 N' --units inch",
         ],
     )
     def test_both_agree(self, linkwork, arguments):
@@ -323,8 +323,12 @@ class TestDual:
         assert result.exit_code == 0, result.output
         assert "the two agree" in result.output
         assert "FAIL" not in result.output
-        closed = re.search(r"the loop closes to (\S+) rad and (\S+) m", result.output)
-        assert max(float(closed[1]), float(closed[2])) < 1e-12
+        length = "in" if "inch" in arguments else "mm"
+        closed = re.search(rf"the loop closes to (\S+) deg and (\S+) {length} in", result.output)
+        assert max(float(closed[1]), float(closed[2])) < 1e-9
+        unit, largest, *_ = rows(result.output)["slider position"]
+        assert unit == length
+        assert 36.0 < float(largest) * (1.0 if length == "in" else 1.0 / 25.4) < 70.0
 
     def test_a_disagreement_is_a_failed_check(self, linkwork, monkeypatch):
         right = dual_dynamics.joint_loads

@@ -46,16 +46,16 @@ def dual(chosen: MechanismChoice, problem: Problem, tolerance: float, two_rotati
     if chosen.groove == "shaft" and "torque" in problem.given:
         raise click.UsageError("--torque is for a shift that is driven apart from the crank: give --groove apart")
     found = sc.compare(problem.turn(chosen))
-    passed = [d.relative <= tolerance for d in found.differences]
+    units, passed = chosen.units, [d.relative <= tolerance for d in found.differences]
     show_table(
         f"{chosen.title}: dual numbers less vector mechanics, {found.angles} crank angles",
         ("quantity", "unit", "largest", "largest difference", "relative", "verdict"),
         [
             (
                 d.quantity,
-                d.unit,
-                f"{d.largest:.6g}",
-                f"{d.difference:.1e}",
+                units.name(d.unit),
+                f"{d.largest * units.factor(d.unit):.6g}",
+                f"{d.difference * units.factor(d.unit):.1e}",
                 f"{d.relative:.1e}",
                 "pass" if ok else "FAIL",
             )
@@ -65,8 +65,9 @@ def dual(chosen: MechanismChoice, problem: Problem, tolerance: float, two_rotati
         styles=[None if ok else "red" for ok in passed],
     )
     say(
-        f"the loop closes to {found.rotation_residual:.1e} rad and {found.length_residual:.1e} m in at most "
-        f"{found.iterations} iterations; moment about the rod's line, which no equation asks for: {found.rod_moment:.1e} N.m"
+        f"the loop closes to {found.rotation_residual * units.factor('rad'):.1e} {units.name('rad')} and "
+        f"{found.length_residual * units.factor('m'):.1e} {units.name('m')} in at most {found.iterations} iterations; moment "
+        f"about the rod's line, which no equation asks for: {found.rod_moment * units.factor('N.m'):.1e} {units.name('N.m')}"
     )
     if not all(passed):
         print_error("check failed: the two do not agree", "red")
