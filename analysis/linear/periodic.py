@@ -14,6 +14,7 @@ from scipy.integrate import solve_ivp
 
 from linkwork.errors import InputError
 from linkwork.mechanism import Mechanism
+from linkwork.parameters import field_name
 
 from ..files import Whole
 from ..mechanisms import InitialState, Parameters, find_mechanism
@@ -34,6 +35,9 @@ from .model import (
 
 #: Least number of samples of a period.
 LEAST_SAMPLES = 16
+#: Samples for each of a model with dry friction, and at least in all, with which its mean decay rate is compared; largest
+#: difference of the two, relative to the fastest pole of the mean model.
+BETWEEN, IN_ALL, RESOLVED = 2, 2048, 1e-2
 #: Newton steps at most to find the crank angle at a given time.
 MOST_ITERATIONS = 60
 
@@ -163,6 +167,31 @@ class PeriodicModel(Matrices):
                     f"{freedom.rate} differs from the derivative of {freedom.coordinate} by {gap:.3g} {units[freedom.rate]}"
                 )
 
+    def check_resolution(self) -> None:
+        """Check that the samples resolve dry friction: the mean decay rate, of the trace of A, is that of many more samples.
+
+        Friction makes A large for the short time in which a rate passes through zero, which a sample hits or misses.
+
+        Raises
+        ------
+        InputError
+            If the mean decay rates differ.
+        """
+        if not any(getattr(self.parameters, field_name(name)) for name in self.mechanism.names("friction")):
+            return
+        count = max(BETWEEN * len(self), IN_ALL)
+        times = self.period * np.arange(count) / count
+        motion, channels = self.motion(), self.interpolate(self.channels)
+        states = full_states(self.mechanism, [motion(t) for t in times])
+        arrays = evaluate(self.parameters, self.modes, states, np.array([channels(t) for t in times]))
+        closer = Matrices(parameters=self.parameters, modes=self.modes, **arrays)
+        rates = [np.trace(one.A, axis1=-2, axis2=-1).mean() for one in (self, closer)]
+        if abs(rates[0] - rates[1]) > RESOLVED * np.abs(self.mean().poles).max():
+            raise InputError(
+                f"{len(self)} samples do not resolve the linear model over the period: its mean decay rate is {-rates[0]:.4g} "
+                f"1/s with them and {-rates[1]:.4g} 1/s with {count}; take more samples, or leave out dry friction"
+            )
+
     def monodromy(self, tolerance: float = 1e-10) -> FloatArray:
         """Compute the monodromy matrix: integrate Phi' = A(t) Phi from the unit matrix over a period; shape (2 n, 2 n).
 
@@ -222,7 +251,8 @@ def linearise_orbit(
     ------
     InputError
         If inputs or period are given for an orbit; if there are fewer than `LEAST_SAMPLES` samples; or if the samples are not
-        finite, not evenly spaced in time, or not from a periodic motion.
+        finite, not evenly spaced in time, not from a periodic motion, or too few for the changes of the model, as those of dry
+        friction.
     AssemblyError
         If the links cannot be joined at one of the samples.
     """
@@ -247,6 +277,7 @@ def linearise_orbit(
     arrays = evaluate(parameters, modes, states, channels)
     model = PeriodicModel(parameters=parameters, modes=modes, period=period, states=states, channels=channels, **arrays)
     model.check()
+    model.check_resolution()
     return model
 
 

@@ -492,6 +492,10 @@ def test_bad_motions_are_reported(turning) -> None:
         linearise_orbit(TABLE_3_1, states)
     with pytest.raises(InputError, match=r"period is -1\.0 s"):
         linearise_orbit(TABLE_3_1, states, TURNING, period=-1.0)
+    # dry friction passes between the samples, or is hit by one of them
+    dry = replace(TABLE_3_1, slider_coulomb_friction=0.5)
+    with pytest.raises(InputError, match=r"128 samples do not resolve .* leave out dry friction"):
+        linearise_orbit(dry, settled_motion(dry, TURNING, turns=20), TURNING)
     with pytest.raises(InputError, match="speed is 0"):
         settled_motion(TABLE_3_1, Inputs(speed=0.0))
     with pytest.raises(InputError, match="constant"):
