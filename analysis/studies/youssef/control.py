@@ -82,7 +82,8 @@ def machine() -> Machine:
         slider_mass=1.1 * model.slider_mass,
         coupler_mass=1.1 * model.coupler_mass,
     )
-    mean = linearise_orbit(model, inverse_dynamics(model, motion, SPEED)).mean()
+    smooth = replace(model, slider_coulomb_friction=0.0)
+    mean = linearise_orbit(smooth, inverse_dynamics(smooth, motion, SPEED)).mean()
     return Machine(model, plant, motion, design_pid(mean, bandwidth=BANDWIDTH))
 
 
