@@ -186,7 +186,7 @@ def rows_by_target(rows: Iterable[Row]) -> dict[tuple[str, str], dict[str, Row]]
 
 
 def rival_error(by_search: Mapping[str, Row], seconds: float) -> float:
-    """Return the least error of all searches except ours after a time (s); ``of`` has the rows of a target by search."""
+    """Return the least error of all searches except ours after a time (s); ``by_search`` has the rows of a target."""
     return min(row.least_error(seconds) for search, row in by_search.items() if search != OURS)
 
 

@@ -38,12 +38,12 @@ KINDS = {
 }
 HEADINGS = ("solver.tolerance", "evaluations per second", *KINDS)
 CAPTION = (
-    "Largest global error of the outputs over all times on {}, relative to the largest magnitude of the output, or to a "
+    "Largest global error of the outputs over all times of {}, relative to the largest magnitude of the output, or to a "
     "thousandth of the largest output of its unit if that is more. Evaluations of the equations are per second of "
     "simulated time{}; shorter communication steps need more evaluations, and have smaller errors."
 )
 #: Words for the two gaps in the caption, for the standard cases and for the default experiment.
-STANDARD_CASES = ("the standard cases, the largest of all", ", the most of all cases")
+STANDARD_CASES = ("all standard cases", ", the most of all cases")
 DEFAULT = ("the default experiment in ten communication steps", "")
 
 

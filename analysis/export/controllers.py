@@ -306,8 +306,8 @@ class StateFeedback(Controller):
     """State feedback of position and velocity with feed-forward and force limit; `design_lqr` gives its gains."""
 
     rows = (
-        Row("position_gain", "parameter", "N/m", 0.0, "Force per deviation of the position"),
-        Row("velocity_gain", "parameter", "N.s/m", 0.0, "Force per deviation of the velocity"),
+        Row("position_gain", "parameter", "N/m", 0.0, "Restoring force per deviation of the position"),
+        Row("velocity_gain", "parameter", "N.s/m", 0.0, "Restoring force per deviation of the velocity"),
         Row("limit", "parameter", "N", 1e6, "Greatest magnitude of the force", "not negative"),
         Row("reference", "input", "m", 0.0, "Wanted position"),
         Row("reference_velocity", "input", "m/s", 0.0, "Wanted velocity"),

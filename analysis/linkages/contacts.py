@@ -44,7 +44,7 @@ class Contacts:
         ]
         arguments = "b: Places, m: tuple[Mass, ...], units: tuple[Rubbing, ...], matrix: tuple[tuple[float, ...], ...]"
         signature = f"responses({arguments}, held_ones: tuple[float, ...], p: Constants)"
-        doc = "Return how the friction that a force of 1 N in each joint causes changes the forces in these joints."
+        doc = "Return, for a force of 1 N in each joint in turn, the change of all joint forces by its friction."
         yield function(f"{signature} -> tuple[tuple[tuple[float, float], ...], ...]", doc, rows)
 
     def _unit_friction(self) -> str:

@@ -325,7 +325,7 @@ class Motion:
         rows += [f"{tuple_source((*names, *loads))} = u", f"return Applied({', '.join((*values, *loads))})"]
         signature = "apply_inputs(modes: tuple[float, ...], u: tuple[float, ...], p: Constants) -> Applied"
         yield function(
-            signature, "Return the loads and the commanded rates for values of the modes and the inputs.", rows
+            signature, "Return the loads and the commanded accelerations for values of the modes and the inputs.", rows
         )
 
     def _commanded_rates(self) -> tuple[str, str]:

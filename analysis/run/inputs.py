@@ -416,7 +416,7 @@ def encode(inputs: Inputs, mechanism: Mechanism) -> Encoded:
         elif isinstance(part, (TorsionBar, InductionMotor)):
             if signals[n][1] not in mechanism.torques:
                 raise InputError(
-                    f"{signals[n][0]} of a {mechanism.name} is {part!r}: only a torque on a freedom that turns can be that"
+                    f"{signals[n][0]} of a {mechanism.name} is {part!r}, which can only be a torque on a freedom that turns"
                 )
             law = laws[mechanism.torques.index(signals[n][1])]
             if isinstance(part, TorsionBar):

@@ -116,7 +116,7 @@ class Application:
         if environ.get("HTTP_HOST") not in self.hosts:
             raise _Refused(
                 HTTPStatus.MISDIRECTED_REQUEST,
-                "this server is served only at its own address: open the one that linkwork studio printed; a tunnel must "
+                "this server answers only at its own address: open the one that linkwork studio printed; a tunnel must "
                 "keep its port",
             )
         place = environ.get("PATH_INFO", "")

@@ -442,7 +442,7 @@ def ranges(parameters: SliderCrankParameters, law: PeriodicShift) -> tuple[Range
 
 @takes_published()
 def assembled_ranges(parameters: SliderCrankParameters, law: PeriodicShift) -> tuple[Range, ...]:
-    """Find the `ranges` of a mechanism that can be assembled.
+    """Find the `ranges` of crank angles in which a mechanism can be assembled; there is at least one.
 
     Raises
     ------

@@ -267,7 +267,8 @@ def monte_carlo(
         If ``turn`` is not a `ForceTurn`; if there is no tolerance, or two of the same name; if samples are invalid: a length
         not above zero, or a crank inertia below the least that its mass allows.
     ParameterError
-        If there is no such quantity, ``samples`` is not a whole number above one, or ``seed`` not a whole number above -1.
+        If there is no such quantity, ``samples`` is not a whole number of at least 2, or ``seed`` is a negative
+        number or not a whole one.
 
     Examples
     --------

@@ -344,8 +344,8 @@ def run_system(
     stepper, bonds = _Stepper(step, stop_time, share), wiring.bonds()
     if share is not None and not (share > 0.0 and bonds):
         raise InputError(
-            f"the share is {share:g} and the system has {len(bonds)} power bonds: the share must be above 0, with a bond at "
-            "least"
+            f"the share is {share:g} and the system has {len(bonds)} power bonds: the share must be above 0, and there must be "
+            "at least one bond"
         )
     if share is not None or abs(stepper.count * step - stop_time) > 1e-9 * step:
         for name, part in wiring.parts.items():

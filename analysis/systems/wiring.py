@@ -285,7 +285,7 @@ class Wiring:
                     after.setdefault(source, []).append(end)
         seen: set[frozenset[End]] = set()
         for first in connected:
-            # extend chains of outputs from this one, each only to outputs that no shorter chain reached: there can be too many
+            # extend chains of outputs from this one to outputs that no chain has reached yet: all chains can be too many
             chains, reached = [[first]], set[End]()
             for chain in chains:
                 for end in after.get(chain[-1], ()):

@@ -303,7 +303,7 @@ def _kinds(branch: Branch) -> Iterator[Crossing]:
 def _parts(
     wish: Wish, branch: Branch, kind: Crossing, response: Response
 ) -> Iterator[tuple[SpecialPoint | None, Any, SpecialPoint | None]]:
-    """Yield the parts of a branch into which the sign changes of a test function divide it.
+    """Divide a branch where the test function of a kind of crossing changes its sign, and yield the parts.
 
     Each part is (special point at the beginning or None, indices of the points, special point at the end or None).
     """

@@ -201,7 +201,7 @@ def test_parts_of_fmi_3_have_lines_by_their_middle_and_updates_within_long_steps
 
 
 def test_power_residuals_are_the_work_that_the_coupling_brings_in(tmp_path: Path) -> None:
-    """Two oscillators without losses gain what the coupling brings in."""
+    """Two oscillators without losses gain what the coupling adds."""
     free = {"mass": 1.0, "speed": 0.1, "spring": {"stiffness": 0.0, "damping": 1e-12}}
     system = carts(tmp_path, "gaining", free, free | {"speed": -0.1}, {"stiffness": 100.0})
     run = run_system(system.without_rates().wiring(), step=1e-3, stop_time=0.5)

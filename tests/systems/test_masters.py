@@ -53,7 +53,7 @@ def test_a_master_comes_to_where_ours_does(archive: Path, tmp_path: Path, master
 
 @pytest.mark.parametrize("tolerance", [1e-6, 1e-8])
 def test_ecco_keeps_its_tolerance_on_the_bond(archive: Path, tolerance: float) -> None:
-    """It holds the energy that a step brings in: at rest its controller is where 0.8 e^-0.15 = 1, e relative to the tolerance.
+    """It holds the energy that a step adds: at rest its controller is where 0.8 e^-0.15 = 1, e relative to the tolerance.
 
     What goes through the bond is then right to as many tolerances as there were steps.
     """

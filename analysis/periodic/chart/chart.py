@@ -544,7 +544,9 @@ class _Survey:
         region = f"{boundary.kind.value}{whose} from {other.format_value(low)} to {other.format_value(high)}"
         if top > greatest - 1e-6 * size:
             return f"{region}: still there at {up.format_value(greatest)}"
-        by_points = f"{region}: reaches {self.damping} = {top:.4g} {up.si} at the highest point of its boundary"
+        by_points = (
+            f"{region}: gone from about {self.damping} = {top:.4g} {up.si} on, the greatest on its traced boundary"
+        )
         if boundary.motion != TRUE_ORBIT:
             return by_points
         # a range of the other parameter that contains this region and no other

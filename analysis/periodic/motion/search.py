@@ -591,7 +591,7 @@ class _FoundMotions:
         return all(other.knows(orbit.start) for orbit in self.orbits)
 
     def intermediate_starts(self) -> list[FloatArray]:
-        """Return starts between each two known motions, where a third motion often lies, and around each known motion."""
+        """Return starts between every pair of known motions, where a third one often lies, and around each known motion."""
         places = [
             a + share * (b - a) for n, a in enumerate(self.known) for b in self.known[:n] for share in (0.25, 0.5, 0.75)
         ]

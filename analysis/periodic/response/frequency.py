@@ -114,9 +114,9 @@ def mean_effective_mass(parameters: Parameters) -> float:
 def natural_frequency(parameters: Parameters) -> float:
     """Compute the natural frequency (rad/s) of the only degree of freedom that is not a crank, from its mean effective mass.
 
-    Only the spring of this degree of freedom counts, such as ``slider.stiffness``, and the mass is averaged with this spring
-    free; gravity and all other forces are ignored. `analysis.linear.natural_modes` computes the natural frequencies of every
-    mechanism about its equilibrium.
+    Only the spring of this degree of freedom counts, such as ``slider.stiffness``. The mass is the mean over a turn with the
+    coordinate where this spring is free; gravity and all other forces are ignored. `analysis.linear.natural_modes` computes the
+    natural frequencies of every mechanism about its equilibrium.
 
     Raises
     ------

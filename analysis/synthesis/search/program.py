@@ -267,7 +267,7 @@ class Program(Statement):
         )
 
     def recover_start(self, z: FloatArray, start: Start, quality: float) -> Start:
-        """Convert unknowns z to a start; unless z has the rotations of all stations, they are taken from ``start``."""
+        """Convert unknowns z to a start; ``start`` gives the rotations of the stations unless z has them all."""
         end = len(UNKNOWNS) + pivot_size(self.pivot)
         rotation = None if self.normal.timed else start.rotation
         if not self.normal.timed and len(self.knots) == self.normal.n:

@@ -203,7 +203,7 @@ def synthesize(
     for number, guess in enumerate(guesses):
         if not any(limits.admits(guess.linkage) for limits in every):
             raise InputError(
-                f"guess {number} is a {guess.verdicts.grashof}: it must be of one of the kinds in the search"
+                f"guess {number} is a {guess.verdicts.grashof}: it must be of one of the kinds that the search allows"
             )
     found: list[tuple[Solution, ...]] = []
     exact = closed_form_solutions(task) if pivot is None else ()
