@@ -89,7 +89,7 @@ def _header(mechanism: Mechanism) -> str:
             "Equation equations_joints_forward; /* m, parameters, state as given, u, dparameters, dstate -> dplaces */",
             "Equation equations_motor;          /* motor, crank's speed -> torque */",
             "Equation equations_motor_forward;  /* ..., dmotor, dspeed -> dtorque */",
-            "Equation equations_slopes;         /* x, m, u, p, motor -> x', derivatives of accelerations by x */",
+            "Equation equations_slopes;         /* x, m, u, p, motor -> x', accelerations by coordinates, rates */",
             "Equation equations_along;          /* ..., dx, du, dp, dmotor -> accelerations; both without a switch */",
             "Equation equations_at_rest;        /* crank angle, p -> mass of the freedom beside the crank */",
             "",

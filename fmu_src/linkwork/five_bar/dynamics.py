@@ -392,7 +392,7 @@ def jump_speed(x: State, speed: float, p: Constants) -> State:
 
 
 def jump(x: State, i: Inputs, u: tuple[float, ...], p: Constants) -> State:
-    """Return the state after a jump of the commanded speed to its value in the channels ``u``; no jump at a torque drive."""
+    """Return the state after a jump of the commanded speed to its value in ``u``; under a torque the state is unchanged."""
     return jump_speed(x, (1.0 - i.speed_drive) * x[2] + i.speed_drive * u[1], p)
 
 
