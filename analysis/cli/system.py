@@ -55,6 +55,11 @@ def new(name: str | None, file: str | None) -> None:
     """Write the description of the example system NAME.
 
     Without NAME, list the example systems.
+
+    \b
+    Examples:
+      linkwork system new
+      linkwork system new motor-crank
     """
     from ..files import read_tables, unknown_name, write_text
     from ..systems import library
@@ -83,6 +88,11 @@ def build(file: str, fmi: str, out: str) -> None:
     """Build the FMUs of a system and write it as an SSP archive.
 
     The archive is of SSP 1.0, with --fmi 3 of SSP 2.0.
+
+    \b
+    Examples:
+      linkwork system build motor-crank.toml
+      linkwork system build motor-crank.toml --fmi 3
     """
     from ..systems import write_ssp
 
@@ -118,6 +128,12 @@ def run(
     """Run a system, print its connected outputs and draw them.
 
     All outputs are written as CSV.
+
+    \b
+    Examples:
+      linkwork system run motor-crank.toml --stop '3 s'
+      linkwork system run motor-crank.toml --share 1e-3
+      linkwork system run out/motor-crank.ssp --stop '3 s' --coupling derivatives
     """
     from ..files import write_csv
     from ..systems import run_system
@@ -169,6 +185,11 @@ def check(file: str, stop: str | None, decades: int, out: str, plot: bool) -> No
     This needs the equations of all parts, and is left out if a part is an FMU.
     The step is the communication step. The reference for the errors is the system as a single model, solved by SciPy with a
     tolerance of 1e-12.
+
+    \b
+    Examples:
+      linkwork system check motor-crank.toml
+      linkwork system check motor-crank.toml --stop '0.2 s' --decades 3
     """
     from ..systems import convergence, load_system
 
@@ -219,7 +240,12 @@ def check(file: str, stop: str | None, decades: int, out: str, plot: bool) -> No
 @common.out_option(help="Folder for the picture.")
 @common.report_errors
 def draw(file: str, out: str) -> None:
-    """Draw the parts of a system and their connections."""
+    """Draw the parts of a system and their connections.
+
+    \b
+    Examples:
+      linkwork system draw motor-crank.toml
+    """
     common.print_paths(
         common.save_plot(True, _wiring(file), common.output_folder(out) / f"{Path(file).stem}-diagram.png")
     )
@@ -233,6 +259,10 @@ def host(file: str, out: str) -> None:
     """Build a system as one C program for real-time targets.
 
     The program uses neither a heap nor Python. It reports the step times and the missed deadlines.
+
+    \b
+    Examples:
+      linkwork system host motor-crank.toml
     """
     from ..systems import build_host
 

@@ -237,7 +237,9 @@ def _design(method: str, model: LinearModel, channel: str | None, gains: FloatAr
     phase, crossings = np.atleast_1d(np.radians(phase)), np.atleast_1d(crossings)
     # a delay can only lower the phase: 2 pi is added to a negative margin
     delays = np.where(phase > 0.0, phase, phase + 2.0 * pi) / crossings
-    gains_up = [float(value) for value in np.atleast_1d(gain) if value > 1.0]
+    # where the loop gain is a billionth of its largest, it and its sign are rounding errors, as of a gain that should be zero
+    least = 1e-9 * np.abs(loop(1j * np.abs(poles))).max()
+    gains_up = [float(value) for value in np.atleast_1d(gain) if value > 1.0 and least * value < 1.0]
     return Design(
         method=method,
         model=model,

@@ -6,6 +6,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
+from linkwork.errors import ParameterError
+
 from ..files import Many, Quantity, Reader, Table
 from ..sections import Bar, MassProperties, Plate, Rod, Section, Tube, density
 
@@ -60,14 +62,26 @@ def _plate(thickness: float, corners: tuple[Any, ...], material: float) -> LinkB
     return LinkBody(Plate(thickness, material), words, corners=corners)
 
 
+#: The densest solid, osmium, has 22.6 g/cm3; a smaller number without a unit is probably in g/cm3, not kg/m3.
+_DENSEST = 22.6
+
+
+def _material(value: Any, name: str) -> float:
+    """Return the density (kg/m3) of a material; raise ParameterError if it is a number that is probably in g/cm3."""
+    number = density(value, name)
+    if not isinstance(value, str) and number <= _DENSEST:
+        raise ParameterError(name, value, f'have its unit, such as "{value:g} g/cm3"; a number alone is in kg/m3')
+    return number
+
+
 _LENGTH = Quantity("m", above=0.0)
-_COMMON: Mapping[str, Reader] = {"material": density, "overhang": Quantity("m", least=0.0)}
+_COMMON: Mapping[str, Reader] = {"material": _material, "overhang": Quantity("m", least=0.0)}
 #: The kinds of a ``section`` with their entries.
 SECTIONS: Mapping[str, Table] = {
     "bar": Table(_bar, {"width": _LENGTH, "thickness": _LENGTH, **_COMMON}),
     "rod": Table(_rod, {"diameter": _LENGTH, **_COMMON}),
     "tube": Table(_tube, {"outer": _LENGTH, "inner": _LENGTH, **_COMMON}),
     "plate": Table(
-        _plate, {"thickness": _LENGTH, "corners": Many(Many(Quantity("m"), length=2), least=3), "material": density}
+        _plate, {"thickness": _LENGTH, "corners": Many(Many(Quantity("m"), length=2), least=3), "material": _material}
     ),
 }

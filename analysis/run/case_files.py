@@ -16,6 +16,7 @@ from typing import Any, NamedTuple
 from linkwork.errors import InputError, LinkworkError, MissingParameterError, ParameterError, UnknownNameError
 from linkwork.mechanism import Mechanism
 from linkwork.parameters import field_name
+from linkwork.plant import TOLERANCE_RANGE
 
 from .. import files
 from ..files import Choice, Kinds, Many, Quantity, Reader, Table, entry
@@ -157,6 +158,15 @@ def case_inputs(mechanism: Mechanism) -> dict[str, ActingInput]:
     return found
 
 
+def _tolerance(value: Any, name: str) -> float:
+    """Return a tolerance of the solver; raise ParameterError with its name in the file if it is outside of its range."""
+    number = quantity(value, "1", name)
+    low, high = TOLERANCE_RANGE
+    if not low <= number <= high:
+        raise ParameterError(name, value, f"be between {low:g} and {high:g}")
+    return number
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RunTable:
     """The table ``[run]``: duration, step and tolerance of a run."""
@@ -164,7 +174,7 @@ class RunTable:
     stop_time: float | None = entry(Quantity("s"), None)
     revolutions: float | None = entry(Quantity("1", above=0.0), None)
     step: float | None = entry(Quantity("s"), None)
-    tolerance: float = entry(Quantity("1"), 1e-9)
+    tolerance: float = entry(_tolerance, 1e-9)
 
     def times(self, inputs: Inputs, mechanism: Mechanism) -> tuple[float, float]:
         """Return the stop time and the sampling step (s).

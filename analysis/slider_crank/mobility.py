@@ -35,6 +35,8 @@ FINEST = 1e-3
 #: Value relative to its scale below which a function counts as zero, so that rounding errors do not make a slider at rest turn
 #: back.
 _ROUNDING = 1e-13
+#: Relative difference up to which the rod and its distance to the guide count as equal: their rounding errors.
+_EQUAL = 8.0 * float_info.epsilon
 #: Pieces into which the turn is divided first.
 _PIECES = 32
 #: Angle (rad) at which the search of a turn begins: an arbitrary one, at which a zero is unlikely.
@@ -317,7 +319,9 @@ def _wrap_angle(angle: float, law: PeriodicShift) -> float:
 
 
 def _assembly_square(angle: float, law: PeriodicShift, p: Constants) -> float:
-    return kinematics.assembly_square(angle, law.at(angle)[0], p)
+    """Return the square of the rod less that of the distance from crank pin to guide (m2): zero if they differ by rounding."""
+    square = kinematics.assembly_square(angle, law.at(angle)[0], p)
+    return 0.0 if abs(square) <= _EQUAL * p.a2 * p.a2 else square
 
 
 def _extremes(law: PeriodicShift, p: Constants) -> list[float]:
@@ -356,7 +360,8 @@ def greatest_shift(parameters: SliderCrankParameters) -> float | None:
     turns fully at one shift, it does so at every shift, and the result is infinite.
     """
     p = parameters.constants()
-    if p.a2 < p.a1 + abs(p.a4):
+    room = p.a2 - p.a1 - abs(p.a4)
+    if room < -_EQUAL * p.a2:
         return None
     # |S1 sin(alpha4) - a1 s cos(alpha4)| <= r = sqrt(a2^2 - f^2) at every angle: |S1 sin(alpha4)| is at most the least
     # value of a1 s |cos(alpha4)| + r, the position of a planar slider apart from the cosine
@@ -375,9 +380,10 @@ def greatest_shift(parameters: SliderCrankParameters) -> float | None:
         f = p.a1 * cos(angle) + p.a4
         return p.a1 * sin(angle) * abs(p.ca) + sqrt(max(0.0, p.a2 * p.a2 - f * f))
 
-    least = min(bound(zero.angle) for zero in _zeros(_slider_slope(changes, 1.0), _SEAM, _SEAM + 2.0 * pi, p.a1 * p.a2))
-    if least < 0.0:
-        return None
+    least = 0.0
+    if room > _EQUAL * p.a2:
+        zeros = _zeros(_slider_slope(changes, 1.0), _SEAM, _SEAM + 2.0 * pi, p.a1 * p.a2)
+        least = min(bound(zero.angle) for zero in zeros)
     # the sine of a twist of pi is a rounding error
     parallel = abs(p.sa) <= 4.0 * float_info.epsilon * max(1.0, abs(parameters.guide_twist))
     return inf if parallel else least / abs(p.sa)

@@ -230,6 +230,11 @@ def test_a_table_file_that_is_none(tmp_path, text, said):
             'published = "table-3.1"\n[run]\nrevolutions = 1\nstop_time = "1 s"',
             r"not come together with run\.stop_time",
         ),
+        ('published = "table-3.1"\n[run]\ntolerance = 2', r"run\.tolerance is 2: it must be between 1e-13 and 0\.01"),
+        (
+            'published = "table-3.1"\n[coupler.section]\nkind = "rod"\ndiameter = "1 cm"\nmaterial = 7.85',
+            '"7.85 g/cm3"',
+        ),
         ('published = "table-3.1"\n[initial]\nangle = 1', r"initial\.angle"),
         ('published = "table-3.1"\ntitle = nan', "title is nan"),
         ('published = "table-3.1"\n[load]\nfz = 1', r"load\.fz"),

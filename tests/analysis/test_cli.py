@@ -18,7 +18,7 @@ import pytest
 from rich.console import Console
 
 from analysis import Inputs, cli, export, figures, simulate
-from analysis.cli import common, slider_crank
+from analysis.cli import common, slider_crank, system
 from analysis.cli.runs import _places
 from analysis.export.description import KINDS, description
 from analysis.mechanisms import FIVE_BAR
@@ -48,7 +48,11 @@ def in_own_process(*arguments, cwd):
 
 @pytest.mark.parametrize(
     "command",
-    [[], *([name] for name in cli.COMMANDS), *(["slider-crank", name] for name in slider_crank.slider_crank.commands)],
+    [
+        [],
+        *([name] for name in cli.COMMANDS),
+        *([group.name, name] for group in (slider_crank.slider_crank, system.system) for name in group.commands),
+    ],
 )
 def test_help_shows_examples(linkwork, command):
     result = linkwork(*command, "--help")

@@ -84,6 +84,12 @@ def test_lqr_of_a_heavy_force_only_moves_the_unstable_poles() -> None:
     assert np.poly(design.poles) == pytest.approx(np.poly(mirrored), rel=1e-6)
 
 
+def test_lqr_of_a_velocity_alone_has_an_infinite_gain_margin(held) -> None:
+    """The gain of the position is a rounding error of either sign; where the loop has only this gain, nothing is crossed."""
+    designs = [lin.design_lqr(held, {"slider.velocity": weight}) for weight in np.geomspace(1.0, 1e8, 17)]
+    assert {design.gain_margin for design in designs} == {inf}
+
+
 def test_lqr_weighs_outputs(hanging) -> None:
     """H' H has zeros as eigenvalues, rounded to either side; x' Q x is that of the symmetric part of Q."""
     rows = np.random.default_rng(0).normal(size=(8, 1, 4)) * [1.0, 30.0, 0.3, 10.0]

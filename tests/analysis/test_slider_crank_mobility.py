@@ -501,3 +501,14 @@ def test_law_beyond_its_bound_is_refused_where_it_is() -> None:
     law = M.PeriodicShift(at=lambda th: (0.1 * sin(th), 0.1 * cos(th)), rate=0.05, curvature=0.1)
     with pytest.raises(InputError, match=r"crank angle .* 0\.05 m/rad"):
         M.dead_centres(published.parameters(), law)
+
+
+@pytest.mark.parametrize(("rod", "offset"), [(0.1, 0.0), (0.3, 0.2), (0.3, -0.2), (0.1 * (1.0 - 1e-16), 0.0)])
+@pytest.mark.parametrize("twist", [0.5 * pi, radians(310.0)])
+def test_a_rod_that_just_reaches_the_guide_does_so_whatever_the_rounding(
+    rod: float, offset: float, twist: float
+) -> None:
+    par, law = mechanism(0.1, rod, offset, twist), M.constant_shift(0.0)
+    assert M.assembly_margin(par, law).length == M.greatest_shift(par) == 0.0
+    (whole,) = M.ranges(par, law)
+    assert (whole.low, whole.high) == (0.0, 2.0 * pi)

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 
-from linkwork.errors import LinkworkError, ParameterError, UnknownNameError
+from linkwork.errors import LinkworkError, MissingParameterError, ParameterError, UnknownNameError
 from linkwork.five_bar.kinematics import joint_distance
 from linkwork.five_bar.parameters import InitialState
 from linkwork.five_bar.published import SETS, TABLE_3_1
@@ -381,3 +381,18 @@ def test_of_many_names_the_nearest_five_are_listed(count: int, listed: list[str]
     assert len(found) == (count if count <= 8 else 5)
     assert set(listed) <= set(found)
     assert f"the nearest of {count} names" in str(error) or count <= 8
+
+
+@pytest.mark.parametrize(
+    ("error", "said"),
+    [
+        (ParameterError("a", "b" * 498, "be short"), f"'{'b' * 498}': it"),
+        (ParameterError("a", "b" * 499, "be short"), f"'{'b' * 499}...: it"),
+        (MissingParameterError("a"), "missing"),
+        (MissingParameterError("a", ("b",)), "missing, and so is b"),
+        (MissingParameterError("a", ("b",) * 12), f"missing, and so are {'b, ' * 11}b"),
+        (MissingParameterError("a", ("b",) * 13), f"missing, and so are {'b, ' * 11}b and 1 more"),
+    ],
+)
+def test_long_values_and_lists_are_cut(error: ParameterError, said: str) -> None:
+    assert str(error).removesuffix(" must be short") == f"parameter a is {said}"
