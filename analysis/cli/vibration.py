@@ -88,7 +88,8 @@ def resonance(
     """Follow the periodic motions of a CASE file or a published set over the speed, or over another parameter.
 
     The command writes amplitude, harmonics, crank torque and pin forces along the branches. It reports natural frequencies,
-    maxima, folds, period doublings, the speeds to avoid, and the classical approximations next to the true motion.
+    maxima, folds, branch points, period doublings, the speeds to avoid, and the classical approximations next to the true
+    motion.
 
     An isola is a closed branch that is not connected with any other branch; in the table its end reads "closed".
 

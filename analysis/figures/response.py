@@ -244,7 +244,7 @@ def _peaks(branch: Branch, look: _Scale, top: float) -> list[Label]:
 
 
 def _crossings(branches: Sequence[Branch], look: _Scale, top: float) -> list[Label]:
-    """Return labels for period doublings and tori that a machine reaches; points close together share one label."""
+    """Return labels for the special points, apart from folds, that a machine reaches; points close together share one."""
     # a point on two branches, or passed twice, is named once
     met = {
         (special.kind, look.place(special.parameter)): special

@@ -14,9 +14,11 @@ import pytest
 from analysis.mechanisms import PUBLISHED, find_mechanism
 from analysis.periodic import Drive, frequency_response, natural_frequency, newton_orbit, steady_drive
 from analysis.run import Case, InductionMotor, Inputs, read_case, simulate
-from analysis.studio import page_case, page_state
+from analysis.studio import make_page, page_case, page_state
 from benchmarks.studio import figures_in_words, measure_page
+from tests.analysis.conftest import opened
 from tests.analysis.test_studio import _HELD, _load, _near, _saved, _varied, in_browser
+from tests.analysis.test_swinging_links import yoke
 
 RPM = np.pi / 30.0
 RIG = PUBLISHED["rig-1-spring-b"]
@@ -79,6 +81,28 @@ def test_the_response_is_pythons_with_its_fold_and_what_to_avoid(page: Any) -> N
     after = page.evaluate("window.studio.state.values['drive.speed']")
     assert after - before == pytest.approx(100.0 * RPM / 200.0, rel=1e-9)
     assert page.evaluate("window.studio.charts.response.done")
+
+
+@in_browser
+def test_where_a_motion_breaks_its_symmetry_there_is_no_fold(browser: Any, tmp_path: Path) -> None:
+    """A pendulum on a yoke hangs still, or swings at the speed of the crank up to a branch point."""
+    parameters = replace(yoke("yoke-in-the-page").parameters, hinge_damping=1e-4)
+    mechanism = find_mechanism(parameters)
+    swinging = newton_orbit(parameters, Drive(speed=6.6), start=(-0.856, 1.569))
+    initial = mechanism.initial(**dict(zip(mechanism.freedoms[1].initial, swinging.start.tolist())))
+    inputs = Drive(speed=6.6).inputs(mechanism)
+    case = Case(title="", parameters=parameters, initial=initial, inputs=inputs, stop_time=1.0)
+    (tmp_path / "yoke.html").write_text(make_page(page_state(case)), encoding="utf-8")
+    page = opened(browser, tmp_path / "yoke.html")
+    _explored(page, "response", {"What varies": (6.6 / RPM, 7.2 / RPM)})
+    swings, hangs = page.evaluate("window.studio.charts.response.branches")
+    response = frequency_response(parameters, 6.6, 7.2, doublings=0)
+    crossing = response.branches[0].special[1].parameter
+    assert max(point["value"] for point in swings) == pytest.approx(crossing, rel=1e-4)
+    assert not any(point["kind"] for point in [*swings, *hangs])
+    assert not any(point["amplitude"] for point in hangs)
+    assert not page.locator(".told").filter(has_text="Fold at").count()
+    page.close()
 
 
 @in_browser

@@ -53,10 +53,10 @@ static struct {
 
 /* The motion over the crank's angle */
 
-/* A branch: the point that was reached, the way on, both relative to range and scale, the step, and what changes its sign at a
-   fold and at a doubling; the special point that was reached last, if it is one. */
+/* A branch: the point that was reached, the way on, both relative to range and scale, the step, and the test functions; the
+   special point that was reached last, if it is one. */
 static struct {
-    double size, value, y[MOST], way[MOST + 1], step, tests[2];
+    double size, value, y[MOST], way[MOST + 1], step, tests[3];
     int kind;
 } branch = {.size = 1.0};
 
@@ -415,14 +415,18 @@ static int along(double step, double y[], double way[]) {
     return 0;
 }
 
-/* What changes its sign at a fold, and at a doubling of the period. */
-static void test_functions(const double way[], double tests[2]) {
-    double complex product = 1.0;
+/* What changes its sign where the branch turns back, at a doubling of the period, and where a multiplier passes +1. */
+static void test_functions(const double way[], double tests[3]) {
+    double complex doubling = 1.0, passing = 1.0;
     int n = section.size;
     eigenvalues(found.monodromy, section.size, found.real, found.imaginary);
-    for (int i = 0; i < n; i++) product *= 1.0 + found.real[i] + I * found.imaginary[i];
+    for (int i = 0; i < n; i++) {
+        doubling *= 1.0 + found.real[i] + I * found.imaginary[i];
+        passing *= 1.0 - found.real[i] - I * found.imaginary[i];
+    }
     tests[0] = way[n];
-    tests[1] = creal(product);
+    tests[1] = creal(doubling);
+    tests[2] = creal(passing);
 }
 
 /* Begin a branch at the motion that was found: what is varied, its range, and the sense in which it first goes. */
@@ -447,7 +451,7 @@ int FACE(studio_branch)(int reference, double size, double sense) {
 
 /* The place of the special point of a kind within a step, to which it is narrowed down. */
 static bool narrow(int kind, double step, double end, double y[], double way[]) {
-    double low = 0.0, high = step, at_low = branch.tests[kind - 1], at_high = end, tests[2];
+    double low = 0.0, high = step, at_low = branch.tests[kind - 1], at_high = end, tests[3];
     for (int trial = 0; trial < REFINEMENTS; trial++) {
         double middle = (low * at_high - high * at_low) / (at_high - at_low);
         if (!along(middle, y, way)) return false;
@@ -470,19 +474,23 @@ static bool narrow(int kind, double step, double end, double y[], double way[]) 
 /* The next point of the branch: found.kind is 1 at a fold, 2 where the period doubles, to which it is narrowed down, else 0. */
 int FACE(studio_follow)(void) {
     int n = section.size;
-    double y[MOST], way[MOST + 1], tests[2];
+    double y[MOST], way[MOST + 1], tests[3];
     for (double step = branch.step; step > LEAST_ALONG; step *= 0.5) {
         double cosine = 0.0;
         int kind = 0, trials = along(step, y, way);
         for (int i = 0; trials && i <= n; i++) cosine += way[i] * branch.way[i];
         if (!trials || cosine < STRAIGHT) continue;
         test_functions(way, tests);
-        for (int k = 1; k <= 2 && !kind; k++)
-            if (k != branch.kind && (tests[k - 1] < 0.0) != (branch.tests[k - 1] < 0.0)) kind = k;
+        bool changed[3];
+        for (int k = 0; k < 3; k++) changed[k] = (tests[k] < 0.0) != (branch.tests[k] < 0.0);
+        /* where it crosses another branch, it may turn back, but no multiplier passes +1 */
+        if (branch.kind != 1 && changed[0] && changed[2]) kind = 1;
+        if (!kind && branch.kind != 2 && changed[1]) kind = 2;
         if (kind && !narrow(kind, step, tests[kind - 1], y, way)) continue;
         if (kind) test_functions(way, tests);
         /* past a special point the sign is that of the other side */
         if (kind) tests[kind - 1] = -branch.tests[kind - 1];
+        if (kind == 1) tests[2] = -branch.tests[2];
         double grown = step * (trials <= 4 && cosine > 1.0 - 0.2 * (1.0 - STRAIGHT) ? 1.6 : 1.0);
         branch.step = fmin(fmin(grown, GREATEST_ALONG), GREATEST_VARIED / fmax(fabs(way[n]), GREATEST_VARIED / GREATEST_ALONG));
         branch.kind = kind;
@@ -504,7 +512,7 @@ int FACE(studio_follow)(void) {
     return 0;
 }
 
-/* Half of how far the first of y swings in the motion that was found. */
+/* Half of how far the first of y swings in the motion that was found; 0 where that is no more than rounding. */
 double FACE(studio_amplitude)(void) {
     double samples[SAMPLES], z[LENGTH] = {0}, scale[LENGTH], proposal = PERIOD / 64.0;
     motion_scales(scale);
@@ -514,7 +522,8 @@ double FACE(studio_amplitude)(void) {
         samples[i] = z[0];
         if (!across(from, to, z, scale, section.size + 1, FINE, &proposal)) return NAN;
     }
-    return swing_amplitude(samples);
+    double size = swing_amplitude(samples);
+    return size > 10.0 * FOUND * scale[0] ? size : 0.0;
 }
 
 /* Natural frequency of the freedom beside the crank, from the mean of what moves with it over a turn, the links at rest and it at

@@ -20,7 +20,7 @@ import numpy as np
 import scipy
 from numpy.typing import ArrayLike, NDArray
 
-from linkwork.errors import LinkworkError
+from linkwork.errors import InputError, LinkworkError
 
 from ...numerics.boundaries import Test, find_minimum
 from ...numerics.continuation import ContinuationError, End, Evaluate, Evaluation, Follower, Settings
@@ -80,6 +80,7 @@ def follow_crossing(
     orbit : PeriodicOrbit
         An orbit on the curve, or close to it.
     kind : Crossing
+        Not a branch point.
     place : (float, float)
         Values of the two parameters for this orbit.
     x, y : (float, float)
@@ -92,9 +93,13 @@ def follow_crossing(
 
     Raises
     ------
+    InputError
+        If the kind is a branch point: there the motion is not unique, and the equations of the curve are singular.
     ContinuationError
         If no point of the curve is near the orbit.
     """
+    if kind is Crossing.BRANCH_POINT:
+        raise InputError("kind is a branch point, whose curve has singular equations: stability_chart traces it")
     n = len(orbit.start)
     settings = Settings(
         low=y[0], high=y[1], bounds={n: x}, first=first, greatest=greatest, widest=widest, most_points=most_points

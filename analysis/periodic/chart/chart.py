@@ -440,7 +440,7 @@ class _Survey:
             self.problems.append(f"{len(lost)} motions on the lines searched are not followed, the first at {lost[0]}")
 
     def _follow_special(self, special: SpecialPoint, place: tuple[float, float]) -> None:
-        """Follow the boundary through a fold, period doubling or torus point, unless this boundary is already known."""
+        """Follow the boundary through a special point of a branch, unless this boundary is already known."""
         if self._is_known(special, place):
             return
         what = f"the {special.kind.value} at {self.place(*place)}"

@@ -2,8 +2,9 @@
 
 The parameter is the speed, the torque, a force, any parameter of the FMI contract, or any number from which a function
 computes mechanism and drive. A branch is followed by arclength, past its folds. Special points are located between the computed
-points: there a Floquet multiplier crosses the unit circle at +1 (fold), at -1 (period doubling), or as a complex pair (torus).
-At a period doubling, `switch` changes to the branch of motions with twice the period.
+points: there a Floquet multiplier crosses the unit circle at +1 (fold or branch point), at -1 (period doubling), or as a
+complex pair (torus). At a branch point, `switch` changes to the branch that crosses; at a period doubling, to the motions of
+twice the period.
 """
 
 from __future__ import annotations
@@ -62,7 +63,7 @@ class Branch(NotebookResult):
     orbits : tuple of PeriodicOrbit
         The orbit at each point.
     special : tuple of SpecialPoint
-        Folds, period doublings and torus points on the branch.
+        Folds, branch points, period doublings and torus points on the branch.
     reached : bool
         Whether the branch was followed to its end: to an end of the range, to its own beginning, or to a branch of half its
         period.

@@ -1,10 +1,11 @@
 """Compute the normal form at a loss of stability, and check it by long runs of the nonlinear mechanism.
 
-On the centre manifold of a special point the map over a period is one of three normal forms (Y. A. Kuznetsov, Elements of
+On the centre manifold of a special point the map over a period is one of a few normal forms (Y. A. Kuznetsov, Elements of
 Applied Bifurcation Theory, 3rd ed., Springer 2004, sections 5.4 and 8.7). The sign of one coefficient decides: beyond a
-supercritical period doubling or torus point a new stable motion grows out of the motion of the branch; beyond a subcritical
-point the mechanism jumps to another motion. The second and third derivatives of the map are computed by finite differences
-along eigenvectors. `confirm_form` compares the normal form, and `confirm` the verdict, with a long run of the mechanism.
+supercritical period doubling, torus point or branch point a new stable motion grows out of the motion of the branch; beyond a
+subcritical point the mechanism jumps to another motion. The second and third derivatives of the map are computed by finite
+differences along eigenvectors. `confirm_form` compares the normal form, and `confirm` the verdict, with a long run of the
+mechanism.
 """
 
 from __future__ import annotations
@@ -37,7 +38,7 @@ class SpecialPoint:
     Attributes
     ----------
     kind : Crossing
-        FOLD, PERIOD_DOUBLING or TORUS.
+        FOLD, BRANCH_POINT, PERIOD_DOUBLING or TORUS.
     parameter : float
         Value of the branch's parameter.
     orbit : PeriodicOrbit
@@ -295,7 +296,7 @@ def _slope(family: Family, forms: Forms, special: SpecialPoint) -> float:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FormRun:
-    """A run near a period doubling or a torus point, on the side where the motion of the branch is unstable.
+    """A run near a period doubling, torus point or branch point, on the side where the motion of the branch is unstable.
 
     ``distance`` is the greatest distance from the motion of the branch over the last periods, relative to the scale of y, and
     infinite if the run ended early; ``expected`` is the distance that the normal form predicts for a supercritical point.
@@ -324,7 +325,7 @@ def confirm_form(family: Family, special: SpecialPoint, form: NormalForm) -> For
     InputError
         If the point is a fold: the branch has no motion beyond a fold.
     LinkworkError
-        If the motion of the branch is unstable on neither side.
+        If the motion of the branch is unstable on neither side, or only over a range too narrow for a run.
     """
     if special.kind is Crossing.FOLD:
         raise InputError("beyond a fold the branch has no motion from which a run could deviate")
@@ -344,6 +345,10 @@ def confirm_form(family: Family, special: SpecialPoint, form: NormalForm) -> For
     value = special.parameter + sign * beyond / rate
     parameters, drive = family.operation(value)
     old = newton_orbit(parameters, drive, turns=special.orbit.turns, start=special.orbit.start, settle=False)
+    if old.largest <= 1.0:
+        raise LinkworkError(
+            f"at {family.format_value(value)} the motion is stable again: the unstable range is too narrow"
+        )
     scale = old.scale
     expected = sqrt((old.largest - 1.0) / abs(form.coefficient))
     q = _eigenvectors(_forms(old).matrix, complex(old.multipliers[0]))[0].real
