@@ -283,7 +283,7 @@ def test_row_of_orbits_is_the_orbits_one_by_one() -> None:
         assert values[i] == pytest.approx(orbit.largest, abs=1e-9)
         assert starts[i] == pytest.approx(orbit.start, abs=1e-10)
     assert np.isnan(values[~good]).all()
-    with pytest.raises(InputError, match="one kind"):
+    with pytest.raises(InputError, match="kind of drive"):
         largest_multipliers(rows[:2], [Drive(speed=SPEED), Drive(motor=MOTOR)])
 
 
