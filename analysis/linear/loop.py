@@ -524,12 +524,11 @@ class _Linear:
     def step(self, time: float, step: float) -> tuple[int, str]:
         count = max(1, ceil(step * self.rate / FINE_STEP))
         h = step / count
+        # forces that are not held are those of the motion
+        held, forces = list(self.held), np.array(list(self.held.values()))
 
         def rates(t: float, x: FloatArray) -> FloatArray:
-            # forces that are not held are those of the motion
-            held = list(self.held)
-            w = np.array(list(self.held.values())) - self.acting(t)[held]
-            change: FloatArray = self.a(t) @ x + self.b(t)[:, held] @ w
+            change: FloatArray = self.a(t) @ x + self.b(t)[:, held] @ (forces - self.acting(t)[held])
             return change
 
         for number in range(count):

@@ -142,7 +142,7 @@ def margin_matrix(monodromy: FloatArray, kind: Crossing, radius: float = 1.0) ->
     ``kind`` is the kind of crossing. The determinant is positive if all multipliers are inside the circle.
     """
     if kind is not Crossing.TORUS:
-        return monodromy / radius if kind is Crossing.FOLD else -monodromy / radius
+        return kind.sign * monodromy / radius
     # the matrix of minors of order 2, whose eigenvalues are the products of two multipliers
     pairs = list(combinations(range(len(monodromy)), 2))
     minors = [

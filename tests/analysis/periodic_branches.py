@@ -22,11 +22,12 @@ def orbit(
     amplitude: float, largest: float, start: float | None = None, *, periods: int = 1, crank_turns: int = 1
 ) -> Any:
     """Return a stand-in for an orbit, with the attributes that branches read."""
+    y = np.array([amplitude if start is None else start, 0.0])
     return SimpleNamespace(
         amplitude=amplitude,
         amplitudes=np.array([amplitude]),
         largest=largest,
-        start=np.array([amplitude if start is None else start, 0.0]),
+        start=y,
         swing=("u", "m"),
         swings=(("u", "m"),),
         scale=np.ones(2),
@@ -34,6 +35,7 @@ def orbit(
         turns=periods,
         crank_turns=crank_turns,
         flow=SimpleNamespace(remove_turns=lambda away: away),
+        distance=lambda other: float(np.abs(other - y).max()),
     )
 
 

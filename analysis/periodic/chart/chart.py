@@ -67,14 +67,8 @@ SAME_MOTION = 0.4
 SAME = 5e-3
 #: Names for boundaries of the grid's motion and of other motions.
 TRUE_ORBIT, OTHER_ORBIT = "true orbit", "another motion"
-#: Codes in files for a boundary's motion (0: the linear equation) and for its multiplier.
+#: Codes in files for a boundary's motion (0: the linear equation).
 _MOTION = {TRUE_ORBIT: 1.0, OTHER_ORBIT: 2.0}
-_MULTIPLIER = {
-    Crossing.FOLD: 1.0,
-    Crossing.BRANCH_POINT: 1.0,
-    Crossing.PERIOD_DOUBLING: -1.0,
-    Crossing.TORUS: 0.0,
-}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -215,7 +209,7 @@ class StabilityChart(NotebookResult):
         rows = [np.empty((0, 5))]
         for number, traced in enumerate(self.boundaries, start=1):
             points = traced.points * [axis.column[1] for axis in self.axes]
-            head = [number, _MOTION.get(traced.motion, 0.0), _MULTIPLIER[traced.kind]]
+            head = [number, _MOTION.get(traced.motion, 0.0), traced.kind.sign]
             rows.append(np.column_stack([np.tile(head, (len(points), 1)), points]))
         names = (
             "boundary",

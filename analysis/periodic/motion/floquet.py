@@ -43,9 +43,10 @@ class Crossing(Enum):
     PERIOD_DOUBLING = "period doubling"  # at -1
     TORUS = "torus"  # a complex pair
 
-
-#: The real multiplier at a crossing.
-_SIGN = {Crossing.FOLD: 1, Crossing.BRANCH_POINT: 1, Crossing.PERIOD_DOUBLING: -1}
+    @property
+    def sign(self) -> int:
+        """Real multiplier at the crossing, +1 or -1; 0 at a torus point."""
+        return {Crossing.PERIOD_DOUBLING: -1, Crossing.TORUS: 0}.get(self, 1)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -193,7 +194,7 @@ def crossing_test(monodromy: NDArray[np.float64], crossing: Crossing | int) -> N
         mu = multipliers(monodromy)
         pairs = [mu[..., i] * mu[..., j] - 1.0 for i in range(mu.shape[-1]) for j in range(i)]
         return np.asarray(np.prod(pairs, axis=0).real)
-    multiplier = _SIGN[crossing] if isinstance(crossing, Crossing) else crossing
+    multiplier = crossing.sign if isinstance(crossing, Crossing) else crossing
     require_sign(multiplier)
     if monodromy.shape[-1] != 2:
         return np.asarray(np.linalg.det(np.eye(monodromy.shape[-1]) - multiplier * monodromy))

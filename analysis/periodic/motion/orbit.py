@@ -317,6 +317,10 @@ class PeriodicOrbit(NotebookResult):
         found: NDArray[np.complex128] = self._kept["multipliers"]
         return found
 
+    def distance(self, start: FloatArray) -> float:
+        """Return the greatest difference of a start y from that of this orbit, relative to the scale, without whole turns."""
+        return float((np.abs(self.flow.remove_turns(start - self.start)) / self.scale).max())
+
     @property
     def largest(self) -> float:
         """Largest modulus of the Floquet multipliers."""

@@ -154,9 +154,7 @@ def find_beginning(
     times = 2 if kind is Crossing.PERIOD_DOUBLING else 1
     points = [s for b in branches if times * b.turns == orbit.turns for s in b.special if s.kind is kind]
     for point in sorted(points, key=lambda point: abs(point.parameter - value)):
-        there = point.orbit
-        away = np.abs(there.flow.remove_turns(there.start - orbit.start) / there.scale).max()
-        if abs(point.parameter - value) < BEGINNING * width and away < BEGINNING:
+        if abs(point.parameter - value) < BEGINNING * width and point.orbit.distance(orbit.start) < BEGINNING:
             return point
     return None
 
@@ -164,15 +162,16 @@ def find_beginning(
 def arcs(branches: Iterable[Branch]) -> tuple[Arc, ...]:
     """Return the arcs into which branches divide, in the order of the branches."""
     branches = tuple(branches)
-    return tuple(arc for branch in branches for arc in _branch_arcs(branch, branches))
+    values = np.concatenate([branch.parameter for branch in branches]) if branches else np.zeros(1)
+    low, high = float(values.min()), float(values.max())
+    return tuple(arc for branch in branches for arc in _branch_arcs(branch, branches, low, high))
 
 
-def _branch_arcs(branch: Branch, branches: Sequence[Branch]) -> list[Arc]:
+def _branch_arcs(branch: Branch, branches: Sequence[Branch], low: float, high: float) -> list[Arc]:
+    """Return the arcs into which one of the branches divides; ``low`` and ``high`` are the range of their parameter."""
     passed = [(s.after + 1, s) for s in branch.special]
     # a branch that begins inside the range begins a step beyond a point of another one
     others = [b for b in branches if b is not branch]
-    values = np.concatenate([b.parameter for b in branches])
-    low, high = float(values.min()), float(values.max())
     for place, end in ((0, 0), (len(branch), -1)):
         value = float(branch.parameter[end])
         if branch.closed or not low < value < high:

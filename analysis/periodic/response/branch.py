@@ -296,7 +296,7 @@ def switch(
         if taken is None:
             continue
         away = (np.append(taken.y, taken.parameter) - np.append(orbit.start, special.parameter)) / follower.scale
-        if np.abs(away).max() < BEGINNING and (times == 1 or _half_shift(taken) @ _half_shift(taken) > length**2):
+        if np.abs(away).max() < BEGINNING and (times == 1 or np.linalg.norm(_half_shift(taken)) > length):
             return _branch(family, begun.turns, follower, taken, watch, stop, largest)
     motion = "of twice the period" if times > 1 else "that branches off"
     raise ContinuationError(f"no motion {motion} was found near {family.format_value(special.parameter)}")
@@ -458,33 +458,31 @@ def _half_shift(point: Point) -> NDArray[np.float64]:
     return np.asarray(orbit.point.period(orbit.start, orbit.turns // 2).shift / orbit.scale)
 
 
-def _turn(point: Point) -> float:
-    """Return the change of the parameter along the branch, whose sign changes where the branch turns back."""
-    return float(point.tangent[-1])
+def _test(point: Point, kind: Crossing) -> float:
+    """Return a test function: for a fold the change of the parameter along the branch, otherwise `crossing_test`."""
+    return float(point.tangent[-1] if kind is Crossing.FOLD else crossing_test(point.data.monodromy, kind))
 
 
-def _crossings(before: Point, after: Point) -> Iterator[tuple[Crossing, Callable[[Point], float]]]:
-    """Yield the crossings between two neighbouring points of a branch, each with a function that is zero there."""
+def _crossings(before: Point, after: Point, changed: set[Crossing]) -> Iterator[tuple[Crossing, Crossing]]:
+    """Yield the crossings between two neighbouring points of a branch, each with the kind whose test function is zero there.
+
+    ``changed`` are the kinds whose test functions change their sign between the points.
+    """
     ends = before.data, after.data
-    tests = {kind: partial(_test, kind=kind) for kind in Crossing if kind is not Crossing.FOLD}
-    changed = {kind for kind, test in tests.items() if test(before) * test(after) < 0.0}
-    turned = _turn(before) * _turn(after) < 0.0
+    turned = Crossing.FOLD in changed
     # where two branches cross, either the parameter turns back or det(I - M) changes its sign; at a fold both do. Without
     # damping or stiffness multipliers lie at the crossing all along, and their rounding crosses nothing
-    settled = max(float(np.abs(end.multipliers - 1.0).min()) for end in ends) > _AT_CROSSING
-    crossed = settled and turned != (Crossing.BRANCH_POINT in changed)
+    crossed = turned != (Crossing.BRANCH_POINT in changed) and (
+        max(float(np.abs(end.multipliers - 1.0).min()) for end in ends) > _AT_CROSSING
+    )
     if turned:
-        yield (Crossing.BRANCH_POINT if crossed else Crossing.FOLD), _turn
+        yield (Crossing.BRANCH_POINT if crossed else Crossing.FOLD), Crossing.FOLD
     elif crossed:
-        yield Crossing.BRANCH_POINT, tests[Crossing.BRANCH_POINT]
+        yield Crossing.BRANCH_POINT, Crossing.BRANCH_POINT
     if Crossing.PERIOD_DOUBLING in changed:
-        yield Crossing.PERIOD_DOUBLING, tests[Crossing.PERIOD_DOUBLING]
+        yield Crossing.PERIOD_DOUBLING, Crossing.PERIOD_DOUBLING
     if Crossing.TORUS in changed and max(torus_pair(end.multipliers)[1] for end in ends) > _AT_CROSSING:
-        yield Crossing.TORUS, tests[Crossing.TORUS]
-
-
-def _test(point: Point, kind: Crossing) -> float:
-    return float(crossing_test(point.data.monodromy, kind))
+        yield Crossing.TORUS, Crossing.TORUS
 
 
 def _special_points(
@@ -497,10 +495,12 @@ def _special_points(
     passed = sum(len(piece.points) - 1 for _, piece in pieces)
     found: list[tuple[int, float, SpecialPoint]] = []
     problems: list[str] = []
+    values = [{kind: _test(point, kind) for kind in Crossing} for point in curve.points]
     for i, (before, after, length) in enumerate(zip(curve.points, curve.points[1:], curve.steps)):
-        for kind, test in _crossings(before, after):
+        changed = {kind for kind in Crossing if values[i][kind] * values[i + 1][kind] < 0.0}
+        for kind, tested in _crossings(before, after, changed):
             try:
-                point, s = follower.locate(before, length, after, test)
+                point, s = follower.locate(before, length, after, partial(_test, kind=tested))
             except ContinuationError as error:
                 span = " and ".join(family.format_value(p.parameter) for p in (before, after))
                 problems.append(f"the {kind.value} between {span} is not located: {error}")

@@ -419,11 +419,8 @@ class _Search:
 
         def is_end(special: SpecialPoint) -> bool:
             orbit, reach = special.orbit, 1e-3 * (self.high - self.low)
-            scale = orbit.scale
             return any(
-                turns == 2 * orbit.turns
-                and abs(value - special.parameter) < reach
-                and np.abs(orbit.flow.remove_turns(y - orbit.start) / scale).max() < 0.1
+                turns == 2 * orbit.turns and abs(value - special.parameter) < reach and orbit.distance(y) < 0.1
                 for turns, value, y in ends
             )
 
@@ -493,9 +490,8 @@ class _Search:
         orbit, width = special.orbit, self.high - self.low
 
         def is_same(other: SpecialPoint) -> bool:
-            away = orbit.flow.remove_turns(other.orbit.start - orbit.start) / orbit.scale
             near = abs(other.parameter - special.parameter) < _SAME_POINT * width
-            return other.kind is special.kind and near and float(np.abs(away).max()) < sqrt(_SAME_POINT)
+            return other.kind is special.kind and near and orbit.distance(other.orbit.start) < sqrt(_SAME_POINT)
 
         return sum(any(map(is_same, branch.special)) for branch in branches if branch.turns == orbit.turns)
 
@@ -556,9 +552,7 @@ def describe_end(branch: Branch) -> str:
 def _passes(branch: Branch, value: float, orbit: motion.PeriodicOrbit) -> bool:
     """Return whether one of the two ends of a branch is the given orbit at the parameter ``value``."""
     return any(
-        abs(branch.parameter[i] - value) <= 1e-9 * abs(value)
-        and float(np.abs(orbit.flow.remove_turns(branch.orbits[i].start - orbit.start) / orbit.scale).max())
-        < motion.SAME
+        abs(branch.parameter[i] - value) <= 1e-9 * abs(value) and orbit.distance(branch.orbits[i].start) < motion.SAME
         for i in (0, -1)
     )
 

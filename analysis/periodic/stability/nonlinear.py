@@ -183,10 +183,8 @@ def normal_form(family: Family, special: SpecialPoint) -> NormalForm:
         If the integration over a period, from a start next to the orbit, fails.
     """
     forms = _forms(special.orbit)
-    multiplier = torus_pair(special.orbit.multipliers)[0] if special.kind is Crossing.TORUS else 1.0
-    real = {Crossing.FOLD: 1.0, Crossing.BRANCH_POINT: 1.0, Crossing.PERIOD_DOUBLING: -1.0}
-    crossing = real.get(special.kind, multiplier / abs(multiplier))
-    if np.abs(special.orbit.multipliers - crossing).min() > _LOCATED:
+    multiplier = special.kind.sign or torus_pair(special.orbit.multipliers)[0]
+    if np.abs(special.orbit.multipliers - multiplier / abs(multiplier)).min() > _LOCATED:
         return NormalForm(kind=special.kind, coefficient=0.0, uncertainty=np.inf, words=_UNSETTLED)
     coefficient, uncertainty = _extrapolate_coefficient(lambda h: form_coefficient(forms, special.kind, multiplier, h))
     if not uncertainty < UNSETTLED * abs(coefficient):
@@ -252,7 +250,7 @@ def form_coefficient(forms: Forms, kind: Crossing, multiplier: complex, h: float
             + b(v.conj(), np.linalg.solve(turn**2 * unit - matrix, b(v, v)))
         )
         return float(0.5 * (np.vdot(left, inner) / turn).real)
-    q, p = _real_eigenvectors(matrix, -1.0 if kind is Crossing.PERIOD_DOUBLING else 1.0)
+    q, p = _real_eigenvectors(matrix, kind.sign)
     second = forms.second_form(q, h)
     if kind is Crossing.FOLD:
         return float(0.5 * p @ second)

@@ -553,8 +553,7 @@ def _singular_matrix(matrix: FloatArray, by: FloatArray, kind: Crossing) -> tupl
     ``matrix`` is the monodromy matrix and ``by`` its derivatives.
     """
     if kind is not Crossing.TORUS:
-        sign = -1.0 if kind is Crossing.PERIOD_DOUBLING else 1.0
-        return np.eye(len(matrix)) - sign * matrix, -sign * by
+        return np.eye(len(matrix)) - kind.sign * matrix, -kind.sign * by
     # the second compound matrix has the products of two multipliers as eigenvalues
     i, j = np.triu_indices(len(matrix), 1)
 
