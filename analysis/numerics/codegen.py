@@ -72,8 +72,6 @@ class MachineCode:
     rows : sequence of str
         Names of the functions whose outputs are read lane by lane: all outputs of the first lane are written first, then those
         of the next lane. On some processors gathering a lane's outputs afterwards takes longer than computing them.
-    shared : bool
-        Whether b, c and d are the same for all lanes; they are then plain arrays.
 
     Attributes
     ----------
@@ -88,14 +86,12 @@ class MachineCode:
         If an operation of CasADi is not supported, or an output is not dense.
     """
 
-    def __init__(
-        self, functions: Sequence[Any], lanes: int = 1, rows: Sequence[str] = (), *, shared: bool = False
-    ) -> None:
+    def __init__(self, functions: Sequence[Any], lanes: int = 1, rows: Sequence[str] = ()) -> None:
         _prepare()
         triple, cpu = binding.get_default_triple(), binding.get_host_cpu_name()
         features = binding.get_host_cpu_features().flatten()
         digest = hashlib.sha256(
-            f"{llvmlite.__version__} {triple} {cpu} {features} {lanes} {rows} {shared}".encode() + own_source()
+            f"{llvmlite.__version__} {triple} {cpu} {features} {lanes} {rows}".encode() + own_source()
         )
         digest.update(" ".join(function.serialize() for function in functions).encode())
         self.fingerprint = digest.hexdigest()
@@ -104,7 +100,7 @@ class MachineCode:
         )
         code = load_or_make(
             code_folder("llvm") / self.fingerprint,
-            lambda: _compile(functions, lanes, rows, shared, triple, machine),
+            lambda: _compile(functions, lanes, rows, triple, machine),
         )
         engine = binding.create_mcjit_compiler(binding.parse_assembly(f'target triple = "{triple}"'), machine)
         engine.add_object_file(binding.ObjectFileRef.from_data(code))
@@ -113,14 +109,12 @@ class MachineCode:
         self.addresses = {f.name(): engine.get_function_address(f.name()) for f in functions}
 
 
-def _compile(
-    functions: Sequence[Any], lanes: int, rows: Sequence[str], shared: bool, triple: str, machine: Any
-) -> bytes:
+def _compile(functions: Sequence[Any], lanes: int, rows: Sequence[str], triple: str, machine: Any) -> bytes:
     """Compile functions; return the object file."""
     module = ir.Module("linkwork")
     module.triple = triple
     for function in functions:
-        Writer(module, function, lanes, function.name() in rows, shared).write()
+        Writer(module, function, lanes, function.name() in rows).write()
     parsed = binding.parse_assembly(str(module))
     passes = binding.create_pass_builder(machine, binding.create_pipeline_tuning_options(speed_level=2))
     passes.getModulePassManager().run(parsed, passes)
@@ -190,7 +184,6 @@ class Writer:
         function: Any,
         lanes: int = 1,
         in_rows: bool = False,
-        shared: bool = False,
         *,
         own: bool = False,
     ) -> None:
@@ -198,7 +191,6 @@ class Writer:
         self.source = function
         self.lanes = lanes
         self.in_rows = in_rows and lanes > 1
-        self.shared = shared and lanes > 1
         self.own = own or lanes > 1
         self.kind = vectors.vector(lanes)
         self.reciprocals: dict[int, tuple[Any, Any]] = {}
@@ -261,8 +253,6 @@ class Writer:
         """Return the entry ``place`` of the argument ``which`` in each lane."""
         if which == 0:
             return self._repeat(self.arguments[0])
-        if which > 1 and self.shared:
-            return self._repeat(self.build.load(self.build.gep(self.arguments[which], [_index(place)])))
         return self.build.load(self._place(which, place), align=8)
 
     def _repeat(self, number: Any) -> Any:

@@ -138,6 +138,7 @@ def test_rows_are_kept_and_an_interrupted_picture_goes_on(
         return compute(*arguments)
 
     monkeypatch.setattr(coexistences, work, interrupted)
+    monkeypatch.setattr(coexistences, "_TOGETHER", 1)
     with pytest.raises(GridInterrupted, match=r"2 of 3 rows done, which are kept in .*: call again to go on"):
         of(tmp_path)
     monkeypatch.setattr(coexistences, work, compute)
@@ -146,6 +147,8 @@ def test_rows_are_kept_and_an_interrupted_picture_goes_on(
     # of another mechanism there are as many rows anew as it is in
     assert of(tmp_path, 11.5).computed == others
     (whole := tmp_path / "alone").mkdir()
+    # rows that are computed together are those computed one by one, to the last bit
+    monkeypatch.setattr(coexistences, "_TOGETHER", 2)
     alone = of(whole)
     for name in ("largest", "starts", "ends"):
         np.testing.assert_array_equal(*(np.ma.filled(getattr(found, name, 0), np.nan) for found in (last, alone)))

@@ -25,7 +25,7 @@ from analysis.periodic.motion.tracks import (
     advance_tracks,
     begin,
     make_tracks,
-    set_scale,
+    set_mechanism,
 )
 from analysis.run.compiled import read_lane
 from linkwork.five_bar.published import SETS
@@ -34,11 +34,12 @@ RIG = SETS["rig-2-spring-c"].parameters
 USED = PLAIN, VARIATIONAL, IN_LANES + PLAIN, IN_LANES + VARIATIONAL, IN_LANES + GAP
 
 
-@kernel(types.void(SECTION, int64, float64, VECTOR, MATRIX, MATRIX, int64[::1]), purpose="a test")
-def follow_all(section: Any, columns: int, end: float, tolerances: Any, starts: Any, rows: Any, statuses: Any) -> None:
-    """Integrate from all starts in lanes, each to its own tolerance."""
-    v, owner, place = make_tracks(starts.shape[1], columns), np.full(LANES, -1), 0
-    set_scale(section.scale, v)
+@kernel(types.void(SECTION, int64, float64, MATRIX, VECTOR, MATRIX, MATRIX, int64[::1]), purpose="a test")
+def follow_all(
+    section: Any, columns: int, end: float, constants: Any, tolerances: Any, starts: Any, rows: Any, statuses: Any
+) -> None:
+    """Integrate from all starts in lanes, each with its own constants to its own tolerance."""
+    v, owner, place = make_tracks(section, columns), np.full(LANES, -1), 0
     running = True
     while running:
         for lane in range(LANES):
@@ -51,7 +52,11 @@ def follow_all(section: Any, columns: int, end: float, tolerances: Any, starts: 
                 if place == starts.shape[0]:
                     break
                 owner[lane], v.step[lane] = place, 0.1
-                begin(lane, section, starts[place], end, tolerances[place], v)
+                own = kernels.replace_numbers(
+                    section, section.drive, constants[place], section.scale, tolerances[place]
+                )
+                set_mechanism(lane, own, v)
+                begin(lane, own, starts[place], end, tolerances[place], v)
                 place += 1
         running = advance_tracks(section, v)
 
@@ -63,7 +68,7 @@ def follow_all(section: Any, columns: int, end: float, tolerances: Any, starts: 
 )
 @pytest.mark.parametrize("columns", [0, 1], ids=["plain", "derivatives"])
 def test_lanes_take_the_steps_of_one_motion_alone(drive: Drive, columns: int) -> None:
-    """More starts than lanes, some beyond the limit of assembly, to several tolerances."""
+    """More starts than lanes, some beyond the limit of assembly, with several dampers, to several tolerances."""
     point = operating_point(RIG, drive)
     n = point.flow.size
     generator = np.random.default_rng(5)
@@ -74,10 +79,12 @@ def test_lanes_take_the_steps_of_one_motion_alone(drive: Drive, columns: int) ->
     tolerances = 10.0 ** generator.uniform(-12.0, -6.0, 21)
     rows, statuses = np.zeros((21, n * (1 + n * columns))), np.zeros(21, dtype=np.int64)
     section = point.section(starts[0], *USED)
-    follow_all(section, n * columns, 2.0 * pi, tolerances, starts, rows, statuses)
-    for start, tolerance, row, status in zip(starts, tolerances, rows, statuses):
+    rigs = [replace(RIG, slider_damping=damping) for damping in generator.uniform(0.0, 9.0, 21)]
+    constants = np.array([operating_point(rig, drive).section(starts[0]).p for rig in rigs])
+    follow_all(section, n * columns, 2.0 * pi, constants, tolerances, starts, rows, statuses)
+    for start, p, tolerance, row, status in zip(starts, constants, tolerances, rows, statuses):
         alone = np.zeros((1, row.size))
-        own = section._replace(tolerance=tolerance)
+        own = section._replace(p=p, tolerance=tolerance)
         assert status == kernels.segments(own, np.array([0.0, 2.0 * pi]), start[None, :], alone)
         if status == Status.DONE:
             assert row == pytest.approx(alone[0], rel=1e-10, abs=1e-11 * np.abs(alone).max())

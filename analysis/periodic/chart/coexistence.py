@@ -27,12 +27,14 @@ from ..motion.search import Orbits, search_orbits, unsought_hint
 from ..motion.variables import Plane
 from . import kernels
 from .grid import RowComputation, grid_points, row_code, row_name
-from .kernels import LOST, MOST_ORBITS, UNSETTLED, Motions
+from .kernels import LOST, MOST_ORBITS, UNSETTLED, Motions, Points
 from .rows import PointRow, point_row
 
 FloatArray = NDArray[np.float64]
 #: Number of guesses from which the motions of a point are sought, after the motions of its neighbour: a power of two.
 STARTS = 16
+#: Rows of a grid whose motions are sought at once, so that all lanes have work while the last search of a point ends.
+_TOGETHER = 4
 #: Samples of a turn from which an amplitude is computed.
 SAMPLES = 64
 #: For basins: bound of the integrator's local error, distance from a motion, relative to the scale, below which a start has
@@ -158,7 +160,7 @@ def coexistence(
     """
     xs, ys, rows, guesses = grid_points(operation, x, y, start, STARTS)
     code = row_code(kernels.solve_all)
-    data, computed = RowComputation(folder, n_jobs, progress, what, kernels.solve_all).rows(
+    data, computed = RowComputation(folder, n_jobs, progress, what, kernels.solve_all, _TOGETHER).rows(
         partial(_compute_motions, guesses),
         rows,
         [row_name(row, guesses, (*_SEARCHED, GAP), code) for row in rows],
@@ -175,20 +177,24 @@ def coexistence(
     )
 
 
-def _compute_motions(guesses: FloatArray, row: PointRow) -> FloatArray:
-    """Compute the motions at the m points of a row, shape (m, MOST_ORBITS, n + 2): largest multiplier, amplitude and start.
+def _compute_motions(guesses: FloatArray, rows: Sequence[PointRow]) -> FloatArray:
+    """Compute the motions at the m points of each row, shape (rows, m, MOST_ORBITS, n + 2).
 
-    The motions of a point are sorted by amplitude; entries after the last motion are NaN.
+    The last axis has the largest multiplier, the amplitude and the start. The motions of a point are sorted by amplitude;
+    entries after the last motion are NaN.
     """
-    m, n = row.scales.shape
-    shapes = (m, MOST_ORBITS, n), (m, MOST_ORBITS, n * n), (m, MOST_ORBITS, SAMPLES)
+    first, m = rows[0], rows[0].scales.shape[0]
+    if any((row.flow, row.switched) != (first.flow, first.switched) for row in rows):
+        return np.vstack([_compute_motions(guesses, [row]) for row in rows])
+    count, n = m * len(rows), first.flow.size
+    shapes = (count, MOST_ORBITS, n), (count, MOST_ORBITS, n * n), (count, MOST_ORBITS, SAMPLES)
     starts, monodromies, swings = (np.full(shape, np.nan) for shape in shapes)
-    counts = np.zeros(m, dtype=np.int64)
-    section = row.first.section(guesses[0], *_SEARCHED, switched=row.switched)
-    angles = np.linspace(0.0, row.flow.period, SAMPLES, endpoint=False)
-    found_all = Motions(starts, monodromies, swings, counts)
-    kernels.solve_all(section, row.points(), row.search(), angles, guesses, found_all)
-    largest = np.full((m, MOST_ORBITS), np.nan)
+    counts = np.zeros(count, dtype=np.int64)
+    section = first.first.section(guesses[0], *_SEARCHED, switched=first.switched)
+    angles = np.linspace(0.0, first.flow.period, SAMPLES, endpoint=False)
+    points = Points(*map(np.vstack, zip(*[row.points() for row in rows])))
+    kernels.solve_all(section, points, first.search(), m, angles, guesses, Motions(starts, monodromies, swings, counts))
+    largest = np.full((count, MOST_ORBITS), np.nan)
     found = np.arange(MOST_ORBITS) < counts[:, None]
     largest[found] = np.abs(multipliers(monodromies[found].reshape(-1, n, n)))[:, 0]
     # evaluate the Fourier series of the samples on a finer grid, as in `Turn.amplitude`
@@ -197,7 +203,7 @@ def _compute_motions(guesses: FloatArray, row: PointRow) -> FloatArray:
     order = np.argsort(np.where(found, amplitude, np.inf), axis=1, kind="stable")
     amplitude[~found] = np.nan
     whole = np.concatenate([largest[..., None], amplitude[..., None], starts], axis=2)
-    return np.take_along_axis(whole, order[:, :, None], axis=1)
+    return np.take_along_axis(whole, order[:, :, None], axis=1).reshape(len(rows), m, MOST_ORBITS, n + 2)
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -428,15 +434,20 @@ def describe_turns(flow: Flow, turns: int) -> str:
     return ("" if turns == 1 else "up to ") + format_turns(turns * flow.turns)
 
 
-def _ends(point: OperatingPoint, known: FloatArray, place: int, across: FloatArray, rate: float) -> FloatArray:
+def _ends(
+    point: OperatingPoint, known: FloatArray, place: int, across: FloatArray, rates: Sequence[float]
+) -> FloatArray:
     """Return for each start of a row an index into ``known``: the motion on which the mechanism settles; or LOST or UNSETTLED.
 
     A start is the first known motion with other values of one coordinate and its rate: the coordinate with the index ``place``
     in y is one value of ``across``, shape (points,); the rate is ``rate`` at all starts of the row.
     """
-    starts = np.tile(known[0], (len(across), 1))
-    starts[:, place], starts[:, point.flow.size // 2 + place] = across, rate
-    ends = np.zeros(len(across), dtype=np.int64)
+    starts = np.tile(known[0], (len(rates) * len(across), 1))
+    starts[:, place], starts[:, point.flow.size // 2 + place] = (
+        np.tile(across, len(rates)),
+        np.repeat(rates, len(across)),
+    )
+    ends = np.zeros(len(starts), dtype=np.int64)
     section = point.section(known[0], *_FOLLOWED, tolerance=_TOLERANCE)
     kernels.settle_starts(section, point.flow.period, _NEAR, _TURNS, starts, known, ends)
-    return ends.astype(float)
+    return ends.reshape(len(rates), -1).astype(float)

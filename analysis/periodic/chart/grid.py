@@ -20,7 +20,7 @@ from ...files import load_array, save_array
 from ...mechanisms import Parameters, find_mechanism
 from ...numerics.cache import cache_root
 from ...numerics.codegen import fingerprint
-from ...numerics.workers import check_jobs, record_interrupts, run_in_parallel
+from ...numerics.workers import check_jobs, record_interrupts, run_in_parallel, worker_count
 from ...run import show_progress
 from ...units import si
 from ..motion import TOLERANCE, Drive, Plane, Stability, multipliers, spread_starts
@@ -229,10 +229,10 @@ def grid(
     )
 
 
-def _compute_row(guesses: FloatArray, tolerance: float, row: PointRow) -> FloatArray:
-    """Compute a row of a grid, shape (m, n + 2): largest multiplier, start and status of the orbit at each of the m points."""
-    values, starts, status = _solve_row(row, guesses, tolerance)
-    return np.column_stack([values, starts, status])
+def _compute_row(guesses: FloatArray, tolerance: float, rows: Sequence[PointRow]) -> FloatArray:
+    """Compute a row of a grid, shape (1, m, n + 2): largest multiplier, start and status of the orbit at each point."""
+    values, starts, status = _solve_row(rows[0], guesses, tolerance)
+    return np.column_stack([values, starts, status])[None]
 
 
 # Rows over workers, kept on disk
@@ -313,6 +313,8 @@ class RowComputation:
         Text before the progress bar.
     kernel : Kernel
         Kernel that computes the rows; it is compiled once, before the workers start.
+    together : int
+        Greatest number of rows that are computed in one piece of work.
     """
 
     folder: str | Path | None
@@ -320,10 +322,11 @@ class RowComputation:
     progress: bool
     what: str
     kernel: Any
+    together: int = 1
 
     def rows(
         self,
-        work: Callable[[Item], FloatArray],
+        work: Callable[[Sequence[Item]], FloatArray],
         items: Sequence[Item],
         names: Sequence[str],
         shape: tuple[int, ...],
@@ -332,6 +335,8 @@ class RowComputation:
 
         Parameters
         ----------
+        work : callable
+            Function that computes up to ``together`` items; the result has a row for each of them.
         names : sequence of str
             Names of the items in the cache: see `row_name`.
         shape : tuple of int
@@ -368,16 +373,19 @@ class RowComputation:
         unkept = 0
         with record_interrupts() as interrupted, show_progress(self.progress, float(len(paths)), self.what) as show:
             show(float(len(rows)))
-            places = list(missing)
-            for number, made in run_in_parallel(work, list(missing.values()), interrupted, n_jobs=self.n_jobs):
-                path = places[number]
-                rows[path] = made
-                try:
-                    save_array(path, made)
-                except OSError as error:
-                    if not unkept:
-                        warnings.warn(f"rows of the grid are not kept: {error}", RuntimeWarning, stacklevel=3)
-                    unkept += 1
+            # at least two pieces of work for each worker, so that no worker waits long for the others
+            size = min(self.together, 1 + len(missing) // (2 * worker_count(self.n_jobs)))
+            pieces = [list(missing)[n : n + size] for n in range(0, len(missing), size)]
+            tasks = [[missing[path] for path in piece] for piece in pieces]
+            for number, made in run_in_parallel(work, tasks, interrupted, n_jobs=self.n_jobs):
+                for path, row in zip(pieces[number], made):
+                    rows[path] = row
+                    try:
+                        save_array(path, row)
+                    except OSError as error:
+                        if not unkept:
+                            warnings.warn(f"rows of the grid are not kept: {error}", RuntimeWarning, stacklevel=3)
+                        unkept += 1
                 show(float(len(rows)))
                 if interrupted:
                     break

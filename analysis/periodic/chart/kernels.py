@@ -41,7 +41,7 @@ from ..motion.kernels import (
     replace_numbers,
     subtract_modulo_turns,
 )
-from ..motion.tracks import IDLE, RUNNING, advance_tracks, begin, make_tracks, set_scale
+from ..motion.tracks import IDLE, RUNNING, advance_tracks, begin, make_tracks, set_mechanism
 
 #: Numbers of elements of a turn that are tried, from few to many.
 COUNTS = np.array([8, 16, 24, 32, 48])
@@ -297,7 +297,7 @@ def solve_row(section, points, search, guesses, found):
     found : Row
         The result; its arrays are written.
     """
-    tables = make_desk(guesses.shape[1], COUNTS[-1] * search.turns, False)
+    tables = make_desk(section, COUNTS[-1] * search.turns, False)
     solve_from_left(section, points, search, guesses[0].copy(), found, tables)
     solve_from_right(section, points, search, found)
     missing = False
@@ -319,21 +319,40 @@ def _is_known(start, known, section, away):
 
 
 class Seekers(NamedTuple):
-    """Searches for periodic motions that run at the same time, one in each lane of the vector instructions."""
+    """Searches for periodic motions at the points of several rows of a chart, one search in each lane.
 
-    place: NDArray[np.int64]  # index of the guess from which the search began, -1 if the lane is free
-    begun: NDArray[np.int64]  # number of motions that were known when the search began
+    In each row one point is searched after the other, in waves: from the motions of the previous point, then from every guess,
+    then again from the guesses that led to a motion, until a wave finds nothing new. Only motions that were known before a wave
+    are divided out in it, so that its results do not depend on the order in which its searches end.
+    """
+
+    row: NDArray[np.int64]  # row of a lane's search, -1 if the lane is free
+    place: NDArray[np.int64]  # index of the start from which the lane's search began
     polishing: NDArray[np.bool_]  # whether Newton's method now refines a motion at the full tolerance
     hunts: Hunt  # states of Newton's method: each array has a row for each lane
+    point: NDArray[
+        np.int64
+    ]  # column of the point at which a row is searched; this and the following: one entry per row
+    guessing: NDArray[np.bool_]  # whether the wave begins at guesses
+    begun: NDArray[np.int64]  # number of motions that were known when the wave began
+    left: NDArray[np.int64]  # number of searches of the wave that have not ended
+    following: NDArray[np.int64]  # index of the next start of the wave from which no search has begun
+    todo: NDArray[np.bool_]  # whether the wave has a search from each start, shape (rows, starts)
+    reached: NDArray[np.bool_]  # whether the search from each start has led to a motion, shape (rows, starts)
+    ends: NDArray[np.float64]  # start and monodromy matrix of these motions, shape (rows, starts, n + n * n)
 
 
 @part
-def _make_seekers(n):
+def _make_seekers(n, rows, starts):
     hunts = Hunt(
         np.zeros((LANES, n)), np.zeros((LANES, n)), np.zeros((LANES, n)), np.zeros((LANES, n)),
         np.zeros((LANES, n, n + 1)), np.zeros((LANES, n * (1 + n))), np.zeros((LANES, 4)),
     )  # fmt: skip
-    return Seekers(np.full(LANES, -1), np.zeros(LANES, np.int64), np.zeros(LANES, np.bool_), hunts)
+    return Seekers(
+        np.full(LANES, -1), np.zeros(LANES, np.int64), np.zeros(LANES, np.bool_), hunts, np.zeros(rows, np.int64),
+        np.zeros(rows, np.bool_), np.zeros(rows, np.int64), np.zeros(rows, np.int64), np.zeros(rows, np.int64),
+        np.zeros((rows, starts), np.bool_), np.zeros((rows, starts), np.bool_), np.zeros((rows, starts, n * (1 + n))),
+    )  # fmt: skip
 
 
 @inline
@@ -345,110 +364,162 @@ def _hunt(lane, hunts):
     )  # fmt: skip
 
 
-class Point(NamedTuple):
-    """A point of a chart whose motions are sought, and the motions found so far."""
+class Job(NamedTuple):
+    """Arguments of `solve_all`."""
 
-    own: Any  # section with the full tolerance
-    wide: Any  # section with the looser tolerance of a search
+    section: Any
+    points: Points
     search: Search
-    before: NDArray[np.float64]  # starts of the motions of the previous point of the row, (b, n)
-    guesses: NDArray[np.float64]  # further guesses of a start, (k, n)
-    angles: NDArray[np.float64]  # crank angles of the samples (rad)
-    starts: NDArray[np.float64]  # starts of the motions found, (MOST_ORBITS, n)
-    monodromies: NDArray[np.float64]  # as in `Motions`
-    swings: NDArray[np.float64]  # as in `Motions`
-    count: NDArray[np.int64]  # number of motions found, (1,)
-
-
-@inner
-def _begin_search(lane, point, seekers, v):
-    """Begin the search of a lane: Newton's method from a motion of the previous point, or deflated Newton from a guess."""
-    place, before = seekers.place[lane], point.before.shape[0]
-    seekers.polishing[lane] = place < before
-    seekers.begun[lane] = point.count[0]
-    v.step[lane] = 0.1
-    begin_hunt(point.before[place] if place < before else point.guesses[place - before], _hunt(lane, seekers.hunts))
-
-
-@inner
-def _record(lane, point, seekers, v, room, carry):
-    """Add the motion that a lane has found to the motions of the point, if it is new."""
-    count, start = point.count[0], seekers.hunts.start[lane]
-    single = v.z[: start.shape[0]]
-    if count == MOST_ORBITS or _is_known(start, point.starts[:count], point.own, single):
-        return
-    copy(start, point.starts[count])
-    copy(v.z[start.shape[0] :], point.monodromies[count])
-    copy(start, single)
-    angle, carry[0] = 0.0, 0.1
-    for i in range(point.angles.shape[0]):
-        if point.angles[i] > angle:
-            advance(point.own, angle, point.angles[i], single, room, carry)
-            angle = point.angles[i]
-        point.swings[count, i] = single[0]
-    point.count[0] += 1
-
-
-@inner
-def _continue_search(lane, point, seekers, v, room, carry):
-    """Continue the search of a lane after its integration; if the search is over, set ``seekers.place[lane]`` = -1 (free)."""
-    hunt, most, status = _hunt(lane, seekers.hunts), point.search.most, v.status[lane]
-    read_lane(lane, LANES, v.x, v.z)
-    if seekers.polishing[lane]:
-        what = continue_newton(point.own, most, status, v.z, hunt)
-    else:
-        what = continue_deflated_newton(point.wide, most, 1.0, status, point.starts[: point.count[0]], v.z, hunt)
-    if what == GOING:
-        return
-    if what != DONE:
-        seekers.place[lane] = -1
-    elif not seekers.polishing[lane]:
-        seekers.polishing[lane] = True
-        begin_hunt(hunt.start, hunt)
-    else:
-        _record(lane, point, seekers, v, room, carry)
-        count = point.count[0]
-        if seekers.place[lane] >= point.before.shape[0] and seekers.begun[lane] < count and count < MOST_ORBITS:
-            # search again from the same guess: the motions found since the search began were not divided out
-            _begin_search(lane, point, seekers, v)
-        else:
-            seekers.place[lane] = -1
+    columns: int
+    angles: NDArray[np.float64]
+    guesses: NDArray[np.float64]
+    found: Motions
 
 
 @part
-def _search_point(point, seekers, tables, room, carry):
-    """Find the motions of a point by searches in lanes: from the motions of the previous point, then from all guesses."""
-    v, before = refer(tables), point.before.shape[0]
-    place = 0
-    for bound in (before, before + point.guesses.shape[0]):
-        running = True
-        while running:
-            for lane in range(LANES):
-                while v.status[lane] != RUNNING:
-                    if seekers.place[lane] >= 0:
-                        _continue_search(lane, point, seekers, v, room, carry)
-                    elif place < bound:
-                        seekers.place[lane] = place
-                        place += 1
-                        _begin_search(lane, point, seekers, v)
-                    else:
-                        v.status[lane] = IDLE
-                        break
-                    if seekers.place[lane] >= 0:
-                        tolerance = (point.own if seekers.polishing[lane] else point.wide).tolerance
-                        begin(lane, point.own, seekers.hunts.trial[lane], point.search.end, tolerance, v)
-            running = advance_tracks(point.own, v)
+def _record(at, end, job, carry):
+    """Add a motion to those of the point with the index ``at``, if it is new; ``end`` is its start and monodromy matrix."""
+    found, count, n = job.found, job.found.counts[at], job.guesses.shape[1]
+    own = point_section(job.section, job.points, at, job.section.tolerance)
+    z = end[:n].copy()
+    if count == MOST_ORBITS or _is_known(end[:n], found.starts[at, :count], own, z):
+        return
+    copy(end[:n], found.starts[at, count])
+    copy(end[n:], found.monodromies[at, count])
+    copy(end[:n], z)
+    room = make_room(own, 0)
+    angle, carry[0] = 0.0, 0.1
+    for i in range(job.angles.shape[0]):
+        if job.angles[i] > angle:
+            advance(own, angle, job.angles[i], z, room, carry)
+            angle = job.angles[i]
+        found.swings[at, count, i] = z[0]
+    found.counts[at] += 1
 
 
-@kernel(types.void(SECTION, POINTS, SEARCH, VECTOR, MATRIX, MOTIONS), purpose="grids of coexisting motions")
-def solve_all(section, points, search, angles, guesses, found):
-    """Find all orbits of each mechanism in a row of a chart.
+@inner
+def _pass_start(row, seekers):
+    """Go to the next start of a row's wave from which there is a search."""
+    seekers.following[row] += 1
+    while seekers.following[row] < seekers.todo.shape[1] and not seekers.todo[row, seekers.following[row]]:
+        seekers.following[row] += 1
+
+
+@part
+def _begin_wave(row, job, seekers, carry):
+    """End the wave of a row, and begin the next wave that has searches, at this point or at one of the following points."""
+    counts, todo, reached = job.found.counts, seekers.todo[row], seekers.reached[row]
+    while seekers.left[row] == 0 and seekers.point[row] < job.columns:
+        at = row * job.columns + seekers.point[row]
+        for place in range(reached.shape[0]):
+            if reached[place]:
+                _record(at, seekers.ends[row, place], job, carry)
+        again = seekers.begun[row] < counts[at] < MOST_ORBITS
+        if seekers.guessing[row] and not again:
+            seekers.point[row] += 1
+            seekers.guessing[row] = False
+            for place in range(todo.shape[0]):
+                todo[place] = place < counts[at]
+            seekers.begun[row] = 0
+        else:
+            for place in range(todo.shape[0]):
+                todo[place] = reached[place] if seekers.guessing[row] else place < job.guesses.shape[0]
+            seekers.guessing[row] = True
+            seekers.begun[row] = counts[at]
+        for place in range(todo.shape[0]):
+            reached[place] = False
+            seekers.left[row] += todo[place]
+        seekers.following[row] = -1
+        _pass_start(row, seekers)
+
+
+@inner
+def _integrate(lane, job, seekers, v):
+    """Begin the next integration of a lane's search."""
+    row = seekers.row[lane]
+    tolerance = job.section.tolerance if seekers.polishing[lane] else job.search.loose
+    own = point_section(job.section, job.points, row * job.columns + seekers.point[row], tolerance)
+    begin(lane, own, seekers.hunts.trial[lane], job.search.end, tolerance, v)
+
+
+@inner
+def _take_search(lane, job, seekers, v):
+    """Begin a search in a free lane, in the row that is least advanced; return whether there is a search to begin."""
+    row = -1
+    for other in range(seekers.point.shape[0]):
+        if seekers.following[other] < seekers.todo.shape[1] and (row < 0 or seekers.point[other] < seekers.point[row]):
+            row = other
+    if row < 0:
+        return False
+    at, place = row * job.columns + seekers.point[row], seekers.following[row]
+    _pass_start(row, seekers)
+    seekers.row[lane], seekers.place[lane], seekers.polishing[lane] = row, place, not seekers.guessing[row]
+    set_mechanism(lane, point_section(job.section, job.points, at, job.section.tolerance), v)
+    v.step[lane] = 0.1
+    hunt = _hunt(lane, seekers.hunts)
+    begin_hunt(job.guesses[place] if seekers.guessing[row] else job.found.starts[at - 1, place], hunt)
+    _integrate(lane, job, seekers, v)
+    return True
+
+
+@inner
+def _continue_search(lane, job, seekers, v, carry):
+    """Continue the search of a lane after its integration: with the next integration, or with an end of the search."""
+    hunt, most, status = _hunt(lane, seekers.hunts), job.search.most, v.status[lane]
+    row, place = seekers.row[lane], seekers.place[lane]
+    at, n = row * job.columns + seekers.point[row], job.guesses.shape[1]
+    read_lane(lane, LANES, v.x, v.z)
+    if seekers.polishing[lane]:
+        own = point_section(job.section, job.points, at, job.section.tolerance)
+        what = continue_newton(own, most, status, v.z, hunt)
+    else:
+        wide = point_section(job.section, job.points, at, job.search.loose)
+        known = job.found.starts[at, : seekers.begun[row]]
+        what = continue_deflated_newton(wide, most, 1.0, status, known, v.z, hunt)
+        if what == DONE:
+            seekers.polishing[lane], what = True, GOING
+            begin_hunt(hunt.start, hunt)
+    if what == GOING:
+        _integrate(lane, job, seekers, v)
+        return
+    if what == DONE:
+        seekers.reached[row, place] = True
+        copy(hunt.start, seekers.ends[row, place, :n])
+        copy(v.z[n:], seekers.ends[row, place, n:])
+    seekers.row[lane] = -1
+    seekers.left[row] -= 1
+    _begin_wave(row, job, seekers, carry)
+
+
+@part
+def _search_rows(job, seekers, tables, carry):
+    """Search in all lanes until the searches of all rows have ended."""
+    v = refer(tables)
+    for row in range(seekers.point.shape[0]):
+        _begin_wave(row, job, seekers, carry)
+    running = True
+    while running:
+        for lane in range(LANES):
+            while v.status[lane] != RUNNING:
+                if seekers.row[lane] >= 0:
+                    _continue_search(lane, job, seekers, v, carry)
+                elif not _take_search(lane, job, seekers, v):
+                    v.status[lane] = IDLE
+                    break
+        running = advance_tracks(job.section, v)
+
+
+@kernel(types.void(SECTION, POINTS, SEARCH, int64, VECTOR, MATRIX, MOTIONS), purpose="grids of coexisting motions")
+def solve_all(section, points, search, columns, angles, guesses, found):
+    """Find all orbits of each mechanism in several rows of a chart.
 
     Newton's method starts from each orbit of the previous mechanism in the row, then from every guess, with the known orbits
-    divided out.
+    divided out. The result of a row does not depend on the other rows.
 
     Parameters
     ----------
+    columns : int
+        Number of mechanisms in a row; ``points`` and ``found`` have one row after the other.
     angles : ndarray, shape (samples,)
         Crank angles at which the first component of y is sampled.
     found : Motions
@@ -457,18 +528,10 @@ def solve_all(section, points, search, angles, guesses, found):
     The other parameters are those of `solve_row`.
     """
     n = guesses.shape[1]
-    seekers, tables = _make_seekers(n), make_tracks(n, n)
-    carry, none = np.array([0.1, 0.0]), np.empty((0, n))
-    for row in range(found.counts.shape[0]):
-        own = point_section(section, points, row, section.tolerance)
-        wide = point_section(section, points, row, search.loose)
-        set_scale(own.scale, tables)
-        before = found.starts[row - 1, : found.counts[row - 1]] if row > 0 else none
-        point = Point(
-            own, wide, search, before, guesses, angles, found.starts[row], found.monodromies[row], found.swings[row],
-            found.counts[row : row + 1],
-        )  # fmt: skip
-        _search_point(point, seekers, tables, make_room(own, 0), carry)
+    seekers = _make_seekers(n, found.counts.shape[0] // columns, max(MOST_ORBITS, guesses.shape[0]))
+    job = Job(section, points, search, columns, angles, guesses, found)
+    tables = make_tracks(section, n)
+    _search_rows(job, seekers, tables, np.array([0.1, 0.0]))
 
 
 #: Results for a start that settles on no known motion: the links reach the limit of assembly, or the turns are used up.
@@ -536,6 +599,7 @@ def settle_starts(section, turn, near, most, starts, known, ends):
     ends : ndarray of int64, shape (m,)
         The result, written: for each start the index of the known motion, or `LOST` or `UNSETTLED`.
     """
-    tables = make_tracks(starts.shape[1], 0)
-    set_scale(section.scale, tables)
+    tables = make_tracks(section, 0)
+    for lane in range(LANES):
+        set_mechanism(lane, section, tables)
     _settle(section, turn, near, most, starts, known, ends, tables)

@@ -31,6 +31,7 @@ from ...numerics.codegen import MATRIX, VECTOR, copy, evaluate, inner, kernel, p
 from ...numerics.gauss import gauss
 from ...numerics.references import refer
 from ...numerics.vectors import LANES, absolute, greater, load, multiply_add, store
+from ...run.compiled import write_lane
 from .flow import DIRECTIONAL, GAP, IN_LANES, PLAIN, VARIATIONAL
 from .kernels import DIVERGED, DONE, LIMIT, NO_STEP, SECTION, advance, eliminate, make_room
 
@@ -68,6 +69,9 @@ class Desk(NamedTuple):
     shifts: NDArray[np.float64]  # changes of y at the beginnings, (rows, n LANES)
     z: NDArray[np.float64]  # arguments of the flow
     out: NDArray[np.float64]  # values of the flow at each node
+    modes: NDArray[np.float64]  # this and the following two: those of the section, the same in all lanes
+    drive: NDArray[np.float64]
+    p: NDArray[np.float64]
     single: NDArray[np.float64]  # a number for each element of a row, (LANES,)
     equations: NDArray[np.float64]  # linear equations for the corrections of the slopes
     along: NDArray[np.float64]  # derivatives by lambda of the coordinates' slopes at the nodes
@@ -84,11 +88,12 @@ def row_count(elements):
 
 
 @part
-def make_desk(n, most, directional):
-    """Return the work space for y of n components and up to ``most`` elements.
+def make_desk(section, most, directional):
+    """Return the work space for the motions of a flow and up to ``most`` elements.
 
     ``directional`` tells whether the work space has room for derivatives with respect to lambda.
     """
+    n = section.scale.shape[0]
     f, columns = n // 2, n + 1 if directional else n
     unknowns, rows = NODES * f, row_count(most)
     return Desk(
@@ -101,6 +106,9 @@ def make_desk(n, most, directional):
         np.zeros((rows, n * LANES)),
         np.zeros((n + 1) * LANES),
         np.zeros((NODES, n * (1 + columns) * LANES)),
+        np.zeros(section.modes.shape[0] * LANES),
+        np.zeros(section.drive.shape[0] * LANES),
+        np.zeros(section.p.shape[0] * LANES),
         np.zeros(LANES),
         np.zeros(unknowns * (unknowns + 1 + columns) * LANES),
         np.zeros(unknowns * LANES),
@@ -122,6 +130,15 @@ def lay_elements(angles, desk):
         e = min(place, m - 1)
         desk.angles[place // LANES, place % LANES] = angles[e]
         desk.lengths[place // LANES, place % LANES] = angles[e + 1] - angles[e]
+
+
+@inner
+def _set_mechanism(section, desk):
+    """Write the mechanism and the drive of a section into all lanes."""
+    for lane in range(LANES):
+        write_lane(lane, LANES, section.modes, desk.modes)
+        write_lane(lane, LANES, section.drive, desk.drive)
+        write_lane(lane, LANES, section.p, desk.p)
 
 
 @inner
@@ -155,7 +172,7 @@ def _pace(section, y, desk):
         store(desk.z, i, load(y[0], i))
     store(desk.z, n, load(desk.angles[0], 0))
     out = desk.out[0]
-    evaluate(_equation(section, desk), 0.0, desk.z, section.modes, section.drive, section.p, out)
+    evaluate(_equation(section, desk), 0.0, desk.z, desk.modes, desk.drive, desk.p, out)
     return out[LANES * (n + n // 2 * n)]
 
 
@@ -193,7 +210,7 @@ def _linearise_row(section, row, unit, y, w, desk):
     h = load(desk.lengths[row], 0)
     for s in range(NODES):
         _evaluate_node(s, row, unit, y, w, desk)
-        evaluate(_equation(section, desk), 0.0, desk.z, section.modes, section.drive, section.p, desk.out[s])
+        evaluate(_equation(section, desk), 0.0, desk.z, desk.modes, desk.drive, desk.p, desk.out[s])
         if directional:
             for i in range(f):
                 store(desk.along, s * f + i, load(desk.out[s], n + n * n + i))
@@ -425,9 +442,7 @@ def _least_gap(section, y, w, desk):
     for row in range(y.shape[0]):
         for s in range(NODES):
             _evaluate_node(s, row, unit, y, w, desk)
-            evaluate(
-                section.equations[IN_LANES + GAP], 0.0, desk.z, section.modes, section.drive, section.p, desk.single
-            )
+            evaluate(section.equations[IN_LANES + GAP], 0.0, desk.z, desk.modes, desk.drive, desk.p, desk.single)
             for gap in desk.single:
                 if not (gap >= least or isnan(least)):
                     least = gap
@@ -442,6 +457,7 @@ def close(section, m, y, w, desk):
     more elements are needed.
     """
     before = tail = 0.0
+    _set_mechanism(section, desk)
     for count in range(_CORRECTIONS):
         change = _correct_period(section, m, y, w, desk)
         if not change <= (0.5 * before if count else _FAR):
@@ -590,6 +606,7 @@ def _solve_pieces(section, angles, firsts, starts, change, known, neighbour, fou
     y, w, moves = neighbour
     m, desk, room = angles.shape[0] - 1, refer(tables), make_room(section, 0)
     lay_elements(angles, desk)
+    _set_mechanism(section, desk)
     if known:
         _predict(firsts, starts, change, _pace(section, y, desk), neighbour, desk)
     else:
@@ -662,5 +679,5 @@ def solve_pieces(section, angles, firsts, starts, change, known, neighbour, foun
     int
         A `Status`; NO_STEP if elements are too long, DIVERGED if Newton's method did not find the slopes.
     """
-    m, n = angles.shape[0] - 1, starts.shape[1]
-    return _solve_pieces(section, angles, firsts, starts, change, known, neighbour, found, make_desk(n, m, True))
+    m = angles.shape[0] - 1
+    return _solve_pieces(section, angles, firsts, starts, change, known, neighbour, found, make_desk(section, m, True))

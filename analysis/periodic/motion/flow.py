@@ -219,7 +219,7 @@ class Flow:
                     if n < IN_LANES:
                         code = MachineCode([self.function(n, switched)])
                     else:
-                        code = MachineCode([self.function_in_lanes(n - IN_LANES, switched)], LANES, shared=True)
+                        code = MachineCode([self.function_in_lanes(n - IN_LANES, switched)], LANES)
                     self._addresses[int(switched), n] = code.addresses[_NAMES[n % IN_LANES]]
                     self._code[switched, n] = code
         addresses: NDArray[np.int64] = self._addresses[int(switched)]

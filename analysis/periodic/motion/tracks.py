@@ -1,8 +1,8 @@
-"""Integrate several motions of one mechanism at once, each in its own lane: functions of compiled kernels.
+"""Integrate several motions at once, each in its own lane: functions of compiled kernels.
 
-Each lane has its own start, tolerance, step size and end; mechanism and drive are the same. A kernel starts a motion in each
-lane, steps all lanes until one motion ends, and then starts another motion in the lane of this motion. The integrator is that
-of `kernels.advance`. In all functions ``section`` is a `kernels.Section`, and v the work space `Tracks`.
+Each lane has its own mechanism, drive, start, tolerance, step size and end; all mechanisms have the same flow. A kernel starts
+a motion in each lane, steps all lanes until one motion ends, and then starts another motion in the lane of this motion. The
+integrator is that of `kernels.advance`. In all functions ``section`` is a `kernels.Section`, and v the work space `Tracks`.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from linkwork.limits import LIMIT_SINE, NEAR_LIMIT
 
 from ...numerics.codegen import evaluate, inner, part
 from ...numerics.vectors import LANES, load, multiply_add, store
-from ...run.compiled import read_lane, write_lane
+from ...run.compiled import write_lane
 from ...run.stepping import NODES, STAGES, next_step_size, shorter_step_size
 from ...run.stepping_in_lanes import errors_in_lanes, stage_in_lanes
 from .flow import GAP, IN_LANES, PLAIN, VARIATIONAL
@@ -38,6 +38,9 @@ class Tracks(NamedTuple):
     out: NDArray[np.float64]  # values of the flow
     k: NDArray[np.float64]  # rates at the stages
     sizes: NDArray[np.float64]  # magnitudes of z
+    modes: NDArray[np.float64]  # this and the following two: those of `Section`
+    drive: NDArray[np.float64]
+    p: NDArray[np.float64]
     error: NDArray[np.float64]  # error of a step; this and the following have shape (LANES,)
     angle: NDArray[np.float64]  # crank angle (rad)
     end: NDArray[np.float64]  # crank angle at which the motion ends (rad)
@@ -45,50 +48,57 @@ class Tracks(NamedTuple):
     step: NDArray[np.float64]  # proposed next step (rad)
     tolerance: NDArray[np.float64]  # bound of the error
     slowest: NDArray[np.float64]  # crank speed below which the crank counts as stalled (rad/s)
-    gap: NDArray[np.float64]  # clearance to the limit of assembly
+    gap: NDArray[np.float64]  # clearance to the limit of assembly at the end of a step
+    before: NDArray[np.float64]  # the same at its beginning
     status: NDArray[np.int64]
     z: NDArray[np.float64]  # z of one lane
 
 
 @part
-def make_tracks(n, columns):
-    """Return work space for y of n components with ``columns`` columns of derivatives; all lanes are idle."""
+def make_tracks(section, columns):
+    """Return work space for the motions of a flow with ``columns`` columns of derivatives; all lanes are idle."""
+    n = section.scale.shape[0]
     width = n * (1 + columns)
     lanes = width * LANES
     return Tracks(
         np.zeros(lanes), np.zeros(lanes), np.zeros((n + 1) * LANES), np.zeros(n * (1 + n) * LANES), np.zeros((STAGES, lanes)),
-        np.zeros(lanes), np.zeros(LANES), np.zeros(LANES), np.zeros(LANES), np.zeros(LANES), np.zeros(LANES), np.ones(LANES),
-        np.zeros(LANES), np.zeros(LANES), np.full(LANES, IDLE), np.zeros(width),
+        np.zeros(lanes), np.zeros(section.modes.shape[0] * LANES), np.zeros(section.drive.shape[0] * LANES),
+        np.zeros(section.p.shape[0] * LANES), np.zeros(LANES), np.zeros(LANES), np.zeros(LANES), np.zeros(LANES),
+        np.zeros(LANES), np.ones(LANES), np.zeros(LANES), np.zeros(LANES), np.zeros(LANES), np.full(LANES, IDLE),
+        np.zeros(width),
     )  # fmt: skip
 
 
 @inner
-def set_scale(scale, v):
-    """Compute the magnitudes of z (see `Tracks`) from the magnitudes ``scale`` of y, and write them into ``v.sizes``."""
-    n = scale.shape[0]
+def set_mechanism(lane, section, v):
+    """Write the mechanism and the drive of a lane, and the magnitudes of z."""
+    scale, n = section.scale, section.scale.shape[0]
+    write_lane(lane, LANES, section.modes, v.modes)
+    write_lane(lane, LANES, section.drive, v.drive)
+    write_lane(lane, LANES, section.p, v.p)
     for i in range(n):
-        store(v.sizes, i, scale[i])
+        v.z[i] = scale[i]
         for j in range(v.z.shape[0] // n - 1):
-            store(v.sizes, n + j * n + i, scale[i] / scale[j])
-
-
-@inner
-def _clearance(section, z, angle, v):
-    evaluate(section.equations[GAP], angle, z, section.modes, section.drive, section.p, v.out)
-    return v.out[0]
+            v.z[n + j * n + i] = scale[i] / scale[j]
+    write_lane(lane, LANES, v.z, v.sizes)
 
 
 @inner
 def begin(lane, section, start, end, tolerance, v):
-    """Begin a motion in a lane, from the crank angle 0 to ``end``, and set its status: RUNNING, or a failure at the start."""
+    """Begin a motion in a lane, from the crank angle 0 to ``end``, and set its status: RUNNING, or a failure at the start.
+
+    Mechanism and drive of the section must be those of the lane: see `set_mechanism`.
+    """
     n = start.shape[0]
     start_piece(n, start, v.z)
     write_lane(lane, LANES, v.z, v.x)
     v.angle[lane], v.end[lane], v.tolerance[lane] = 0.0, end, tolerance
     v.slowest[lane] = STALL * start[n - 1] if section.torque else 0.0
+    evaluate(section.equations[GAP], 0.0, v.z, section.modes, section.drive, section.p, v.out)
+    v.before[lane] = v.out[0]
     if section.torque and not v.slowest[lane] > 0.0:
         v.status[lane] = STALLED
-    elif not _clearance(section, v.z, 0.0, v) > LIMIT_SINE:
+    elif not v.before[lane] > LIMIT_SINE:
         v.status[lane] = LIMIT
     else:
         v.status[lane] = RUNNING
@@ -108,7 +118,7 @@ def _rates(section, s, z, v):
     columns = z.shape[0] // (n * LANES) - 1
     equation = section.equations[IN_LANES + (VARIATIONAL if columns else PLAIN)]
     _set_argument(NODES[s], n, z, v)
-    evaluate(equation, 0.0, v.argument, section.modes, section.drive, section.p, v.out)
+    evaluate(equation, 0.0, v.argument, v.modes, v.drive, v.p, v.out)
     for i in range(n):
         store(v.k[s], i, load(v.out, i))
         for j in range(columns):
@@ -128,7 +138,7 @@ def _attempt(section, v):
     stage_in_lanes(STAGES, v.x, v.k, v.h, v.y)
     errors_in_lanes(v.x, v.y, v.k, v.h, v.sizes, v.error)
     _set_argument(1.0, section.scale.shape[0], v.y, v)
-    evaluate(section.equations[IN_LANES + GAP], 0.0, v.argument, section.modes, section.drive, section.p, v.gap)
+    evaluate(section.equations[IN_LANES + GAP], 0.0, v.argument, v.modes, v.drive, v.p, v.gap)
 
 
 @inner
@@ -143,12 +153,11 @@ def _judge(lane, section, last, v):
         # beyond the limit of assembly the error is NaN
         v.step[lane] = shorter_step_size(h, error)
         if v.step[lane] < LEAST_STEP:
-            read_lane(lane, LANES, v.x, v.z)
-            near = _clearance(section, v.z, v.angle[lane], v) < NEAR_LIMIT
-            v.status[lane] = LIMIT if near else NO_STEP
+            v.status[lane] = LIMIT if v.before[lane] < NEAR_LIMIT else NO_STEP
         return v.status[lane] != RUNNING
     v.step[lane] = next_step_size(h, v.step[lane], error)
     v.angle[lane] = v.end[lane] if last else v.angle[lane] + h
+    v.before[lane] = v.gap[lane]
     for i in range(lane, v.x.shape[0], LANES):
         v.x[i] = v.y[i]
     if not v.gap[lane] > LIMIT_SINE:
@@ -164,7 +173,7 @@ def _judge(lane, section, last, v):
 def advance_tracks(section, v):
     """Step all lanes until the motion in one lane has ended; return False at once if no lane is running.
 
-    If the status of a lane is DONE, z at the end of its motion is in ``v.x``.
+    If the status of a lane is DONE, z at the end of its motion is in ``v.x``. The mechanism of ``section`` is not used.
     """
     ended = running = False
     while not ended:
