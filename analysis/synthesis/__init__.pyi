@@ -15,7 +15,6 @@ from .exact.four_bar import function_generators as function_generators
 from .exact.four_bar import has_cognates as has_cognates
 from .exact.quick_return import QuickReturn as QuickReturn
 from .exact.quick_return import QuickSwing as QuickSwing
-from .linkage.kind import Kind as Kind
 from .linkage.linkage import ANGLES as ANGLES
 from .linkage.linkage import LENGTHS as LENGTHS
 from .linkage.linkage import LINKS as LINKS
@@ -27,11 +26,11 @@ from .linkage.machine import MachineSpec as MachineSpec
 from .linkage.machine import PinForces as PinForces
 from .linkage.machine import pin_forces as pin_forces
 from .linkage.pivot import CrankUnknown as CrankUnknown
+from .linkage.pivot import Kind as Kind
 from .linkage.pivot import PivotUnknown as PivotUnknown
 from .linkage.pivot import SecondCrank as SecondCrank
 from .linkage.pivot import SliderMotion as SliderMotion
 from .linkage.pivot import SliderUnknown as SliderUnknown
-from .result.alike import format_variants as format_variants
 from .result.drawing import LinkageScene as LinkageScene
 from .result.drawing import crowded_plates as crowded_plates
 from .result.drawing import drawing as drawing
@@ -58,6 +57,7 @@ from .result.solution import Evaluation as Evaluation
 from .result.solution import Solution as Solution
 from .result.solution import Verdicts as Verdicts
 from .result.solution import evaluate as evaluate
+from .result.solution import format_variants as format_variants
 from .result.solution import judge as judge
 from .result.solution import rank_solutions as rank_solutions
 from .search.solve import OVER as OVER

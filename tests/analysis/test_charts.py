@@ -27,8 +27,7 @@ from analysis.periodic import (
 )
 from analysis.periodic.chart import chart as charts
 from analysis.periodic.chart import grid as grids
-from analysis.periodic.chart.grid import Grid
-from analysis.periodic.chart.rows import grid_rows
+from analysis.periodic.chart.grid import Grid, grid_rows
 from analysis.periodic.motion.discretisation import operating_point
 from analysis.periodic.motion.orbit import first_guess
 from analysis.periodic.motion.variables import parameter_value

@@ -26,7 +26,7 @@ from analysis.probe import probe
 from analysis.run import Inputs, Trajectory, compare, cosimulate, load_case, read_case, simulate, simulate_many
 from analysis.studio import make_page, page_state
 from analysis.studio.tables import mechanism_tables
-from analysis.synthesis.result.described import description, drives
+from analysis.synthesis.linkage.machine import description, drives
 from linkwork.errors import InputError
 from linkwork.limits import LIMIT_SINE
 from linkwork.mechanism import Mechanism

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import analysis.synthesis as syn
-from analysis.synthesis.result.alike import group_similar
+from analysis.synthesis.result.solution import group_similar
 from analysis.synthesis.search.polish import distinct_answers
 from analysis.synthesis.search.start import Answer, make_start
 from analysis.synthesis.task.task import normal_form

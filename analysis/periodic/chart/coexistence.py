@@ -26,9 +26,8 @@ from ..motion.orbit import PeriodicOrbit, require_turns
 from ..motion.search import Orbits, search_orbits, unsought_hint
 from ..motion.variables import Plane
 from . import kernels
-from .grid import RowComputation, grid_points, row_code, row_name
+from .grid import PointRow, RowComputation, grid_points, point_row, row_code, row_name
 from .kernels import LOST, MOST_ORBITS, UNSETTLED, Motions, Points
-from .rows import PointRow, point_row
 
 FloatArray = NDArray[np.float64]
 #: Number of guesses from which the motions of a point are sought, after the motions of its neighbour: a power of two.

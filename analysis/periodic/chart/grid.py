@@ -6,7 +6,7 @@ import hashlib
 import warnings
 from collections.abc import Callable, Sequence
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 from typing import Any, TypeVar
@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from linkwork.errors import InputError, Interrupted
+from linkwork.parameters import field_name
 
 from ...files import load_array, save_array
 from ...mechanisms import Parameters, find_mechanism
@@ -22,16 +23,16 @@ from ...numerics.cache import cache_root
 from ...numerics.codegen import fingerprint
 from ...numerics.workers import check_jobs, record_interrupts, run_in_parallel, worker_count
 from ...run import show_progress
+from ...run.varied import VariedSequence, array_functions, check_sets, varied_constants
 from ...units import si
 from ..motion import TOLERANCE, Drive, Plane, Stability, multipliers, spread_starts
-from ..motion.discretisation import INTEGRATOR_TOLERANCE, operating_point
-from ..motion.flow import GAP, IN_LANES, PLAIN, VARIATIONAL
+from ..motion.discretisation import INTEGRATOR_TOLERANCE, OperatingPoint, collocation_serves, operating_point
+from ..motion.flow import GAP, IN_LANES, PLAIN, VARIATIONAL, Flow
 from ..motion.kernels import REASONS, Status
-from ..motion.orbit import first_guess
-from ..motion.variables import NamedPlane, parameter_unit
+from ..motion.orbit import MOST_ITERATIONS, SEARCH_TOLERANCE, first_guess
+from ..motion.variables import NamedPlane, parameter_places, parameter_unit
 from . import kernels
-from .kernels import Row
-from .rows import PointRow, grid_rows, point_row
+from .kernels import Points, Row, Search
 
 FloatArray = NDArray[np.float64]
 Item = TypeVar("Item")
@@ -233,6 +234,104 @@ def _compute_row(guesses: FloatArray, tolerance: float, rows: Sequence[PointRow]
     """Compute a row of a grid, shape (1, m, n + 2): largest multiplier, start and status of the orbit at each point."""
     values, starts, status = _solve_row(rows[0], guesses, tolerance)
     return np.column_stack([values, starts, status])[None]
+
+
+# The operating points of a row in arrays, for the kernels that solve the row
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class PointRow:
+    """The m operating points of a row of a chart, which share a flow.
+
+    Attributes
+    ----------
+    first : OperatingPoint
+        The first point.
+    constants, vectors, scales : ndarray, shapes (m, constants), (m, drive) and (m, n)
+        Constants of the equations, drive vectors (`Drive.vector`), and magnitudes of y, of each point.
+    smooth : bool
+        Whether collocation can be used at all points.
+    """
+
+    first: OperatingPoint
+    constants: FloatArray
+    vectors: FloatArray
+    scales: FloatArray
+    smooth: bool
+
+    @property
+    def flow(self) -> Flow:
+        """The flow of the mechanism that all the points share."""
+        return self.first.flow
+
+    @property
+    def switched(self) -> bool:
+        """Whether the mechanism's switch (friction by joint forces) is on at any point: see `Mechanism.is_switched_on`."""
+        place = self.first.mechanism.switch_index
+        return place >= 0 and bool(self.constants[:, place].any())
+
+    def points(self) -> Points:
+        """Return the data of the points as arrays for the kernels."""
+        numbers, vectors = self.constants, self.vectors
+        return Points(
+            np.hstack([numbers, np.zeros_like(numbers)]), np.hstack([vectors, np.zeros_like(vectors)]), self.scales
+        )
+
+    def search(self, turns: int = 1) -> Search:
+        """Return the settings of the search for orbits whose period has ``turns`` common periods."""
+        return Search(self.flow.period * turns, turns, MOST_ITERATIONS, SEARCH_TOLERANCE, self.smooth)
+
+
+def point_row(points: Sequence[OperatingPoint], start: FloatArray) -> PointRow:
+    """Collect operating points in a row; the magnitudes of y are computed from the guess ``start``.
+
+    Raises InputError if the points do not all have the same kind of drive.
+    """
+    if any(point.flow is not points[0].flow for point in points):
+        raise InputError(
+            "the points of a row differ in the kind of drive (speed or torque), in modes or in ratios: these must be the same"
+        )
+    return PointRow(
+        points[0],
+        np.array([point.constants for point in points]),
+        np.array([point.vector for point in points]),
+        np.array([point.scale(start) for point in points]),
+        collocation_serves([point.drive for point in points], [point.parameters for point in points]),
+    )
+
+
+def grid_rows(operation: Plane, xs: FloatArray, ys: FloatArray, start: FloatArray) -> list[PointRow]:
+    """Return the rows of operating points of a grid; in a `NamedPlane` the data of a whole row are computed at once."""
+    if isinstance(operation, NamedPlane):
+        return [_named_row(operation, xs, y, start) for y in ys.tolist()]
+    return [point_row([operating_point(*operation(x, y)) for x in xs.tolist()], start) for y in ys.tolist()]
+
+
+def _named_row(operation: NamedPlane, xs: FloatArray, y: float, start: FloatArray) -> PointRow:
+    """Return the row of a `NamedPlane` at one value ``y`` of the second parameter."""
+    first = operating_point(*operation(float(xs[0]), y))
+    flow, mechanism = first.flow, first.mechanism
+    vectors = np.tile(first.vector, (len(xs), 1))
+    sets: Sequence[Parameters] = [first.parameters]
+    # checking the two ends is enough: if the drive rejects a value, or a friction is not zero, this happens at an end
+    ends = [operating_point(*operation(x, y)) for x in (float(xs.min()), float(xs.max()))]
+    factors = parameter_places(flow, first.drive, operation.x)
+    if factors is None:
+        sets = VariedSequence(first.parameters, {field_name(operation.x): xs}, replace)
+        check_sets(mechanism, sets)
+    else:
+        for place, factor in factors.items():
+            vectors[:, place] = factor * xs
+    parameters, columns = varied_constants(mechanism, sets)
+    states = flow.state(start, vectors.T)
+    scale = array_functions(mechanism)[0].find(mechanism.error_scale)(parameters, states)
+    constants, scales = np.empty((len(xs), len(columns))), np.empty((len(xs), flow.size))
+    for n, column in enumerate(columns):
+        constants[:, n] = column
+    for n, place in enumerate(flow.places):
+        scales[:, n] = scale[place]
+    serves = collocation_serves([end.drive for end in ends], [end.parameters for end in ends])
+    return PointRow(first, constants, vectors, scales, serves)
 
 
 # Rows over workers, kept on disk

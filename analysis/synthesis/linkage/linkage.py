@@ -30,8 +30,7 @@ from ...mechanisms import FIVE_BAR
 from ...run import symbolic_equations
 from ...units import in_si
 from .kernels import PLACES, close_slider_crank, coupler_path, coupler_path_jacobian, link_directions, link_jacobian
-from .kind import Kind
-from .pivot import SecondCrank, SliderMotion, format_ratio, gear_turns
+from .pivot import Kind, SecondCrank, SliderMotion, format_ratio, gear_turns
 
 FloatArray = NDArray[np.float64]
 #: Names of the dimensions: links, which are greater than zero; all lengths; angles.

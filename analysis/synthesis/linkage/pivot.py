@@ -1,10 +1,11 @@
-"""Define motions of the rocker pivot on a guide or on a second crank: known motions, and motions that a search finds."""
+"""Define the kinds of linkages, and the motions of the rocker pivot on a guide or a second crank, known or to be found."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from math import cos, inf, isfinite, pi, sin
+from typing import Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -15,6 +16,8 @@ from ...numerics.fourier import FourierSeries
 from ...units import Amount, in_si
 
 FloatArray = NDArray[np.float64]
+#: The kinds of linkages; a kind need not be one of the mechanisms that can be simulated.
+Kind = Literal["four-bar", "slider-crank", "geared-five-bar"]
 #: Greatest number of turns of either crank per period of a geared five-bar.
 TEETH = 6
 

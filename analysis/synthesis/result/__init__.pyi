@@ -1,5 +1,3 @@
-from .alike import format_variants as format_variants
-from .described import description as description
 from .drawing import LinkageScene as LinkageScene
 from .drawing import plates as plates
 from .report import Assessment as Assessment
@@ -8,4 +6,5 @@ from .report import sensitivities as sensitivities
 from .solution import Solution as Solution
 from .solution import Verdicts as Verdicts
 from .solution import evaluate as evaluate
+from .solution import format_variants as format_variants
 from .solution import judge as judge

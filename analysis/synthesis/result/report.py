@@ -19,8 +19,17 @@ from ..linkage.pivot import SecondCrank, SliderMotion, format_ratio
 from ..task.constraint import SECOND_LENGTH, stroke
 from ..task.limit_position import dead_centres, mechanical_advantage, time_ratio, toggles
 from ..task.task import Normal, PrecisionPoints, RockerFunction, SliderFunction, Task, UntimedPath, normal_form
-from .alike import format_variants
-from .solution import CLOSELY, CURVE, Solution, Verdicts, evaluate, nearest_rotations, path_rate, whole_turn
+from .solution import (
+    CLOSELY,
+    CURVE,
+    Solution,
+    Verdicts,
+    evaluate,
+    format_variants,
+    nearest_rotations,
+    path_rate,
+    whole_turn,
+)
 
 FloatArray = NDArray[np.float64]
 #: Steps to which dimensions are rounded (m, rad): 0.1 mm, or a tenth of a small link, and 0.1 degrees.

@@ -26,8 +26,8 @@ from scipy.stats import qmc
 
 from ...run import show_progress
 from ..linkage.kernels import many_directions, match_windows
-from ..linkage.kind import Kind
 from ..linkage.linkage import BY_SHORTEST, Linkage, SliderCrank
+from ..linkage.pivot import Kind
 from ..task.constraint import TURNING, InfeasibleError
 from ..task.limits import Limits
 from ..task.task import Normal

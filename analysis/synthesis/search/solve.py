@@ -18,12 +18,10 @@ from ...display import NotebookResult, format_count
 from ...files import write_csv
 from ...units import Amount, in_si
 from ..exact.quick_return import QuickReturn, QuickSwing, quick_returns
-from ..linkage.kind import Kind
 from ..linkage.linkage import UNITS, Linkage
-from ..linkage.pivot import PivotUnknown
-from ..result.alike import group_similar
+from ..linkage.pivot import Kind, PivotUnknown
 from ..result.report import solution_columns
-from ..result.solution import Solution, rank_solutions
+from ..result.solution import Solution, group_similar, rank_solutions
 from ..task.constraint import (
     USUAL,
     Constraint,

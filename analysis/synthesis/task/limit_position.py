@@ -24,8 +24,8 @@ from ...mechanisms import FIVE_BAR
 from ...numerics import symbolic
 from ...run import symbolic_equations
 from ...units import Amount, in_si
-from ..linkage.kind import Kind
 from ..linkage.linkage import Linkage
+from ..linkage.pivot import Kind
 from .constraint import TURNING, Demand, Require, RotationRange, RotationRequirement, even_rotations, search_range
 
 FloatArray = NDArray[np.float64]

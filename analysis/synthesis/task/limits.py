@@ -13,9 +13,8 @@ from numpy.typing import NDArray
 from linkwork.errors import InputError, ParameterError
 
 from ...files import unknown_name
-from ..linkage.kind import Kind
 from ..linkage.linkage import ANGLES, LINKS, FiveBar, Linkage, SliderCrank
-from ..linkage.pivot import CrankUnknown, gear_turns
+from ..linkage.pivot import CrankUnknown, Kind, gear_turns
 from .constraint import (
     SECOND_LENGTH,
     UNKNOWNS,
