@@ -131,7 +131,7 @@ MECHANISM = Mechanism(
     position_parameters=(
 {positions}
     ),
-    experiment=(0.0, 1.0, 1e-3, 1e-9),
+    experiment={experiment},
     modules=(friction, planar, equations),
     equations=Equations.of(equations),
     check_assembly=check_assembly,
@@ -409,6 +409,7 @@ class Package:
             notes=quote(f"Source: {d.source}."),
             started=", ".join(f"{start.name}={start.value!r}" for start in v.starts),
             driven=v.commanded_rates(),
+            experiment=v.experiment(),
             origins=indent_lines(v.origins(), 16),
             source=quote(d.source),
             freedoms=indent_lines(v.freedoms(), 8),

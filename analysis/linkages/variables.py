@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
+from math import floor, log10, pi
 from typing import NamedTuple
 
 from .description import is_given
@@ -131,6 +132,19 @@ class Variables:
         """Return the source of the entries of the published set's ``drive``: the commanded rates."""
         driven = [d for d in self.interface.drives if d.commanded]
         return ", ".join(f'"{self._argument(d, "speed")}": {d.speed!r}' for d in driven)
+
+    def experiment(self) -> tuple[float, float, float, float]:
+        """Return the default experiment of the FMU: start, stop and step (s), tolerance.
+
+        It takes three turns of the slowest crank that turns at the start, about as many as two digits can say, in steps of at
+        most one degree of the fastest crank; 1 s in steps of 1 ms if no crank turns.
+        """
+        turns = [2.0 * pi / abs(d.speed) for d in self.interface.drives if d.unit == "rad" and d.speed]
+        if not turns:
+            return 0.0, 1.0, 1e-3, 1e-9
+        power = 10.0 ** floor(log10(min(turns) / 360.0))
+        step = max(digit * power for digit in (1.0, 2.0, 5.0) if digit * power <= min(turns) / 360.0 or digit == 1.0)
+        return 0.0, float(f"{3.0 * max(turns):.2g}"), float(f"{step:.1g}"), 1e-9
 
     def origins(self) -> Iterator[str]:
         """Yield the entries that say where the mass properties come from."""

@@ -644,6 +644,15 @@ def test_pins_and_drives_of_the_builder(tmp_path):
         built.pin("A", wheel=(0, 0))
 
 
+@pytest.mark.parametrize(
+    ("speed", "span", "step"),
+    [("300 rpm", 0.6, 5e-4), ("7 rpm", 26.0, 0.02), ("-1e6 rpm", 1.8e-4, 1e-7), (None, 1.0, 1e-3)],
+)
+def test_the_default_experiment_is_three_turns(tmp_path: Path, speed: str | None, span: float, step: float) -> None:
+    mechanism = Package(read_description(changed("freedoms/crank/speed", speed))).mechanism(tmp_path)
+    assert mechanism.experiment == (0.0, pytest.approx(span), pytest.approx(step), 1e-9)
+
+
 def test_the_builder_refuses_a_name_given_twice() -> None:
     with pytest.raises(InputError, match=r"already has springs\.wind"):
         wheel("twice", stiffness=1.0).spring("wind", at="Q", damping=1.0)
