@@ -89,10 +89,10 @@ def basins(
         highlight=False,
         soft_wrap=True,
     )
-    if picture.held:
+    if picture.fixed:
         varied = " and ".join(label.partition(" [")[0] for label in picture.labels)
         say(
-            f"the starts differ in {varied}; {', '.join(picture.held)} are those of motion 1, "
+            f"the starts differ in {varied}; {', '.join(picture.fixed)} are those of motion 1, "
             "and a motion that differs from it only there may be out of reach (--coordinate NAME: another plane)"
         )
     stem = output_folder(chosen.folder) / f"{chosen.stem}-basins"

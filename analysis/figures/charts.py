@@ -302,7 +302,7 @@ def plot_basins(found: Basins, *, title: str = "") -> Picture:
                 )
             )
     panel = Panel(
-        x_label=f"{varied} at crank angle 0{', all else as in motion 1' if found.held else ''} [{drawn}]",
+        x_label=f"{varied} at crank angle 0{', all else as in motion 1' if found.fixed else ''} [{drawn}]",
         y_label=label_in_words(found.labels[1]),
         curves=curves,
         legend_at="above",
@@ -338,5 +338,5 @@ def plot_basins(found: Basins, *, title: str = "") -> Picture:
 
 def _nearest_turn(found: Basins, position: float) -> float:
     """Return a coordinate of a motion at crank angle 0; for an angle, within half a turn of the middle of the plane."""
-    way, middle = found.motions[0].flow.ways[found.place], 0.5 * (found.position[0] + found.position[-1])
+    way, middle = found.motions[0].flow.angle_periods[found.place], 0.5 * (found.position[0] + found.position[-1])
     return float(position - way * np.round((position - middle) / way) if way else position)

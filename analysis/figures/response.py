@@ -18,7 +18,7 @@ from ..numerics.peaks import peaks
 from ..periodic import (
     FORCE,
     TOLERANCE,
-    Avoided,
+    AvoidedRange,
     Branch,
     Crossing,
     Family,
@@ -108,7 +108,7 @@ def plot_branches(
     title: str = "",
     rpm: bool = True,
     beside: Callable[[FloatArray], Mapping[str, FloatArray]] | None = None,
-    avoid: Sequence[Avoided] = (),
+    avoid: Sequence[AvoidedRange] = (),
 ) -> Figure:
     """Plot amplitude, harmonics, crank torque and pin force along branches, stable parts solid, unstable ones dashed.
 
@@ -125,7 +125,7 @@ def plot_branches(
     beside : callable, optional
         ``beside(values)`` receives values of the parameter, shape (k,), and returns the amplitudes of each approximation in
         metres, shape (k,), by its name. The errors are relative to the stable motions with a period of one crank turn.
-    avoid : sequence of Avoided
+    avoid : sequence of AvoidedRange
         Ranges of the parameter to shade.
     """
     return draw(describe_branches(branches, title=title, rpm=rpm, beside=beside, avoid=avoid))
@@ -137,7 +137,7 @@ def describe_branches(
     title: str = "",
     rpm: bool = True,
     beside: Callable[[FloatArray], Mapping[str, FloatArray]] | None = None,
-    avoid: Sequence[Avoided] = (),
+    avoid: Sequence[AvoidedRange] = (),
     caution: str = "",
 ) -> Picture:
     """Return the picture that `plot_branches` draws; ``caution`` is a line above the legend on limits of the shaded ranges."""

@@ -81,7 +81,7 @@ from .motion.variables import speed_names as speed_names
 from .motion.variables import variable_names as variable_names
 from .motion.variables import with_values as with_values
 from .response.advice import Arc as Arc
-from .response.advice import Avoided as Avoided
+from .response.advice import AvoidedRange as AvoidedRange
 from .response.advice import Extremum as Extremum
 from .response.advice import FoldJump as FoldJump
 from .response.advice import Risk as Risk

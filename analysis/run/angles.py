@@ -33,12 +33,12 @@ class WholeTurns:
     ) -> None:
         self._mechanism, self._p, self._modes = mechanism, p, modes
         self._periods = [freedom.period for freedom in mechanism.freedoms]
-        self.taken = np.zeros(mechanism.size)
+        self.subtracted = np.zeros(mechanism.size)
         self._never = encoded.has_functions or any(event.function for event in events)
         #: index of a sample, and the angles subtracted from that sample on
         self._since: list[tuple[int, NDArray[np.float64]]] = []
 
-    def take(
+    def subtract(
         self, x: NDArray[np.float64], u: NDArray[np.float64], laws: NDArray[np.float64], first: int, watch: Any = None
     ) -> None:
         """Subtract whole turns from large angles of the state x, in place, if the mechanism behaves the same without them.
@@ -60,7 +60,7 @@ class WholeTurns:
             return
         off = x - less
         x[:] = less
-        self.taken += off
+        self.subtracted += off
         self._since.append((first, off))
         if watch is not None:
             for column, angle in zip(self._columns, off):

@@ -183,7 +183,7 @@ class Run:
         turns = WholeTurns(self.mechanism, self.p, self.modes, self.encoded, self.events)
         start, laws = self.start(), self.encoded.source.laws
         if turns.has_many_turns(start.x):
-            turns.take(start.x, sample(self.encoded, float(self.settings.times[0]), start.x, laws), laws, 0)
+            turns.subtract(start.x, sample(self.encoded, float(self.settings.times[0]), start.x, laws), laws, 0)
             # the energy at the start must be that of the reduced angles
             start = replace(start, energy=self.mechanism.equations.energy(tuple(start.x.tolist()), self.p))
         problem = make_problem(self.encoded, self.settings, self.mechanism.is_switched_on(self.p))
@@ -206,7 +206,7 @@ class Run:
                     integrating += clock.perf_counter() - entered
                     if carry["found"]:
                         found = watch.found[: carry["found"]]
-                        found[:, 2:] += turns.taken
+                        found[:, 2:] += turns.subtracted
                         occurrences += found.tolist()
                         carry["found"] = 0
                     passed, steps = float(carry["begin"] + carry["elapsed"] - times[0]), float(carry["steps"])
@@ -214,18 +214,20 @@ class Run:
                     stiff = self.stiffness_caution(x, u, steps, passed)
                     needed = steps * span / passed if stiff and is_too_slow(steps, passed, span, most) else 0.0
                     if status[0] == k.RUNNING:
-                        turns.take(x, u, source.laws, int(carry["sample"]), watch)
+                        turns.subtract(x, u, source.laws, int(carry["sample"]), watch)
             except KeyboardInterrupt:  # raised by the caller's code
                 interrupted.append(True)
         last = dict(zip(k.CARRY.names, carry.item()))
         t, done = last["begin"] + last["elapsed"], last["sample"]
         if status[0] == k.BAD_INPUT:
-            raise NotFiniteError(self.encoded, last["lost"], t, x + turns.taken)
+            raise NotFiniteError(self.encoded, last["lost"], t, x + turns.subtracted)
         times, states, forces = times[:done], samples.states[0, :done], samples.forces[0, :done]
         if last["started"] and times[-1] < t:
             # the run ended between two samples: its last configuration is recorded too
             times, states, forces = np.append(times, t), np.vstack([states, x]), np.vstack([forces, u])
-        code, message = verdict(self.mechanism, self.settings, int(status[0]), t, x + turns.taken, self.limit, needed)
+        code, message = verdict(
+            self.mechanism, self.settings, int(status[0]), t, x + turns.subtracted, self.limit, needed
+        )
         if status[0] == k.NO_STEP:
             message += self.describe_undefined_forces(x)
         values = turns.put_back(compute_outputs(self.mechanism, problem.modes, batch.p[0], states, forces))

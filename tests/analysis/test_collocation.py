@@ -15,7 +15,7 @@ from analysis.numerics.vectors import LANES
 from analysis.periodic import Drive, OrbitEquations, OrbitError, newton_orbit
 from analysis.periodic.chart.grid import largest_multipliers
 from analysis.periodic.motion import collocation
-from analysis.periodic.motion.discretisation import Discretisation, collocation_serves
+from analysis.periodic.motion.discretisation import Discretisation, can_collocate
 from analysis.periodic.motion.variables import Family
 from linkwork.five_bar.published import SETS
 
@@ -80,9 +80,9 @@ def test_collocation_knows_how_near_the_links_come_to_the_limit_of_assembly() ->
 def test_friction_and_torques_are_left_to_the_integrator() -> None:
     """The kink of Coulomb friction has no polynomial; under a torque the crank's rate is unknown too."""
     rough, drive = replace(SMOOTH, slider_coulomb_friction=0.2), Drive(speed=30.0)
-    assert collocation_serves([drive], [SMOOTH])
-    assert not collocation_serves([drive], [SMOOTH, rough])
-    assert not collocation_serves([drive, Drive(torque=1.0)], [SMOOTH])
+    assert can_collocate([drive], [SMOOTH])
+    assert not can_collocate([drive], [SMOOTH, rough])
+    assert not can_collocate([drive, Drive(torque=1.0)], [SMOOTH])
 
 
 def test_a_row_by_collocation_is_its_orbits_one_by_one() -> None:

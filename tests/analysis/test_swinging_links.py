@@ -152,7 +152,7 @@ def test_basins_are_in_the_plane_that_the_motions_span() -> None:
     found = join_orbits([find_orbits(parameters, speed="112 rpm", turns=turns) for turns in (1, 2)])
     swings = basins(parameters, drive, points=6, found=found)
     assert swings.labels == ("swing.angle [rad]", "swing.speed [rad/s]")
-    assert swings.held == ("lift.position", "lift.velocity")
+    assert swings.fixed == ("lift.position", "lift.velocity")
     assert min(swings.share(0), swings.share(1)) > 0.1
     # the pendulum also stands, unstable: a whole turn of it, and speeds such as those of the motions
     assert np.ptp(swings.position) == pytest.approx(2.0 * pi)

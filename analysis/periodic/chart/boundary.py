@@ -24,7 +24,7 @@ from linkwork.errors import InputError, LinkworkError
 
 from ...numerics.boundaries import Test, find_minimum
 from ...numerics.continuation import ContinuationError, End, Evaluate, Evaluation, Follower, Settings
-from ..motion.discretisation import Discretisation, OrbitError, collocation_serves, operating_point
+from ..motion.discretisation import Discretisation, OrbitError, can_collocate, operating_point
 from ..motion.floquet import Crossing, crossing_test
 from ..motion.orbit import PeriodicOrbit, newton_orbit, trial_orbit
 from ..motion.variables import Family, Plane
@@ -127,7 +127,7 @@ def _evaluate(at: Plane, turns: int, kind: Crossing, scale: NDArray[np.float64],
     (low, high), (bottom, top) = settings.bounds[n], (settings.low, settings.high)
     corners = [operating_point(*at(a, b)) for a in (low, high) for b in (bottom, top)]
     whole = np.array([0.0, corners[0].flow.period * turns])
-    path = Discretisation(whole, collocation_serves([c.drive for c in corners], [c.parameters for c in corners]))
+    path = Discretisation(whole, can_collocate([c.drive for c in corners], [c.parameters for c in corners]))
 
     def values(z: NDArray[np.float64]) -> tuple[NDArray[np.float64], PeriodicOrbit]:
         point = operating_point(*at(float(z[n]), float(z[n + 1])))

@@ -213,7 +213,7 @@ class Basins(NotebookResult):
     ----------
     position, rate : ndarray, shapes (nx,) and (ny,)
         Initial values of a free coordinate (m for a slider) and of its rate (m/s); the other components of the initial state y
-        are those of the first motion, see ``held``.
+        are those of the first motion, see ``fixed``.
     ends : ndarray of int, shape (ny, nx)
         Index of the stable motion in ``motions``; -1 if the links reach the limit of assembly, -2 if the mechanism settles on
         no motion within the computed number of turns.
@@ -259,7 +259,7 @@ class Basins(NotebookResult):
         return write_csv(path, columns)
 
     @property
-    def held(self) -> tuple[str, ...]:
+    def fixed(self) -> tuple[str, ...]:
         """FMI names of the coordinates and rates that are the same at all starts, those of the first motion.
 
         A motion that differs from the first motion only in these may not be reached: a pendulum exactly at rest begins to swing
@@ -392,8 +392,8 @@ def _path(orbit: PeriodicOrbit) -> FloatArray:
     """Return samples of y over the period, shape (m, n), with angles that begin at most half a turn from `Flow.rest`."""
     flow, n = orbit.flow, SAMPLES * orbit.turns
     y = orbit.sample(np.linspace(0.0, flow.period * orbit.turns, n, endpoint=False))[:, list(flow.places)]
-    whole = np.divide(y[0] - flow.rest, flow.ways, out=np.zeros(flow.size), where=flow.ways > 0.0)
-    return np.asarray(y - flow.ways * np.round(whole))
+    whole = np.divide(y[0] - flow.rest, flow.angle_periods, out=np.zeros(flow.size), where=flow.angle_periods > 0.0)
+    return np.asarray(y - flow.angle_periods * np.round(whole))
 
 
 def _most_different(moved: Sequence[FloatArray], scale: FloatArray) -> int:
@@ -421,7 +421,7 @@ def _default_plane(
     middle, half = 0.5 * (moved.max(axis=0) + moved.min(axis=0)), 0.5 * _WIDTH * np.ptp(moved, axis=0)
     still = half <= _REST * scale
     low, high = max(lowest, middle[place] - half[place]), min(highest, middle[place] + half[place])
-    if still[place] or (first.flow.ways[place] > 0.0 and (low == lowest or high == highest)):
+    if still[place] or (first.flow.angle_periods[place] > 0.0 and (low == lowest or high == highest)):
         extent = min(rest - lowest, highest - rest)
         low, high = rest - extent, rest + extent
     reach = scale[rates] / scale[place] * 0.5 * (high - low) if still[rates] else half[rates]

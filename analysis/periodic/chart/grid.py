@@ -26,7 +26,7 @@ from ...run import show_progress
 from ...run.varied import VariedSequence, array_functions, check_sets, varied_constants
 from ...units import si
 from ..motion import TOLERANCE, Drive, Plane, Stability, multipliers, spread_starts
-from ..motion.discretisation import INTEGRATOR_TOLERANCE, OperatingPoint, collocation_serves, operating_point
+from ..motion.discretisation import INTEGRATOR_TOLERANCE, OperatingPoint, can_collocate, operating_point
 from ..motion.flow import GAP, IN_LANES, PLAIN, VARIATIONAL, Flow
 from ..motion.kernels import REASONS, Status
 from ..motion.orbit import MOST_ITERATIONS, SEARCH_TOLERANCE, first_guess
@@ -296,7 +296,7 @@ def point_row(points: Sequence[OperatingPoint], start: FloatArray) -> PointRow:
         np.array([point.constants for point in points]),
         np.array([point.vector for point in points]),
         np.array([point.scale(start) for point in points]),
-        collocation_serves([point.drive for point in points], [point.parameters for point in points]),
+        can_collocate([point.drive for point in points], [point.parameters for point in points]),
     )
 
 
@@ -330,7 +330,7 @@ def _named_row(operation: NamedPlane, xs: FloatArray, y: float, start: FloatArra
         constants[:, n] = column
     for n, place in enumerate(flow.places):
         scales[:, n] = scale[place]
-    serves = collocation_serves([end.drive for end in ends], [end.parameters for end in ends])
+    serves = can_collocate([end.drive for end in ends], [end.parameters for end in ends])
     return PointRow(first, constants, vectors, scales, serves)
 
 

@@ -313,7 +313,7 @@ def _is_known(start, known, section, away):
     """Return whether a start equals one of the known starts, apart from whole turns of angles; ``away`` is work space."""
     found = False
     for k in range(known.shape[0]):
-        subtract_modulo_turns(start, known[k], section.ways, away)
+        subtract_modulo_turns(start, known[k], section.angle_periods, away)
         found = found or magnitude(away, section.scale) < SAME
     return found
 
@@ -546,7 +546,7 @@ def _find_known(z, known, near, section, away):
     """
     end = UNSETTLED
     for k in range(known.shape[0]):
-        subtract_modulo_turns(z, known[k], section.ways, away)
+        subtract_modulo_turns(z, known[k], section.angle_periods, away)
         if magnitude(away, section.scale) < near:
             end = k
     return end

@@ -9,7 +9,7 @@ equations for Newton's method and for continuation from them.
 - **Shooting** integrates each piece with steps of order 8. With one piece it is single shooting, with several multiple
   shooting. It works for every drive.
 - **Collocation** corrects the polynomials of a neighbouring motion, element by element. It evaluates the right-hand sides a
-  sixth as often as shooting. It works if the crank's speed is prescribed and the rates are smooth (`collocation_serves`), as
+  sixth as often as shooting. It works if the crank's speed is prescribed and the rates are smooth (`can_collocate`), as
   long as the links stay clear of the limit of assembly and not too many elements are needed; otherwise shooting is used for
   a while.
 
@@ -169,7 +169,7 @@ class OperatingPoint:
             np.concatenate([self.vector, d_drive]),
             np.concatenate([self.constants, d_p]),
             self.scale(start),
-            self.flow.ways,
+            self.flow.angle_periods,
             along,
             tolerance,
             self.flow.torque,
@@ -245,7 +245,11 @@ def _repeats(point: OperatingPoint) -> bool:
     way = np.zeros(mechanism.size)
     way[flow.crank] = flow.period
     way[list(flow.others)] = flow.period * point.vector[flow.held + rates :]
-    turned = [np.eye(mechanism.size)[n] * period for n, period in zip(flow.free, flow.ways[: len(flow.free)]) if period]
+    turned = [
+        np.eye(mechanism.size)[n] * period
+        for n, period in zip(flow.free, flow.angle_periods[: len(flow.free)])
+        if period
+    ]
     x, found = np.array(mechanism.state(mechanism.first_set.initial)), []
     for share in (0.1234, 0.3719, 0.6283, 0.8871):
         for own in (way, *turned):
@@ -288,7 +292,7 @@ def follow_period(
     return operating_point(parameters, drive).period(start, turns, direction, along)
 
 
-def collocation_serves(drives: Iterable[Drive], mechanisms: Iterable[Parameters]) -> bool:
+def can_collocate(drives: Iterable[Drive], mechanisms: Iterable[Parameters]) -> bool:
     """Return whether collocation can be used: all speeds must be prescribed, and all rates must be smooth functions.
 
     Collocation assumes that the slope of a coordinate over the crank angle is its rate divided by the crank speed. This does
@@ -314,7 +318,7 @@ class Stations(NamedTuple):
     starts : ndarray, shape (k, n)
         y at the beginnings of the pieces.
     growth : float
-        Greatest growth factor of a deviation over a piece: see `growths`.
+        Greatest growth factor of a deviation over a piece: see `growth_factors`.
     """
 
     angles: FloatArray
@@ -322,13 +326,13 @@ class Stations(NamedTuple):
     growth: float
 
 
-def growths(matrices: FloatArray, scale: FloatArray) -> FloatArray:
+def growth_factors(matrices: FloatArray, scale: FloatArray) -> FloatArray:
     """Return the greatest growth factor of a deviation over each piece of a period; shape (k,).
 
     ``matrices`` are those of `Ends`; deviations are measured in units of ``scale``, the scale of y.
     """
-    growths: FloatArray = np.linalg.norm(matrices * scale / scale[:, None], ord=2, axis=(1, 2))
-    return growths
+    growth_factors: FloatArray = np.linalg.norm(matrices * scale / scale[:, None], ord=2, axis=(1, 2))
+    return growth_factors
 
 
 def choose_pieces(point: OperatingPoint, places: FloatArray, turns: int) -> tuple[FloatArray, FloatArray]:
@@ -346,7 +350,7 @@ def choose_pieces(point: OperatingPoint, places: FloatArray, turns: int) -> tupl
     """
     count = len(places)
     angles = np.linspace(0.0, point.flow.period * turns, count + 1)
-    growth = np.log(growths(point.shoot(angles, places).matrices, point.scale(places[0])).clip(1.0))
+    growth = np.log(growth_factors(point.shoot(angles, places).matrices, point.scale(places[0])).clip(1.0))
     # half of the pieces by growth, half by angle
     pieces = int(np.clip(np.ceil(2.0 * growth.sum() / np.log(AIM)), _FEWEST * turns, count))
     share = np.concatenate([[0.0], np.cumsum(growth / max(growth.sum(), 1e-9) + 1.0 / count)])
@@ -364,7 +368,7 @@ class Discretisation:
     angles : ndarray, shape (k + 1,)
         As in `Stations`.
     collocated : bool
-        Whether collocation is tried: see `collocation_serves`.
+        Whether collocation is tried: see `can_collocate`.
     """
 
     def __init__(self, angles: FloatArray, collocated: bool) -> None:

@@ -630,7 +630,7 @@ def assembly_ranges(
     for sign in (-1.0, 1.0):
         found = scale[: flow.size // 2].copy()
         for i in range(len(found)):
-            half = 0.5 * flow.ways[i]
+            half = 0.5 * flow.angle_periods[i]
             while found[i] < (half or _WIDEST * scale[i]):
                 y = guess.copy()
                 y[i] = flow.rest[i] + sign * found[i]

@@ -137,7 +137,7 @@ class Flow:
         crank's speed if there are none.
     rest : ndarray, shape (n,)
         y with the coordinates at which the mechanism starts by default, and rates of zero.
-    ways : ndarray, shape (n,)
+    angle_periods : ndarray, shape (n,)
         Period of each component of y: for an angle the rotation after which the mechanism is the same, otherwise 0. It is 0
         for an angle that a spring couples to others, too: a whole turn of it alone winds the spring up.
     swinging : dict of str to int
@@ -180,9 +180,9 @@ class Flow:
         self.size, free = len(names), len(freedoms)
         self.swing_count = free or self.size
         initial = mechanism.state(mechanism.initial())
-        self.rest, self.ways = np.zeros(self.size), np.zeros(self.size)
+        self.rest, self.angle_periods = np.zeros(self.size), np.zeros(self.size)
         self.rest[:free] = [initial[n] for n in self.free]
-        self.ways[:free] = [0.0 if freedom.coupled else freedom.period for freedom in freedoms]
+        self.angle_periods[:free] = [0.0 if freedom.coupled else freedom.period for freedom in freedoms]
         self.swinging = {freedom.coordinate: place for place, freedom in enumerate(freedoms) if freedom.swings}
         self.inputs = self.motors = len(mechanism.channels)
         self.held = self.motors + len(MOTOR) * len(mechanism.torques)
@@ -256,7 +256,9 @@ class Flow:
         return y - self._whole(y - self.rest)
 
     def _whole(self, away: NDArray[np.float64]) -> NDArray[np.float64]:
-        whole: NDArray[np.float64] = self.ways * np.round(away / np.where(self.ways > 0.0, self.ways, 1.0))
+        whole: NDArray[np.float64] = self.angle_periods * np.round(
+            away / np.where(self.angle_periods > 0.0, self.angle_periods, 1.0)
+        )
         return whole
 
     def paces(self, drive: NDArray[np.float64]) -> dict[str, float]:

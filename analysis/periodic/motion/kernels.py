@@ -73,7 +73,7 @@ class Section(NamedTuple):
     drive: NDArray[np.float64]  # drive vector, then its derivatives by lambda
     p: NDArray[np.float64]  # constants of the equations, then their derivatives by lambda
     scale: NDArray[np.float64]  # magnitudes of y, shape (n,)
-    ways: NDArray[np.float64]  # whole turn of each component of y that is an angle, otherwise 0, shape (n,)
+    angle_periods: NDArray[np.float64]  # whole turn of each component of y that is an angle, otherwise 0, shape (n,)
     along: float  # typical magnitude of lambda
     tolerance: float  # bound of the local error of a step
     torque: bool  # whether the crank's rate is the last component of y
@@ -85,7 +85,9 @@ SECTION = types.NamedTuple((int64[::1], VECTOR, VECTOR, VECTOR, VECTOR, VECTOR, 
 @part
 def replace_numbers(section, drive, p, scale, tolerance):
     """Return the section with new drive vector, constants p, scale and tolerance, and with 1 for the magnitude of lambda."""
-    return Section(section.equations, section.modes, drive, p, scale, section.ways, 1.0, tolerance, section.torque)
+    return Section(
+        section.equations, section.modes, drive, p, scale, section.angle_periods, 1.0, tolerance, section.torque
+    )
 
 
 class Room(NamedTuple):
@@ -202,12 +204,12 @@ def difference(a, b, out):
 
 
 @inner
-def subtract_modulo_turns(a, b, ways, out):
+def subtract_modulo_turns(a, b, periods, out):
     """Write a - b into ``out``, with whole turns removed from differences of angles."""
     for i in range(out.shape[0]):
         out[i] = a[i] - b[i]
-        if ways[i] > 0.0:
-            out[i] -= ways[i] * np.floor(out[i] / ways[i] + 0.5)
+        if periods[i] > 0.0:
+            out[i] -= periods[i] * np.floor(out[i] / periods[i] + 0.5)
 
 
 @inner
@@ -517,7 +519,7 @@ def settle(section, turn, change, most, start):
         status = advance(section, 0.0, turn, z, room, carry)
         if status != DONE:
             return status
-        subtract_modulo_turns(z, start, section.ways, start)
+        subtract_modulo_turns(z, start, section.angle_periods, start)
         size = magnitude(start, section.scale)
         copy(z, start)
         if size < change:

@@ -34,8 +34,8 @@ from .discretisation import (
     OrbitAssemblyError,
     OrbitError,
     Stations,
-    collocation_serves,
-    growths,
+    can_collocate,
+    growth_factors,
     operating_point,
     orbit_error,
 )
@@ -763,7 +763,7 @@ class OrbitEquations:
         flow = drive.flow(find_mechanism(mechanism))
         self.angles = np.array([0.0, flow.period * turns]) if angles is None else angles
         self._shape = len(self.angles) - 1, flow.size
-        self._discretised = Discretisation(self.angles, collocation_serves((drive, last), (mechanism, other)))
+        self._discretised = Discretisation(self.angles, can_collocate((drive, last), (mechanism, other)))
         # if only the drive varies, its numbers are linear in the parameter: one derivative serves all values
         self._direction = family.direction(high, low, high) if mechanism is other else None
 
@@ -784,7 +784,7 @@ class OrbitEquations:
         scale = point.scale(starts[0])
         stations = None
         if len(starts) > 1:
-            stations = Stations(self.angles, starts, float(growths(ends.matrices, scale).max()))
+            stations = Stations(self.angles, starts, float(growth_factors(ends.matrices, scale).max()))
         orbit = make_orbit(
             point,
             turns=self.turns,

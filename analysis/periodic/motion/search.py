@@ -496,7 +496,7 @@ def _search_rounds(
     guess = first_guess(point.flow, point.drive, start)
     require_turns(turns, point, guess)
     many, deflated = (_FoundMotions(point, turns, guess) for _ in range(2))
-    whole = 0 if point.flow.ways.any() else 1
+    whole = 0 if point.flow.angle_periods.any() else 1
     for orbit in known:
         many.add(orbit)
     places = [guess, *many.places(MANY, 0)]
@@ -505,7 +505,8 @@ def _search_rounds(
         even, free = guess.copy(), len(point.flow.free)
         even[free : 2 * free] = mean_rates(point.drive, point.flow, guess)
         near = (
-            approach_uniform_rotation(point, turns, even + share * point.flow.ways) for share in (0.0, 0.25, 0.5, 0.75)
+            approach_uniform_rotation(point, turns, even + share * point.flow.angle_periods)
+            for share in (0.0, 0.25, 0.5, 0.75)
         )
         places += [place for place in near if place is not None]
     settled = settle_motion(point, guess, tolerance=SEARCH_TOLERANCE, change=1e-4, turns=50)
@@ -631,6 +632,6 @@ def _reached_motion(
         for orbit in stable
     ]
     nearest = int(np.argmin(apart))
-    if first is not None and turns == 1 and point.flow.ways.any() and apart[nearest] > _ARRIVED:
+    if first is not None and turns == 1 and point.flow.angle_periods.any() and apart[nearest] > _ARRIVED:
         return first
     return stable[nearest]

@@ -51,21 +51,25 @@ class Risk(Enum):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Avoided:
+class AvoidedRange:
     """A range of the parameter (rad/s if it is a speed) that a machine should avoid, and the reason.
 
-    ``of`` is the short name of the coordinate that resonates; it is empty if only one coordinate is free.
+    ``coordinate`` is the short name of the coordinate that resonates; it is empty if only one coordinate is free.
     """
 
     low: float
     high: float
     risk: Risk
-    of: str = ""
+    coordinate: str = ""
 
     @property
     def words(self) -> str:
         """The reason in words."""
-        return self.risk.value.replace("resonance", f"resonance of {self.of}") if self.of else self.risk.value
+        return (
+            self.risk.value.replace("resonance", f"resonance of {self.coordinate}")
+            if self.coordinate
+            else self.risk.value
+        )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -249,7 +253,7 @@ def fold_jumps(branches: Sequence[Branch]) -> tuple[FoldJump, ...]:
     return tuple(sorted(found, key=lambda jump: jump.parameter))
 
 
-def ranges_to_avoid(branches: Sequence[Branch], low: float, high: float) -> tuple[Avoided, ...]:
+def ranges_to_avoid(branches: Sequence[Branch], low: float, high: float) -> tuple[AvoidedRange, ...]:
     """Return the ranges of the parameter that a machine should avoid: resonance, jump, doubled period, or no stable motion.
 
     ``low`` and ``high`` bound the range of the parameter over which the branches were followed.
@@ -271,8 +275,8 @@ def ranges_to_avoid(branches: Sequence[Branch], low: float, high: float) -> tupl
         bands = (band for arc in stable for band in _resonances(arc, n))
         found[Risk.RESONANCE, name if len(swings) > 1 else ""] = _union(bands, least)
     ranges = [
-        Avoided(low=a, high=b, risk=risk, of=of)
-        for (risk, of), parts in found.items()
+        AvoidedRange(low=a, high=b, risk=risk, coordinate=name)
+        for (risk, name), parts in found.items()
         for a, b in parts
         if b - a > least
     ]

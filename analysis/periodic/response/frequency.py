@@ -33,7 +33,7 @@ from ...run import inertia_and_stiffness, require_kind, show_progress, takes_pub
 from ...units import Amount, si
 from .. import motion
 from ..stability import SpecialPoint
-from .advice import Avoided, Extremum, FoldJump, extrema, fold_jumps, ranges_to_avoid
+from .advice import AvoidedRange, Extremum, FoldJump, extrema, fold_jumps, ranges_to_avoid
 from .branch import GREATEST, GREATEST_MULTIPLIER, Branch, describe, follow, follow_both, passes, switch
 
 #: Number of crank angles over which the effective mass is averaged.
@@ -211,7 +211,7 @@ class Response(NotebookResult):
         return self.branches[0].family
 
     @property
-    def speeds_to_avoid(self) -> tuple[Avoided, ...]:
+    def speeds_to_avoid(self) -> tuple[AvoidedRange, ...]:
         """Ranges of the speed, or of another parameter that varies, that a machine should avoid, each with its reason.
 
         The ranges follow from the branches. Stable motions to which no branch leads are included only after `with_isolas`.
